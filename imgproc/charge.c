@@ -36,11 +36,11 @@ static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bs
 }
 
 /* What a candidate is when its charge is all there is: centroid and extent of the charge. */
-static void describe_charge(const bst_locate_frame *f, const int *at, int count, double sharpest,
-                            bst_found *found) {
+static void describe_charge(const bst_sharpness *s, const bst_locate_frame *f, const int *at,
+                            int count, double sharpest, bst_found *found) {
     double sum = 0.0, square = 0.0, mx = 0.0, my = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;
     for (int k = 0; k < count; k++) {
-        double v = (double)f->signal[at[k]], x = at[k] % f->width - found->peak_x,
+        double v = bst_sharpness_signal(s, f->signal[at[k]]), x = at[k] % f->width - found->peak_x,
                y = at[k] / f->width - found->peak_y;
         sum += v;
         square += v * v;
@@ -96,7 +96,7 @@ void bst_charge_remove(bst_locator *l, const bst_locate_frame *f) {
         int at[MAX_CHARGE];
         double sharpest;
         int count = find_charge(l, f, &l->found[i], at, &sharpest);
-        describe_charge(f, at, count, sharpest, &l->found[i]);
+        describe_charge(&l->sharpness, f, at, count, sharpest, &l->found[i]);
         for (int k = 0; k < count && l->charged_count < l->charged_capacity; k++) {
             l->charged[l->charged_count++] = at[k];
         }

@@ -4,23 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIRST_ROWS = 31, MOST_ROWS = 1024, BLOCK = 64 };
+#include "sim/world/column_level.h"
 
-/* Offsets of columns of this share of the read noise and more are taken off. They add about twice
- * their variance to a point filter's, three rows of which share one: at 0.2 that triples the false
- * alarms at 5 sigma, exp(25 * 2 * 0.04 / 2). */
-static const double OFFSET_SHARE = 0.2;
+enum {
+    FIRST_ROWS = BST_COLUMN_LEVEL_LEAST_ROWS,
+    MOST_ROWS = BST_COLUMN_LEVEL_MOST_ROWS,
+    BLOCK = 64
+};
+
 static const double CLIP_SIGMAS = 3.0;
 /* Share of the full well beyond which a column holds overflow instead of smear. */
 static const double FULL_SHARE = 0.5;
-
-bool bst_columns_wanted(const bst_imgproc_config *config, const bst_camera *camera) {
-    const bst_detector_config *d = &camera->detector;
-    bool uneven =
-        d->frame_transfer_s > 0.0 || d->column_offset_rms_e > OFFSET_SHARE * camera->read_noise_e;
-    return config->column_level == BST_COLUMNS_ON ||
-           (config->column_level == BST_COLUMNS_AUTO && uneven);
-}
 
 bst_status bst_columns_create(bst_ctx *ctx, int width, bst_columns *out) {
     *out = (bst_columns){.capacity = width};
@@ -129,10 +123,11 @@ void bst_columns_measure(bst_columns *columns, bst_parallel *pool, const bst_cam
     double quiet = camera->read_noise_e * camera->read_noise_e +
                    fmax((double)columns->median_e, 0.0) +
                    camera->gain_e_per_dn * camera->gain_e_per_dn / 12.0;
+    bool smeared = camera->detector.frame_transfer_s > 0.0;
     for (int x = 0; x < m.width; x++) {
         double over = (double)columns->level_e[x] - (double)columns->median_e;
         over = over > FULL_SHARE * well ? 0.0 : over;
         columns->level_e[x] = (float)over;
-        columns->noise[x] = (float)sqrt(1.0 + fmax(over, 0.0) / quiet);
+        columns->noise[x] = (float)sqrt(1.0 + (smeared ? fmax(over, 0.0) / quiet : 0.0));
     }
 }

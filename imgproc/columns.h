@@ -6,8 +6,6 @@
 #include "imgproc/imgproc.h"
 #include "sim/core/parallel.h"
 
-enum { BST_COLUMNS_AUTO, BST_COLUMNS_ON, BST_COLUMNS_OFF }; /* of bst_imgproc_config.column_level */
-
 typedef struct bst_columns {
     int capacity, count;
     float *level_e; /* [count]: over the median of all columns, electrons of a binned pixel */
@@ -16,10 +14,6 @@ typedef struct bst_columns {
     float median_e; /* level over the camera's offset that the columns are compared with */
 } bst_columns;
 
-/* Whether the levels are to be taken off: the configuration says so, or leaves it to the camera and
- * that has a frame transfer, or offsets of its columns above a fifth of the read noise. */
-bool bst_columns_wanted(const bst_imgproc_config *config, const bst_camera *camera);
-
 /* Room for a frame of `width` columns. BST_ERR_MEMORY. */
 bst_status bst_columns_create(bst_ctx *ctx, int width, bst_columns *out) BST_MUST_CHECK;
 void bst_columns_free(bst_columns *columns);
@@ -27,7 +21,8 @@ void bst_columns_free(bst_columns *columns);
 /* Measures the columns of a whole frame: the median of 31 rows, then twice the mean of up to 1024
  * rows within three standard deviations of it, that of the read noise and of the level's counted
  * electrons. A column of which half is near the full well, or with fewer than 31 rows, has the
- * median level. */
+ * median level. Only a frame transfer's smear is counted light, which adds noise; offsets of
+ * columns are electronic. */
 void bst_columns_measure(bst_columns *columns, bst_parallel *pool, const bst_camera *camera,
                          const bst_imgproc_frame *frame);
 

@@ -1,14 +1,12 @@
 #include "imgproc/imgproc.h"
 #include "imgproc/plugged.h"
+#include "sim/world/column_level.h"
 
 static const bst_config_desc bad_pixel_table[] = {
     BST_INT(bst_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),
     BST_INT(bst_bad_pixel, y, "px", 0, 32767, NULL, "Row, 0 the first."),
     BST_CONFIG_END,
 };
-
-/* in the order of columns.h */
-static const char *const column_levels[] = {"auto", "on", "off", NULL};
 
 const bst_config_desc bst_imgproc_config_table[] = {
     BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
@@ -52,7 +50,7 @@ const bst_config_desc bst_imgproc_config_table[] = {
         "in a row to confirm a track."),
     BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
                "Search for objects too faint for one frame in stacks of frames."),
-    BST_ENUM(bst_imgproc_config, column_level, column_levels, "\"auto\"",
+    BST_ENUM(bst_imgproc_config, column_level, bst_column_level_words, "\"auto\"",
              "Whether each column's level over the others' is taken off, with the noise that it "
              "brings: the smear of a frame transfer under light, offsets of columns. auto: where "
              "the onboard camera has frame_transfer_s, or column_offset_rms_e above a fifth of its "

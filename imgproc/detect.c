@@ -12,6 +12,7 @@
 #include "imgproc/windows.h"
 #include "sim/core/pages.h"
 #include "sim/core/threshold_statistics.h"
+#include "sim/world/column_level.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
@@ -47,7 +48,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
-    if (bst_columns_wanted(&ip->config, &ip->camera)) {
+    if (bst_column_level_wanted(ip->config.column_level, &ip->camera)) {
         BST_TRY(bst_columns_create(ctx, width, &ip->columns));
     }
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
@@ -191,6 +192,14 @@ static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) 
     double well = ip->camera.full_well_e * frame->binning * frame->binning;
     double full = ip->camera.offset_dn + 0.98 * well / ip->camera.gain_e_per_dn;
     return (int)fmin(top, fmax(full, 1.0));
+}
+
+/* Least signal of a pixel of that number, above the background of the frame. */
+static double saturation_e(const bst_imgproc *ip, int saturated_dn) {
+    const bst_camera *c = &ip->camera;
+    double level = (saturated_dn - c->offset_dn) * c->gain_e_per_dn;
+    bool overflows = c->detector.full_well == BST_WELL_BLOOM;
+    return overflows ? 0.0 : fmax(level - (double)ip->background.median_level, 0.0);
 }
 
 /* The path of stars on the window's middle, on a grid of half a pixel: small changes of the
@@ -370,6 +379,7 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
     set_view(ip, frame, motion, sigma, column_noise, pool);
+    ip->view.full_e = saturation_e(ip, saturated_dn);
     *out = (part){threshold, false_alarms, search};
 }
 

@@ -32,7 +32,7 @@ typedef struct bst_imgproc_config {
     int64_t window_px, window_stars, full_every, full_frames;
     bst_stack_config stack;
     bst_pixel_learner_config bad_pixel_learning;
-    int column_level;           /* see columns.h */
+    int column_level;           /* see sim/world/column_level.h */
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */

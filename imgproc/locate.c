@@ -409,6 +409,7 @@ static void choose(bst_locator *l, const bst_candidates *candidates, int fits) {
 
 void bst_locate_prepare(bst_locator *l, const bst_locate_frame *f) {
     bst_profiles_on(&l->profiles, f->origin_x_px, f->origin_y_px, (int)f->binning);
+    l->sharpness.full_e = f->full_e;
     bst_sharpness_set(&l->sharpness, &l->psf, l->profiles.known, (int)f->binning, f->sigma_px);
     bst_profiles_set(&l->profiles, &l->psf, f->sigma_px);
 }

@@ -78,6 +78,8 @@ typedef struct bst_locate_frame {
     const bst_background *background;
     const bst_filter *filter;
     const float *column_noise; /* [width]: of a pixel over the background's; NULL: 1 */
+    double full_e;             /* least signal of a saturated pixel; 0: of one that may have taken
+                                  its neighbours' overflow */
     double sigma_px;           /* of the PSF, in this frame's pixels */
     const bst_motion *motion;  /* NULL: stars are points */
     const bst_camera *camera;

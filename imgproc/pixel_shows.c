@@ -27,13 +27,19 @@ static const float CLEAR_SNR = 20.0f;
 enum { CLUSTER_PX = 2 }; /* about a pixel with charge */
 
 /* The highest of the pixels about a maximum: the filter's maximum may lie beside a hot pixel. */
-static void find_highest(const bst_locate_frame *f, int *x, int *y) {
+static void find_highest(const bst_sharpness *s, const bst_locate_frame *f, int *x, int *y) {
     int x0 = *x, y0 = *y;
+    double highest = -INFINITY;
     for (int v = y0 - 1; v <= y0 + 1; v++) {
         for (int u = x0 - 1; u <= x0 + 1; u++) {
-            if (u >= 0 && v >= 0 && u < f->width && v < f->height &&
-                f->signal[(size_t)v * (size_t)f->width + (size_t)u] >
-                    f->signal[(size_t)*y * (size_t)f->width + (size_t)*x]) {
+            if (u < 0 || v < 0 || u >= f->width || v >= f->height) {
+                continue;
+            }
+            double here =
+                bst_sharpness_signal(s, f->signal[(size_t)v * (size_t)f->width + (size_t)u]);
+            bool middle = u == x0 && v == y0;
+            if (here > highest || (middle && here == highest)) {
+                highest = here;
                 *x = u;
                 *y = v;
             }
@@ -93,7 +99,7 @@ void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_locator *l, const bst
     for (int i = 0; i < candidates->count; i++) {
         int x = candidates->items[i].x, y = candidates->items[i].y;
         a.noise_e = bst_locate_noise_at(f, x, y);
-        find_highest(f, &x, &y);
+        find_highest(&l->sharpness, f, &x, &y);
         if (candidates->items[i].snr > CLEAR_SNR && !is_open(&a, x, y)) {
             continue;
         }

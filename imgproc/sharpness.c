@@ -96,6 +96,10 @@ void bst_sharpness_set(bst_sharpness *s, const bst_gauss *psf, const bst_known_p
     }
 }
 
+double bst_sharpness_signal(const bst_sharpness *s, float signal) {
+    return signal == BST_PIXEL_SATURATED && s->full_e > 0.0 ? s->full_e : (double)signal;
+}
+
 bool bst_sharpness_is_open(const bst_sharpness *s, const float *signal, int width, int height,
                            float noise_e, int x, int y) {
     if (x < 1 || y < 1 || x + 1 >= width || y + 1 >= height) {
@@ -103,7 +107,7 @@ bool bst_sharpness_is_open(const bst_sharpness *s, const float *signal, int widt
     }
     const float *pixel = signal + (long)y * width + x, *above = pixel - width,
                 *below = pixel + width;
-    float c = *pixel, e1 = (pixel[-1] + pixel[1]) * s->factor[1],
+    float c = (float)bst_sharpness_signal(s, *pixel), e1 = (pixel[-1] + pixel[1]) * s->factor[1],
           e2 = (above[0] + below[0]) * s->factor[2], e3 = (above[-1] + below[1]) * s->factor[3],
           e4 = (above[1] + below[-1]) * s->factor[4];
     float all = (e1 * s->share[1] + e2 * s->share[2]) + (e3 * s->share[3] + e4 * s->share[4]);
@@ -121,8 +125,9 @@ typedef struct surroundings {
     bool known[3][3];
 } surroundings;
 
-static surroundings look_around(const float *signal, int width, int height, int x, int y) {
-    surroundings s = {.centre = (double)signal[(long)y * width + x]};
+static surroundings look_around(const bst_sharpness *sharpness, const float *signal, int width,
+                                int height, int x, int y) {
+    surroundings s = {.centre = bst_sharpness_signal(sharpness, signal[(long)y * width + x])};
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < 3; i++) {
             int u = x + i - 1, v = y + j - 1;
@@ -165,10 +170,10 @@ static double worst_of(const bst_sharpness *s, const surroundings *p, double noi
 double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, int height,
                         double noise_e, int x, int y) {
     if (x < 0 || y < 0 || x >= width || y >= height ||
-        !((double)signal[(long)y * width + x] > 3.0 * noise_e)) {
+        !(bst_sharpness_signal(s, signal[(long)y * width + x]) > 3.0 * noise_e)) {
         return 0.0;
     }
-    surroundings p = look_around(signal, width, height, x, y);
+    surroundings p = look_around(s, signal, width, height, x, y);
     bool suspicious = false;
     /* the group of all is a mean of the pairs: it is short only where one of them is */
     for (int g = 1; g < BST_SHARP_GROUPS; g++) {
@@ -181,10 +186,10 @@ bst_sharpness_test bst_sharpness_compare(const bst_sharpness *s, const float *si
                                          int height, double noise_e, int x, int y) {
     bst_sharpness_test out = {0};
     if (x < 0 || y < 0 || x >= width || y >= height ||
-        !((double)signal[(long)y * width + x] > 3.0 * noise_e)) {
+        !(bst_sharpness_signal(s, signal[(long)y * width + x]) > 3.0 * noise_e)) {
         return out;
     }
-    surroundings p = look_around(signal, width, height, x, y);
+    surroundings p = look_around(s, signal, width, height, x, y);
     double alone = 0.0;
     for (int g = 0; g < BST_SHARP_GROUPS; g++) {
         if (!is_whole(&p, g)) {

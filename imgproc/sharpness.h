@@ -21,6 +21,9 @@ enum { BST_SHARP_GROUPS = 5 };
 
 typedef struct bst_sharpness {
     double sigma_px; /* that it was made for */
+    /* Least signal of a BST_PIXEL_SATURATED pixel; its neighbours must fit at least that. 0: such
+     * pixels are not asked. Set by the caller. */
+    double full_e;
     double ratio[3][3];
     double inverse_square[BST_SHARP_GROUPS]; /* 1 / sum r^2 of the group */
     double cube[BST_SHARP_GROUPS];           /* sum r^3 (inverse_square)^2 */
@@ -38,6 +41,9 @@ typedef struct bst_sharpness {
  * when they are already there. */
 void bst_sharpness_set(bst_sharpness *sharpness, const bst_gauss *psf, const bst_known_psf *known,
                        int binning, double sigma_px);
+
+/* What a pixel holds at least: full_e where `signal` is BST_PIXEL_SATURATED, else `signal`. */
+double bst_sharpness_signal(const bst_sharpness *sharpness, float signal);
 
 /* Quick: false where bst_sharpness_at is sure to be below BST_SHARP_DEVIATION. (x, y) inside the
  * frame. */

@@ -4,15 +4,6 @@
 #include "obsgen/generator_internal.h"
 #include "sim/core/vec.h"
 
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
-/* Image processing tells two sources apart where the saddle between them is so much lower than the
- * fainter one; and two places closer than this share of the FWHM are one. */
-static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
-/* It looks at what is above these shares of the threshold: that which a source between four pixels
- * shows on one of them, or the other one. */
-static const double LOOK_CORNER = 0.93, LOOK_SHARE = 0.65;
-/* Further apart than this, and their streaks, no two share a maximum. */
-static const double FAR_SIGMAS = 8.0;
 /* Sources below this share of the threshold are no detections, but light. */
 static const double FAINTEST_SHARE = 0.3;
 /* Errors of places grow by no more than this between sources that are seen as one. */
@@ -20,15 +11,13 @@ static const double FLATTEST = 6.0;
 /* Deviation along a streak, in sigmas of the PSF, from which on the place is not that of the
  * nearest top any more; noise of its filters over white noise's that is believed. */
 static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
-/* Bright sources that nothing else is fitted beside are fitted with their width, up to so many of
- * the PSF's variances more. */
-static const double WIDTH_FIT_SNR = 20.0, MOST_FREE_WIDENING = 1.8;
 /* Keys of such streaks. */
 static const uint64_t WANDER = (uint64_t)1 << 52;
+/* Alone, so bright and so many FWHM long, a detection is fitted as a streak of its own. */
+static const double OWN_STREAK_SNR = 10.0, OWN_STREAK_LENGTH = 1.5;
 
-/* What source b adds at source a's place to the output of the filter for a. */
-static double overlap(const bst_generator *g, const generator_source *a,
-                      const generator_source *b) {
+double bst_generator_overlap(const bst_generator *g, const generator_source *a,
+                             const generator_source *b) {
     double dx = b->x - a->x, dy = b->y - a->y;
     double c = a->length > 0.0 ? a->path.dx / a->length : 1.0;
     double s = a->length > 0.0 ? a->path.dy / a->length : 0.0;
@@ -39,73 +28,6 @@ static double overlap(const bst_generator *g, const generator_source *a,
 double bst_generator_output_variance(const bst_generator *g, const generator_source *s) {
     const bst_generator_filter *filter = &g->filters[s->as_streak];
     return filter->variance + filter->shot * fmax(s->amplitude, 0.0);
-}
-
-/* The filter's output for two sources at a pixel. */
-static double output_of(const bst_generator *g, const generator_source *a,
-                        const generator_source *b, int x, int y) {
-    generator_source pixel = {.x = x, .y = y};
-    return a->level * overlap(g, a, &pixel) + b->level * overlap(g, b, &pixel);
-}
-
-typedef struct grid_place {
-    int x, y;
-    double value;
-} grid_place;
-
-/* The pixel of the output's maximum about source s, one of both. */
-static grid_place climb(const bst_generator *g, const generator_source *a,
-                        const generator_source *b, const generator_source *s) {
-    enum { MOST = 8 };
-    grid_place at = {(int)lround(s->x), (int)lround(s->y), 0.0};
-    at.value = output_of(g, a, b, at.x, at.y);
-    for (int step = 0; step < MOST; step++) {
-        grid_place best = at;
-        for (int k = 0; k < 9; k++) {
-            int x = at.x + k % 3 - 1, y = at.y + k / 3 - 1;
-            double value = output_of(g, a, b, x, y);
-            if (value > best.value) {
-                best = (grid_place){x, y, value};
-            }
-        }
-        if (best.x == at.x && best.y == at.y) {
-            break;
-        }
-        at = best;
-    }
-    return at;
-}
-
-/* Whether image processing would find two maxima: the fainter source b beside a. */
-static bool told_apart(const bst_generator *g, const generator_source *a,
-                       const generator_source *b) {
-    generator_source at = *b;
-    double factor = g->calibration.blend_distance_factor;
-    double dx = (b->x - a->x) / factor, dy = (b->y - a->y) / factor;
-    if (hypot(dx, dy) < CLOSEST_FWHM * FWHM_PER_SIGMA * g->sigma) {
-        return false;
-    }
-    if (hypot(dx, dy) > FAR_SIGMAS * g->cross_sigma + fmax(a->length, b->length)) {
-        return true;
-    }
-    at.x = a->x + dx;
-    at.y = a->y + dy;
-    grid_place bright = climb(g, a, &at, a), faint = climb(g, a, &at, &at);
-    int steps = abs(faint.x - bright.x) > abs(faint.y - bright.y) ? abs(faint.x - bright.x)
-                                                                  : abs(faint.y - bright.y);
-    /* between the pixels a source between four of them is looked at */
-    double corner = exp(-0.125 / (g->filter_sigma * g->filter_sigma));
-    double least = fmax(faint.value - fmax(SADDLE_SIGMA, SADDLE_SHARE * faint.value),
-                        fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold);
-    for (int i = 1; i < steps; i++) {
-        double t = (double)i / steps;
-        int x = bright.x + (int)lround(t * (faint.x - bright.x));
-        int y = bright.y + (int)lround(t * (faint.y - bright.y));
-        if (output_of(g, a, &at, x, y) < least) {
-            return true;
-        }
-    }
-    return false;
 }
 
 /* Calls for every other source whose light reaches number i. */
@@ -139,7 +61,8 @@ void bst_generator_decide(bst_generator *g) {
             s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
             s->spread = sqrt(bst_generator_output_variance(g, s));
             s->level = s->amplitude + s->spread * s->noise / g->calibration.slope;
-            g->ranks[ranks++] = (generator_rank){s->level, i};
+            generator_source pixel = {.x = round(s->x), .y = round(s->y)};
+            g->ranks[ranks++] = (generator_rank){s->level * bst_generator_overlap(g, s, &pixel), i};
         }
     }
     qsort(g->ranks, (size_t)ranks, sizeof *g->ranks, brighter);
@@ -158,12 +81,13 @@ void bst_generator_decide(bst_generator *g) {
             if (k == i || o->broken || fabs(o->x - s->x) > g->reach) {
                 continue;
             }
-            double light = o->amplitude * overlap(g, o, s);
+            double light = o->amplitude * bst_generator_overlap(g, o, s);
             if (light < 0.01) {
                 continue;
             }
-            if (o->found && !merged && !told_apart(g, o, s)) {
-                s->head = k;
+            bool brighter_one = o->found || o->head >= 0; /* a maximum that merged is one as well */
+            if (brighter_one && !merged && !bst_generator_separates(g, o, s)) {
+                s->head = o->found ? k : o->head;
                 merged = true;
             }
             peak += light;
@@ -253,6 +177,66 @@ static void wander(const bst_generator *g, const generator_source *s,
     out->snr = top.snr;
 }
 
+/* Whether a source's light is part of another detection, which is fitted beside this one. */
+static bool is_of_another(const bst_generator *g, const generator_source *s,
+                          const generator_source *o) {
+    return o->head >= 0 && g->sources[o->head].item != s->item;
+}
+
+/* Greatest second moment of the light about (x, y), px^2, as image processing measures it: under a
+ * Gaussian window of twice the fitted PSF's variance, which is taken off again (inverse covariances
+ * add), as is the pixel's. */
+static double longest_moment(const bst_generator *g, const generator_source *s,
+                             const generator_source *merged, int count, double x, double y) {
+    double own = g->response.source.across_px * g->response.source.along_px;
+    double window = 2.0 * g->filter_sigma * g->filter_sigma, both = own + window;
+    double shrunk = window / both, xx = 0.0, xy = 0.0, yy = 0.0, sum = 0.0;
+    for (int k = -1; k < count; k++) {
+        const generator_source *o = k < 0 ? s : &merged[k];
+        if (is_of_another(g, s, o)) {
+            continue;
+        }
+        double dx = o->x - x, dy = o->y - y;
+        double light = o->flux_e * exp(-0.5 * (dx * dx + dy * dy) / both);
+        sum += light;
+        xx += light * dx * dx;
+        xy += light * dx * dy;
+        yy += light * dy * dy;
+    }
+    double scale = shrunk * shrunk / sum, even = own * shrunk;
+    double mean = even + 0.5 * scale * (xx + yy), half = scale * hypot(0.5 * (xx - yy), xy);
+    double windowed = fmin(mean + half, (1.0 - 1e-3) * window);
+    return windowed * window / (window - windowed) - 1.0 / 12.0;
+}
+
+/* What stands alone and is longer than a point is fitted as a streak of its own, whose middle is
+ * that of all light in it: a bright pair that is seen as one. */
+static void take_for_streak(const bst_generator *g, const generator_source *s,
+                            const generator_source *merged, int count, generator_blend *out) {
+    double snr = out->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e;
+    double point = g->fitted_sigma * g->fitted_sigma;
+    if (g->smeared || out->near || s->as_streak || snr < OWN_STREAK_SNR) {
+        return;
+    }
+    double moment = longest_moment(g, s, merged, count, out->x, out->y);
+    if (moment < OWN_STREAK_LENGTH * OWN_STREAK_LENGTH * point) {
+        return;
+    }
+    /* an even streak of this length has this moment */
+    double length = sqrt(12.0 * (moment - point)), x = 0.0, y = 0.0, sum = 0.0;
+    for (int k = -1; k < count; k++) {
+        const generator_source *o = k < 0 ? s : &merged[k];
+        if (hypot(o->x - out->x, o->y - out->y) <= length && !is_of_another(g, s, o)) {
+            sum += o->flux_e;
+            x += o->flux_e * (o->x - s->x);
+            y += o->flux_e * (o->y - s->y);
+        }
+    }
+    out->flux_e = sum;
+    out->x = s->x + x / sum;
+    out->y = s->y + y / sum;
+}
+
 /* Light of sources that are seen in this one, and of what is fitted beside it. A fit of one source
  * to several lands where the filter's output is greatest: found by moving to the mean weighted with
  * what each gives there (mean shift). */
@@ -263,7 +247,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     generator_blend out = {
         .flux_e = s->flux_e, .x = s->x, .y = s->y, .widen = 1.0, .flat = 1.0, .near = false};
     int count = 0;
-    double beside = 0.0, stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
+    double beside = 0.0, stamp = fmax(3.0, ceil(3.6 * g->fitted_sigma)) + 1.5;
     for (int k = first_near(g, i, g->reach);
          k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
         const generator_source *o = &g->sources[k];
@@ -272,7 +256,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         if (k == i || fabs(dx) > half_x + stamp || fabs(dy) > half_y + stamp) {
             continue;
         }
-        double share = overlap(g, s, o);
+        double share = bst_generator_overlap(g, s, o);
         if (o->found && !g->smeared) { /* in smeared frames nothing is fitted beside another */
             beside += o->amplitude * share;
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
@@ -288,35 +272,29 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         }
     }
     generator_source at = *s;
-    double narrow = 1.0; /* variance of the PSF over that of the fitted width */
-    bool width_is_free = !g->smeared && !out.near && s->amplitude > WIDTH_FIT_SNR;
     for (int round = 0; round < ROUNDS && count > 0; round++) {
         at.x = out.x;
         at.y = out.y;
         /* the fitted light's brightest pixel, over the noise's variance */
         double bright =
             g->smeared ? 0.0 : out.flux_e * bst_bound_norm(&g->bound, s->length) * g->fit_light;
-        double own = s->flux_e *
-                     bst_blend_weight(&g->blend_weights, bright, pow(overlap(g, s, &at), narrow));
-        double sum = own, x = 0.0, y = 0.0, square = 0.0;
+        double sum = s->flux_e *
+                     bst_blend_weight(&g->blend_weights, bright, bst_generator_overlap(g, s, &at));
+        double x = 0.0, y = 0.0;
         for (int k = 0; k < count; k++) {
-            double seen = pow(overlap(g, &at, &merged[k]), narrow);
-            double light = merged[k].flux_e * bst_blend_weight(&g->blend_weights, bright, seen);
-            double dx = merged[k].x - s->x, dy = merged[k].y - s->y;
+            double light =
+                merged[k].flux_e * bst_blend_weight(&g->blend_weights, bright,
+                                                    bst_generator_overlap(g, &at, &merged[k]));
             sum += light;
-            x += light * dx;
-            y += light * dy;
-            square += light * (dx * dx + dy * dy);
+            x += light * (merged[k].x - s->x);
+            y += light * (merged[k].y - s->y);
         }
         out.flux_e = sum;
         out.x = s->x + x / sum;
         out.y = s->y + y / sum;
-        if (width_is_free) { /* the mean of both axes */
-            double own_variance = g->cross_sigma * g->cross_sigma;
-            double spread = 0.5 * (square / sum - (x * x + y * y) / (sum * sum));
-            spread = fmin(spread, MOST_FREE_WIDENING * own_variance);
-            narrow = own_variance / (own_variance + spread);
-        }
+    }
+    if (count > 0) {
+        take_for_streak(g, s, merged, count, &out);
     }
     if (count > 0 && s->length > 1.0) {
         /* two streaks on one line have a flat top between them, where noise decides the place */
@@ -325,14 +303,14 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             double weight = step == 0 ? 2.0 : -1.0;
             at.x = out.x + step * h * s->path.dx;
             at.y = out.y + step * h * s->path.dy;
-            all += weight * s->flux_e * overlap(g, &at, s);
+            all += weight * s->flux_e * bst_generator_overlap(g, &at, s);
             for (int k = 0; k < count; k++) {
-                all += weight * merged[k].flux_e * overlap(g, &at, &merged[k]);
+                all += weight * merged[k].flux_e * bst_generator_overlap(g, &at, &merged[k]);
             }
             generator_source off = *s;
             off.x = s->x + step * h * s->path.dx;
             off.y = s->y + step * h * s->path.dy;
-            alone += weight * s->flux_e * overlap(g, &off, s);
+            alone += weight * s->flux_e * bst_generator_overlap(g, &off, s);
         }
         out.flat = fmin(fmax(alone / fmax(all, 1e-9 * alone), 1.0), FLATTEST);
     }

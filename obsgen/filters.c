@@ -5,6 +5,7 @@
 #include "obsgen/generator_internal.h"
 #include "sim/core/threshold_statistics.h"
 #include "sim/core/vec.h"
+#include "sim/world/column_level.h"
 
 /* Shot noise of a source through its own filter, times the noise of a pixel, over sqrt(sum p^2):
  * the sum of k^2 p for a Gaussian at rest, and for a long line of it. */
@@ -101,7 +102,7 @@ static double summed_up(const bst_generator *g, double moved, double square) {
  * offsets of columns and rows are these shares. */
 static double output_variance(const bst_generator *g, const bst_path_px *path, double columns,
                               double rows) {
-    if (!(columns + rows > 0.0)) {
+    if (columns == 0.0 && rows == 0.0) {
         return 1.0;
     }
     double square = bst_response_product(&g->response.filter, *path, *path);
@@ -134,6 +135,23 @@ static bst_threshold_noise noise_law(const bst_generator *g) {
     return (bst_threshold_noise){g->noise_e, counted, gain};
 }
 
+/* A column has a level of its own in the frame as it is processed. */
+static bool has_levels(const bst_generator *g) {
+    return g->levels_columns && g->height >= BST_COLUMN_LEVEL_LEAST_ROWS;
+}
+
+double bst_generator_column_variance(const bst_generator *g) {
+    double offset_e = g->camera->detector.column_offset_rms_e;
+    return has_levels(g) ? 0.0 : offset_e * offset_e;
+}
+
+/* Share of a pixel's variance that a column has in common. The mean of its rows, which is taken off
+ * as its level, takes their noise with it: the share of one row is missing. */
+static double column_share(const bst_generator *g, double variance) {
+    int rows = g->height < BST_COLUMN_LEVEL_MOST_ROWS ? g->height : BST_COLUMN_LEVEL_MOST_ROWS;
+    return has_levels(g) ? -1.0 / rows : bst_generator_column_variance(g) / variance;
+}
+
 void bst_generator_set_filters(bst_generator *g) {
     /* a Gaussian's top over its sqrt(sum p^2) */
     g->fit_light = 1.0 / (sqrt(BST_PI) * g->cross_sigma * g->noise_e * g->noise_e);
@@ -143,7 +161,7 @@ void bst_generator_set_filters(bst_generator *g) {
     const bst_threshold_noise law = noise_law(g);
     const bst_detector_config *d = &g->camera->detector;
     double variance = g->noise_e * g->noise_e;
-    double columns = d->column_offset_rms_e * d->column_offset_rms_e / variance;
+    double columns = column_share(g, variance);
     double rows =
         (d->row_offset_rms_e * d->row_offset_rms_e + d->row_noise_e * d->row_noise_e) / variance;
     g->white_share = fmax(1.0 - columns - rows, 0.05);

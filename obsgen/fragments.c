@@ -166,7 +166,7 @@ static int by_place(const void *a, const void *b) {
 /* Reports what no higher maximum in a box about it shares a ridge with. */
 static void report(bst_generator *g) {
     struct generator_streaks *w = g->streaks;
-    int reach = (int)ceil(6.0 * g->sigma) + 2;
+    int reach = (int)ceil(6.0 * g->fitted_sigma) + 2;
     if (w->maxima_count > 0) {
         qsort(w->maxima, (size_t)w->maxima_count, sizeof *w->maxima, by_place);
     }

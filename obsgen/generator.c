@@ -7,6 +7,7 @@
 #include "obsgen/clutter.h"
 #include "obsgen/fragments.h"
 #include "obsgen/generator_internal.h"
+#include "sim/world/column_level.h"
 #include "sim/world/motion.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
@@ -33,6 +34,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     g->onboard_sigma_px = hypot(bst_camera_psf_sigma_px(knowledge), settings->jitter_px);
     g->settings = *settings;
     g->settings.mesh_px = settings->mesh_px > 0 ? settings->mesh_px : 64;
+    g->levels_columns = bst_column_level_wanted(settings->column_level, knowledge);
     g->calibration = *calibration;
     bst_blend_weights_init(&g->blend_weights);
     g->key = key;
@@ -249,12 +251,12 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     double added = (double)g->binning * g->binning;
     double level = (f->truth->background_e + f->truth->dark_e) * added;
     double uneven_dark = f->truth->dark_e * d->dsnu_rms;
-    double variance =
-        level + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0 +
-        d->row_noise_e * d->row_noise_e + d->row_offset_rms_e * d->row_offset_rms_e +
-        d->column_offset_rms_e * d->column_offset_rms_e +
-        d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
-        level * level * d->prnu_rms * d->prnu_rms / added + added * uneven_dark * uneven_dark;
+    double variance = level + c->read_noise_e * c->read_noise_e +
+                      c->gain_e_per_dn * c->gain_e_per_dn / 12.0 + d->row_noise_e * d->row_noise_e +
+                      d->row_offset_rms_e * d->row_offset_rms_e + bst_generator_column_variance(g) +
+                      d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
+                      level * level * d->prnu_rms * d->prnu_rms / added +
+                      added * uneven_dark * uneven_dark;
     g->background_e = level;
     g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
 }
@@ -373,6 +375,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
         g->total_sigma = sqrt(sigma * sigma + 1.0 / 12.0);
         bst_bound_init(&g->bound, sigma);
     }
+    g->fitted_sigma = fmax(g->onboard_sigma_px / g->binning, 0.2);
     double length = hypot(f->streak_dx_px, f->streak_dy_px) / g->binning;
     g->bend_x = f->bend_x_px / g->binning;
     g->bend_y = f->bend_y_px / g->binning;

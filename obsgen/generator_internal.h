@@ -49,6 +49,7 @@ struct bst_generator {
     const bst_camera *camera;
     double electrons_per_s_v0; /* onboard zero point */
     bst_generator_settings settings;
+    bool levels_columns; /* image processing takes the columns' offsets off */
     bst_obsgen_calibration calibration;
     bst_rng_key key;
     /* of the frame */
@@ -57,6 +58,7 @@ struct bst_generator {
     double origin_x, origin_y, exposure_s;
     double sigma, total_sigma; /* of the PSF without and with the pixel's width */
     double onboard_sigma_px;   /* of the PSF that the filters are made for, sensor px */
+    double fitted_sigma;       /* the same, pixels that are read */
     bst_response response;     /* of these to the frame's images */
     double filter_sigma;       /* of the filters' image of a point, with the pixel's width */
     double cross_sigma; /* of what filters show of a source beside its place: sqrt(2) of it */
@@ -109,8 +111,17 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
  * thresholds and noise. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
 void bst_generator_set_filters(bst_generator *g);
+/* What offsets of columns add to the variance of a pixel, electrons^2: none where image processing
+ * takes the columns' levels off. */
+double bst_generator_column_variance(const bst_generator *g);
 /* Variance of the filter's output at a source, SNR 1. */
 double bst_generator_output_variance(const bst_generator *g, const generator_source *s);
+/* What source b adds at source a's place to the output of the filter for a. */
+double bst_generator_overlap(const bst_generator *g, const generator_source *a,
+                             const generator_source *b);
+/* Whether image processing would find two maxima: the fainter source beside the brighter one. */
+bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
+                             const generator_source *faint);
 /* Finds which sources are detected, and which are seen in one with a brighter one. */
 void bst_generator_decide(bst_generator *g);
 /* What is seen in source number i and fitted beside it. */

@@ -5,6 +5,7 @@
 #include "obsgen/generator.h"
 #include "obsgen/identify.h"
 #include "obsgen/obsgen.h"
+#include "sim/world/column_level.h"
 #include "sim/world/field.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/knowledge.h"
@@ -21,6 +22,7 @@ typedef struct obsgen_config {
     int64_t truth_capacity, capacity, mesh_px;
     double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
         match_tolerance_px;
+    int column_level;
 } obsgen_config;
 
 static const char *const no_file[] = {"theory", NULL};
@@ -52,6 +54,8 @@ static const bst_config_desc config_table[] = {
              "Greatest pointing error over which stars are identified" OF_OTHERS "."),
     BST_REAL(obsgen_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift" OF_OTHERS "."),
+    BST_ENUM(obsgen_config, column_level, bst_column_level_words, "\"auto\"",
+             "Whether each column's level over the others' is taken off" OF_OTHERS "."),
     BST_CONFIG_END,
 };
 
@@ -157,7 +161,8 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
                                              .jitter_px = c->jitter_px,
                                              .streak_min_px = c->streak_min_px,
                                              .streak_max_px = c->streak_max_px,
-                                             .mesh_px = (int)c->mesh_px};
+                                             .mesh_px = (int)c->mesh_px,
+                                             .column_level = c->column_level};
     BST_TRY(bst_generator_create(env->ctx, o->world_camera, bst_knowledge_camera(env->knowledge),
                                  &settings, &o->calibration, o->key, &o->generator));
     BST_TRY(bst_generator_reserve_streaks(env->ctx, o->generator, (int)o->world_camera->width_px,

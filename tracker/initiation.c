@@ -83,6 +83,8 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .at_rest = gate->rest,
     };
     bst_mtt_note_place(track, later);
+    bst_mtt_start_fixed(mtt, earlier, track);
+    bst_mtt_note_fixed(mtt, later, -log(BST_PI * reach * reach), track);
     mtt->rest_count += gate->rest;
     bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
     if (mtt->cue_lag_valid && bst_mtt_shares_acceleration(mtt, track, frame)) {

@@ -324,6 +324,7 @@ static void hit(bst_mtt *m, int t) {
     track->last_chi2 = fit.chi2;
     track->score += log(m->params.detection_probability / m->clutter_density) + fit.log_likelihood;
     bst_mtt_note_place(track, detection);
+    bst_mtt_note_fixed(m, detection, fit.log_likelihood, track);
     track->last_update_tick = m->now.tick;
     track->last_update_s = m->now.seconds;
     if (track->status != BST_TRACK_TENTATIVE && !track->star &&
@@ -346,7 +347,8 @@ static double chi2_limit(int dof) {
 static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
     if (track->at_rest || track->hits < m->params.confirm_hits ||
-        track->score < m->params.confirm_score || (dof > 0 && track->chi2 > chi2_limit(dof))) {
+        track->score < m->params.confirm_score || (dof > 0 && track->chi2 > chi2_limit(dof)) ||
+        bst_mtt_may_be_fixed(m, track)) {
         return false;
     }
     /* a second copy of what is tracked already is no new object */
@@ -486,6 +488,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     predict(m, frame);
     load_detections(m, frame);
     double floor = m->params.false_alarms_per_frame;
+    m->bad_pixels = frame->bad_pixels;
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
     bst_mtt_associate(m, frame->partial);

@@ -11,7 +11,10 @@
  * cut short displace a centroid by so much), and it is not what the cue expects: it is not
  * confirmed, and a pair of detections at one place is taken for such a track before any other
  * pairing. Once its rate is known to be less than any object's it is a star: a fixed direction that
- * keeps its detections from everything else. What is at rest has room of its own. */
+ * keeps its detections from everything else. What is at rest has room of its own.
+ *
+ * On a sensor with bad pixels a track is confirmed when its detections prefer its motion to one
+ * fixed place of the sensor, by a likelihood ratio of at least the number of bad pixels known. */
 #ifndef BST_TRACKER_MULTITARGET_H
 #define BST_TRACKER_MULTITARGET_H
 
@@ -41,8 +44,9 @@ typedef struct bst_mtt_params {
     double manoeuvre_noise_rad2ps3, quiet_s, manoeuvre_s;
     double gate_chi2; /* 2 degrees of freedom */
     double detection_probability;
-    double false_alarms_per_frame;    /* least density of clutter that is believed */
-    double field_sr;                  /* solid angle of the field */
+    double false_alarms_per_frame; /* least density of clutter that is believed */
+    double field_sr;               /* solid angle of the field */
+    double pixel_rad;              /* 0: that a track may be a place of the sensor is not asked */
     int confirm_hits, confirm_frames; /* M of N, the two initial detections included */
     double confirm_score;             /* least log-likelihood ratio */
     bool orbits; /* tracks whose range is known or assumed move along orbits (orbit_track.h) */
@@ -101,7 +105,19 @@ typedef struct bst_mtt_detection {
     double v_mag, v_mag_sigma; /* sigma INFINITY: no brightness */
     double snr;
     double length_rad; /* of its image, FWHM */
+    double width_px;   /* the same, across; 0: not known */
 } bst_mtt_detection;
+
+/* A defective pixel that a track's detections may be of. */
+typedef struct bst_mtt_defect {
+    double x_px, y_px, variance_px2; /* variance per axis */
+} bst_mtt_defect;
+
+/* A track as detections of defective pixels (fixed_pixel.c). */
+typedef struct bst_mtt_fixed {
+    bst_mtt_defect now, before;
+    double log_odds; /* log-likelihood ratio of the track's motion against it */
+} bst_mtt_fixed;
 
 typedef struct bst_mtt_track {
     int64_t id;
@@ -122,6 +138,7 @@ typedef struct bst_mtt_track {
     double last_update_s;
     bst_vec3 first_direction; /* of its first detection */
     double first_length_rad;
+    bst_mtt_fixed fixed;
     bool moved;   /* the latest detection lies farther from the first than their images are long */
     bool at_rest; /* shows no motion and is not what the cue expects */
     bst_mtt_sight sight; /* in the latest frame; BST_MTT_CLEAR without an orbit */
@@ -175,6 +192,7 @@ typedef struct bst_mtt_frame {
     /* What there is to see of a confirmed track with an orbit at the frame's time; *sunlight is the
      * share of the Sun's light that it gets. NULL: everything is in full light. */
     bst_mtt_sight (*sight)(const void *user, const bst_mtt_track *track, bst_mtt_light *light);
+    int bad_pixels; /* of the sensor, known so far: as many may be unknown */
     /* 1 sigma per axis of an apparent rate that all of this frame's directions may share */
     double common_rate_sigma_radps;
 } bst_mtt_frame;

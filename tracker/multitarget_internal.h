@@ -50,6 +50,7 @@ struct bst_mtt {
      * per second of that time; in the tangent plane at the cue. */
     bool cue_lag_valid;
     bst_vec3 cue_lag_radps2;
+    int bad_pixels;         /* of the latest frame */
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
     /* smoothed number of detections that no confirmed track has, of how many frames, and their
@@ -145,6 +146,14 @@ void bst_mtt_make_star(bst_mtt_track *track);
 
 /* Carries a star over dt_s. */
 void bst_mtt_predict_star(const bst_mtt *mtt, double dt_s, bst_mtt_track *track);
+
+/* Begins the comparison of a track with a fixed place of the sensor. */
+void bst_mtt_start_fixed(const bst_mtt *mtt, const bst_mtt_detection *first, bst_mtt_track *track);
+/* Compares the track's next detection, which has `log_density` (rad^-2) by its motion. */
+void bst_mtt_note_fixed(const bst_mtt *mtt, const bst_mtt_detection *detection, double log_density,
+                        bst_mtt_track *track);
+/* Whether a track may be a defective pixel for all that its detections say. */
+bool bst_mtt_may_be_fixed(const bst_mtt *mtt, const bst_mtt_track *track);
 
 /* Whether a track has the cue's acceleration. What the observer's motion adds to a rate falls with
  * the range, as the rate itself does: what is at rest, or nearly so beside the cue, is too far away

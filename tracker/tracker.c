@@ -5,6 +5,9 @@
 
 #include "tracker/sky_of_detection.h"
 
+/* Least SNR of a source, share of the threshold that its maximum passed: 2.5 sigma below, at 5. */
+static const double LEAST_SNR_SHARE = 0.5;
+
 static double arcsec(double v) {
     return v * BST_ARCSEC_RAD;
 }
@@ -73,6 +76,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .gate_chi2 = c->gate_chi2,
         .detection_probability = c->detection_probability,
         .false_alarms_per_frame = c->false_alarms_per_frame,
+        .pixel_rad = scale,
         .field_sr = (double)t->camera.width_px * (double)t->camera.height_px * scale * scale,
         .confirm_hits = (int)c->confirm_hits,
         .confirm_frames = (int)c->confirm_frames,
@@ -261,7 +265,10 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
         /* a star that no catalogue has is told from a slow object by its track */
         bool may_move = item->label == BST_LABEL_OBJECT || item->label == BST_LABEL_UNKNOWN ||
                         (item->label == BST_LABEL_STAR && item->star_id == 0);
-        if (!may_move || !positive || !sharp || !isfinite(item->x_px) || !isfinite(item->y_px)) {
+        /* of charge that was taken off a bad pixel the filter's maximum is left */
+        bool empty = d->bad_pixels > 0 && item->snr < LEAST_SNR_SHARE * d->threshold_snr;
+        if (empty || !may_move || !positive || !sharp || !isfinite(item->x_px) ||
+            !isfinite(item->y_px)) {
             continue;
         }
         if (count == t->max_detections) {
@@ -276,7 +283,8 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
                                 .v_mag = bright ? item->v_mag : 0.0,
                                 .v_mag_sigma = bright ? item->v_mag_sigma : INFINITY,
                                 .snr = item->snr,
-                                .length_rad = scale * item->length_px};
+                                .length_rad = scale * item->length_px,
+                                .width_px = item->width_px};
     }
     return count;
 }
@@ -460,6 +468,7 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                            .seconds = seconds,
                            .detections = t->detections,
                            .partial = d->windows > 0,
+                           .bad_pixels = d->bad_pixels,
                            .in_field = bst_frame_in_field,
                            .expected = bst_frame_is_expected,
                            .range = bst_frame_range_of,

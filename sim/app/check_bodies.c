@@ -7,6 +7,7 @@
 #include "control/control.h"
 #include "gimbal/ideal.h"
 #include "sim/app/check_reach.h"
+#include "sim/app/check_spans.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/stray.h"
 #include "sim/world/world_config.h"
@@ -204,31 +205,20 @@ bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
     return status;
 }
 
-static void warn_of_spans(bst_ctx *ctx, const char *name, int body, const bst_body_span *spans,
-                          int count, double duration_s) {
-    const bst_body_span *first = NULL;
-    double sum_s = 0.0;
-    int times = 0;
+static void warn_of_body(bst_ctx *ctx, const char *name, int body, const bst_body_span *spans,
+                         int count, double duration_s) {
+    bst_check_spans met = {0};
     for (int i = 0; i < count; i++) {
         if ((int)spans[i].body == body) {
-            first = first ? first : &spans[i];
-            sum_s += spans[i].until_s - spans[i].from_s;
-            times++;
+            bst_check_spans_add(&met, spans[i].from_s, spans[i].until_s);
         }
     }
-    if (!first) {
-        return;
+    if (met.count > 0) {
+        bst_check_span_words words =
+            bst_check_spans_word(&met, fmin(duration_s, BST_CHECK_LOOKED_S), duration_s);
+        bst_log(ctx, BST_LOG_WARNING, "%s: the %s is in the field %s%s", name, body_names[body],
+                words.from, words.more);
     }
-    bool cut = duration_s > BST_CHECK_LOOKED_S;
-    char until[48] = "the end of the run", more[80] = "";
-    if (cut || first->until_s < duration_s) {
-        snprintf(until, sizeof until, "%.1f s", first->until_s);
-    }
-    if (times > 1) {
-        snprintf(more, sizeof more, " (the first of %d times, %.0f s in all)", times, sum_s);
-    }
-    bst_log(ctx, BST_LOG_WARNING, "%s: the %s is in the field from %.1f s until %s%s%s", name,
-            body_names[body], first->from_s, until, more, cut ? " in the first three days" : "");
 }
 
 bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,
@@ -249,7 +239,7 @@ bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,
             }
             count = count < MOST_SPANS ? count : MOST_SPANS;
             for (int b = 0; b < BST_FIELD_BODIES; b++) {
-                warn_of_spans(ctx, name, b, spans, count, scenario->duration_s);
+                warn_of_body(ctx, name, b, spans, count, scenario->duration_s);
             }
         }
     }

@@ -7,6 +7,7 @@
 #include "gimbal/mount.h"
 #include "gimbal/two_axis.h"
 #include "sim/app/check_moves.h"
+#include "sim/app/check_spans.h"
 #include "sim/engine/loop_timing.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/world_config.h"
@@ -65,39 +66,20 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look 
 /* ---- what was found ---- */
 
 typedef struct found {
-    int count[BST_REACH_COUNT];
-    double from_s[BST_REACH_COUNT], until_s[BST_REACH_COUNT], sum_s[BST_REACH_COUNT];
+    bst_check_spans spans[BST_REACH_COUNT];
 } found;
 
-static void note(found *f, int reason, double from_s, double until_s) {
-    if (f->count[reason]++ == 0) {
-        f->from_s[reason] = from_s;
-        f->until_s[reason] = until_s;
-    }
-    f->sum_s[reason] += until_s - from_s;
-}
-
-static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s, bool rolls,
-                 bool cut) {
+static void warn(bst_ctx *ctx, const char *name, const found *f, double examined_s,
+                 double duration_s, bool rolls) {
     for (int reason = BST_REACH_BEHIND_EARTH; reason < BST_REACH_COUNT; reason++) {
-        char more[80] = "", until[48] = "the end of the run";
-        if (cut) {
-            snprintf(until, sizeof until, "the end of what was looked at");
+        if (f->spans[reason].count > 0) {
+            bst_check_span_words words =
+                bst_check_spans_word(&f->spans[reason], examined_s, duration_s);
+            bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach %s: %s%s%s", name,
+                    words.from, bst_reach_reason(reason),
+                    rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "",
+                    words.more);
         }
-        if (f->count[reason] == 0) {
-            continue;
-        }
-        if (f->count[reason] > 1) {
-            snprintf(more, sizeof more, " (the first of %d times, %.0f s in all)", f->count[reason],
-                     f->sum_s[reason]);
-        }
-        if (f->until_s[reason] < duration_s) {
-            snprintf(until, sizeof until, "%.1f s", f->until_s[reason]);
-        }
-        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s%s%s",
-                name, f->from_s[reason], until, bst_reach_reason(reason),
-                rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "", more,
-                cut ? " in the first three days" : "");
     }
 }
 
@@ -115,7 +97,7 @@ static bst_status chase(bst_ctx *ctx, const bst_reach_problem *problem, double t
                             losses, MOST_LOSSES, &count));
     for (int i = 0; i < count; i++) {
         double until = fmin(losses[i].until_s, end_s);
-        note(f, reason, losses[i].from_s, until);
+        bst_check_spans_add(&f->spans[reason], losses[i].from_s, until);
         *until_s = fmax(*until_s, until);
     }
     return BST_OK;
@@ -144,7 +126,7 @@ static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double toler
         if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
             BST_TRY(chase(ctx, &problem, tolerance_rad, (int)why, from, &until, duration_s, f));
         } else {
-            note(f, (int)why, from, until);
+            bst_check_spans_add(&f->spans[why], from, until);
         }
         at = fmax(until, at + step);
     }
@@ -259,12 +241,11 @@ static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const
         return BST_OK;
     }
     double pixel = bst_camera_scale_rad(bst_knowledge_camera(s->knowledge));
-    found f = {.count = {0}};
+    found f = {.spans = {{0}}};
     double looked_s = fmin(scenario->duration_s, BST_CHECK_LOOKED_S);
     BST_TRY(spans(ctx, s, looked_s, config->guidance.loss_tolerance_px * pixel, &f));
-    tell(ctx, name, &f, looked_s,
-         s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll,
-         looked_s < scenario->duration_s);
+    warn(ctx, name, &f, looked_s, scenario->duration_s,
+         s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll);
     return BST_OK;
 }
 

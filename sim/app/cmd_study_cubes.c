@@ -36,6 +36,8 @@ enum {
     METRICS
 };
 
+_Static_assert((int)METRICS <= (int)BST_STUDY_METRICS,
+               "results of a run have room for the figures");
 static const bst_metric metrics[METRICS] = {
     [FRAMES] = {"frames", "", "Frames.", 0},
     [SATELLITES] = {"satellite_labels", "", "Labels of satellites in all frames.", 0},

@@ -155,6 +155,9 @@ enum {
     TRACKS_RMS_ARCSEC,
     ALL_METRICS
 };
+_Static_assert((int)ALL_METRICS <= (int)BST_STUDY_METRICS &&
+                   (int)METRICS + 1 <= (int)BST_SERIES_COLUMNS,
+               "results of a run have room for the figures");
 
 #define METRIC_LIST                                                                               \
     [FRAMES] = {"frames", "", "Frames.", BST_METRIC_VALUE},                                       \

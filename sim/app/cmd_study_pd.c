@@ -62,6 +62,8 @@ static const bst_metric metrics[METRICS] = {
 
 enum { SNR, V_MAG, TRIALS, DETECTED, PD, PD_LOW, PD_HIGH, IDEAL_PD, ERROR_PX, SERIES };
 
+_Static_assert((int)METRICS <= (int)BST_STUDY_METRICS && (int)SERIES <= (int)BST_SERIES_COLUMNS,
+               "results of a run have room for the figures");
 static const bst_metric series[SERIES] = {
     [SNR] = {"snr", "", "SNR of the targets.", BST_METRIC_KEY},
     [V_MAG] = {"v_mag", "mag", "Their V magnitude.", 0},

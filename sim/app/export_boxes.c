@@ -18,6 +18,7 @@
 #include "sim/io/fits_reader.h"
 #include "sim/io/frame_picture.h"
 #include "sim/io/grey_png.h"
+#include "sim/io/mask_outline.h"
 
 typedef enum class_kind { SATELLITE, STAR, CLASSES } class_kind;
 
@@ -25,6 +26,14 @@ static const char *const class_names[CLASSES] = {"satellite", "star"};
 
 /* Boxes are clipped to the image; what is left of them has this width and height at least. */
 #define LEAST_PX 1.0
+/* Sources in a frame; truth has room for fewer. */
+enum { MOST_ITEMS = 1 << 24 };
+
+/* Where the pixels of a source lie in the mask: x1 and y1 beyond them; pixels 0: nowhere. */
+typedef struct extent {
+    int x0, y0, x1, y1;
+    int64_t pixels;
+} extent;
 
 typedef struct job {
     const bst_export *e;
@@ -33,8 +42,13 @@ typedef struct job {
     bst_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
     bool truth_more;
     char set[256];
+    bst_fits_reader *masks;  /* NULL: the run has none */
+    bst_fits_read_mask mask; /* of the frame; items NULL: none */
+    extent *extents;         /* of the sources in the mask, by their numbers */
+    int extent_count, extent_room;
     cJSON *images, *annotations; /* COCO */
     int64_t written, boxes;
+    int sensors, masked; /* exported, and of them those with masks */
 } job;
 
 /* The delivered frame that a box is in, and its own PNG. */
@@ -59,7 +73,7 @@ static const char frames_sql[] =
 static const char truth_sql[] =
     "SELECT t.exposure_id, t.kind, t.x_start_px, t.x_mid_px, t.x_end_px, t.y_start_px, t.y_mid_px,"
     " t.y_end_px, t.v_mag, t.electrons, t.snr, t.x_chief_px, t.y_chief_px, t.x_centroid_px,"
-    " t.y_centroid_px, o.name, t.norad FROM truth t"
+    " t.y_centroid_px, o.name, t.norad, t.item FROM truth t"
     " LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
     " WHERE t.sensor = ?1 ORDER BY t.exposure_id, t.rowid";
 
@@ -97,16 +111,116 @@ static bool box_of(const job *j, const frame_row *f, box *out) {
            clip(y, margin, f->height, &out->y, &out->height);
 }
 
-static void add_coco_box(job *j, const box *b) {
+/* ------------------------------------------------------------------ masks */
+
+/* Opens the masks that were recorded beside the sensor's frames, if they were. */
+static bst_status open_masks(bst_ctx *ctx, job *j) {
+    char name[320], path[4096];
+    /* frames.fits -> segmentation.fits, frames_OBSERVER_SENSOR.fits -> ... */
+    if (!j->e->coco || strncmp(j->sensor->file, "frames", 6) != 0) {
+        return BST_OK;
+    }
+    snprintf(name, sizeof name, "segmentation%s", j->sensor->file + 6);
+    BST_TRY(bst_run_reader_file(ctx, j->e->run, name, path, sizeof path));
+    bst_ctx quiet = {0};
+    bst_status status = bst_fits_reader_open_masks(&quiet, path, &j->masks);
+    j->masked += status == BST_OK;
+    return status == BST_OK || status == BST_ERR_NOT_FOUND
+               ? BST_OK
+               : bst_fail(ctx, status, "%s", quiet.message);
+}
+
+static bst_status take_extents(bst_ctx *ctx, job *j) {
+    const bst_fits_read_mask *m = &j->mask;
+    int32_t most = 0;
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    for (size_t i = 0; i < pixels; i++) {
+        most = m->items[i] > most ? m->items[i] : most;
+    }
+    if (most >= MOST_ITEMS) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "the mask of exposure %lld holds source %d",
+                        (long long)m->exposure_id, most);
+    }
+    if (most + 1 > j->extent_room) {
+        extent *grown = realloc(j->extents, 2 * ((size_t)most + 1) * sizeof *grown);
+        if (!grown) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", most);
+        }
+        j->extents = grown;
+        j->extent_room = 2 * (most + 1);
+    }
+    j->extent_count = most + 1;
+    memset(j->extents, 0, (size_t)j->extent_count * sizeof *j->extents);
+    for (size_t i = 0; i < pixels; i++) {
+        if (m->items[i] > 0) {
+            extent *e = &j->extents[m->items[i]];
+            int x = (int)(i % (size_t)m->width), y = (int)(i / (size_t)m->width);
+            bool first = e->pixels++ == 0;
+            e->x0 = first || x < e->x0 ? x : e->x0;
+            e->x1 = first || x >= e->x1 ? x + 1 : e->x1;
+            e->y0 = first ? y : e->y0;
+            e->y1 = y + 1;
+        }
+    }
+    return BST_OK;
+}
+
+/* The mask of a frame and where its sources lie in it. */
+static bst_status read_mask(bst_ctx *ctx, job *j, const frame_row *f, int64_t index) {
+    j->mask.items = NULL;
+    if (!j->masks) {
+        return BST_OK;
+    }
+    BST_TRY(bst_fits_reader_mask(ctx, j->masks, index, &j->mask));
+    if (j->mask.exposure_id != f->id || j->mask.width != f->width || j->mask.height != f->height) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%s: the masks are not those of the frames (mask %lld is of exposure %lld)",
+                        bst_run_reader_folder(j->e->run), (long long)index,
+                        (long long)j->mask.exposure_id);
+    }
+    return take_extents(ctx, j);
+}
+
+/* "segmentation" and "area" of the current row of the truth: of its pixels in the mask; without
+ * any no polygons and the area of the box. */
+static bst_status add_segmentation(bst_ctx *ctx, const job *j, const box *b, cJSON *node) {
+    int64_t item = bst_rows_int(j->truth, 17);
+    bool shown = j->mask.items && item > 0 && item < j->extent_count && j->extents[item].pixels > 0;
+    char *text = NULL;
+    size_t bytes;
+    if (!shown) {
+        bst_json_add_number(node, "area", b->width * b->height);
+        cJSON_AddItemToObject(node, "segmentation", cJSON_CreateArray());
+        return BST_OK;
+    }
+    const extent *e = &j->extents[item];
+    const bst_mask_item outlined = {j->mask.items, j->mask.width, (int32_t)item, e->x0,
+                                    e->y0,         e->x1,         e->y1};
+    bst_json_add_number(node, "area", (double)e->pixels);
+    FILE *stream = open_memstream(&text, &bytes);
+    bst_status status = stream ? bst_mask_outline_write(ctx, &outlined, stream)
+                               : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an outline");
+    if (stream && fclose(stream) != 0 && status == BST_OK) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an outline");
+    }
+    if (status == BST_OK) {
+        cJSON_AddItemToObject(node, "segmentation", cJSON_CreateRaw(text));
+    }
+    free(text);
+    return status;
+}
+
+/* ------------------------------------------------------------------ boxes */
+
+static bst_status add_coco_box(bst_ctx *ctx, job *j, const box *b) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddNumberToObject(node, "id", (double)(j->boxes + 1));
     cJSON_AddNumberToObject(node, "image_id", (double)(j->written + 1));
     cJSON_AddNumberToObject(node, "category_id", b->class + 1);
     cJSON_AddItemToObject(node, "bbox",
                           cJSON_CreateDoubleArray((double[]){b->x, b->y, b->width, b->height}, 4));
-    bst_json_add_number(node, "area", b->width * b->height);
     cJSON_AddNumberToObject(node, "iscrowd", 0);
-    cJSON_AddItemToObject(node, "segmentation", cJSON_CreateArray());
+    bst_status status = add_segmentation(ctx, j, b, node);
     bst_json_add_number(node, "x_centroid", b->x_centroid);
     bst_json_add_number(node, "y_centroid", b->y_centroid);
     bst_json_add_number(node, "v_mag", bst_rows_real(j->truth, 8));
@@ -114,6 +228,7 @@ static void add_coco_box(job *j, const box *b) {
     cJSON_AddStringToObject(node, "object_name", bst_rows_text(j->truth, 15));
     cJSON_AddNumberToObject(node, "norad", (double)bst_rows_int(j->truth, 16));
     cJSON_AddItemToArray(j->annotations, node);
+    return status;
 }
 
 static void add_coco_image(job *j, const frame_row *f) {
@@ -141,7 +256,7 @@ static bst_status write_boxes(bst_ctx *ctx, job *j, const frame_row *f, FILE *yo
                         b.height / f->height);
             }
             if (j->annotations) {
-                add_coco_box(j, &b);
+                BST_TRY(add_coco_box(ctx, j, &b));
             }
             j->boxes++;
         }
@@ -188,6 +303,7 @@ static bst_status write_frame(bst_ctx *ctx, job *j, frame_row *f) {
     snprintf(f->name, sizeof f->name, "%s.%04" PRId64, j->set, f->id);
     if (j->e->coco) {
         BST_TRY(write_image(ctx, j, j->e->coco, f, &image));
+        BST_TRY(read_mask(ctx, j, f, f->fits_index - !cube));
     }
     if (!j->e->yolo) {
         BST_TRY(write_boxes(ctx, j, f, NULL));
@@ -245,13 +361,15 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));
     BST_TRY(bst_rows_open(ctx, j->e->run, truth_sql, j->sensor->index, 0, &j->truth));
     bst_status status = bst_rows_next(ctx, j->truth, &j->truth_more);
+    j->fits = j->masks = NULL;
+    j->sensors++;
     if (status == BST_OK) {
         status = bst_fits_reader_open(ctx, path, &j->fits);
     }
-    if (status == BST_OK) {
-        status = write_frames(ctx, j);
-        bst_fits_reader_close(j->fits);
-    }
+    status = status == BST_OK ? open_masks(ctx, j) : status;
+    status = status == BST_OK ? write_frames(ctx, j) : status;
+    bst_fits_reader_close(j->fits);
+    bst_fits_reader_close(j->masks);
     bst_rows_close(j->truth);
     return status;
 }
@@ -331,6 +449,7 @@ bst_status bst_export_boxes(bst_ctx *ctx, const bst_export *e) {
                             "train: images\nval: images\nnames:\n  0: satellite\n  1: star\n");
     }
     cJSON_Delete(root);
+    free(j.extents);
     const char *const folders[] = {e->coco, e->yolo};
     for (int k = 0; status == BST_OK && k < 2; k++) {
         if (folders[k]) {
@@ -338,6 +457,11 @@ bst_status bst_export_boxes(bst_ctx *ctx, const bst_export *e) {
             printf("%s: %s with %s\n", folders[k],
                    bst_count_text(frames, j.written, "frame", "frames"),
                    bst_count_text(boxes, j.boxes, "box", "boxes"));
+            if (k == 0 && j.masked < j.sensors) {
+                printf(
+                    "  \"segmentation\" is empty: the run has no masks; record them with "
+                    "--set '/record/planes=[\"segmentation\"]'\n");
+            }
         }
     }
     return status;

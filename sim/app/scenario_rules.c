@@ -33,24 +33,6 @@ static const bst_module_config *module_of(const subject *s, const char *role) {
     return bst_scenario_module(s->scenario, s->observer, s->number, role);
 }
 
-/* A number of a module's configuration; false when it has no such key. */
-static bool number_of(const bst_module_config *module, const char *key, double *out) {
-    for (const bst_config_desc *d = module ? module->desc->config : NULL; d && d->key; d++) {
-        const char *at = (const char *)module->config + d->offset;
-        if (strcmp(d->key, key) == 0 && d->type == BST_CONFIG_REAL) {
-            memcpy(out, at, sizeof *out);
-            return true;
-        }
-        if (strcmp(d->key, key) == 0 && d->type == BST_CONFIG_INT) {
-            int64_t value;
-            memcpy(&value, at, sizeof value);
-            *out = (double)value;
-            return true;
-        }
-    }
-    return false;
-}
-
 /* ---- rules about the whole scenario ---- */
 
 static bst_status no_duration(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world) {
@@ -203,21 +185,21 @@ static bst_status short_times(const subject *s) {
     bst_loop_timing_of(s->scenario, s->observer, s->number, &timing);
     const bst_module_config *tracker = module_of(s, "tracker"), *control = module_of(s, "control");
     double period = timing.period_s, value, frames;
-    if (number_of(tracker, "initiation_gap_s", &value)) {
+    if (bst_scenario_module_number(tracker, "initiation_gap_s", &value)) {
         warn_short(s, "tracker", "initiation_gap_s", value, period, "no track can begin");
     }
-    if (number_of(tracker, "max_coast_s", &value)) {
+    if (bst_scenario_module_number(tracker, "max_coast_s", &value)) {
         warn_short(s, "tracker", "max_coast_s", value, period,
                    "every track ends before its next frame");
     }
-    if (number_of(control, "dwell_timeout_s", &value) &&
-        number_of(control, "dwell_frames", &frames)) {
+    if (bst_scenario_module_number(control, "dwell_timeout_s", &value) &&
+        bst_scenario_module_number(control, "dwell_frames", &frames)) {
         warn_short(s, "control", "dwell_timeout_s", value, (frames + 1.0) * period,
                    "a search leaves each place before its dwell_frames are exposed");
     }
-    if (number_of(control, "acquire_timeout_s", &value)) {
+    if (bst_scenario_module_number(control, "acquire_timeout_s", &value)) {
         double hits = 2.0;
-        (void)number_of(tracker, "confirm_hits", &hits);
+        (void)bst_scenario_module_number(tracker, "confirm_hits", &hits);
         warn_short(s, "control", "acquire_timeout_s", value, hits * period,
                    "a candidate is given up before it can be confirmed");
     }

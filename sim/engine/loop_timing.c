@@ -3,18 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-/* A real number of a module's configuration; 0 when it has no such key. */
-static double real_of(const bst_module_config *module, const char *key) {
-    for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
-        if (d->type == BST_CONFIG_REAL && strcmp(d->key, key) == 0) {
-            double value;
-            memcpy(&value, (const char *)module->config + d->offset, sizeof value);
-            return value;
-        }
-    }
-    return 0.0;
-}
-
 static bool has_port(const bst_module_config *module, bst_port_direction direction,
                      const char *channel) {
     for (int p = 0; p < module->desc->port_count; p++) {
@@ -59,8 +47,9 @@ void bst_loop_timing_of(const bst_scenario *scenario, int observer, int sensor,
             out->frame_latency_s += delay_of(scenario, module, way[w]);
         }
         if (has_port(module, BST_PORT_OUT, BST_CHANNEL_SENSOR_COMMAND)) {
-            double exposure_s = real_of(module, "exposure_s"),
-                   period_s = real_of(module, "period_s");
+            double exposure_s = 0.0, period_s = 0.0;
+            (void)bst_scenario_module_number(module, "exposure_s", &exposure_s);
+            (void)bst_scenario_module_number(module, "period_s", &period_s);
             out->exposure_s = exposure_s > 0.0 ? exposure_s : out->exposure_s;
             out->period_s = period_s > 0.0 ? period_s : out->period_s;
         }

@@ -87,6 +87,13 @@ void bst_scenario_free(bst_scenario *scenario);
 const bst_module_config *bst_scenario_module(const bst_scenario *scenario, int observer, int sensor,
                                              const char *role);
 
+/* Value of a module's key of type real or integer, in the key's unit.
+ *
+ * Given:    module  NULL: as a module without the key
+ *           key     its name, as in the scenario
+ * Returned: true and *out; false where the module has no such number, *out unchanged */
+bool bst_scenario_module_number(const bst_module_config *module, const char *key, double *out);
+
 /* The scenario with every default written out; the caller deletes it. NULL when out of memory. */
 struct cJSON *bst_scenario_echo(const bst_scenario *scenario);
 /* JSON Schema (draft 2020-12) of scenarios for these modules; the caller deletes it. */

@@ -324,3 +324,20 @@ const bst_module_config *bst_scenario_module(const bst_scenario *scenario, int o
     }
     return NULL;
 }
+
+bool bst_scenario_module_number(const bst_module_config *module, const char *key, double *out) {
+    for (const bst_config_desc *d = module ? module->desc->config : NULL; d && d->key; d++) {
+        const char *at = (const char *)module->config + d->offset;
+        if (strcmp(d->key, key) == 0 && d->type == BST_CONFIG_REAL) {
+            memcpy(out, at, sizeof *out);
+            return true;
+        }
+        if (strcmp(d->key, key) == 0 && d->type == BST_CONFIG_INT) {
+            int64_t value;
+            memcpy(&value, at, sizeof value);
+            *out = (double)value;
+            return true;
+        }
+    }
+    return false;
+}

@@ -49,6 +49,7 @@ struct bst_fits_reader {
     const char *data;
     uint64_t bytes; /* of the file */
     bst_fits_file_info info;
+    bool items;          /* pixels are numbers of sources, 32 bits */
     frame_place *frames; /* of a file with an extension each */
     size_t frame_room;
     hdu cube;
@@ -59,6 +60,8 @@ struct bst_fits_reader {
     uint8_t *row; /* MOST_ROW_BYTES of a compressed one */
     uint16_t *pixels;
     size_t capacity;
+    int32_t *mask; /* of a file of masks */
+    size_t mask_capacity;
 };
 
 /* Reads `bytes` at `at`, all of which lie within the file as it was when it was opened. */
@@ -138,8 +141,9 @@ static bool is_text(const bst_fits_reader *reader, const char *key, const char *
            strncmp(value, expected, strlen(expected)) == 0;
 }
 
-/* Whether pixels are 16-bit unsigned; "32768" and "32768." are both written. */
-static bool is_unsigned16(const bst_fits_reader *reader, int64_t bitpix) {
+/* Whether pixels are 16-bit unsigned, in a file of masks 32-bit signed; "32768" and "32768." are
+ * both written. */
+static bool are_known_pixels(const bst_fits_reader *reader, int64_t bitpix) {
     char value[BST_FITS_CARD] = "", *end;
     double zero = 0.0, scale = 1.0;
     if (bst_fits_card_text(reader->header, reader->header_bytes, "BZERO", value)) {
@@ -148,15 +152,17 @@ static bool is_unsigned16(const bst_fits_reader *reader, int64_t bitpix) {
     if (bst_fits_card_text(reader->header, reader->header_bytes, "BSCALE", value)) {
         scale = strtod(value, &end);
     }
-    return bitpix == 16 && zero == 32768.0 && scale == 1.0;
+    return reader->items ? bitpix == 32 && zero == 0.0 && scale == 1.0
+                         : bitpix == 16 && zero == 32768.0 && scale == 1.0;
 }
 
 static bst_status not_a_frame(bst_ctx *ctx, const bst_fits_reader *reader, const hdu *h,
                               const char *what) {
-    return bst_fail(ctx, BST_ERR_FORMAT,
-                    "%.400s: HDU %d: %s (allowed: 16-bit unsigned images, as they are or "
-                    "compressed by RICE_1, a row to a tile)",
-                    reader->path, h->number, what);
+    return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: HDU %d: %s (allowed: %s)", reader->path,
+                    h->number, what,
+                    reader->items ? "32-bit images that are not compressed"
+                                  : "16-bit unsigned images, as they are or compressed by RICE_1, "
+                                    "a row to a tile");
 }
 
 /* Takes what the header says of a compressed image. */
@@ -181,10 +187,11 @@ static bst_status look_packed(bst_ctx *ctx, const bst_fits_reader *reader,
     h->p.block = (int)int_of(reader, "ZVAL1", 32);
     h->p.wide = is_text(reader, "TFORM1", "1Q") || is_text(reader, "TFORM1", "Q");
     h->p.row_bytes = cards->axes[0];
-    if (!is_text(reader, "ZCMPTYPE", "RICE_1") || !row_tiles) {
+    if (reader->items || !is_text(reader, "ZCMPTYPE", "RICE_1") || !row_tiles) {
         return not_a_frame(ctx, reader, h, "is compressed in another way");
     }
-    if (!is_unsigned16(reader, int_of(reader, "ZBITPIX", 0)) || int_of(reader, "ZVAL2", 4) != 2) {
+    if (!are_known_pixels(reader, int_of(reader, "ZBITPIX", 0)) ||
+        int_of(reader, "ZVAL2", 4) != 2) {
         return not_a_frame(ctx, reader, h, "has pixels of another kind");
     }
     bool known = is_text(reader, "TTYPE1", "COMPRESSED_DATA") &&
@@ -224,7 +231,7 @@ static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
         for (int i = 0; i < h->axes; i++) {
             h->size[i] = cards->axes[i];
         }
-        if (!is_unsigned16(reader, cards->bitpix)) {
+        if (!are_known_pixels(reader, cards->bitpix)) {
             return not_a_frame(ctx, reader, h, "has pixels of another kind");
         }
     }
@@ -370,7 +377,7 @@ static bst_status open_file(bst_ctx *ctx, bst_fits_reader *reader) {
 }
 
 static bst_status open_reader(bst_ctx *ctx, const char *path, const void *data, uint64_t bytes,
-                              bst_fits_reader **out) {
+                              bool items, bst_fits_reader **out) {
     *out = NULL;
     bst_fits_reader *reader = calloc(1, sizeof *reader);
     if (!reader) {
@@ -379,6 +386,7 @@ static bst_status open_reader(bst_ctx *ctx, const char *path, const void *data, 
     reader->fd = -1;
     reader->data = data;
     reader->bytes = bytes;
+    reader->items = items;
     bst_status status = BST_OK;
     int n = snprintf(reader->path, sizeof reader->path, "%s", path);
     if (n < 0 || (size_t)n >= sizeof reader->path) {
@@ -398,12 +406,23 @@ static bst_status open_reader(bst_ctx *ctx, const char *path, const void *data, 
 }
 
 bst_status bst_fits_reader_open(bst_ctx *ctx, const char *path, bst_fits_reader **out) {
-    return open_reader(ctx, path, NULL, 0, out);
+    return open_reader(ctx, path, NULL, 0, false, out);
+}
+
+bst_status bst_fits_reader_open_masks(bst_ctx *ctx, const char *path, bst_fits_reader **out) {
+    BST_TRY(open_reader(ctx, path, NULL, 0, true, out));
+    if ((*out)->info.cube) {
+        bst_fits_reader_close(*out);
+        *out = NULL;
+        return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: is a cube (allowed: an extension a mask)",
+                        path);
+    }
+    return BST_OK;
 }
 
 bst_status bst_fits_reader_open_buffer(bst_ctx *ctx, const char *name, const void *data,
                                        uint64_t bytes, bst_fits_reader **out) {
-    return open_reader(ctx, name, data ? data : "", data ? bytes : 0, out);
+    return open_reader(ctx, name, data ? data : "", data ? bytes : 0, false, out);
 }
 
 void bst_fits_reader_close(bst_fits_reader *reader) {
@@ -415,6 +434,7 @@ void bst_fits_reader_close(bst_fits_reader *reader) {
         free(reader->header);
         free(reader->row);
         free(reader->pixels);
+        free(reader->mask);
         free(reader);
     }
 }
@@ -518,6 +538,9 @@ static bst_status read_row(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, 
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) {
     hdu h;
+    if (reader->items) {
+        return bst_fail(ctx, BST_ERR_STATE, "%.400s: holds masks", reader->path);
+    }
     BST_TRY(find_frame(ctx, reader, index, &h));
     BST_TRY(read_id(ctx, reader, index, &out->exposure_id));
     int64_t plane = reader->info.cube ? index : 0, height = h.size[1];
@@ -543,5 +566,32 @@ bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t 
                                  .width = (int)h.size[0],
                                  .height = (int)height,
                                  .exposure_id = out->exposure_id};
+    return BST_OK;
+}
+
+bst_status bst_fits_reader_mask(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
+                                bst_fits_read_mask *out) {
+    hdu h;
+    if (!reader->items) {
+        return bst_fail(ctx, BST_ERR_STATE, "%.400s: holds frames", reader->path);
+    }
+    BST_TRY(find_frame(ctx, reader, index, &h));
+    BST_TRY(read_id(ctx, reader, index, &out->exposure_id));
+    size_t count = (size_t)h.size[0] * (size_t)h.size[1];
+    if (reader->mask_capacity < count) {
+        free(reader->mask);
+        reader->mask = malloc(count * sizeof *reader->mask);
+        reader->mask_capacity = reader->mask ? count : 0;
+        if (!reader->mask) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a mask");
+        }
+    }
+    BST_TRY(read_at(ctx, reader, reader->mask, count * sizeof *reader->mask, h.data_at));
+    for (size_t i = 0; i < count; i++) {
+        reader->mask[i] = (int32_t)big_endian((const uint8_t *)&reader->mask[i], 4);
+    }
+    out->items = reader->mask;
+    out->width = (int)h.size[0];
+    out->height = (int)h.size[1];
     return BST_OK;
 }

@@ -51,4 +51,20 @@ bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t ind
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) BST_MUST_CHECK;
 
+/* Opens a file of masks (segmentation.fits): 32-bit signed images, an extension each, not
+ * compressed. Errors as bst_fits_reader_open. */
+bst_status bst_fits_reader_open_masks(bst_ctx *ctx, const char *path,
+                                      bst_fits_reader **out) BST_MUST_CHECK;
+
+/* A mask as read. */
+typedef struct bst_fits_read_mask {
+    const int32_t *items; /* row-major [height][width]; the reader's, until its next call */
+    int width, height;
+    int64_t exposure_id; /* -1: the file does not say */
+} bst_fits_read_mask;
+
+/* Reads mask `index`, counted from 0, of a file that was opened as one of masks. */
+bst_status bst_fits_reader_mask(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
+                                bst_fits_read_mask *out) BST_MUST_CHECK;
+
 #endif

@@ -13,7 +13,9 @@ static const char opening[] =
     "This page is made by `boresight icd` from the tables with which the program encodes, decodes "
     "and checks;\n"
     "a test keeps it current. How to use the link, with examples: [link.md](link.md).\n"
-    "\n"
+    "\n";
+
+static const char transport[] =
     "## Transport\n"
     "\n"
     "- ZeroMQ 4 over `tcp://127.0.0.1:PORT` (any loopback address, `[::1]` too) or `ipc://PATH`. "
@@ -39,7 +41,7 @@ static const char opening[] =
     "\n"
     "| member | required | value |\n"
     "|---|---|---|\n"
-    "| `version` | yes | version of this protocol: 1 |\n"
+    "| `version` | yes | version of this protocol, above; of another version nothing is taken |\n"
     "| `type` | yes | one of the messages below |\n"
     "| `tick` | yes | tick of the simulation to which the message belongs (when it was written) |\n"
     "| `utc` | no | the same instant, for readers |\n"
@@ -284,6 +286,12 @@ static void print_example(FILE *out) {
 
 bst_status bst_link_icd(bst_ctx *ctx, FILE *out) {
     fputs(opening, out);
+    fprintf(out,
+            "The version of the protocol is %d. It rises with every change to the layout or the "
+            "meaning of a message or of a\n"
+            "header's member.\n\n",
+            BST_LINK_VERSION);
+    fputs(transport, out);
     fputs(shared_text, out);
     fputs(
         "## Payloads\n\n"

@@ -6,6 +6,9 @@
 #include "sim/core/rng.h"
 #include "sim/studies/study_internal.h"
 
+/* All designs of a study together, 128 MiB. */
+static const double MOST_PLACED = 16777216.0;
+
 typedef struct ranked {
     double key;
     int64_t index;
@@ -62,6 +65,24 @@ static void morris_path(bst_rng_key key, uint64_t path, int axes, int levels, ra
     }
 }
 
+/* Whether a design of so many points has room beside those placed before. */
+static bst_status check_size(bst_ctx *ctx, const bst_study *study, const bst_study_factor *factor) {
+    double here = (double)factor->levels * factor->axis_count, placed = here;
+    for (int f = 0; f < study->factor_count; f++) {
+        const bst_study_factor *before = &study->factors[f];
+        placed += before->unit ? (double)before->levels * before->axis_count : 0.0;
+    }
+    return placed <= MOST_PLACED
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_CONFIG,
+                          "%s: /sweeps/%d/%s: the design has %lld points of %d axes, %.0f values "
+                          "(allowed: %.0f values in all designs latin_hypercube and morris of a "
+                          "study); take fewer points, or draw the values by dispersions, whose "
+                          "number of runs is not limited by memory",
+                          study->file, factor->sweep, factor->steps ? "trajectories" : "points",
+                          (long long)factor->levels, factor->axis_count, here, MOST_PLACED);
+}
+
 bst_status bst_study_place_points(bst_ctx *ctx, const bst_study *study,
                                   const bst_sweep_config *sweep, bst_study_factor *factor) {
     bool morris = sweep->design == BST_SWEEP_MORRIS;
@@ -72,6 +93,7 @@ bst_status bst_study_place_points(bst_ctx *ctx, const bst_study *study,
     }
     factor->levels = morris ? sweep->trajectories * (axes + 1) : sweep->points;
     factor->steps = morris ? (int)sweep->levels : 0;
+    BST_TRY(check_size(ctx, study, factor));
     int64_t room = factor->levels > axes ? factor->levels : axes;
     ranked *scratch = malloc((size_t)room * sizeof *scratch);
     factor->unit = malloc((size_t)factor->levels * (size_t)axes * sizeof *factor->unit);

@@ -211,74 +211,108 @@ static bool same(const double *a, const double *b, int count) {
     return true;
 }
 
-/* One line of a file: rows of a run, of a run's series. */
-static bst_status take_line(bst_ctx *ctx, bst_results *r, char *line, int64_t *run, bool *skip,
-                            bool *good) {
-    int metrics = r->kind->metric_count, columns = r->kind->series_count;
-    double values[BST_STUDY_METRICS];
-    /* a part is there for the latest row if its run did what it should and the kind has series */
-    bool has_part = r->part_count > 0 && r->parts[r->part_count - 1].run == *run;
-    *good = false;
-    if (line[0] == 'S' && (*skip || has_part)) {
-        if (!*skip) {
-            size_t bytes = (size_t)columns * sizeof *r->series;
-            if (r->series_rows == r->series_room) {
-                size_t room = 2 * r->series_room + 256;
-                double *grown = realloc(r->series, room * bytes);
-                if (!grown) {
-                    return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of runs");
-                }
-                r->series = grown;
-                r->series_room = room;
-            }
-            char *at = line + 1;
-            *good = read_numbers(&at, columns, r->series + r->series_rows * (size_t)columns);
-            r->series_rows += *good;
-            r->parts[r->part_count - 1].rows += *good;
-        }
-        *good = *good || *skip;
-        return BST_OK;
+/* One line of a shard: the row of a run, or a row of the run's series. */
+typedef struct shard_row {
+    char kind; /* 'R' done, 'F' failed, 'S' of the series */
+    int64_t run;
+    double wall_s, cpu_s;
+    double values[BST_STUDY_METRICS]; /* R: the metrics; S: the columns of the series */
+    char *error;                      /* F: into the line, as it is in the file */
+} shard_row;
+
+/* Reads a line. False: it is no row of this study's kind. */
+static bool read_row(const bst_results *r, char *line, shard_row *out) {
+    char *at = line + 1, *end;
+    out->kind = line[0];
+    if (line[0] == 'S') {
+        return r->kind->series_count > 0 && read_numbers(&at, r->kind->series_count, out->values);
     }
     if (line[0] != 'R' && line[0] != 'F') {
-        return BST_OK;
+        return false;
     }
-    char *at, *end;
-    *run = strtoll(line + 1, &at, 10);
-    if (at == line + 1 || *run < 0 || *run >= r->study->runs) {
-        return BST_OK;
+    out->run = strtoll(line + 1, &at, 10);
+    if (at == line + 1 || out->run < 0 || out->run >= r->study->runs) {
+        return false;
     }
-    double wall_s = strtod(at, &end);
-    bool failed = line[0] == 'F';
+    out->wall_s = strtod(at, &end);
+    if (end == at) {
+        return false;
+    }
     at = end;
-    double cpu_s = strtod(at, &end);
-    *good = failed ? *end == ' ' : end != at && read_numbers(&end, metrics, values);
-    if (!*good) {
-        return BST_OK;
+    out->cpu_s = strtod(at, &end);
+    if (end == at) {
+        return false;
     }
-    *skip = r->state[*run] != BST_ROW_MISSING;
-    if (*skip) {
-        r->doubled++;
-        r->differing += (r->state[*run] == BST_ROW_FAILED) != failed ||
-                        (!failed && !same(values, r->metrics + *run * metrics, metrics));
-        return BST_OK;
+    out->error = end + 1;
+    return line[0] == 'F' ? *end == ' ' : read_numbers(&end, r->kind->metric_count, out->values);
+}
+
+/* A row of the series of the latest run that was taken. */
+static bst_status take_series(bst_ctx *ctx, bst_results *r, const shard_row *row) {
+    size_t columns = (size_t)r->kind->series_count;
+    if (r->series_rows == r->series_room) {
+        size_t room = 2 * r->series_room + 256;
+        double *grown = realloc(r->series, room * columns * sizeof *grown);
+        if (!grown) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of runs");
+        }
+        r->series = grown;
+        r->series_room = room;
     }
-    r->wall_s[*run] = wall_s;
-    r->cpu_s[*run] = cpu_s;
-    r->state[*run] = failed ? BST_ROW_FAILED : BST_ROW_DONE;
+    memcpy(r->series + r->series_rows * columns, row->values, columns * sizeof *r->series);
+    r->series_rows++;
+    r->parts[r->part_count - 1].rows++;
+    return BST_OK;
+}
+
+/* Takes a row of a run that has none yet, with room for its error or its series. */
+static bst_status take_run(bst_ctx *ctx, bst_results *r, const shard_row *row) {
+    int metrics = r->kind->metric_count;
+    bool failed = row->kind == 'F';
+    if (failed) {
+        BST_TRY(grow(ctx, (void **)&r->errors, r->error_count, &r->error_room, sizeof *r->errors));
+        char *text = strdup(row->error);
+        if (!text) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of runs");
+        }
+        for (char *c = text; *c; c++) {
+            *c = *c == '\x1f' ? '\n' : *c;
+        }
+        r->errors[r->error_count++] = (bst_row_error){row->run, text};
+    } else if (r->kind->series_count > 0) {
+        BST_TRY(grow(ctx, (void **)&r->parts, r->part_count, &r->part_room, sizeof *r->parts));
+        r->parts[r->part_count++] = (bst_series_part){row->run, r->series_rows, 0};
+    }
+    r->wall_s[row->run] = row->wall_s;
+    r->cpu_s[row->run] = row->cpu_s;
+    r->state[row->run] = failed ? BST_ROW_FAILED : BST_ROW_DONE;
     r->done++;
     r->failed += failed;
     for (int m = 0; m < metrics; m++) {
-        r->metrics[*run * metrics + m] = failed ? NAN : values[m];
+        r->metrics[row->run * metrics + m] = failed ? NAN : row->values[m];
     }
-    if (failed) {
-        BST_TRY(grow(ctx, (void **)&r->errors, r->error_count, &r->error_room, sizeof *r->errors));
-        for (char *c = end + 1; *c; c++) {
-            *c = *c == '\x1f' ? '\n' : *c;
+    return BST_OK;
+}
+
+/* Takes the rows of a shard that was found whole. */
+static bst_status take_rows(bst_ctx *ctx, bst_results *r, char *text, const char *end) {
+    int metrics = r->kind->metric_count;
+    bool skip = false;
+    shard_row row = {.run = -1};
+    for (char *line = text; line < end && read_row(r, line, &row); line += strlen(line) + 1) {
+        if (row.kind == 'S') {
+            BST_TRY(skip ? BST_OK : take_series(ctx, r, &row));
+            continue;
         }
-        r->errors[r->error_count++] = (bst_row_error){*run, strdup(end + 1)};
-    } else if (columns > 0) {
-        BST_TRY(grow(ctx, (void **)&r->parts, r->part_count, &r->part_room, sizeof *r->parts));
-        r->parts[r->part_count++] = (bst_series_part){*run, r->series_rows, 0};
+        bool failed = row.kind == 'F';
+        skip = r->state[row.run] != BST_ROW_MISSING;
+        if (skip) {
+            r->doubled++;
+            r->differing += (r->state[row.run] == BST_ROW_FAILED) != failed ||
+                            (!failed && !same(row.values, r->metrics + row.run * metrics, metrics));
+        } else {
+            BST_TRY(take_run(ctx, r, &row));
+        }
     }
     return BST_OK;
 }
@@ -331,6 +365,22 @@ static char *next_line(char **text) {
     return line;
 }
 
+/* Whether all lines up to `end` are rows, of which `count` are those of runs, and a series follows
+ * a run that did what it should. Cuts the lines off. */
+static bool are_rows(const bst_results *r, char *text, const char *end, int64_t count) {
+    int64_t seen = 0;
+    shard_row row = {.run = -1};
+    bool has_series = false;
+    for (char *line; text < end && (line = next_line(&text));) {
+        if (!read_row(r, line, &row) || (row.kind == 'S' && !has_series)) {
+            return false;
+        }
+        has_series = row.kind == 'S' || row.kind == 'R';
+        seen += row.kind != 'S';
+    }
+    return text == end && seen == count;
+}
+
 static bst_status take_text(bst_ctx *ctx, bst_results *r, const char *path, char *text,
                             size_t bytes) {
     char *last = text + bytes;
@@ -341,7 +391,7 @@ static bst_status take_text(bst_ctx *ctx, bst_results *r, const char *path, char
     while (last > text && last[-1] != '\n') {
         last--;
     }
-    int64_t count = 0, seen = 0, run = -1;
+    int64_t count = 0;
     uint64_t sum = 0;
     if (sscanf(last, "end %" SCNd64 " %" SCNx64, &count, &sum) != 2 ||
         sum != checksum(text, (size_t)(last - text))) {
@@ -358,15 +408,12 @@ static bst_status take_text(bst_ctx *ctx, bst_results *r, const char *path, char
     if (!line || strcmp(line, expected) != 0) {
         return bst_fail(ctx, BST_ERR_STATE, "%s: belongs to another study", path);
     }
-    bool skip = false, good = next_line(&text) && next_line(&text);
-    if (good) {
-        BST_TRY(check_runs(ctx, path, text));
+    if (!next_line(&text) || !next_line(&text)) {
+        return damaged(ctx, path);
     }
-    while (good && (line = next_line(&text))) {
-        seen += line[0] != 'S';
-        BST_TRY(take_line(ctx, r, line, &run, &skip, &good));
-    }
-    return good && seen == count ? BST_OK : damaged(ctx, path);
+    BST_TRY(check_runs(ctx, path, text));
+    /* a shard with a fault anywhere gives no row: what is wrong there may be wrong in others */
+    return are_rows(r, text, last, count) ? take_rows(ctx, r, text, last) : damaged(ctx, path);
 }
 
 bst_status bst_results_load(bst_ctx *ctx, bst_results *r, const char *path) {

@@ -35,7 +35,7 @@ def element_set(path, norad):
 
 
 class Orbit:
-    """GCRF positions by SGP4; TEME to GCRF by ERFA's IAU 2006/2000A model."""
+    """GCRF positions by SGP4; TEME to GCRF by GMST82 and the intermediate origin of IAU 2006/2000A."""
 
     def __init__(self, path, norad, epoch_utc):
         self.satellite = element_set(path, norad)
@@ -49,10 +49,10 @@ class Orbit:
         error, place, _ = self.satellite.sgp4(*utc)
         assert error == 0
         tt = erfa.taitt(*erfa.utctai(*utc))
-        to_date = erfa.pnm06a(*tt)
-        equinoxes = erfa.ee06a(*tt)  # from the mean equinox of TEME to the true one
-        teme_to_date = erfa.rz(-equinoxes, np.eye(3))
-        return to_date.T @ (teme_to_date @ (np.array(place) * 1e3))
+        # UT1 cancels but for precession during its difference from UTC
+        to_intermediate = erfa.c2i06a(*tt)
+        teme_to_intermediate = erfa.rz(erfa.gmst82(*utc) - erfa.era00(*utc), np.eye(3))
+        return to_intermediate.T @ (teme_to_intermediate @ (np.array(place) * 1e3))
 
     def direction(self, here_m, earth_mps, seconds):
         """Geometric direction with light time, and the position that it is of: where the target

@@ -9,6 +9,8 @@ import os
 import subprocess
 import unittest
 
+import numpy as np
+
 import runs
 from readers import read_oem, read_tdm, seconds
 
@@ -67,6 +69,52 @@ class Orbit(unittest.TestCase):
         # two minutes of a LEO's own motion tell the range of a GEO to some 10 km
         self.assertLess(math.hypot(*sigma[:3]), 100e3)
         self.assertAlmostEqual(report["osculating"]["semi_major_axis_m"], 42.165e6, delta=1e6)
+
+    def test_report_agrees_with_itself(self):
+        """Osculating elements, arc, sums and sigmas, from the report's state, covariance and observations."""
+        report, gm = self.report, 3.986004415e14
+        r, v = np.array(report["position_gcrf_m"]), np.array(report["velocity_gcrf_mps"])
+        h, found = np.cross(r, v), report["osculating"]
+        e = np.cross(v, h) / gm - r / np.linalg.norm(r)
+        node = np.cross([0, 0, 1], h)
+        a = 1 / (2 / np.linalg.norm(r) - v @ v / gm)
+        turned = lambda x, y: np.degrees(np.arctan2(np.cross(x, y) @ h / np.linalg.norm(h), x @ y)) % 360  # noqa: E731
+        anomaly = np.arctan2(np.sqrt(1 - e @ e) * np.sin(np.radians(turned(e, r))),
+                             np.linalg.norm(e) + np.cos(np.radians(turned(e, r))))
+        expected = {"semi_major_axis_m": a, "eccentricity": np.linalg.norm(e), "arg_perigee_deg": turned(node, e),
+                    "inclination_deg": np.degrees(np.arccos(h[2] / np.linalg.norm(h))),
+                    "raan_deg": np.degrees(np.arctan2(node[1], node[0])) % 360,
+                    "mean_anomaly_deg": np.degrees(anomaly - np.linalg.norm(e) * np.sin(anomaly)) % 360}
+        for key, value in expected.items():
+            # gm of the forces is known to 1e-9
+            self.assertAlmostEqual(found[key] % 360 if key.endswith("deg") else found[key], value, delta=1e-6 * abs(value), msg=key)
+        rows = self.database.execute(
+            "SELECT time_s FROM tracks WHERE track_id = ? AND misses_in_row = 0 ORDER BY tick", (report["track"],)).fetchall()
+        times = [seconds(item["utc"], self.epoch) for item in report["observations"]]
+        self.assertEqual(len(times), report["used"] + report["rejected"])
+        self.assertLessEqual(set(np.round(times, 6)), {round(row[0], 6) for row in rows})
+        self.assertAlmostEqual(report["arc_s"], times[-1] - times[0], delta=1e-6)
+        self.assertEqual(report["used"] + report["rejected"] + report["without_attitude"], len(rows))
+        self.assertEqual(report["dof"], 2 * report["used"] - 6)
+        self.assertAlmostEqual(seconds(report["epoch_utc"], self.epoch), report["epoch_s"], delta=1e-6)
+        covariance = np.array(report["covariance_gcrf"])
+        np.testing.assert_allclose(covariance, covariance.T, rtol=1e-12)
+        scale = np.sqrt(np.diag(covariance))
+        self.assertGreater(np.linalg.eigvalsh(covariance / np.outer(scale, scale)).min(), 0)
+        # the range and its sigma, from the observer's place at that time
+        here = np.array(self.database.execute(
+            "SELECT observer_gcrf_x_m, observer_gcrf_y_m, observer_gcrf_z_m FROM exposures ORDER BY abs(mid_s - ?)",
+            (report["epoch_s"],)).fetchone())
+        sight = (r - here) / np.linalg.norm(r - here)
+        self.assertAlmostEqual(report["range_m"] / np.linalg.norm(r - here), 1, delta=2e-3)
+        self.assertAlmostEqual(report["range_sigma_m"] / np.sqrt(sight @ covariance[:3, :3] @ sight), 1, delta=2e-2)
+        # the OEM's covariance is the report's, in km, lower triangle
+        with open(self.files["oem"], encoding="ascii") as file:
+            text = file.read()
+        lines = [[float(w) for w in line.split()] for line in text[text.index("COVARIANCE_START"):].splitlines()[3:9]]
+        for i, line in enumerate(lines):
+            for k, value in enumerate(line):
+                self.assertAlmostEqual(value * 1e6 / covariance[i, k], 1, delta=1e-9, msg=(i, k))
 
     def test_what_it_says(self):
         self.assertIn("neossat/telescope, track 1 (INMARSAT GX5)\n", self.said)

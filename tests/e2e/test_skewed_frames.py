@@ -11,6 +11,7 @@ import unittest
 
 import numpy as np
 from astropy.io import fits
+from astropy.wcs import WCS
 
 import runs
 
@@ -217,6 +218,10 @@ class Skewed(unittest.TestCase):
             for k in range(0, len(r["x"]), 16):
                 row = {key: values[k] for key, values in r.items()}
                 ratio.append(row["snr"] / expected_snr(row, case, camera))
+            # the detection's SNR is its flux over the same noise; straight trails lose some by their templates
+            seen = np.median(r["seen"] / r["flux"] * r["electrons"] / r["snr"])
+            if not any(CASES[case][3]):
+                self.assertTrue(0.9 < seen < 1.15, (name, case, seen))
             print(f"{name} case {case}: true SNR over the sum over pixels {np.median(ratio):.3f}")
             if any(CASES[case][3]):
                 continue  # a bend counts as blur in the truth's SNR, which is 15 to 30 % low then
@@ -224,6 +229,35 @@ class Skewed(unittest.TestCase):
             # with the place, and these are the same stars again and again
             self.assertLess(abs(np.median(ratio) - 1), 0.01 if any(CASES[case][2]) or CASES[case][1] == 1 else 0.07,
                             (name, case))
+
+    def test_headers_of_windows_and_binning(self):
+        """Stars of the truth through each header's WCS, by astropy, at their binned pixels of the window."""
+        db = runs.database(self.out[False])
+        rows = {row["exposure_id"]: row for row in db.execute("SELECT * FROM frames")}
+        with fits.open(os.path.join(self.out[False], "frames.fits")) as hdus:
+            for hdu in hdus[1:]:
+                header, number = hdu.header, hdu.header["FRAMEID"]
+                window, binning, way, bend = CASES[number // REPEATS]
+                self.assertEqual([header[k] for k in ("WINX0", "WINY0", "BINNING")], [*window[:2], binning])
+                self.assertEqual([rows[number][k] for k in ("x0_px", "y0_px", "width_px", "height_px", "binning")],
+                                 [*window, binning])
+                self.assertEqual(header["PIXSCALE"], 6.0 * binning)
+                # full pixels hold as many electrons each; counts end with the converter
+                self.assertEqual((header["GAIN"], header["RDNOISE"]), (1.6, 8.0))
+                stars = np.array([tuple(row) for row in db.execute(
+                    "SELECT ra_deg, dec_deg, x_chief_px, y_chief_px FROM truth WHERE exposure_id = ? AND kind = 'star'"
+                    " AND in_field", (number,))])
+                self.assertGreater(len(stars), 5)
+                x, y = WCS(header).all_world2pix(stars[:, 0], stars[:, 1], 0)
+                places = (stars[:, 2:] - window[:2] - 0.5 * (binning - 1)) / binning
+                # the header's WCS is good to a thousandth of a pixel
+                self.assertLess(np.hypot(x - places[:, 0], y - places[:, 1]).max(), 2e-3, number)
+                # the table's is that of the whole sensor
+                row = rows[number]
+                self.assertAlmostEqual(header["CRPIX1"], (row["crpix1"] - 1 - window[0] - 0.5 * (binning - 1)) / binning + 1,
+                                       delta=1e-9)
+                self.assertAlmostEqual(header["CRPIX2"], (row["crpix2"] - 1 - window[1] - 0.5 * (binning - 1)) / binning + 1,
+                                       delta=1e-9)
 
     def test_recorded_pixels_are_where_the_truth_says(self):
         """First moments of the brightest lonely stars on the recorded pixels, against the truth."""

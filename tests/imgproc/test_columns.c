@@ -3,6 +3,7 @@
 
 #include "imgproc/columns.h"
 #include "sim/core/rng.h"
+#include "sim/world/column_level.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
@@ -36,6 +37,7 @@ static void levels(void **state) {
     }
     expose(&s, key, 7);
     bst_imgproc_frame frame = synthetic_frame(&s);
+    s.camera.detector.frame_transfer_s = 0.3;
     bst_columns_measure(&columns, NULL, &s.camera, &frame);
     for (int x = 0; x < WIDTH; x++) {
         double noise2 = synthetic_noise(&s) * synthetic_noise(&s), over = smear(key, x);
@@ -44,6 +46,12 @@ static void levels(void **state) {
         double tolerance = 6.0 * sqrt((noise2 + over) / HEIGHT) + 0.02 * sqrt(noise2);
         bst_assert_close(columns.level_e[x], over, tolerance);
         bst_assert_close(columns.noise[x], sqrt(1.0 + over / noise2), 0.05);
+    }
+    /* without a frame transfer the same levels are electronic offsets, which bring no noise */
+    s.camera.detector.frame_transfer_s = 0.0;
+    bst_columns_measure(&columns, NULL, &s.camera, &frame);
+    for (int x = 0; x < WIDTH; x++) {
+        bst_assert_close(columns.noise[x], 1.0, 0.0);
     }
     bst_columns_free(&columns);
     synthetic_free(&s);
@@ -105,12 +113,13 @@ static void wanted(void **state) {
         s.camera.detector.frame_transfer_s = k == 1 ? 0.01 : 0.0;
         /* of 8 e- of read noise: an eighth, and a quarter */
         s.camera.detector.column_offset_rms_e = k == 2 ? 1.0 : k == 3 ? 2.0 : 0.0;
-        s.config.column_level = BST_COLUMNS_AUTO;
-        assert_int_equal(bst_columns_wanted(&s.config, &s.camera), k == 1 || k == 3);
-        s.config.column_level = BST_COLUMNS_ON;
-        assert_true(bst_columns_wanted(&s.config, &s.camera));
-        s.config.column_level = BST_COLUMNS_OFF;
-        assert_false(bst_columns_wanted(&s.config, &s.camera));
+        s.config.column_level = BST_COLUMN_LEVEL_AUTO;
+        assert_int_equal(bst_column_level_wanted(s.config.column_level, &s.camera),
+                         k == 1 || k == 3);
+        s.config.column_level = BST_COLUMN_LEVEL_ON;
+        assert_true(bst_column_level_wanted(s.config.column_level, &s.camera));
+        s.config.column_level = BST_COLUMN_LEVEL_OFF;
+        assert_false(bst_column_level_wanted(s.config.column_level, &s.camera));
     }
     synthetic_free(&s);
 }

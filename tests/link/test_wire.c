@@ -1,6 +1,7 @@
 /* Packets: checksums, bytes, and what the decoder refuses. */
 #include "tests/test_support.h"
 
+#include "sim/core/fnv.h"
 #include "sim/link/crc32c.h"
 #include "sim/link/packet.h"
 #include "sim/link/payloads.h"
@@ -215,7 +216,7 @@ static void headers_are_read(void **state) {
     assert_int_equal(
         read_text("{ \"crcs\" : [ \"0000000a\" ] , \"mine\":{\"a\":[1,{}],\"b\":\"}\"}, "
                   "\"lengths\":[16],\n\"sequence\":0,\"tick\":0, \"flag\":true,"
-                  "\"type\":\"done\",\"version\":1, ",
+                  "\"type\":\"done\",\"version\":2, ",
                   &out),
         BST_WIRE_GOOD);
     assert_int_equal(out.crcs[0], 10);
@@ -230,41 +231,41 @@ static void wrong_headers_are_refused(void **state) {
         const char *text;
         bst_wire_fault fault;
     } cases[] = {
-        {"{\"version\":2,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":1,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_VERSION},
         {"{\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_VERSION},
-        {"{\"version\":1,\"type\":\"dance\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":2,\"type\":\"dance\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_UNEXPECTED},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16,3],\"crcs\":["
+        {"{\"version\":2,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16,3],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_LENGTH},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":[],",
+        {"{\"version\":2,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":[],",
          BST_WIRE_BAD_LENGTH},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[1,2,3],\"crcs\":["
+        {"{\"version\":2,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[1,2,3],\"crcs\":["
          "],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":0,\"sequence\":-1,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":2,\"type\":\"done\",\"tick\":0,\"sequence\":-1,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":0.5,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":2,\"type\":\"done\",\"tick\":0.5,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":1e3,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":2,\"type\":\"done\",\"tick\":1e3,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":9999999999999999,\"sequence\":0,\"lengths\":["
+        {"{\"version\":2,\"type\":\"done\",\"tick\":9999999999999999,\"sequence\":0,\"lengths\":["
          "16],\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":1,\"version\":1,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16]"
+        {"{\"version\":2,\"version\":2,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16]"
          ",\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":1,\"type\":\"do\\u006ee\",\"tick\":0,\"sequence\":0,\"lengths\":[16],"
+        {"{\"version\":2,\"type\":\"do\\u006ee\",\"tick\":0,\"sequence\":0,\"lengths\":[16],"
          "\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":1,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":2,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"0000000A\"],",
          BST_WIRE_BAD_HEADER},
         {"[1,", BST_WIRE_BAD_HEADER},
@@ -314,6 +315,50 @@ static void tables_fit_their_structs(void **state) {
     assert_int_equal(bst_wire_type_of("nothing"), BST_LINK_TYPES);
 }
 
+static uint64_t add_text(uint64_t h, const char *text) {
+    return bst_fnv(h, text, strlen(text) + 1);
+}
+
+static uint64_t add_number(uint64_t h, int64_t number) {
+    char text[24];
+    snprintf(text, sizeof text, "%lld", (long long)number);
+    return add_text(h, text);
+}
+
+/* What a peer must know to read and write a record: names, order, types, lengths and units. */
+static uint64_t add_layout(uint64_t h, const bst_wire_field *table) {
+    for (const bst_wire_field *f = table; f && f->name; f++) {
+        h = add_text(add_text(h, f->name), f->unit);
+        h = add_number(add_number(h, (int64_t)f->type), f->count);
+        h = add_number(h, (int64_t)bst_wire_offset(table, f));
+    }
+    return add_text(h, "end");
+}
+
+/* Another layout needs another version: a peer of the old one would read wrong numbers. After a
+ * change raise BST_LINK_VERSION and VERSION of python/boresight_link.py, and state the new digest
+ * here. */
+static void layouts_are_those_of_the_version(void **state) {
+    (void)state;
+    const struct {
+        int version;
+        uint64_t digest;
+    } known = {2, UINT64_C(0xe3f71124867e0bab)};
+    uint64_t h = BST_FNV_START;
+    for (int t = 0; t < BST_LINK_TYPES; t++) {
+        const bst_wire_message *m = bst_wire_message_of((bst_link_type)t);
+        h = add_number(add_text(h, m->name), m->pixels);
+        h = add_layout(add_layout(h, m->record), m->items);
+    }
+    if (h != known.digest || BST_LINK_VERSION != known.version) {
+        fail_msg(
+            "version %d of the link has layouts of digest 0x%016llx; this test knows version "
+            "%d, 0x%016llx: a changed layout needs a new version",
+            BST_LINK_VERSION, (unsigned long long)h, known.version,
+            (unsigned long long)known.digest);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(checksums_are_those_of_the_rfc),
@@ -325,6 +370,7 @@ int main(void) {
         cmocka_unit_test(headers_are_read),
         cmocka_unit_test(wrong_headers_are_refused),
         cmocka_unit_test(tables_fit_their_structs),
+        cmocka_unit_test(layouts_are_those_of_the_version),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -365,6 +365,10 @@ static void test_digest(void **state) {
     bst_study_close(&s);
 }
 
+#define AXIS "{\"path\": \"/a\", \"from\": 0, \"to\": 1}"
+#define AXES_4 AXIS ", " AXIS ", " AXIS ", " AXIS
+#define AXES_8 AXES_4 ", " AXES_4
+
 /* What is wrong is refused with its place and what is allowed. */
 static void test_errors(void **state) {
     (void)state;
@@ -387,6 +391,13 @@ static void test_errors(void **state) {
         {"\"sweeps\": [{\"design\": \"latin_hypercube\", \"axes\": [{\"path\": \"/a\", \"from\": "
          "1, \"to\": 2}]}]",
          "/sweeps/0/points: a latin_hypercube needs at least 2"},
+        {"\"sweeps\": [{\"design\": \"latin_hypercube\", \"points\": 1000000, \"axes\": [" AXES_8
+         ", " AXES_8 ", " AXIS "]}]",
+         "/sweeps/0/points: the design has 1000000 points of 17 axes, 17000000 values (allowed: "
+         "16777216 values in all designs"},
+        {"\"sweeps\": [{\"design\": \"morris\", \"trajectories\": 100000, \"axes\": [" AXES_8
+         ", " AXES_8 "]}]",
+         "/sweeps/0/trajectories: the design has 1700000 points of 16 axes, 27200000 values"},
         {"\"sweeps\": [{\"design\": \"morris\", \"levels\": 3, \"axes\": [{\"path\": \"/a\", "
          "\"from\": 1, \"to\": 2}]}]",
          "/sweeps/0/levels: not even (found 3)"},

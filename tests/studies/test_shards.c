@@ -146,6 +146,61 @@ static void test_damage(void **state) {
     }
 }
 
+/* Puts `text` in place of `old` and a right checksum (FNV-1a, 64 bits) at the end. */
+static void rewrite(const char *path, const char *old, const char *text) {
+    char before[8192], after[8192];
+    FILE *file = fopen(path, "r");
+    before[fread(before, 1, sizeof before - 1, file)] = '\0';
+    fclose(file);
+    char *at = strstr(before, old), *end = strstr(before, "\nend ");
+    assert_true(at && end);
+    int count = atoi(end + 5), n;
+    end[1] = '\0';
+    n = snprintf(after, sizeof after, "%.*s%s%s", (int)(at - before), before, text,
+                 at + strlen(old));
+    uint64_t sum = UINT64_C(0xcbf29ce484222325);
+    for (int i = 0; i < n; i++) {
+        sum = (sum ^ (unsigned char)after[i]) * UINT64_C(0x100000001b3);
+    }
+    file = fopen(path, "w");
+    fprintf(file, "%send %d %016llx\n", after, count, (unsigned long long)sum);
+    fclose(file);
+}
+
+/* A right checksum round a row that is none: no row of the shard is taken, also not those before
+ * it. */
+static void test_malformed_middle(void **state) {
+    static const char *const faults[][2] = {
+        {"\nR 3 ", "\nR 3 x"},         /* a number that is none */
+        {"\nR 3 ", "\nR 3 7 "},        /* one number too many */
+        {"\nR 3 ", "\nS 1 2\nR 3 "},   /* a row of the series that is too short */
+        {"\nR 3 ", "\nQ\nR 3 "},       /* a row of no kind */
+        {"\nR 0 ", "\nS 1 2 3\nR 0 "}, /* a series of no run */
+    };
+    fixture *f = *state;
+    char path[512];
+    bst_results r;
+    bst_shard_news news;
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
+        execute(f, 0, 5, &news);
+        first_file(f, path, sizeof path);
+        rewrite(path, "\nR 3 ", "\nR 3 ");
+        load(f, &r);
+        assert_int_equal(r.done, 5); /* the checksum above is that of the format */
+        bst_results_free(&r);
+        rewrite(path, faults[i][0], faults[i][1]);
+        load(f, &r);
+        assert_int_equal(r.done, 0);
+        assert_int_equal(r.part_count, 0);
+        assert_int_equal(r.series_rows, 0);
+        for (int run = 0; run < 5; run++) {
+            assert_int_equal(r.state[run], BST_ROW_MISSING);
+        }
+        assert_int_equal(access(path, F_OK), -1); /* put aside */
+        bst_results_free(&r);
+    }
+}
+
 /* Rows of a study that has changed since are not taken for its own. */
 static void test_other_study(void **state) {
     fixture *f = *state;
@@ -165,6 +220,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_fault_of_the_place, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_first_wins, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_damage, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_malformed_middle, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_other_study, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,188 @@
+/* Which sources image processing separates: those whose maxima of the filters' output, on the pixel
+ * grid, have a saddle between them that is low enough. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "obsgen/generator_internal.h"
+
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+/* Image processing separates two sources where the saddle between them is so much lower than the
+ * fainter one; and two places closer than this share of the FWHM are one. */
+static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
+/* It looks at what is above these shares of the threshold: that which a source between four pixels
+ * shows on one of them, or the other one. */
+static const double LOOK_CORNER = 0.93, LOOK_SHARE = 0.65;
+/* Further apart than this, and their streaks, no two share a maximum. */
+static const double FAR_SIGMAS = 8.0;
+/* Light below this at both maxima, SNR, does not shift the saddle. */
+static const double LEAST_LIGHT = 0.3;
+/* A saddle that is so many deviations of the noise off needs no noise. */
+static const double CERTAIN_SIGMAS = 4.0;
+/* Keys of the noise between two maxima: 32 draws a source. */
+static const uint64_t SADDLE_NOISE = (uint64_t)1 << 54;
+
+enum { MOST_LIGHTS = 16, MOST_NOISY = 14, MOST_PIXELS = 256 };
+
+/* The light on the pixels about two sources. Places are moved towards the brighter one by the
+ * calibration's factor on distances. */
+typedef struct scene {
+    const bst_generator *g;
+    double x, y; /* of the brighter */
+    generator_source light[MOST_LIGHTS];
+    int count;
+} scene;
+
+typedef struct grid_place {
+    int x, y;
+    double value;
+} grid_place;
+
+static void add_light(scene *s, const generator_source *o) {
+    double factor = s->g->calibration.blend_distance_factor;
+    if (s->count < MOST_LIGHTS) {
+        generator_source *at = &s->light[s->count++];
+        *at = *o;
+        at->x = s->x + (o->x - s->x) / factor;
+        at->y = s->y + (o->y - s->y) / factor;
+    }
+}
+
+static void gather(scene *s, const generator_source *bright, const generator_source *faint) {
+    const bst_generator *g = s->g;
+    add_light(s, bright);
+    add_light(s, faint);
+    double top = fmin(bright->y, faint->y) - g->reach, end = fmax(bright->y, faint->y) + g->reach;
+    int k = (int)(faint - g->sources);
+    while (k > 0 && g->sources[k - 1].y >= top) {
+        k--;
+    }
+    for (; k < g->source_count && g->sources[k].y <= end; k++) {
+        const generator_source *o = &g->sources[k];
+        if (o == bright || o == faint || o->broken || !(o->level > 0.0) ||
+            fabs(o->x - faint->x) > 2.0 * g->reach) {
+            continue;
+        }
+        double most = o->level *
+                      fmax(bst_generator_overlap(g, o, faint), bst_generator_overlap(g, o, bright));
+        if (most > LEAST_LIGHT) {
+            add_light(s, o);
+        }
+    }
+}
+
+static double output_of(const scene *s, int x, int y) {
+    generator_source pixel = {.x = x, .y = y};
+    double sum = 0.0;
+    for (int i = 0; i < s->count; i++) {
+        sum += s->light[i].level * bst_generator_overlap(s->g, &s->light[i], &pixel);
+    }
+    return sum;
+}
+
+/* The pixel of the output's maximum about a source. */
+static grid_place climb(const scene *s, const generator_source *from) {
+    enum { MOST = 8 };
+    grid_place at = {(int)lround(from->x), (int)lround(from->y), 0.0};
+    at.value = output_of(s, at.x, at.y);
+    for (int step = 0; step < MOST; step++) {
+        grid_place best = at;
+        for (int k = 0; k < 9; k++) {
+            int x = at.x + k % 3 - 1, y = at.y + k / 3 - 1;
+            double value = output_of(s, x, y);
+            if (value > best.value) {
+                best = (grid_place){x, y, value};
+            }
+        }
+        if (best.x == at.x && best.y == at.y) {
+            break;
+        }
+        at = best;
+    }
+    return at;
+}
+
+/* Correlation of the noise of the filter's output at two pixels. */
+static double correlation(const bst_generator *g, bool as_streak, const grid_place *a,
+                          const grid_place *b) {
+    double dx = b->x - a->x, dy = b->y - a->y, length = as_streak ? g->streak : 0.0;
+    double c = length > 0.0 ? g->star_path.dx / length : 1.0;
+    double s = length > 0.0 ? g->star_path.dy / length : 0.0;
+    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->filter_sigma);
+}
+
+/* Adds to the outputs between two maxima what their noise is beside that of the maxima, which the
+ * levels of both sources hold: normal draws with the conditional covariance (Cholesky). */
+static void add_noise(const scene *s, const generator_source *faint, const grid_place ends[2],
+                      grid_place *between, int count) {
+    enum { ALL = MOST_NOISY + 2 };
+    const bst_generator *g = s->g;
+    const bst_generator_filter *filter = &g->filters[faint->as_streak];
+    double factor[ALL][ALL] = {{0.0}}, normal[MOST_NOISY];
+    int skip = (count + MOST_NOISY - 1) / MOST_NOISY, used = 0;
+    grid_place *place[MOST_NOISY];
+    const grid_place *all[ALL] = {&ends[0], &ends[1]};
+    for (int i = 0; i < count && used < MOST_NOISY; i += skip, used++) {
+        place[used] = &between[i];
+        all[used + 2] = &between[i];
+        normal[used] = bst_rng_normal(g->key, (uint64_t)g->exposure_id,
+                                      SADDLE_NOISE | faint->name << 5 | (uint64_t)used);
+    }
+    for (int i = 0; i < used + 2; i++) { /* Cholesky */
+        for (int k = 0; k <= i; k++) {
+            double sum = correlation(g, faint->as_streak, all[i], all[k]);
+            for (int n = 0; n < k; n++) {
+                sum -= factor[i][n] * factor[k][n];
+            }
+            factor[i][k] = i == k ? sqrt(fmax(sum, 0.0)) : sum / fmax(factor[k][k], 1e-6);
+        }
+    }
+    for (int i = 0; i < used; i++) {
+        double z = 0.0;
+        for (int n = 0; n <= i; n++) {
+            z += factor[i + 2][n + 2] * normal[n];
+        }
+        place[i]->value += sqrt(filter->variance + filter->shot * fmax(place[i]->value, 0.0)) * z;
+    }
+}
+
+bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
+                             const generator_source *faint) {
+    double factor = g->calibration.blend_distance_factor;
+    double apart = hypot(faint->x - bright->x, faint->y - bright->y) / factor;
+    if (apart < CLOSEST_FWHM * FWHM_PER_SIGMA * g->fitted_sigma) {
+        return false;
+    }
+    if (apart > FAR_SIGMAS * g->cross_sigma + fmax(bright->length, faint->length)) {
+        return true;
+    }
+    scene s = {.g = g, .x = bright->x, .y = bright->y};
+    gather(&s, bright, faint);
+    const grid_place ends[2] = {climb(&s, &s.light[0]), climb(&s, &s.light[1])};
+    int dx = ends[1].x - ends[0].x, dy = ends[1].y - ends[0].y;
+    int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+    /* between the pixels a source between four of them is looked at */
+    double corner = exp(-0.125 / (g->filter_sigma * g->filter_sigma));
+    double value = ends[1].value;
+    double least = fmax(value - fmax(SADDLE_SIGMA, SADDLE_SHARE * value),
+                        fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold);
+    grid_place between[MOST_PIXELS];
+    int count = 0;
+    double lowest = INFINITY;
+    for (int i = 1; i < steps && count < MOST_PIXELS; i++, count++) {
+        double t = (double)i / steps;
+        grid_place *p = &between[count];
+        p->x = ends[0].x + (int)lround(t * dx);
+        p->y = ends[0].y + (int)lround(t * dy);
+        p->value = output_of(&s, p->x, p->y);
+        lowest = fmin(lowest, p->value);
+    }
+    const bst_generator_filter *filter = &g->filters[faint->as_streak];
+    double certain = CERTAIN_SIGMAS * sqrt(filter->variance + filter->shot * fmax(lowest, 0.0));
+    if (count > 0 && fabs(lowest - least) < certain) {
+        add_noise(&s, faint, ends, between, count);
+        for (int i = 0; i < count; i++) {
+            lowest = i == 0 ? between[0].value : fmin(lowest, between[i].value);
+        }
+    }
+    return lowest < least;
+}
