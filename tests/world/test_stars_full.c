@@ -3,6 +3,9 @@
 
 #include "sim/world/stars.h"
 
+/* Stars that bright_stars_table.inc leaves with V 15, since their light is in their primary's. */
+enum { COMPANIONS = 4 };
+
 static void test_counts_of_the_full_catalogue(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -32,7 +35,7 @@ static void test_counts_of_the_full_catalogue(void **state) {
                                             NULL, 0, &below));
         bst_assert_ok(
             &ctx, bst_stars_query(&ctx, stars, pole, BST_PI, known[i].v, 2000.0, NULL, 0, &within));
-        assert_in_range(known[i].count, below, within);
+        assert_in_range(known[i].count - COMPANIONS, below, within);
     }
     bst_stars_close(stars);
 }
