@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/nav_motion.h"
 #include "tracker/sky_of_detection.h"
 
 /* Least SNR of a source, share of the threshold that its maximum passed: 2.5 sigma below, at 5. */
@@ -445,7 +446,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     }
     double seconds = (double)tick / t->tick_rate_hz;
     double dt = t->started ? (double)(tick - t->last_tick) / t->tick_rate_hz : 0.0;
-    bst_light light = {.velocity_mps = input->nav->velocity_bary_mps, .sun_m = input->nav->sun_m};
+    bst_light light =
+        bst_nav_light_after(input->nav, seconds - (double)input->nav->tick / t->tick_rate_hz);
     frame_attitude attitude;
     find_attitude(t, d, &light, tick, dt, &attitude);
     t->event_count = 0;
