@@ -176,8 +176,9 @@ typedef struct frame_attitude {
     bool usable;
 } frame_attitude;
 
-static void solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
-                           bst_attitude_solution *out) {
+/* Returns the number of t->stars that were looked at. */
+static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
+                          bst_attitude_solution *out) {
     int count = 0;
     for (int i = 0; i < d->count && count < MAX_STARS; i++) {
         const bst_detection *item = &d->items[i];
@@ -188,7 +189,8 @@ static void solve_attitude(bst_tracker *t, const bst_detections *d, const bst_li
             continue;
         }
         t->stars[count++] =
-            (bst_attitude_star){.apparent_gcrf = bst_light_apparent_star(light, icrs),
+            (bst_attitude_star){.id = item->star_id,
+                                .apparent_gcrf = bst_light_apparent_star(light, icrs),
                                 .x_px = item->x_px,
                                 .y_px = item->y_px,
                                 .cov_xx = item->cov_xx,
@@ -200,6 +202,7 @@ static void solve_attitude(bst_tracker *t, const bst_detections *d, const bst_li
     bool given = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w > 0.5;
     bst_attitude_solve(&t->camera, &t->attitude_params, given ? q : d->q_telemetry_from_gcrf,
                        t->stars, count, out);
+    return count;
 }
 
 static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
@@ -207,7 +210,7 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     memset(out, 0, sizeof *out);
     bst_quat q_telemetry = bst_quat_unit(d->q_telemetry_from_gcrf);
     bst_attitude_solution solution;
-    solve_attitude(t, d, light, &solution);
+    int star_count = solve_attitude(t, d, light, &solution);
     bst_attitude_error_predict(&t->error, &t->error_params, dt_s);
     out->fix.tick = tick;
     out->fix.stars = solution.stars_used;
@@ -224,6 +227,9 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
                                                 out->fix.error_cam_rad, solution.covariance);
         out->fix.valid = out->usable;
+        if (out->usable) {
+            bst_attitude_shared_update(&t->shared, &solution, t->stars, star_count);
+        }
     } else {
         bst_vec3 rate;
         bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
@@ -235,6 +241,7 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
             bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
     }
     out->fix.q_cam_from_gcrf = out->q_cam_from_gcrf;
+    out->fix.shared = bst_attitude_shared_get(&t->shared);
     for (int i = 0; i < 3; i++) {
         out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
     }
