@@ -11,6 +11,7 @@
 #include "imgproc/windows.h"
 #include "imgproc/wings.h"
 #include "sim/world/knowledge.h"
+#include "sim/world/nav_motion.h"
 #include "sim/world/photometry.h"
 
 enum { PORT_FRAME, PORT_PREDICTIONS, PORT_POINTING, PORT_NAV, PORT_DETECTIONS, PORT_COUNT };
@@ -218,14 +219,13 @@ static void add_stars(imgproc_module *m, const bst_frame_message *message, const
  * bright stars. False: everywhere. */
 static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
                                const bst_frame_message *message, const bst_motion *motion,
-                               const bst_nav_telemetry *nav, const bst_predictions *predictions,
+                               const bst_light *light, const bst_predictions *predictions,
                                const bst_quat *q_cam_from_gcrf, bool *use) {
     *use = false;
     m->windows.count = 0;
     if (!l->ip || message->exposure_id % m->config->full_every < m->config->full_frames) {
         return BST_OK;
     }
-    bst_light light = {nav->velocity_bary_mps, nav->sun_m};
     double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
     double age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     double half = 0.5 * (double)m->config->window_px, scale = bst_camera_scale_rad(&m->camera);
@@ -233,7 +233,7 @@ static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
     for (int i = 0; i < predictions->count; i++) {
         const bst_prediction *p = &predictions->items[i];
         bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(p->direction_gcrf, age_s, p->rate_gcrf_radps));
-        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_light_aberrate(&light, d));
+        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_light_aberrate(light, d));
         double x, y, reach = half + 5.0 * p->sigma_rad / scale;
         bool added = bst_camera_project(&m->camera, v, &x, &y) &&
                      bst_windows_add(&m->windows, &message->window, x, y, reach, reach);
@@ -243,7 +243,7 @@ static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
         return BST_OK;
     }
     int expected = 0;
-    BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, &light, message->window, 0.0,
+    BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, light, message->window, 0.0,
                            bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR), &expected));
     add_stars(m, message, motion, expected);
     *use = bst_windows_settle(&m->windows, &message->window, message->binning, WINDOWS_SHARE);
@@ -264,15 +264,14 @@ static int in_windows(imgproc_module *m, int expected) {
 
 /* *q_cam_from_gcrf: in, the attitude that is believed; out, that of the stars, when any are
  * identified. */
-static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
-                           const bst_nav_telemetry *nav, bst_window window, bool locked,
-                           bst_detections *out, bst_quat *q_cam_from_gcrf) {
-    bst_light light = {nav->velocity_bary_mps, nav->sun_m};
+static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const bst_light *light,
+                           bst_window window, bool locked, bst_detections *out,
+                           bst_quat *q_cam_from_gcrf) {
     double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
     double v_limit =
         m->plugged ? bst_plugged_v_limit(m->plugged, snr) : bst_imgproc_v_limit(l->ip, snr);
     int expected = 0;
-    BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, &light, window,
+    BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, light, window,
                            m->config->search_radius_px, v_limit, &expected));
     expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
     bst_starid_options options = {m->config->search_radius_px,
@@ -302,7 +301,7 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
                 out->items[i].star_id = 0;
             }
         }
-        BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, &light, window,
+        BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, light, window,
                                m->config->search_radius_px, v_limit, &expected));
         expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
         options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
@@ -478,6 +477,12 @@ static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l
     }
 }
 
+/* Of the middle of an exposure: navigation may be later by the read-out. */
+static bst_light light_at(const imgproc_module *m, const bst_nav_telemetry *nav,
+                          double middle_tick) {
+    return bst_nav_light_after(nav, (middle_tick - (double)nav->tick) / (double)m->tick_rate_hz);
+}
+
 static bst_status process(imgproc_module *m, struct bst_step *step,
                           const bst_frame_message *message) {
     bst_ctx *ctx = bst_step_ctx(step);
@@ -502,9 +507,11 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
 
     m->windows.count = 0;
     out->windows = 0;
-    if (m->config->track_windows && locked && nav.payload && !nav.stale) {
+    bool navigated = nav.payload && !nav.stale;
+    bst_light light = navigated ? light_at(m, nav.payload, middle) : (bst_light){0};
+    if (m->config->track_windows && locked && navigated) {
         bool use;
-        BST_TRY(plan_windows(m, ctx, l, message, &motion, nav.payload, predictions,
+        BST_TRY(plan_windows(m, ctx, l, message, &motion, &light, predictions,
                              &out->q_cam_from_gcrf, &use));
         m->windows.count = use ? m->windows.count : 0;
         out->windows = m->windows.count;
@@ -517,10 +524,9 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         .window = message->window,
         .streak_px = m->plugged ? bst_plugged_streak_px(m->plugged) : bst_imgproc_streak_px(l->ip),
         .predictions = predictions};
-    if (oriented && nav.payload && !nav.stale && !smeared) {
-        const bst_nav_telemetry *n = nav.payload;
-        BST_TRY(identify(m, l, ctx, n, message->window, locked, out, &known.q_cam_from_gcrf));
-        known.light = (bst_light){n->velocity_bary_mps, n->sun_m};
+    if (oriented && navigated && !smeared) {
+        BST_TRY(identify(m, l, ctx, &light, message->window, locked, out, &known.q_cam_from_gcrf));
+        known.light = light;
         known.oriented = out->stars_identified > 0;
     }
     bst_zero_point zero_point = bst_photometer_zero_point(&m->photometer);

@@ -33,7 +33,7 @@ from typing import Any, Iterator, Optional
 import numpy as np
 import zmq
 
-VERSION = 2
+VERSION = 3
 PIXELS_AT = 4096  # of a slot in shared memory
 
 # Members of each message's record, then of its items: name:type, x for an array. A test compares

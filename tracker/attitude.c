@@ -220,6 +220,28 @@ static bool solve(const bst_camera *camera, const bst_attitude_params *params,
            step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved);
 }
 
+/* What a star does to the attitude. */
+static void measure_pull(const star_residual *s, const double covariance[3][3],
+                         bst_attitude_star *star) {
+    double g[3], gain[3] = {0.0}, info[3][3];
+    for (int k = 0; k < 3; k++) {
+        double a = s->w[0] * s->j[0][k] + s->w[1] * s->j[1][k];
+        double b = s->w[1] * s->j[0][k] + s->w[2] * s->j[1][k];
+        g[k] = a * s->r[0] + b * s->r[1];
+        for (int m = 0; m < 3; m++) {
+            info[k][m] = a * s->j[0][m] + b * s->j[1][m];
+        }
+    }
+    star->leverage = 0.0;
+    for (int k = 0; k < 3; k++) {
+        for (int m = 0; m < 3; m++) {
+            gain[k] += covariance[k][m] * g[m];
+            star->leverage += k < 2 ? 0.5 * covariance[k][m] * info[m][k] : 0.0;
+        }
+    }
+    star->pull_rad = (bst_vec3){gain[0], gain[1], gain[2]};
+}
+
 void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *params,
                         bst_quat q_start, bst_attitude_star *stars, int count,
                         bst_attitude_solution *out) {
@@ -239,6 +261,7 @@ void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *par
         if (stars[i].weight > 0.0 && evaluate(camera, extra_px2, q, &stars[i], &s)) {
             out->chi2 += s.chi2;
             square += s.r[0] * s.r[0] + s.r[1] * s.r[1];
+            measure_pull(&s, (const double(*)[3])out->covariance, &stars[i]);
         }
     }
     out->q_cam_from_gcrf = q;

@@ -6,10 +6,15 @@
 
 /* One identified star: where it should be seen and where it was. */
 typedef struct bst_attitude_star {
+    uint32_t id;                   /* of the catalogue; not looked at */
     bst_vec3 apparent_gcrf;        /* unit, light deflection and aberration included */
     double x_px, y_px;             /* centroid */
     double cov_xx, cov_xy, cov_yy; /* px^2 */
-    double weight;                 /* out: 1 where the star was used, 0 where it was rejected */
+    /* out */
+    double weight;     /* 1 where the star was used, 0 where it was rejected */
+    bst_vec3 pull_rad; /* where it was used: what its residual alone turns the attitude by, camera
+                          axes; their sum over all stars is zero */
+    double leverage;   /* where it was used: its share in the two angles about camera x and y */
 } bst_attitude_star;
 
 typedef struct bst_attitude_params {

@@ -1,7 +1,7 @@
 /* What one frame's view of the sky and the cue say of a track. */
 #include <math.h>
 
-#include "sim/world/kepler.h"
+#include "sim/world/nav_motion.h"
 #include "tracker/sight.h"
 #include "tracker/tracker_internal.h"
 
@@ -75,16 +75,9 @@ bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track,
 
 bool bst_frame_observer(const bst_tracker *t, const bst_nav_telemetry *nav, double seconds,
                         bst_od_observer *out) {
-    bst_ctx quiet = {0}; /* telemetry that is no orbit is no failure of the run */
     double dt = seconds - (double)nav->tick / t->tick_rate_hz;
     out->time_s = seconds;
     out->earth_bary_mps = bst_vec3_sub(nav->velocity_bary_mps, nav->velocity_gcrf_mps);
-    if (bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
-                             nav->velocity_gcrf_mps, dt, &out->position_m,
-                             &out->velocity_mps) != BST_OK) {
-        /* at rest, or straight up: no orbit; frames are a second apart or so */
-        out->position_m = bst_vec3_axpy(nav->position_gcrf_m, dt, nav->velocity_gcrf_mps);
-        out->velocity_mps = nav->velocity_gcrf_mps;
-    }
+    bst_nav_state_after(nav, dt, &out->position_m, &out->velocity_mps);
     return isfinite(bst_vec3_norm(out->position_m)) && bst_vec3_norm(out->position_m) > 0.0;
 }

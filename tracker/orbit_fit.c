@@ -325,8 +325,13 @@ static bool reject(work *w, bool *changed, double *scratch) {
 static bst_status check(work *w) {
     for (int i = 0; i < w->count; i++) {
         const bst_od_observation *o = &w->items[i];
-        double low = o->cov_12 / o->cov_11, rest = o->cov_22 - low * o->cov_12;
-        if (!(o->cov_11 > 0.0) || !(rest > 0.0) || !isfinite(o->cov_11 + rest)) {
+        /* what it does not share with others */
+        const double(*s)[2] = o->shared_rad;
+        double c11 = o->cov_11 - s[0][0] * s[0][0] - s[0][1] * s[0][1];
+        double c12 = o->cov_12 - s[0][0] * s[1][0] - s[0][1] * s[1][1];
+        double c22 = o->cov_22 - s[1][0] * s[1][0] - s[1][1] * s[1][1];
+        double low = c12 / c11, rest = c22 - low * c12;
+        if (!(c11 > 0.0) || !(rest > 0.0) || !isfinite(c11 + rest)) {
             return bst_fail(w->ctx, BST_ERR_ARGUMENT,
                             "observation %d: its covariance is not positive definite", i);
         }
@@ -337,7 +342,7 @@ static bst_status check(work *w) {
                             "than the one before",
                             i);
         }
-        w->white[i][0] = 1.0 / sqrt(o->cov_11);
+        w->white[i][0] = 1.0 / sqrt(c11);
         w->white[i][2] = 1.0 / sqrt(rest);
         w->white[i][1] = -low * w->white[i][2];
         w->used[i] = true;
@@ -345,34 +350,50 @@ static bst_status check(work *w) {
     return BST_OK;
 }
 
+/* What shared errors make of the solution's covariance, as consider parameters (Tapley, Schutz and
+ * Born, Statistical Orbit Determination, 2004, section 6.3): the sum over all pairs of observations
+ * of g_i g_j^T exp(-|change between them|), with g_i what the error of one moves the solution by.
+ * The exponential makes it one pass: a = exp(-change) a + g, sum += g a^T + a g^T - g g^T. */
+static void add_shared(const work *w, const double l[PARAMETERS][PARAMETERS],
+                       const double size[PARAMETERS], double p[PARAMETERS][PARAMETERS]) {
+    double past[2][PARAMETERS] = {{0.0}};
+    for (int i = 0; i < w->count; i++) {
+        const double *white = w->white[i];
+        const double(*s)[2] = w->items[i].shared_rad;
+        double kept = exp(-w->items[i].shared_change);
+        for (int c = 0; c < 2; c++) {
+            double *a = past[c], b[PARAMETERS] = {0.0}, g[PARAMETERS];
+            const double r[2] = {white[0] * s[0][c], white[1] * s[0][c] + white[2] * s[1][c]};
+            for (int k = 0; k < PARAMETERS && w->used[i]; k++) {
+                b[k] = w->slope[i][k][0] * r[0] + w->slope[i][k][1] * r[1];
+            }
+            solve(l, size, b, g);
+            for (int k = 0; k < PARAMETERS; k++) {
+                a[k] = kept * a[k] + g[k];
+            }
+            for (int k = 0; k < PARAMETERS; k++) {
+                for (int m = 0; m < PARAMETERS; m++) {
+                    p[k][m] += g[k] * a[m] + a[k] * g[m] - g[k] * g[m];
+                }
+            }
+        }
+    }
+}
+
 /* Covariance of the chart's steps: that of the observations' independent errors times the variance
- * factor, and what their shared errors make of the solution, as consider parameters (Tapley, Schutz
- * and Born, Statistical Orbit Determination, 2004, section 6.3). */
+ * factor, and that of their shared errors. */
 static void covariance_of_steps(const work *w, const double l[PARAMETERS][PARAMETERS],
                                 const double size[PARAMETERS], double variance_factor,
                                 double p[PARAMETERS][PARAMETERS]) {
-    double shared[2][PARAMETERS];
-    for (int c = 0; c < 2; c++) {
-        double b[PARAMETERS] = {0.0};
-        for (int i = 0; i < w->count; i++) {
-            const double *white = w->white[i];
-            const double(*s)[2] = w->items[i].shared_rad;
-            const double r[2] = {white[0] * s[0][c], white[1] * s[0][c] + white[2] * s[1][c]};
-            for (int k = 0; k < PARAMETERS && w->used[i]; k++) {
-                b[k] += w->slope[i][k][0] * r[0] + w->slope[i][k][1] * r[1];
-            }
-        }
-        solve(l, size, b, shared[c]);
-    }
     for (int k = 0; k < PARAMETERS; k++) {
         double unit[PARAMETERS] = {0.0}, x[PARAMETERS];
         unit[k] = 1.0;
         solve(l, size, unit, x);
         for (int i = 0; i < PARAMETERS; i++) {
-            p[i][k] =
-                variance_factor * x[i] + shared[0][i] * shared[0][k] + shared[1][i] * shared[1][k];
+            p[i][k] = variance_factor * x[i];
         }
     }
+    add_shared(w, l, size, p);
 }
 
 /* Observations and residuals of the solution in numbers. */

@@ -8,12 +8,14 @@
 typedef struct bst_od_observation {
     bst_od_observer observer; /* at mid exposure, when the light arrived */
     bst_vec3 direction;       /* unit, geometric: aberration removed, light time contained */
-    /* of its independent error, in the tangent axes at the direction (bst_tangent_at), rad^2 */
+    /* of its error, the shared part below included, in the tangent axes at the direction
+     * (bst_tangent_at), rad^2 */
     double cov_11, cov_12, cov_22;
-    /* of what all observations of the arc have in common: the error along axis i is the sum of
-     * shared_rad[i][c] times two numbers of mean 0 and variance 1, the same for all. Not fitted,
+    /* of what it has in common with the others: the error along axis i is the sum of
+     * shared_rad[i][c] times two numbers of mean 0 and variance 1, whose correlation with those of
+     * the observation before is exp(-shared_change); 0: the same for all of the arc. Not fitted,
      * but part of the covariance. */
-    double shared_rad[2][2];
+    double shared_rad[2][2], shared_change;
 } bst_od_observation;
 
 typedef struct bst_od_options {

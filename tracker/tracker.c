@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/nav_motion.h"
 #include "tracker/sky_of_detection.h"
 
 /* Least SNR of a source, share of the threshold that its maximum passed: 2.5 sigma below, at 5. */
@@ -175,8 +176,9 @@ typedef struct frame_attitude {
     bool usable;
 } frame_attitude;
 
-static void solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
-                           bst_attitude_solution *out) {
+/* Returns the number of t->stars that were looked at. */
+static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
+                          bst_attitude_solution *out) {
     int count = 0;
     for (int i = 0; i < d->count && count < MAX_STARS; i++) {
         const bst_detection *item = &d->items[i];
@@ -187,7 +189,8 @@ static void solve_attitude(bst_tracker *t, const bst_detections *d, const bst_li
             continue;
         }
         t->stars[count++] =
-            (bst_attitude_star){.apparent_gcrf = bst_light_apparent_star(light, icrs),
+            (bst_attitude_star){.id = item->star_id,
+                                .apparent_gcrf = bst_light_apparent_star(light, icrs),
                                 .x_px = item->x_px,
                                 .y_px = item->y_px,
                                 .cov_xx = item->cov_xx,
@@ -199,6 +202,7 @@ static void solve_attitude(bst_tracker *t, const bst_detections *d, const bst_li
     bool given = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w > 0.5;
     bst_attitude_solve(&t->camera, &t->attitude_params, given ? q : d->q_telemetry_from_gcrf,
                        t->stars, count, out);
+    return count;
 }
 
 static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
@@ -206,7 +210,7 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     memset(out, 0, sizeof *out);
     bst_quat q_telemetry = bst_quat_unit(d->q_telemetry_from_gcrf);
     bst_attitude_solution solution;
-    solve_attitude(t, d, light, &solution);
+    int star_count = solve_attitude(t, d, light, &solution);
     bst_attitude_error_predict(&t->error, &t->error_params, dt_s);
     out->fix.tick = tick;
     out->fix.stars = solution.stars_used;
@@ -223,6 +227,9 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
                                                 out->fix.error_cam_rad, solution.covariance);
         out->fix.valid = out->usable;
+        if (out->usable) {
+            bst_attitude_shared_update(&t->shared, &solution, t->stars, star_count);
+        }
     } else {
         bst_vec3 rate;
         bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
@@ -234,6 +241,7 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
             bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
     }
     out->fix.q_cam_from_gcrf = out->q_cam_from_gcrf;
+    out->fix.shared = bst_attitude_shared_get(&t->shared);
     for (int i = 0; i < 3; i++) {
         out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
     }
@@ -445,7 +453,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     }
     double seconds = (double)tick / t->tick_rate_hz;
     double dt = t->started ? (double)(tick - t->last_tick) / t->tick_rate_hz : 0.0;
-    bst_light light = {.velocity_mps = input->nav->velocity_bary_mps, .sun_m = input->nav->sun_m};
+    bst_light light =
+        bst_nav_light_after(input->nav, seconds - (double)input->nav->tick / t->tick_rate_hz);
     frame_attitude attitude;
     find_attitude(t, d, &light, tick, dt, &attitude);
     t->event_count = 0;

@@ -5,6 +5,7 @@
 #include "sim/astro/bodies.h"
 #include "tracker/attitude.h"
 #include "tracker/attitude_error.h"
+#include "tracker/attitude_shared.h"
 #include "tracker/target.h"
 #include "tracker/tracker.h"
 
@@ -41,6 +42,7 @@ struct bst_tracker {
     size_t event_capacity;
     int event_count;
     bst_attitude_error error;
+    bst_attitude_shared shared;
     bst_target target;
     bst_tracker_cue cue_before;
     bool started, attitude_was_lost;

@@ -1,5 +1,6 @@
 #include "sim/app/run_observations.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -65,7 +66,8 @@ static const char query[] =
     " t.cov_d1_d1_rad2, t.cov_d1_d2_rad2, t.cov_d2_d2_rad2, f.attitude_valid,"
     " f.attitude_q_cam_from_gcrf_x, f.attitude_q_cam_from_gcrf_y, f.attitude_q_cam_from_gcrf_z,"
     " f.attitude_q_cam_from_gcrf_w, f.attitude_sigma_x_arcsec, f.attitude_sigma_y_arcsec,"
-    " f.attitude_sigma_z_arcsec, t.x_px, t.y_px, d.cov_xx_px2, d.cov_xy_px2, d.cov_yy_px2,"
+    " f.attitude_sigma_z_arcsec, f.attitude_shared, t.x_px, t.y_px, d.cov_xx_px2, d.cov_xy_px2, "
+    "d.cov_yy_px2,"
     " g.end_tick - g.start_tick"
     " FROM tracks t JOIN track_frames f ON f.sensor = t.sensor AND f.exposure_id = t.exposure_id"
     " LEFT JOIN detections d ON d.sensor = t.sensor AND d.exposure_id = t.exposure_id"
@@ -88,7 +90,8 @@ enum {
     VALID = COV_D + 3,
     ATTITUDE,
     SIGMA = ATTITUDE + 4,
-    X_PX = SIGMA + 3,
+    SHARED = SIGMA + 3,
+    X_PX,
     Y_PX,
     COV_PX,
     EXPOSURE = COV_PX + 3
@@ -102,12 +105,9 @@ typedef struct gathering {
     bst_run_track track;
     bst_run_observation *items;
     int64_t capacity;
+    bst_vec3 boresight; /* of the latest item */
+    double share;       /* of the attitude's variance that frames share, latest */
 } gathering;
-
-/* Of the standard deviation of an attitude from stars: what stays the same from frame to frame, as
- * neighbours that stars are not resolved from move their places. Measured with generator and
- * images, 0.1 to 0.3, by tests/e2e/test_orbit_consistency.py. */
-static const double SHARED_ATTITUDE = 0.2;
 
 /* The detection's place on the sky, and what its errors and the attitude's make of it. */
 static void measure(const gathering *g, const bst_rows *rows, const bst_light *light,
@@ -137,16 +137,38 @@ static void measure(const gathering *g, const bst_rows *rows, const bst_light *l
         j[0][i] = bst_vec3_dot(column, axes.e1);
         j[1][i] = bst_vec3_dot(column, axes.e2);
     }
-    for (int axis = 0; axis < 2; axis++) { /* about camera x and y */
-        double shared = SHARED_ATTITUDE * bst_rows_real(rows, SIGMA + axis) * BST_ARCSEC_RAD;
-        out->shared_rad[0][axis] = j[0][2 + axis] * shared;
-        out->shared_rad[1][axis] = j[1][2 + axis] * shared;
+    for (int axis = 0; axis < 2; axis++) { /* about camera x and y; all of it: see set_shared */
+        double sigma = bst_rows_real(rows, SIGMA + axis) * BST_ARCSEC_RAD;
+        out->shared_rad[0][axis] = j[0][2 + axis] * sigma;
+        out->shared_rad[1][axis] = j[1][2 + axis] * sigma;
     }
     for (int i = 0; i < 5; i++) {
         for (int k = 0; k < 5; k++) {
             out->cov_11 += j[0][i] * c[i][k] * j[0][k];
             out->cov_12 += j[0][i] * c[i][k] * j[1][k];
             out->cov_22 += j[1][i] * c[i][k] * j[1][k];
+        }
+    }
+}
+
+/* Stars leave the field as the camera turns: of two fields that are d apart along a side s they
+ * have the part 1 - d / s in common, of which the exponential has the same integral. */
+static double change_of_stars(gathering *g, const bst_rows *rows) {
+    const bst_camera *c = g->camera;
+    bst_vec3 before = g->boresight;
+    bst_quat q = {bst_rows_real(rows, ATTITUDE), bst_rows_real(rows, ATTITUDE + 1),
+                  bst_rows_real(rows, ATTITUDE + 2), bst_rows_real(rows, ATTITUDE + 3)};
+    g->boresight = bst_quat_rotate(bst_quat_conj(bst_quat_unit(q)), (bst_vec3){0.0, 0.0, 1.0});
+    double side = 0.5 * (double)(c->width_px + c->height_px) * bst_camera_scale_rad(c);
+    return g->track.count > 1 ? 2.0 * bst_vec3_angle(before, g->boresight) / side : 0.0;
+}
+
+/* The shared part of the attitude's errors: its share as the last frame has it, which has seen the
+ * most. */
+static void set_shared(gathering *g) {
+    for (int64_t i = 0; i < g->track.count && !g->filtered; i++) {
+        for (int k = 0; k < 4; k++) {
+            g->items[i].od.shared_rad[k / 2][k % 2] *= sqrt(g->share);
         }
     }
 }
@@ -189,6 +211,8 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_rows *rows) {
     } else {
         bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
         measure(g, rows, &light, &o->od);
+        o->od.shared_change = change_of_stars(g, rows);
+        g->share = bst_rows_real(rows, SHARED);
     }
     g->track.target = g->track.target || bst_rows_int(rows, TARGET) != 0;
     if (g->track.count == 1) {
@@ -201,6 +225,7 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_rows *rows) {
 
 static bst_status hand_over(bst_ctx *ctx, gathering *g, bst_run_track_fn take, void *user) {
     g->track.items = g->items;
+    set_shared(g);
     bst_status status = g->track.count > 0 ? take(user, ctx, &g->track) : BST_OK;
     g->track = (bst_run_track){.sensor = g->track.sensor};
     return status;

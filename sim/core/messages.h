@@ -350,6 +350,8 @@ typedef struct bst_attitude_fix {
                                  q_telemetry */
     double sigma_rad[3];      /* standard deviation about camera x, y, z */
     double rms_px;            /* of the star residuals */
+    double shared; /* share of the variance about camera x and y that successive frames have in
+                      common, 0 to 1: errors that stay with the stars */
 } bst_attitude_fix;
 
 /* tracks (queue): the tracker's state after one frame, valid at `tick` (mid-exposure). */

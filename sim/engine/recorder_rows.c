@@ -414,6 +414,7 @@ bst_status bst_recorder_track_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         put_real(&r, a->sigma_rad[i] * (a->valid ? ARCSEC : NAN));
     }
     put_real(&r, a->valid ? a->rms_px : NAN);
+    put_real(&r, a->valid ? a->shared : NAN);
     BST_TRY(append(ctx, recorder, BST_TABLE_TRACK_FRAMES, &r));
     for (int i = 0; i < t->count; i++) {
         BST_TRY(track_row(ctx, recorder, sensor, t, &t->items[i]));

@@ -211,6 +211,8 @@ static const bst_column track_frame_columns[] = {
     REAL("attitude_sigma_y_arcsec", "arcsec", "about camera y"),
     REAL("attitude_sigma_z_arcsec", "arcsec", "about the boresight"),
     REAL("attitude_rms_px", "px", "residuals of the stars"),
+    REAL("attitude_shared", "",
+         "share of the variance about camera x and y that successive frames have in common"),
 };
 static const bst_column track_columns[] = {
     SENSOR,

@@ -285,6 +285,7 @@ static const bst_wire_field tracks[] = {
     VECTOR(bst_tracks, FIX(error_cam_rad), "rad", "Telemetry's error, camera axes."),
     REALS(bst_tracks, FIX(sigma_rad), 3, "rad", "1 sigma about camera x, y, z."),
     REAL(bst_tracks, FIX(rms_px), "px", "Of the stars' residuals."),
+    BOUNDED(bst_tracks, FIX(shared), 0, 1, "", "Variance that successive frames share, of all."),
     NUMBER(bst_tracks, target_id, 0, "Track of interest, 0 when none."),
     INT(bst_tracks, at_rest, 0, MANY, "", "Followed and at rest among the stars: not told."),
     COUNT(bst_tracks, "Items."),

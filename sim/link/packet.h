@@ -2,7 +2,7 @@
  * and for frames the pixels. The header is one flat object of at most BST_LINK_HEADER_BYTES bytes
  * whose last member is "crc32c", a checksum of all bytes before that member:
  *
- *   {"version":2,"type":"done","tick":6000,"sequence":3,"step":2,"instance":"a/b/control",
+ *   {"version":3,"type":"done","tick":6000,"sequence":3,"step":2,"instance":"a/b/control",
  *    "lengths":[16],"crcs":["0a1b2c3d"],"crc32c":"8899aabb"} */
 #ifndef BST_LINK_PACKET_H
 #define BST_LINK_PACKET_H
@@ -12,7 +12,7 @@
 enum {
     /* rises with every change to the layout or the meaning of a message or a header's member; a
        peer of another version is refused (test link_wire) */
-    BST_LINK_VERSION = 2,
+    BST_LINK_VERSION = 3,
     BST_LINK_HEADER_BYTES = 1024, /* of a header, at most */
     BST_LINK_PARTS = 2,           /* after the header: the payload, the pixels */
     BST_LINK_INSTANCE_BYTES = 160,

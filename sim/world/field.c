@@ -453,12 +453,17 @@ static bst_image_moments smear_of(const bst_field *field, const bst_source *sour
     return m;
 }
 
+/* Variance that a path has beyond a straight one, over the PSF's, from which on it is followed:
+ * what a bend across is taken for a Gaussian's then makes 2 % of a long streak's signal-to-noise
+ * ratio. */
+static const double BENT = 0.08;
+
 /* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
  * pixel's own width, widened along and across the way from the first to the last
  * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
- */
-static void blur(const bst_camera *camera, const bst_source *source, const bst_image_moments *m,
-                 double dx, double dy, double *along, double *across) {
+ * Returns the variance before that widening. */
+static double blur(const bst_camera *camera, const bst_source *source, const bst_image_moments *m,
+                   double dx, double dy, double *along, double *across) {
     double psf = bst_camera_psf_sigma_px(camera), sigma;
     if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
         psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
@@ -469,6 +474,7 @@ static void blur(const bst_camera *camera, const bst_source *source, const bst_i
     double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
     *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
     *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
+    return variance;
 }
 
 const bst_skylight_map *bst_field_background(const bst_field *field) {
@@ -483,10 +489,10 @@ double bst_field_background_e(const bst_field *field, const bst_truth *header, d
 
 /* What a rolling shutter sees of a source: it is exposed while the row where it is. */
 static bst_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
-                                       const bst_source *source, bst_window window, bst_quat *q_mid,
-                                       bst_truth_item *out) {
+                                       const bst_source *source, bst_window window, double u[2],
+                                       bst_quat *q_mid, bst_truth_item *out) {
     const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
-    double u[2], duration = track->time_s[track->count - 1];
+    double duration = track->time_s[track->count - 1];
     bst_row_source_times(field->camera, &rows, track, source, u);
     double middle = 0.5 * (u[0] + u[1]);
     const double when[3] = {u[0], middle, u[1]};
@@ -530,10 +536,11 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             .y_chief_px = NAN,
                             .x_centroid_px = NAN,
                             .y_centroid_px = NAN};
-    bst_image_moments image;
+    bst_image_moments image, path;
     bst_quat q_mid = field->q_mid;
+    double u[2] = {0.0, 1.0}; /* of the track, while the source is exposed */
     if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
-        image = place_in_rows(field, track, source, window, &q_mid, out);
+        image = place_in_rows(field, track, source, window, u, &q_mid, out);
     } else {
         (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
         (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
@@ -543,6 +550,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         image = source->rate ? bst_image_by_light(field->camera, track, source, 0.0, 1.0)
                              : smear_of(field, source);
     }
+    path = image;
     out->x_chief_px = image.x_mean;
     out->y_chief_px = image.y_mean;
     if (source->shape) {
@@ -559,11 +567,19 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
-    blur(camera, source, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px,
-         &along, &across);
+    double sharp = blur(camera, source, &image, out->x_end_px - out->x_start_px,
+                        out->y_end_px - out->y_start_px, &along, &across);
     if (isfinite(length) && variance > 0.0) {
         double square = bst_image_squared(sqrt(along * along + widened),
                                           sqrt(across * across + widened), length);
+        double excess = along * along + across * across - 2.0 * sharp;
+        if (excess > BENT * (sharp + widened)) {
+            /* a disc's own light widens the path */
+            double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
+            double exact = bst_image_squared_path(camera, track, source, u[0], u[1], &path, excess,
+                                                  sharp + widened + disc);
+            square = isfinite(exact) ? exact : square;
+        }
         out->snr = out->electrons * sqrt(square / variance);
     }
     if (source->occulted) {

@@ -1,6 +1,7 @@
 #include "sim/world/field_image.h"
 
 #include "sim/world/disc.h"
+#include "sim/world/los_track.h"
 #include "sim/world/psf.h"
 
 bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
@@ -125,4 +126,61 @@ double bst_image_squared(double along, double across, double length) {
                            : erf(a) / length -
                                  (2.0 * along / (length * length * root_pi)) * (1.0 - exp(-a * a));
     return line / (2.0 * root_pi * across);
+}
+
+double bst_image_squared_path(const bst_camera *camera, const bst_los_track *track,
+                              const bst_source *source, double u0, double u1,
+                              const bst_image_moments *moments, double excess_px2,
+                              double variance_px2) {
+    enum { FEWEST = 64, MOST = 256 };
+    const double step_px = 1.5;
+    /* twice the length of a straight path with these moments */
+    double wanted = 2.0 * sqrt(12.0 * (moments->xx + moments->yy)) / step_px;
+    int count = wanted < FEWEST ? FEWEST : wanted < MOST ? (int)wanted : MOST;
+    double x[MOST], y[MOST], w[MOST], total = 0.0, length = 0.0, line = 0.0;
+    double duration = track->time_s[track->count - 1], before = bst_source_light(source, u0);
+    for (int k = 0; k < count; k++) {
+        double u = u0 + (u1 - u0) * ((k + 0.5) / count);
+        double after = bst_source_light(source, u0 + (u1 - u0) * ((k + 1.0) / count));
+        bst_quat q = bst_track_attitude(track, u * duration);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x[k],
+                                &y[k])) {
+            return NAN;
+        }
+        w[k] = after - before;
+        total += w[k];
+        before = after;
+        double h = k > 0 ? hypot(x[k] - x[k - 1], y[k] - y[k - 1]) : 0.0;
+        length += h;
+        if (h > 0.0) {
+            double part = 0.5 * (w[k] + w[k - 1]);
+            line += part * part / h;
+        }
+    }
+    if (!(total > 0.0)) {
+        return NAN;
+    }
+    /* second differences: 6 times the variance of what is independent from place to place */
+    double rough = 0.0;
+    for (int k = 1; k + 1 < count; k++) {
+        double dx = x[k - 1] - 2.0 * x[k] + x[k + 1], dy = y[k - 1] - 2.0 * y[k] + y[k + 1];
+        rough += (dx * dx + dy * dy) / (6.0 * (count - 2));
+    }
+    if (rough > 0.5 * excess_px2) {
+        return NAN;
+    }
+    double norm = 1.0 / (total * total);
+    if (length > step_px * (count - 1)) {
+        return norm * line / (2.0 * sqrt(BST_PI * variance_px2));
+    }
+    double sum = 0.0, far = 36.0 * 2.0 * variance_px2;
+    for (int k = 0; k < count; k++) {
+        double row = 0.5 * w[k];
+        for (int i = k + 1; i < count; i++) {
+            double dx = x[i] - x[k], dy = y[i] - y[k], d2 = dx * dx + dy * dy;
+            row += d2 < far ? w[i] * exp(-0.25 * d2 / variance_px2) : 0.0;
+        }
+        sum += 2.0 * w[k] * row;
+    }
+    return norm * sum / (4.0 * BST_PI * variance_px2);
 }

@@ -174,6 +174,8 @@ static void shared_errors_count(void **state) {
                 for (int k = 0; k < 2; k++) {
                     items[i].shared_rad[k][k] = stated ? shared[k] : 0.0;
                 }
+                items[i].cov_11 += stated ? shared[0] * shared[0] : 0.0;
+                items[i].cov_22 += stated ? shared[1] * shared[1] : 0.0;
                 if (!stated) {
                     items[i].direction = bst_tangent_exp(
                         items[i].direction,
@@ -189,6 +191,51 @@ static void shared_errors_count(void **state) {
     print_message("NEES / 6: %.2f, stated %.3f\n", sum[0], sum[1]);
     assert_true(sum[0] > 1.5);
     bst_assert_close(sum[1], 1.0, 4.0 * sqrt(2.0 / (6.0 * RUNS))); /* four sigma */
+}
+
+/* Shared errors that change along the arc: a first-order autoregressive sequence (Box, Jenkins and
+ * Reinsel, 3.2.3). Taken for ones that stay, which move rates less, or for independent ones, they
+ * make the covariance too small. */
+static void shared_errors_change(void **state) {
+    (void)state;
+    enum { RUNS = 60, COUNT = 100 };
+    const scene s = {{0}, geo(), leo_eye(), EARTH, 0, 900, COUNT, 0.2 * ARCSEC};
+    const double shared = 0.1 * ARCSEC, change = 0.1, kept = exp(-change);
+    static bst_od_observation items[COUNT];
+    double sum[3] = {0.0};
+    for (int run = 0; run < RUNS; run++) {
+        bst_ctx ctx = {0};
+        double now[2] = {0.0};
+        observe(&s, 4000 + run, items);
+        for (int i = 0; i < COUNT; i++) {
+            bst_tangent axes = bst_tangent_at(items[i].direction);
+            bst_rng_key key = bst_rng_make_key((uint64_t)run, 0, "test", "change");
+            double draw[2], fresh = i > 0 ? sqrt(1.0 - kept * kept) : 1.0;
+            bst_rng_normal2(key, (uint64_t)i, 0, draw);
+            for (int k = 0; k < 2; k++) {
+                now[k] = kept * now[k] + fresh * draw[k];
+                items[i].shared_rad[k][k] = shared;
+            }
+            items[i].cov_11 += shared * shared;
+            items[i].cov_22 += shared * shared;
+            items[i].direction = bst_tangent_exp(
+                items[i].direction, bst_tangent_vector(&axes, shared * now[0], shared * now[1]));
+        }
+        for (int as = 0; as < 3; as++) { /* as it is, as if it stayed, as if it were independent */
+            for (int i = 0; i < COUNT; i++) {
+                items[i].shared_change = as == 0 ? change : 0.0;
+                items[i].shared_rad[0][0] = items[i].shared_rad[1][1] = as == 2 ? 0.0 : shared;
+            }
+            bst_od_solution got;
+            bst_assert_ok(
+                &ctx, bst_od_fit(&ctx, items, COUNT, &(bst_od_options){0}, &s.body, NULL, &got));
+            sum[as] += nees(&s, &got) / (6.0 * RUNS);
+        }
+    }
+    print_message("NEES / 6: %.3f, as if it stayed %.2f, as if independent %.2f\n", sum[0], sum[1],
+                  sum[2]);
+    bst_assert_close(sum[0], 1.0, 4.0 * sqrt(2.0 / (6.0 * RUNS))); /* four sigma */
+    assert_true(sum[1] > 1.5 && sum[2] > 1.5);
 }
 
 /* ------------------------------------------------------------------ textbook examples */
@@ -522,6 +569,7 @@ int main(void) {
         cmocka_unit_test(covariance_is_true),
         cmocka_unit_test(integrated_motion),
         cmocka_unit_test(shared_errors_count),
+        cmocka_unit_test(shared_errors_change),
         cmocka_unit_test(vallado_example_7_2),
         cmocka_unit_test(curtis_example_5_12),
         cmocka_unit_test(three_sights_in_the_orbits_plane),

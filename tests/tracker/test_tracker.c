@@ -532,6 +532,46 @@ static void predictions_hold(void **state) {
     world_close(&w);
 }
 
+/* Navigation of 4 s after the middle of the exposure, as a read-out leaves it: stars are aberrated
+ * by the velocity of the middle, from which a low circular orbit's has turned by 34 m/s, 24 mas. */
+static void late_navigation(void **state) {
+    (void)state;
+    static world w;
+    world_open(&w, 3, &plain);
+    const double r = 7.0e6, late_s = 4.0, v = sqrt(3.986004418e14 / r), turned = v / r * late_s;
+    const bst_vec3 earth = {-21000, 19000, 11000}, ahead = {-v, 0, 0};
+    w.light.velocity_mps = bst_vec3_add(earth, ahead);
+    bst_nav_telemetry late = {.tick = (int64_t)(late_s * RATE_HZ),
+                              .position_gcrf_m = {-r * sin(turned), r * cos(turned), 0},
+                              .velocity_gcrf_mps = {-v * cos(turned), -v * sin(turned), 0},
+                              .sun_m = nav.sun_m};
+    late.velocity_bary_mps = bst_vec3_add(earth, late.velocity_gcrf_mps);
+    bst_quat q = bst_quat_look(w.centre, w.e1);
+    bst_detections *d = w.detections;
+    *d = (bst_detections){.start_tick = -RATE_HZ / 4, .end_tick = RATE_HZ / 4};
+    d->q_telemetry_from_gcrf = d->q_cam_from_gcrf = q;
+    for (uint32_t i = 0; i < STARS; i++) {
+        bst_vec3 apparent = bst_light_apparent_star(&w.light, w.stars[i]);
+        double x, y;
+        if (bst_vec3_dot(w.stars[i], w.centre) > 0.9998 && project(q, apparent, &x, &y)) {
+            d->items[d->count++] = (bst_detection){.label = BST_LABEL_STAR,
+                                                   .star_id = i + 1,
+                                                   .x_px = x,
+                                                   .y_px = y,
+                                                   .cov_xx = 1e-4,
+                                                   .cov_yy = 1e-4};
+        }
+    }
+    bst_tracker_input input = {.detections = d, .nav = &late};
+    assert_int_equal(bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256),
+                     BST_TRACKER_USED);
+    assert_true(w.tracks->attitude.valid);
+    bst_vec3 off =
+        bst_quat_to_rotvec(bst_quat_mul(w.tracks->attitude.q_cam_from_gcrf, bst_quat_conj(q)));
+    bst_assert_close(hypot(off.x, off.y) / AS, 0.0, 1e-6); /* arcsec: rounding */
+    world_close(&w);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(main_scenario),
                                        cmocka_unit_test(dropped_frames),
@@ -544,6 +584,7 @@ int main(void) {
                                        cmocka_unit_test(a_frame_of_an_uneven_turn),
                                        cmocka_unit_test(a_bad_first_frame),
                                        cmocka_unit_test(vague_detections),
-                                       cmocka_unit_test(predictions_hold)};
+                                       cmocka_unit_test(predictions_hold),
+                                       cmocka_unit_test(late_navigation)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -198,6 +198,16 @@ static double brute_squared_image(int n, double sigma) {
     return sum;
 }
 
+static void expect_snr(scene *s, const bst_source *source, double variance, double tolerance) {
+    int n = dense_track(s, source, x_of, y_of);
+    double squared =
+        brute_squared_image(n, bst_camera_psf_sigma_px(bst_world_camera(s->world, 0, 0)));
+    bst_truth_item item;
+    bst_field_truth_item(s->field, &s->track, source, full, 1, &s->truth, &item);
+    bst_assert_close(item.electrons, source->electrons_per_s * 0.5, 1e-9);
+    bst_assert_close(item.snr / (item.electrons * sqrt(squared / variance)), 1, tolerance);
+}
+
 static void snr_is_that_of_the_smeared_image(void **state) {
     (void)state;
     scene s = make_scene(GX5);
@@ -213,13 +223,30 @@ static void snr_is_that_of_the_smeared_image(void **state) {
         /* by hand: 4.44645 e/s of sky, 0.5 e/s of dark current, half a second */
         bst_assert_close(variance, 0.5 * (4.44645 + 0.5) + 64, 1e-4);
         for (int i = 0; i < s.count; i += 1 + s.count / 12) {
-            int n = dense_track(&s, &s.sources[i], x_of, y_of);
-            double squared =
-                brute_squared_image(n, bst_camera_psf_sigma_px(bst_world_camera(s.world, 0, 0)));
-            bst_truth_item item;
-            bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
-            bst_assert_close(item.electrons, s.sources[i].electrons_per_s * 0.5, 1e-9);
-            bst_assert_close(item.snr / (item.electrons * sqrt(squared / variance)), 1, 0.02);
+            expect_snr(&s, &s.sources[i], variance, 0.02);
+        }
+    }
+    free_scene(&s);
+}
+
+/* A line of sight that moves by some px and swings across in half waves. */
+static void snr_of_bent_streaks(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    const double cases[][4] = {/* line, swing, half waves, roll in degrees */
+                               {30, 4, 1, 0}, {60, 12, 1, 0},  {40, 6, 2, 0},  {0, 10, 1, 0},
+                               {0, 30, 2, 0}, {150, 40, 1, 0}, {20, 20, 3, 0}, {10, 6, 1, 2}};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        s.history->written = 0;
+        for (int64_t tick = 0; tick <= 3000; tick += 6) {
+            double u = (double)tick / 3000.0;
+            double x = cases[c][0] * (u - 0.5), y = cases[c][1] * sin(BST_PI * cases[c][2] * u);
+            push(s.history, tick, turned(s.target, x, y, cases[c][3] * BST_DEG_RAD * (u - 0.5)));
+        }
+        query(&s, 3000, full);
+        double variance = s.truth.background_e + s.truth.dark_e + 64;
+        for (int i = 0; i < s.count; i += 1 + s.count / 6) {
+            expect_snr(&s, &s.sources[i], variance, 0.03);
         }
     }
     free_scene(&s);
@@ -557,6 +584,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mean_places_are_those_of_the_light),
         cmocka_unit_test(snr_is_that_of_the_smeared_image),
+        cmocka_unit_test(snr_of_bent_streaks),
         cmocka_unit_test(truth_follows_the_optics),
         cmocka_unit_test(no_star_is_missed),
         cmocka_unit_test(an_exposure_of_no_length),
