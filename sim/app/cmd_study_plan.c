@@ -143,7 +143,8 @@ static void print_axes(const bst_study *study) {
         }
     }
     for (int a = study->swept_count; a < study->axis_count; a++) {
-        printf("  %-28s dispersed\n", study->axes[a].name);
+        printf("  %-28s %s\n", study->axes[a].name,
+               study->axes[a].population ? "population, a number of objects" : "dispersed");
     }
 }
 
