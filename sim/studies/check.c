@@ -196,6 +196,7 @@ static bst_status try_populations(checker *c, const bst_study_place *place) {
     for (int i = 0; i < count && status == BST_OK; i++) {
         double ends[2];
         bst_population_reach(&list->items[i], ends);
+        status = try_objects(c, place, &list->items[i], i);
         for (int e = 0; e < 2 && status == BST_OK; e++) {
             c->values[first + i] = number_value(ends[e]);
             status = try_values(c, place, first + i, false);
@@ -205,9 +206,6 @@ static bst_status try_populations(checker *c, const bst_study_place *place) {
             status = try_values(c, place, first + i, true);
         }
         c->values[first + i] = (bst_study_value){.given = false};
-        if (status == BST_OK) {
-            status = try_objects(c, place, &list->items[i], i);
-        }
     }
     bst_populations_free(&own);
     return status;

@@ -72,11 +72,6 @@ static bst_status read_one(bst_ctx *ctx, const bst_study *study, const bst_json 
     const cJSON *dispersions = cJSON_GetObjectItemCaseSensitive(node, "dispersions");
     for (int i = 0; i < count; i++) {
         snprintf(out->axes[i].where, sizeof out->axes[i].where, "%s/dispersions/%d", out->where, i);
-        if (*list[i].name) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "%s: %s/name: values of objects have no column (allowed: none)",
-                            study->file, out->axes[i].where);
-        }
         BST_TRY(bst_study_read_dispersion(ctx, study, cJSON_GetArrayItem(dispersions, i), &list[i],
                                           &out->axes[i]));
         snprintf(out->axes[i].name, sizeof out->axes[i].name, "%.60s", out->axes[i].path);
@@ -425,9 +420,11 @@ static bst_status add_population(bst_ctx *ctx, const bst_study *study, const bst
         status = add_object(ctx, p, orbit, k, objects);
         cJSON_Delete(orbit);
         for (int d = 0; d < p->config.dispersions.count && status == BST_OK; d++) {
-            bst_study_value drawn = probe && k == 0 && d == probe->dispersion
-                                        ? probe->value
-                                        : draw_of(study, p, d, counter, k);
+            bool probed = probe && k == 0;
+            if (probed && d != probe->dispersion) {
+                continue; /* so that the probe alone is to blame */
+            }
+            bst_study_value drawn = probed ? probe->value : draw_of(study, p, d, counter, k);
             status = disperse(ctx, study, p, &drawn, d, first + k, json);
         }
     }

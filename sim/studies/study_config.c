@@ -57,31 +57,40 @@ static const bst_config_desc sweep_table[] = {
     BST_LIST(bst_sweep_config, axes, bst_axis_config, axis_table, 1, 64, NULL, "What is varied."),
     BST_CONFIG_END};
 
+/* What every dispersion has beside where its numbers go. */
+#define DISPERSION_LAW                                                                             \
+    BST_ENUM(                                                                                      \
+        bst_dispersion_config, distribution, distributions, "\"uniform\"",                         \
+        "What the numbers are drawn from: evenly or evenly in the logarithm between from and "     \
+        "to; a normal distribution; a table of values."),                                          \
+        BST_REAL(bst_dispersion_config, from, "", -1e300, 1e300, "0",                              \
+                 "Least value (uniform, log_uniform)."),                                           \
+        BST_REAL(bst_dispersion_config, to, "", -1e300, 1e300, "0",                                \
+                 "Greatest value (uniform, log_uniform)."),                                        \
+        BST_REAL(bst_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),           \
+        BST_REAL(bst_dispersion_config, sigma, "", 0, 1e100, "0", "Standard deviation (normal)."), \
+        BST_REAL(bst_dispersion_config, truncate_sigma, "", 0.1, 8, "4",                           \
+                 "Draws further than so many standard deviations from the mean are made again "    \
+                 "(normal)."),                                                                     \
+        RAW("values", "[]", "What is drawn from, of any type (table)."),                           \
+        RAW("weights", "[]",                                                                       \
+            "How often each value comes, relative to the others; []: all alike "                   \
+            "(table)."),                                                                           \
+        BST_ENUM(                                                                                  \
+            bst_dispersion_config, apply, applies, "\"set\"",                                      \
+            "What becomes of the number that is drawn: it takes the place of the scenario's, is "  \
+            "added to it, or multiplies it."),                                                     \
+        BST_BOOL(bst_dispersion_config, integer, "false", "Round the result to a whole number.")
+
 static const bst_config_desc dispersion_table[] = {
-    BST_STRING(bst_dispersion_config, path, NULL, PATH_DOC),
-    RAW("also", "[]", ALSO_DOC),
-    BST_STRING(bst_dispersion_config, name, "\"\"", NAME_DOC),
-    BST_ENUM(bst_dispersion_config, distribution, distributions, "\"uniform\"",
-             "What the numbers are drawn from: evenly or evenly in the logarithm between from and "
-             "to; a normal distribution; a table of values."),
-    BST_REAL(bst_dispersion_config, from, "", -1e300, 1e300, "0",
-             "Least value (uniform, log_uniform)."),
-    BST_REAL(bst_dispersion_config, to, "", -1e300, 1e300, "0",
-             "Greatest value (uniform, log_uniform)."),
-    BST_REAL(bst_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),
-    BST_REAL(bst_dispersion_config, sigma, "", 0, 1e100, "0", "Standard deviation (normal)."),
-    BST_REAL(bst_dispersion_config, truncate_sigma, "", 0.1, 8, "4",
-             "Draws further than so many standard deviations from the mean are made again "
-             "(normal)."),
-    RAW("values", "[]", "What is drawn from, of any type (table)."),
-    RAW("weights", "[]",
-        "How often each value comes, relative to the others; []: all alike "
-        "(table)."),
-    BST_ENUM(bst_dispersion_config, apply, applies, "\"set\"",
-             "What becomes of the number that is drawn: it takes the place of the scenario's, is "
-             "added to it, or multiplies it."),
-    BST_BOOL(bst_dispersion_config, integer, "false", "Round the result to a whole number."),
-    BST_CONFIG_END};
+    BST_STRING(bst_dispersion_config, path, NULL, PATH_DOC), RAW("also", "[]", ALSO_DOC),
+    BST_STRING(bst_dispersion_config, name, "\"\"", NAME_DOC), DISPERSION_LAW, BST_CONFIG_END};
+
+static const bst_config_desc object_dispersion_table[] = {
+    BST_STRING(bst_dispersion_config, path, NULL,
+               "What is varied: a JSON pointer into the object, such as \"/orbit/offset_rtn_m/0\" "
+               "or \"/brightness/standard_v_mag\"."),
+    RAW("also", "[]", ALSO_DOC), DISPERSION_LAW, BST_CONFIG_END};
 
 static const bst_config_desc number_table[] = {
     BST_ENUM(bst_number_config, distribution, number_laws, "\"fixed\"",
@@ -107,10 +116,8 @@ const bst_config_desc bst_population_table[] = {
                "File of element sets, relative to the study's folder. Each object then has the "
                "orbit of a satellite of it, drawn with equal probability, none twice and none that "
                "the scenario lists. \"\": the orbit is that of \"object\"."),
-    BST_LIST(bst_population_config, dispersions, bst_dispersion_config, dispersion_table, 0, 64,
-             "[]",
-             "Numbers that are drawn anew for each object of each run; paths are JSON pointers "
-             "into the object, such as \"/orbit/offset_rtn_m/0\"."),
+    BST_LIST(bst_population_config, dispersions, bst_dispersion_config, object_dispersion_table, 0,
+             64, "[]", "Numbers that are drawn anew for each object of each run."),
     BST_CONFIG_END};
 
 const bst_config_desc bst_study_pd_table[] = {

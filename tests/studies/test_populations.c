@@ -425,7 +425,7 @@ static void test_errors(void **state) {
          "/populations/0/dispersions/1/path: \"/a\" is dispersed by /populations/0/dispersions/0"},
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"dispersions\": [{\"path\": \"/a\", "
          "\"name\": \"b\", \"to\": 1}]}",
-         "/populations/0/dispersions/0/name: values of objects have no column"},
+         "/populations/0/dispersions/0/name: unknown key"},
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"nummer\": 2}",
          "/populations/0/nummer: unknown key; did you mean \"number\""},
     };
