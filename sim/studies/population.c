@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/astro/elements.h"
+#include "sim/astro/tle.h"
 #include "sim/core/rng.h"
 #include "sim/studies/study_internal.h"
 
@@ -285,18 +285,26 @@ void bst_population_reach(const bst_population *p, double ends[2]) {
 
 /* ------------------------------------------------------------------ satellites of a file */
 
-/* Marks the satellite of an "orbit"; *left: how many are not marked. */
-static void mark(const cJSON *owner, const bst_population_file *file, bool *taken, int *left) {
-    const cJSON *orbit = cJSON_GetObjectItemCaseSensitive(owner, "orbit");
+/* Catalogue number of an "orbit"; 0: none. */
+static int number_of(const cJSON *orbit) {
     const cJSON *norad = cJSON_GetObjectItemCaseSensitive(orbit, "norad");
-    if (cJSON_IsNumber(norad)) {
-        int number = norad->valueint;
-        const int *found =
-            bsearch(&number, file->norad, (size_t)file->count, sizeof number, compare_numbers);
-        if (found && !taken[found - file->norad]) {
-            taken[found - file->norad] = true;
-            (*left)--;
-        }
+    const cJSON *line = cJSON_GetObjectItemCaseSensitive(orbit, "tle_line1");
+    int number = cJSON_IsNumber(norad) ? norad->valueint : 0;
+    if (cJSON_IsString(line) && strlen(line->valuestring) > 6 &&
+        !bst_tle_decode_number(line->valuestring + 2, &number)) {
+        number = 0;
+    }
+    return number;
+}
+
+/* Marks the satellite of an object or observer; *left: how many are not marked. */
+static void mark(const cJSON *owner, const bst_population_file *file, bool *taken, int *left) {
+    int number = number_of(cJSON_GetObjectItemCaseSensitive(owner, "orbit"));
+    const int *found =
+        bsearch(&number, file->norad, (size_t)file->count, sizeof number, compare_numbers);
+    if (found && !taken[found - file->norad]) {
+        taken[found - file->norad] = true;
+        (*left)--;
     }
 }
 

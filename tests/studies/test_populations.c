@@ -286,9 +286,10 @@ static void test_satellites(void **state) {
     bst_study s, again;
     bst_ctx ctx = {0};
     write_sets(SATELLITES);
-    fixture_write(folder, "scenario.json",
-                  "{\"name\": \"base\", \"world\": {\"objects\": [{\"name\": \"x\", \"orbit\": "
-                  "{\"norad\": 103}}]}, \"observers\": [{\"orbit\": {\"norad\": 107}}]}");
+    fixture_write(
+        folder, "scenario.json",
+        "{\"name\": \"base\", \"world\": {\"objects\": [{\"name\": \"x\", \"orbit\": "
+        "{\"norad\": 103}}]}, \"observers\": [{\"orbit\": {\"tle_line1\": \"1 00107U\"}}]}");
     open_study(
         "\"replicates\": 3000, \"populations\": [{\"name\": \"a\", \"number\": {\"count\": 4}, "
         "\"elements_file\": \"sets.csv\"}, {\"name\": \"b\", \"number\": {\"count\": 6}, "
