@@ -32,6 +32,9 @@
 /* Stars of the catalogue in the field at any time of the run: half of them are found and identified
  * in frames of smeared stars, and a run whose field has 8 to 12 loses its attitude. */
 #define LEAST_STARS 14
+/* They are smeared over some pixels. */
+#define STAR_SNR 20.0
+#define FAINTEST_STARS_V_MAG 12.5
 #define SIDE_PX 1024
 #define SMALL_SIDE_PX 512
 #define MOON_CLEAR_DEG 3.0
@@ -221,6 +224,12 @@ static bst_status count_stars(bst_ctx *ctx, const search *s, int i, const bst_ne
     bst_time_utc(scene->epoch, &jd1, &jd2);
     double year = 2000.0 + (jd1 - 2451545.0 + jd2) / 365.25;
     int last = i + (int)ceil(scene->duration_s / LOOK_S);
+    double faintest = FAINTEST_STARS_V_MAG;
+    while (snr_of(s->request->aperture_m, scene->pixel_arcsec, faintest, scene->exposure_s) <
+               STAR_SNR &&
+           faintest > 0.0) {
+        faintest -= 0.25;
+    }
     *enough = true;
     if (scene->rate_arcsec_per_s <= STARLESS_RATE_ARCSEC_PER_S) {
         return BST_OK;
@@ -228,7 +237,7 @@ static bst_status count_stars(bst_ctx *ctx, const search *s, int i, const bst_ne
     for (int k = i; k <= last && *enough; k++) {
         int count = 0;
         BST_TRY(bst_stars_query(ctx, bst_world_stars(s->world), s->looks[k].direction, radius,
-                                ENOUGH_STARS_V_MAG, year, NULL, 0, &count));
+                                faintest, year, NULL, 0, &count));
         *enough = count >= LEAST_STARS;
     }
     return BST_OK;
