@@ -7,6 +7,7 @@
 
 #include "sim/astro/tle.h"
 #include "sim/core/rng.h"
+#include "sim/core/text.h"
 #include "sim/studies/study_internal.h"
 
 /* Draws of one object come from counters of their own: some may be made again. */
@@ -415,12 +416,14 @@ static bst_status add_population(bst_ctx *ctx, const bst_study *study, const bst
     int first = cJSON_GetArraySize(objects);
     bst_status status = BST_OK;
     if (*file->file && (!taken || left < number)) {
-        status = taken ? bst_fail(ctx, BST_ERR_CONFIG,
-                                  "%s: %s/number: %d objects of the %d satellites in %s, of which "
-                                  "the scenario has %d already",
-                                  study->file, p->where, number, file->count, file->file,
-                                  file->count - left)
-                       : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the objects of a run");
+        status =
+            taken ? bst_fail(ctx, BST_ERR_CONFIG,
+                             "%s: %s/number: %s of the %d satellites in %s, of which the "
+                             "scenario has %d already",
+                             study->file, p->where,
+                             bst_count_text((char[BST_COUNT_TEXT]){0}, number, "object", "objects"),
+                             file->count, file->file, file->count - left)
+                  : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the objects of a run");
     }
     for (int k = 0; k < number && status == BST_OK; k++) {
         cJSON *orbit =
