@@ -13,6 +13,8 @@
 /* Draws of one object come from counters of their own: some may be made again. */
 #define OBJECT_COUNTER(k) ((uint64_t)(k) << 16)
 enum { MOST_ATTEMPTS = 1 << 16 };
+/* Of the objects of a population: as of a document. */
+static const double MOST_VALUES = 8e6;
 
 bool bst_population_pointer(const char *pointer) {
     return strncmp(pointer, "/populations/", strlen("/populations/")) == 0;
@@ -36,6 +38,14 @@ static bst_status check_number(bst_ctx *ctx, const bst_study *study, const bst_p
     return BST_OK;
 }
 
+static double count_values(const cJSON *node) {
+    double count = 1.0;
+    for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
+        count += count_values(item);
+    }
+    return count;
+}
+
 static bst_status check_object(bst_ctx *ctx, const bst_study *study, const bst_population *p) {
     char path[64];
     snprintf(path, sizeof path, "%s/object", p->where);
@@ -47,6 +57,13 @@ static bst_status check_object(bst_ctx *ctx, const bst_study *study, const bst_p
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "%s: %s/name: the objects are called %s_1, %s_2 and so on; leave it out",
                         study->file, path, p->config.name, p->config.name);
+    }
+    double reach[2];
+    bst_population_reach(p, reach);
+    if (reach[1] * count_values(p->object) > MOST_VALUES) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s: %.0f objects of %.0f values each (allowed: %.0f values in all)",
+                        study->file, p->where, reach[1], count_values(p->object), MOST_VALUES);
     }
     bool orbit = cJSON_GetObjectItemCaseSensitive(p->object, "orbit") != NULL;
     if (orbit == (*p->config.elements_file != '\0')) {
@@ -367,12 +384,18 @@ static bst_status disperse(bst_ctx *ctx, const bst_study *study, const bst_popul
                            const bst_study_value *drawn, int dispersion, int index,
                            bst_json *json) {
     const bst_study_axis *axis = &p->axes[dispersion];
-    char pointer[340];
-    snprintf(pointer, sizeof pointer, "/world/objects/%d%s", index, axis->path);
-    BST_TRY(bst_study_put(ctx, study, axis, drawn, pointer, json));
-    for (const cJSON *also = axis->also ? axis->also->child : NULL; also; also = also->next) {
-        snprintf(pointer, sizeof pointer, "/world/objects/%d%.300s", index, also->valuestring);
+    const cJSON *also = axis->also ? axis->also->child : NULL;
+    const char *own = axis->path;
+    while (own) {
+        char pointer[512];
+        int n = snprintf(pointer, sizeof pointer, "/world/objects/%d%s", index, own);
+        if (n < 0 || (size_t)n >= sizeof pointer) {
+            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: a pointer is too long", study->file,
+                            axis->where);
+        }
         BST_TRY(bst_study_put(ctx, study, axis, drawn, pointer, json));
+        own = also ? also->valuestring : NULL;
+        also = also ? also->next : NULL;
     }
     return BST_OK;
 }

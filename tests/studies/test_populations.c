@@ -398,6 +398,11 @@ static void test_check(void **state) {
     }
 }
 
+#define ZEROS_10 "0, 0, 0, 0, 0, 0, 0, 0, 0, 0"
+#define ZEROS_50 ZEROS_10 ", " ZEROS_10 ", " ZEROS_10 ", " ZEROS_10 ", " ZEROS_10
+#define ZEROS_250 ZEROS_50 ", " ZEROS_50 ", " ZEROS_50 ", " ZEROS_50 ", " ZEROS_50
+#define ZEROS_1000 ZEROS_250 ", " ZEROS_250 ", " ZEROS_250 ", " ZEROS_250
+
 static void test_errors(void **state) {
     (void)state;
     static const char *const cases[][2] = {
@@ -427,13 +432,16 @@ static void test_errors(void **state) {
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"dispersions\": [{\"path\": \"/a\", "
          "\"name\": \"b\", \"to\": 1}]}",
          "/populations/0/dispersions/0/name: unknown key"},
+        {"{\"name\": \"t\", \"object\": {\"orbit\": {}, \"l\": [" ZEROS_1000
+         "]}, \"number\": {\"count\": 10000}}",
+         "/populations/0: 10000 objects of 1003 values each (allowed: 8000000 values in all)"},
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"nummer\": 2}",
          "/populations/0/nummer: unknown key; did you mean \"number\""},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         bst_ctx ctx = {0};
         bst_study s;
-        char body[1024];
+        char body[4000];
         snprintf(body, sizeof body, "\"populations\": [%s]", cases[i][0]);
         write_sets(2);
         assert_int_not_equal(fixture_open(&ctx, folder, body, &s), BST_OK);
@@ -442,6 +450,9 @@ static void test_errors(void **state) {
         }
     }
 }
+
+#define LONG_20 "aaaaaaaaaaaaaaaaaaaa"
+#define LONG_100 LONG_20 LONG_20 LONG_20 LONG_20 LONG_20
 
 /* What is wrong with a run is said with its place. */
 static void test_run_errors(void **state) {
@@ -454,6 +465,10 @@ static void test_run_errors(void **state) {
         {"\"populations\": [{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"dispersions\": "
          "[{\"path\": \"/albedo\", \"to\": 1, \"apply\": \"multiply\"}]}]",
          "/populations/0/dispersions/0: /world/objects/0/albedo has no number"},
+        {"\"populations\": [{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"dispersions\": "
+         "[{\"path\": \"/b\", \"to\": 1, \"also\": [\"/" LONG_100 LONG_100 LONG_100 LONG_100
+             LONG_100 "\"]}]}]",
+         "/populations/0/dispersions/0: a pointer is too long"},
         {"\"sweeps\": [{\"axes\": [{\"path\": \"/populations/0/name\", \"values\": [\"u\"]}]}], "
          "\"populations\": [{\"name\": \"t\", \"object\": {\"orbit\": {}}}]",
          "cannot be varied"},
