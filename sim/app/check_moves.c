@@ -1,6 +1,7 @@
 #include "sim/app/check_moves.h"
 
 #include <math.h>
+#include <stdio.h>
 
 typedef struct limits {
     double rate_radps, accel_radps2; /* INFINITY: none */
@@ -47,6 +48,12 @@ static double dwell_of(const bst_mount_moves *m) {
     return (double)m->control->dwell_frames * m->period_s + m->exposure_s;
 }
 
+/* "0.25 s", "1709 s": three digits, and no exponent. */
+static const char *seconds_text(double seconds, char out[32]) {
+    snprintf(out, 32, seconds < 100.0 ? "%.3g s" : "%.0f s", seconds);
+    return out;
+}
+
 double bst_search_place_s(const bst_mount_moves *moves) {
     double step = step_of(moves);
     return step > 0.0 ? bst_mount_slew_s(moves->mount, step) + dwell_of(moves) : 0.0;
@@ -59,12 +66,13 @@ static int check_search(bst_ctx *ctx, const char *name, const bst_mount_moves *m
         return 0;
     }
     limits low = lowest(m->mount);
+    char text[32];
     double slew = bst_mount_slew_s(m->mount, step);
     bst_log(ctx, BST_LOG_WARNING,
-            "%s: the mount takes %.3g s for a step of the search (%.3g deg at %.3g deg/s^2 and at "
+            "%s: the mount takes %s for a step of the search (%.3g deg at %.3g deg/s^2 and at "
             "most %.3g deg/s): with dwell_frames of %lld, dwell_timeout_s of %g s is over first; "
             "raise its limits, or give control a dwell_timeout_s of %.0f s",
-            name, slew, step / BST_DEG_RAD, low.accel_radps2 / BST_DEG_RAD,
+            name, seconds_text(slew, text), step / BST_DEG_RAD, low.accel_radps2 / BST_DEG_RAD,
             low.rate_radps / BST_DEG_RAD, (long long)m->control->dwell_frames, allowed,
             ceil(slew + dwell_of(m) + m->period_s));
     return 1;
@@ -85,12 +93,13 @@ static int check_scan(bst_ctx *ctx, const char *name, const bst_mount_moves *m) 
         return 1;
     }
     if (turn * rate > length) {
-        bst_log(
-            ctx, BST_LOG_WARNING,
-            "%s: the mount takes %.3g s to turn a scan round at its ends (%.3g deg/s^2), longer "
-            "than the scan from end to end (%.3g s); lower scan_rate_arcsec_per_s or raise the "
-            "mount's acceleration limit",
-            name, turn, low.accel_radps2 / BST_DEG_RAD, length / rate);
+        char text[2][32];
+        bst_log(ctx, BST_LOG_WARNING,
+                "%s: the mount takes %s to turn a scan round at its ends (%.3g deg/s^2), longer "
+                "than the scan from end to end (%s); lower scan_rate_arcsec_per_s or raise the "
+                "mount's acceleration limit",
+                name, seconds_text(turn, text[0]), low.accel_radps2 / BST_DEG_RAD,
+                seconds_text(length / rate, text[1]));
         return 1;
     }
     return 0;
@@ -107,10 +116,11 @@ int bst_check_first_slew(bst_ctx *ctx, const char *name, const bst_mount_moves *
     if (slew <= moves->duration_s) {
         return 0;
     }
+    char text[32];
     bst_log(ctx, BST_LOG_WARNING,
-            "%s: the slew to the cue, %.3g deg, takes %.4g s at the mount's %.3g deg/s^2 and at "
+            "%s: the slew to the cue, %.3g deg, takes %s at the mount's %.3g deg/s^2 and at "
             "most %.3g deg/s, and the run %g s; raise its limits, or start nearer to the cue",
-            name, angle_rad / BST_DEG_RAD, slew, low.accel_radps2 / BST_DEG_RAD,
+            name, angle_rad / BST_DEG_RAD, seconds_text(slew, text), low.accel_radps2 / BST_DEG_RAD,
             low.rate_radps / BST_DEG_RAD, moves->duration_s);
     return 1;
 }

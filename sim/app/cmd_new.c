@@ -70,7 +70,8 @@ static bst_status take(bst_ctx *ctx, const char *option, const char *file,
     } else {
         snprintf(out->name, sizeof out->name, "NORAD %d", elements->norad);
     }
-    return BST_OK;
+    bst_status status = bst_tle_format(ctx, elements, out->line1, out->line2);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "--%s %.300s", option, file);
 }
 
 /* What is looked for in the shipped element sets, and what was found. */

@@ -131,6 +131,14 @@ static void print_time(double seconds) {
     }
 }
 
+static void print_bytes(double bytes) {
+    if (bytes < 1e10) {
+        printf(bytes < 1e7 ? "%.1f MB" : "%.0f MB", 1e-6 * bytes);
+    } else {
+        printf("%.1f GB", 1e-9 * bytes);
+    }
+}
+
 static void print_axes(const bst_study *study) {
     static const char *const designs[] = {"grid", "list", "latin hypercube", "one at a time",
                                           "morris"};
@@ -143,7 +151,8 @@ static void print_axes(const bst_study *study) {
         }
     }
     for (int a = study->swept_count; a < study->axis_count; a++) {
-        printf("  %-28s dispersed\n", study->axes[a].name);
+        printf("  %-28s %s\n", study->axes[a].name,
+               study->axes[a].population ? "population, a number of objects" : "dispersed");
     }
 }
 
@@ -173,9 +182,12 @@ void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, in
     }
     double all = (bytes + row_bytes) * (double)study->runs;
     double room = (double)bst_run_free_bytes(out);
-    printf("  disk: about %.3g MB", 1e-6 * all);
+    printf("  disk: about ");
+    print_bytes(all);
     if (room >= 0.0) {
-        printf(" of %.3g MB that are free%s", 1e-6 * room,
+        printf(" of ");
+        print_bytes(room);
+        printf(" that are free%s",
                all > room ? ": NOT ENOUGH; choose another folder with --out" : "");
     }
     printf("\n  results: %s\n", out);

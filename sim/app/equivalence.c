@@ -11,6 +11,7 @@
 #include "sim/app/pairing.h"
 #include "sim/app/watch.h"
 #include "sim/core/rng.h"
+#include "sim/core/text.h"
 #include "sim/io/manifest.h"
 
 /* Edges of the bins of SNR; sources below the first are not looked for. */
@@ -234,8 +235,8 @@ bst_status bst_equivalence_run(bst_ctx *ctx, const bst_equivalence_options *o, b
         }
     }
     if (status == BST_OK) {
-        printf("%s, %d runs each: image, generator, 95 %% interval over runs\n", o->scenario,
-               o->seeds);
+        printf("%s, %s each: image, generator, 95 %% interval over runs\n", o->scenario,
+               bst_count_text((char[BST_COUNT_TEXT]){0}, o->seeds, "run", "runs"));
         *equivalent = judge_all(sums, sums + seeds, o->seeds, chosen, list);
         cJSON_AddStringToObject(root, "scenario", o->scenario);
         cJSON_AddNumberToObject(root, "runs", o->seeds);

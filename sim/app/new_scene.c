@@ -29,6 +29,12 @@
 #define FEW_STARS_FAST_ARCSEC 10.0
 /* Slower targets are followed by the attitude telemetry alone. */
 #define STARLESS_RATE_ARCSEC_PER_S 60.0
+/* Stars of the catalogue in the field at any time of the run: half of them are found and identified
+ * in frames of smeared stars, and a run whose field has 8 to 12 loses its attitude. */
+#define LEAST_STARS 14
+/* They are smeared over some pixels. */
+#define STAR_SNR 20.0
+#define FAINTEST_STARS_V_MAG 12.5
 #define SIDE_PX 1024
 #define SMALL_SIDE_PX 512
 #define MOON_CLEAR_DEG 3.0
@@ -209,6 +215,34 @@ static bool fit_field(search *s, bst_vec3 direction, bst_new_scene *out) {
     return false;
 }
 
+/* Whether the field has the stars for an attitude at all times of the run that begins at look i. */
+static bst_status count_stars(bst_ctx *ctx, const search *s, int i, const bst_new_scene *scene,
+                              bool *enough) {
+    /* of the same area as the square field */
+    double radius = scene->side_px * scene->pixel_arcsec * BST_ARCSEC_RAD / sqrt(BST_PI);
+    double jd1, jd2;
+    bst_time_utc(scene->epoch, &jd1, &jd2);
+    double year = 2000.0 + (jd1 - 2451545.0 + jd2) / 365.25;
+    int last = i + (int)ceil(scene->duration_s / LOOK_S);
+    double faintest = FAINTEST_STARS_V_MAG;
+    while (snr_of(s->request->aperture_m, scene->pixel_arcsec, faintest, scene->exposure_s) <
+               STAR_SNR &&
+           faintest > 0.0) {
+        faintest -= 0.25;
+    }
+    *enough = true;
+    if (scene->rate_arcsec_per_s <= STARLESS_RATE_ARCSEC_PER_S) {
+        return BST_OK;
+    }
+    for (int k = i; k <= last && *enough; k++) {
+        int count = 0;
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(s->world), s->looks[k].direction, radius,
+                                faintest, year, NULL, 0, &count));
+        *enough = count >= LEAST_STARS;
+    }
+    return BST_OK;
+}
+
 /* The run that begins at look i; false: something is in the way or it is too faint. */
 static bool scene_at(search *s, int i, bst_new_scene *out) {
     const bst_new_request *q = s->request;
@@ -378,7 +412,7 @@ static bst_status choose(bst_ctx *ctx, search *s, bst_new_judge judge, void *use
     for (int i = 0; i < s->count; i++) {
         s->cost[i] = scene_at(s, i, out) ? cost_of(out) : (double)INFINITY;
     }
-    for (int judged = 0; judged < MOST_JUDGED; judged++) {
+    for (int judged = 0; judged < MOST_JUDGED;) {
         int best = 0;
         bool holds = false;
         for (int i = 1; i < s->count; i++) {
@@ -387,6 +421,13 @@ static bst_status choose(bst_ctx *ctx, search *s, bst_new_judge judge, void *use
         if (isinf(s->cost[best]) || !scene_at(s, best, out)) {
             break;
         }
+        BST_TRY(count_stars(ctx, s, best, out, &holds));
+        if (!holds) {
+            s->few_stars++;
+            s->cost[best] = INFINITY;
+            continue;
+        }
+        judged++;
         BST_TRY(judge(user, ctx, out, &holds, why));
         if (holds) {
             return BST_OK;

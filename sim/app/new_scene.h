@@ -4,14 +4,15 @@
 
 #include <stdio.h>
 
-#include "sim/astro/elements.h"
+#include "sim/astro/tle.h"
 #include "sim/core/status.h"
 
 /* One satellite and the file of its element set. */
 typedef struct bst_new_satellite {
     bst_elements elements;
-    char file[4096]; /* full path */
-    char name[64];   /* in the scenario */
+    char file[4096];                                         /* full path */
+    char line1[BST_TLE_CHARS + 1], line2[BST_TLE_CHARS + 1]; /* the set as a scenario has it */
+    char name[64];                                           /* in the scenario */
 } bst_new_satellite;
 
 typedef struct bst_new_request {

@@ -36,9 +36,12 @@ static void put_head(FILE *f, const bst_new_request *q, const bst_new_scene *s) 
             utc, s->duration_s);
 }
 
-static void put_orbit(FILE *f, const char *before, const bst_new_satellite *one) {
-    put_text(f, before, one->file, "");
-    fprintf(f, ", \"norad\": %d},\n", one->elements.norad);
+static void put_orbit(FILE *f, const char *indent, const bst_new_satellite *one) {
+    fprintf(f, "%s\"orbit\": {\n%s    \"source\": \"sgp4\",\n%s    ", indent, indent, indent);
+    put_text(f, "\"tle_line1\": ", one->line1, ",\n");
+    fprintf(f, "%s    ", indent);
+    put_text(f, "\"tle_line2\": ", one->line2, "\n");
+    fprintf(f, "%s},\n", indent);
 }
 
 static void put_camera(FILE *f, const bst_new_request *q, const bst_new_scene *s) {
@@ -167,14 +170,13 @@ void bst_new_scene_write(FILE *f, const bst_new_request *q, const bst_new_scene 
             "                \"description\": \"A sphere of this cross-section and albedo; "
             "brightness can be a standard magnitude or a light curve, too.\",\n");
     put_text(f, "                \"name\": ", q->target.name, ",\n");
-    put_orbit(f,
-              "                \"orbit\": {\"source\": \"sgp4\", \"elements_file\": ", &q->target);
+    put_orbit(f, "                ", &q->target);
     fprintf(f,
             "                \"area_m2\": %g,\n                \"albedo\": %g\n            }\n"
             "        ]\n    },\n    \"observers\": [\n        {\n",
             BST_NEW_AREA_M2, BST_NEW_ALBEDO);
     put_text(f, "            \"name\": ", q->observer_label, ",\n");
-    put_orbit(f, "            \"orbit\": {\"source\": \"sgp4\", \"elements_file\": ", &q->observer);
+    put_orbit(f, "            ", &q->observer);
     fprintf(f,
             "            \"sensors\": [\n                {\n"
             "                    \"name\": \"telescope\",\n");

@@ -159,7 +159,10 @@ static void put_identity(FILE *out, const bst_study_view *v) {
         const bst_study_axis_view *a = &v->axes[i];
         char values[400], role[64];
         describe_axis(v, a, values);
-        snprintf(role, sizeof role, "%s%s%s", a->swept ? "sweep" : "dispersion",
+        snprintf(role, sizeof role, "%s%s%s",
+                 a->swept        ? "sweep"
+                 : a->population ? "population"
+                                 : "dispersion",
                  a->swept ? ", " : "", a->swept ? a->design : "");
         fputs("<tr>", out);
         put_cell(out, false, a->name);

@@ -9,7 +9,8 @@ enum { BST_STUDY_LEVELS = 64, BST_STUDY_WORD = 64 };
 /* Something that was varied. Values that are no numbers are told by their number in `words`. */
 typedef struct bst_study_axis_view {
     char name[BST_STUDY_WORD], path[256], design[32];
-    bool swept;       /* else a dispersion */
+    bool swept; /* else a dispersion or a population */
+    bool population;
     bool is_text;     /* values are numbers of `words` */
     bool logarithmic; /* drawn so: positive numbers over more than a decade, evenly in logarithms */
     char (*words)[BST_STUDY_WORD];

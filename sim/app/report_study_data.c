@@ -86,8 +86,13 @@ static bst_status add_axis(bst_ctx *ctx, bst_study_view *v, const char *name, co
 }
 
 static bst_status take_axis(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
-    return add_axis(ctx, v, bst_rows_text(rows, 0), bst_rows_text(rows, 1), bst_rows_text(rows, 3),
-                    strcmp(bst_rows_text(rows, 2), "sweep") == 0);
+    int before = v->axis_count;
+    BST_TRY(add_axis(ctx, v, bst_rows_text(rows, 0), bst_rows_text(rows, 1), bst_rows_text(rows, 3),
+                     strcmp(bst_rows_text(rows, 2), "sweep") == 0));
+    if (v->axis_count > before) {
+        v->axes[before].population = strcmp(bst_rows_text(rows, 2), "population") == 0;
+    }
+    return BST_OK;
 }
 
 static bst_status take_scenario(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {

@@ -90,7 +90,9 @@ static bst_status add_axes(bst_ctx *ctx, const bst_results *r, cJSON *card) {
         cJSON_AddStringToObject(node, "name", axis->name);
         cJSON_AddStringToObject(node, "path", axis->path);
         cJSON_AddStringToObject(node, "how",
-                                axis->dispersion ? laws[axis->dispersion->distribution] : "sweep");
+                                axis->population   ? "population"
+                                : axis->dispersion ? laws[axis->dispersion->distribution]
+                                                   : "sweep");
         if (axis->dispersion) {
             cJSON_AddStringToObject(node, "apply", acts[axis->dispersion->apply]);
         }

@@ -1,4 +1,4 @@
-/* Two-line element sets: reading, checking. */
+/* Two-line element sets: reading, checking, writing. */
 #ifndef BST_ASTRO_TLE_H
 #define BST_ASTRO_TLE_H
 
@@ -14,6 +14,18 @@
  * space-track.org documents them (A to Z without I and O stand for 10 to 33). */
 bst_status bst_tle_parse(bst_ctx *ctx, const char *line1, const char *line2,
                          bst_elements *out) BST_MUST_CHECK;
+
+enum { BST_TLE_CHARS = 69 };
+
+/* Writes one element set as its two lines, which bst_tle_parse reads.
+ * Given: set (of any source; its name is not in the lines).
+ * Returned: line1, line2 (69 characters and a NUL each), classification U, ephemeris type 0;
+ * numbers rounded to the columns: epoch 1e-8 day, angles 1e-4 degree, eccentricity 1e-7, mean
+ * motion 1e-8 rev/day. A set that was read from two lines comes back with the same bits.
+ * Errors: BST_ERR_RANGE for what the columns cannot hold: catalogue numbers above 339999 (Alpha-5),
+ * epochs before 1957 or after 2056, elements too great. Format: as bst_tle_parse. */
+bst_status bst_tle_format(bst_ctx *ctx, const bst_elements *set, char line1[BST_TLE_CHARS + 1],
+                          char line2[BST_TLE_CHARS + 1]) BST_MUST_CHECK;
 
 /* Five digits, or Alpha-5: a letter for the two leading digits 10 to 33, without I and O. Reads
  * five characters at text; false when they are no number. */

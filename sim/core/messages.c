@@ -65,6 +65,30 @@ const bst_channel_type *bst_channel_type_find(const char *name) {
     return NULL;
 }
 
+const char *bst_channel_writers(const char *name) {
+    static const char *const writers[][2] = {
+        {BST_CHANNEL_LOS_HISTORY, "gimbal"},
+        {BST_CHANNEL_POINTING_TELEMETRY, "gimbal"},
+        {BST_CHANNEL_MOUNT_STATUS, "gimbal"},
+        {BST_CHANNEL_FRAME, "scenegen"},
+        {BST_CHANNEL_PLANES, "scenegen"},
+        {BST_CHANNEL_TRUTH, "scenegen or obsgen"},
+        {BST_CHANNEL_DETECTIONS, "imgproc or obsgen"},
+        {BST_CHANNEL_PREDICTIONS, "tracker"},
+        {BST_CHANNEL_TRACKS, "tracker"},
+        {BST_CHANNEL_LOS_COMMAND, "control"},
+        {BST_CHANNEL_SENSOR_COMMAND, "control"},
+        {BST_CHANNEL_CONTROL_STATUS, "control"},
+        {BST_CHANNEL_TASK, "tasking"},
+    };
+    for (size_t i = 0; i < sizeof writers / sizeof *writers; i++) {
+        if (strcmp(writers[i][0], name) == 0) {
+            return writers[i][1];
+        }
+    }
+    return NULL;
+}
+
 const char *bst_mode_name(int mode) {
     static const char *const names[BST_MODE_COUNT] = {"idle",  "slew",      "search", "acquire",
                                                       "track", "reacquire", "stare",  "rate",

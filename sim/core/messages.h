@@ -454,4 +454,8 @@ typedef struct bst_channel_type {
 /* The type of a channel by its unscoped name; NULL when there is none. */
 const bst_channel_type *bst_channel_type_find(const char *name);
 
+/* Which modules write a channel, for messages: "gimbal", "imgproc or obsgen"; NULL for channels
+ * that every sensor has, and for unknown names. */
+const char *bst_channel_writers(const char *name);
+
 #endif

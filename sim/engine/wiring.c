@@ -89,10 +89,12 @@ static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
                 if (port->flags & BST_PORT_OPTIONAL) {
                     continue;
                 }
+                const char *writers = bst_channel_writers(port->channel);
                 return bst_fail(ctx, BST_ERR_CONFIG,
                                 "%s: reads the channel %s/%s, which no module writes; add the "
-                                "module that makes it",
-                                reader->name, scope, port->channel);
+                                "module that makes it%s%s",
+                                reader->name, scope, port->channel, writers ? ": " : "",
+                                writers ? writers : "");
             }
             state->delay_ticks = declared_delay(&reader->spec, p % reader->spec.desc->port_count);
             if (state->delay_ticks < 1 && (port->flags & BST_PORT_FEEDBACK)) {

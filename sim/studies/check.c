@@ -63,10 +63,10 @@ static bst_status check_metrics(bst_ctx *ctx, const bst_study *study, const bst_
 
 static bst_status check_run(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                             const bst_study_place *place, const bst_study_value *values,
-                            bool deep) {
+                            const bst_population_probe *probe, bool deep) {
     bst_study_run run = {.study = study, .place = *place};
     cJSON *settings;
-    BST_TRY(bst_study_document(ctx, study, place, values, &run.scenario, &settings));
+    BST_TRY(bst_study_document_probed(ctx, study, place, values, probe, &run.scenario, &settings));
     run.settings = settings;
     bst_status status = kind->check(ctx, kind->user, &run, deep);
     bst_json_free(run.scenario);
@@ -96,9 +96,9 @@ typedef struct checker {
 } checker;
 
 /* With the values as they are; `axis`: which of them is tried. */
-static bst_status try_values(checker *c, const bst_study_place *place, int axis) {
+static bst_status try_values(checker *c, const bst_study_place *place, int axis, bool deep) {
     char value[200];
-    bst_status status = check_run(c->ctx, c->study, c->kind, place, c->values, false);
+    bst_status status = check_run(c->ctx, c->study, c->kind, place, c->values, NULL, deep);
     if (status == BST_OK) {
         return BST_OK;
     }
@@ -116,6 +116,21 @@ static bst_study_value listed_value(const cJSON *item) {
     return (bst_study_value){true, number, number ? item->valuedouble : 0.0, item};
 }
 
+/* Where the values of a range end. */
+static void ends_of(const bst_study_axis *axis, double ends[2]) {
+    if (axis->axis) {
+        ends[0] = axis->axis->integer ? round(axis->axis->from) : axis->axis->from;
+        ends[1] = axis->axis->integer ? round(axis->axis->to) : axis->axis->to;
+    } else if (axis->dispersion->distribution == BST_DISTRIBUTION_NORMAL) {
+        double reach = axis->dispersion->truncate_sigma * axis->dispersion->sigma;
+        ends[0] = axis->dispersion->mean - reach;
+        ends[1] = axis->dispersion->mean + reach;
+    } else {
+        ends[0] = axis->dispersion->from;
+        ends[1] = axis->dispersion->to;
+    }
+}
+
 /* Ends of ranges and values of lists of one axis, with the others as in the first setting. */
 static bst_status try_axis(checker *c, const bst_study_place *place, int a) {
     const bst_study_axis *axis = &c->study->axes[a];
@@ -124,27 +139,75 @@ static bst_status try_axis(checker *c, const bst_study_place *place, int a) {
     if (axis->values) {
         for (const cJSON *item = axis->values->child; item && status == BST_OK; item = item->next) {
             c->values[a] = listed_value(item);
-            status = try_values(c, place, a);
+            status = try_values(c, place, a, false);
         }
     } else {
         double ends[2];
-        if (axis->axis) {
-            ends[0] = axis->axis->integer ? round(axis->axis->from) : axis->axis->from;
-            ends[1] = axis->axis->integer ? round(axis->axis->to) : axis->axis->to;
-        } else if (axis->dispersion->distribution == BST_DISTRIBUTION_NORMAL) {
-            double reach = axis->dispersion->truncate_sigma * axis->dispersion->sigma;
-            ends[0] = axis->dispersion->mean - reach;
-            ends[1] = axis->dispersion->mean + reach;
-        } else {
-            ends[0] = axis->dispersion->from;
-            ends[1] = axis->dispersion->to;
-        }
+        ends_of(axis, ends);
         for (int e = 0; e < 2 && status == BST_OK; e++) {
             c->values[a] = number_value(ends[e]);
-            status = try_values(c, place, a);
+            status = try_values(c, place, a, false);
         }
     }
     c->values[a] = kept;
+    return status;
+}
+
+/* What one of a population's dispersions may give an object. */
+static bst_status try_probe(checker *c, const bst_study_place *place, const bst_study_axis *axis,
+                            const bst_population_probe *probe) {
+    char value[200];
+    bst_status status = check_run(c->ctx, c->study, c->kind, place, c->values, probe, false);
+    if (status == BST_OK) {
+        return BST_OK;
+    }
+    say_value(axis, &probe->value, value, sizeof value);
+    return bst_fail_prefix(c->ctx, status, "%s: %s: %s", c->study->file, axis->where, value);
+}
+
+static bst_status try_objects(checker *c, const bst_study_place *place,
+                              const bst_population *population, int index) {
+    bst_status status = BST_OK;
+    for (int d = 0; d < population->config.dispersions.count && status == BST_OK; d++) {
+        const bst_study_axis *axis = &population->axes[d];
+        bst_population_probe probe = {.population = index, .dispersion = d};
+        double ends[2];
+        const cJSON *item = axis->values ? axis->values->child : NULL;
+        for (; item && status == BST_OK; item = item->next) {
+            probe.value = listed_value(item);
+            status = try_probe(c, place, axis, &probe);
+        }
+        for (int e = 0; !axis->values && e < 2 && status == BST_OK; e++) {
+            ends_of(axis, ends);
+            probe.value = number_value(ends[e]);
+            status = try_probe(c, place, axis, &probe);
+        }
+    }
+    return status;
+}
+
+/* Least and greatest numbers of objects, and what the objects may have. */
+static bst_status try_populations(checker *c, const bst_study_place *place) {
+    int count = c->study->populations.count, first = c->study->axis_count - count;
+    bst_population_list own;
+    const bst_population_list *list;
+    BST_TRY(bst_populations_of(c->ctx, c->study, c->values, &own, &list));
+    bst_status status = BST_OK;
+    for (int i = 0; i < count && status == BST_OK; i++) {
+        double ends[2];
+        bst_population_reach(&list->items[i], ends);
+        status = try_objects(c, place, &list->items[i], i);
+        for (int e = 0; e < 2 && status == BST_OK; e++) {
+            c->values[first + i] = number_value(ends[e]);
+            status = try_values(c, place, first + i, false);
+        }
+        if (status == BST_OK && ends[1] > 0.0) { /* with the files and references of an object */
+            c->values[first + i] = number_value(fmax(ends[0], 1.0));
+            status = try_values(c, place, first + i, true);
+        }
+        c->values[first + i] = (bst_study_value){.given = false};
+    }
+    bst_populations_free(&own);
     return status;
 }
 
@@ -156,7 +219,7 @@ static bst_status try_list(checker *c, const bst_study_place *place, int factor)
     for (int64_t level = 0; level < f->levels; level++) {
         levels[factor] = level;
         bst_study_swept_values(c->study, levels, c->values);
-        BST_TRY(try_values(c, place, f->first_axis));
+        BST_TRY(try_values(c, place, f->first_axis, false));
     }
     levels[factor] = 0;
     bst_study_swept_values(c->study, levels, c->values);
@@ -171,14 +234,14 @@ static bst_status blame(checker *c, const bst_study_place *place) {
     bst_ctx quiet = {0};
     memcpy(first, c->values, sizeof first);
     memset(c->values, 0, sizeof first);
-    if (check_run(&quiet, study, c->kind, place, c->values, false) == BST_OK) {
+    if (check_run(&quiet, study, c->kind, place, c->values, NULL, false) == BST_OK) {
         for (int a = 0; a < study->swept_count; a++) {
             c->values[a] = first[a];
-            BST_TRY(first[a].given ? try_values(c, place, a) : BST_OK);
+            BST_TRY(first[a].given ? try_values(c, place, a, false) : BST_OK);
         }
     }
     memcpy(c->values, first, sizeof first);
-    bst_status status = check_run(c->ctx, study, c->kind, place, c->values, true);
+    bst_status status = check_run(c->ctx, study, c->kind, place, c->values, NULL, true);
     return bst_fail_prefix(c->ctx, status, "%s: the first setting", study->file);
 }
 
@@ -188,7 +251,7 @@ static bst_status try_base(checker *c, const bst_study_place *place) {
     bst_study_levels(study, place->setting, levels);
     memset(c->values, 0, BST_STUDY_AXES * sizeof *c->values);
     bst_study_swept_values(study, levels, c->values);
-    if (check_run(c->ctx, study, c->kind, place, c->values, true) != BST_OK) {
+    if (check_run(c->ctx, study, c->kind, place, c->values, NULL, true) != BST_OK) {
         return blame(c, place);
     }
     for (int f = 0; f < study->factor_count; f++) {
@@ -201,10 +264,10 @@ static bst_status try_base(checker *c, const bst_study_place *place) {
             BST_TRY(try_axis(c, place, a));
         }
     }
-    for (int a = study->swept_count; a < study->axis_count; a++) {
+    for (int a = study->swept_count; a < study->axis_count - study->populations.count; a++) {
         BST_TRY(try_axis(c, place, a));
     }
-    return BST_OK;
+    return try_populations(c, place);
 }
 
 /* Runs as they will be. */
@@ -215,7 +278,7 @@ static bst_status try_runs(checker *c) {
         int64_t run = (int64_t)((double)i * (double)study->runs / (double)count);
         bst_study_place place = bst_study_place_of(study, run);
         bst_study_values(study, &place, c->values);
-        bst_status status = check_run(c->ctx, study, c->kind, &place, c->values, false);
+        bst_status status = check_run(c->ctx, study, c->kind, &place, c->values, NULL, false);
         if (status != BST_OK) {
             return bst_fail_prefix(c->ctx, status, "%s: run %" PRId64, study->file, place.run);
         }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "sim/core/rng.h"
-#include "sim/studies/study.h"
+#include "sim/studies/study_internal.h"
 
 bst_study_place bst_study_place_of(const bst_study *study, int64_t run) {
     bst_study_place place = {.run = run,
@@ -89,10 +89,10 @@ void bst_study_swept_values(const bst_study *study, const int64_t *levels, bst_s
     }
 }
 
-static bst_study_value draw(const bst_study *study, const bst_study_axis *axis, uint64_t counter) {
+bst_study_value bst_study_draw(const bst_study_axis *axis, bst_rng_key key, uint64_t a,
+                               uint64_t b) {
     const bst_dispersion_config *c = axis->dispersion;
-    bst_rng_key key = bst_rng_make_key(study->config.seed, 0, axis->path, "dispersion");
-    double u = bst_rng_uniform(key, counter, 0), z;
+    double u = bst_rng_uniform(key, a, b), z;
     bst_study_value value = {true, true, 0.0, NULL};
     switch ((bst_distribution)c->distribution) {
         case BST_DISTRIBUTION_UNIFORM:
@@ -103,9 +103,9 @@ static bst_study_value draw(const bst_study *study, const bst_study_axis *axis, 
             break;
         case BST_DISTRIBUTION_NORMAL:
             /* 8 % of the draws pass the narrowest limit */
-            for (uint64_t b = 1; fabs(z = bst_rng_normal(key, counter, b)) > c->truncate_sigma;) {
-                b++;
-            }
+            do {
+                z = bst_rng_normal(key, a, ++b);
+            } while (fabs(z) > c->truncate_sigma);
             value.number = c->mean + c->sigma * z;
             break;
         case BST_DISTRIBUTION_TABLE: {
@@ -127,7 +127,11 @@ void bst_study_values(const bst_study *study, const bst_study_place *place, bst_
     int64_t levels[BST_STUDY_AXES + 1];
     bst_study_levels(study, place->setting, levels);
     bst_study_swept_values(study, levels, out);
-    for (int a = study->swept_count; a < study->axis_count; a++) {
-        out[a] = draw(study, &study->axes[a], place->run_number);
+    int populations = study->axis_count - study->populations.count;
+    for (int a = study->swept_count; a < populations; a++) {
+        const bst_study_axis *axis = &study->axes[a];
+        bst_rng_key key = bst_rng_make_key(study->config.seed, 0, axis->path, "dispersion");
+        out[a] = bst_study_draw(axis, key, place->run_number, 0);
     }
+    bst_population_numbers(study, place->run_number, out);
 }

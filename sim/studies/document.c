@@ -102,8 +102,8 @@ static bst_status present_number(bst_ctx *ctx, const bst_study *study, const bst
     return BST_OK;
 }
 
-static bst_status put(bst_ctx *ctx, const bst_study *study, const bst_study_axis *axis,
-                      const bst_study_value *value, const char *pointer, bst_json *json) {
+bst_status bst_study_put(bst_ctx *ctx, const bst_study *study, const bst_study_axis *axis,
+                         const bst_study_value *value, const char *pointer, bst_json *json) {
     cJSON *node;
     if (value->is_number) {
         double number = value->number;
@@ -123,23 +123,28 @@ static bst_status put(bst_ctx *ctx, const bst_study *study, const bst_study_axis
     return status == BST_OK ? BST_OK : fail_axis(ctx, study, axis, status);
 }
 
-static bst_status put_all(bst_ctx *ctx, const bst_study *study, const bst_study_value *values,
-                          bst_json *json) {
-    for (int a = 0; a < study->axis_count; a++) {
+bst_status bst_study_put_all(bst_ctx *ctx, const bst_study *study, const bst_study_value *values,
+                             bool populations, bst_json *json) {
+    for (int a = 0; a < study->axis_count - study->populations.count; a++) {
         const bst_study_axis *axis = &study->axes[a];
         if (!values[a].given) {
             continue;
         }
-        BST_TRY(put(ctx, study, axis, &values[a], axis->path, json));
+        if (bst_population_pointer(axis->path) == populations) {
+            BST_TRY(bst_study_put(ctx, study, axis, &values[a], axis->path, json));
+        }
         for (const cJSON *also = axis->also ? axis->also->child : NULL; also; also = also->next) {
-            BST_TRY(put(ctx, study, axis, &values[a], also->valuestring, json));
+            if (bst_population_pointer(also->valuestring) == populations) {
+                BST_TRY(bst_study_put(ctx, study, axis, &values[a], also->valuestring, json));
+            }
         }
     }
     return BST_OK;
 }
 
 static bst_status make_document(bst_ctx *ctx, const bst_study *study, const bst_study_place *place,
-                                const bst_study_value *values, bst_json *json) {
+                                const bst_study_value *values, const bst_population_probe *probe,
+                                bst_json *json) {
     const char *block = block_name(study);
     char seed[24];
     if (block) {
@@ -155,17 +160,25 @@ static bst_status make_document(bst_ctx *ctx, const bst_study *study, const bst_
     if (study->config.keep == BST_KEEP_TABLES) {
         BST_TRY(bst_json_assign(ctx, json, "/record/frames", cJSON_CreateString("none")));
     }
-    return put_all(ctx, study, values, json);
+    BST_TRY(bst_study_put_all(ctx, study, values, false, json));
+    return bst_populations_add(ctx, study, place, values, probe, json);
 }
 
 bst_status bst_study_document(bst_ctx *ctx, const bst_study *study, const bst_study_place *place,
                               const bst_study_value *values, bst_json **scenario,
                               cJSON **settings) {
+    return bst_study_document_probed(ctx, study, place, values, NULL, scenario, settings);
+}
+
+bst_status bst_study_document_probed(bst_ctx *ctx, const bst_study *study,
+                                     const bst_study_place *place, const bst_study_value *values,
+                                     const bst_population_probe *probe, bst_json **scenario,
+                                     cJSON **settings) {
     const bst_study_base *base = &study->bases[place->base];
     const char *block = block_name(study);
     *settings = NULL;
     BST_TRY(bst_json_copy(ctx, base->json, scenario));
-    bst_status status = make_document(ctx, study, place, values, *scenario);
+    bst_status status = make_document(ctx, study, place, values, probe, *scenario);
     if (status != BST_OK) {
         bst_json_free(*scenario);
         *scenario = NULL;
@@ -255,6 +268,11 @@ cJSON *bst_study_echo(const bst_study *study) {
     for (int i = 0; i < study->base_count; i++) {
         cJSON_ReplaceItemInObjectCaseSensitive(cJSON_GetArrayItem(scenarios, i), "file",
                                                cJSON_CreateString(study->bases[i].file));
+    }
+    cJSON *populations = cJSON_GetObjectItemCaseSensitive(echo, "populations");
+    for (int i = 0; i < study->populations.count; i++) {
+        cJSON_ReplaceItemInObjectCaseSensitive(cJSON_GetArrayItem(populations, i), "elements_file",
+                                               cJSON_CreateString(study->population_files[i].file));
     }
     const char *block = block_name(study);
     static const char *const blocks[] = {"pd", "cubes"};

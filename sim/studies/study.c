@@ -31,7 +31,10 @@ static bst_status read_raw_array(bst_ctx *ctx, const bst_study *study, const cJS
 static bst_status check_pointer(bst_ctx *ctx, const bst_study *study, const char *where,
                                 const cJSON *value) {
     const char *allowed =
-        "a JSON pointer into the scenario, such as \"/observers/0/sensors/0/camera/read_noise_e\"";
+        bst_population_pointer(where)
+            ? "a JSON pointer into the object, such as \"/brightness/standard_v_mag\""
+            : "a JSON pointer into the scenario, such as "
+              "\"/observers/0/sensors/0/camera/read_noise_e\"";
     if (!cJSON_IsString(value)) {
         return bst_config_fail(ctx, study->file, where, value, "wrong type", allowed);
     }
@@ -122,31 +125,35 @@ static bst_status name_axis(bst_ctx *ctx, const bst_study *study, const char *gi
     return BST_OK;
 }
 
-static bst_status begin_axis(bst_ctx *ctx, bst_study *study, const cJSON *node, const char *where,
-                             const char *given_name, const char *suffix, bst_study_axis **out) {
-    if (study->axis_count == BST_STUDY_AXES) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "%s: more than %d axes and dispersions", study->file,
-                        BST_STUDY_AXES);
-    }
-    bst_study_axis *axis = &study->axes[study->axis_count];
+/* Pointers and values of an axis or a dispersion, whose place in the study is known. */
+static bst_status read_axis(bst_ctx *ctx, const bst_study *study, const cJSON *node,
+                            bst_study_axis *axis) {
     char path[96];
-    snprintf(axis->where, sizeof axis->where, "%s", where);
-    snprintf(path, sizeof path, "%s/path", where);
+    snprintf(path, sizeof path, "%s/path", axis->where);
     const cJSON *pointer = cJSON_GetObjectItemCaseSensitive(node, "path");
     BST_TRY(check_pointer(ctx, study, path, pointer));
     axis->path = pointer->valuestring;
-    BST_TRY(
-        read_raw_array(ctx, study, node, where, "also", "an array of JSON pointers", &axis->also));
+    BST_TRY(read_raw_array(ctx, study, node, axis->where, "also", "an array of JSON pointers",
+                           &axis->also));
     int i = 0;
     for (const cJSON *item = axis->also ? axis->also->child : NULL; item; item = item->next) {
-        snprintf(path, sizeof path, "%s/also/%d", where, i++);
+        snprintf(path, sizeof path, "%s/also/%d", axis->where, i++);
         BST_TRY(check_pointer(ctx, study, path, item));
     }
-    BST_TRY(read_raw_array(ctx, study, node, where, "values", "an array of values", &axis->values));
+    BST_TRY(read_raw_array(ctx, study, node, axis->where, "values", "an array of values",
+                           &axis->values));
     axis->value_count = cJSON_GetArraySize(axis->values);
-    BST_TRY(name_axis(ctx, study, given_name, suffix, axis));
-    study->axis_count++;
-    *out = axis;
+    return BST_OK;
+}
+
+static bst_status next_axis(bst_ctx *ctx, bst_study *study, const char *where,
+                            bst_study_axis **out) {
+    *out = &study->axes[study->axis_count];
+    if (study->axis_count == BST_STUDY_AXES) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "%s: more than %d axes, dispersions and populations",
+                        study->file, BST_STUDY_AXES);
+    }
+    snprintf((*out)->where, sizeof(*out)->where, "%s", where);
     return BST_OK;
 }
 
@@ -168,7 +175,10 @@ static bst_status check_range(bst_ctx *ctx, const bst_study *study, const char *
 static bst_status add_swept_axis(bst_ctx *ctx, bst_study *study, const cJSON *node,
                                  const char *where, const bst_axis_config *config, bool counted) {
     bst_study_axis *axis;
-    BST_TRY(begin_axis(ctx, study, node, where, config->name, "", &axis));
+    BST_TRY(next_axis(ctx, study, where, &axis));
+    BST_TRY(read_axis(ctx, study, node, axis));
+    BST_TRY(name_axis(ctx, study, config->name, "", axis));
+    study->axis_count++;
     axis->axis = config;
     bool range = config->from != config->to || config->count > 0;
     if (axis->values ? range : !range) {
@@ -292,31 +302,20 @@ static bst_status read_weights(bst_ctx *ctx, const bst_study *study, const cJSON
     return BST_OK;
 }
 
-static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *node, int index) {
-    const bst_dispersion_config *c =
-        (const bst_dispersion_config *)study->config.dispersions.items + index;
-    static const char *const suffixes[] = {"", "_offset", "_factor"};
-    bst_study_axis *axis;
-    char where[64];
-    snprintf(where, sizeof where, "/dispersions/%d", index);
-    BST_TRY(begin_axis(ctx, study, node, where, c->name, suffixes[c->apply], &axis));
+bst_status bst_study_read_dispersion(bst_ctx *ctx, const bst_study *study, const cJSON *node,
+                                     const bst_dispersion_config *c, bst_study_axis *axis) {
+    BST_TRY(read_axis(ctx, study, node, axis));
     axis->dispersion = c;
-    for (int a = study->swept_count; a < study->axis_count - 1; a++) {
-        if (strcmp(study->axes[a].path, axis->path) == 0) {
-            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/path: \"%s\" is dispersed by %s already",
-                            study->file, where, axis->path, study->axes[a].where);
-        }
-    }
     bool table = c->distribution == BST_DISTRIBUTION_TABLE;
     if (table != (axis->values != NULL)) {
         return bst_fail(
-            ctx, BST_ERR_CONFIG, "%s: %s/values: %s", study->file, where,
+            ctx, BST_ERR_CONFIG, "%s: %s/values: %s", study->file, axis->where,
             table ? "missing: a table is drawn from them" : "only for the distribution \"table\"");
     }
     if (table) {
         for (const cJSON *item = axis->values->child; item; item = item->next) {
             if (c->apply != BST_APPLY_SET && !cJSON_IsNumber(item)) {
-                return bst_config_fail(ctx, study->file, where, item,
+                return bst_config_fail(ctx, study->file, axis->where, item,
                                        "cannot be added or multiplied", "numbers");
             }
         }
@@ -326,13 +325,54 @@ static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *no
         return c->sigma > 0.0 ? BST_OK
                               : bst_fail(ctx, BST_ERR_CONFIG,
                                          "%s: %s/sigma: a normal distribution needs one above 0",
-                                         study->file, where);
+                                         study->file, axis->where);
     }
-    return check_range(ctx, study, where, c->from, c->to,
+    return check_range(ctx, study, axis->where, c->from, c->to,
                        c->distribution == BST_DISTRIBUTION_LOG_UNIFORM, false);
 }
 
-static bst_status add_axes(bst_ctx *ctx, bst_study *study) {
+static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *node, int index) {
+    const bst_dispersion_config *c =
+        (const bst_dispersion_config *)study->config.dispersions.items + index;
+    static const char *const suffixes[] = {"", "_offset", "_factor"};
+    bst_study_axis *axis;
+    char where[64];
+    snprintf(where, sizeof where, "/dispersions/%d", index);
+    BST_TRY(next_axis(ctx, study, where, &axis));
+    BST_TRY(bst_study_read_dispersion(ctx, study, node, c, axis));
+    BST_TRY(name_axis(ctx, study, c->name, suffixes[c->apply], axis));
+    study->axis_count++;
+    for (int a = study->swept_count; a < study->axis_count - 1; a++) {
+        if (strcmp(study->axes[a].path, axis->path) == 0) {
+            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/path: \"%s\" is dispersed by %s already",
+                            study->file, where, axis->path, study->axes[a].where);
+        }
+    }
+    return BST_OK;
+}
+
+/* The number of objects of each is a value of a run. */
+static bst_status add_populations(bst_ctx *ctx, bst_study *study, const char *file) {
+    BST_TRY(bst_populations_open(ctx, study, file));
+    for (int i = 0; i < study->populations.count; i++) {
+        const bst_population *p = &study->populations.items[i];
+        bst_study_axis *axis;
+        BST_TRY(next_axis(ctx, study, p->where, &axis));
+        if (!is_word(p->config.name)) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: %s/name: no name of a column (found \"%.60s\"; allowed: letters, "
+                            "digits and underscores)",
+                            study->file, p->where, p->config.name);
+        }
+        BST_TRY(name_axis(ctx, study, p->config.name, "", axis));
+        axis->path = "/world/objects";
+        axis->population = i + 1;
+        study->axis_count++;
+    }
+    return BST_OK;
+}
+
+static bst_status add_axes(bst_ctx *ctx, bst_study *study, const char *file) {
     const cJSON *root = bst_json_root(study->json);
     const cJSON *sweeps = cJSON_GetObjectItemCaseSensitive(root, "sweeps");
     const cJSON *dispersions = cJSON_GetObjectItemCaseSensitive(root, "dispersions");
@@ -348,6 +388,7 @@ static bst_status add_axes(bst_ctx *ctx, bst_study *study) {
     for (int i = 0; i < study->config.dispersions.count; i++) {
         BST_TRY(add_dispersion(ctx, study, cJSON_GetArrayItem(dispersions, i), i));
     }
+    BST_TRY(add_populations(ctx, study, file));
     double runs = (double)study->config.replicates;
     study->settings = 1;
     for (int f = 0; f < study->factor_count; f++) {
@@ -377,6 +418,11 @@ static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
     for (size_t i = 0; echo && i < sizeof without / sizeof *without; i++) {
         cJSON_DeleteItemFromObjectCaseSensitive(echo, without[i]);
     }
+    cJSON *populations = cJSON_GetObjectItemCaseSensitive(echo, "populations");
+    for (int i = 0; i < study->populations.count; i++) {
+        cJSON_DeleteItemFromObjectCaseSensitive(cJSON_GetArrayItem(populations, i),
+                                                "elements_file");
+    }
     char *text = echo ? cJSON_PrintUnformatted(echo) : NULL;
     cJSON_Delete(echo);
     if (!text) {
@@ -387,6 +433,10 @@ static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
     for (int i = 0; i < study->base_count; i++) {
         h = hash_text(h, study->bases[i].text);
     }
+    for (int i = 0; i < study->populations.count; i++) {
+        const bst_population_file *of = &study->population_files[i];
+        h = bst_fnv(h, of->norad, (size_t)of->count * sizeof *of->norad);
+    }
     snprintf(study->digest, sizeof study->digest, "%016" PRIx64, h);
     return BST_OK;
 }
@@ -396,18 +446,19 @@ static bst_status open_study(bst_ctx *ctx, const char *file, bst_study *study) {
     BST_TRY(bst_json_load(ctx, file, &study->json));
     BST_TRY(bst_config_read(ctx, study->json, bst_json_root(study->json), "", bst_study_table,
                             &study->config));
-    char *full = realpath(file, NULL);
-    bst_status status = bst_study_read_bases(ctx, study, full ? full : file);
-    free(full);
-    BST_TRY(status);
     if (!bst_text_is_file_name(study->config.name) || strchr(study->config.name, ' ')) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "%s: /name: \"%s\" cannot be the name of a folder (allowed: 1 to 63 bytes "
                         "without blanks, \"/\" and control characters, not beginning with \".\")",
                         file, study->config.name);
     }
-    BST_TRY(add_axes(ctx, study));
-    return set_digest(ctx, study);
+    char *full = realpath(file, NULL);
+    bst_status status = bst_study_read_bases(ctx, study, full ? full : file);
+    if (status == BST_OK) {
+        status = add_axes(ctx, study, full ? full : file);
+    }
+    free(full);
+    return status == BST_OK ? set_digest(ctx, study) : status;
 }
 
 bst_status bst_study_open(bst_ctx *ctx, const char *file, bst_study *out) {
@@ -425,6 +476,7 @@ void bst_study_close(bst_study *study) {
         free(study->bases[i].text);
     }
     free(study->bases);
+    bst_populations_close(study);
     for (int i = 0; study->axes && i < BST_STUDY_AXES; i++) {
         free(study->axes[i].cumulative);
     }

@@ -18,7 +18,8 @@ typedef struct bst_study_value {
     const struct cJSON *json; /* what is no number; lent by the study */
 } bst_study_value;
 
-/* One thing that is varied: an axis of a sweep, or a dispersion. */
+/* One thing that is varied: an axis of a sweep, a dispersion, or the number of objects of a
+ * population. */
 typedef struct bst_study_axis {
     char name[BST_STUDY_NAME_BYTES]; /* of its column: unique, letters, digits, underscores */
     char where[64];                  /* "/sweeps/0/axes/1", for messages */
@@ -26,8 +27,9 @@ typedef struct bst_study_axis {
     const struct cJSON *also;   /* pointers that get the same value; NULL: none */
     const struct cJSON *values; /* NULL: a range */
     int value_count;
-    const bst_axis_config *axis;             /* NULL: a dispersion */
-    const bst_dispersion_config *dispersion; /* NULL: an axis of a sweep */
+    const bst_axis_config *axis;             /* NULL: not of a sweep */
+    const bst_dispersion_config *dispersion; /* NULL: no dispersion */
+    int population;                          /* 1, 2, ...: the number of its objects; 0: none */
     double *cumulative; /* [value_count] of a table's weights; NULL: all alike */
 } bst_study_axis;
 
@@ -48,16 +50,40 @@ typedef struct bst_study_base {
     char *text;     /* the same, as JSON */
 } bst_study_base;
 
+/* What is read of a population: its file has it, or a run's axes have changed it. */
+typedef struct bst_population {
+    bst_population_config config;
+    const struct cJSON *object; /* what each object has; NULL: nothing */
+    bst_study_axis *axes;       /* [config.dispersions.count], with pointers into the object */
+    char where[24];             /* "/populations/0" */
+} bst_population;
+
+typedef struct bst_population_list {
+    bst_population *items;
+    int count;
+    bst_json *json; /* what they were read from, where that is not the study's own; else NULL */
+} bst_population_list;
+
+/* Satellites of the file of element sets of a population. */
+typedef struct bst_population_file {
+    char file[512]; /* full path; "": none */
+    int *norad;     /* [count], rising, none twice */
+    int count;
+} bst_population_file;
+
 typedef struct bst_study {
     bst_study_config config;
     char file[512];
     bst_json *json;
     bst_study_base *bases;
     int base_count;
-    bst_study_axis *axes; /* of sweeps, then dispersions */
+    bst_study_axis *axes; /* of sweeps, then dispersions, then populations */
     int axis_count, swept_count;
     bst_study_factor *factors; /* the last one varies fastest */
     int factor_count;
+    bst_population_list populations;       /* as the study's file has them */
+    bst_population_file *population_files; /* [populations.count] */
+    bool populations_vary;                 /* some axis or dispersion changes what is in them */
     int64_t settings, runs;
     char digest[20];                    /* of all that results follow from */
     const struct bst_study_note *notes; /* lent */
@@ -88,7 +114,8 @@ bst_study_place bst_study_place_of(const bst_study *study, int64_t run);
 void bst_study_levels(const bst_study *study, int64_t setting, int64_t *levels);
 /* Values on the axes of sweeps, [swept_count], at these levels. */
 void bst_study_swept_values(const bst_study *study, const int64_t *levels, bst_study_value *out);
-/* Values on all axes, [axis_count]. Of dispersions: what was drawn, before it is applied. */
+/* Values on all axes, [axis_count]. Of dispersions: what was drawn, before it is applied; of
+ * populations: the number of objects. */
 void bst_study_values(const bst_study *study, const bst_study_place *place, bst_study_value *out);
 
 /* The run's documents: the scenario that it is, and the settings of its kind (an object that

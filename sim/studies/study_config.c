@@ -7,6 +7,7 @@ static const char *const designs[] = {"grid",          "list",   "latin_hypercub
                                       "one_at_a_time", "morris", NULL};
 static const char *const spacings[] = {"linear", "log", NULL};
 static const char *const distributions[] = {"uniform", "log_uniform", "normal", "table", NULL};
+static const char *const number_laws[] = {"fixed", "uniform", "poisson", NULL};
 static const char *const applies[] = {"set", "add", "multiply", NULL};
 
 #define ALSO_DOC "JSON pointers that get the same value."
@@ -56,30 +57,67 @@ static const bst_config_desc sweep_table[] = {
     BST_LIST(bst_sweep_config, axes, bst_axis_config, axis_table, 1, 64, NULL, "What is varied."),
     BST_CONFIG_END};
 
+/* What every dispersion has beside where its numbers go. */
+#define DISPERSION_LAW                                                                             \
+    BST_ENUM(                                                                                      \
+        bst_dispersion_config, distribution, distributions, "\"uniform\"",                         \
+        "What the numbers are drawn from: evenly or evenly in the logarithm between from and "     \
+        "to; a normal distribution; a table of values."),                                          \
+        BST_REAL(bst_dispersion_config, from, "", -1e300, 1e300, "0",                              \
+                 "Least value (uniform, log_uniform)."),                                           \
+        BST_REAL(bst_dispersion_config, to, "", -1e300, 1e300, "0",                                \
+                 "Greatest value (uniform, log_uniform)."),                                        \
+        BST_REAL(bst_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),           \
+        BST_REAL(bst_dispersion_config, sigma, "", 0, 1e100, "0", "Standard deviation (normal)."), \
+        BST_REAL(bst_dispersion_config, truncate_sigma, "", 0.1, 8, "4",                           \
+                 "Draws further than so many standard deviations from the mean are made again "    \
+                 "(normal)."),                                                                     \
+        RAW("values", "[]", "What is drawn from, of any type (table)."),                           \
+        RAW("weights", "[]",                                                                       \
+            "How often each value comes, relative to the others; []: all alike "                   \
+            "(table)."),                                                                           \
+        BST_ENUM(                                                                                  \
+            bst_dispersion_config, apply, applies, "\"set\"",                                      \
+            "What becomes of the number that is drawn: it takes the place of the scenario's, is "  \
+            "added to it, or multiplies it."),                                                     \
+        BST_BOOL(bst_dispersion_config, integer, "false", "Round the result to a whole number.")
+
 static const bst_config_desc dispersion_table[] = {
-    BST_STRING(bst_dispersion_config, path, NULL, PATH_DOC),
-    RAW("also", "[]", ALSO_DOC),
-    BST_STRING(bst_dispersion_config, name, "\"\"", NAME_DOC),
-    BST_ENUM(bst_dispersion_config, distribution, distributions, "\"uniform\"",
-             "What the numbers are drawn from: evenly or evenly in the logarithm between from and "
-             "to; a normal distribution; a table of values."),
-    BST_REAL(bst_dispersion_config, from, "", -1e300, 1e300, "0",
-             "Least value (uniform, log_uniform)."),
-    BST_REAL(bst_dispersion_config, to, "", -1e300, 1e300, "0",
-             "Greatest value (uniform, log_uniform)."),
-    BST_REAL(bst_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),
-    BST_REAL(bst_dispersion_config, sigma, "", 0, 1e100, "0", "Standard deviation (normal)."),
-    BST_REAL(bst_dispersion_config, truncate_sigma, "", 0.1, 8, "4",
-             "Draws further than so many standard deviations from the mean are made again "
-             "(normal)."),
-    RAW("values", "[]", "What is drawn from, of any type (table)."),
-    RAW("weights", "[]",
-        "How often each value comes, relative to the others; []: all alike "
-        "(table)."),
-    BST_ENUM(bst_dispersion_config, apply, applies, "\"set\"",
-             "What becomes of the number that is drawn: it takes the place of the scenario's, is "
-             "added to it, or multiplies it."),
-    BST_BOOL(bst_dispersion_config, integer, "false", "Round the result to a whole number."),
+    BST_STRING(bst_dispersion_config, path, NULL, PATH_DOC), RAW("also", "[]", ALSO_DOC),
+    BST_STRING(bst_dispersion_config, name, "\"\"", NAME_DOC), DISPERSION_LAW, BST_CONFIG_END};
+
+static const bst_config_desc object_dispersion_table[] = {
+    BST_STRING(bst_dispersion_config, path, NULL,
+               "What is varied: a JSON pointer into the object, such as \"/orbit/offset_rtn_m/0\" "
+               "or \"/brightness/standard_v_mag\"."),
+    RAW("also", "[]", ALSO_DOC), DISPERSION_LAW, BST_CONFIG_END};
+
+static const bst_config_desc number_table[] = {
+    BST_ENUM(bst_number_config, distribution, number_laws, "\"fixed\"",
+             "The number is count in every run (fixed), any whole number between from and to with "
+             "the same probability (uniform), or of a Poisson distribution (poisson)."),
+    BST_INT(bst_number_config, count, "", 0, 10000, "1", "Number of objects (fixed)."),
+    BST_INT(bst_number_config, from, "", 0, 10000, "0", "Least number (uniform)."),
+    BST_INT(bst_number_config, to, "", 0, 10000, "0", "Greatest number (uniform)."),
+    BST_REAL(bst_number_config, mean, "", 0, 500, "1", "Mean (poisson)."),
+    BST_INT(bst_number_config, most, "", 0, 10000, "1000",
+            "Greater numbers are drawn again; at least the mean (poisson)."),
+    BST_CONFIG_END};
+
+const bst_config_desc bst_population_table[] = {
+    BST_STRING(bst_population_config, name, NULL,
+               "Its objects are called NAME_1, NAME_2 and so on, and the column of their number in "
+               "tables NAME: letters, digits and underscores."),
+    BST_OBJECT(bst_population_config, number, number_table, "{}",
+               "How many objects there are; drawn anew for every run."),
+    RAW("object", "{}",
+        "What each object has, with the keys of /world/objects[] of a scenario but for the name."),
+    BST_STRING(bst_population_config, elements_file, "\"\"",
+               "File of element sets, relative to the study's folder. Each object then has the "
+               "orbit of a satellite of it, drawn with equal probability, none twice and none that "
+               "the scenario lists. \"\": the orbit is that of \"object\"."),
+    BST_LIST(bst_population_config, dispersions, bst_dispersion_config, object_dispersion_table, 0,
+             64, "[]", "Numbers that are drawn anew for each object of each run."),
     BST_CONFIG_END};
 
 const bst_config_desc bst_study_pd_table[] = {
@@ -144,6 +182,11 @@ const bst_config_desc bst_study_table[] = {
              "Values that are gone through: each combination is a setting of the study."),
     BST_LIST(bst_study_config, dispersions, bst_dispersion_config, dispersion_table, 0, 256, "[]",
              "Numbers that are drawn anew for every run."),
+    BST_LIST(bst_study_config, populations, bst_population_config, bst_population_table, 0, 32,
+             "[]",
+             "Objects whose number, orbits and brightnesses are drawn anew for every run; they "
+             "come after those in the scenario's /world/objects. Axes and dispersions may vary "
+             "what stands here: \"/populations/0/number/mean\"."),
     BST_INT(bst_study_config, replicates, "", 1, 1e7, "1", "Runs of each setting."),
     BST_SEED(bst_study_config, seed, "\"0x1\"",
              "Master seed: of dispersions and designs, and of every run."),

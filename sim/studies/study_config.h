@@ -34,6 +34,12 @@ typedef struct bst_study_scenario {
     char name[64];
 } bst_study_scenario;
 
+typedef enum bst_number_law {
+    BST_NUMBER_FIXED,
+    BST_NUMBER_UNIFORM,
+    BST_NUMBER_POISSON
+} bst_number_law;
+
 /* The keys "also" and "values" are read where axes are made. */
 typedef struct bst_axis_config {
     char path[256];
@@ -60,6 +66,23 @@ typedef struct bst_dispersion_config {
     bool integer;
 } bst_dispersion_config;
 
+/* How many objects a population has in a run. */
+typedef struct bst_number_config {
+    int32_t distribution; /* bst_number_law */
+    int64_t count;        /* fixed */
+    int64_t from, to;     /* uniform */
+    double mean;          /* poisson */
+    int64_t most;         /* poisson */
+} bst_number_config;
+
+/* Objects that are drawn for each run. The key "object" is read where populations are. */
+typedef struct bst_population_config {
+    char name[40];
+    bst_number_config number;
+    char elements_file[512];
+    bst_config_list dispersions; /* bst_dispersion_config, with paths in the object */
+} bst_population_config;
+
 /* How a run of kind "pd" measures: as the options of boresight pd. */
 typedef struct bst_study_pd_config {
     char sensor[160];
@@ -84,6 +107,7 @@ typedef struct bst_study_config {
     bst_config_list scenarios; /* bst_study_scenario */
     bst_config_list sweeps;    /* bst_sweep_config */
     bst_config_list dispersions;
+    bst_config_list populations; /* bst_population_config */
     int64_t replicates;
     uint64_t seed;
     int32_t random; /* bst_study_random */
@@ -94,6 +118,7 @@ typedef struct bst_study_config {
 } bst_study_config;
 
 extern const bst_config_desc bst_study_table[];
+extern const bst_config_desc bst_population_table[];
 extern const bst_config_desc bst_study_pd_table[];
 extern const bst_config_desc bst_study_cubes_table[];
 

@@ -83,12 +83,13 @@ static const bst_study_factor *factor_of(const bst_study *s, int axis) {
 
 static bst_status write_axes(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_study *s = j->results->study;
-    const bst_column columns[] = {int_column("axis", "Its number."),
-                                  text_column("name", "Its column in other tables."),
-                                  text_column("path", "JSON pointer of what is varied."),
-                                  text_column("role", "sweep or dispersion."),
-                                  text_column("design", "How a sweep takes its values."),
-                                  int_column("sweep", "Number of the sweep in the study.")};
+    const bst_column columns[] = {
+        int_column("axis", "Its number."),
+        text_column("name", "Its column in other tables."),
+        text_column("path", "JSON pointer of what is varied."),
+        text_column("role", "sweep, dispersion or population: the number of its objects."),
+        text_column("design", "How a sweep takes its values."),
+        int_column("sweep", "Number of the sweep in the study.")};
     bst_table_out t;
     BST_TRY(bst_table_begin(ctx, j->out, "axes", "What is varied.", columns, 6, false, &t));
     bst_status status = BST_OK;
@@ -97,7 +98,9 @@ static bst_status write_axes(bst_ctx *ctx, const bst_tables_job *j) {
         const bst_value row[] = {bst_int_value(a),
                                  bst_text_value(s->axes[a].name),
                                  bst_text_value(s->axes[a].path),
-                                 bst_text_value(f ? "sweep" : "dispersion"),
+                                 bst_text_value(f                       ? "sweep"
+                                                : s->axes[a].population ? "population"
+                                                                        : "dispersion"),
                                  bst_text_value(f ? designs[f->design] : NULL),
                                  f ? bst_int_value(f->sweep) : bst_null_value(BST_COLUMN_INT)};
         status = bst_table_row(ctx, &t, row);

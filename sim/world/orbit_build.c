@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/astro/tle.h"
 #include "sim/world/constellation.h"
 #include "sim/world/steering.h"
 #include "sim/world/world_build.h"
@@ -31,12 +32,31 @@ bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *
     return bst_sgp4_create(b->ctx, set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &orbit->sgp4);
 }
 
+/* From the two lines in the scenario. */
+static bst_status build_lines(const bst_world_builder *b, const bst_orbit_config *config,
+                              const char *path, const char *name, bst_orbit *orbit, int *norad) {
+    bst_elements set;
+    bst_status status = bst_tle_parse(b->ctx, config->tle_line1, config->tle_line2, &set);
+    if (status == BST_OK) {
+        *norad = set.norad;
+        status = bst_orbit_build_sgp4(b, &set, name, orbit);
+    }
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s", b->scenario, path);
+}
+
 static bst_status build_sgp4(const bst_world_builder *b, const bst_orbit_config *config,
                              const char *path, const char *name, bst_orbit *orbit, int *norad) {
-    if (!*config->elements_file || config->norad == 0) {
+    bool lines = *config->tle_line1 || *config->tle_line2;
+    bool file_given = *config->elements_file || config->norad != 0;
+    if (lines && !file_given) {
+        return build_lines(b, config, path, name, orbit, norad);
+    }
+    if (lines || !*config->elements_file || config->norad == 0) {
         return bst_fail(b->ctx, BST_ERR_CONFIG,
-                        "%s: %s: source \"sgp4\" needs \"elements_file\" and \"norad\"",
-                        b->scenario, path);
+                        "%s: %s: source \"sgp4\" needs either \"elements_file\" and \"norad\", or "
+                        "\"tle_line1\" and \"tle_line2\"%s",
+                        b->scenario, path, lines ? "; both are given" : "");
     }
     bst_world_path file = bst_world_path_join(b, config->elements_file);
     bst_elements *sets = NULL;

@@ -10,7 +10,7 @@ static const char *const state_kinds[] = {"cartesian", "keplerian", "element_set
 const bst_config_desc bst_initial_state_table[] = {
     BST_ENUM(bst_initial_state_config, from, state_kinds, "\"cartesian\"",
              "cartesian: position and velocity below. keplerian: the elements below. element_set: "
-             "what the orbit's elements_file and norad give at that time by SGP4. relative: the "
+             "what the orbit's element set gives at that time by SGP4. relative: the "
              "orbit's reference, offset_rtn_m and rate_rtn_mps at that time."),
     BST_REAL(bst_initial_state_config, at_s, "s", -1e9, 1e9, "0", "Time of the state."),
     BST_REALS(bst_initial_state_config, position_gcrf_m, "m", -1e10, 1e10, "[0, 0, 0]",

@@ -56,6 +56,8 @@ typedef struct bst_orbit_config {
     int32_t source;          /* BST_ORBIT_... */
     char elements_file[512]; /* sgp4: path, relative to the scenario's folder */
     int64_t norad;           /* sgp4 */
+    char tle_line1[80];      /* sgp4: the element set itself, instead of a file */
+    char tle_line2[80];
     char reference[64]; /* relative: name of an object with an orbit of its own, earlier in the list
                          */
     double at_s;        /* relative: time at which offset_rtn_m holds */

@@ -114,7 +114,7 @@ class Messages(unittest.TestCase):
     def test_missing_module(self):
         scenario = json.loads(call("check", runs.TRACK).stdout)
         del scenario["observers"][0]["sensors"][0]["modules"]["gimbal"]
-        self.bad_scenario(json.dumps(scenario), "which no module writes; add the module")
+        self.bad_scenario(json.dumps(scenario), "which no module writes; add the module that makes it: gimbal")
 
     def bad_scenario(self, text, pattern):
         path = os.path.join(runs.scratch(), "bad.json")

@@ -125,6 +125,45 @@ class New(unittest.TestCase):
             self.assertIn(text, said.stderr)
             self.assertFalse(os.path.exists(path))
 
+    def test_stands_alone(self):
+        """The element sets are in the scenario: it needs no file beside it, wherever it goes."""
+        folder, away = runs.scratch(), runs.scratch()
+        sets = os.path.join(folder, "sets.tle")
+        shutil.copy(SETS[0], sets)
+        made = call("new", os.path.join(folder, "first.json"), "--observer-tle", sets + ":39089",
+                    "--target-tle", sets + ":44801")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        with open(sets, encoding="ascii") as file:
+            lines = file.read().split("\n")
+        os.remove(sets)
+        path = shutil.move(os.path.join(folder, "first.json"), away)
+        said = subprocess.run([os.path.abspath(runs.BORESIGHT), "check", path], capture_output=True,
+                              text=True, check=False, cwd="/", env=dict(os.environ, XDG_DATA_HOME=EMPTY))
+        self.assertEqual((said.returncode, said.stderr), (0, ""))
+        scenario = json.loads(said.stdout)
+        for owner, number in ((scenario["observers"][0], "39089"), (scenario["world"]["objects"][0], "44801")):
+            self.assertEqual(owner["orbit"]["elements_file"], "")
+            for key, first in (("tle_line1", "1 "), ("tle_line2", "2 ")):
+                source = next(line for line in lines if line.startswith(first + number))
+                self.assertEqual(owner["orbit"][key][:61], source[:61])
+
+    def test_stars_in_every_frame(self):
+        """Of this pair the first time that is good otherwise has 8 stars in some frames."""
+        path = os.path.join(runs.scratch(), "pair.json")
+        made = call("new", path, "--observer-tle", "40906", "--target-tle", "46561")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        sensor, out = "/observers/0/sensors/0", os.path.join(runs.scratch(), "run")
+        modules = {"gimbal": {"type": "ideal", "object": "STARLINK-1709"}, "scenegen": {"type": "opencl"}}
+        result = call("run", path, "--quiet", "--out", out, "--set", runs.NO_FRAMES,
+                      "--set", f"{sensor}/modules={json.dumps(modules)}",
+                      "--set", sensor + '/exposure={"exposure_s": 0.1, "period_s": 5}')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with runs.database(out) as database:
+            counts = database.execute("SELECT sum(kind = 'star' AND v_mag < 9) FROM truth"
+                                      " GROUP BY exposure_id").fetchall()
+        self.assertEqual(len(counts), 24)
+        self.assertGreaterEqual(min(count for count, in counts), 12)
+
     def test_element_sets_are_not_written_over(self):
         sets = os.path.join(runs.scratch(), "sets.tle")
         shutil.copy(SETS[0], sets)

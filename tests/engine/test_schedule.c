@@ -260,7 +260,7 @@ static void wrong_wiring_is_refused(void **state) {
     fake_add(&ctx, engine, FAKE_SPEC(command_reader, "o/s/gimbal", p, 10));
     expect_refusal(engine, &ctx,
                    "o/s/gimbal: reads the channel o/s/los_command, which no module writes; add "
-                   "the module that makes it");
+                   "the module that makes it: control");
 
     engine = fake_engine(&ctx, 1000);
     fake_add(&ctx, engine, FAKE_SPEC(command_writer, "o/s/two", p, 10));

@@ -221,6 +221,26 @@ static void burns_add_up(void **state) {
                         "(found 99 after 100)");
 }
 
+#define GX5_1 "1 44801U 19080B   22167.00079919  .00000075  00000+0  00000+0 0  9998"
+#define GX5_2 "2 44801   0.0366 343.6423 0001933 100.2390 191.6441  1.00270919  9442"
+
+/* Two lines in the scenario are the same set as in its file, to the last bit. */
+static void lines_are_as_good_as_a_file(void **state) {
+    (void)state;
+    bst_world *world =
+        test_world_with(GX5 ", {\"name\": \"lines\", \"orbit\": {\"tle_line1\": \"" GX5_1
+                            "\", \"tle_line2\": \"" GX5_2 "\"}}",
+                        "");
+    bst_view *view = view_of(world);
+    assert_int_equal(bst_world_object(world, 1)->norad, 44801);
+    for (double t = 0.0; t < 3600.0; t += 600.0) {
+        bst_state file = object_at(view, 0, t), lines = object_at(view, 1, t);
+        assert_memory_equal(&file, &lines, sizeof file);
+    }
+    bst_view_free(view);
+    bst_world_free(world);
+}
+
 static void refuse(const char *epoch, const char *objects, const char *sensor,
                    const char *message) {
     bst_ctx ctx = {0};
@@ -242,7 +262,16 @@ static void wrong_worlds_are_refused(void **state) {
     refuse(TEST_EPOCH, GX5 ", " GX5, "",
            "test: /world/objects/1/name: \"GX5\" is the name of /world/objects/0 too");
     refuse(TEST_EPOCH, "{\"name\": \"a\", \"orbit\": {}}", "",
-           "test: /world/objects/0/orbit: source \"sgp4\" needs \"elements_file\" and \"norad\"");
+           "test: /world/objects/0/orbit: source \"sgp4\" needs either \"elements_file\" and "
+           "\"norad\", or \"tle_line1\" and \"tle_line2\"");
+    refuse(TEST_EPOCH,
+           "{\"name\": \"a\", \"orbit\": {\"norad\": 44801, \"tle_line1\": \"" GX5_1
+           "\", \"tle_line2\": \"" GX5_2 "\"}}",
+           "",
+           "test: /world/objects/0/orbit: source \"sgp4\" needs either \"elements_file\" and "
+           "\"norad\", or \"tle_line1\" and \"tle_line2\"; both are given");
+    refuse(TEST_EPOCH, "{\"name\": \"a\", \"orbit\": {\"tle_line1\": \"" GX5_1 "\"}}", "",
+           "test: /world/objects/0/orbit: line 2");
     refuse(TEST_EPOCH,
            "{\"name\": \"a\", \"orbit\": {\"elements_file\": \"nowhere.tle\", \"norad\": 5}}", "",
            "test: /world/objects/0/orbit/elements_file: nowhere.tle");
@@ -267,6 +296,7 @@ int main(void) {
         cmocka_unit_test(a_burn_moves_the_object_as_theory_says),
         cmocka_unit_test(a_burnt_orbit_has_the_period_of_its_energy),
         cmocka_unit_test(burns_add_up),
+        cmocka_unit_test(lines_are_as_good_as_a_file),
         cmocka_unit_test(wrong_worlds_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
