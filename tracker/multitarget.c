@@ -494,6 +494,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     load_detections(m, frame);
     double floor = m->params.false_alarms_per_frame;
     m->bad_pixels = frame->bad_pixels;
+    m->charged = frame->charged;
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
     bst_mtt_associate(m, frame->partial);

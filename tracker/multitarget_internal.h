@@ -51,6 +51,7 @@ struct bst_mtt {
     bool cue_lag_valid;
     bst_vec3 cue_lag_radps2;
     int bad_pixels;         /* of the latest frame */
+    int charged;            /* the same */
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
     /* smoothed number of detections that no confirmed track has, of how many frames, and their
