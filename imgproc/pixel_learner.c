@@ -37,10 +37,10 @@ typedef struct suspect {
     uint8_t binning;
     bool bad;
     uint16_t shown, looks;
-    int32_t jumps; /* of the boresight up to the latest return that counted */
     float sky, hit,
         at_rest;        /* log-likelihood ratios against each; bad: at_rest is that of `still` */
     float direction[3]; /* of the pixel on the sky, at the latest return that counted */
+    float offset[2];    /* of the boresight, at the latest return that counted against rest */
 } suspect;
 
 struct bst_pixel_learner {
@@ -57,7 +57,11 @@ struct bst_pixel_learner {
     bst_quat q[2];
     double time_s[2];
     int frames;
-    int32_t jumps;
+    /* Where the boresight would be had it always gone on steadily; its turn in GCRF in the latest
+     * frames of steady motion, rad/s; and how far the boresight is off it, rad along x and y. */
+    bst_quat q_steady;
+    bst_vec3 steady_radps;
+    double offset[2], offset_limit;
 };
 
 const bst_config_desc bst_pixel_learner_config_table[] = {
@@ -65,7 +69,7 @@ const bst_config_desc bst_pixel_learner_config_table[] = {
         bst_pixel_learner_config, enabled, "true",
         "Learn which pixels are bad from frames in which the sky moves and a maximum does not."),
     BST_INT(bst_pixel_learner_config, capacity, "", 16, 4000000, "65536",
-            "Room for bad pixels and pixels under suspicion; 120 bytes each."),
+            "Room for bad pixels and pixels under suspicion; 130 bytes each."),
     BST_REAL(bst_pixel_learner_config, false_rate, "", 1e-12, 0.01, "1e-5",
              "Greatest chance that a good pixel under suspicion is taken for bad."),
     BST_CONFIG_END,
@@ -196,12 +200,17 @@ static bool take_return(const bst_pixel_learner *l, const bst_pixel_frame *f, do
         return false;
     }
     double ratio = log(return_chance(s) / q), shape = shape_ratio(l, show);
-    bool jumped = s->jumps != l->jumps && !is_predicted(l, f, s->pixel);
+    bool elsewhere = hypot(l->offset[0] - (double)s->offset[0],
+                           l->offset[1] - (double)s->offset[1]) > l->offset_limit;
+    bool jumped = elsewhere && !is_predicted(l, f, s->pixel);
     add_to(&s->hit, ratio);
     add_to(&s->sky, ratio + shape);
     add_to(&s->at_rest, shape + (jumped ? ratio : 0.0));
     note_look(s, true);
-    s->jumps = l->jumps;
+    if (elsewhere) {
+        s->offset[0] = (float)l->offset[0];
+        s->offset[1] = (float)l->offset[1];
+    }
     s->direction[0] = (float)now.x;
     s->direction[1] = (float)now.y;
     s->direction[2] = (float)now.z;
@@ -237,30 +246,49 @@ static suspect new_suspect(const bst_pixel_learner *l, const bst_pixel_frame *f,
                      .binning = (uint8_t)f->binning,
                      .shown = 1,
                      .looks = 1,
-                     .jumps = l->jumps,
                      .sky = (float)shape,
                      .at_rest = (float)shape,
-                     .direction = {(float)d.x, (float)d.y, (float)d.z}};
+                     .direction = {(float)d.x, (float)d.y, (float)d.z},
+                     .offset = {(float)l->offset[0], (float)l->offset[1]}};
 }
 
 /* ---- frames ---- */
 
-/* Counts the boresight's departures from steady motion. */
+/* Follows how far the boresight is from where steady motion would have brought it. Light at rest in
+ * the frame comes back to a pixel when the boresight comes back to the same offset. */
 static void follow_boresight(bst_pixel_learner *l, const bst_pixel_frame *f) {
-    double scale = bst_camera_scale_rad(&l->camera), before = l->time_s[1] - l->time_s[0];
-    if (l->frames >= 2 && before > 0.0) {
-        bst_vec3 turn = bst_quat_to_rotvec(bst_quat_mul(l->q[1], bst_quat_conj(l->q[0])));
-        double share = (f->time_s - l->time_s[1]) / before;
-        bst_vec3 steady = bst_vec3_scale(turn, share);
-        bst_quat expected = bst_quat_mul(bst_quat_from_rotvec(steady), l->q[1]);
-        bst_vec3 off =
-            bst_quat_to_rotvec(bst_quat_mul(f->q_cam_from_gcrf, bst_quat_conj(expected)));
-        double limit = fmax(JUMP_PX * scale, JUMP_SHARE * bst_vec3_norm(steady));
-        l->jumps += hypot(off.x, off.y) > limit;
+    bst_quat q = f->q_cam_from_gcrf;
+    double scale = bst_camera_scale_rad(&l->camera), dt = f->time_s - l->time_s[1];
+    double before = l->time_s[1] - l->time_s[0];
+    bst_vec3 turn = {0};
+    l->offset_limit = JUMP_PX * scale;
+    if (l->frames == 0) {
+        l->q_steady = q;
+    } else if (dt > 0.0) {
+        turn = bst_quat_to_rotvec(bst_quat_mul(bst_quat_conj(l->q[1]), q));
     }
+    if (l->frames == 1 && dt > 0.0) {
+        l->steady_radps = bst_vec3_scale(turn, 1.0 / dt);
+    } else if (l->frames >= 2 && before > 0.0 && dt > 0.0) {
+        bst_vec3 last = bst_quat_to_rotvec(bst_quat_mul(bst_quat_conj(l->q[0]), l->q[1]));
+        bst_vec3 steady = bst_vec3_scale(last, dt / before);
+        bst_quat expected = bst_quat_mul(l->q[1], bst_quat_from_rotvec(steady));
+        bst_vec3 off = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(expected)));
+        l->offset_limit = fmax(l->offset_limit, JUMP_SHARE * bst_vec3_norm(steady));
+        if (hypot(off.x, off.y) <= l->offset_limit) {
+            l->steady_radps = bst_vec3_scale(turn, 1.0 / dt);
+        }
+    }
+    if (l->frames > 0 && dt > 0.0) {
+        bst_quat step = bst_quat_from_rotvec(bst_vec3_scale(l->steady_radps, dt));
+        l->q_steady = bst_quat_unit(bst_quat_mul(l->q_steady, step));
+    }
+    bst_vec3 offset = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(l->q_steady)));
+    l->offset[0] = offset.x;
+    l->offset[1] = offset.y;
     l->q[0] = l->q[1];
     l->time_s[0] = l->time_s[1];
-    l->q[1] = f->q_cam_from_gcrf;
+    l->q[1] = q;
     l->time_s[1] = f->time_s;
     l->frames++;
 }

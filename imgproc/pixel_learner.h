@@ -9,8 +9,9 @@
  * - Return. A pixel that showed k maxima in n looks shows another with P = (k + 1) / (n + 2), a
  * good one with the share of the frame's pixels that hold a maximum, q: log(P / q), or log((1 - P)
  * / (1 - q)) without one. A return counts only after the sky has moved by three pixels; against
- * light at rest only after the boresight has left its steady motion (a slew, a step of a search),
- * and not where a track is predicted.
+ * light at rest only where the boresight is off its steady motion by another offset than at the
+ * return before (a slew, a step of a search, but not the way back), and not where a track is
+ * predicted.
  * - Shape. The deviation from light is normal about 0 for light, about its value for the pixel's
  *   charge alone for a defect; a share of light, measured on identified stars, has any.
  *

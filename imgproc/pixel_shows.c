@@ -21,7 +21,7 @@ void bst_pixel_shows_free(bst_pixel_shows *shows) {
     *shows = (bst_pixel_shows){0};
 }
 
-/* A maximum from this SNR on is taken for light by the quick test alone. */
+/* A maximum from this SNR on is taken for light by the quick test alone, where that can tell. */
 static const float CLEAR_SNR = 20.0f;
 
 enum { CLUSTER_PX = 2 }; /* about a pixel with charge */
@@ -100,7 +100,9 @@ void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_locator *l, const bst
         int x = candidates->items[i].x, y = candidates->items[i].y;
         a.noise_e = bst_locate_noise_at(f, x, y);
         find_highest(&l->sharpness, f, &x, &y);
-        if (candidates->items[i].snr > CLEAR_SNR && !is_open(&a, x, y)) {
+        float signal = f->signal[(size_t)y * (size_t)f->width + (size_t)x];
+        if (candidates->items[i].snr > CLEAR_SNR && !is_open(&a, x, y) &&
+            bst_sharpness_is_telling(&l->sharpness, signal, (float)a.noise_e)) {
             continue;
         }
         bst_sharpness_test sharp = compare(&a, x, y);

@@ -119,6 +119,15 @@ bool bst_sharpness_is_open(const bst_sharpness *s, const float *signal, int widt
            (f4 * c - e4 > noise_e * s->deviation[4]);
 }
 
+bool bst_sharpness_is_telling(const bst_sharpness *s, float signal, float noise_e) {
+    float c = (float)bst_sharpness_signal(s, signal);
+    bool telling = false;
+    for (int g = 0; g < BST_SHARP_GROUPS; g++) {
+        telling = telling || (float)s->floor[g] * c > 2.0f * noise_e * s->deviation[g];
+    }
+    return telling;
+}
+
 /* The pixel's signal and its neighbours'. */
 typedef struct surroundings {
     double centre, at[3][3];

@@ -50,6 +50,11 @@ double bst_sharpness_signal(const bst_sharpness *sharpness, float signal);
 bool bst_sharpness_is_open(const bst_sharpness *sharpness, const float *signal, int width,
                            int height, float noise_e, int x, int y);
 
+/* Whether bst_sharpness_is_open is sure of a pixel that holds this much and whose neighbours hold
+ * nothing: its deviation would be at least twice BST_SHARP_DEVIATION. Where the PSF is so narrow
+ * that it is not, a pixel that is not open may hold charge all the same. */
+bool bst_sharpness_is_telling(const bst_sharpness *sharpness, float signal, float noise_e);
+
 /* How far, in standard deviations, the pixel (x, y) of signal [height][width] stands out of what
  * light could do; 0 or less: not at all. Neighbours outside or without a measurement speak for
  * light. */

@@ -94,7 +94,7 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
 }
 
 /* Brightness counts, but a flare or an eclipse must not cost a track its detection. */
-static double brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection) {
+double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection) {
     double variance =
         track->v_mag_variance + 0.09 + detection->v_mag_sigma * detection->v_mag_sigma;
     double difference = track->v_mag - detection->v_mag;
@@ -144,7 +144,8 @@ static int collect(const bst_mtt *mtt, int t, double detection_sigma, int *colum
             continue;
         }
         double cost = -fit.log_likelihood + log(mtt->clutter_density) -
-                      log(params->detection_probability) + brightness_cost(track, detection);
+                      log(params->detection_probability) +
+                      bst_mtt_brightness_cost(track, detection);
         int at = count;
         if (count == BST_MTT_CANDIDATES) {
             at = 0;
@@ -236,6 +237,7 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     /* confirmed tracks choose first: a false start must not take their detections */
     assign_group(mtt, false);
     bst_mtt_share(mtt);
+    bst_mtt_gate_manoeuvres(mtt);
     int unused = 0;
     for (int i = 0; i < mtt->now.count; i++) {
         unused += !mtt->now.used[i];

@@ -1,18 +1,19 @@
 /* Manoeuvres and changes of brightness, told from the innovations of a track. */
 #include "tracker/multitarget_internal.h"
 
-/* Probability that one test may call a false event. Tests come once per hit and for windows of 1,
- * 2, 4, ... hits; the chance that any of them is wrong is at most the sum of theirs. */
-static double test_probability(const bst_mtt_params *params, double dt_s) {
+static bool is_told(const bst_mtt_params *params) {
+    return params->event_window > 0 && params->false_events_per_hour > 0.0;
+}
+
+double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s) {
+    if (!is_told(params)) {
+        return 0.0;
+    }
     int tests = 0;
     for (int n = 1; n <= params->event_window; n *= 2) {
         tests++;
     }
     return fmin(0.5, params->false_events_per_hour * dt_s / 3600.0 / tests);
-}
-
-static bool is_told(const bst_mtt_params *params) {
-    return params->event_window > 0 && params->false_events_per_hour > 0.0;
 }
 
 bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
@@ -27,7 +28,7 @@ bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
     double *slot = track->innovations[(count - 1) % window];
     slot[0] = innovation->nu[0] / l11;
     slot[1] = (innovation->nu[1] - l21 * slot[0]) / l22;
-    double allowed = test_probability(params, dt_s), sum[2] = {0.0, 0.0};
+    double allowed = bst_mtt_event_probability(params, dt_s), sum[2] = {0.0, 0.0};
     for (int n = 1, test = 1; n <= window && n <= count; n++) {
         const double *z = track->innovations[(count - n) % window];
         sum[0] += z[0];
@@ -53,7 +54,7 @@ bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track,
     }
     int window = params->event_window, count = ++track->brightness_count;
     track->brightness[(count - 1) % window] = z;
-    double allowed = test_probability(params, dt_s), sum = 0.0;
+    double allowed = bst_mtt_event_probability(params, dt_s), sum = 0.0;
     for (int n = 1, test = 1; n <= window && n <= count; n++) {
         sum += track->brightness[(count - n) % window];
         if (n != test) {

@@ -3,6 +3,11 @@
 
 #include "tracker/multitarget_internal.h"
 
+/* Detections of a frame, beside those of confirmed tracks, up to which `confirm_score` alone keeps
+ * false tracks rare: 100 exp(-12) a frame. With more, a track's odds before its first detection are
+ * less in their proportion, so that the rate of false tracks is no higher. */
+static const double FEW_ALARMS = 100.0;
+
 /* What a pair must fulfil: its rate lies within `gate_radps` of `rate`. */
 typedef struct rate_gate {
     bst_vec3 rate_radps; /* in the tangent plane at the new detection */
@@ -61,6 +66,8 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
     double floor = mtt->params.brightness_floor_mag;
     double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
+    /* of what was taken for charge the like may have been taken for light */
+    double alarms = mtt->clutter_density * mtt->params.field_sr + (double)mtt->charged;
     bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
     *track = (bst_mtt_track){
         .id = mtt->next_id++,
@@ -73,7 +80,8 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .hits = 2,
         .frames = 2,
         .score = fmax(0.0, log(mtt->params.detection_probability /
-                               (mtt->clutter_density * BST_PI * reach * reach))),
+                               (mtt->clutter_density * BST_PI * reach * reach))) -
+                 log(fmax(1.0, alarms / FEW_ALARMS)),
         .last_chi2 = -1.0,
         .first_tick = pool->tick,
         .last_update_tick = mtt->now.tick,

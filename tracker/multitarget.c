@@ -82,10 +82,11 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
     m->extra = calloc(nt, sizeof *m->extra);
     m->shared = calloc(nt, sizeof *m->shared);
     m->observable = calloc(nt, sizeof *m->observable);
+    m->departed_chi2 = calloc(nt, sizeof *m->departed_chi2);
     bool ok = m->tracks && m->memory && m->events && m->edge_order && m->edge_row && m->edge_key &&
               m->owner && m->rows && m->first && m->column_of_row && m->miss_costs &&
               m->edge_columns && m->edge_costs && m->detection_of_track && m->extra && m->shared &&
-              m->observable && pool_create(&m->now, params->max_detections);
+              m->observable && m->departed_chi2 && pool_create(&m->now, params->max_detections);
     for (int h = 0; ok && h < BST_MTT_HISTORY; h++) {
         ok = pool_create(&m->history[h], params->max_detections);
     }
@@ -123,6 +124,7 @@ void bst_mtt_free(bst_mtt *m) {
     free(m->extra);
     free(m->shared);
     free(m->observable);
+    free(m->departed_chi2);
     pool_free(&m->now);
     for (int h = 0; h < BST_MTT_HISTORY; h++) {
         pool_free(&m->history[h]);
@@ -327,8 +329,11 @@ static void hit(bst_mtt *m, int t) {
     bst_mtt_note_fixed(m, detection, fit.log_likelihood, track);
     track->last_update_tick = m->now.tick;
     track->last_update_s = m->now.seconds;
-    if (track->status != BST_TRACK_TENTATIVE && !track->star &&
-        bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
+    if (m->departed_chi2[t] > 0.0) {
+        record(m, BST_MTT_MANOEUVRE, track, m->departed_chi2[t]);
+        track->innovation_count = 0;
+    } else if (track->status != BST_TRACK_TENTATIVE && !track->star &&
+               bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
         record(m, BST_MTT_MANOEUVRE, track, statistic);
         track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_s;
     }
@@ -489,6 +494,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     load_detections(m, frame);
     double floor = m->params.false_alarms_per_frame;
     m->bad_pixels = frame->bad_pixels;
+    m->charged = frame->charged;
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
     bst_mtt_associate(m, frame->partial);

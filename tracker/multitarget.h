@@ -193,6 +193,7 @@ typedef struct bst_mtt_frame {
      * share of the Sun's light that it gets. NULL: everything is in full light. */
     bst_mtt_sight (*sight)(const void *user, const bst_mtt_track *track, bst_mtt_light *light);
     int bad_pixels; /* of the sensor, known so far: as many may be unknown */
+    int charged; /* detections that are not given because they were taken for charge, not light */
     /* 1 sigma per axis of an apparent rate that all of this frame's directions may share */
     double common_rate_sigma_radps;
 } bst_mtt_frame;

@@ -51,6 +51,7 @@ struct bst_mtt {
     bool cue_lag_valid;
     bst_vec3 cue_lag_radps2;
     int bad_pixels;         /* of the latest frame */
+    int charged;            /* the same */
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
     /* smoothed number of detections that no confirmed track has, of how many frames, and their
@@ -77,6 +78,7 @@ struct bst_mtt {
     double (*extra)[3];      /* widening of a shared detection, tangent axes of the track */
     bst_mtt_sharing *shared;
     bool *observable;
+    double *departed_chi2; /* of a manoeuvre that the wider gate tells in this frame; 0: none */
 };
 
 /* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
@@ -90,6 +92,9 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
 
 /* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
 void bst_mtt_associate(bst_mtt *mtt, bool partial);
+
+/* What a detection's brightness adds to -ln of its likelihood, at most 4.5. */
+double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection);
 
 /* Gives missed confirmed tracks a detection that they share with a neighbour. */
 void bst_mtt_share(bst_mtt *mtt);
@@ -117,6 +122,16 @@ void bst_mtt_remember(bst_mtt *mtt, const bst_mtt_track *track);
  * confirmed `anew`, or of a sleeping one that was not seen any more when it began, and that is then
  * `replaced`. False when it is none of them. */
 bool bst_mtt_resume(bst_mtt *mtt, bst_mtt_track *track, bool anew);
+
+/* Probability that one test of a track's events may call a false one, dt_s after the test before;
+ * 0: none are told. Tests come once per hit and for windows of 1, 2, 4, ... hits; the chance that
+ * any of them is wrong is at most the sum of theirs. */
+double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s);
+
+/* Gives confirmed tracks that have no detection the likeliest one that a manoeuvre begun since
+ * their latest would bring, if that is likelier than a miss and clutter together; such a track's
+ * covariance is widened by the manoeuvre's noise of that time. */
+void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
 
 /* Note a hit's innovation, and the difference of its magnitude over its standard deviation; true
  * when the latest ones together are an event, which starts the window anew. dt_s is the time since

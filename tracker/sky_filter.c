@@ -43,6 +43,19 @@ static void sandwich(const double a[4][4], double p[4][4]) {
     }
 }
 
+void bst_sky_add_noise(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
+    double(*p)[4] = state->covariance;
+    double dt = fabs(dt_s);
+    double q_pp = noise_rad2ps3 * dt * dt * dt / 3.0, q_pr = noise_rad2ps3 * dt * dt_s / 2.0,
+           q_rr = noise_rad2ps3 * dt;
+    for (int i = 0; i < 2; i++) {
+        p[i][i] += q_pp;
+        p[i][i + 2] += q_pr;
+        p[i + 2][i] += q_pr;
+        p[i + 2][i + 2] += q_rr;
+    }
+}
+
 void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
     bst_vec3 d0 = state->direction, r0 = state->rate_radps;
     double speed = bst_vec3_norm(r0);
@@ -62,15 +75,7 @@ void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
     }
     turn_blocks(p, c, s);
     sandwich(f, p);
-    double dt = fabs(dt_s);
-    double q_pp = noise_rad2ps3 * dt * dt * dt / 3.0, q_pr = noise_rad2ps3 * dt * dt_s / 2.0,
-           q_rr = noise_rad2ps3 * dt;
-    for (int i = 0; i < 2; i++) {
-        p[i][i] += q_pp;
-        p[i][i + 2] += q_pr;
-        p[i + 2][i] += q_pr;
-        p[i + 2][i + 2] += q_rr;
-    }
+    bst_sky_add_noise(state, dt_s, noise_rad2ps3);
     if (speed > 0.0) {
         bst_vec3 along = bst_vec3_scale(r0, 1.0 / speed);
         bst_vec3 d1 =

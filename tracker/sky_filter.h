@@ -36,6 +36,11 @@ typedef struct bst_sky_innovation {
  * Geometry, chapter 5). */
 void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3);
 
+/* Adds to the covariance what white acceleration of that power spectral density brings in |dt_s|:
+ * noise [dt^3/3, dt^2/2; dt^2/2, dt] per axis (Bar-Shalom, Li and Kirubarajan 2001, eq. 6.2.2-12).
+ */
+void bst_sky_add_noise(bst_sky_state *state, double dt_s, double noise_rad2ps3);
+
 /* Shifts the mean by tangent vectors (any part along the direction is dropped); the covariance is
  * carried along. Used for a known acceleration. */
 void bst_sky_shift(bst_sky_state *state, bst_vec3 direction_rad, bst_vec3 rate_radps);

@@ -297,6 +297,14 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
     return count;
 }
 
+static int charged_of(const bst_detections *d) {
+    int count = 0;
+    for (int i = 0; i < d->count; i++) {
+        count += d->items[i].label == BST_LABEL_HOT_PIXEL || d->items[i].label == BST_LABEL_HIT;
+    }
+    return count;
+}
+
 static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt_track *track) {
     if ((size_t)t->event_count == t->event_capacity) {
         return;
@@ -478,6 +486,7 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                            .detections = t->detections,
                            .partial = d->windows > 0,
                            .bad_pixels = d->bad_pixels,
+                           .charged = charged_of(d),
                            .in_field = bst_frame_in_field,
                            .expected = bst_frame_is_expected,
                            .range = bst_frame_range_of,

@@ -116,7 +116,7 @@ const bst_config_desc bst_tracker_config_table[] = {
              "model of "
              "type imm; of ekf and ukf for manoeuvre_s after an event `manoeuvre`."),
     BST_REAL(C, quiet_s, "s", 1e-3, 1e9, "3600",
-             "Type imm: mean time between the end of a manoeuvre and the next one."),
+             "Mean time between the end of a manoeuvre and the next one."),
     BST_REAL(C, manoeuvre_s, "s", 1e-3, 1e9, "60", "Mean length of a manoeuvre."),
     BST_REAL(C, brightness_floor_mag, "mag", 0, 10, "0.2",
              "Standard deviation added to every magnitude."),

@@ -1,4 +1,4 @@
-"""A target that burns unknown to the cue is held by every filter: accelerations from 0.1 to 30 m/s^2
+"""A target that burns unknown to the cue is held by every filter: accelerations from 0.1 to 100 m/s^2
 for minutes, from rates that are the cue's to 80 arcsec/s away from it.
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_manoeuvre.py BORESIGHT
@@ -59,10 +59,11 @@ class Manoeuvre(unittest.TestCase):
                            (30, 200, (0, 1, 0))))
 
     def test_ekf(self):
-        self.check("ekf", ((1, 200, (0, 1, 0)), (10, 200, (0, 1, 0))))
+        self.check("ekf", ((1, 200, (0, 1, 0)), (10, 200, (0, 1, 0)), (30, 200, (0, 1, 0)),
+                           (30, 100, (0, 0, 1)), (100, 100, (0, 1, 0))))
 
     def test_ukf(self):
-        self.check("ukf", ((10, 200, (0, 0, -1)),))
+        self.check("ukf", ((10, 200, (0, 0, -1)), (30, 200, (0, 1, 0))))
 
 
 def tearDownModule():

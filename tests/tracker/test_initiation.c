@@ -67,7 +67,54 @@ static void pairs_have_the_cues_acceleration(void **state) {
     }
 }
 
+/* An object over four frames, `charged` detections of each taken for charge; its score after them,
+ * and whether it was confirmed. */
+static double score_among(int charged, double confirm_score, bool *confirmed) {
+    bst_ctx ctx = {0};
+    bst_mtt *mtt;
+    bst_mtt_params params = pixel_tracker(16, 16);
+    params.confirm_score = confirm_score;
+    bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+    for (int k = 0; k < 4; k++) {
+        bst_vec3 rate;
+        bst_mtt_detection seen = {.sky = {.direction = place(0.0, 20.0 * AS, k, &rate),
+                                          .cov_11 = 0.01 * PX * PX,
+                                          .cov_22 = 0.01 * PX * PX},
+                                  .v_mag = 10,
+                                  .v_mag_sigma = 0.05,
+                                  .snr = 50,
+                                  .length_rad = 2 * PX};
+        bst_mtt_frame f = {
+            .tick = 1000 * k, .seconds = k, .detections = &seen, .count = 1, .charged = charged};
+        bst_mtt_step(mtt, &f);
+    }
+    int n;
+    const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &n);
+    assert_int_equal(n, 1);
+    double score = tracks->score;
+    *confirmed = tracks->status == BST_TRACK_CONFIRMED;
+    bst_mtt_free(mtt);
+    return score;
+}
+
+/* Among N detections that may start false tracks the odds of a track are N/100 times worse. */
+static void many_alarms_ask_for_more(void **state) {
+    (void)state;
+    bool confirmed;
+    double alone = score_among(0, 5.0, &confirmed);
+    assert_true(confirmed);
+    /* 100 are few; the detection itself is another one */
+    assert_true(fabs(score_among(99, 5.0, &confirmed) - alone) < 1e-12);
+    assert_true(fabs(score_among(2000, 5.0, &confirmed) - (alone - log(2001.0 / 100.0))) < 1e-9);
+    assert_true(confirmed);
+    score_among(0, alone - 1.0, &confirmed);
+    assert_true(confirmed);
+    score_among(2000, alone - 1.0, &confirmed);
+    assert_false(confirmed);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pairs_have_the_cues_acceleration)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pairs_have_the_cues_acceleration),
+                                       cmocka_unit_test(many_alarms_ask_for_more)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
