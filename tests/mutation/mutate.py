@@ -83,10 +83,10 @@ def mutants_of(path, text):
             for kind, rules in OPERATORS.items():
                 for pattern, new in rules:
                     for m in re.finditer(pattern, line):
-                        found.append((kind, at + m.start(), m.group(), m.expand(new) if "\\" in new else new))
+                        found.append((kind, at + m.start(), text[at + m.start():at + m.end()], m.expand(new) if "\\" in new else new))
             if STATEMENT.match(line) and re.match(r"^\s+(?:[\w\.\[\]>-]+) ?(?:=|\+=|-=|\*=)", line):
-                statement = line.strip()
-                found.append(("statement", at + line.index(statement), statement, ";"))
+                first, last = at + len(line) - len(line.lstrip()), at + len(line.rstrip())
+                found.append(("statement", first, text[first:last], ";"))
         at += len(line) + 1
     return found
 
