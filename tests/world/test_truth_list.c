@@ -156,13 +156,13 @@ static void saturation(void **state) {
         fill(&s, &list, n, MOST, NULL);
         /* pixel of 6 arcsec, 0.5 s */
         const bst_camera *camera = bst_world_camera(s.world, 0, 0);
-        double dark = 0.5 * (2000 + bst_camera_electrons_per_s(camera, 15) * 36);
+        double sky = 0.5 * bst_camera_electrons_per_s(camera, 15) * 36;
         double limits[MOST];
         for (int i = 0; i < s.count; i++) {
             const bst_truth_item *item = &s.truth->items[i];
             double rx = item->x_chief_px - 449.5, ry = item->y_chief_px - 349.5;
             double r2 = (rx * rx + ry * ry) / (0.25 * (900.0 * 900 + 700.0 * 700));
-            double light = 1 - 0.3 * r2 + 0.1 * r2 * r2;
+            double light = 1 - 0.3 * r2 + 0.1 * r2 * r2, dark = 1000 + sky * light;
             double wx = item->x_end_px - item->x_start_px, wy = item->y_end_px - item->y_start_px;
             double psf = 1.7 / (2 * sqrt(2 * log(2))), share = 1;
             double spread[2] = {psf * psf + wx * wx / 12, psf * psf + wy * wy / 12};
@@ -177,7 +177,8 @@ static void saturation(void **state) {
         }
         for (int above = 0; above < 2; above++) {
             for (int i = 0; i < s.count; i++) {
-                s.peak_e[i] = limits[i] * (above ? 1 + 1e-7 : 1 - 1e-7);
+                /* the sky between the nodes of its map: 5e-4 of 1800 e-, nine times */
+                s.peak_e[i] = limits[i] * (above ? 1 + 5e-4 : 1 - 5e-4);
             }
             fill(&s, &list, n, MOST, NULL);
             for (int i = 0; i < s.count; i++) {
