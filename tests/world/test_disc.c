@@ -1,62 +1,7 @@
-/* A lit sphere as a disc against sums over its surface: elements of area, each with the light that
- * falls on it and the cosine under which it is seen. */
+/* A lit sphere as a disc against sums over its surface. */
 #include "sim/world/disc.h"
 
-#include "tests/test_support.h"
-
-/* Mean direction beside the middle, second moments and total of the light, by elements of the
- * surface. */
-typedef struct moments {
-    bst_vec3 mean;
-    double along_xx, along_yy,
-        along_xy; /* about the middle, on two axes across the line of sight */
-    double total;
-} moments;
-
-/* No axis is like another. */
-static const bst_vec3 ahead = {0.48, -0.64, 0.6};
-static const bst_vec3 cross_x = {0.8, 0.6, 0.0}; /* at right angles to `ahead`, as cross_y */
-static const bst_vec3 cross_y = {-0.36, 0.48, 0.8};
-
-static void add(moments *m, bst_vec3 offset, double light) {
-    double x = bst_vec3_dot(offset, cross_x), y = bst_vec3_dot(offset, cross_y);
-    m->mean = bst_vec3_axpy(m->mean, light, offset);
-    m->along_xx += light * x * x;
-    m->along_yy += light * y * y;
-    m->along_xy += light * x * y;
-    m->total += light;
-}
-
-static void close_sum(moments *m) {
-    m->mean = bst_vec3_scale(m->mean, 1.0 / m->total);
-    m->along_xx /= m->total;
-    m->along_yy /= m->total;
-    m->along_xy /= m->total;
-}
-
-enum { RINGS = 700, SPOKES = 1400 };
-
-/* Elements of a sphere of radius k at distance 1. light: unit, from the sphere; NULL: it glows
- * evenly. */
-static moments surface(double k, const bst_vec3 *light) {
-    moments m = {.total = 0};
-    for (int i = 0; i < RINGS; i++) {
-        double c = 1 - 2 * (i + 0.5) / RINGS, s = sqrt(1 - c * c);
-        for (int j = 0; j < SPOKES; j++) {
-            double phi = 2 * BST_PI * (j + 0.5) / SPOKES;
-            bst_vec3 n = {s * cos(phi), s * sin(phi), c};
-            bst_vec3 place = bst_vec3_axpy(ahead, k, n); /* from the eye */
-            double range = bst_vec3_norm(place), seen = -bst_vec3_dot(n, place) / range;
-            double lit = light ? bst_vec3_dot(n, *light) : 1;
-            if (seen > 0 && lit > 0) {
-                bst_vec3 at = bst_vec3_scale(place, 1 / bst_vec3_dot(place, ahead));
-                add(&m, bst_vec3_sub(at, ahead), lit * seen / (range * range));
-            }
-        }
-    }
-    close_sum(&m);
-    return m;
-}
+#include "tests/world/lit_sphere.h"
 
 static moments of_points(const bst_source *source, int lights) {
     bst_ctx ctx = {0};
@@ -65,10 +10,10 @@ static moments of_points(const bst_source *source, int lights) {
     bst_assert_ok(
         &ctx, bst_disc_make_points(&ctx, source, lights, asin(source->shape->radius) / 20, &list));
     for (int i = 0; i < list.count; i++) {
-        add(&m, list.items[i].offset, list.items[i].share);
+        moments_add(&m, list.items[i].offset, list.items[i].share);
     }
     free(list.items);
-    close_sum(&m);
+    moments_close(&m);
     return m;
 }
 
@@ -104,9 +49,10 @@ static void points_have_the_light_of_the_surface(void **state) {
                                       .thermal = 0.15};
             /* any length will do for the direction */
             bst_source s = {.apparent_mid = bst_vec3_scale(ahead, 3), .shape = &shape};
-            compare(of_points(&s, BST_DISC_SUN), surface(radii[r], &shape.sun), radii[r], 0.4);
-            compare(of_points(&s, BST_DISC_EARTH), surface(radii[r], &shape.earth), radii[r], 0.25);
-            compare(of_points(&s, BST_DISC_THERMAL), surface(radii[r], NULL), radii[r], 0.15);
+            compare(of_points(&s, BST_DISC_SUN), lit_surface(radii[r], &shape.sun), radii[r], 0.4);
+            compare(of_points(&s, BST_DISC_EARTH), lit_surface(radii[r], &shape.earth), radii[r],
+                    0.25);
+            compare(of_points(&s, BST_DISC_THERMAL), lit_surface(radii[r], NULL), radii[r], 0.15);
             bst_assert_close(of_points(&s, BST_DISC_ALL).total, 1, 1e-12);
         }
     }
@@ -146,8 +92,9 @@ static void radiance_is_that_of_the_place(void **state) {
                                       .earthshine = 0.3,
                                       .thermal = 0.2};
             bst_source s = {.apparent_mid = ahead, .shape = &shape};
-            double sun = surface(k, &shape.sun).total, earth = surface(k, &shape.earth).total;
-            double element = 4 * BST_PI * k * k / (RINGS * SPOKES);
+            double sun = lit_surface(k, &shape.sun).total,
+                   earth = lit_surface(k, &shape.earth).total;
+            double element = 4 * BST_PI * k * k / (LIT_RINGS * LIT_SPOKES);
             /* solid angle of the disc */
             double solid = 2 * BST_PI * (1 - sqrt(1 - k * k));
             bst_disc disc;
