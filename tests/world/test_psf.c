@@ -287,6 +287,32 @@ static void tilt_moves_the_image(void **state) {
     bst_psf_free(still);
 }
 
+/* The centroid lies where the mean slope of the wavefront points: 4 a lambda F of tilt a, and for
+ * coma, sqrt(8) (3 r^3 - 2 r) cos t, 2 sqrt(8) a (1 + 3 e^2) lambda F, on an annulus of inner
+ * radius e (mean of r^2: (1 + e^2) / 2). Terms 2 and 8 are along x, 3 and 7 along y; lambda F is 2
+ * px. */
+static void odd_aberrations_move_the_centroid(void **state) {
+    (void)state;
+    for (int n = 0; n < 4; n++) {
+        bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
+        double e2 = n % 2 ? 0.16 : 0.0, *z = camera.optics.zernike_waves.waves;
+        camera.obscuration = e2;
+        camera.optics.zernike_nm = 551.0;
+        z[2 - 2] = n < 2 ? 0.0 : 0.05;
+        z[3 - 2] = n < 2 ? 0.0 : -0.08;
+        z[8 - 2] = 0.06;
+        z[7 - 2] = -0.03;
+        double coma = 2 * sqrt(8.0) * (1 + 3 * e2) * 2, shift[2];
+        bst_psf *psf = psf_of(&camera);
+        const float white[BST_PSF_COLOURS] = {0};
+        bst_psf_centroid_px(psf, white, 50, 25, shift);
+        /* cells of 1/384 of the aperture, and the OTF's phase from two low frequencies */
+        bst_assert_close(shift[0], 8 * z[2 - 2] + coma * 0.06, 0.01);
+        bst_assert_close(shift[1], 8 * z[3 - 2] - coma * 0.03, 0.01);
+        bst_psf_free(psf);
+    }
+}
+
 /* The autocorrelation by brute force: a fine midpoint rule on the aperture's very outline. */
 static void brute_otf(const bst_camera *camera, const double amounts[38], double sx, double sy,
                       double out[2]) {
@@ -368,6 +394,7 @@ int main(void) {
         cmocka_unit_test(a_detector_out_of_focus_is_term_4),
         cmocka_unit_test(small_aberrations_have_marechals_strehl),
         cmocka_unit_test(tilt_moves_the_image),
+        cmocka_unit_test(odd_aberrations_move_the_centroid),
         cmocka_unit_test(an_aberrated_spidered_aperture_is_its_autocorrelation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
