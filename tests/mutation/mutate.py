@@ -16,8 +16,8 @@ With --work the copy is kept, and the next call takes over only what has changed
 The unit suite judges a file by the unit tests of its own folder. The command line, sim/app, has few of those: its tests
 are the e2e suite. The unit suite therefore leaves sim/app out (--files still takes its files).
 
---coverage names a folder for a build with gcov (made there, kept up to date): every unit test runs once in it. A bug
-on a line that no test executes has survived without a trial; others are judged only by the tests that execute the line.
+--coverage names a folder for a build with gcov (made there, kept up to date): every unit test runs once in it, and a
+bug is judged only by the tests that execute its line; where none does, by all of its folder.
 
 A file is drawn by the number of its lines that can hold a bug, and a kind of bug evenly among those of the file.
 Prints a line for each bug, the survivors with their place, and the score with its 95 % Wilson interval (Wilson 1927,
@@ -165,7 +165,8 @@ class Coverage:
         near = [max((v for v in lines if v <= line), default=None), min((v for v in lines if v > line), default=None)]
         near = near[:1] if near[0] == line else near
         reached = set().union(*(lines[v] for v in near if v is not None))
-        return [n for n in names if n in reached or n not in self.known]
+        judges = [n for n in names if n in reached or n not in self.known]
+        return judges if judges else names  # a child process that is killed leaves no trace with gcov
 
     def unexecuted(self, path, names):
         """Lines with code that none of these tests executes, as ranges."""
@@ -309,7 +310,7 @@ def trial(tree, coverage, name, line, mutant, suite):
         if digest(os.path.join(tree.build, target)) == before:
             return "equal", "same object"
         if not names:
-            return "survived", "no test executes it" if coverage else "no tests"
+            return "survived", "no tests"
         failed = tree.judge(names)
         return ("noticed", failed) if failed else ("survived", f"{len(names)} tests passed")
     finally:
