@@ -313,6 +313,36 @@ static void odd_aberrations_move_the_centroid(void **state) {
     }
 }
 
+/* A PSF reaches as far as its longest wavelength makes it, in proportion to the wavelength; slopes
+ * of the wavefront are too many waves at the shortest. */
+static void the_ends_of_a_band_count(void **state) {
+    (void)state;
+    double reach[2];
+    for (int wide = 0; wide < 2; wide++) {
+        bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
+        camera.optics.q = 0.0; /* by aperture and scale: lambda / (0.1 m * 2 arcsec) */
+        camera.optics.wavelengths = 8;
+        camera.optics.band_nm[0] = wide ? 400.0 : 979.0;
+        camera.optics.band_nm[1] = wide ? 1000.0 : 981.0;
+        bst_psf *psf = psf_of(&camera);
+        reach[wide] = bst_psf_reach_px(psf);
+        bst_psf_free(psf);
+    }
+    /* eight wavelengths of a rule whose last one is 12 nm from the end */
+    bst_assert_close(reach[1] / reach[0], 988.0 / 980.0, 0.005);
+    /* a tilt of 4 * 15 waves of 500 nm a diameter: 64 are too many, of the shortest wavelength */
+    bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
+    bst_ctx ctx = {0};
+    bst_psf *psf;
+    camera.optics.zernike_nm = 500.0;
+    camera.optics.wavelengths = 8;
+    camera.optics.band_nm[0] = 250.0;
+    camera.optics.band_nm[1] = 1000.0;
+    camera.optics.zernike_waves.waves[2 - 2] = 15.0;
+    assert_int_equal(bst_psf_create(&ctx, &camera, &psf), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "aberrations with slopes of"));
+}
+
 /* The autocorrelation by brute force: a fine midpoint rule on the aperture's very outline. */
 static void brute_otf(const bst_camera *camera, const double amounts[38], double sx, double sy,
                       double out[2]) {
@@ -395,6 +425,7 @@ int main(void) {
         cmocka_unit_test(small_aberrations_have_marechals_strehl),
         cmocka_unit_test(tilt_moves_the_image),
         cmocka_unit_test(odd_aberrations_move_the_centroid),
+        cmocka_unit_test(the_ends_of_a_band_count),
         cmocka_unit_test(an_aberrated_spidered_aperture_is_its_autocorrelation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
