@@ -267,8 +267,10 @@ static void a_prediction_has_correlated_axes(void **state) {
     const struct {
         double rho, east, north; /* the error over the standard deviation of its own axis */
         int wrong;
-    } cases[] = {{0.9, 1, 1, 0},   {0.9, 1, -1, 25}, {0.9, -1, 1, 25},
-                 {-0.9, 1, -1, 0}, {-0.9, 1, 1, 25}, {-0.9, -1, -1, 25}};
+    } cases[] = {{0.9, 1, 1, 0},         {0.9, 1, -1, 25}, {0.9, -1, 1, 25},
+                 {-0.9, 1, -1, 0},       {-0.9, 1, 1, 25}, {-0.9, -1, -1, 25},
+                 {0.9, 1.05, 1.05, 25}, /* 1.03 of the bound */
+                 {-0.9, -1.05, 1.05, 25}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         scene *s = open_scene(GX5, 0);
         /* 0.98 of the bound along the long axis, where it is 4 times the bound across */
