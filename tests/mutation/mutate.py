@@ -347,6 +347,7 @@ def main():
     parser.add_argument("--suite", choices=["unit", "e2e"], default="unit",
                         help="which tests judge (default unit, which leaves sim/app out: its tests are the e2e suite)")
     parser.add_argument("--count", type=int, default=30, help="bugs to plant (default 30)")
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="plant no more after so many minutes")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--least", type=float, default=0.0, help="least score, 0 to 1, for exit code 0")
@@ -369,9 +370,9 @@ def main():
             return show_unexecuted(pools, tree, coverage) if coverage else parser.error("--unexecuted needs --coverage")
         if not pools:
             sys.exit("mutate: no source file to plant a bug in: look at --files and --since")
-        outcomes, tried = [], set()
+        outcomes, tried, begun = [], set(), time.monotonic()
         for _ in range(20 * options.count):
-            if len(outcomes) == options.count:
+            if len(outcomes) == options.count or (outcomes and time.monotonic() > begun + 60 * options.minutes):
                 break
             name, mutant = draw(pools, rng)
             if (name, mutant) in tried:
