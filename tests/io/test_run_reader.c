@@ -4,6 +4,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/io/csv.h"
 #include "sim/io/manifest.h"
 #include "sim/io/run_store.h"
 #include "tests/io/scratch.h"
@@ -272,11 +273,59 @@ static void folders_that_are_damaged(void **state) {
     scratch_remove(&s);
 }
 
+/* A query as a table of comma-separated values: names, then rows; reals that read back the same. */
+static int told;
+static void tell(void *user, int64_t rows) {
+    assert_int_equal(rows, 1024 * ++told);
+    *(int64_t *)user = rows;
+}
+
+static void queries_become_csv(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx = {0};
+    char out[600], text[400] = "";
+    snprintf(out, sizeof out, "%s/run", s.folder);
+    bst_run *run = begin(&ctx, out, NULL);
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
+    bst_run_reader *r = open_reader(out);
+    int64_t rows = -1, last = -1;
+    bst_assert_ok(&ctx, bst_csv_write(&ctx, r,
+                                      "SELECT tick, x_px / 3.0 AS third, label FROM spots WHERE "
+                                      "tick IS NULL OR tick < 1000000000002 ORDER BY tick",
+                                      scratch_path(&s, "a.csv"), tell, &last, &rows));
+    assert_int_equal(rows, 3);
+    assert_int_equal(last, -1); /* too few to tell */
+    FILE *f = fopen(scratch_path(&s, "a.csv"), "rb");
+    assert_non_null(f);
+    assert_true(fread(text, 1, sizeof text - 1, f) > 0);
+    fclose(f);
+    /* 0.25 / 3 to 17 digits, by Python's repr of 17 */
+    assert_string_equal(text,
+                        "tick,third,label\r\n,,\r\n1000000000000,0,even\r\n"
+                        "1000000000001,0.083333333333333329,odd\r\n");
+    bst_assert_ok(&ctx, bst_csv_write(&ctx, r, "SELECT a.tick FROM spots a, spots b",
+                                      scratch_path(&s, "b.csv"), tell, &last, &rows));
+    assert_int_equal(rows, 2500);
+    assert_int_equal(last, 2048);
+    assert_int_equal(told, 2);
+    assert_int_equal(bst_csv_write(&ctx, r, "SELECT x FROM nowhere", scratch_path(&s, "c.csv"),
+                                   NULL, NULL, NULL),
+                     BST_ERR_FORMAT);
+    assert_false(scratch_has(scratch_path(&s, "c.csv")));
+    assert_int_equal(bst_csv_write(&ctx, r, "SELECT 1", "/nowhere/at/all.csv", NULL, NULL, NULL),
+                     BST_ERR_IO);
+    bst_run_reader_close(r);
+    scratch_remove(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_whole_run),
         cmocka_unit_test(what_became_of_it),
         cmocka_unit_test(folders_that_are_damaged),
+        cmocka_unit_test(queries_become_csv),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
