@@ -264,6 +264,53 @@ static void fast_runs_lose_nothing(void **state) {
     }
 }
 
+/* A sensor without detections has dealt with a frame when it is made; one with neither is not
+ * waited for. */
+static const bst_port frame_ports[] = {{.channel = BST_CHANNEL_EXPOSURE, .direction = BST_PORT_OUT},
+                                       {.channel = BST_CHANNEL_FRAME, .direction = BST_PORT_OUT}};
+static const bst_module_desc frame_module = FAKE_DESC(frame_ports),
+                             bare_module = FAKE_DESC(camera_ports);
+
+static bst_status make_whole_frame(fake *self, struct bst_step *step) {
+    int64_t id = bst_step_tick(step) / PERIOD;
+    (void)bst_pacing_frame(step, id);
+    *(bst_exposure *)bst_step_write(step, 0, NULL) = (bst_exposure){.id = id};
+    if (self->value) {
+        wall_s += 0.006;
+        *(bst_frame_message *)bst_step_write(step, 1, NULL) =
+            (bst_frame_message){.exposure_id = id};
+    }
+    return BST_OK;
+}
+
+static void frames_stand_for_detections(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_engine *engine = fake_engine(&ctx, RATE);
+    fake whole = {.on_step = make_whole_frame, .value = 1}, bare = {.on_step = make_whole_frame};
+    fake *pw = &whole, *pb = &bare;
+    bst_instance_spec spec = FAKE_SPEC(frame_module, "whole", pw, PERIOD);
+    spec.scope = "o/t";
+    spec.frame_period_s = PERIOD / (double)RATE;
+    fake_add(&ctx, engine, spec);
+    spec = FAKE_SPEC(bare_module, "bare", pb, PERIOD);
+    spec.scope = "o/u";
+    spec.frame_period_s = 3 * PERIOD / (double)RATE;
+    fake_add(&ctx, engine, spec);
+    bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
+    wall_s = 1000.25;
+    bst_pacing_config c = {.mode = BST_PACING_REALTIME, .speed = 2, .cpu = -1};
+    bst_pacing_figures f;
+    bst_assert_ok(&ctx, bst_engine_pace(&ctx, engine, &c));
+    bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, 4 * PERIOD));
+    assert_true(bst_engine_pacing(engine, &f));
+    assert_int_equal(f.frames, 8);
+    assert_int_equal(f.done, 4);
+    bst_assert_close(f.sum_s, 4 * 0.006, 4 * EPS);
+    bst_assert_close(f.deadline_s, 0.15, 1e-12); /* the longest: of the slower sensor */
+    bst_engine_free(engine);
+}
+
 /* Asked about every 20 ms of wall time while it sleeps. */
 static void a_sleep_is_interrupted(void **state) {
     (void)state;
@@ -287,6 +334,7 @@ int main(void) {
         cmocka_unit_test(an_overrun_hurries),
         cmocka_unit_test(fast_runs_lose_nothing),
         cmocka_unit_test(a_sleep_is_interrupted),
+        cmocka_unit_test(frames_stand_for_detections),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
