@@ -50,6 +50,7 @@ enum { RECENT = 256 };
 typedef struct recent_frame {
     const char *scope;
     int64_t id, tick;
+    double made_s; /* by the wall clock */
 } recent_frame;
 
 struct bst_pacing {
@@ -186,7 +187,9 @@ bool bst_pacing_frame(struct bst_step *step, int64_t id) {
         return drop_in_recording(step, p, false);
     }
     pthread_mutex_lock(&p->lock);
-    double behind = bst_wall_seconds() - due_s(p, step->tick);
+    /* without a clock to keep to, nothing is late */
+    double now = bst_wall_seconds();
+    double behind = p->config.mode == BST_PACING_REALTIME ? now - due_s(p, step->tick) : 0.0;
     double deadline = deadline_of(p, step->self);
     bool overrun = behind > deadline, drop = overrun && p->config.overrun == BST_OVERRUN_DROP;
     p->figures.deadline_s = fmax(p->figures.deadline_s, deadline);
@@ -198,7 +201,7 @@ bool bst_pacing_frame(struct bst_step *step, int64_t id) {
         p->figures.slipped_s += behind;
     }
     if (!drop) {
-        p->recent[p->next] = (recent_frame){step->self->scope, id, step->tick};
+        p->recent[p->next] = (recent_frame){step->self->scope, id, step->tick, now};
         p->next = (p->next + 1) % RECENT;
     }
     pthread_mutex_unlock(&p->lock);
@@ -232,14 +235,17 @@ void bst_pacing_done(const struct bst_step *step, const channel *ch, const void 
     bst_pacing *p = step->engine->pacing;
     int64_t id = exposure_of(ch, payload), tick = step->tick;
     pthread_mutex_lock(&p->lock);
+    double now = bst_wall_seconds(), made_s = now;
     for (int i = 0; i < RECENT; i++) {
         const recent_frame *r = &p->recent[i];
         if (r->scope && r->id == id && strcmp(r->scope, ch->scope) == 0) {
             int64_t due = r->tick + declared_delay(step->self);
             tick = due < tick ? due : tick; /* an answer that was not awaited: when it was due */
+            made_s = r->made_s;
         }
     }
-    double response = fmax(0.0, bst_wall_seconds() - due_s(p, tick));
+    double since = p->config.mode == BST_PACING_REALTIME ? due_s(p, tick) : made_s;
+    double response = fmax(0.0, now - since);
     int bin = 0;
     while (bin < BST_PACING_BINS - 1 && response * 1e3 > bst_pacing_edges_ms[bin]) {
         bin++;

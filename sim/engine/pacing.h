@@ -40,7 +40,8 @@ extern const double bst_pacing_edges_ms[BST_PACING_BINS - 1];
 
 /* How the clock was kept. A frame's response is the wall time from when it was due to those who
  * read it (its exposure's end and the declared delay) until their detections were there; without
- * any, until it was made. */
+ * any, until it was made. Where time is not kept by the clock (BST_PACING_FAST) nothing is an
+ * overrun, and a response is the wall time from when the frame was made. */
 typedef struct bst_pacing_figures {
     int64_t frames;  /* exposures that ended, dropped ones too */
     int64_t dropped; /* of these, by the overrun policy */

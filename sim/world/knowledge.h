@@ -94,8 +94,9 @@ bool bst_knowledge_is_itself(const bst_knowledge *knowledge, int object);
  * object has no orbit then. */
 bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee_m,
                            double *apogee_m);
-/* Geocentric places (GCRF) of all objects within 2 s of `seconds`, to 1 km: for a first choice.
- * Returns the time that they are for. NAN: not known so quickly; 0, 0, 0: it has no orbit. */
+/* Geocentric places (GCRF) of all objects within 4 s of `seconds`, to 1 km: for a first choice.
+ * Returns the time that they are for, a whole multiple of 8 s. NAN: not known so quickly; 0, 0, 0:
+ * it has no orbit. */
 double bst_knowledge_places(const bst_knowledge *knowledge, double seconds, double *x_m,
                             double *y_m, double *z_m);
 /* Where the spacecraft believes to be, and the bodies by its clock. */

@@ -100,6 +100,38 @@ static void order_of_calls_does_not_matter(void **state) {
     bst_eop_free(eop);
 }
 
+/* Clocks on one grid give what a clock of its own gives, however far apart they are, and when the
+ * grid's places are taken again and again: days, in steps that are no multiple of the grid's. */
+static void clocks_share_a_grid(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_eop *eop = NULL;
+    bst_sky_grid *grid = NULL;
+    bst_sky_clock *own = NULL, *first = NULL, *second = NULL;
+    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_sky_grid_create(&ctx, eop, &grid));
+    bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &own));
+    bst_assert_ok(&ctx, bst_sky_clock_create_on(&ctx, grid, &first));
+    bst_assert_ok(&ctx, bst_sky_clock_create_on(&ctx, grid, &second));
+    bst_time start = utc("2024-05-04T03:02:01Z");
+    for (int i = 0; i < 60; i++) {
+        bst_sky a, b, c;
+        bst_time t = bst_time_add(start, 5731.7 * i), later = bst_time_add(t, 86400.0 * 3);
+        bst_assert_ok(&ctx, bst_sky_clock_at(&ctx, own, t, &a));
+        bst_assert_ok(&ctx, bst_sky_clock_at(&ctx, second, later, &c));
+        bst_assert_ok(&ctx, bst_sky_clock_at(&ctx, first, t, &b));
+        assert_memory_equal(&a, &b, sizeof a);
+        bst_assert_ok(&ctx, bst_sky_clock_at(&ctx, own, later, &a));
+        assert_memory_equal(&a, &c, sizeof a);
+    }
+    bst_sky_clock_free(own);
+    bst_sky_clock_free(first);
+    bst_sky_clock_free(second);
+    bst_sky_grid_free(grid);
+    bst_sky_grid_free(NULL);
+    bst_eop_free(eop);
+}
+
 static void ends_with_the_table(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -149,6 +181,7 @@ int main(void) {
         cmocka_unit_test(keeps_to_the_exact_values),
         cmocka_unit_test(passes_a_leap_second),
         cmocka_unit_test(order_of_calls_does_not_matter),
+        cmocka_unit_test(clocks_share_a_grid),
         cmocka_unit_test(ends_with_the_table),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

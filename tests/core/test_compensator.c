@@ -312,6 +312,143 @@ static void test_config(void **state) {
     bst_json_free(json);
 }
 
+/* A plug-in's: an integrator of gain 2 that remembers its last error. */
+typedef struct summed {
+    double sum, last, dt_s;
+} summed;
+
+static bst_status summed_init(bst_ctx *ctx, const void *config, double dt_s, void *state) {
+    if (*(const double *)config < 0.0) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "a gain below zero");
+    }
+    *(summed *)state = (summed){.dt_s = dt_s};
+    return BST_OK;
+}
+static double summed_step(void *state, double error) {
+    summed *s = state;
+    s->last = error;
+    return s->sum += 2.0 * s->dt_s * error;
+}
+static void summed_set(void *state, double error, double output) {
+    ((summed *)state)->sum = output;
+    ((summed *)state)->last = error;
+}
+static double complex summed_response(const void *state, double omega_per_sample) {
+    (void)state;
+    return 3.0 + I * omega_per_sample;
+}
+
+static void test_plug(void **state) {
+    (void)state;
+    bst_compensator_stage stage = {.state_bytes = sizeof(summed),
+                                   .init = summed_init,
+                                   .step = summed_step,
+                                   .set = summed_set,
+                                   .response = summed_response};
+    const bst_stage_desc desc = {.type = "summed", .functions = &stage};
+    double gain = 1.0;
+    bst_compensator_config config = plain(BST_COMPENSATOR_PI);
+    config.plug = (bst_stage_use){.plugin = "lib.so", .desc = &desc, .config = &gain};
+    assert_true(bst_compensator_is_linear(&config));
+    bst_compensator c = made(&config, 0.25);
+    /* 2 * 0.25 * 3, then the same again, and the feed-forward on top */
+    bst_assert_close(bst_compensator_step(&c, 3.0, 0.0), 1.5, ROUNDING);
+    bst_assert_close(bst_compensator_step(&c, 3.0, 10.0), 13.0, ROUNDING);
+    assert_false(c.limited);
+    c.limit = 4.0;
+    bst_assert_close(bst_compensator_step(&c, -1.0, 10.0), 4.0, ROUNDING); /* 2.5 + 10 */
+    assert_true(c.limited);
+    bst_assert_close(bst_compensator_step(&c, -1.0, -10.0), -4.0, ROUNDING);
+    /* to an output of -9, which is more than it may give: 3 less than the feed-forward of -1 */
+    bst_compensator_set(&c, 7.0, -1.0, -9.0);
+    bst_assert_close(((const summed *)(const void *)c.plug_state)->sum, -3.0, ROUNDING);
+    bst_assert_close(((const summed *)(const void *)c.plug_state)->last, 7.0, ROUNDING);
+    bst_assert_close(c.output, -4.0, ROUNDING);
+    assert_false(c.limited);
+    /* at 8 rad/s and a sample of 0.25 s: 2 rad */
+    assert_close(bst_compensator_response(&c, 8.0), 3.0 + 2.0 * I, ROUNDING);
+    stage.set = NULL;
+    bst_compensator_set(&c, 1.0, 0.0, 2.0);
+    bst_assert_close(((const summed *)(const void *)c.plug_state)->sum, -3.0, ROUNDING);
+    bst_assert_close(c.output, 2.0, ROUNDING);
+    stage.response = NULL;
+    assert_false(bst_compensator_is_linear(&config));
+    assert_true(isnan(creal(bst_compensator_response(&c, 8.0))));
+    bst_ctx ctx = {0};
+    gain = -1.0;
+    assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.25, NULL, NULL), BST_ERR_CONFIG);
+    assert_string_equal(ctx.message, "plug-in lib.so: a gain below zero");
+    gain = 1.0;
+    stage.state_bytes = BST_COMPENSATOR_STATE_BYTES;
+    bst_assert_ok(&ctx, bst_compensator_init(&ctx, &c, &config, 0.25, NULL, NULL));
+    stage.state_bytes++;
+    assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.25, NULL, NULL), BST_ERR_CONFIG);
+    stage.state_bytes = 8;
+    stage.step = NULL;
+    assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.25, NULL, NULL), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "lacks init or step"));
+}
+
+/* Each key by itself, at the border of what is allowed and beyond it; 100 samples a second. */
+static void test_refusals(void **state) {
+    (void)state;
+    enum { KEYS = 8 };
+    static const char *const words[KEYS] = {"bandwidth_hz: 50 Hz is not below half",
+                                            "crossover_hz: 50 Hz is not below half",
+                                            "prewarp_hz: 50 Hz is not below half",
+                                            "low_pass_hz: 50 Hz is not below half",
+                                            "notches/frequency_hz: 50 Hz is not below half",
+                                            "lead_pole_hz: a lead with its zero at 4 Hz",
+                                            "delay_s: ",
+                                            "are not finite"};
+    for (int key = 0; key < KEYS; key++) {
+        for (int beyond = 0; beyond < 2; beyond++) {
+            bst_ctx ctx = {0};
+            bst_compensator c;
+            double hz = beyond ? 50.0 : 49.9;
+            bst_notch_config notch = {hz, 1.0, 30.0};
+            bst_compensator_config config =
+                plain(key == 5 ? BST_COMPENSATOR_LEAD_LAG : BST_COMPENSATOR_PI);
+            config.proportional = config.gain = 1.0;
+            if (key < 2 && !beyond) {
+                continue; /* a design of its own */
+            }
+            *(key == 0   ? &config.bandwidth_hz
+              : key == 1 ? &config.crossover_hz
+              : key == 2 ? &config.prewarp_hz
+                         : &config.low_pass_hz) = key < 4 ? hz : 0.0;
+            config.notches = (bst_config_list){&notch, key == 4};
+            config.lead_zero_hz = key == 5 ? 4.0 : 0.0;
+            config.lead_pole_hz = key == 5 && !beyond ? 8.0 : 0.0;
+            config.delay_s = key == 6 ? 0.01 * (BST_COMPENSATOR_DELAY - 2 + 0.5 * beyond) : 0.0;
+            config.gain_scale = key == 7 && beyond ? INFINITY : 1.0;
+            assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.01, NULL, NULL),
+                             beyond ? BST_ERR_CONFIG : BST_OK);
+            if (beyond && !strstr(ctx.message, words[key])) {
+                fail_msg("%s", ctx.message);
+            }
+        }
+    }
+    bst_ctx ctx = {0};
+    bst_compensator c;
+    bst_compensator_config config = plain(BST_COMPENSATOR_TYPE_COUNT);
+    assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.01, NULL, NULL), BST_ERR_CONFIG);
+    /* a specification needs a plant, and no gain of any kind beside it */
+    config = plain(BST_COMPENSATOR_PI);
+    config.bandwidth_hz = 1.0;
+    assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.01, NULL, NULL), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "cannot be used here"));
+    for (int gain = 0; gain < 4; gain++) {
+        bst_compensator_config both = config;
+        *(gain == 0   ? &both.proportional
+          : gain == 1 ? &both.integral_per_s
+          : gain == 2 ? &both.derivative_s
+                      : &both.gain) = 0.1;
+        assert_int_equal(bst_compensator_init(&ctx, &c, &both, 0.01, NULL, NULL), BST_ERR_CONFIG);
+        assert_non_null(strstr(ctx.message, "both gains and a specification"));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_tustin),      cmocka_unit_test(test_step_of_pi),
@@ -319,6 +456,7 @@ int main(void) {
         cmocka_unit_test(test_anti_windup), cmocka_unit_test(test_rate_limit),
         cmocka_unit_test(test_bumpless),    cmocka_unit_test(test_delay),
         cmocka_unit_test(test_limits),      cmocka_unit_test(test_config),
+        cmocka_unit_test(test_plug),        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,15 +3,18 @@
 #include "sim/engine/simulation.h"
 #include "tests/test_support.h"
 
+#include <unistd.h>
+
 /* A control that writes one sensor_command at a tick of the test's choice. */
 typedef struct commander {
-    double exposure_s, period_s;
+    double exposure_s, period_s, pixel_scale_arcsec;
     int64_t at_tick, x0, y0, width, height, binning;
 } commander;
 
 static const bst_config_desc commander_table[] = {
     BST_REAL(commander, exposure_s, "s", -1, 1e300, "0", "Exposure."),
     BST_REAL(commander, period_s, "s", -1, 1e300, "0", "Period."),
+    BST_REAL(commander, pixel_scale_arcsec, "arcsec", -1, 100, "0", "Scale."),
     BST_INT(commander, at_tick, "", 0, 1e9, "0", "When."),
     BST_INT(commander, x0, "px", -2147483647, 2147483647, "0", "Window."),
     BST_INT(commander, y0, "px", -2147483647, 2147483647, "0", "Window."),
@@ -41,7 +44,7 @@ static bst_status commander_step(void *self, struct bst_step *step) {
                                 c->period_s,
                                 {(int)c->x0, (int)c->y0, (int)c->width, (int)c->height},
                                 (int)c->binning,
-                                0.0};
+                                c->pixel_scale_arcsec};
     return BST_OK;
 }
 
@@ -85,8 +88,9 @@ static bst_status keep(void *user, const char *scope, const char *channel, const
 
 /* Runs a scenario whose sensor has these "exposure" and "modules" blocks, and more keys of its
  * camera. */
-static void run_camera(const char *camera, const char *exposure, const char *module_block,
-                       const char *extra, int64_t until_tick, train *out) {
+static bst_status try_camera(bst_ctx *ctx, const char *camera, const char *exposure,
+                             const char *module_block, const char *extra, int64_t until_tick,
+                             train *out) {
     static const char format[] =
         "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300, %s"
         "\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": \"sat\","
@@ -97,22 +101,30 @@ static void run_camera(const char *camera, const char *exposure, const char *mod
         "}]}";
     char text[2000];
     snprintf(text, sizeof text, format, extra, camera, exposure, module_block);
-    bst_ctx ctx = {0};
     bst_json *json = NULL;
-    bst_assert_ok(&ctx, bst_json_parse(&ctx, "scenarios/x.json", text, strlen(text), &json));
+    bst_assert_ok(ctx, bst_json_parse(ctx, "scenarios/x.json", text, strlen(text), &json));
     bst_scenario scenario;
-    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, &registry, &scenario));
+    bst_assert_ok(ctx, bst_scenario_read(ctx, json, &registry, &scenario));
     bst_simulation *sim = NULL;
     bst_simulation_options options = {0};
-    bst_assert_ok(&ctx, bst_simulation_create(&ctx, &scenario, &options, &sim));
-    assert_null(bst_simulation_device(sim)); /* none was asked for */
+    bst_status status = bst_simulation_create(ctx, &scenario, &options, &sim);
     memset(out, 0, sizeof *out);
-    bst_engine *engine = bst_simulation_engine(sim);
-    bst_engine_set_hooks(engine, &(bst_engine_hooks){.user = out, .message = keep});
-    bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, until_tick));
+    if (status == BST_OK) {
+        assert_null(bst_simulation_device(sim)); /* none was asked for */
+        bst_engine *engine = bst_simulation_engine(sim);
+        bst_engine_set_hooks(engine, &(bst_engine_hooks){.user = out, .message = keep});
+        bst_assert_ok(ctx, bst_engine_run(ctx, engine, until_tick));
+    }
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);
     bst_json_free(json);
+    return status;
+}
+
+static void run_camera(const char *camera, const char *exposure, const char *module_block,
+                       const char *extra, int64_t until_tick, train *out) {
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, try_camera(&ctx, camera, exposure, module_block, extra, until_tick, out));
 }
 
 static void run(const char *exposure, const char *module_block, const char *extra,
@@ -266,6 +278,116 @@ static void rolling_shutters_take_their_time(void **state) {
     }
 }
 
+/* The scale stays as commanded; a command without a window gives the scenario's own. */
+static void scale_and_own_window(void **state) {
+    (void)state;
+    train l;
+    run("\"exposure_s\": 0.5, \"period_s\": 1, \"window_px\": [16, 32, 200, 100]",
+        "\"control\": {\"type\": \"commander\", \"at_tick\": 7000, \"pixel_scale_arcsec\": 1.5}",
+        "", 30000, &l);
+    assert_int_equal(l.count, 5);
+    for (int i = 0; i < 5; i++) {
+        const bst_exposure *e = &l.items[i];
+        bst_assert_close(e->pixel_scale_arcsec, i < 2 ? 0 : 1.5, 0);
+        assert_true(e->window.x0 == 16 && e->window.y0 == 32);
+        assert_true(e->window.width == 200 && e->window.height == 100);
+    }
+    run("\"exposure_s\": 0.5, \"period_s\": 1, \"window_px\": [16, 32, 200, 100]",
+        "\"control\": {\"type\": \"commander\", \"x0\": 300, \"y0\": 400, \"width\": 50, "
+        "\"height\": 60, \"pixel_scale_arcsec\": -1}",
+        "", 20000, &l);
+    assert_true(l.items[2].window.x0 == 300 && l.items[2].window.y0 == 400);
+    assert_true(l.items[2].window.width == 50 && l.items[2].window.height == 60);
+    bst_assert_close(l.items[2].pixel_scale_arcsec, 0, 0);
+}
+
+/* Writes a file of frame updates and the keys that name it, closing the block "exposure" before. */
+static void write_updates(const char *frames, char path[BST_TEST_PATH], char *keys, size_t bytes) {
+    bst_test_template(path, "boresight_updates");
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    FILE *f = fdopen(fd, "w");
+    fprintf(f, "{\"boresight_frame_updates\": 1, \"frames\": [%s]}", frames);
+    fclose(f);
+    snprintf(
+        keys, bytes,
+        "\"exposure_s\": 0.5, \"period_s\": 1, \"first_s\": 2}, \"frame_updates_file\": \"%s\", "
+        "\"knowledge\": {",
+        path);
+}
+
+/* A file of frame updates alone decides, whatever is commanded. */
+static void a_file_drives_the_frames(void **state) {
+    (void)state;
+    char path[BST_TEST_PATH], keys[600];
+    train l;
+    write_updates(
+        "{\"frame\": 1, \"exposure_s\": 0.25, \"binning\": 2}, {\"frame\": 3, "
+        "\"exposure_s\": 2, \"period_s\": 1.5, \"window_px\": [1, 2, 30, 40], "
+        "\"pixel_scale_arcsec\": 6}",
+        path, keys, sizeof keys);
+    run(keys,
+        "\"control\": {\"type\": \"commander\", \"exposure_s\": 0.1, \"period_s\": 0.2, "
+        "\"binning\": "
+        "5}",
+        "", 60001, &l);
+    /* starts at 2, 3, 4, 5 s, then as long as the exposure */
+    static const int64_t starts[] = {12000, 18000, 24000, 30000, 42000};
+    static const int64_t lengths[] = {3000, 1500, 1500, 12000, 12000};
+    assert_int_equal(l.count, 5);
+    for (int i = 0; i < 5; i++) {
+        const bst_exposure *e = &l.items[i];
+        assert_int_equal(e->id, i);
+        assert_int_equal(e->start_tick, starts[i]);
+        assert_int_equal(e->end_tick, starts[i] + lengths[i]);
+        assert_int_equal(e->binning, i < 1 ? 1 : 2);
+        assert_int_equal(e->window.x0, i < 3 ? 0 : 1);
+        assert_int_equal(e->window.y0, i < 3 ? 0 : 2);
+        assert_int_equal(e->window.width, i < 3 ? 640 : 30);
+        assert_int_equal(e->window.height, i < 3 ? 480 : 40);
+        bst_assert_close(e->pixel_scale_arcsec, i < 3 ? 3 : 6, 0);
+    }
+    unlink(path);
+}
+
+static void times_that_do_not_fit(void **state) {
+    (void)state;
+    static const char rolling[] = ", \"detector\": {\"row_time_s\": 1e-4}";
+    static const struct {
+        const char *camera, *exposure, *frames, *words;
+    } cases[] = {
+        {"", "\"dropped_fraction\": 0.8, \"dropped_burst_frames\": 3.9", NULL,
+         "dropped_burst_frames: 3.9 (allowed: 0, or 4 and more"},
+        {"", "\"dropped_fraction\": 0.2, \"dropped_burst_frames\": 0.9", NULL,
+         "dropped_burst_frames: 0.9 (allowed: 0, or 1 and more"},
+        {rolling, "\"exposure_s\": 0.5, \"first_s\": 0.0235", NULL,
+         "the first row is exposed 0.024 s before the middle one"},
+        {"", NULL, "{\"frame\": 4, \"exposure_s\": 0.00001}", "/frames/0 (frame 4)/exposure_s"},
+        {"", NULL, "{\"frame\": 2}, {\"frame\": 4, \"period_s\": 1.00001}",
+         "/frames/1 (frame 4)/period_s"},
+        /* with 2 * 0.024 s of rows */
+        {rolling, NULL, "{\"frame\": 2, \"period_s\": 0.548}, {\"frame\": 5, \"period_s\": 0.547}",
+         "frame 5: a period_s of 0.547 is too short (allowed: at least 0.548"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char path[BST_TEST_PATH] = "", keys[600];
+        bst_ctx ctx = {0};
+        train l;
+        if (cases[i].frames) {
+            write_updates(cases[i].frames, path, keys, sizeof keys);
+        }
+        assert_int_equal(try_camera(&ctx, cases[i].camera,
+                                    cases[i].frames ? keys : cases[i].exposure, "", "", 0, &l),
+                         BST_ERR_CONFIG);
+        if (!strstr(ctx.message, cases[i].words)) {
+            fail_msg("%s", ctx.message);
+        }
+        if (*path) {
+            unlink(path);
+        }
+    }
+}
+
 static int dropped(const train *l) {
     int n = 0;
     for (int i = 0; i < l->count; i++) {
@@ -344,6 +466,9 @@ int main(void) {
         cmocka_unit_test(commands_are_latched_at_the_start),
         cmocka_unit_test(odd_commands_do_no_harm),
         cmocka_unit_test(rolling_shutters_take_their_time),
+        cmocka_unit_test(scale_and_own_window),
+        cmocka_unit_test(a_file_drives_the_frames),
+        cmocka_unit_test(times_that_do_not_fit),
         cmocka_unit_test(dropped_frames_follow_the_seed),
         cmocka_unit_test(dropped_frames_come_in_bursts),
     };

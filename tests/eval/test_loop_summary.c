@@ -63,8 +63,10 @@ static double mid_of(int64_t id) {
     return (double)id + 0.25;
 }
 
-/* One frame whose target lies (x, y) px from the boresight. */
-static void truth_at(scene *s, int64_t id, double x, double y) {
+/* One frame whose target lies (x, y) px of 3 arcsec from the boresight, and so many of these items.
+ */
+static void truth_with(scene *s, int64_t id, double x, double y, double scale_arcsec,
+                       const bst_truth_item *items, int count) {
     bst_sight sight = sight_at(s, mid_of(id));
     const double scale = 3.0 * BST_ARCSEC_RAD;
     bst_quat q = bst_quat_look(sight.apparent, (bst_vec3){0, 0, 1});
@@ -73,13 +75,25 @@ static void truth_at(scene *s, int64_t id, double x, double y) {
     bst_vec3 axis = bst_vec3_cross((bst_vec3){0, 0, 1}, want);
     double angle = bst_vec3_angle((bst_vec3){0, 0, 1}, want);
     q = bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(bst_vec3_unit(axis), angle)), q);
-    bst_truth truth = {.exposure_id = id,
-                       .start_tick = id * RATE,
-                       .end_tick = id * RATE + RATE / 2,
-                       .q_cam_from_gcrf_mid = q,
-                       .boresight_x_px = 511.5,
-                       .boresight_y_px = 511.5};
-    bst_assert_ok(&s->ctx, bst_loop_summary_truth(&s->ctx, s->summary, &truth));
+    bst_truth *truth = calloc(1, sizeof *truth + 8 * sizeof *truth->items);
+    assert_true(truth && count <= 8);
+    *truth = (bst_truth){.exposure_id = id,
+                         .start_tick = id * RATE,
+                         .end_tick = id * RATE + RATE / 2,
+                         .q_cam_from_gcrf_mid = q,
+                         .boresight_x_px = 511.5,
+                         .boresight_y_px = 511.5,
+                         .pixel_scale_arcsec = scale_arcsec,
+                         .count = count};
+    for (int i = 0; i < count; i++) {
+        truth->items[i] = items[i];
+    }
+    bst_assert_ok(&s->ctx, bst_loop_summary_truth(&s->ctx, s->summary, truth));
+    free(truth);
+}
+
+static void truth_at(scene *s, int64_t id, double x, double y) {
+    truth_with(s, id, x, y, 0.0, NULL, 0);
 }
 
 /* Tracks of frame `id`, published 0.4 s after its end; the track of interest lies `off` px beside
@@ -253,8 +267,10 @@ static void a_prediction_has_correlated_axes(void **state) {
     const struct {
         double rho, east, north; /* the error over the standard deviation of its own axis */
         int wrong;
-    } cases[] = {{0.9, 1, 1, 0},   {0.9, 1, -1, 25}, {0.9, -1, 1, 25},
-                 {-0.9, 1, -1, 0}, {-0.9, 1, 1, 25}, {-0.9, -1, -1, 25}};
+    } cases[] = {{0.9, 1, 1, 0},         {0.9, 1, -1, 25}, {0.9, -1, 1, 25},
+                 {-0.9, 1, -1, 0},       {-0.9, 1, 1, 25}, {-0.9, -1, -1, 25},
+                 {0.9, 1.05, 1.05, 25}, /* 1.03 of the bound */
+                 {-0.9, -1.05, 1.05, 25}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         scene *s = open_scene(GX5, 0);
         /* 0.98 of the bound along the long axis, where it is 4 times the bound across */
@@ -440,6 +456,67 @@ static void without_a_target_every_track_is_wrong(void **state) {
     }
 }
 
+/* An exposure with a scale of its own has pixels of its own; the target's SNR is that of the item
+ * that is the target and in the field. */
+static void places_at_another_scale(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5, 0);
+    static const bst_truth_item items[] = {
+        {.kind = BST_SOURCE_STAR, .id = 0, .flags = BST_TRUTH_IN_FIELD, .snr = 3},
+        {.kind = BST_SOURCE_OBJECT, .id = 0, .flags = BST_TRUTH_IN_FIELD, .snr = 11},
+        {.kind = BST_SOURCE_OBJECT, .id = 0, .flags = 0, .snr = 4},
+        {.kind = BST_SOURCE_OBJECT, .id = 1, .flags = BST_TRUTH_IN_FIELD, .snr = 5},
+    };
+    static const double scales[] = {0, 3, 6, 1.5};
+    for (int id = 0; id < 4; id++) {
+        truth_with(s, id, 40, -25, scales[id], items, id == 3 ? 1 : 4);
+        bst_loop_frame newest;
+        bst_loop_summary_newest(s->summary, &newest);
+        assert_int_equal(newest.exposure_id, id);
+        tracks_at(s, id, -1, 0);
+        double size = scales[id] > 0 ? 3 / scales[id] : 1;
+        const bst_loop_frame *f = &s->judged[id];
+        /* rounding of angles of 1e-3 rad; the angle is shorter than its tangent by r^2 / 3 */
+        bst_assert_close(f->target_x_px, 511.5 + 40 * size, 1e-6);
+        bst_assert_close(f->target_y_px, 511.5 - 25 * size, 1e-6);
+        bst_assert_close(f->error_x_px, 40 * size, 1e-4);
+        bst_assert_close(f->error_y_px, -25 * size, 1e-4);
+        bst_assert_close(f->error_px, hypot(40, 25) * size, 1e-4);
+        bst_assert_close(f->target_snr, id == 3 ? 0 : 11, 0);
+        bst_assert_close(f->time_s, mid_of(id), 1e-12);
+        bst_assert_close(newest.error_px, f->error_px, 0);
+    }
+    close_scene(s);
+}
+
+/* A new target is to be acquired and settled on anew; the first times stay. */
+static void another_target_begins_anew(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5 ", {\"name\": \"twin\", " TEST_GX5 "}", 0);
+    for (int id = 0; id < 8; id++) {
+        if (id == 4) {
+            bst_loop_summary_retarget(s->summary, 1);
+        }
+        mode(s, id, id == 4 || id == 5 ? BST_MODE_SLEW : BST_MODE_TRACK);
+        truth_at(s, id, 0, 1);
+        tracks_at(s, id, id == 4 ? BST_TRACK_TENTATIVE : BST_TRACK_CONFIRMED, 0);
+    }
+    static const bool acquired[] = {false, true, true, true, false, false, true, true};
+    static const bool settled[] = {false, true, true, true, false, false, true, true};
+    for (int id = 0; id < 8; id++) {
+        assert_true(s->judged[id].acquired == acquired[id]);
+        assert_true(s->judged[id].settled == settled[id]);
+        assert_int_equal(s->judged[id].mode, id == 4 || id == 5 ? BST_MODE_SLEW : BST_MODE_TRACK);
+    }
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    bst_assert_close(f.time_to_acquire_s, 0.9, 1e-12); /* its tracks come 0.4 s after its end */
+    bst_assert_close(f.time_to_settle_s, 1.0, 1e-12);
+    assert_int_equal(f.frames, 8);
+    assert_int_equal(f.final_mode, BST_MODE_TRACK);
+    close_scene(s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_target_that_is_never_confirmed),
@@ -451,6 +528,8 @@ int main(void) {
         cmocka_unit_test(dropped_frames_are_judged_by_the_track_known_before),
         cmocka_unit_test(frames_do_not_wait_for_ever),
         cmocka_unit_test(rms_is_exact_and_p99_within_a_bin),
+        cmocka_unit_test(places_at_another_scale),
+        cmocka_unit_test(another_target_begins_anew),
         cmocka_unit_test(frames_without_light_do_not_count),
         cmocka_unit_test(without_a_target_every_track_is_wrong),
     };

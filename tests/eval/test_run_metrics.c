@@ -59,6 +59,8 @@ static void show_truth(fixture *f, int64_t id, int objects, uint32_t flags, doub
                                               .y_centroid_px = 200 + 100 * i,
                                               .snr = snr};
     }
+    /* past the end, and a star of an object's number: where each track of these tests is */
+    f->truth->items[objects] = f->truth->items[0];
     bst_assert_ok(&f->ctx, bst_run_metrics_truth(&f->ctx, f->metrics, f->truth));
 }
 
@@ -78,6 +80,10 @@ static void show_track(fixture *f, int64_t exposure, int64_t id, int status, boo
     f->tracks->count = 1;
     f->tracks->items[0] = (bst_track){
         .id = id, .status = status, .target_of_interest = of_interest, .direction_gcrf = direction};
+    f->tracks->items[1] = (bst_track){.id = 99, /* past the end */
+                                      .status = BST_TRACK_CONFIRMED,
+                                      .target_of_interest = true,
+                                      .direction_gcrf = beside(1, 0.01, 0)};
     bst_assert_ok(&f->ctx, bst_run_metrics_tracks(&f->ctx, f->metrics, f->tracks));
 }
 
@@ -135,6 +141,10 @@ static void show_detections(fixture *f, int64_t id, double x_px, double y_px) {
     f->detections->count = 2;
     f->detections->items[0] = (bst_detection){.x_px = 100, .y_px = 200}; /* object 0's */
     f->detections->items[1] = (bst_detection){.x_px = x_px, .y_px = y_px};
+    /* past the end: on each of the objects */
+    for (int i = 2; i < 5; i++) {
+        f->detections->items[i] = (bst_detection){.x_px = 100, .y_px = 200 + 100 * (i - 2)};
+    }
     bst_run_metrics_detections(f->metrics, f->detections);
 }
 
@@ -198,6 +208,86 @@ static void losses(void **state) {
     assert_int_equal(m.losses.no_attitude_frames, 5);
 }
 
+/* Objects that were not in the field are neither seen nor tracked; frames with a body's disc in
+ * them are counted; a message about a frame that is long gone changes nothing; so many objects that
+ * the list of a frame grows. */
+static void frames_and_objects(void **state) {
+    fixture *f = *state;
+    bst_run_metric_figures m;
+    for (int i = 0; i < 9; i++) {
+        f->truth->earth_fraction = i < 4 ? 0.1 : 0;
+        f->truth->moon_fraction = i < 3 ? 0.1 : 0;
+        f->truth->sun_fraction = i < 2 ? 0.1 : 0;
+        show_truth(f, i, 1, BST_TRUTH_IN_FIELD, 10);
+        show_truth(f, 100 + i, 2, 0, 10); /* not in the field */
+    }
+    f->detections->bad_pixels = 17;
+    show_detections(f, 8, 0, 0);
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.losses.frames, 18);
+    assert_int_equal(m.losses.earth_frames, 8); /* two frames a turn */
+    assert_int_equal(m.losses.moon_frames, 6);
+    assert_int_equal(m.losses.sun_frames, 4);
+    assert_int_equal(m.objects_seen, 1);
+    assert_int_equal(m.objects_tracked, 0);
+    assert_int_equal(m.bad_pixels, 17);
+    for (int i = 0; i < 70; i++) { /* frame 8 and those before are forgotten */
+        show_truth(f, 200 + i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+    }
+    show_detections(f, 205, 100, 300); /* 64 frames are kept: 206 to 269 */
+    show_track(f, 205, 1, BST_TRACK_CONFIRMED, true, beside(1, 0, 0.5));
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.detected_frames, 0);
+    assert_int_equal(m.track_frames, 0);
+    assert_int_equal(m.tracks, 0);
+    show_detections(f, 206, 100, 300);
+    show_track(f, 206, 1, BST_TRACK_CONFIRMED, true, beside(1, 0, 0.5));
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.detected_frames, 1);
+    assert_int_equal(m.track_frames, 1);
+    /* 40 objects in a frame; the last is the target */
+    bst_truth *many = calloc(1, sizeof *many + 40 * sizeof *many->items);
+    assert_non_null(many);
+    many->exposure_id = 500;
+    many->count = 40;
+    for (int i = 0; i < 40; i++) {
+        many->items[i] = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
+                                          .id = i == 39 ? 1 : (uint32_t)(100 + i),
+                                          .flags = BST_TRUTH_IN_FIELD,
+                                          .ra_rad = 2.0,
+                                          .dec_rad = -0.5 + 0.01 * i,
+                                          .x_centroid_px = 10 * i,
+                                          .y_centroid_px = 500,
+                                          .snr = 9};
+    }
+    bst_assert_ok(&f->ctx, bst_run_metrics_truth(&f->ctx, f->metrics, many));
+    free(many);
+    show_detections(f, 500, 390, 500);
+    show_track(f, 500, 1, BST_TRACK_CONFIRMED, true, bst_vec3_from_radec(2.0, -0.11));
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.detected_frames, 2);
+    assert_int_equal(m.track_frames, 2);
+}
+
+/* Next to the celestial pole east and north are still at right angles. */
+static void errors_at_the_pole(void **state) {
+    fixture *f = *state;
+    f->truth->exposure_id = 1;
+    f->truth->count = 1;
+    f->truth->items[0] = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
+                                          .id = 1,
+                                          .flags = BST_TRUTH_IN_FIELD,
+                                          .dec_rad = 0.5 * BST_PI,
+                                          .snr = 5};
+    bst_assert_ok(&f->ctx, bst_run_metrics_truth(&f->ctx, f->metrics, f->truth));
+    show_track(f, 1, 3, BST_TRACK_CONFIRMED, true,
+               (bst_vec3){2 * PX_RAD, -1.5 * PX_RAD, 1}); /* 2.5 px */
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.track_frames, 1);
+    bst_assert_close(m.track_rms_px, 2.5, 1e-8);
+}
+
 /* After a change of the target the other object counts. */
 static void another_target(void **state) {
     fixture *f = *state;
@@ -219,6 +309,8 @@ int main(void) {
         cmocka_unit_test_setup_teardown(false_tracks, set_up, tear_down),
         cmocka_unit_test_setup_teardown(detected_fraction, set_up, tear_down),
         cmocka_unit_test_setup_teardown(losses, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(frames_and_objects, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(errors_at_the_pole, set_up, tear_down),
         cmocka_unit_test_setup_teardown(another_target, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

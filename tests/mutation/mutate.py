@@ -5,13 +5,24 @@
     tests/mutation/mutate.py --since v0.1.0 --count 60            only in files that changed since a revision
     tests/mutation/mutate.py --files tracker/sky_filter.c         only in these files
     tests/mutation/mutate.py --suite e2e --count 30               judged by the tests of the whole program
+    tests/mutation/mutate.py --coverage build-cov --count 100     many bugs: only the tests that execute a bug's line run
+    tests/mutation/mutate.py --coverage build-cov --unexecuted sim/world    lines that no unit test of the folder executes
 
 The tree is copied, built once, and every bug is compiled in that copy: nothing here is touched. A bug whose object
 file equals that of the sound source cannot be noticed and does not count. A bug counts as noticed if a test fails,
-crashes or exceeds its time, or if it does not compile. Tests run in the order of their last duration, and the first
-failure ends a bug's trial.
+crashes or exceeds its time. Tests run in the order of their last duration, and the first failure ends a bug's trial.
+With --work the copy is kept, and the next call takes over only what has changed since.
 
-Prints a line for each bug, the survivors with their place, and the score. Ends with 1 if the score is below --least.
+The unit suite judges a file by the unit tests of its own folder. The command line, sim/app, has few of those: its tests
+are the e2e suite. The unit suite therefore leaves sim/app out (--files still takes its files).
+
+--coverage names a folder for a build with gcov (made there, kept up to date): every unit test runs once in it, and a
+bug is judged only by the tests that execute its line; where none does, by all of its folder.
+
+A file is drawn by the number of its lines that can hold a bug, and a kind of bug evenly among those of the file.
+Prints a line for each bug, the survivors with their place, and the score with its 95 % Wilson interval (Wilson 1927,
+JASA 22, 209-212). Bugs that change no result (fmax of numbers that are equal, for example) count as survivors: look at
+each one. Ends with 1 if the score is below --least.
 The kinds of bugs are those of mutation testing (Offutt et al. 1996, ACM TOSEM 5(2), 99-118: relational, arithmetic and
 logical operators, constants, statements) and those that physical code invites: signs, axes, squares, roots.
 """
@@ -72,16 +83,112 @@ def mutants_of(path, text):
             for kind, rules in OPERATORS.items():
                 for pattern, new in rules:
                     for m in re.finditer(pattern, line):
-                        found.append((kind, at + m.start(), m.group(), m.expand(new) if "\\" in new else new))
+                        found.append((kind, at + m.start(), text[at + m.start():at + m.end()], m.expand(new) if "\\" in new else new))
             if STATEMENT.match(line) and re.match(r"^\s+(?:[\w\.\[\]>-]+) ?(?:=|\+=|-=|\*=)", line):
-                statement = line.strip()
-                found.append(("statement", at + line.index(statement), statement, ";"))
+                first, last = at + len(line) - len(line.lstrip()), at + len(line.rstrip())
+                found.append(("statement", first, text[first:last], ";"))
         at += len(line) + 1
     return found
 
 
 def run(command, **keywords):
     return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, **keywords)
+
+
+def same_text(a, b):
+    with open(a, "rb") as first, open(b, "rb") as second:
+        return first.read() == second.read()
+
+
+class Coverage:
+    """Which unit tests execute which lines, by gcov, in a build folder of its own; kept there from call to call."""
+
+    def __init__(self, source, build, jobs, names):
+        self.source, self.build = os.path.abspath(source), os.path.abspath(build)
+        flags = "-O1 --coverage -DNDEBUG"
+        made = run(["cmake", "-S", self.source, "-B", self.build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Coverage",
+                    f"-DCMAKE_C_FLAGS_COVERAGE={flags}", f"-DCMAKE_CXX_FLAGS_COVERAGE={flags}"])
+        if made.returncode:
+            sys.exit(f"mutate: cmake failed:\n{made.stdout}")
+        tests = {n: c for n, (labels, c) in listed_tests(self.build).items()
+                 if n in names and os.path.basename(c[0]).startswith("test_")}
+        made = run(["ninja", "-C", self.build, f"-j{jobs}", "--quiet", *{os.path.basename(c[0]) for c in tests.values()}])
+        if made.returncode:
+            sys.exit(f"mutate: the build with gcov failed:\n{made.stdout}")
+        kept = os.path.join(self.build, "executed_lines.json")
+        self.known = {}
+        if os.path.exists(kept):
+            with open(kept, encoding="utf-8") as file:
+                self.known = json.load(file)
+        for name, command in tests.items():
+            program = digest(command[0])
+            if self.known.get(name, {}).get("program") != program:
+                self.known[name] = {"program": program, **self.measure(command)}
+                with open(kept, "w", encoding="utf-8") as file:
+                    json.dump(self.known, file)
+        self.lines = {}  # file: {line: the tests that execute it}
+        for name, entry in self.known.items():
+            for path, (counted, executed) in entry["files"].items():
+                lines = self.lines.setdefault(path, {})
+                for line in counted:
+                    lines.setdefault(line, set())
+                for line in executed:
+                    lines[line].add(name)
+
+    def measure(self, command):
+        """Time and {file: (lines with code, lines executed)} of one test."""
+        def counters():
+            return [os.path.join(root, f) for root, _, files in os.walk(self.build) for f in files if f.endswith(".gcda")]
+        for name in counters():
+            os.remove(name)
+        begun, code = time.monotonic(), 1
+        try:
+            code = run(command, cwd=self.source, timeout=900).returncode
+        except subprocess.TimeoutExpired:
+            pass
+        spent = time.monotonic() - begun
+        found = {}
+        for line in run(["gcov", "--json-format", "--stdout", *counters()], cwd=self.build).stdout.split("\n"):
+            if not line.startswith("{"):
+                continue
+            shown = json.loads(line)
+            for file in shown["files"]:
+                path = os.path.relpath(os.path.join(shown["current_working_directory"], file["file"]), self.source)
+                if path.split("/")[0] in FOLDERS and path.endswith(".c"):
+                    found[path] = (sorted({v["line_number"] for v in file["lines"]}),
+                                   sorted({v["line_number"] for v in file["lines"] if v["count"] > 0}))
+        return {"seconds": spent, "code": code, "files": found}
+
+    def tests_of(self, path, line, names):
+        """Of these tests, those that execute the line, or the nearest lines with code above and below it."""
+        lines = self.lines.get(path, {})
+        near = [max((v for v in lines if v <= line), default=None), min((v for v in lines if v > line), default=None)]
+        near = near[:1] if near[0] == line else near
+        reached = set().union(*(lines[v] for v in near if v is not None))
+        judges = [n for n in names if n in reached or n not in self.known]
+        return judges if judges else names  # a child process that is killed leaves no trace with gcov
+
+    def unexecuted(self, path, names):
+        """Lines with code that none of these tests executes, as ranges."""
+        lines = self.lines.get(path, {})
+        missed, ranges = sorted(v for v, tests in lines.items() if not tests.intersection(names)), []
+        for line in missed:
+            follows = ranges and not any(ranges[-1][1] < v < line for v in lines)
+            ranges = ranges[:-1] + [(ranges[-1][0], line)] if follows else ranges + [(line, line)]
+        return len(missed), len(lines), ranges
+
+
+def listed_tests(build):
+    """{name: (labels, command)} of all tests of a build, whether or not their programs are built yet."""
+    commands, labels = {}, {}
+    for root, _, files in os.walk(os.path.join(build, "tests")):
+        if "CTestTestfile.cmake" in files:
+            with open(os.path.join(root, "CTestTestfile.cmake"), encoding="utf-8") as file:
+                text = file.read()
+            for name, command in re.findall(r"^add_test\(\[=\[(.*?)\]=\] (.*)\)$", text, re.M):
+                commands[name] = re.findall(r'"((?:[^"\\]|\\.)*)"', command)
+            labels.update(re.findall(r'^set_tests_properties\(\[=\[(.*?)\]=\] .*\bLABELS "([^"]*)"', text, re.M))
+    return {name: (labels[name].split(";"), command) for name, command in commands.items() if name in labels}
 
 
 class Tree:
@@ -91,35 +198,25 @@ class Tree:
         self.folder, self.build, self.jobs = folder, os.path.join(folder, "build"), jobs
         listed = run(["git", "-C", source, "ls-files", "-co", "--exclude-standard"]).stdout.split("\n")
         for name in filter(None, listed):
-            if os.path.isfile(os.path.join(source, name)):
-                target = os.path.join(folder, name)
-                if not os.path.exists(target):
-                    os.makedirs(os.path.dirname(target), exist_ok=True)
-                    shutil.copy2(os.path.join(source, name), target)
+            origin, target = os.path.join(source, name), os.path.join(folder, name)
+            if os.path.isfile(origin) and not (os.path.exists(target) and same_text(origin, target)):
+                os.makedirs(os.path.dirname(target), exist_ok=True)
+                shutil.copy(origin, target)
         configured = run(["cmake", "--preset", preset, "-G", "Ninja", "-B", self.build], cwd=folder)
         if configured.returncode:
             sys.exit(f"mutate: cmake failed:\n{configured.stdout}")
-        self.make("all")
-        shown = run(["ctest", "--test-dir", self.build, "--show-only=json-v1"]).stdout
-        self.tests = {}
-        for test in json.loads(shown)["tests"]:
-            labels = [p["value"] for p in test["properties"] if p["name"] == "LABELS"][0]
-            self.tests[test["name"]] = (labels, os.path.basename(test["command"][0]), " ".join(test["command"]))
-        self.costs = {}
+        self.objects = re.findall(r"^(\S+\.o):", run(["ninja", "-C", self.build, "-t", "targets", "all"]).stdout, re.M)
+        self.tests = {name: (labels, os.path.basename(command[0]), " ".join(command))
+                      for name, (labels, command) in listed_tests(self.build).items()}
+        self.costs, self.unsound = {}, set()
 
     def make(self, *targets):
-        made = run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *targets])
-        if made.returncode and targets == ("all",):
-            sys.exit(f"mutate: the sound tree does not build:\n{made.stdout}")
-        return made.returncode == 0
+        return run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *targets]).returncode == 0
 
     def object_of(self, path):
-        folder = os.path.dirname(path)
-        for root, _, files in os.walk(os.path.join(self.build, folder, "CMakeFiles")):
-            for name in files:
-                if os.path.join(root, name).endswith("/" + os.path.basename(path) + ".o"):
-                    return os.path.relpath(os.path.join(root, name), self.build)
-        return None
+        folder, name = os.path.split(path)
+        inside = [o for o in self.objects if o.startswith(folder + "/CMakeFiles/") and o.endswith("/" + name + ".o")]
+        return inside[0] if inside else None
 
     def tests_for(self, path, suite):
         """Names of the tests that judge a file: those of its folder, or those of the program."""
@@ -130,7 +227,15 @@ class Tree:
             prefix = UNIT_TESTS.get(folder, folder.split("/")[0])
             names = [n for n, (labels, _, _) in self.tests.items()
                      if re.match(rf"(?:{prefix})_", n) and "unit" in labels and "slow" not in labels]
-        return sorted(names, key=lambda n: self.costs.get(n, 1.0))
+        return sorted(set(names) - self.unsound, key=lambda n: self.costs.get(n, 1.0))
+
+    def prove(self, names):
+        """Runs the tests that have not run yet on the sound tree: one that fails there judges nothing."""
+        for name in [n for n in names if n not in self.costs]:
+            failed = self.judge([name])
+            if failed:
+                print(f"mutate: left out, for it fails without a bug: {failed}", flush=True)
+                self.unsound.add(name)
 
     def judge(self, names):
         """The first test that fails, or None."""
@@ -156,28 +261,32 @@ def digest(path):
 
 def candidates(options, tree):
     if options.files:
-        names = options.files
+        names = run(["git", "-C", options.source, "ls-files", "--", *options.files]).stdout.split("\n")
     else:
         command = ["git", "-C", options.source, "diff", "--name-only", options.since] if options.since else \
             ["git", "-C", options.source, "ls-files"]
         names = run(command).stdout.split("\n")
     names = [n for n in names if n.endswith(".c") and n.split("/")[0] in FOLDERS
              and os.path.exists(os.path.join(tree.folder, n)) and not os.path.basename(n).startswith(options.without)]
+    if options.suite == "unit" and not options.files:
+        names = [n for n in names if not n.startswith("sim/app/")]
     found = []
     for name in sorted(names):
         with open(os.path.join(tree.folder, name), encoding="utf-8") as file:
-            found.append((name, mutants_of(name, file.read())))
-    return [(n, m) for n, m in found if m]
+            text = file.read()
+        mutants = mutants_of(name, text)
+        found.append((name, mutants, len({text.count("\n", 0, m[1]) for m in mutants})))
+    return [f for f in found if f[1]]
 
 
 def draw(pools, rng):
-    """A file by the root of its size, a kind among those in it, a place of that kind: no kind swamps the others."""
-    name, mutants = rng.choices(pools, [len(m) ** 0.5 for _, m in pools])[0]
+    """A file by its lines that can hold a bug, a kind among those in it, a place of that kind."""
+    name, mutants, _ = rng.choices(pools, [lines for _, _, lines in pools])[0]
     kind = rng.choice(sorted({m[0] for m in mutants}))
     return name, rng.choice([m for m in mutants if m[0] == kind])
 
 
-def trial(tree, name, mutant, suite):
+def trial(tree, coverage, name, line, mutant, suite):
     """(outcome, the test that noticed): noticed, survived, equal, or no tests."""
     kind, at, old, new = mutant
     path = os.path.join(tree.folder, name)
@@ -188,6 +297,11 @@ def trial(tree, name, mutant, suite):
     if target is None or not tree.make(target):
         return "equal", "not compiled"
     before = digest(os.path.join(tree.build, target))
+    names = tree.tests_for(name, suite)
+    if coverage:
+        names = coverage.tests_of(name, line, names)
+    tree.prove(names)
+    names = [n for n in names if n not in tree.unsound]
     try:
         with open(path, "w", encoding="utf-8") as file:
             file.write(sound[:at] + new + sound[at + len(old):])
@@ -195,7 +309,6 @@ def trial(tree, name, mutant, suite):
             return "equal", "does not compile"
         if digest(os.path.join(tree.build, target)) == before:
             return "equal", "same object"
-        names = tree.tests_for(name, suite)
         if not names:
             return "survived", "no tests"
         failed = tree.judge(names)
@@ -203,6 +316,15 @@ def trial(tree, name, mutant, suite):
     finally:
         with open(path, "w", encoding="utf-8") as file:
             file.write(sound)
+
+
+def show_unexecuted(pools, tree, coverage):
+    for name, _, _ in pools:
+        missed, of, ranges = coverage.unexecuted(name, tree.tests_for(name, "unit"))
+        if missed or not of:
+            shown = " ".join(f"{a}-{b}" if b > a else str(a) for a, b in ranges)
+            print(f"{name}: {missed} of {of} lines: {shown}" if of else f"{name}: no test executes any of it")
+    return 0
 
 
 def wilson(k, n):
@@ -216,11 +338,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0], epilog="example: mutate.py --count 60 --seed 1")
     parser.add_argument("--source", default=os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
     parser.add_argument("--work", help="folder of the copy, kept for the next time (default: a temporary one)")
-    parser.add_argument("--files", nargs="+", help="files to plant bugs in")
+    parser.add_argument("--files", nargs="+", help="files or folders to plant bugs in")
+    parser.add_argument("--coverage", help="folder for a build with gcov: run only the tests that execute a bug's line")
+    parser.add_argument("--unexecuted", nargs="+", dest="files_unexecuted", metavar="FILE",
+                        help="with --coverage: show the lines that no unit test of the folder executes, and end")
     parser.add_argument("--since", help="only files that changed since this git revision")
     parser.add_argument("--without", nargs="*", default=["bench_"], help="beginnings of file names to leave out")
-    parser.add_argument("--suite", choices=["unit", "e2e"], default="unit", help="which tests judge (default unit)")
+    parser.add_argument("--suite", choices=["unit", "e2e"], default="unit",
+                        help="which tests judge (default unit, which leaves sim/app out: its tests are the e2e suite)")
     parser.add_argument("--count", type=int, default=30, help="bugs to plant (default 30)")
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="plant no more after so many minutes")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--least", type=float, default=0.0, help="least score, 0 to 1, for exit code 0")
@@ -228,15 +355,24 @@ def main():
     options = parser.parse_args()
     options.without = tuple(options.without)
     rng = random.Random(options.seed)
-    folder = options.work or tempfile.mkdtemp(prefix="boresight-mutation-")
+    options.files = options.files_unexecuted or options.files
+    folder = os.path.abspath(options.work) if options.work else tempfile.mkdtemp(prefix="boresight-mutation-")
     try:
         tree = Tree(options.source, folder, "release", options.jobs)
         pools = candidates(options, tree)
+        coverage = None
+        if options.coverage:
+            names = set().union(*(tree.tests_for(name, "unit") for name, _, _ in pools))
+            coverage = Coverage(options.source, options.coverage, options.jobs, names)
+            tree.costs = {n: coverage.known[n]["seconds"] for n in names & set(coverage.known)
+                          if coverage.known[n]["code"] == 0}
+        if options.files_unexecuted:
+            return show_unexecuted(pools, tree, coverage) if coverage else parser.error("--unexecuted needs --coverage")
         if not pools:
             sys.exit("mutate: no source file to plant a bug in: look at --files and --since")
-        outcomes, tried = [], set()
+        outcomes, tried, begun = [], set(), time.monotonic()
         for _ in range(20 * options.count):
-            if len(outcomes) == options.count:
+            if len(outcomes) == options.count or (outcomes and time.monotonic() > begun + 60 * options.minutes):
                 break
             name, mutant = draw(pools, rng)
             if (name, mutant) in tried:
@@ -245,7 +381,7 @@ def main():
             with open(os.path.join(tree.folder, name), encoding="utf-8") as file:
                 text = file.read()
             line = text.count("\n", 0, mutant[1]) + 1
-            outcome, by = trial(tree, name, mutant, options.suite)
+            outcome, by = trial(tree, coverage, name, line, mutant, options.suite)
             if outcome == "equal":
                 continue
             shown = text.split("\n")[line - 1].strip()
@@ -257,7 +393,7 @@ def main():
             sys.exit("mutate: no bug could be planted in these files")
         low, high = wilson(noticed, len(outcomes))
         print(f"{noticed} of {len(outcomes)} bugs noticed: {100 * noticed / len(outcomes):.0f} % "
-              f"(95 % interval {100 * low:.0f} to {100 * high:.0f} %)")
+              f"(95 % Wilson interval {100 * low:.0f} to {100 * high:.0f} %)")
         if options.json:
             with open(options.json, "w", encoding="utf-8") as file:
                 json.dump(outcomes, file, indent=1)

@@ -237,6 +237,9 @@ static void test_sensitivity(void **state) {
             bst_assert_close(of[3]->mean_effect, 2.0, 1.4);
             bst_assert_close(of[3]->spread, 1.49, 0.5);
             assert_true(of[3]->effect >= of[3]->mean_effect - 1e-12);
+            /* axis 3 has no effect below 0: sizes spread as the effects do, over 60 of them */
+            bst_assert_close(of[3]->error, of[3]->spread / sqrt(60.0), 1e-12);
+            bst_assert_close(of[1]->error, 0.0, 1e-6);
         } else {
             assert_int_equal(e[0].axis, 1);
             assert_int_equal(e[1].axis, 2);

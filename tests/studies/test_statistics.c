@@ -58,9 +58,70 @@ static void test_coverage(void **state) {
     bst_assert_close((double)held / SETS, 0.935, 0.035);
 }
 
+/* With gaps a resample's mean is over what was drawn of them: against sums over every resample of
+ * three rows of two columns, 27 of equal probability. */
+static void test_gaps(void **state) {
+    (void)state;
+    enum { RESAMPLES = 40000 };
+    bst_ctx ctx = {0};
+    const double values[] = {1, 5, NAN, 11, 4, 20};
+    bst_statistics out[2];
+    bst_rng_key key = bst_rng_make_key(3, 0, "test", "gaps");
+    bst_assert_ok(&ctx, bst_statistics_of(&ctx, values, 3, 2, RESAMPLES, key, out));
+    for (int c = 0; c < 2; c++) {
+        double means[27], mean = c == 0 ? 2.5 : 12;
+        int kept = 0;
+        for (int i = 0; i < 27; i++) {
+            const int rows[3] = {i % 3, i / 3 % 3, i / 9};
+            double sum = 0, n = 0;
+            for (int k = 0; k < 3; k++) {
+                double v = values[2 * rows[k] + c];
+                sum += isnan(v) ? 0 : v;
+                n += !isnan(v);
+            }
+            if (n > 0) {
+                means[kept++] = sum / n;
+            }
+        }
+        assert_int_equal(kept, c == 0 ? 26 : 27);
+        /* the lowest and the highest have 1/27 and more of them: they are the interval's ends */
+        double low = INFINITY, high = -INFINITY;
+        for (int i = 0; i < kept; i++) {
+            low = fmin(low, means[i]);
+            high = fmax(high, means[i]);
+        }
+        bst_assert_close(out[c].mean, mean, 1e-14);
+        bst_assert_close(out[c].low, low, 1e-12);
+        bst_assert_close(out[c].high, high, 1e-12);
+    }
+}
+
+/* Of more runs than are resampled, by the normal distribution. */
+static void test_many(void **state) {
+    (void)state;
+    const int64_t rows = BST_BOOTSTRAP_RUNS + 1;
+    bst_ctx ctx = {0};
+    double *values = malloc((size_t)rows * sizeof *values);
+    assert_non_null(values);
+    for (int64_t i = 0; i < rows; i++) {
+        values[i] = (double)(i % 2);
+    }
+    bst_statistics out;
+    bst_rng_key key = bst_rng_make_key(3, 0, "test", "many");
+    bst_assert_ok(&ctx, bst_statistics_of(&ctx, values, rows, 1, 10, key, &out));
+    double n = (double)rows, ones = floor(n / 2), mean = ones / n;
+    double std = sqrt(ones * (1 - mean) / (n - 1)); /* n p (1 - p) over n - 1 */
+    bst_assert_close(out.mean, mean, 1e-12);
+    bst_assert_close(out.std, std, 1e-12);
+    bst_assert_close(out.low, mean - 1.959963984540054 * std / sqrt(n), 1e-12);
+    bst_assert_close(out.high, mean + 1.959963984540054 * std / sqrt(n), 1e-12);
+    assert_true(out.p25 == 0 && out.p75 == 1 && out.p05 == 0 && out.p95 == 1);
+    free(values);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_closed_forms),
-                                       cmocka_unit_test(test_too_few),
-                                       cmocka_unit_test(test_coverage)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_closed_forms), cmocka_unit_test(test_too_few),
+        cmocka_unit_test(test_gaps), cmocka_unit_test(test_many), cmocka_unit_test(test_coverage)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

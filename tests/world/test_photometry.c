@@ -71,6 +71,49 @@ static void wrong_stars_count_little(void **state) {
     assert_true(fabs(bias) < 1.0 && square < 2.5);
 }
 
+/* Four stars by hand. Their magnitudes are 0.10, 0.16, 0.22 and 0.12 too faint, with noise of 0.02,
+ * 0.04, 0.02 and 0.04 mag (1.0857 over the SNR): the median is 0.14, the deviations 0.04, 0.02,
+ * 0.08, 0.02, their median 0.03, the spread 1.4826 times that, 0.04448. The median variance of the
+ * noise is (0.0004 + 0.0016) / 2 = 0.001: 0.04448^2 - 0.001 = 9.784e-4 is shared. */
+static void a_zero_point_by_hand(void **state) {
+    (void)state;
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
+    bst_photometer p;
+    bst_assert_ok(&ctx, bst_photometer_create(&ctx, 8, &p));
+    bst_photometer_begin(&p);
+    static const double off[] = {0.10, 0.16, 0.22, 0.12}, noise[] = {0.02, 0.04, 0.02, 0.04};
+    const double unit = 2.5 / log(10.0);
+    double shared = 1.4826 * 0.03 * 1.4826 * 0.03 - 0.001, weights = 0, sum = 0;
+    for (int i = 0; i < 4; i++) {
+        bst_detection d = star(9.0 + off[i], unit / noise[i]);
+        bst_photometer_add(&p, &d, 9.0);
+        double w = 1 / (noise[i] * noise[i] + shared);
+        weights += w;
+        sum -= w * off[i]; /* what has to be added to a magnitude that is measured */
+    }
+    bst_zero_point z = bst_photometer_zero_point(&p);
+    assert_int_equal(z.stars, 4);
+    /* 1.4826 is rounded to five digits */
+    bst_assert_close(z.offset_mag, sum / weights, 1e-6);
+    bst_assert_close(z.sigma_mag, sqrt(1 / weights), 1e-6);
+    bst_assert_close(z.scatter_mag, sqrt(shared), 2e-6);
+    bst_detections *d = calloc(1, sizeof *d + 2 * sizeof d->items[0]);
+    assert_non_null(d);
+    d->count = 1;
+    d->items[0] = star(11.0, unit / 0.03);
+    d->items[1] = star(11.0, unit / 0.03); /* past the end */
+    bst_photometry_apply(&z, 22.5, d);
+    bst_assert_close(d->zero_point_mag, 22.5 + sum / weights, 1e-6);
+    bst_assert_close(d->zero_point_sigma_mag, sqrt(1 / weights), 1e-6);
+    assert_int_equal(d->zero_point_stars, 4);
+    bst_assert_close(d->items[0].v_mag, 11.0 + sum / weights, 1e-6);
+    bst_assert_close(d->items[0].v_mag_sigma, sqrt(0.0009 + 1 / weights), 1e-6);
+    bst_assert_close(d->items[1].v_mag, 11.0, 0);
+    free(d);
+    bst_photometer_free(&p);
+}
+
 static void too_few_leave_the_camera_alone(void **state) {
     (void)state;
     bst_ctx ctx;
@@ -125,6 +168,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_are_as_stated),
         cmocka_unit_test(wrong_stars_count_little),
+        cmocka_unit_test(a_zero_point_by_hand),
         cmocka_unit_test(too_few_leave_the_camera_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -287,6 +287,62 @@ static void tilt_moves_the_image(void **state) {
     bst_psf_free(still);
 }
 
+/* The centroid lies where the mean slope of the wavefront points: 4 a lambda F of tilt a, and for
+ * coma, sqrt(8) (3 r^3 - 2 r) cos t, 2 sqrt(8) a (1 + 3 e^2) lambda F, on an annulus of inner
+ * radius e (mean of r^2: (1 + e^2) / 2). Terms 2 and 8 are along x, 3 and 7 along y; lambda F is 2
+ * px. */
+static void odd_aberrations_move_the_centroid(void **state) {
+    (void)state;
+    for (int n = 0; n < 4; n++) {
+        bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
+        double e2 = n % 2 ? 0.16 : 0.0, *z = camera.optics.zernike_waves.waves;
+        camera.obscuration = e2;
+        camera.optics.zernike_nm = 551.0;
+        z[2 - 2] = n < 2 ? 0.0 : 0.05;
+        z[3 - 2] = n < 2 ? 0.0 : -0.08;
+        z[8 - 2] = 0.06;
+        z[7 - 2] = -0.03;
+        double coma = 2 * sqrt(8.0) * (1 + 3 * e2) * 2, shift[2];
+        bst_psf *psf = psf_of(&camera);
+        const float white[BST_PSF_COLOURS] = {0};
+        bst_psf_centroid_px(psf, white, 50, 25, shift);
+        /* cells of 1/384 of the aperture, and the OTF's phase from two low frequencies */
+        bst_assert_close(shift[0], 8 * z[2 - 2] + coma * 0.06, 0.01);
+        bst_assert_close(shift[1], 8 * z[3 - 2] - coma * 0.03, 0.01);
+        bst_psf_free(psf);
+    }
+}
+
+/* A PSF reaches as far as its longest wavelength makes it, in proportion to the wavelength; slopes
+ * of the wavefront are too many waves at the shortest. */
+static void the_ends_of_a_band_count(void **state) {
+    (void)state;
+    double reach[2];
+    for (int wide = 0; wide < 2; wide++) {
+        bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
+        camera.optics.q = 0.0; /* by aperture and scale: lambda / (0.1 m * 2 arcsec) */
+        camera.optics.wavelengths = 8;
+        camera.optics.band_nm[0] = wide ? 400.0 : 979.0;
+        camera.optics.band_nm[1] = wide ? 1000.0 : 981.0;
+        bst_psf *psf = psf_of(&camera);
+        reach[wide] = bst_psf_reach_px(psf);
+        bst_psf_free(psf);
+    }
+    /* eight wavelengths of a rule whose last one is 12 nm from the end */
+    bst_assert_close(reach[1] / reach[0], 988.0 / 980.0, 0.005);
+    /* a tilt of 4 * 15 waves of 500 nm a diameter: 64 are too many, of the shortest wavelength */
+    bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
+    bst_ctx ctx = {0};
+    bst_psf *psf;
+    camera.optics.zernike_nm = 500.0;
+    camera.optics.wavelengths = 8;
+    camera.optics.band_nm[0] = 250.0;
+    camera.optics.band_nm[1] = 1000.0;
+    camera.optics.zernike_waves.waves[2 - 2] = 15.0;
+    assert_int_equal(bst_psf_create(&ctx, &camera, &psf), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "aberrations with slopes of"));
+}
+
 /* The autocorrelation by brute force: a fine midpoint rule on the aperture's very outline. */
 static void brute_otf(const bst_camera *camera, const double amounts[38], double sx, double sy,
                       double out[2]) {
@@ -368,6 +424,8 @@ int main(void) {
         cmocka_unit_test(a_detector_out_of_focus_is_term_4),
         cmocka_unit_test(small_aberrations_have_marechals_strehl),
         cmocka_unit_test(tilt_moves_the_image),
+        cmocka_unit_test(odd_aberrations_move_the_centroid),
+        cmocka_unit_test(the_ends_of_a_band_count),
         cmocka_unit_test(an_aberrated_spidered_aperture_is_its_autocorrelation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -512,6 +512,35 @@ static void edges_are_drawn_pixel_by_pixel(void **state) {
     bst_world_free(world);
 }
 
+/* Sunlight from 30 degrees beside the field: the Sun's irradiance in stars of V = 0, what the table
+ * lets through of it, the flux of such a star and the area of a pixel; neither aperture nor
+ * throughput count. */
+static void stray_light_on_the_detector(void **state) {
+    (void)state;
+#define DARK "\"model\": \"sky\", \"starlight\": false, \"earth\": false, \"moon\": false"
+    double value[2];
+    bst_surroundings around = look_down((bst_vec3){7e6, 0, 0}, BST_PI - BST_PI / 6);
+    around.exposure_s = 3;
+    double v0 = 0, efficiency = 0;
+    for (int table = 0; table < 2; table++) {
+        bst_world *world = test_world(
+            table
+                ? SKY_WORLD("64", DARK ", \"pixel_um\": 12, \"pst\": [{\"angle_deg\": 0, \"pst\": "
+                                       "1e-3}, {\"angle_deg\": 60, \"pst\": 1e-9}]")
+                : SKY_WORLD("64", DARK));
+        bst_skylight *s;
+        const bst_skylight_map *map = make(world, &around, (bst_window){0, 0, 64, 64}, &s);
+        value[table] = bst_skylight_at(map, 31, 40);
+        v0 = bst_world_camera(world, 0, 0)->photon_flux_v0_per_s_m2;
+        efficiency = bst_world_camera(world, 0, 0)->quantum_efficiency;
+        bst_skylight_free(s);
+        bst_world_free(world);
+    }
+    /* 1e-6 at half of the angle; the Sun is 7000 km nearer than 1 au: 1e-4 */
+    double expected = 3 * FULL_SUN * 1e-6 * v0 * efficiency * 12e-6 * 12e-6;
+    bst_assert_close(value[1] - value[0], expected, 3e-4 * expected);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_of_windows),
@@ -528,6 +557,7 @@ int main(void) {
         cmocka_unit_test(gradients_are_polynomials),
         cmocka_unit_test(windows_and_interpolation),
         cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
+        cmocka_unit_test(stray_light_on_the_detector),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
