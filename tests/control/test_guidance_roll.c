@@ -152,6 +152,14 @@ static void without_a_way_the_roll_stays(void **state) {
         assert_int_equal(g.roll_given, given == 1);
         assert_true(g.roll_rad == 0.125);
     }
+    /* 85 degrees on either side of the pole are not enough, 90 just are: the axis
+     * turns at 2 deg/s there, at 2.008 deg/s five degrees before, and 0.8 of the limit are 2.004 */
+    make_mount(&g, 2.505);
+    p.miss_deg = 0.0;
+    bool least;
+    bst_assert_ok(&ctx, bst_guidance_choose_roll(&ctx, &g, &problem, 80.0, &least));
+    assert_true(least);
+    bst_assert_close(fabs(g.roll_rad) / DEG, 90.0, 1e-9); /* rounding */
     /* a body that does not roll, or of which nothing is known */
     for (int i = 0; i < 2; i++) {
         make_mount(&g, 5.0);

@@ -70,13 +70,15 @@ static void near_the_end_the_law_is_linear(void **state) {
     expect(c.integral_radps2, 0.0021380899352993954, -0.0010690449676496977, 0.0032071349029490926,
            1e-17);
     /* on the spot: the reference's torque and the gyroscopic one alone */
-    c = control_of(0.02);
     const bst_vec3 rate = {0.001, -0.002, 0.0015};
-    t = step(&c, 0.0, rate, false);
+    const bst_attitude_reference there = {.q_body_from_gcrf = BST_QUAT_IDENTITY,
+                                          .rate_radps = rate,
+                                          .accel_radps2 = {1e-4, 2e-4, -3e-4}};
+    c = control_of(0.02);
+    t = bst_attitude_control_step(&c, &there, BST_QUAT_IDENTITY, rate, (bst_vec3){3, -2, 1}, false);
     /* I a = (0.0099, 0.0171, -0.0441); I w + h = (3.1335, -2.18, 1.226) */
-    expect(t, 0.0099 + (-0.002 * 1.226 - 0.0015 * -2.18),
-           0.0171 + (0.0015 * 3.1335 - 0.001 * 1.226), -0.0441 + (0.001 * -2.18 - -0.002 * 3.1335),
-           1e-14);
+    expect(t, 0.0099 - 0.002 * 1.226 + 0.0015 * 2.18, 0.0171 + 0.0015 * 3.1335 - 0.001 * 1.226,
+           -0.0441 - 0.001 * 2.18 + 0.002 * 3.1335, 1e-14);
 }
 
 static void a_slew_brakes_along_its_curve(void **state) {
