@@ -256,6 +256,30 @@ static void the_body_turns_on_after_its_telemetry(void **state) {
         bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 5.0, &why, NULL, &snr));
         assert_int_equal(why, BST_WHY_NOT);
     }
+    /* nine tenths of an axis' rate may be used: the camera's x along the target's motion, so that
+     * one axis makes all of it, the body at rest */
+    bst_tasking_why why;
+    bst_sight now, later;
+    double snr;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, &now, &snr));
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 1.0, &why, &later, &snr));
+    bst_vec3 moved = bst_vec3_sub(later.apparent, now.apparent);
+    for (int enough = 0; enough < 2; enough++) {
+        double limit = bst_vec3_norm(moved) / (enough ? 0.88 : 0.92);
+        bst_mount_status mount = {.axes = 2,
+                                  .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
+                                  .q_body_from_gcrf = bst_quat_look(now.apparent, moved)};
+        for (int a = 0; a < 2; a++) {
+            mount.axis[a] = (bst_mount_axis){.axis_body = {a == 1, a == 0, 0},
+                                             .rate_limit_radps = limit,
+                                             .accel_limit_radps2 = 10 * BST_DEG_RAD,
+                                             .min_rad = -50 * BST_DEG_RAD,
+                                             .max_rad = 50 * BST_DEG_RAD};
+        }
+        bst_tasking_telemetry(&f.tasking, 0, NULL, &mount);
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
+        assert_int_equal(why, enough ? BST_WHY_NOT : BST_WHY_MOUNT);
+    }
     assert_string_equal(bst_tasking_reason(BST_WHY_MOUNT), "out of the mount's reach");
     assert_string_equal(bst_tasking_reason(BST_WHY_NOT), "visible");
     assert_string_equal(bst_tasking_reason(-1), "unknown");
