@@ -93,6 +93,68 @@ static void gates_reach_every_model(void **state) {
     bst_mtt_free(b->mtt);
 }
 
+/* And a model's own covariance, on each axis, where the track's is small. */
+static void gates_are_as_wide_as_a_model(void **state) {
+    (void)state;
+    bst_mtt_params params = defaults();
+    params.association = BST_MTT_MIXTURE;
+    bench *b = start(6, &params);
+    bst_vec3 centre = bst_vec3_from_radec(5.1, -0.7);
+    for (int k = 0; k < 8; k++) {
+        int model = k & 1, axis = k >> 1 & 1, side = k & 4 ? 1 : -1;
+        bst_mtt_track *track = set_track(b->mtt, centre, 2 * AS, 2 * AS);
+        track->models.count = 2;
+        for (int m = 0; m < 2; m++) {
+            track->models.state[m] = track->state;
+            track->models.probability[m] = 0.5;
+        }
+        double sigma = 60 * AS, off = side * 150 * AS;
+        track->models.state[model].covariance[axis][axis] = sigma * sigma;
+        put(b->mtt, aside(centre, axis ? 0.0 : off, axis ? off : 0.0), 0.01 * AS);
+        assert_int_equal(chosen(b->mtt), 0);
+        track->models.state[model].covariance[axis][axis] = 4 * AS * AS;
+        assert_int_equal(chosen(b->mtt), -1);
+    }
+    bst_mtt_free(b->mtt);
+}
+
+/* A detection that a confirmed track has taken is no tentative track's. */
+static void confirmed_tracks_choose_first(void **state) {
+    (void)state;
+    bst_mtt_params params = defaults();
+    for (int nearest = 0; nearest < 2; nearest++) {
+        params.association = nearest ? BST_MTT_NEAREST : BST_MTT_GNN;
+        bench *b = start(7, &params);
+        bst_vec3 centre = bst_vec3_from_radec(0.4, 0.9);
+        /* number 1 is confirmed and is the farther off */
+        set_track(b->mtt, centre, 3 * AS, 3 * AS);
+        b->mtt->tracks[1] = b->mtt->tracks[0];
+        b->mtt->tracks[0].status = BST_TRACK_TENTATIVE;
+        b->mtt->tracks[1].id = 2;
+        b->mtt->tracks[1].state.direction = aside(centre, 6 * AS, 0.0);
+        b->mtt->track_count = 2;
+        b->mtt->observable[1] = true;
+        put(b->mtt, centre, 0.1 * AS);
+        bst_mtt_pool_index(&b->mtt->now);
+        bst_mtt_associate(b->mtt, false);
+        assert_int_equal(b->mtt->detection_of_track[0], -1);
+        assert_int_equal(b->mtt->detection_of_track[1], 0);
+        assert_int_equal(b->mtt->owner[0], 1);
+        assert_true(b->mtt->now.used[0]);
+        /* two confirmed ones: the likelier pair of one detection, both with two */
+        b->mtt->tracks[0].status = BST_TRACK_CONFIRMED;
+        b->mtt->now.used[0] = false;
+        bst_mtt_associate(b->mtt, false);
+        assert_int_equal(b->mtt->detection_of_track[0], 0);
+        put(b->mtt, aside(centre, -1 * AS, 0.0), 0.1 * AS);
+        b->mtt->now.used[0] = false;
+        bst_mtt_pool_index(&b->mtt->now);
+        bst_mtt_associate(b->mtt, false);
+        assert_int_equal(b->mtt->detection_of_track[0] + b->mtt->detection_of_track[1], 1);
+        bst_mtt_free(b->mtt);
+    }
+}
+
 /* Of two in the gate the likelier one; and of those equally far the one of the track's brightness.
  */
 static void the_likelier_one_is_taken(void **state) {
@@ -199,8 +261,12 @@ static void false_alarms_are_counted(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gates_have_two_axes),       cmocka_unit_test(gates_reach_every_model),
-        cmocka_unit_test(the_likelier_one_is_taken), cmocka_unit_test(ranges_hold_what_is_near),
+        cmocka_unit_test(gates_have_two_axes),
+        cmocka_unit_test(gates_reach_every_model),
+        cmocka_unit_test(the_likelier_one_is_taken),
+        cmocka_unit_test(gates_are_as_wide_as_a_model),
+        cmocka_unit_test(confirmed_tracks_choose_first),
+        cmocka_unit_test(ranges_hold_what_is_near),
         cmocka_unit_test(false_alarms_are_counted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
