@@ -316,28 +316,40 @@ static void the_status_tells_limits_and_stops(void **state) {
 }
 
 /* The other way to point, over the pole, is the shorter one where the outer axis would have to make
- * nearly half a turn. */
+ * nearly half a turn, or a slow inner axis a long way. */
 static void over_the_pole_is_the_shorter_way(void **state) {
     (void)state;
-    for (int side = -1; side <= 1; side += 2) {
+    const struct {
+        double start, azimuth, elevation, outer, inner;
+    } cases[] = {{70, 175, 75, -5, 105},    {70, -175, 75, 5, 105},  {-70, 175, -75, -5, -105},
+                 {-70, -175, -75, 5, -105}, {170, 0, -50, 180, 230}, /* 60 degrees for the inner one
+                                                                        instead of 150 */
+                 {-170, 0, 50, 180, -230}};
+    for (int k = 0; k < 6; k++) {
         bst_mount_config config = default_config();
-        config.travel_min_deg[1] = -170.0;
-        config.travel_max_deg[1] = 170.0;
-        config.start_deg[1] = side * 70.0;
+        config.rate_limit_degps[1] = 5.0;
+        config.travel_min_deg[1] = -240.0;
+        config.travel_max_deg[1] = 240.0;
+        config.start_deg[1] = cases[k].start;
         bst_mount m;
         make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
         bst_mount_body body = {.q_believed_from_gcrf = some_attitude};
-        /* azimuth 175 and elevation 75 degrees: or azimuth -5 and elevation 105 */
-        double so = sin(175.0 * BST_DEG_RAD), co = cos(175.0 * BST_DEG_RAD);
-        double si = sin(side * 75.0 * BST_DEG_RAD), ci = cos(75.0 * BST_DEG_RAD);
-        bst_vec3 d = {si, -ci * so, ci * co};
-        bst_los_command k = command_from(some_attitude, d, (bst_vec3){0, 0, 0});
-        for (int n = 0; n < 12000; n++) {
-            bst_mount_step(&m, &body, &k, 0.0, true);
+        double azimuth = cases[k].azimuth * BST_DEG_RAD,
+               elevation = cases[k].elevation * BST_DEG_RAD;
+        bst_vec3 d = {sin(elevation), -cos(elevation) * sin(azimuth),
+                      cos(elevation) * cos(azimuth)};
+        bst_los_command c = command_from(some_attitude, d, (bst_vec3){0, 0, 0});
+        bool limited = false;
+        for (int n = 0; n < 24000; n++) {
+            bst_mount_step(&m, &body, &c, 0.0, true);
+            limited = limited || m.limited;
         }
-        bst_assert_close(m.servo[0].unwrapped_rad, -5.0 * BST_DEG_RAD, 1e-4);
-        bst_assert_close(m.servo[1].unwrapped_rad, side * 105.0 * BST_DEG_RAD, 1e-4);
+        bst_assert_close(fabs(m.servo[0].unwrapped_rad), fabs(cases[k].outer) * BST_DEG_RAD, 1e-4);
+        assert_true(cases[k].outer == 180 || m.servo[0].unwrapped_rad * cases[k].outer > 0.0);
+        bst_assert_close(m.servo[1].unwrapped_rad, cases[k].inner * BST_DEG_RAD, 1e-4);
         assert_true(m.settled && bst_vec3_angle(boresight(m.q_cam_from_body), d) < 1e-5);
+        /* on its way at the rate limits, and not at the end */
+        assert_true(limited && !m.limited);
     }
 }
 
