@@ -436,6 +436,49 @@ static void light_below_the_clip_is_background(void **state) {
     }
 }
 
+/* While the stars are long streaks a source at rest stands at the top of the filter's output: noise
+ * of unit variance has a gradient of 1 / (sqrt(2) sigma), the top a curvature of SNR / (2 sigma^2).
+ */
+static void tops_at_rest_scatter_evenly(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.frame.streak_dx_px = 160.0;
+    s.frame.streak_dy_px = 120.0;
+    start(&s);
+    fill(&s, 40.0);
+    bst_generator_result r = run(&s, 1);
+    assert_true(r.smeared && r.count >= 890);
+    double sum[2] = {0.0}, square[3] = {0.0}, snr = 0.0, n = r.count;
+    for (int i = 0; i < r.count; i++) {
+        const bst_detection *d = &r.items[i].detection;
+        const bst_truth_item *item = &s.truth->items[r.items[i].item];
+        double x = d->x_px - item->x_mid_px, y = d->y_px - item->y_mid_px;
+        sum[0] += x / n;
+        sum[1] += y / n;
+        square[0] += x * x / n;
+        square[1] += x * y / n;
+        square[2] += y * y / n;
+        snr += d->snr / n;
+        /* what it says of itself: a pixel, no better; flux by its SNR */
+        assert_true(d->cov_xx == 1.0 && d->cov_yy == 1.0);
+        double sigma = d->flux_e / d->snr;
+        bst_assert_close(d->flux_sigma_e, sqrt(sigma * sigma + d->flux_e), 1e-9 * d->flux_e);
+    }
+    /* seen on the brightest pixel, which is off the top by up to half a pixel */
+    assert_true(snr > 34.0 && snr < 41.0);
+    double width = sqrt(s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0);
+    double sigma = sqrt(2.0) * width / 40.0;
+    /* four standard errors of a variance, a mean and a covariance; widths of a Gaussian's: 3 % */
+    double error = 4.0 * sqrt(2.0 / n) + 0.06;
+    bst_assert_close(square[0] / (sigma * sigma), 1.0, error);
+    bst_assert_close(square[2] / (sigma * sigma), 1.0, error);
+    bst_assert_close(square[1] / (sigma * sigma), 0.0, 4.0 / sqrt(n));
+    bst_assert_close(sum[0] / sigma, 0.0, 4.0 / sqrt(n));
+    bst_assert_close(sum[1] / sigma, 0.0, 4.0 / sqrt(n));
+    close_scene(&s);
+}
+
 static void room_is_for_the_brightest(void **state) {
     (void)state;
     scene s;
@@ -496,6 +539,7 @@ int main(void) {
         cmocka_unit_test(long_streaks_are_seen_in_parts),
         cmocka_unit_test(a_pixels_noise_is_the_sum_of_its_parts),
         cmocka_unit_test(light_below_the_clip_is_background),
+        cmocka_unit_test(tops_at_rest_scatter_evenly),
         cmocka_unit_test(room_is_for_the_brightest),
         cmocka_unit_test(hits_come_at_the_detectors_rate),
     };
