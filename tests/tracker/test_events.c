@@ -56,6 +56,17 @@ static void a_manoeuvre_is_told_at_its_rate(void **state) {
     params.false_events_per_hour = 0.0; /* none are told */
     assert_false(bst_mtt_note_innovation(&params, &track, &far, 1.0, &statistic));
     assert_false(bst_mtt_note_brightness(&params, &track, 100.0, 1.0, &statistic));
+    params.false_events_per_hour = 1e9;
+    params.event_window = 0;
+    assert_false(bst_mtt_note_innovation(&params, &track, &far, 1.0, &statistic));
+    assert_false(bst_mtt_note_brightness(&params, &track, 100.0, 1.0, &statistic));
+    /* however many are allowed, what is likelier than not is no event: exp(-x / 2) = 0.55, 0.45 */
+    params.event_window = 1;
+    for (int rare = 0; rare < 2; rare++) {
+        bst_sky_innovation one = {.nu = {sqrt(-2.0 * log(rare ? 0.45 : 0.55)), 0.0},
+                                  .s = {1.0, 0.0, 1.0}};
+        assert_int_equal(bst_mtt_note_innovation(&params, &track, &one, 1.0, &statistic), rare);
+    }
 }
 
 /* The same with one dimension: the tail of a normal distribution on both sides. */
