@@ -157,6 +157,136 @@ static void faint_and_fast_ones_are_left_out(void **state) {
     tear_down(&f);
 }
 
+/* What the rule expects of a frame, by closed forms: noise of a pixel, the pixels that a point
+ * fills (4 pi sigma^2, the pixel's own width added), electrons over both. */
+static void noise_and_snr_are_the_cameras(void **state) {
+    (void)state;
+    fixture f;
+    start(&f, "{\"targets\": [{}], \"min_snr\": 0}");
+    const bst_camera *c = bst_knowledge_camera(f.knowledge[0]);
+    double area = BST_PI / 4.0 * c->aperture_m * c->aperture_m;
+    double v0 = c->photon_flux_v0_per_s_m2 * area * c->throughput * c->quantum_efficiency;
+    double sky = v0 * pow(10.0, -0.4 * c->background_mag_arcsec2) * 9.0; /* 3 arcsec a pixel */
+    double noise2 = 0.5 * (sky + 0.5) + c->read_noise_e * c->read_noise_e;
+    double sigma = c->psf_fwhm_px / 2.3548200450309493;
+    double pixels = 4.0 * BST_PI * (sigma * sigma + 1.0 / 12.0);
+    bst_assert_close(f.tasking.sensors[0].noise_e, sqrt(noise2), 1e-9); /* rounding */
+    bst_assert_close(f.tasking.sensors[0].pixels, pixels, 1e-9);
+    bst_tasking_why why;
+    bst_sight sight;
+    double snr;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, &sight, &snr));
+    assert_int_equal(why, BST_WHY_NOT);
+    double electrons = 0.5 * v0 * pow(10.0, -0.4 * sight.v_mag);
+    /* the object's light is of the Sun's colour, as the magnitude is */
+    bst_assert_close(snr, electrons / sqrt(noise2 * pixels), 1e-3 * snr);
+    tear_down(&f);
+}
+
+/* The greatest rate is that of the line of sight: differences over a second, forwards. */
+static void the_rate_is_that_of_the_line_of_sight(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{}], \"min_snr\": 0, \"sun_keep_out_deg\": 0, \"moon_keep_out_deg\": 0, "
+          "\"earth_limb_keep_out_deg\": 0}");
+    bst_view *view;
+    bst_assert_ok(&f.ctx, bst_view_create(&f.ctx, f.world, &view));
+    bst_vec3 to[2];
+    for (int k = 0; k < 2; k++) {
+        bst_state eye, target;
+        bst_assert_ok(&f.ctx, bst_view_observer_state(&f.ctx, view, 0, k, &eye));
+        bst_assert_ok(&f.ctx, bst_view_object_state(&f.ctx, view, GX5, k, &target));
+        to[k] = bst_vec3_sub(target.position_m, eye.position_m);
+    }
+    double rate = bst_vec3_angle(to[0], to[1]) / BST_ARCSEC_RAD, snr;
+    for (int slower = 0; slower < 2; slower++) {
+        bst_tasking_why why;
+        /* light time changes the rate by some 1e-4 of itself; a second later it is another by more
+         * than that */
+        f.tasking.config.max_rate_arcsec_per_s = (slower ? 0.9997 : 1.0003) * rate;
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
+        assert_int_equal(why, slower ? BST_WHY_RATE : BST_WHY_NOT);
+    }
+    bst_view_free(view);
+    tear_down(&f);
+}
+
+/* A mount of five degrees of travel on a body that turns: it reaches the target when the body has
+ * turned its zero there, 15 s after its telemetry, and not before. */
+static void the_body_turns_on_after_its_telemetry(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{}], \"min_snr\": 0, \"sun_keep_out_deg\": 0, \"moon_keep_out_deg\": 0, "
+          "\"earth_limb_keep_out_deg\": 0}");
+    const bst_vec3 rates[3] = {{0.02, 0, 0}, {0, 0.02, 0}, {-0.01, 0.02, 0.01}};
+    for (int k = 0; k < 3; k++) {
+        bst_tasking_why why;
+        bst_sight sight;
+        double snr;
+        f.tasking.sensors[0].mount_known = false;
+        bst_assert_ok(&f.ctx,
+                      bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 20.0, &why, &sight, &snr));
+        assert_int_equal(why, BST_WHY_NOT);
+        /* z on the target at 20 s; the body's coordinates turn against its own motion */
+        bst_quat then = bst_quat_look(sight.apparent, (bst_vec3){0.3, -0.5, 0.8});
+        bst_mount_status mount = {.tick = 50, /* 5 s */
+                                  .axes = 2,
+                                  .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
+                                  .q_body_from_gcrf = bst_quat_mul(
+                                      bst_quat_from_rotvec(bst_vec3_scale(rates[k], 15.0)), then),
+                                  .rate_body_radps = rates[k]};
+        for (int a = 0; a < 2; a++) {
+            mount.axis[a] = (bst_mount_axis){.axis_body = {a == 1, a == 0, 0},
+                                             .rate_limit_radps = 10 * BST_DEG_RAD,
+                                             .accel_limit_radps2 = 10 * BST_DEG_RAD,
+                                             .min_rad = -5 * BST_DEG_RAD,
+                                             .max_rad = 5 * BST_DEG_RAD};
+        }
+        bst_tasking_telemetry(&f.tasking, 0, NULL, &mount);
+        const double times[3] = {20.0, 5.0, 35.0};
+        for (int i = 0; i < 3; i++) {
+            bst_assert_ok(&f.ctx,
+                          bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, times[i], &why, NULL, &snr));
+            assert_int_equal(why, i == 0 ? BST_WHY_NOT : BST_WHY_MOUNT);
+        }
+        mount.axes = 0; /* follows at once */
+        bst_tasking_telemetry(&f.tasking, 0, NULL, &mount);
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 5.0, &why, NULL, &snr));
+        assert_int_equal(why, BST_WHY_NOT);
+    }
+    /* nine tenths of an axis' rate may be used: the camera's x along the target's motion, so that
+     * one axis makes all of it, the body at rest */
+    bst_tasking_why why;
+    bst_sight now, later;
+    double snr;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, &now, &snr));
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 1.0, &why, &later, &snr));
+    bst_vec3 moved = bst_vec3_sub(later.apparent, now.apparent);
+    for (int enough = 0; enough < 2; enough++) {
+        double limit = bst_vec3_norm(moved) / (enough ? 0.88 : 0.92);
+        bst_mount_status mount = {.axes = 2,
+                                  .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
+                                  .q_body_from_gcrf = bst_quat_look(now.apparent, moved)};
+        for (int a = 0; a < 2; a++) {
+            mount.axis[a] = (bst_mount_axis){.axis_body = {a == 1, a == 0, 0},
+                                             .rate_limit_radps = limit,
+                                             .accel_limit_radps2 = 10 * BST_DEG_RAD,
+                                             .min_rad = -50 * BST_DEG_RAD,
+                                             .max_rad = 50 * BST_DEG_RAD};
+        }
+        bst_tasking_telemetry(&f.tasking, 0, NULL, &mount);
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
+        assert_int_equal(why, enough ? BST_WHY_NOT : BST_WHY_MOUNT);
+    }
+    assert_string_equal(bst_tasking_reason(BST_WHY_MOUNT), "out of the mount's reach");
+    assert_string_equal(bst_tasking_reason(BST_WHY_NOT), "visible");
+    assert_string_equal(bst_tasking_reason(-1), "unknown");
+    assert_string_equal(bst_tasking_reason(BST_WHY_COUNT), "unknown");
+    tear_down(&f);
+}
+
 static void the_first_line_that_fits_counts(void **state) {
     (void)state;
     fixture f;
@@ -314,6 +444,9 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(earth_and_sun_are_where_the_geometry_has_them),
         cmocka_unit_test(faint_and_fast_ones_are_left_out),
+        cmocka_unit_test(noise_and_snr_are_the_cameras),
+        cmocka_unit_test(the_rate_is_that_of_the_line_of_sight),
+        cmocka_unit_test(the_body_turns_on_after_its_telemetry),
         cmocka_unit_test(the_first_line_that_fits_counts),
         cmocka_unit_test(one_target_goes_to_one_sensor_until_it_is_due_again),
         cmocka_unit_test(a_target_is_given_up_in_time),

@@ -237,10 +237,95 @@ static void test_consistency(void **state) {
     }
 }
 
+/* Against numpy, with everything that could be zero or alike different: block matrices of the error
+ * model F = [C, -dt; 0, 1] with C the turn of the axes and its noise, and H = [1, age]. */
+static void expect_filter(const bst_attitude_filter *f, const double turn[9],
+                          const double covariance[21]) {
+    bst_mat3 m = bst_quat_to_mat3(f->q_body_from_gcrf);
+    for (int i = 0; i < 9; i++) {
+        bst_assert_close(m.m[i / 3][i % 3], turn[i], 1e-14);
+    }
+    for (int i = 0, n = 0; i < 6; i++) {
+        for (int j = 0; j <= i; j++, n++) {
+            /* rounding, of the greater variances too */
+            double scale = sqrt(f->covariance[i][i] * f->covariance[j][j]);
+            bst_assert_close(f->covariance[i][j], covariance[n], 1e-9 * scale);
+            assert_true(f->covariance[i][j] == f->covariance[j][i]);
+        }
+    }
+}
+
+static void test_correlated(void **state) {
+    (void)state;
+    static const double factor[6][6] = {{3},
+                                        {1, 2.5},
+                                        {-0.7, 0.6, 2.2},
+                                        {0.9, -0.4, 0.5, 1.8},
+                                        {-0.3, 0.8, -0.6, 0.4, 1.5},
+                                        {0.5, -0.2, 0.7, -0.5, 0.3, 1.2}};
+    static const double carried_turn[9] = {
+        7.469191342891944e-01, -5.967381125949153e-01, -2.932838758086421e-01,
+        5.238166784093630e-01, 7.997665570112789e-01,  -2.932397341877582e-01,
+        4.095459610994387e-01, 6.539938274160705e-02,  9.099423204160549e-01};
+    static const double carried[21] = {
+        8.967605434017300e-08,  2.955634860384643e-08,  7.205331077885338e-08,
+        -2.249463360461004e-08, 7.152276448151376e-09,  5.807489109010311e-08,
+        2.691551011645519e-10,  -1.361025661531459e-11, 1.514076899317487e-11,
+        5.459999999999999e-12,  -8.931859085979665e-11, 1.690746176005763e-10,
+        -6.358415911355323e-11, -1.700000000000001e-13, 4.500000000000000e-12,
+        1.531433571719781e-10,  -5.284969137947406e-14, 1.016928629762102e-10,
+        -1.999999999999991e-14, -4.800000000000001e-13, 3.560000000000000e-12};
+    static const double updated_turn[9] = {
+        7.472510062281810e-01, -5.963404520353878e-01, -2.932473341007567e-01,
+        5.235676132500858e-01, 8.000712295056841e-01,  -2.928531749407401e-01,
+        4.092589498674160e-01, 6.530002284450211e-02,  9.100785784589857e-01};
+    static const double updated[21] = {
+        3.694108131937182e-09,  1.030471617556698e-09,  2.931217552194248e-09,
+        -4.386834584774524e-10, 7.159222416300551e-10,  1.958980534495798e-09,
+        5.668334379254982e-12,  -1.553169281488546e-12, 2.362130510632250e-12,
+        4.261036835571924e-12,  -6.903689931820565e-12, 6.821916304353994e-13,
+        -1.641909070270662e-12, 6.889960673385627e-13,  3.431202748102121e-12,
+        9.609733632433268e-12,  4.268268179025451e-13,  -9.036174171663305e-13,
+        -8.688320443381261e-13, 2.234470725230122e-13,  2.802592621336756e-12};
+    static const double changes[6] = {2.697153386780862e-04,  -1.951095332536239e-04,
+                                      4.811865320548370e-04,  2.646687272792246e-06,
+                                      -2.862350825938547e-06, 2.640232207471546e-06};
+    bst_attitude_filter f;
+    bst_attitude_filter_init(&f, bst_quat_unit((bst_quat){0.1, -0.2, 0.3, 0.9}), 1.0, 1.0, 3e-5,
+                             2e-6);
+    f.bias_radps = (bst_vec3){2e-4, -1e-4, 3e-4};
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j < 6; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < 6; k++) {
+                sum += factor[i][k] * factor[j][k];
+            }
+            f.covariance[i][j] = sum * (i < 3 ? 1e-4 : 1e-6) * (j < 3 ? 1e-4 : 1e-6);
+        }
+    }
+    bst_attitude_filter_propagate(&f, (bst_vec3){0.02, -0.03, 0.015}, 0.25);
+    expect_filter(&f, carried_turn, carried);
+    const bst_mat3 noise = {{{4e-9, 1e-9, -0.5e-9}, {1e-9, 3e-9, 0.7e-9}, {-0.5e-9, 0.7e-9, 2e-9}}};
+    bst_vec3 correction[2];
+    bst_attitude_filter_update(&f, (bst_vec3){3e-4, -2e-4, 5e-4}, 1.7,
+                               bst_quat_from_rotvec((bst_vec3){0.05, -0.04, 0.07}), &noise,
+                               correction);
+    expect_filter(&f, updated_turn, updated);
+    const double got[6] = {correction[0].x, correction[0].y, correction[0].z,
+                           correction[1].x, correction[1].y, correction[1].z};
+    for (int i = 0; i < 6; i++) {
+        bst_assert_close(got[i], changes[i], 1e-9 * fabs(changes[i]));
+    }
+    bst_assert_close(f.bias_radps.x, 2e-4 + changes[3], 1e-15);
+    bst_assert_close(f.bias_radps.y, -1e-4 + changes[4], 1e-15);
+    bst_assert_close(f.bias_radps.z, 3e-4 + changes[5], 1e-15);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_allan_deviation),   cmocka_unit_test(test_tracker_noise),
-        cmocka_unit_test(test_tracker_blind),     cmocka_unit_test(test_steady_state),
-        cmocka_unit_test(test_a_million_updates), cmocka_unit_test(test_consistency)};
+        cmocka_unit_test(test_correlated),    cmocka_unit_test(test_allan_deviation),
+        cmocka_unit_test(test_tracker_noise), cmocka_unit_test(test_tracker_blind),
+        cmocka_unit_test(test_steady_state),  cmocka_unit_test(test_a_million_updates),
+        cmocka_unit_test(test_consistency)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -71,6 +71,52 @@ static void test_magnetic(void **state) {
     assert_true(fmax(fabs(m.x), fmax(fabs(m.y), fabs(m.z))) <= 1.0);
 }
 
+/* One place off all axes, everything on: parts by numpy from the laws (gravity gradient 3 mu / r^5
+ * r x J r, lever x force, dipole x field, h x B / |B|^2), field and force apart. */
+static void test_sum_of_all(void **state) {
+    (void)state;
+    const bst_mat3 inertia = {{{120, -3, 5}, {-3, 90, 2}, {5, 2, 150}}};
+    const bst_quat q = bst_quat_unit((bst_quat){0.1, -0.2, 0.3, 0.9});
+    const bst_vec3 place = {4200e3, -3100e3, 4700e3}, sun = {0.9e11, -1.1e11, 0.4e11};
+    const bst_vec3 momentum = {0.4, -0.3, 0.6}, none = {0, 0, 0};
+    const double gradient[3] = {-4.458495018841054e-05, -3.176880470864664e-05,
+                                1.696826675407855e-05};
+    const double per_newton[3] = {-8.348434477804589e-02, -2.665652989966814e-01,
+                                  -5.653551273184501e-02};
+    const double magnetic[3] = {5.564022722561540e-06, -5.155126176455868e-05,
+                                -2.089310240322725e-05};
+    const double unloading[3] = {2.506803319974646e+03, -9.139166401527926e+03,
+                                 -6.240785414080395e+03}; /* dipole times 600 s */
+    const double field[3] = {-2.633616200412180e-05, 1.943859576494705e-05,
+                             -7.529064889054064e-06}; /* GCRF */
+    bst_vec3 b = bst_dipole_field_t(place);
+    bst_assert_close(b.x, field[0], 1e-17);
+    bst_assert_close(b.y, field[1], 1e-17);
+    bst_assert_close(b.z, field[2], 1e-17);
+    double force =
+        1361.0 / 299792458.0 * 3.0 * 1.5 * 0.6 / (0.9869674609100836 * 0.9869674609100836);
+    bst_disturbance_config c = {.gravity_gradient = true,
+                                .solar_area_m2 = 3.0,
+                                .solar_coefficient = 1.5,
+                                .solar_lever_m = {0.3, -0.2, 0.5},
+                                .residual_dipole_am2 = {2, -1, 3},
+                                .constant_torque_nm = {1e-5, -2e-5, 3e-5}};
+    bst_vec3 t = bst_disturbance_torque(&c, &inertia, q, place, sun, 0.6, none);
+    bst_assert_close(t.x, 1e-5 + gradient[0] + force * per_newton[0] + magnetic[0], 1e-15);
+    bst_assert_close(t.y, -2e-5 + gradient[1] + force * per_newton[1] + magnetic[1], 1e-15);
+    bst_assert_close(t.z, 3e-5 + gradient[2] + force * per_newton[2] + magnetic[2], 1e-15);
+    /* torquers alone, each clipped by itself */
+    bst_vec3 body = bst_quat_rotate(q, b), m = bst_unload_dipole(momentum, body, 12.0);
+    bst_assert_close(m.x, unloading[0] / 600.0, 1e-12);
+    bst_assert_close(m.y, -12.0, 0.0);
+    bst_assert_close(m.z, unloading[2] / 600.0, 1e-12);
+    c = (bst_disturbance_config){.unload_dipole_am2 = 12.0};
+    t = bst_disturbance_torque(&c, &inertia, q, place, sun, 0.6, momentum);
+    bst_assert_close(t.x, m.y * body.z - m.z * body.y, 1e-18);
+    bst_assert_close(t.y, m.z * body.x - m.x * body.z, 1e-18);
+    bst_assert_close(t.z, m.x * body.y - m.y * body.x, 1e-18);
+}
+
 /* Axis and second axis go where each law says; the roll turns about the axis alone. */
 static void test_laws(void **state) {
     (void)state;
@@ -159,7 +205,9 @@ static void test_reference(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_gravity_gradient),
                                        cmocka_unit_test(test_sunlight),
-                                       cmocka_unit_test(test_magnetic), cmocka_unit_test(test_laws),
+                                       cmocka_unit_test(test_magnetic),
+                                       cmocka_unit_test(test_sum_of_all),
+                                       cmocka_unit_test(test_laws),
                                        cmocka_unit_test(test_reference)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

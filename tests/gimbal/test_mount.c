@@ -248,6 +248,111 @@ static void a_wanted_turn_of_the_outer_axis_is_taken(void **state) {
     assert_true(m.settled);
 }
 
+/* Angles asked for are of the command's tick: they move on at their rates until the torque acts. */
+static void wanted_turns_move_on(void **state) {
+    (void)state;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        bst_mount_config config = default_config();
+        config.travel_min_deg[0] = -1000.0;
+        config.travel_max_deg[0] = 1000.0;
+        bst_mount m;
+        make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
+        bst_mount_body body = {.q_believed_from_gcrf = some_attitude};
+        bst_vec3 d = {0.1, -sin(120.0 * BST_DEG_RAD), cos(120.0 * BST_DEG_RAD)};
+        bst_los_command k = command_from(some_attitude, d, (bst_vec3){0, 0, 0});
+        /* 350 degrees on to either side after 10 s: next to 480 or to -240 degrees */
+        k.near_given = true;
+        k.near_rad[0] = 120.0 * BST_DEG_RAD;
+        k.near_radps[0] = sign * 35.0 * BST_DEG_RAD;
+        bst_mount_step(&m, &body, &k, 10.0, true);
+        for (int n = 0; n < 60000; n++) {
+            bst_mount_step(&m, &body, &k, 10.0, true);
+        }
+        bst_assert_close(m.servo[0].unwrapped_rad, (120.0 + sign * 360.0) * BST_DEG_RAD, 1e-4);
+        assert_true(m.settled);
+    }
+}
+
+/* What the status says of limits, stops and the third axis. */
+static void the_status_tells_limits_and_stops(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    config.third_axis = true;
+    const double limits[3] = {9.0, 7.0, 3.0}, accels[3] = {20.0, 15.0, 11.0};
+    for (int k = 0; k < 3; k++) {
+        config.rate_limit_degps[k] = limits[k];
+        config.accel_limit_degps2[k] = accels[k];
+    }
+    config.travel_min_deg[0] = config.travel_max_deg[0] = 0.0; /* without end */
+    config.travel_min_deg[1] = -80.0;
+    config.travel_max_deg[1] = 60.0;
+    for (int stop = -1; stop <= 1; stop++) {
+        config.start_deg[0] = 200.0;
+        config.start_deg[1] = stop < 0 ? -80.0 : stop > 0 ? 60.0 : 10.0;
+        bst_mount m;
+        make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
+        bst_mount_body body = {.q_believed_from_gcrf = some_attitude};
+        for (int n = 0; n < 20; n++) {
+            bst_mount_step(&m, &body, NULL, 0.0, true);
+        }
+        bst_mount_status s;
+        bst_mount_status_of(&m, 77, &s);
+        assert_int_equal(s.tick, 77);
+        assert_int_equal(s.axes, 3);
+        assert_false(s.axis[0].redundant || s.axis[1].redundant);
+        assert_true(s.axis[2].redundant);
+        for (int k = 0; k < 3; k++) {
+            bst_assert_close(s.axis[k].rate_limit_radps, limits[k] * BST_DEG_RAD, 1e-12);
+            bst_assert_close(s.axis[k].accel_limit_radps2, accels[k] * BST_DEG_RAD, 1e-12);
+            assert_int_equal((s.axis[k].flags & BST_AXIS_AT_STOP) != 0, k == 1 && stop != 0);
+        }
+        bst_assert_close(s.axis[0].angle_rad, -160.0 * BST_DEG_RAD, 1e-5); /* in (-pi, pi] */
+        assert_true(s.axis[0].min_rad == 0.0 && s.axis[0].max_rad == 0.0);
+        bst_assert_close(s.axis[1].angle_rad, config.start_deg[1] * BST_DEG_RAD, 1e-5);
+        bst_assert_close(s.axis[1].min_rad, -80.0 * BST_DEG_RAD, 1e-12);
+        bst_assert_close(s.axis[1].max_rad, 60.0 * BST_DEG_RAD, 1e-12);
+        assert_true(s.axis[0].axis_body.x == 1.0 && s.axis[2].axis_body.x == 1.0);
+    }
+}
+
+/* The other way to point, over the pole, is the shorter one where the outer axis would have to make
+ * nearly half a turn, or a slow inner axis a long way. */
+static void over_the_pole_is_the_shorter_way(void **state) {
+    (void)state;
+    const struct {
+        double start, azimuth, elevation, outer, inner;
+    } cases[] = {{70, 175, 75, -5, 105},    {70, -175, 75, 5, 105},  {-70, 175, -75, -5, -105},
+                 {-70, -175, -75, 5, -105}, {170, 0, -50, 180, 230}, /* 60 degrees for the inner one
+                                                                        instead of 150 */
+                 {-170, 0, 50, 180, -230}};
+    for (int k = 0; k < 6; k++) {
+        bst_mount_config config = default_config();
+        config.rate_limit_degps[1] = 5.0;
+        config.travel_min_deg[1] = -240.0;
+        config.travel_max_deg[1] = 240.0;
+        config.start_deg[1] = cases[k].start;
+        bst_mount m;
+        make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
+        bst_mount_body body = {.q_believed_from_gcrf = some_attitude};
+        double azimuth = cases[k].azimuth * BST_DEG_RAD,
+               elevation = cases[k].elevation * BST_DEG_RAD;
+        bst_vec3 d = {sin(elevation), -cos(elevation) * sin(azimuth),
+                      cos(elevation) * cos(azimuth)};
+        bst_los_command c = command_from(some_attitude, d, (bst_vec3){0, 0, 0});
+        bool limited = false;
+        for (int n = 0; n < 24000; n++) {
+            bst_mount_step(&m, &body, &c, 0.0, true);
+            limited = limited || m.limited;
+        }
+        bst_assert_close(fabs(m.servo[0].unwrapped_rad), fabs(cases[k].outer) * BST_DEG_RAD, 1e-4);
+        assert_true(cases[k].outer == 180 || m.servo[0].unwrapped_rad * cases[k].outer > 0.0);
+        bst_assert_close(m.servo[1].unwrapped_rad, cases[k].inner * BST_DEG_RAD, 1e-4);
+        assert_true(m.settled && bst_vec3_angle(boresight(m.q_cam_from_body), d) < 1e-5);
+        /* on its way at the rate limits, and not at the end */
+        assert_true(limited && !m.limited);
+    }
+}
+
 static void a_stuck_axis_is_told_and_the_rest_goes_on(void **state) {
     (void)state;
     bst_mount_config config = default_config();
@@ -469,6 +574,9 @@ int main(void) {
         cmocka_unit_test(half_a_turn_is_made_within_the_limits),
         cmocka_unit_test(a_wound_cable_is_unwound),
         cmocka_unit_test(a_wanted_turn_of_the_outer_axis_is_taken),
+        cmocka_unit_test(wanted_turns_move_on),
+        cmocka_unit_test(the_status_tells_limits_and_stops),
+        cmocka_unit_test(over_the_pole_is_the_shorter_way),
         cmocka_unit_test(a_stuck_axis_is_told_and_the_rest_goes_on),
         cmocka_unit_test(it_runs_into_its_stop_at_full_speed_and_stays_whole),
         cmocka_unit_test(a_turning_body_is_undone),

@@ -274,11 +274,68 @@ static void the_tolerance_follows_the_errors_up_to_its_limit(void **state) {
     }
 }
 
+/* Six stars with errors of their own on each axis, and three detections that are none: shift and
+ * roll are those of numpy's weighted least squares (weights 1 / (variance + 0.0025 px^2), the roll
+ * expected to 3 mrad), and the probabilities follow from the distances by Bayes' rule. */
+static void the_fit_weighs_by_the_errors(void **state) {
+    scene *s = *state;
+    static const double at[6][2] = {{100, 80},  {900, 150}, {420, 510},
+                                    {700, 860}, {60, 940},  {980, 620}};
+    static const double seen[6][4] = {
+        /* x, y, variances */
+        {107.838, 74.3, 0.01, 0.05},     {907.324, 145.65, 0.04, 0.01},
+        {427.062, 505.184, 0.09, 0.03},  {706.322, 855.15, 0.02, 0.12},
+        {66.636, 934.582, 0.16, 0.0025}, {987.1, 615.276, 0.0225, 0.06}};
+    static const double probability[6] = {0.9950445944286893, 0.9963080159108955,
+                                          0.995968991639745,  0.9929532586139461,
+                                          0.9955579255085463, 0.9883335828879546};
+    s->star_count = 6;
+    s->count = 0;
+    for (int i = 0; i < 6; i++) {
+        double v = 9.0 + 0.2 * i;
+        s->stars[i] = (bst_expected_star){at[i][0], at[i][1], v, (uint32_t)(1000 + i)};
+        detect(s, seen[i][0], seen[i][1], v, i);
+        s->items[i].cov_xx = seen[i][2];
+        s->items[i].cov_yy = seen[i][3];
+    }
+    for (int i = 0; i < 3; i++) {
+        detect(s, 300.0 + 100.0 * i, 300.0, 16.0, -1);
+    }
+    /* a small field, so that the three are dense: 3 / 600 px^2 */
+    s->options = (bst_starid_options){60.0, 3.0, 500.0, 520.0, 30.0, 20.0};
+    match(s);
+    assert_int_equal(s->result.matched, 6);
+    /* rounding, of the normal equations too */
+    bst_assert_close(s->result.shift_x_px, 7.083168758563298, 1e-9);
+    bst_assert_close(s->result.shift_y_px, -4.880044344382002, 1e-9);
+    bst_assert_close(s->result.roll_rad, 0.0013404261493059622, 1e-12);
+    bst_assert_close(s->result.rms_px, 0.22908527127097342, 1e-9);
+    for (int i = 0; i < 6; i++) {
+        assert_int_equal(s->items[i].star_id, 1000 + i);
+        assert_int_equal(bst_starid_star_of(s->id, i), i);
+        bst_assert_close(s->items[i].label_probability, probability[i], 1e-9);
+    }
+    for (int i = 6; i < 9; i++) {
+        assert_int_equal(s->items[i].star_id, 0);
+        assert_int_equal(bst_starid_star_of(s->id, i), -1);
+    }
+    /* exact places: the residuals count as 0.01 px at the least */
+    for (int i = 0; i < 6; i++) {
+        s->items[i].x_px = at[i][0] + 7.0;
+        s->items[i].y_px = at[i][1] - 5.0;
+        s->items[i].cov_xx = s->items[i].cov_yy = 0.0;
+    }
+    match(s);
+    double near = 1.0 / (2.0 * BST_PI * 1e-4), others = 3.0 / 600.0;
+    bst_assert_close(s->items[0].label_probability, near / (near + others), 1e-12);
+}
+
 int main(void) {
 #define STARID_TEST(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
     const struct CMUnitTest tests[] = {
         STARID_TEST(shifted_field_with_false_detections),
         STARID_TEST(few_stars),
+        STARID_TEST(the_fit_weighs_by_the_errors),
         STARID_TEST(the_tolerance_follows_the_errors_up_to_its_limit),
         STARID_TEST(single_star_when_locked),
         STARID_TEST(chance_is_not_a_match),

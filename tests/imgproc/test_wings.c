@@ -165,12 +165,44 @@ static void faint_stars_have_no_wings(void **state) {
     }
 }
 
+static void places_are_near_by_both_axes(void **state) {
+    fixture *f = *state;
+    bst_wings_begin(f->wings, 0.0, 0.0);
+    bst_wings_add(f->wings, 300.0, 700.0, STAR_E);
+    bst_wings_add(f->wings, 40.0, 90.0, STAR_E);
+    assert_true(bst_wings_holds(f->wings, 303.0, 704.0, 5.0)); /* exactly 5 px */
+    assert_false(bst_wings_holds(f->wings, 303.0, 704.0, 4.9));
+    assert_true(bst_wings_holds(f->wings, 300.0, 696.0, 4.5));
+    assert_false(bst_wings_holds(f->wings, 300.0, 690.0, 4.5));
+    assert_false(bst_wings_holds(f->wings, 300.0, 300.0, 4.5));
+    assert_true(bst_wings_holds(f->wings, 41.0, 91.0, 1.5));
+}
+
+/* Light that is a tenth of a detection's does not matter, four times that of binned pixels does. */
+static void binned_pixels_hold_more_light(void **state) {
+    fixture *f = *state;
+    double level_e = 3.0, noise_e = NOISE_E * sqrt(f->area_px2);
+    double share = light(f, 0, 40) / STAR_E;
+    for (int binning = 1; binning <= 2; binning++) {
+        bst_wings_begin(f->wings, 0.0, 0.0);
+        bst_wings_add(f->wings, STAR_PX, STAR_PX, noise_e / f->area_px2 / share);
+        f->found->count = 0;
+        add(f, 0.0, 40.0, 10.0 * noise_e);
+        bst_wings_label(f->wings, even_ground, &level_e, binning, f->found);
+        assert_int_equal(f->found->items[0].label,
+                         binning == 1 ? BST_LABEL_UNKNOWN : BST_LABEL_ARTEFACT);
+    }
+    bst_assert_close(f->found->items[0].label_probability, 0.9, 1e-12);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spikes_are_artefacts_and_targets_beside_them_are_not),
         cmocka_unit_test(what_the_background_holds_is_no_wing),
         cmocka_unit_test(spikes_move_with_their_star),
         cmocka_unit_test(faint_stars_have_no_wings),
+        cmocka_unit_test(places_are_near_by_both_axes),
+        cmocka_unit_test(binned_pixels_hold_more_light),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -359,6 +359,126 @@ static void long_streaks_are_seen_in_parts(void **state) {
     close_scene(&s);
 }
 
+/* Every part of a pixel's variance by itself, binned two by two: what is added before the read-out
+ * grows with the pixels, what the read-out adds does not. */
+static void a_pixels_noise_is_the_sum_of_its_parts(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.truth->background_e = 36.0;
+    s.truth->dark_e = 5.0;
+    bst_detector_config *d = &s.camera.detector;
+    d->row_noise_e = 2.0;
+    d->row_offset_rms_e = 3.0;
+    d->read_tail_fraction = 0.1;
+    d->read_tail_rms_e = 20.0;
+    d->prnu_rms = 0.03;
+    d->dsnu_rms = 0.4;
+    s.calibration.noise_factor = 1.25;
+    for (int binning = 1; binning <= 2; binning++) {
+        s.frame.binning = binning;
+        start(&s);
+        bst_generator_result r = run(&s, 1);
+        double pixels = binning * binning, level = pixels * (36.0 + 5.0);
+        double variance = level + 64.0 + 1.6 * 1.6 / 12.0 + 4.0 + 9.0 + 0.1 * 400.0 +
+                          level * level * 9e-4 / pixels + pixels * 5.0 * 5.0 * 0.16;
+        bst_assert_close(r.background_e, level, 1e-9);
+        bst_assert_close(r.noise_e, 1.25 * sqrt(variance), 1e-9); /* rounding */
+    }
+    close_scene(&s);
+}
+
+/* Light and its square of one source per pixel of the frame, as far as they lie below three noises
+ * of a pixel: sums over a fine grid of its image. */
+static void light_below_the_clip_is_background(void **state) {
+    (void)state;
+    const double paths[3][2] = {{0.0, 0.0}, {36.0, 27.0}, {-27.0, 36.0}};
+    const double fluxes[4] = {30.0, 900.0, 6e3, 8e4};
+    for (int p = 0; p < 3; p++) {
+        for (int k = 0; k < 4; k++) {
+            scene s;
+            open_scene(&s);
+            double length = hypot(paths[p][0], paths[p][1]), flux = fluxes[k];
+            bst_truth_item *item = add_source(&s, 1, 500.0, 480.0, flux);
+            item->x_start_px -= 0.5 * paths[p][0];
+            item->x_end_px += 0.5 * paths[p][0];
+            item->y_start_px -= 0.5 * paths[p][1];
+            item->y_end_px += 0.5 * paths[p][1];
+            s.frame.streak_dx_px = paths[p][0];
+            s.frame.streak_dy_px = paths[p][1];
+            start(&s);
+            bst_generator_result r = run(&s, 1);
+            double sigma = sqrt(s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0);
+            double clip = 3.0 * sqrt(36.0 + 64.0 + 1.6 * 1.6 / 12.0), light = 0.0, square = 0.0;
+            const double h = 1e-3;
+            if (length == 0.0) {
+                for (double u = 0.5 * h; u < 8.0; u += h) {
+                    double e =
+                        flux / (2.0 * BST_PI * sigma * sigma) * exp(-0.5 * u * u / (sigma * sigma));
+                    double ring = 2.0 * BST_PI * u * h;
+                    light += e < clip ? ring * e : 0.0;
+                    square += e < clip ? ring * e * e : 0.0;
+                }
+            } else {
+                for (double u = 0.5 * h; u < 8.0; u += h) {
+                    double e = flux / (length * sigma * sqrt(2.0 * BST_PI)) *
+                               exp(-0.5 * u * u / (sigma * sigma));
+                    light += e < clip ? 2.0 * h * length * e : 0.0;
+                    square += e < clip ? 2.0 * h * length * e * e : 0.0;
+                }
+            }
+            /* the line's ends: (sigma / length)^2 and what they hold; and the steps of 0.001 px */
+            double share = length > 0.0 ? 0.03 : 0.02, pixels = (double)SIDE * SIDE;
+            bst_assert_close(r.faint_light_e * pixels, light, share * light);
+            bst_assert_close(r.faint_square_e2 * pixels, square, share * square);
+            close_scene(&s);
+        }
+    }
+}
+
+/* While the stars are long streaks a source at rest stands at the top of the filter's output: noise
+ * of unit variance has a gradient of 1 / (sqrt(2) sigma), the top a curvature of SNR / (2 sigma^2).
+ */
+static void tops_at_rest_scatter_evenly(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.frame.streak_dx_px = 160.0;
+    s.frame.streak_dy_px = 120.0;
+    start(&s);
+    fill(&s, 40.0);
+    bst_generator_result r = run(&s, 1);
+    assert_true(r.smeared && r.count >= 890);
+    double sum[2] = {0.0}, square[3] = {0.0}, snr = 0.0, n = r.count;
+    for (int i = 0; i < r.count; i++) {
+        const bst_detection *d = &r.items[i].detection;
+        const bst_truth_item *item = &s.truth->items[r.items[i].item];
+        double x = d->x_px - item->x_mid_px, y = d->y_px - item->y_mid_px;
+        sum[0] += x / n;
+        sum[1] += y / n;
+        square[0] += x * x / n;
+        square[1] += x * y / n;
+        square[2] += y * y / n;
+        snr += d->snr / n;
+        /* what it says of itself: a pixel, no better; flux by its SNR */
+        assert_true(d->cov_xx == 1.0 && d->cov_yy == 1.0);
+        double sigma = d->flux_e / d->snr;
+        bst_assert_close(d->flux_sigma_e, sqrt(sigma * sigma + d->flux_e), 1e-9 * d->flux_e);
+    }
+    /* seen on the brightest pixel, which is off the top by up to half a pixel */
+    assert_true(snr > 34.0 && snr < 41.0);
+    double width = sqrt(s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0);
+    double sigma = sqrt(2.0) * width / 40.0;
+    /* four standard errors of a variance, a mean and a covariance; widths of a Gaussian's: 3 % */
+    double error = 4.0 * sqrt(2.0 / n) + 0.06;
+    bst_assert_close(square[0] / (sigma * sigma), 1.0, error);
+    bst_assert_close(square[2] / (sigma * sigma), 1.0, error);
+    bst_assert_close(square[1] / (sigma * sigma), 0.0, 4.0 / sqrt(n));
+    bst_assert_close(sum[0] / sigma, 0.0, 4.0 / sqrt(n));
+    bst_assert_close(sum[1] / sigma, 0.0, 4.0 / sqrt(n));
+    close_scene(&s);
+}
+
 static void room_is_for_the_brightest(void **state) {
     (void)state;
     scene s;
@@ -417,6 +537,9 @@ int main(void) {
         cmocka_unit_test(close_sources_are_one),
         cmocka_unit_test(the_edge_cuts),
         cmocka_unit_test(long_streaks_are_seen_in_parts),
+        cmocka_unit_test(a_pixels_noise_is_the_sum_of_its_parts),
+        cmocka_unit_test(light_below_the_clip_is_background),
+        cmocka_unit_test(tops_at_rest_scatter_evenly),
         cmocka_unit_test(room_is_for_the_brightest),
         cmocka_unit_test(hits_come_at_the_detectors_rate),
     };

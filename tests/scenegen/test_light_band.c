@@ -1,0 +1,130 @@
+/* What a Gaussian PSF asks of stamps and of the Fourier path: closed forms by the error function,
+ * and sums over a fine grid of frequencies by numpy. No device. */
+#include "scenegen/light_grid.h"
+#include "scenegen/stamp.h"
+#include "tests/test_support.h"
+
+static const double SIGMA = 1.019186160345623; /* of a FWHM of 2.4 px */
+
+static double share(double from, double to, double sigma) {
+    double scale = 1.0 / (sigma * sqrt(2.0));
+    return 0.5 * (erf(to * scale) - erf(from * scale));
+}
+
+/* Light of a line within x of its middle, integrated over x. */
+static double primitive(double x, double sigma) {
+    double u = x / (sigma * sqrt(2.0));
+    return x * erf(u) + sigma * sqrt(2.0 / BST_PI) * exp(-u * u);
+}
+
+static void stamps_of_a_gaussian(void **state) {
+    (void)state;
+    const double sigmas[] = {0.6, SIGMA, 2.5};
+    for (int k = 0; k < 3; k++) {
+        double sigma = sigmas[k];
+        bst_stamp stamp;
+        bst_stamp_init(&stamp, sigma, false);
+        for (int r = 0; r < 9; r++) {
+            double tail = share(r - 0.5, r + 0.5, sigma) / share(-0.5, 0.5, sigma);
+            bst_assert_close(stamp.tail[r], tail, 1e-12 + 1e-9 * tail); /* rounding */
+            /* mean over the places of a source between two pixels; 16 places for the integral:
+             * second derivative of at most 0.5 / sigma^2 over 24 * 16^2 */
+            double kept = primitive(r + 1.5, sigma) - primitive(r + 0.5, sigma);
+            bst_assert_close(stamp.kept[r], kept, 1e-4 / (sigma * sigma));
+            bst_assert_close(bst_stamp_excess(&stamp, r), 1.0 / (kept * kept) - 1.0,
+                             4e-4 / (sigma * sigma) / pow(kept, 3));
+        }
+    }
+    bst_stamp whole;
+    bst_stamp_init(&whole, SIGMA, true);
+    assert_true(whole.tail[3] == 0.0 && whole.kept[0] == 1.0);
+    assert_true(bst_stamp_excess(&whole, 2) == 0.0);
+    assert_int_equal(bst_stamp_radius(&whole, 1e9, 1e-9, 20), 1);
+}
+
+/* The least radius at which neither a pixel beyond nor what the stamp takes from there is over the
+ * limit. */
+static void radii_keep_the_limit(void **state) {
+    (void)state;
+    const struct {
+        double sigma, peak_e, limit_e;
+        int most;
+    } cases[] = {{SIGMA, 1e4, 0.1, 40}, {SIGMA, 1e4, 10.0, 40}, {2.5, 1e5, 1.0, 40},
+                 {0.6, 1e3, 5.0, 40},   {2.5, 1e5, 1.0, 6},     {SIGMA, 0.1, 1.0, 40}};
+    for (int k = 0; k < 6; k++) {
+        double sigma = cases[k].sigma, limit = cases[k].limit_e / cases[k].peak_e;
+        bst_stamp stamp;
+        bst_stamp_init(&stamp, sigma, false);
+        int r = 1;
+        for (; r < cases[k].most; r++) {
+            double kept = primitive(r + 1.5, sigma) - primitive(r + 0.5, sigma);
+            double tail = share(r + 0.5, r + 1.5, sigma) / share(-0.5, 0.5, sigma);
+            if (tail <= limit && 1.0 / (kept * kept) - 1.0 <= limit) {
+                break;
+            }
+        }
+        assert_int_equal(bst_stamp_radius(&stamp, cases[k].peak_e, cases[k].limit_e, cases[k].most),
+                         r);
+    }
+}
+
+/* OTF exp(-2 pi^2 sigma^2 f^2) sinc(fx) sinc(fy). numpy, sums over 2401^2 frequencies up to 1.2
+ * cycles/px; ours over 64^2 to 128^2 of the band kept. */
+static void the_band_of_a_gaussian(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_camera camera = {.width_px = 512,
+                               .height_px = 512,
+                               .pixel_scale_arcsec = 3.0,
+                               .aperture_m = 0.15,
+                               .psf_fwhm_px = 2.4};
+    bst_psf *psf;
+    bst_light_band band;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    bst_assert_ok(&ctx, bst_light_band_measure(&ctx, psf, 1e-6, &band));
+    double centre = share(-0.5, 0.5, SIGMA);
+    bst_assert_close(band.peak, centre * centre, 1e-6); /* single precision, and what is cut */
+    bst_assert_close(band.share_sigma_px, SIGMA, 1e-5);
+    bst_assert_close(band.node_sigma_px, 1.06123829452949, 1e-4);
+    static const double parts[3][3] = {
+        {0.6648644499404959, 0.5112616985803485, 0.38802151843618016},
+        {0.496531871404393, 0.31135879607256944, 0.25411278894297085},
+        {0.4853482072085185, 0.3473560475229782, 0.30325780474810476}};
+    static const int binnings[3] = {2, 3, 8};
+    for (int k = 0; k < 3; k++) {
+        bst_assert_close(band.pixel_part[0][k], 0.85, 1e-12); /* the bound's own factor */
+        for (int b = 0; b < 3; b++) {
+            /* kinks of the moduli, on steps of 0.03 cycles/px */
+            bst_assert_close(band.pixel_part[binnings[b] - 1][k], parts[b][k], 0.02 * parts[b][k]);
+        }
+    }
+    /* what is cut is under the tolerance of the moduli's sum, 1 / (2 pi sigma^2) at most, and the
+     * next ring would not be: beyond f lies exp(-2 pi^2 sigma^2 f^2) of a Gaussian, sincs left out
+     */
+    assert_true(band.lost > 0.0 && band.lost <= 1e-6 / (2.0 * BST_PI * SIGMA * SIGMA) / band.peak);
+    double alone = sqrt(log(1e6) / 2.0) / (BST_PI * SIGMA);
+    assert_true(band.cutoff < alone && band.cutoff > 0.85 * alone);
+    /* a pixel gets 3e-7 at 5.2 px; 16 px are the least, 160 the most */
+    assert_true(band.reach_px >= 16 && band.reach_px <= 160);
+    assert_true(band.beyond >= 0.0 && band.beyond < 1e-6); /* the ring at the reach is part of it */
+    /* strengths along both axes are those of the same Gaussian and sum to that of all moduli */
+    double sum[2] = {0.0, 0.0};
+    for (int i = 0; i < BST_SPREAD_BINS; i++) {
+        sum[0] += band.axis[0].weight[i];
+        sum[1] += band.axis[1].weight[i];
+        bst_assert_close(band.axis[0].weight[i], band.axis[1].weight[i], 1e-9);
+    }
+    bst_assert_close(sum[0], 1.0, 0.02); /* the OTF is nearly positive: moduli sum to the peak */
+    bst_assert_close(sum[1], sum[0], 1e-9);
+    bst_assert_close(band.axis[1].step, band.cutoff / BST_SPREAD_BINS, 1e-12);
+    bst_psf_free(psf);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(stamps_of_a_gaussian),
+        cmocka_unit_test(radii_keep_the_limit),
+        cmocka_unit_test(the_band_of_a_gaussian),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,202 @@
+/* Events told from innovations, and tracks that are places of the sensor: statistics by closed
+ * forms, with correlated innovations and places that differ in x and y. */
+#include "tests/tracker/sky_bench.h"
+#include "tracker/multitarget_internal.h"
+
+/* The sum of n innovations of one covariance S has n S: (sum nu)^T S^-1 (sum nu) / n. */
+static double statistic_of(const double (*nu)[2], int n, const double s[3]) {
+    double a = 0.0, b = 0.0, det = s[0] * s[2] - s[1] * s[1];
+    for (int i = 0; i < n; i++) {
+        a += nu[i][0];
+        b += nu[i][1];
+    }
+    return (s[2] * a * a - 2.0 * s[1] * a * b + s[0] * b * b) / det / n;
+}
+
+/* Windows of 1, 2, 4 and 8 hits share the rate of false events: each has a quarter of it. */
+static void a_manoeuvre_is_told_at_its_rate(void **state) {
+    (void)state;
+    const double s[3] = {4.0, 1.5, 9.0};
+    const double nu[8][2] = {{0.5, -1.0}, {-1.5, 2.0}, {1.0, 1.0},  {2.0, -0.5},
+                             {1.5, 2.5},  {2.5, 1.0},  {3.0, -1.0}, {2.0, 3.0}};
+    for (int hits = 1; hits <= 8; hits++) {
+        /* the latest window of hits that stands out most, all windows */
+        double most = 0.0;
+        for (int n = 1; n <= hits; n *= 2) {
+            most = fmax(most, statistic_of(&nu[hits - n], n, s));
+        }
+        /* half a probability at the most is allowed */
+        for (int told = 0; told < 2 && exp(-0.5 * most) < 0.45; told++) {
+            bst_mtt_params params = defaults();
+            const double dt = 2.5;
+            params.event_window = 8;
+            /* a false one with the probability of its statistic, four tests a hit */
+            double rate = exp(-0.5 * most) * 4.0 * 3600.0 / dt;
+            bst_mtt_track track = {.id = 1};
+            bool event = false;
+            double statistic = 0.0;
+            for (int i = 0; i < hits; i++) {
+                params.false_events_per_hour = i + 1 < hits ? 1e-30 : (told ? 1.001 : 0.999) * rate;
+                bst_sky_innovation innovation = {.nu = {nu[i][0], nu[i][1]},
+                                                 .s = {s[0], s[1], s[2]}};
+                assert_false(event);
+                event = bst_mtt_note_innovation(&params, &track, &innovation, dt, &statistic);
+            }
+            assert_int_equal(event, told);
+            assert_int_equal(track.innovation_count, told ? 0 : hits);
+            if (told) {
+                bst_assert_close(statistic, most, 1e-9 * most); /* rounding */
+            }
+        }
+    }
+    bst_mtt_params params = defaults();
+    bst_mtt_track track = {.id = 1};
+    bst_sky_innovation far = {.nu = {100.0, 100.0}, .s = {1.0, 0.0, 1.0}};
+    double statistic;
+    params.false_events_per_hour = 0.0; /* none are told */
+    assert_false(bst_mtt_note_innovation(&params, &track, &far, 1.0, &statistic));
+    assert_false(bst_mtt_note_brightness(&params, &track, 100.0, 1.0, &statistic));
+    params.false_events_per_hour = 1e9;
+    params.event_window = 0;
+    assert_false(bst_mtt_note_innovation(&params, &track, &far, 1.0, &statistic));
+    assert_false(bst_mtt_note_brightness(&params, &track, 100.0, 1.0, &statistic));
+    /* however many are allowed, what is likelier than not is no event: exp(-x / 2) = 0.55, 0.45 */
+    params.event_window = 1;
+    for (int rare = 0; rare < 2; rare++) {
+        bst_sky_innovation one = {.nu = {sqrt(-2.0 * log(rare ? 0.45 : 0.55)), 0.0},
+                                  .s = {1.0, 0.0, 1.0}};
+        assert_int_equal(bst_mtt_note_innovation(&params, &track, &one, 1.0, &statistic), rare);
+    }
+}
+
+/* The same with one dimension: the tail of a normal distribution on both sides. */
+static void a_change_of_brightness_is_told_at_its_rate(void **state) {
+    (void)state;
+    const double z[5] = {0.3, -0.8, 1.1, 1.4, 1.2};
+    for (int hits = 1; hits <= 5; hits++) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double most = 0.0;
+            for (int n = 1; n <= hits && n <= 4; n *= 2) {
+                double sum = 0.0;
+                for (int i = hits - n; i < hits; i++) {
+                    sum += z[i];
+                }
+                most = fmax(most, sum * sum / n);
+            }
+            for (int told = 0; told < 2; told++) {
+                bst_mtt_params params = defaults();
+                params.event_window = 4; /* windows of 1, 2, 4 */
+                const double dt = 0.5;
+                /* half a probability at the most is allowed */
+                double allowed = erfc(sqrt(0.5 * most));
+                if (allowed > 0.45) {
+                    continue;
+                }
+                double rate = allowed * 3.0 * 3600.0 / dt, statistic = 0.0;
+                bst_mtt_track track = {.id = 1};
+                bool event = false;
+                for (int i = 0; i < hits; i++) {
+                    params.false_events_per_hour =
+                        i + 1 < hits ? 1e-30 : (told ? 1.001 : 0.999) * rate;
+                    event = bst_mtt_note_brightness(&params, &track, sign * z[i], dt, &statistic);
+                }
+                assert_int_equal(event, told);
+                assert_int_equal(track.brightness_count, told ? 0 : hits);
+                if (told) {
+                    bst_assert_close(statistic, most, 1e-12);
+                }
+            }
+        }
+    }
+}
+
+#define PIXEL (3.0 * AS)
+
+static bst_mtt_detection at(double x, double y, double width, double sigma_px) {
+    return (bst_mtt_detection){
+        .sky = {.cov_11 = 0.5 * pow(sigma_px * PIXEL, 2), .cov_22 = 1.5 * pow(sigma_px * PIXEL, 2)},
+        .x_px = x,
+        .y_px = y,
+        .width_px = width};
+}
+
+static double normal(double dx, double dy, double variance) {
+    return exp(-0.5 * (dx * dx + dy * dy) / variance) / (2.0 * BST_PI * variance);
+}
+
+/* Of a defect's detections 85 % scatter about its place, 5 % about the one before, 10 % lie within
+ * 1.5 FWHM; beside them the false alarms. A motion counts as no more than the peak of the first. */
+static void a_place_of_the_sensor_is_weighed(void **state) {
+    (void)state;
+    bst_mtt_params params = defaults();
+    params.pixel_rad = PIXEL;
+    bench *b = start(1, &params);
+    b->mtt->clutter_density = 0.01 / (PIXEL * PIXEL); /* per px^2 */
+    bst_mtt_track track = {.id = 1};
+    bst_mtt_detection d = at(100.0, 200.0, 2.0, 0.1);
+    bst_mtt_start_fixed(b->mtt, &d, &track);
+    const double r2 = 0.1 * 0.1 + 0.5 * 0.5; /* stated, and a quarter of 2 px */
+    bst_assert_close(track.fixed.now.x_px, 100.0, 0.0);
+    bst_assert_close(track.fixed.now.y_px, 200.0, 0.0);
+    bst_assert_close(track.fixed.now.variance_px2, r2, 1e-12);
+    /* near it, a motion that expects it less: density 0.02 per px^2 */
+    d = at(100.4, 199.3, 2.0, 0.1);
+    bst_mtt_note_fixed(b->mtt, &d, log(0.02 / (PIXEL * PIXEL)), &track);
+    double density = 0.01 + 0.9 * normal(0.4, 0.7, 2.0 * r2) + 0.1 / (BST_PI * 9.0);
+    double odds = log(0.02) - log(density);
+    bst_assert_close(track.fixed.log_odds, odds, 1e-9); /* rounding */
+    /* half way, twice as well known */
+    bst_assert_close(track.fixed.now.x_px, 100.2, 1e-9);
+    bst_assert_close(track.fixed.now.y_px, 199.65, 1e-9);
+    bst_assert_close(track.fixed.now.variance_px2, 0.5 * r2, 1e-12);
+    bst_assert_close(track.fixed.before.x_px, 100.0, 0.0);
+    /* far away, in an image of 3 px, where the motion foresees it better than a defect scatters */
+    double r3 = 0.04 + 0.75 * 0.75;
+    d = at(103.0, 204.5, 3.0, 0.2);
+    bst_mtt_note_fixed(b->mtt, &d, log(100.0 / (PIXEL * PIXEL)), &track);
+    density = 0.01 + 0.85 * normal(2.8, 4.85, 0.5 * r2 + r3) + 0.05 * normal(3.0, 4.5, r2 + r3);
+    odds += log(0.85 / (2.0 * BST_PI * r3)) - log(density);
+    bst_assert_close(track.fixed.log_odds, odds, 1e-9);
+    bst_assert_close(track.fixed.now.x_px, 103.0, 0.0);
+    bst_assert_close(track.fixed.now.y_px, 204.5, 0.0);
+    bst_assert_close(track.fixed.now.variance_px2, r3, 1e-12);
+    bst_assert_close(track.fixed.before.x_px, 100.2, 1e-9);
+    bst_assert_close(track.fixed.before.y_px, 199.65, 1e-9);
+    /* and back, in an image whose width is not known: 1 px */
+    double r1 = 0.01 + 0.0625;
+    d = at(100.5, 199.9, 0.0, 0.1);
+    bst_mtt_note_fixed(b->mtt, &d, log(0.001 / (PIXEL * PIXEL)), &track);
+    density = 0.01 + 0.85 * normal(2.5, 4.6, r3 + r1) + 0.05 * normal(0.3, 0.25, 0.5 * r2 + r1);
+    odds += log(0.001) - log(density);
+    bst_assert_close(track.fixed.log_odds, odds, 1e-9);
+    double gain = 0.5 * r2 / (0.5 * r2 + r1);
+    bst_assert_close(track.fixed.now.x_px, 100.2 + 0.3 * gain, 1e-9);
+    bst_assert_close(track.fixed.now.y_px, 199.65 + 0.25 * gain, 1e-9);
+    bst_assert_close(track.fixed.now.variance_px2, 0.5 * r2 * (1.0 - gain), 1e-12);
+    bst_assert_close(track.fixed.before.y_px, 204.5, 0.0);
+    /* as likely as not, for so many bad pixels */
+    track.fixed.log_odds = 3.0;
+    b->mtt->bad_pixels = 21; /* exp(3) = 20.1 */
+    assert_true(bst_mtt_may_be_fixed(b->mtt, &track));
+    b->mtt->bad_pixels = 20;
+    assert_false(bst_mtt_may_be_fixed(b->mtt, &track));
+    track.fixed.log_odds = -3.0;
+    assert_true(bst_mtt_may_be_fixed(b->mtt, &track));
+    b->mtt->bad_pixels = 0;
+    assert_false(bst_mtt_may_be_fixed(b->mtt, &track));
+    b->mtt->bad_pixels = 20;
+    b->mtt->params.pixel_rad = 0.0; /* not asked */
+    assert_false(bst_mtt_may_be_fixed(b->mtt, &track));
+    bst_mtt_note_fixed(b->mtt, &d, 0.0, &track);
+    assert_true(track.fixed.log_odds == -3.0);
+    bst_mtt_free(b->mtt);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_manoeuvre_is_told_at_its_rate),
+        cmocka_unit_test(a_change_of_brightness_is_told_at_its_rate),
+        cmocka_unit_test(a_place_of_the_sensor_is_weighed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
