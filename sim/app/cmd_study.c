@@ -515,6 +515,7 @@ int bst_cmd_study(int argc, char **argv) {
          .target = &r.slurm,
          .doc = "execute on a cluster, as job arrays of Slurm (docs/slurm.md)"},
         {.name = "site",
+         .needs = "slurm",
          .kind = BST_OPTION_TEXT,
          .target = &r.site,
          .path = BST_PATH_INPUT,
@@ -575,6 +576,22 @@ int bst_cmd_study(int argc, char **argv) {
     }
     if (r.schema && arguments == 0) {
         return print_schema();
+    }
+    const char *const errands[] = {r.schema ? "schema" : NULL, r.emit >= 0 ? "emit" : NULL,
+                                   r.dry_run ? "dry-run" : NULL, r.resume ? "resume" : NULL,
+                                   r.shard ? "shard" : NULL};
+    const char *errand = NULL;
+    for (size_t i = 0; i < sizeof errands / sizeof *errands; i++) {
+        if (errand && errands[i]) {
+            bst_fail(&ctx, BST_ERR_ARGUMENT, "--%s and --%s are two errands: give one of them",
+                     errand, errands[i]);
+            return bst_options_misuse(&ctx, "study");
+        }
+        errand = errand ? errand : errands[i];
+    }
+    if (r.schema) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "--schema is of all studies: leave %s out", argv[1]);
+        return bst_options_misuse(&ctx, "study");
     }
     if (r.slurm && r.workers > 0) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--workers is of this machine, --slurm of a cluster");
