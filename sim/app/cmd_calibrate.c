@@ -242,7 +242,8 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
     } else if (e.json && arguments > 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT,
                  "--json takes the figures of one scenario, %d were given: leave it away, or give "
-                 "one scenario at a time", arguments);
+                 "one scenario at a time",
+                 arguments);
     }
     if (*ctx.message || bst_load_check(&ctx, &e.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "calibrate-obsgen");

@@ -138,10 +138,8 @@ int bst_cmd_export(int argc, char **argv) {
     int frames = NOT_ASKED, table_format = NOT_ASKED, orbits = NOT_ASKED, observations = NOT_ASKED;
     int stretch = 0, angles = 0, bits = 0;
     const char *out = NULL, *tables = NULL;
-    bst_export e = {.last = INT64_C(9007199254740992),
-                    .every = 1,
-                    .box_px = 20.0,
-                    .star_limit = 10.0};
+    bst_export e = {
+        .last = INT64_C(9007199254740992), .every = 1, .box_px = 20.0, .star_limit = 10.0};
     const bst_option options[] = {
         {.name = "frames",
          .kind = BST_OPTION_CHOICE,

@@ -487,9 +487,11 @@ int bst_cmd_propagate(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--format czml is always in GCRF: leave --frame teme out");
         return bst_options_misuse(&ctx, "propagate");
     }
-    q.frame = q.frame == FRAME_DEFAULT ? (q.format == FORMAT_CZML ? FRAME_GCRF : FRAME_TEME) : q.frame;
+    q.frame =
+        q.frame == FRAME_DEFAULT ? (q.format == FORMAT_CZML ? FRAME_GCRF : FRAME_TEME) : q.frame;
     if (q.eop_path && q.frame == FRAME_TEME) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "--eop has no effect in TEME: add --frame gcrf or leave "
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "--eop has no effect in TEME: add --frame gcrf or leave "
                  "--eop out");
         return bst_options_misuse(&ctx, "propagate");
     }

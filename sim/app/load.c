@@ -74,8 +74,7 @@ static bst_status apply_external(bst_ctx *ctx, const char *names, bst_json *json
     return BST_OK;
 }
 
-static bst_status assign_text(bst_ctx *ctx, bst_json *json, const char *pointer,
-                              const char *text) {
+static bst_status assign_text(bst_ctx *ctx, bst_json *json, const char *pointer, const char *text) {
     return bst_json_assign(ctx, json, pointer, cJSON_CreateString(text));
 }
 

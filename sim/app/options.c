@@ -186,16 +186,18 @@ static bst_status check_together(bst_ctx *ctx, const bst_option *table, const bo
         bool needed = !o->needs || !given[o - table];
         for (const bst_option *p = table; p->name; p++) {
             if (p < o && p->target == o->target && given[p - table] && given[o - table]) {
-                return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s and --%s are the same: give one of them",
-                                p->name, o->name);
+                return bst_fail(ctx, BST_ERR_ARGUMENT,
+                                "--%s and --%s are the same: give one of them", p->name, o->name);
             }
             needed = needed || (given[p - table] && names_option(o->needs, p->name));
         }
         if (!needed) {
             char list[200] = "";
             list_needed(o->needs, list, sizeof list);
-            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s has no effect without %s: add it or leave "
-                            "--%s out", o->name, list, o->name);
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s has no effect without %s: add it or leave "
+                            "--%s out",
+                            o->name, list, o->name);
         }
     }
     return BST_OK;
@@ -219,7 +221,8 @@ bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, ch
             }
             bool may_repeat = o->kind == BST_OPTION_FLAG || o->kind == BST_OPTION_LIST;
             if (given[o - table] && !may_repeat) {
-                return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is given twice: give it once", o->name);
+                return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is given twice: give it once",
+                                o->name);
             }
             given[o - table] = true;
         } else if (!arguments) {

@@ -51,10 +51,10 @@ typedef struct bst_option {
  * --flag; "--" ends the options. What is no option is moved, in order, to argv[1] ..
  * argv[*arguments]. With arguments NULL such a word is an error. "-h" stands for --help, and after
  * --help nothing is checked any more. What outputs name is checked by bst_outputs_check.
- * Errors: BST_ERR_ARGUMENT with a message that says what to do: an option is unknown (the nearest is
- * suggested), has no value or a value out of its range, is missing, stands twice (flags and lists
- * may), fills the same target as another one that is given, or has no effect because none of those
- * that it needs is given. */
+ * Errors: BST_ERR_ARGUMENT with a message that says what to do: an option is unknown (the nearest
+ * is suggested), has no value or a value out of its range, is missing, stands twice (flags and
+ * lists may), fills the same target as another one that is given, or has no effect because none of
+ * those that it needs is given. */
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) BST_MUST_CHECK;
 

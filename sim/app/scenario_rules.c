@@ -109,10 +109,11 @@ static void warn_late(bst_ctx *ctx, const bst_scenario *scenario, const char *li
     const bst_burn_config *burn = burns->items;
     for (int b = 0; b < burns->count; b++) {
         if (burn[b].time_s >= scenario->duration_s) {
-            bst_log(ctx, BST_LOG_WARNING,
-                    "%s: %s/%d/burns/%d/time_s: the burn at %g s is after the run's end at %g s and "
-                    "changes nothing",
-                    scenario->file, list, index, b, burn[b].time_s, scenario->duration_s);
+            bst_log(
+                ctx, BST_LOG_WARNING,
+                "%s: %s/%d/burns/%d/time_s: the burn at %g s is after the run's end at %g s and "
+                "changes nothing",
+                scenario->file, list, index, b, burn[b].time_s, scenario->duration_s);
         }
     }
 }

@@ -168,8 +168,7 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_re
     snprintf(out->file, sizeof out->file, "%s", bst_json_name(json));
     bst_scenario_folder(out->file, out->base_dir, sizeof out->base_dir);
     char address[BST_LINK_ENDPOINT_BYTES];
-    if (*out->link.address &&
-        bst_link_endpoint_check(ctx, out->link.address, address) != BST_OK) {
+    if (*out->link.address && bst_link_endpoint_check(ctx, out->link.address, address) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /link/address", out->file);
     }
     if (bst_time_from_utc(ctx, out->epoch_utc, &out->epoch) != BST_OK) {

@@ -34,9 +34,10 @@ static bool ends_in(const char *path, const char *suffix) {
 bst_status bst_plot_check_path(bst_ctx *ctx, const char *path) {
     return !path || ends_in(path, ".png") || ends_in(path, ".svg")
                ? BST_OK
-               : bst_fail(ctx, BST_ERR_ARGUMENT,
-                          "--plot %.300s: the name says neither PNG nor SVG: end it in .png or .svg",
-                          path);
+               : bst_fail(
+                     ctx, BST_ERR_ARGUMENT,
+                     "--plot %.300s: the name says neither PNG nor SVG: end it in .png or .svg",
+                     path);
 }
 
 bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int width, int height) {

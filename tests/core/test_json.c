@@ -291,16 +291,20 @@ static void test_set_refused(void **state) {
         {"/o/=5", "--set /o/=5: expected /json/path=value, for example --set /duration_s=60"},
         {"/l/00/y=5", "--set /l/00/y=5: there is no element \"00\" (allowed: 0 to 1)"},
         {"", "--set : expected /json/path=value, for example --set /duration_s=60"},
-        {"/a={", "--set /a={: the value is neither a plain word nor JSON: value:1:2: this is not valid JSON (found the "
+        {"/a={",
+         "--set /a={: the value is neither a plain word nor JSON: value:1:2: this is not valid "
+         "JSON (found the "
          "end of the text; allowed: a key in double quotes or })"},
         {"/a=", "--set /a=: the value is missing"},
         {"/a={\"b\":1,\"b\":2}",
-         "--set /a={\"b\":1,\"b\":2}: the value is neither a plain word nor JSON: value: /b: the key is given twice"},
+         "--set /a={\"b\":1,\"b\":2}: the value is neither a plain word nor JSON: value: /b: the "
+         "key is given twice"},
         {"/l/2=1", "--set /l/2=1: there is no element \"2\" (allowed: 0 to 1)"},
         {"/l/2/y=1", "--set /l/2/y=1: there is no element \"2\" (allowed: 0 to 1)"},
         {"/l/-1/y=1", "--set /l/-1/y=1: there is no element \"-1\" (allowed: 0 to 1)"},
         {"/l/+1/y=1", "--set /l/+1/y=1: there is no element \"+1\" (allowed: 0 to 1)"},
-        {"/l/4294967296/y=1", "--set /l/4294967296/y=1: there is no element \"4294967296\" (allowed: 0 to 1)"},
+        {"/l/4294967296/y=1",
+         "--set /l/4294967296/y=1: there is no element \"4294967296\" (allowed: 0 to 1)"},
         {"/l/y=1", "--set /l/y=1: there is no element \"y\" (allowed: 0 to 1)"},
         {"/a/b=1", "--set /a/b=1: there is no element \"b\" in what is no object and no array"},
         {"/a/b/c=1", "--set /a/b/c=1: there is no element \"b\" in what is no object and no array"},

@@ -193,8 +193,7 @@ class Hostile(unittest.TestCase):
 
     @staticmethod
     def call(*words):
-        return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=SECONDS,
-                              stdin=subprocess.DEVNULL, check=False), words
+        return runs.call(*words, timeout=SECONDS, stdin=subprocess.DEVNULL), words
 
     def refused(self, result, code, pattern):
         done, words = result

@@ -32,7 +32,7 @@ CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
 
 
 def check(*words):
-    return subprocess.run([runs.BORESIGHT, "check", *words], capture_output=True, text=True, check=False)
+    return runs.call("check", *words)
 
 
 class Rules(unittest.TestCase):
