@@ -574,32 +574,23 @@ int bst_cmd_study(int argc, char **argv) {
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
-    if (r.schema && arguments == 0) {
-        return print_schema();
-    }
     const char *const errands[] = {r.schema ? "schema" : NULL, r.emit >= 0 ? "emit" : NULL,
                                    r.dry_run ? "dry-run" : NULL, r.resume ? "resume" : NULL,
                                    r.shard ? "shard" : NULL};
-    const char *errand = NULL;
-    for (size_t i = 0; i < sizeof errands / sizeof *errands; i++) {
-        if (errand && errands[i]) {
-            bst_fail(&ctx, BST_ERR_ARGUMENT, "--%s and --%s are two errands: give one of them",
-                     errand, errands[i]);
-            return bst_options_misuse(&ctx, "study");
-        }
-        errand = errand ? errand : errands[i];
-    }
-    if (r.schema) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "--schema is of all studies: leave %s out", argv[1]);
+    if (bst_options_one_of(&ctx, errands, sizeof errands / sizeof *errands) != BST_OK) {
         return bst_options_misuse(&ctx, "study");
     }
     if (r.slurm && r.workers > 0) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--workers is of this machine, --slurm of a cluster");
         return bst_options_misuse(&ctx, "study");
     }
-    if (arguments != 1) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "one study file is expected, %d were given", arguments);
+    if (arguments != !r.schema) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "%s study file is expected, %d were given",
+                 r.schema ? "with --schema no" : "one", arguments);
         return bst_options_misuse(&ctx, "study");
+    }
+    if (r.schema) {
+        return print_schema();
     }
     if (bst_study_devices_read(&ctx, r.device, &r.devices) != BST_OK) {
         return bst_options_misuse(&ctx, "study");

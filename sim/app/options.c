@@ -239,6 +239,18 @@ bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, ch
     return bst_outputs_check(ctx, table, given, kept, argv + 1);
 }
 
+bst_status bst_options_one_of(bst_ctx *ctx, const char *const *names, size_t count) {
+    const char *first = NULL;
+    for (size_t i = 0; i < count; i++) {
+        if (first && names[i]) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s and --%s exclude each other: give one of them", first, names[i]);
+        }
+        first = first ? first : names[i];
+    }
+    return BST_OK;
+}
+
 void bst_options_print(FILE *stream, const bst_option *table) {
     int width = 0;
     for (const bst_option *o = table; o->name; o++) {

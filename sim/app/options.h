@@ -58,6 +58,10 @@ typedef struct bst_option {
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) BST_MUST_CHECK;
 
+/* That at most one of some options is given: names[i] is the i-th one's name, or NULL where it is
+ * not given. BST_ERR_ARGUMENT with the first two that are. */
+bst_status bst_options_one_of(bst_ctx *ctx, const char *const *names, size_t count) BST_MUST_CHECK;
+
 /* Prints the options, one a line, aligned. */
 void bst_options_print(FILE *stream, const bst_option *table);
 
