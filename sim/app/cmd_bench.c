@@ -266,6 +266,7 @@ int bst_cmd_bench(int argc, char **argv) {
          .doc = "vary each knob of fidelity, and the size of the scene, and write the report "
                 "(a scene's NAME: its curve alone)"},
         {.name = "report",
+         .needs = "curve",
          .kind = BST_OPTION_TEXT,
          .target = &report,
          .path = BST_PATH_OUTPUT_FOLDER,

@@ -162,10 +162,10 @@ static bst_status do_sensor(bst_ctx *ctx, job *j) {
 
 static bst_status do_all(bst_ctx *ctx, const calframes_request *r, bst_scenario *scenario) {
     bst_device *device;
+    BST_TRY(bst_load_check_sensor(ctx, scenario, r->sensor));
     BST_TRY(bst_folder_make(ctx, r->out));
     BST_TRY(bst_device_open(ctx, r->device ? r->device : "", (int)r->threads, &device));
     bst_status status = BST_OK;
-    int done = 0;
     bst_observer_config *observers = scenario->observers.items;
     for (int o = 0; status == BST_OK && o < scenario->observers.count; o++) {
         bst_sensor_config *sensors = observers[o].sensors.items;
@@ -182,15 +182,9 @@ static bst_status do_all(bst_ctx *ctx, const calframes_request *r, bst_scenario 
             }
             status = bst_camera_prepare(ctx, &sensors[s].camera);
             status = status == BST_OK ? do_sensor(ctx, &j) : status;
-            done++;
         }
     }
     bst_device_close(device);
-    if (status == BST_OK && done == 0) {
-        return bst_fail(ctx, BST_ERR_NOT_FOUND,
-                        "the scenario has no sensor %s: give OBSERVER/SENSOR",
-                        r->sensor ? r->sensor : "");
-    }
     return status;
 }
 
@@ -268,6 +262,11 @@ int bst_cmd_calframes(int argc, char **argv) {
     }
     if (arguments != 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
+        return bst_options_misuse(&ctx, "calframes");
+    }
+    if (r.bias + r.dark + r.flat == 0) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "--bias, --dark and --flat are all 0, so that nothing would be made");
         return bst_options_misuse(&ctx, "calframes");
     }
     if (bst_load_check(&ctx, &r.load, table) != BST_OK) {

@@ -205,12 +205,14 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
          .target = &e.check,
          .doc = "compare images and generator instead"},
         {.name = "calibration",
+         .needs = "check",
          .kind = BST_OPTION_TEXT,
          .target = &e.calibration,
          .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "with --check: the generator's calibration (default: as the scenario says)"},
         {.name = "json",
+         .needs = "check",
          .kind = BST_OPTION_TEXT,
          .target = &e.json,
          .path = BST_PATH_OUTPUT,
@@ -237,6 +239,11 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--out is needed: where the calibration goes");
     } else if (e.check && e.out) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--check writes no calibration: leave --out away");
+    } else if (e.json && arguments > 1) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "--json takes the figures of one scenario, %d were given: leave it away, or give "
+                 "one scenario at a time",
+                 arguments);
     }
     if (*ctx.message || bst_load_check(&ctx, &e.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "calibrate-obsgen");

@@ -112,17 +112,34 @@ static const char help_text[] =
 
 enum { NOT_ASKED = -1 };
 
+/* Whether the run has frames among those asked for; a run that lost its tables is not asked. */
+static bst_status check_frames(bst_ctx *ctx, const bst_export *e, bool asked) {
+    char sql[200];
+    snprintf(sql, sizeof sql,
+             "SELECT count(*) FROM exposures WHERE exposure_id BETWEEN %lld AND %lld"
+             " AND (exposure_id - %lld) %% %lld = 0",
+             (long long)e->first, (long long)e->last, (long long)e->first, (long long)e->every);
+    bool some = !asked || (e->first == 0 && e->every == 1) || !bst_run_reader_has_tables(e->run) ||
+                bst_run_reader_int(e->run, sql, 0, 1) != 0;
+    return some ? BST_OK
+                : bst_fail(ctx, BST_ERR_NOT_FOUND,
+                           "%s: none of its frames is among those asked for by --first, --last and "
+                           "--every (it has %lld to %lld)",
+                           bst_run_reader_folder(e->run),
+                           (long long)bst_run_reader_int(
+                               e->run, "SELECT min(exposure_id) FROM exposures", 0, 0),
+                           (long long)bst_run_reader_int(
+                               e->run, "SELECT max(exposure_id) FROM exposures", 0, 0));
+}
+
 int bst_cmd_export(int argc, char **argv) {
     bool help = false;
     double split[3];
     int frames = NOT_ASKED, table_format = NOT_ASKED, orbits = NOT_ASKED, observations = NOT_ASKED;
     int stretch = 0, angles = 0, bits = 0;
     const char *out = NULL, *tables = NULL;
-    bst_export e = {.last = INT64_C(9007199254740992),
-                    .every = 1,
-                    .frame_rate = 10.0,
-                    .box_px = 20.0,
-                    .star_limit = 10.0};
+    bst_export e = {
+        .last = INT64_C(9007199254740992), .every = 1, .box_px = 20.0, .star_limit = 10.0};
     const bst_option options[] = {
         {.name = "frames",
          .kind = BST_OPTION_CHOICE,
@@ -145,6 +162,7 @@ int bst_cmd_export(int argc, char **argv) {
          .argument = "tdm|json|csv",
          .doc = "directions and magnitudes of confirmed tracks; tdm with the observers' OEM"},
         {.name = "angles",
+         .needs = "observations",
          .kind = BST_OPTION_CHOICE,
          .target = &angles,
          .argument = "measured|filtered",
@@ -171,6 +189,7 @@ int bst_cmd_export(int argc, char **argv) {
          .argument = "FOLDER",
          .doc = "the same as YOLO has them: images/, labels/ and data.yaml"},
         {.name = "bits",
+         .needs = "coco|yolo",
          .kind = BST_OPTION_CHOICE,
          .target = &bits,
          .argument = "16|8",
@@ -184,11 +203,13 @@ int bst_cmd_export(int argc, char **argv) {
          .argument = "FOLDER",
          .doc = "where it all goes (default RUN.export)"},
         {.name = "sensor",
+         .needs = "frames|satnet|coco|yolo|observations",
          .kind = BST_OPTION_TEXT,
          .target = &e.sensor,
          .argument = "NAME",
          .doc = "frames and observations of this sensor only: name or observer/name"},
         {.name = "first",
+         .needs = "frames|satnet|coco|yolo",
          .kind = BST_OPTION_INT,
          .target = &e.first,
          .argument = "N",
@@ -196,6 +217,7 @@ int bst_cmd_export(int argc, char **argv) {
          .minimum = 0,
          .maximum = 9e15},
         {.name = "last",
+         .needs = "frames|satnet|coco|yolo",
          .kind = BST_OPTION_INT,
          .target = &e.last,
          .argument = "N",
@@ -203,6 +225,7 @@ int bst_cmd_export(int argc, char **argv) {
          .minimum = 0,
          .maximum = 9e15},
         {.name = "every",
+         .needs = "frames|satnet|coco|yolo",
          .kind = BST_OPTION_INT,
          .target = &e.every,
          .argument = "N",
@@ -210,15 +233,18 @@ int bst_cmd_export(int argc, char **argv) {
          .minimum = 1,
          .maximum = 9e15},
         {.name = "annotate",
+         .needs = "frames",
          .kind = BST_OPTION_FLAG,
          .target = &e.annotate,
          .doc = "draw true objects, detections, tracks, boresight, time and mode over the frames"},
         {.name = "stretch",
+         .needs = "frames",
          .kind = BST_OPTION_CHOICE,
          .target = &stretch,
          .argument = "run|frame",
          .doc = "grey levels: the same for all frames, or each frame's own (default run)"},
         {.name = "size",
+         .needs = "frames",
          .kind = BST_OPTION_INT,
          .target = &e.longest_side,
          .argument = "PX",
@@ -226,6 +252,7 @@ int bst_cmd_export(int argc, char **argv) {
          .minimum = 16,
          .maximum = 16384},
         {.name = "fps",
+         .needs = "frames",
          .kind = BST_OPTION_REAL,
          .target = &e.frame_rate,
          .argument = "HZ",
@@ -233,11 +260,13 @@ int bst_cmd_export(int argc, char **argv) {
          .minimum = 0.1,
          .maximum = 240},
         {.name = "tables",
+         .needs = "table",
          .kind = BST_OPTION_TEXT,
          .target = &tables,
          .argument = "A,B",
          .doc = "these tables only (boresight info lists them)"},
         {.name = "step",
+         .needs = "orbits|observations",
          .kind = BST_OPTION_REAL,
          .target = &e.step_s,
          .argument = "S",
@@ -245,6 +274,7 @@ int bst_cmd_export(int argc, char **argv) {
          .minimum = 1e-3,
          .maximum = 86400},
         {.name = "objects",
+         .needs = "orbits",
          .kind = BST_OPTION_TEXT,
          .target = &e.objects,
          .argument = "A,B|seen|all",
@@ -252,12 +282,14 @@ int bst_cmd_export(int argc, char **argv) {
              "orbits: of these objects, by name or NORAD number, of those that came into a field "
              "and the targets, or of all (default all of up to 100 objects, else seen)"},
         {.name = "split",
+         .needs = "satnet",
          .kind = BST_OPTION_TEXT,
          .target = &e.split,
          .argument = "A,B,C",
          .doc = "satnet: shares of train.txt, val.txt and test.txt, each frame's part following "
                 "from its name, such as 80,10,10"},
         {.name = "box",
+         .needs = "satnet|coco|yolo",
          .kind = BST_OPTION_REAL,
          .target = &e.box_px,
          .argument = "PX",
@@ -267,6 +299,7 @@ int bst_cmd_export(int argc, char **argv) {
          .minimum = 0,
          .maximum = 65536},
         {.name = "star-limit",
+         .needs = "satnet|coco|yolo",
          .kind = BST_OPTION_REAL,
          .target = &e.star_limit,
          .argument = "MAG",
@@ -292,10 +325,16 @@ int bst_cmd_export(int argc, char **argv) {
                  arguments);
         return bst_options_misuse(&ctx, "export");
     }
-    if (e.split && (!e.satnet || bst_export_split(&ctx, e.split, split) != BST_OK)) {
-        if (!e.satnet) {
-            bst_fail(&ctx, BST_ERR_ARGUMENT, "--split needs --satnet FOLDER");
-        }
+    if (e.split && bst_export_split(&ctx, e.split, split) != BST_OK) {
+        return bst_options_misuse(&ctx, "export");
+    }
+    if (e.last < e.first) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "--last %lld is before --first %lld: exchange them",
+                 (long long)e.last, (long long)e.first);
+        return bst_options_misuse(&ctx, "export");
+    }
+    if (e.frame_rate > 0.0 && frames != 1) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "--fps has no effect without --frames mp4");
         return bst_options_misuse(&ctx, "export");
     }
     if (frames == NOT_ASKED && table_format == NOT_ASKED && orbits == NOT_ASKED &&
@@ -305,13 +344,10 @@ int bst_cmd_export(int argc, char **argv) {
                  "--coco or --yolo");
         return bst_options_misuse(&ctx, "export");
     }
-    if (e.objects && orbits == NOT_ASKED) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "--objects needs --orbits oem|czml");
-        return bst_options_misuse(&ctx, "export");
-    }
     bool others = frames != NOT_ASKED || table_format != NOT_ASKED || orbits != NOT_ASKED ||
                   observations != NOT_ASKED;
     e.film = frames == 1;
+    e.frame_rate = e.frame_rate > 0.0 ? e.frame_rate : 10.0;
     e.czml = orbits == 1;
     e.observation_format = observations;
     e.filtered = angles == 1;
@@ -328,6 +364,9 @@ int bst_cmd_export(int argc, char **argv) {
         for (int i = 0; (problem = bst_run_reader_problem(run, i)); i++) {
             bst_log(&ctx, BST_LOG_WARNING, "%s", problem);
         }
+        status = check_frames(&ctx, &e, frames != NOT_ASKED || e.satnet || e.coco || e.yolo);
+    }
+    if (status == BST_OK) {
         status = others ? make_folder(&ctx, out, run, folder, sizeof folder) : BST_OK;
     }
     char sets[3][4096];

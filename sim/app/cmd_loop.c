@@ -10,6 +10,7 @@
 #include "sim/app/load.h"
 #include "sim/app/loop_model.h"
 #include "sim/io/draft_file.h"
+#include "sim/io/plot.h"
 
 typedef struct loop_request {
     bst_load_options load;
@@ -77,9 +78,9 @@ static bst_status all_sensors(bst_ctx *ctx, const loop_request *r, const bst_sce
         }
     }
     if (first) {
+        BST_TRY(bst_load_check_sensor(ctx, scenario, r->sensor));
         return bst_fail(ctx, BST_ERR_NOT_FOUND,
-                        r->sensor ? "%s: no such sensor with a mount that moves under command "
-                                    "(give OBSERVER/SENSOR)"
+                        r->sensor ? "--sensor %s: has no mount that moves under command"
                                   : "%s: no sensor has a mount that moves under command",
                         r->sensor ? r->sensor : scenario->file);
     }
@@ -135,6 +136,9 @@ int bst_cmd_loop(int argc, char **argv) {
             "options:\n");
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
+    }
+    if (bst_plot_check_path(&ctx, r.plot) != BST_OK) {
+        return bst_options_misuse(&ctx, "loop");
     }
     if (arguments != 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);

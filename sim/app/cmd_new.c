@@ -148,10 +148,20 @@ static bst_status find_satellite(bst_ctx *ctx, const char *option, const char *w
     if (access(which, F_OK) == 0) {
         return from_file(ctx, option, which, 0, out);
     }
-    if (colon && (size_t)(colon - which) < sizeof file &&
-        bst_tle_decode_number(colon + 1, &norad)) {
+    if (colon && (size_t)(colon - which) < sizeof file) {
         snprintf(file, sizeof file, "%.*s", (int)(colon - which), which);
-        return from_file(ctx, option, file, norad, out);
+        size_t digits = strspn(colon + 1, "0123456789");
+        bool number = digits > 0 && digits <= 9 && !colon[1 + digits];
+        norad = number ? (int)strtol(colon + 1, NULL, 10) : 0;
+        if (norad > 0 || bst_tle_decode_number(colon + 1, &norad)) {
+            return from_file(ctx, option, file, norad, out);
+        }
+        if (access(file, F_OK) == 0) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s %.200s: \"%.40s\" is no catalogue number (allowed: FILE:NUMBER, "
+                            "1 to 999999999 or Alpha-5)",
+                            option, which, colon + 1);
+        }
     }
     for (int i = 0; i < SHIPPED_SETS; i++) {
         bst_app_shipped_file(shipped_sets[i], file, sizeof file);

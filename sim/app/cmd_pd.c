@@ -10,6 +10,7 @@
 #include "sim/app/pd.h"
 #include "sim/app/stop_signals.h"
 #include "sim/io/manifest.h"
+#include "sim/io/plot.h"
 
 typedef struct pd_request {
     bst_load_options load;
@@ -237,6 +238,7 @@ int bst_cmd_pd(int argc, char **argv) {
          .minimum = 0,
          .maximum = BST_STACK_MAX_FRAMES},
         {.name = "rates",
+         .needs = "stack",
          .kind = BST_OPTION_REAL,
          .target = &o->rates_px,
          .argument = "PX",
@@ -327,6 +329,9 @@ int bst_cmd_pd(int argc, char **argv) {
     if (r.help) {
         print_help(table);
         return BST_EXIT_OK;
+    }
+    if (bst_plot_check_path(&ctx, r.plot) != BST_OK) {
+        return bst_options_misuse(&ctx, "pd");
     }
     if (arguments != 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);

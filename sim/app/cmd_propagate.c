@@ -44,11 +44,13 @@ static const char HELP_END[] =
     "Exit code: 0 done; 1 failed, or SGP4 ended early for a satellite (rows before that are\n"
     "written); 2 wrong usage.\n";
 
-enum { FRAME_TEME, FRAME_GCRF };
+enum { FRAME_DEFAULT = -1, FRAME_TEME, FRAME_GCRF };
 enum { FORMAT_CSV, FORMAT_OEM, FORMAT_CZML };
 
 /* Steps are whole microseconds, so that times are ticks and nothing accumulates. */
 static const int64_t TICKS_PER_SECOND = 1000000;
+/* 9 GB of CSV: more is a slip of --step */
+static const double MOST_ROWS = 1e8;
 
 typedef struct request {
     const char *elements, *start_text, *stop_text, *output, *eop_path;
@@ -115,7 +117,14 @@ static bst_status read_times(bst_ctx *ctx, request *q) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "--step %.15g: give whole microseconds", q->step_s);
     }
     /* half a tick of room: the span is exact to 1e-10 s only */
-    q->rows = (int64_t)floor((span_s * (double)TICKS_PER_SECOND + 0.5) / (double)q->step_ticks) + 1;
+    double steps = floor((span_s * (double)TICKS_PER_SECOND + 0.5) / (double)q->step_ticks);
+    if (steps >= MOST_ROWS) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--step %.15g: from --start to --stop that is %.4g rows of each satellite "
+                        "(allowed: %.0f); give a longer step or a shorter time",
+                        q->step_s, steps + 1.0, MOST_ROWS);
+    }
+    q->rows = (int64_t)steps + 1;
     char text[40];
     bst_time_to_utc(q->start, 9, text, sizeof text);
     bool whole_ms = q->step_ticks % 1000 == 0 && strstr(text, "000000Z");
@@ -386,7 +395,7 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
 }
 
 int bst_cmd_propagate(int argc, char **argv) {
-    request q = {.gravity = BST_SGP4_WGS72, .mode = BST_SGP4_IMPROVED};
+    request q = {.frame = FRAME_DEFAULT, .gravity = BST_SGP4_WGS72, .mode = BST_SGP4_IMPROVED};
     const bst_option table[] = {
         {.name = "elements",
          .kind = BST_OPTION_TEXT,
@@ -474,7 +483,18 @@ int bst_cmd_propagate(int argc, char **argv) {
         (void)bst_fail(&ctx, BST_ERR_ARGUMENT, "--elements is missing: add --elements FILE");
         return bst_options_misuse(&ctx, "propagate");
     }
-    q.frame = q.format == FORMAT_CZML ? FRAME_GCRF : q.frame;
+    if (q.format == FORMAT_CZML && q.frame == FRAME_TEME) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "--format czml is always in GCRF: leave --frame teme out");
+        return bst_options_misuse(&ctx, "propagate");
+    }
+    q.frame =
+        q.frame == FRAME_DEFAULT ? (q.format == FORMAT_CZML ? FRAME_GCRF : FRAME_TEME) : q.frame;
+    if (q.eop_path && q.frame == FRAME_TEME) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "--eop has no effect in TEME: add --frame gcrf or leave "
+                 "--eop out");
+        return bst_options_misuse(&ctx, "propagate");
+    }
     if (read_norad(&ctx, &q) != BST_OK || read_times(&ctx, &q) != BST_OK) {
         return bst_options_misuse(&ctx, "propagate");
     }

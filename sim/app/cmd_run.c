@@ -105,6 +105,13 @@ int bst_cmd_run(int argc, char **argv) {
     if (status != BST_OK) {
         bst_json_name_file(&ctx, json);
     }
+    if (status == BST_OK && (load.link || load.link_keys) && !bst_simulation_link(sim)) {
+        const char *option = load.link ? "link" : "link-keys";
+        status = bst_fail(&ctx, BST_ERR_ARGUMENT,
+                          "--%s: no module of %s is of type \"external\", so that no peer would be "
+                          "waited for: add --external MODULE,... or leave --%s out",
+                          option, scenario.file, option);
+    }
     if (status == BST_OK) {
         status = replay ? bst_run_link_replay(&ctx, sim, replay)
                         : bst_run_link_open(&ctx, sim); /* before anything is written */

@@ -195,6 +195,9 @@ static int info(int argc, char **argv) {
     if (argc > 2) {
         return usage_error("info takes one catalogue, got also", argv[2]);
     }
+    if (argc == 2 && argv[1][0] == '-') {
+        return usage_error("unknown option", argv[1]);
+    }
     bst_ctx ctx;
     bst_ctx_init(&ctx, print_log, NULL, BST_LOG_WARNING);
     bst_stars *stars = NULL;

@@ -515,6 +515,7 @@ int bst_cmd_study(int argc, char **argv) {
          .target = &r.slurm,
          .doc = "execute on a cluster, as job arrays of Slurm (docs/slurm.md)"},
         {.name = "site",
+         .needs = "slurm",
          .kind = BST_OPTION_TEXT,
          .target = &r.site,
          .path = BST_PATH_INPUT,
@@ -573,16 +574,23 @@ int bst_cmd_study(int argc, char **argv) {
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
-    if (r.schema && arguments == 0) {
-        return print_schema();
+    const char *const errands[] = {r.schema ? "schema" : NULL, r.emit >= 0 ? "emit" : NULL,
+                                   r.dry_run ? "dry-run" : NULL, r.resume ? "resume" : NULL,
+                                   r.shard ? "shard" : NULL};
+    if (bst_options_one_of(&ctx, errands, sizeof errands / sizeof *errands) != BST_OK) {
+        return bst_options_misuse(&ctx, "study");
     }
     if (r.slurm && r.workers > 0) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--workers is of this machine, --slurm of a cluster");
         return bst_options_misuse(&ctx, "study");
     }
-    if (arguments != 1) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "one study file is expected, %d were given", arguments);
+    if (arguments != !r.schema) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "%s study file is expected, %d were given",
+                 r.schema ? "with --schema no" : "one", arguments);
         return bst_options_misuse(&ctx, "study");
+    }
+    if (r.schema) {
+        return print_schema();
     }
     if (bst_study_devices_read(&ctx, r.device, &r.devices) != BST_OK) {
         return bst_options_misuse(&ctx, "study");

@@ -426,6 +426,7 @@ bst_status bst_link_host_play(bst_ctx *ctx, bst_link_host *host, const char *add
         bst_ctx leaving = {0};
         bst_link_end end = {.reason = 3, .text = "boresight serve ends"};
         (void)!bst_link_peer_send(&leaving, peer, BST_LINK_END, &end, NULL);
+        bst_fail_prefix(ctx, status, "%.200s", address);
     }
     bst_link_peer_close(peer);
     return status;

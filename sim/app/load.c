@@ -74,17 +74,21 @@ static bst_status apply_external(bst_ctx *ctx, const char *names, bst_json *json
     return BST_OK;
 }
 
+static bst_status assign_text(bst_ctx *ctx, bst_json *json, const char *pointer, const char *text) {
+    return bst_json_assign(ctx, json, pointer, cJSON_CreateString(text));
+}
+
 static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json *json) {
-    char text[128];
     for (int i = 0; i < options->set.count; i++) {
-        BST_TRY(bst_json_set(ctx, json, options->set.items[i]));
+        if (bst_json_set(ctx, json, options->set.items[i]) != BST_OK) {
+            return bst_fail_prefix(ctx, BST_ERR_ARGUMENT, "%s", bst_json_name(json));
+        }
     }
     if (options->external) {
         BST_TRY(apply_external(ctx, options->external, json));
     }
     if (options->link) {
-        snprintf(text, sizeof text, "/link/address=\"%.100s\"", options->link);
-        BST_TRY(bst_json_set(ctx, json, text));
+        BST_TRY(assign_text(ctx, json, "/link/address", options->link));
     }
     if (options->link_keys) {
         char *full = realpath(options->link_keys, NULL);
@@ -92,25 +96,21 @@ static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json 
             return bst_fail(ctx, BST_ERR_NOT_FOUND, "--link-keys %s: %s", options->link_keys,
                             strerror(errno));
         }
-        cJSON *value = cJSON_CreateString(full);
+        bst_status status = assign_text(ctx, json, "/link/keys_file", full);
         free(full);
-        BST_TRY(bst_json_assign(ctx, json, "/link/keys_file", value));
+        BST_TRY(status);
     }
     if (options->pacing) {
-        snprintf(text, sizeof text, "/pacing/mode=\"%.40s\"", options->pacing);
-        BST_TRY(bst_json_set(ctx, json, text));
+        BST_TRY(assign_text(ctx, json, "/pacing/mode", options->pacing));
     }
     if (options->seed) {
-        snprintf(text, sizeof text, "/seed=\"%.40s\"", options->seed);
-        BST_TRY(bst_json_set(ctx, json, text));
+        BST_TRY(assign_text(ctx, json, "/seed", options->seed));
     }
     if (options->duration_s >= 0.0) {
-        snprintf(text, sizeof text, "/duration_s=%.17g", options->duration_s);
-        BST_TRY(bst_json_set(ctx, json, text));
+        BST_TRY(bst_json_assign(ctx, json, "/duration_s", cJSON_CreateNumber(options->duration_s)));
     }
     if (options->run >= 0) {
-        snprintf(text, sizeof text, "/run=%lld", (long long)options->run);
-        BST_TRY(bst_json_set(ctx, json, text));
+        BST_TRY(bst_json_assign(ctx, json, "/run", cJSON_CreateNumber((double)options->run)));
     }
     return BST_OK;
 }
@@ -121,6 +121,25 @@ bst_status bst_load_check(bst_ctx *ctx, bst_load_options *options, const bst_opt
         BST_TRY(bst_json_check_assignment(ctx, options->set.items[i]));
     }
     return BST_OK;
+}
+
+bst_status bst_load_check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const char *name) {
+    char known[400] = "";
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int o = 0; o < scenario->observers.count; o++) {
+        const bst_sensor_config *sensors = observers[o].sensors.items;
+        for (int s = 0; s < observers[o].sensors.count; s++) {
+            char full[160];
+            snprintf(full, sizeof full, "%s/%s", observers[o].name, sensors[s].name);
+            if (!name || strcmp(full, name) == 0) {
+                return BST_OK;
+            }
+            size_t used = strlen(known);
+            snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", full);
+        }
+    }
+    return bst_fail(ctx, BST_ERR_NOT_FOUND, "--sensor %.160s: %s has no such sensor (allowed: %s)",
+                    name, scenario->file, known);
 }
 
 static bst_status spare_named(bst_ctx *ctx, const bst_option *table, const cJSON *node) {

@@ -88,6 +88,11 @@ typedef struct bst_load_options {
 bst_status bst_load_check(bst_ctx *ctx, bst_load_options *options,
                           const bst_option *table) BST_MUST_CHECK;
 
+/* Whether a scenario has the sensor OBSERVER/SENSOR; BST_ERR_NOT_FOUND with the names of those that
+ * it has. `name` may be NULL: BST_OK. */
+bst_status bst_load_check_sensor(bst_ctx *ctx, const bst_scenario *scenario,
+                                 const char *name) BST_MUST_CHECK;
+
 /* Loads `path`, applies the options, reads the scenario. *json is kept for as long as the scenario;
  * free both. BST_ERR_ARGUMENT also when an output of the command is a file that the scenario is
  * made of or names. */

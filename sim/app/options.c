@@ -40,7 +40,9 @@ static bst_status read_number(bst_ctx *ctx, const bst_option *o, const char *tex
     char *end;
     double value = strtod(text, &end);
     bool is_int = o->kind == BST_OPTION_INT;
-    if (end != text && !*end && isfinite(value) && !(is_int && value != floor(value)) &&
+    /* strtod also takes spaces before the number, hexadecimal digits, names */
+    bool decimal = text[strspn(text, "+-.0123456789eE")] == '\0';
+    if (decimal && end != text && !*end && isfinite(value) && !(is_int && value != floor(value)) &&
         value >= o->minimum && value <= o->maximum) {
         *out = value;
         return BST_OK;
@@ -151,6 +153,56 @@ static bst_status check_table(bst_ctx *ctx, const bst_option *table) {
     return BST_OK;
 }
 
+static bool names_option(const char *list, const char *name) {
+    size_t length = strlen(name);
+    for (const char *word = list; word; word = strchr(word, '|'), word += word ? 1 : 0) {
+        if (strcspn(word, "|") == length && strncmp(word, name, length) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* "--frames, --coco or --yolo" of "frames|coco|yolo" */
+static void list_needed(const char *needs, char *out, size_t bytes) {
+    size_t used = 0;
+    for (const char *word = needs; *word && used < bytes;) {
+        size_t length = strcspn(word, "|");
+        const char *next = word + length + (word[length] == '|');
+        const char *join = word == needs ? "" : strchr(next, '|') || *next ? ", " : " or ";
+        int n = snprintf(out + used, bytes - used, "%s--%.*s", join, (int)length, word);
+        used += n > 0 ? (size_t)n : 0;
+        word = next;
+    }
+}
+
+/* What is given against what else is given. */
+static bst_status check_together(bst_ctx *ctx, const bst_option *table, const bool *given) {
+    for (const bst_option *o = table; o->name; o++) {
+        if (o->required && !given[o - table]) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is missing: add --%s %s", o->name, o->name,
+                            o->argument);
+        }
+        bool needed = !o->needs || !given[o - table];
+        for (const bst_option *p = table; p->name; p++) {
+            if (p < o && p->target == o->target && given[p - table] && given[o - table]) {
+                return bst_fail(ctx, BST_ERR_ARGUMENT,
+                                "--%s and --%s are the same: give one of them", p->name, o->name);
+            }
+            needed = needed || (given[p - table] && names_option(o->needs, p->name));
+        }
+        if (!needed) {
+            char list[200] = "";
+            list_needed(o->needs, list, sizeof list);
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s has no effect without %s: add it or leave "
+                            "--%s out",
+                            o->name, list, o->name);
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) {
     bool given[MOST_OPTIONS] = {false};
@@ -167,6 +219,11 @@ bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, ch
             if (strcmp(o->name, "help") == 0) {
                 return BST_OK;
             }
+            bool may_repeat = o->kind == BST_OPTION_FLAG || o->kind == BST_OPTION_LIST;
+            if (given[o - table] && !may_repeat) {
+                return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is given twice: give it once",
+                                o->name);
+            }
             given[o - table] = true;
         } else if (!arguments) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -175,16 +232,23 @@ bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, ch
             argv[++kept] = word;
         }
     }
-    for (const bst_option *o = table; o->name; o++) {
-        if (o->required && !given[o - table]) {
-            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is missing: add --%s %s", o->name, o->name,
-                            o->argument);
-        }
-    }
+    BST_TRY(check_together(ctx, table, given));
     if (arguments) {
         *arguments = kept;
     }
     return bst_outputs_check(ctx, table, given, kept, argv + 1);
+}
+
+bst_status bst_options_one_of(bst_ctx *ctx, const char *const *names, size_t count) {
+    const char *first = NULL;
+    for (size_t i = 0; i < count; i++) {
+        if (first && names[i]) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s and --%s exclude each other: give one of them", first, names[i]);
+        }
+        first = first ? first : names[i];
+    }
+    return BST_OK;
 }
 
 void bst_options_print(FILE *stream, const bst_option *table) {

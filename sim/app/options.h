@@ -42,18 +42,25 @@ typedef struct bst_option {
     const char *argument; /* what --help calls the value: "FILE"; CHOICE: "teme|gcrf" */
     const char *doc;      /* what it does, and the default where there is one */
     bool required;
-    double minimum, maximum; /* INT, REAL */
+    double minimum, maximum; /* INT, REAL: decimal numbers */
+    const char *needs;       /* options of which one must be given too: "frames|coco"; NULL: none */
     bst_option_path path;    /* TEXT, LIST */
 } bst_option;
 
 /* Reads argv[1] .. argv[argc - 1] into the table's targets. Forms: --name value, --name=value,
- * --flag; "--" ends the options; of an option given twice the last value holds, lists excepted.
- * What is no option is moved, in order, to argv[1] .. argv[*arguments]. With arguments NULL such a
- * word is an error. "-h" stands for --help, and after --help nothing is checked any more. What
- * outputs name is checked by bst_outputs_check. Errors: BST_ERR_ARGUMENT with a message that says
- * what to do; an unknown option suggests the nearest. */
+ * --flag; "--" ends the options. What is no option is moved, in order, to argv[1] ..
+ * argv[*arguments]. With arguments NULL such a word is an error. "-h" stands for --help, and after
+ * --help nothing is checked any more. What outputs name is checked by bst_outputs_check.
+ * Errors: BST_ERR_ARGUMENT with a message that says what to do: an option is unknown (the nearest
+ * is suggested), has no value or a value out of its range, is missing, stands twice (flags and
+ * lists may), fills the same target as another one that is given, or has no effect because none of
+ * those that it needs is given. */
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) BST_MUST_CHECK;
+
+/* That at most one of some options is given: names[i] is the i-th one's name, or NULL where it is
+ * not given. BST_ERR_ARGUMENT with the first two that are. */
+bst_status bst_options_one_of(bst_ctx *ctx, const char *const *names, size_t count) BST_MUST_CHECK;
 
 /* Prints the options, one a line, aligned. */
 void bst_options_print(FILE *stream, const bst_option *table);

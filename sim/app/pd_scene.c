@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "scenegen/detector.h"
+#include "sim/app/load.h"
 #include "sim/app/pd.h"
 #include "sim/eval/location_bound.h"
 #include "sim/io/psf_fits.h"
@@ -41,10 +42,9 @@ static bst_status find_sensor(bst_ctx *ctx, bst_pd_scene *s) {
             return BST_OK;
         }
     }
+    BST_TRY(bst_load_check_sensor(ctx, s->scenario, s->options.sensor));
     return s->options.sensor
-               ? bst_fail(ctx, BST_ERR_NOT_FOUND,
-                          "the scenario has no sensor %s with a module \"imgproc\"; give "
-                          "OBSERVER/SENSOR",
+               ? bst_fail(ctx, BST_ERR_NOT_FOUND, "--sensor %s: has no module \"imgproc\"",
                           s->options.sensor)
                : bst_fail(ctx, BST_ERR_CONFIG,
                           "no sensor of the scenario has a module \"imgproc\": there is no "

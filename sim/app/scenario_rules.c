@@ -104,6 +104,33 @@ static bst_status predicted_earth(bst_ctx *ctx, const bst_scenario *scenario,
     return BST_OK;
 }
 
+static void warn_late(bst_ctx *ctx, const bst_scenario *scenario, const char *list, int index,
+                      const bst_config_list *burns) {
+    const bst_burn_config *burn = burns->items;
+    for (int b = 0; b < burns->count; b++) {
+        if (burn[b].time_s >= scenario->duration_s) {
+            bst_log(
+                ctx, BST_LOG_WARNING,
+                "%s: %s/%d/burns/%d/time_s: the burn at %g s is after the run's end at %g s and "
+                "changes nothing",
+                scenario->file, list, index, b, burn[b].time_s, scenario->duration_s);
+        }
+    }
+}
+
+static bst_status late_burns(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world) {
+    (void)world;
+    const bst_object_config *objects = scenario->world.objects.items;
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int i = 0; i < scenario->world.objects.count; i++) {
+        warn_late(ctx, scenario, "/world/objects", i, &objects[i].burns);
+    }
+    for (int i = 0; i < scenario->observers.count; i++) {
+        warn_late(ctx, scenario, "/observers", i, &observers[i].burns);
+    }
+    return BST_OK;
+}
+
 /* ---- rules about a sensor ---- */
 
 static bst_status no_modules(const subject *s) {
@@ -144,6 +171,16 @@ static bst_status long_exposure(const subject *s) {
                 "%s/exposure: an exposure_s of %g s is longer than the period_s of %g s: exposures "
                 "follow one another without a pause, one every %g s; make period_s that long",
                 s->place, e->exposure_s, e->period_s, e->exposure_s);
+    }
+    return BST_OK;
+}
+
+static bst_status no_frames(const subject *s) {
+    if (s->sensor->exposure.dropped_fraction == 1.0) {
+        bst_log(s->ctx, BST_LOG_WARNING,
+                "%s/exposure/dropped_fraction: 1 loses every frame, so that nothing is seen; give "
+                "less than 1",
+                s->place);
     }
     return BST_OK;
 }
@@ -227,10 +264,12 @@ static const rule rules[] = {
     {"earth_orientation",
      "dates beyond the table of the Earth's orientation, predicted with an uncertainty",
      predicted_earth, NULL, NULL},
+    {"burns", "burns after the end of the run", late_burns, NULL, NULL},
     {"modules", "a sensor without modules, without a gimbal, or with a tracker and no detections",
      NULL, no_modules, NULL},
     {"exposure_period", "an exposure longer than the period of the exposures", NULL, long_exposure,
      NULL},
+    {"lost_frames", "a sensor all of whose frames are lost", NULL, no_frames, NULL},
     {"wide_field", "a field too wide for the gnomonic projection (an error from 160 degrees on)",
      NULL, wide_field, NULL},
     {"short_times", "times of tracker and control that are over before the frames they wait for",

@@ -163,9 +163,10 @@ static bst_status read_list(const reader *r, const cJSON *value, const char *pat
 static bst_status read_seed(const reader *r, const cJSON *value, const char *path, uint64_t *out) {
     const char *allowed =
         "a hexadecimal string such as \"0x1F\" or a decimal one such as \"31\", up to 64 bits, or "
-        "an integer from 0 to 9007199254740992";
-    /* integers up to 2^53 are exact in JSON's numbers */
-    if (cJSON_IsNumber(value) && value->valuedouble >= 0.0 && value->valuedouble <= 0x1p53 &&
+        "an integer from 0 to 9007199254740991";
+    /* 2^53 as a number may have been 2^53 + 1 in the text */
+    if (cJSON_IsNumber(value) && value->valuedouble >= 0.0 &&
+        value->valuedouble < END_OF_EXACT_INTEGERS &&
         value->valuedouble == floor(value->valuedouble)) {
         *out = (uint64_t)value->valuedouble;
         return BST_OK;

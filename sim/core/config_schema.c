@@ -14,7 +14,7 @@ static void add_seed(cJSON *node) {
     cJSON_AddItemToArray(types, cJSON_CreateString("integer"));
     cJSON_AddStringToObject(node, "pattern", "^(0x[0-9a-fA-F]{1,16}|[0-9]{1,20})$");
     cJSON_AddNumberToObject(node, "minimum", 0);
-    cJSON_AddRawToObject(node, "maximum", "9007199254740992"); /* 2^53, exact */
+    cJSON_AddRawToObject(node, "maximum", "9007199254740991"); /* 2^53 - 1: exact */
 }
 
 static void add_range(cJSON *node, const bst_config_desc *d) {

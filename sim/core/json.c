@@ -162,16 +162,35 @@ const char *bst_json_name(const bst_json *json) {
 static cJSON *child_of(cJSON *node, const char *segment) {
     if (cJSON_IsArray(node)) {
         size_t digits = strspn(segment, "0123456789");
-        bool is_index = digits > 0 && digits < 10 && !segment[digits];
+        bool is_index = digits > 0 && digits < 10 && !segment[digits] &&
+                        (segment[0] != '0' || digits == 1); /* as RFC 6901, section 4 */
         return is_index ? cJSON_GetArrayItem(node, (int)strtol(segment, NULL, 10)) : NULL;
     }
     return cJSON_GetObjectItemCaseSensitive(node, segment);
 }
 
+/* An element that a pointer names and that is not there. */
+static bst_status no_child(bst_ctx *ctx, const cJSON *node, const char *segment) {
+    int count = cJSON_GetArraySize(node);
+    if (cJSON_IsArray(node) && count > 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "there is no element \"%.80s\" (allowed: 0 to %d)",
+                        segment, count - 1);
+    }
+    return bst_fail(ctx, BST_ERR_ARGUMENT, "there is no element \"%.80s\" in %s", segment,
+                    cJSON_IsArray(node) ? "an empty array" : "what is no object and no array");
+}
+
+bool bst_json_is_pointer(const char *text, size_t length) {
+    bool good = length > 0 && text[0] == '/' && text[length - 1] != '/';
+    for (size_t i = 1; i < length && good; i++) {
+        good = text[i - 1] != '/' || text[i] != '/';
+    }
+    return good;
+}
+
 bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) {
     const char *equals = strchr(assignment, '=');
-    if (assignment[0] != '/' || !equals ||
-        (size_t)(equals - assignment) == strspn(assignment, "/")) {
+    if (!equals || !bst_json_is_pointer(assignment, (size_t)(equals - assignment))) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--set %s: expected /json/path=value, for example --set /duration_s=60",
                         assignment);
@@ -205,8 +224,7 @@ bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJ
             } else if (cJSON_IsObject(node)) {
                 cJSON_AddItemToObject(node, segment, value);
             } else {
-                status =
-                    bst_fail(ctx, BST_ERR_ARGUMENT, "there is no element \"%s\" to set", segment);
+                status = no_child(ctx, node, segment);
                 break;
             }
             value = NULL;
@@ -214,7 +232,7 @@ bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJ
             child = cJSON_AddObjectToObject(node, segment);
         }
         if (next && !child) {
-            status = bst_fail(ctx, BST_ERR_ARGUMENT, "there is no element \"%s\"", segment);
+            status = no_child(ctx, node, segment);
         }
         node = child;
         segment = next;
@@ -241,8 +259,9 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     } else if (equals[1] && !strpbrk(equals + 1, "{}[]\"")) {
         value = cJSON_CreateString(equals + 1);
     } else {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "--set %s: the value is neither JSON nor a plain word", assignment);
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "--set %.300s: %s%s", assignment,
+                        equals[1] ? "the value is neither a plain word nor JSON: " : "",
+                        equals[1] ? scratch.message : "the value is missing");
     }
     char *pointer = strndup(assignment, (size_t)(equals - assignment));
     bst_status status = BST_ERR_MEMORY;

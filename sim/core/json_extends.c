@@ -16,16 +16,9 @@ typedef struct file_chain {
     int count;
 } file_chain;
 
-/* Several slashes in a row are one, as where a pointer is followed. */
-static const char *last_slash(const char *p) {
-    return p[0] == '/' && p[1] == '/' ? last_slash(p + 1) : p;
-}
-
 /* Whether one of two pointers leads to the other's value or into it. */
 static bool one_way(const char *a, const char *b) {
     for (; *a && *b; a++, b++) {
-        a = last_slash(a);
-        b = last_slash(b);
         if (*a != *b) {
             return false;
         }
@@ -108,8 +101,8 @@ static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_js
         char pointer[512];
         size_t length =
             (size_t)snprintf(pointer, sizeof pointer, "%s%s", by_pointer ? "" : "/", value->string);
-        if (pointer[0] != '/' || length == strspn(pointer, "/") || length >= sizeof pointer ||
-            (!by_pointer && strchr(pointer + 1, '/'))) {
+        if (length >= sizeof pointer || (by_pointer && !bst_json_is_pointer(pointer, length)) ||
+            (!by_pointer && (length < 2 || strchr(pointer + 1, '/')))) {
             cJSON_Delete(value);
             return by_pointer
                        ? bst_fail(ctx, BST_ERR_CONFIG,
@@ -125,8 +118,24 @@ static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_js
     return BST_OK;
 }
 
+/* A value that a file gives twice: by its key, and by a pointer of "set". */
+static bst_status check_once(bst_ctx *ctx, const bst_json *own, const cJSON *set) {
+    for (const cJSON *item = set->child; item; item = item->next) {
+        if (item->string[0] == '/' &&
+            cJSON_GetObjectItemCaseSensitive(own->root, item->string + 1)) {
+            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %.200s: is given beside \"set\" and in it",
+                            own->name, item->string);
+        }
+    }
+    return BST_OK;
+}
+
 /* Changes `base` as `own` says. */
 static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
+    const cJSON *given = cJSON_GetObjectItemCaseSensitive(own->root, "set");
+    if (cJSON_IsObject(given)) {
+        BST_TRY(check_once(ctx, own, given));
+    }
     if (!base->origins) {
         BST_TRY(bst_json_note_origin(ctx, base, "", base->name));
     }

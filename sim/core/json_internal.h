@@ -29,6 +29,10 @@ struct bst_json {
 bst_status bst_json_note_origin(bst_ctx *ctx, bst_json *json, const char *pointer,
                                 const char *file) BST_MUST_CHECK;
 
+/* Whether the first `length` bytes are a JSON pointer to something below the root, without empty
+ * keys: "/", then keys and numbers of elements with one "/" between them. */
+bool bst_json_is_pointer(const char *text, size_t length);
+
 /* Why and where a text is not the JSON that is read here. */
 typedef struct bst_json_fault {
     size_t offset;  /* byte in the text */

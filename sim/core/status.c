@@ -1,5 +1,6 @@
 #include "sim/core/status.h"
 
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -10,10 +11,12 @@ void bst_ctx_init(bst_ctx *ctx, bst_log_fn log, void *log_user, bst_log_level le
     ctx->log_level = level;
 }
 
-/* Messages quote what was found: no control character of it may reach a terminal. */
-static void hide_controls(char *text) {
+/* Messages quote what was found: no control character of it may reach a terminal, and no message
+ * gets a second line by it. Lines are those of a `format` that has some itself. */
+static void hide_controls(char *text, const char *format) {
+    bool lines = strchr(format, '\n') != NULL;
     for (; *text; text++) {
-        if (((unsigned char)*text < 0x20 && *text != '\n') || *text == 0x7f) {
+        if (((unsigned char)*text < 0x20 && !(lines && *text == '\n')) || *text == 0x7f) {
             *text = '?';
         }
     }
@@ -27,7 +30,7 @@ bst_status bst_fail(bst_ctx *ctx, bst_status status, const char *format, ...) {
         va_start(args, format);
         vsnprintf(text, sizeof text, format, args);
         va_end(args);
-        hide_controls(text);
+        hide_controls(text, format);
         memcpy(ctx->message, text, sizeof text);
     }
     return status;
@@ -41,7 +44,7 @@ bst_status bst_fail_prefix(bst_ctx *ctx, bst_status status, const char *format, 
         va_start(args, format);
         vsnprintf(prefix, sizeof prefix, format, args);
         va_end(args);
-        hide_controls(prefix);
+        hide_controls(prefix, format);
         snprintf(text, sizeof text, "%s: %s", prefix, ctx->message);
         text[BST_MESSAGE_BYTES - 1] = '\0';
         memcpy(ctx->message, text, BST_MESSAGE_BYTES);
@@ -64,6 +67,7 @@ void bst_log(bst_ctx *ctx, bst_log_level level, const char *format, ...) {
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
+    hide_controls(text, format);
     ctx->log(ctx->log_user, level, text);
 }
 

@@ -9,6 +9,7 @@
 
 #include "sim/core/text.h"
 #include "sim/engine/scenario_internal.h"
+#include "sim/link/endpoint.h"
 
 enum { FORMAT_VERSION = 1 };
 
@@ -149,8 +150,8 @@ static bst_status check_extended(bst_ctx *ctx, const bst_json *json) {
     const cJSON *root = bst_json_root(json);
     if (cJSON_GetObjectItemCaseSensitive(root, "extends")) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "%s: /extends: the file that it names has not been read; load the scenario "
-                        "with bst_json_load_extended",
+                        "%s: /extends: the file that it names has not been read (allowed: in a "
+                        "scenario's file; a program reads that by bst_json_load_extended)",
                         bst_json_name(json));
     }
     const cJSON *set = cJSON_GetObjectItemCaseSensitive(root, "set");
@@ -166,6 +167,10 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_re
     BST_TRY(bst_config_read(ctx, json, bst_json_root(json), "", bst_scenario_table, out));
     snprintf(out->file, sizeof out->file, "%s", bst_json_name(json));
     bst_scenario_folder(out->file, out->base_dir, sizeof out->base_dir);
+    char address[BST_LINK_ENDPOINT_BYTES];
+    if (*out->link.address && bst_link_endpoint_check(ctx, out->link.address, address) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /link/address", out->file);
+    }
     if (bst_time_from_utc(ctx, out->epoch_utc, &out->epoch) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /epoch_utc", out->file);
     }

@@ -26,6 +26,20 @@ static void put_quoted(FILE *script, const char *text) {
     fputc('\'', script);
 }
 
+static bool ends_in(const char *path, const char *suffix) {
+    size_t length = strlen(path), n = strlen(suffix);
+    return length > n && strcmp(path + length - n, suffix) == 0;
+}
+
+bst_status bst_plot_check_path(bst_ctx *ctx, const char *path) {
+    return !path || ends_in(path, ".png") || ends_in(path, ".svg")
+               ? BST_OK
+               : bst_fail(
+                     ctx, BST_ERR_ARGUMENT,
+                     "--plot %.300s: the name says neither PNG nor SVG: end it in .png or .svg",
+                     path);
+}
+
 bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int width, int height) {
     int n = snprintf(plot->path, sizeof plot->path, "%s", path);
     if (n < 0 || (size_t)n >= sizeof plot->path || strchr(path, '\n')) {
@@ -48,8 +62,7 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
         return status;
     }
     close(fd); /* gnuplot writes into the file that is there */
-    size_t length = strlen(path);
-    if (length > 4 && strcmp(path + length - 4, ".svg") == 0) {
+    if (ends_in(path, ".svg")) {
         fprintf(plot->script,
                 "set terminal svg size %d,%d font 'DejaVu Sans,11' background '#ffffff'\n", width,
                 height);

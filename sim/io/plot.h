@@ -15,6 +15,10 @@ typedef struct bst_plot {
     char draft[4160];
 } bst_plot;
 
+/* Whether a plot's path says what it becomes: it must end in .png or .svg. BST_ERR_ARGUMENT. `path`
+ * may be NULL: BST_OK. */
+bst_status bst_plot_check_path(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
+
 /* Begins a PNG, or where the path ends in .svg an SVG, of width x height pixels at `path`: terminal
  * (pngcairo, or png where gnuplot lacks it) and output are set. */
 bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int width,

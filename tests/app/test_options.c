@@ -9,9 +9,10 @@ typedef struct values {
     double step_s;
     int frame;
     bst_option_list set;
+    int64_t size;
 } values;
 
-enum { TABLE_LENGTH = 8, MOST_WORDS = 600 };
+enum { TABLE_LENGTH = 10, MOST_WORDS = 600 };
 
 static void make_table(values *v, bst_option table[TABLE_LENGTH]) {
     const bst_option entries[TABLE_LENGTH] = {
@@ -47,6 +48,19 @@ static void make_table(values *v, bst_option table[TABLE_LENGTH]) {
          .target = &v->set,
          .argument = "/PATH=VALUE",
          .doc = "Override."},
+        {.name = "seeds",
+         .kind = BST_OPTION_INT,
+         .target = &v->seed,
+         .argument = "N",
+         .doc = "The same.",
+         .maximum = 9},
+        {.name = "size",
+         .kind = BST_OPTION_INT,
+         .target = &v->size,
+         .argument = "N",
+         .doc = "Size.",
+         .maximum = 9,
+         .needs = "step|set|verbose"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &v->help, .doc = "This text."},
         {.name = NULL}};
     memcpy(table, entries, sizeof entries);
@@ -93,13 +107,13 @@ static void test_forms(void **state) {
     assert_string_equal(argv[3], "--c.json");
 }
 
-static void test_last_value_holds_and_negative_numbers(void **state) {
+static void test_repeated_flags_and_negative_numbers(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     values v;
     char *argv[MOST_WORDS];
     int arguments;
-    char line[] = "--out x --seed -5 --out - --frame gcrf --frame teme";
+    char line[] = "--out - --seed -5 --verbose --frame teme --size 3 --verbose";
     bst_assert_ok(&ctx, parse(&ctx, &v, line, argv, &arguments));
     assert_int_equal(v.seed, -5);
     assert_string_equal(v.out, "-");
@@ -125,6 +139,15 @@ static void test_messages(void **state) {
         const char *line, *message;
     } cases[] = {
         {"--out x --sed 3", "unknown option --sed; did you mean --seed?"},
+        {"--out x --seed 3 --seed 4", "--seed is given twice: give it once"},
+        {"--out x --out x", "--out is given twice: give it once"},
+        {"--out x --frame gcrf --frame=teme", "--frame is given twice: give it once"},
+        {"--out x --seeds 3 --seed 4", "--seed and --seeds are the same: give one of them"},
+        {"--out x --size 3",
+         "--size has no effect without --step, --set or --verbose: add it or leave --size out"},
+        {"--out x --seed 0x10", "--seed 0x10: give an integer from -5 to 9007199254740992"},
+        {"--out x --step infinity", "--step infinity: give a number from 0.001 to 1000000"},
+        {"--out x --step 1e", "--step 1e: give a number from 0.001 to 1000000"},
         {"--out x --vrbose", "unknown option --vrbose; did you mean --verbose?"},
         {"--out x --fram=teme", "unknown option --fram=teme; did you mean --frame?"},
         {"--out x --zzzzzzzz", "unknown option --zzzzzzzz"},
@@ -156,6 +179,18 @@ static void test_messages(void **state) {
         assert_int_equal(parse(&ctx, &v, line, argv, NULL), BST_ERR_ARGUMENT);
         assert_string_equal(ctx.message, cases[i].message);
     }
+}
+
+static void test_space_before_a_number(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    values v = {0};
+    bst_option table[TABLE_LENGTH];
+    make_table(&v, table);
+    char words[][8] = {"x", "--out", "x", "--step", " 5"};
+    char *argv[] = {words[0], words[1], words[2], words[3], words[4]};
+    assert_int_equal(bst_options_parse(&ctx, table, 5, argv, NULL), BST_ERR_ARGUMENT);
+    assert_string_equal(ctx.message, "--step  5: give a number from 0.001 to 1000000");
 }
 
 static void test_list_is_bounded(void **state) {
@@ -192,15 +227,18 @@ static void test_print(void **state) {
                         "  --step S           Step.\n"
                         "  --frame teme|gcrf  Frame.\n"
                         "  --set /PATH=VALUE  Override.\n"
+                        "  --seeds N          The same.\n"
+                        "  --size N           Size.\n"
                         "  --help             This text.\n");
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_forms),
-        cmocka_unit_test(test_last_value_holds_and_negative_numbers),
+        cmocka_unit_test(test_repeated_flags_and_negative_numbers),
         cmocka_unit_test(test_help_wins),
         cmocka_unit_test(test_messages),
+        cmocka_unit_test(test_space_before_a_number),
         cmocka_unit_test(test_list_is_bounded),
         cmocka_unit_test(test_print),
     };

@@ -129,10 +129,10 @@ static void exact_messages(void **state) {
            "/tick_rate_hz: not an integer (found 0.5; allowed: an integer from 1 to 1000000 Hz)");
     refuse("/seed=\"0xG\"",
            "/seed: not a seed (found \"0xG\"; allowed: a hexadecimal string such as \"0x1F\" or a "
-           "decimal one such as \"31\", up to 64 bits, or an integer from 0 to 9007199254740992)");
+           "decimal one such as \"31\", up to 64 bits, or an integer from 0 to 9007199254740991)");
     refuse("/seed=-1",
            "/seed: out of range (found -1; allowed: a hexadecimal string such as \"0x1F\" or a "
-           "decimal one such as \"31\", up to 64 bits, or an integer from 0 to 9007199254740992)");
+           "decimal one such as \"31\", up to 64 bits, or an integer from 0 to 9007199254740991)");
     refuse("/world=[]", "/world: wrong type (found []; allowed: an object)");
     refuse("/world/objects={}",
            "/world/objects: wrong type (found {}; allowed: an array of 0 to 100000 objects)");

@@ -160,7 +160,7 @@ static bst_status read_text(bst_ctx *ctx, const char *text, const bst_config_des
 
 #define SEEDS                                                                                   \
     "allowed: a hexadecimal string such as \"0x1F\" or a decimal one such as \"31\", up to 64 " \
-    "bits, or an integer from 0 to 9007199254740992)"
+    "bits, or an integer from 0 to 9007199254740991)"
 
 static void seeds_are_decimal_or_hexadecimal(void **state) {
     (void)state;
@@ -172,7 +172,7 @@ static void seeds_are_decimal_or_hexadecimal(void **state) {
         {"{\"seed\": \"31\"}", 31},
         {"{\"seed\": 31}", 31},
         {"{\"seed\": \"012\"}", 12}, /* not octal */
-        {"{\"seed\": 9007199254740992}", UINT64_C(1) << 53},
+        {"{\"seed\": 9007199254740991}", (UINT64_C(1) << 53) - 1},
         {"{\"seed\": \"18446744073709551615\"}", UINT64_MAX},
         {"{\"seed\": \"0xffffffffffffffff\"}", UINT64_MAX},
     };
@@ -443,7 +443,7 @@ static void test_schema(void **state) {
         "\"default\":\"ideal\"},"
         "\"seed\":{\"type\":[\"string\",\"integer\"],\"pattern\":\"^(0x[0-9a-fA-F]{1,16}|[0-9]{1,"
         "20})$\","
-        "\"minimum\":0,\"maximum\":9007199254740992,"
+        "\"minimum\":0,\"maximum\":9007199254740991,"
         "\"description\":\"Seed.\",\"default\":\"0x1\"},"
         "\"axis\":{\"type\":\"array\",\"minItems\":3,\"maxItems\":3,\"items\":{"
         "\"type\":\"number\",\"minimum\":-1,\"maximum\":1},\"description\":\"Axis.\","

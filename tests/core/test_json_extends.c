@@ -69,7 +69,7 @@ static void a_chain_is_resolved(void **state) {
     expect_from(json, "/list/0", "/c.json"); /* something in it */
     expect_from(json, "/o/q", "/sub/b.json");
     expect_from(json, "/o/r", "/sub/b.json");
-    bst_assert_ok(&ctx, bst_json_set(&ctx, json, "/o//q=9"));
+    bst_assert_ok(&ctx, bst_json_set(&ctx, json, "/o/q=9"));
     expect_from(json, "/o/q", "/c.json"); /* as --set of the file that was asked for */
     bst_fail(&ctx, BST_ERR_CONFIG, "%s: /n: is wrong: really", c);
     bst_json_name_file(&ctx, json);
@@ -158,9 +158,14 @@ static void wrong_ones_are_refused(void **state) {
     refuse("x.json", "{\"extends\": \"base.json\", \"a/b\": 1}", BST_ERR_CONFIG,
            "x.json: /a/b: unknown key");
     refuse("x.json", "{\"extends\": \"base.json\", \"set\": {\"/l/1\": 1}}", BST_ERR_CONFIG,
-           "x.json: /set: /l/1: there is no element \"1\" to set");
+           "x.json: /set: /l/1: there is no element \"1\" (allowed: 0 to 0)");
     refuse("x.json", "{\"extends\": \"base.json\", \"set\": {\"/a/b/c\": 1}}", BST_ERR_CONFIG,
-           "x.json: /set: /a/b/c: there is no element \"b\"");
+           "x.json: /set: /a/b/c: there is no element \"b\" in what is no object and no array");
+    refuse("x.json", "{\"extends\": \"base.json\", \"set\": {\"/l//0\": 1}}", BST_ERR_CONFIG,
+           "x.json: /set: \"/l//0\" is no JSON pointer (allowed: \"/\" and keys or numbers of "
+           "elements with \"/\" between them)");
+    refuse("x.json", "{\"extends\": \"base.json\", \"a\": 2, \"set\": {\"/a\": 3}}", BST_ERR_CONFIG,
+           "x.json: /a: is given beside \"set\" and in it");
     refuse_with("x.json", "{\"extends\": \"none.json\"}", BST_ERR_NOT_FOUND,
                 "x.json: /extends: ", "none.json: ");
     refuse_with("x.json", "{\"extends\": \"broken.json\"}", BST_ERR_FORMAT,

@@ -218,14 +218,21 @@ def judge(frames):
     sizes = np.hypot(errors[:, 0], errors[:, 1])
 
     def rank(values, share):
-        return np.sort(values)[int(np.ceil(share * len(values))) - 1]
+        return np.sort(values)[int(np.ceil(share * len(values))) - 1] if len(values) else None
+
+    def rms(values):
+        return np.sqrt(np.mean(values ** 2)) if len(values) else None
+
+    def ratio(part, whole):
+        return part / whole if whole else None
     return dict(
         frames=len(frames.list), time_to_confirm_s=confirmed, time_to_acquire_s=acquired,
-        time_to_settle_s=settled, visible_frames=visible, custody=in_track / visible,
-        track_fraction=in_track_after / visible_after, breaks=breaks, pointing_frames=len(sizes),
-        pointing_rms_px=np.sqrt(np.mean(sizes ** 2)), pointing_median_px=rank(sizes, 0.5),
+        time_to_settle_s=settled, visible_frames=visible, custody=ratio(in_track, visible),
+        track_fraction=ratio(in_track_after, visible_after), breaks=breaks,
+        pointing_frames=len(sizes), pointing_rms_px=rms(sizes), pointing_median_px=rank(sizes, 0.5),
         pointing_p95_px=rank(sizes, 0.95), pointing_p99_px=rank(sizes, 0.99),
-        pointing_max_px=sizes.max(), pointing_bias_px=np.hypot(*errors.mean(axis=0)),
-        detected_fraction=found / in_field, track_frames=len(track_errors),
-        track_rms_px=np.sqrt(np.mean(track_errors ** 2)), track_median_px=rank(track_errors, 0.5),
-        track_p95_px=rank(track_errors, 0.95), track_max_px=track_errors.max()), unclear
+        pointing_max_px=rank(sizes, 1.0),
+        pointing_bias_px=np.hypot(*errors.mean(axis=0)) if len(sizes) else None,
+        detected_fraction=ratio(found, in_field), track_frames=len(track_errors),
+        track_rms_px=rms(track_errors), track_median_px=rank(track_errors, 0.5),
+        track_p95_px=rank(track_errors, 0.95), track_max_px=rank(track_errors, 1.0)), unclear

@@ -35,10 +35,10 @@ def wait_until_open(run):
         line = run.stderr.readline()
 
 
-def serve(scenario, address, part, *more):
+def serve(scenario, address, part, *more, duration=SECONDS):
     return subprocess.Popen(
         [runs.BORESIGHT, "serve", scenario, "--link", address, "--part", part, "--threads", "1",
-         "--duration", str(SECONDS), *EMBEDDED, *more],
+         "--duration", str(duration), *EMBEDDED, *more],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

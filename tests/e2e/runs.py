@@ -60,6 +60,26 @@ def run(scenario, out, *sets, **options):
     return manifest(out)
 
 
+def call(*words, timeout=120, **options):
+    """The program with these words, to its end: returncode, stdout and stderr as text. Ends with
+    subprocess.TimeoutExpired after `timeout` seconds; `options` are those of subprocess.run."""
+    return subprocess.run([BORESIGHT, *words], capture_output=True, text=True, timeout=timeout,
+                          check=False, **options)
+
+
+def call_well(*words, **options):
+    """call() that must end with exit code 0 and an empty standard error: what it printed."""
+    result = call(*words, **options)
+    if (result.returncode, result.stderr) != (0, ""):
+        raise AssertionError(f"{words}: exit code {result.returncode}: {result.stderr}")
+    return result.stdout
+
+
+def export(*words, **options):
+    """call_well() of `boresight export`."""
+    return call_well("export", *words, **options)
+
+
 def manifest(out):
     with open(os.path.join(out, "manifest.json"), encoding="utf-8") as file:
         return json.load(file)

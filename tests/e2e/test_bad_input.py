@@ -69,9 +69,8 @@ class BadInput(unittest.TestCase):
         os.symlink("nowhere", os.path.join(folder, "dangling"))
 
     def call(self, *words, **environment):
-        return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True,
-                              timeout=SECONDS, stdin=subprocess.DEVNULL,
-                              env={**os.environ, **environment})
+        return runs.call(*words, timeout=SECONDS, stdin=subprocess.DEVNULL,
+                         env={**os.environ, **environment})
 
     def refused(self, result, name):
         self.assertEqual(result.returncode, 1, result.stderr)

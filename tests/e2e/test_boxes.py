@@ -5,13 +5,13 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_boxes.py BORESI
 """
 import json
 import os
-import subprocess
 import unittest
 
 import numpy as np
 from astropy.io import fits
 
 import runs
+from runs import call
 from readers import read_png
 
 LIMIT, BOX = 12.0, 16.0
@@ -20,11 +20,6 @@ WINDOW = (100, 60, 800, 640)  # x0, y0, width, height in sensor pixels
 
 def tearDownModule():
     runs.clean()
-
-
-def export(*words):
-    return subprocess.run([runs.BORESIGHT, "export", *words], capture_output=True, text=True,
-                          timeout=120, check=False)
 
 
 def corners(box):
@@ -59,7 +54,7 @@ class Boxes(unittest.TestCase):
         for name, some in sets.items():
             made = os.path.join(cls.folder, name)
             runs.run(runs.STARE, made, '/record/planes=["segmentation"]', *some, duration=4)
-            result = export(made, "--coco", "coco", "--yolo", "yolo", "--star-limit", str(LIMIT),
+            result = call("export", made, "--coco", "coco", "--yolo", "yolo", "--star-limit", str(LIMIT),
                             "--box", str(BOX), "--out", os.path.join(cls.folder, name + ".out"))
             assert (result.returncode, result.stderr) == (0, ""), result.stderr
 
@@ -166,7 +161,7 @@ class Boxes(unittest.TestCase):
     def test_without_masks(self):
         folder = runs.scratch()
         runs.run(runs.STARE, folder + "/run", duration=1)
-        result = export(folder + "/run", "--coco", folder + "/out")
+        result = call("export", folder + "/run", "--coco", folder + "/out")
         self.assertEqual(result.returncode, 0)
         self.assertIn("the run has no masks", result.stdout)
         with open(folder + "/out/annotations.json", encoding="utf-8") as file:
@@ -184,7 +179,7 @@ class Boxes(unittest.TestCase):
     def test_satnet_of_a_binned_part(self):
         """The same frames as SatNet has them: places as fractions of the image, field of view of a pixel, WCS."""
         made, out = self.folder + "/binned", runs.scratch() + "/set"
-        result = export(made, "--satnet", out, "--star-limit", str(LIMIT), "--box", "0")
+        result = call("export", made, "--satnet", out, "--star-limit", str(LIMIT), "--box", "0")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         with open(out + "/Annotations/binned.0001.json", encoding="utf-8") as file:
             data = json.load(file)["data"]
@@ -241,7 +236,7 @@ class Boxes(unittest.TestCase):
 
     def test_eight_bits_and_choice_of_frames(self):
         out = runs.scratch()
-        result = export(self.folder + "/binned", "--yolo", out + "/set", "--bits", "8", "--first",
+        result = call("export", self.folder + "/binned", "--yolo", out + "/set", "--bits", "8", "--first",
                         "2", "--last", "2")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         self.assertEqual(os.listdir(out + "/set/labels"), ["binned.0002.txt"])
@@ -254,7 +249,7 @@ class Boxes(unittest.TestCase):
     def test_no_truth(self):
         folder = runs.scratch()
         runs.run(runs.STARE, folder + "/run", "/record/truth=false", duration=1)
-        result = export(folder + "/run", "--coco", folder + "/out")
+        result = call("export", folder + "/run", "--coco", folder + "/out")
         self.assertEqual(result.returncode, 1)
         self.assertIn("holds no truth to label frames by", result.stderr)
 

@@ -11,6 +11,7 @@ import subprocess
 import unittest
 
 import runs
+from runs import call
 
 try:
     import jsonschema
@@ -21,11 +22,6 @@ SCENARIOS = sorted(set(glob.glob("scenarios/**/*.json", recursive=True)) -
                    set(glob.glob("scenarios/updates/*.json")) - set(glob.glob("scenarios/studies/*.json")) -
                    {"scenarios/boresight.schema.json", "scenarios/study.schema.json"})
 GIMBAL = runs.SENSOR + "/modules/gimbal"
-
-
-def call(*words, **options):
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120,
-                          **options)
 
 
 class Messages(unittest.TestCase):

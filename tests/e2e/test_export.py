@@ -17,21 +17,10 @@ import subprocess
 import unittest
 
 import runs
+from runs import call, export
 from readers import read_oem, read_png, read_tdm, seconds
 
 UTC_COLUMNS = {"mid_s", "time_s", "start_s"}
-
-
-def call(*words, **options):
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120,
-                          **options)
-
-
-def export(*words, **options):
-    result = call("export", *words, **options)
-    if (result.returncode, result.stderr) != (0, ""):
-        raise AssertionError(f"exit code {result.returncode}: {result.stderr}")
-    return result.stdout
 
 
 class Exported(unittest.TestCase):

@@ -14,6 +14,7 @@ import unittest
 
 import figures
 import runs
+from figure_checks import FigureChecks
 from test_report import Page
 
 CATALOGUE, GX5, EPOCH = "scenarios/catalogue_2022-06.tle", 44801, "2022-06-16T22:10:00Z"
@@ -23,17 +24,9 @@ ROUGH = (CAMERA + "/rotation_deg=37", CAMERA + "/boresight_offset_px=[40,-25]",
          CAMERA + "/pixel_scale_arcsec=2.5", "/record/detections_of=all")
 CLEAN = (CAMERA + "/rotation_deg=-110", CAMERA + "/pixel_scale_arcsec=4",
          runs.SENSOR + "/cue/offset_deg=0.3", "/record/detections_of=all")
-# exact but for the rounding of the recorded angles (1e-16 of a turn in degrees: 1e-11 px) and the
-# same formulae in another order
-EXACT = ("time_to_confirm_s", "time_to_acquire_s", "time_to_settle_s", "custody", "track_fraction",
-         "pointing_rms_px", "pointing_max_px", "pointing_bias_px", "detected_fraction",
-         "track_rms_px", "track_max_px")
-COUNTS = ("frames", "visible_frames", "breaks", "pointing_frames", "track_frames")
-PERCENTILES = ("pointing_median_px", "pointing_p95_px", "pointing_p99_px", "track_median_px",
-               "track_p95_px")
 
 
-class Figures(unittest.TestCase):
+class Figures(FigureChecks, unittest.TestCase):
     def play(self, rotation_deg, duration, seed, *sets):
         out = os.path.join(runs.scratch(), "run")
         summary = runs.run("scenarios/day_generator.json", out, *sets, duration=duration,
@@ -46,42 +39,6 @@ class Figures(unittest.TestCase):
         self.assertEqual(unclear, 0)
         self.nees = figures.nees(frames)
         return out, summary, mine
-
-    def compare(self, mine, summary):
-        for key in COUNTS:
-            self.assertEqual(mine[key], summary[key], key)
-        for key in EXACT:
-            self.assertAlmostEqual(mine[key], summary[key], delta=1e-8 + 1e-9 * mine[key], msg=key)
-        for key in PERCENTILES:  # nearest rank, from bins of 0.1 %
-            self.assertAlmostEqual(mine[key] / summary[key], 1, delta=0.00051, msg=key)
-
-    def read_page(self, out):
-        made = subprocess.run([runs.BORESIGHT, "report", out], capture_output=True, text=True,
-                              timeout=120)
-        self.assertEqual((made.returncode, made.stderr), (0, ""))
-        return Page(out + "/report.html")
-
-    def near(self, text, value, digits=3):
-        """A printed number, `digits` of which are shown."""
-        self.assertLessEqual(abs(float(text) - value),
-                             0.51 * 10 ** (math.floor(math.log10(abs(value))) + 1 - digits), text)
-
-    def check_page(self, page, mine):
-        """Cards and captions say the same, and it is that."""
-        cards = page.cards()
-        self.near(cards["custody"], 100 * mine["custody"], 4)
-        self.near(cards["time to acquire"], mine["time_to_acquire_s"], 4)
-        self.near(cards["pointing RMS"], mine["pointing_rms_px"])
-        pointing = re.search(r"In the (\d+) frames in mode track with the visible target, from "
-                             r"settling on: RMS ([\d.]+), .*? largest ([\d.]+) px", page.text)
-        self.assertEqual(int(pointing[1]), mine["pointing_frames"])
-        self.assertEqual(pointing[2], cards["pointing RMS"].strip())
-        self.near(pointing[3], mine["pointing_max_px"])
-        track = re.search(r"In the (\d+) processed frames with the target in the field and in "
-                          r"track: RMS ([\d.]+), .*? largest ([\d.]+) px", page.text)
-        self.assertEqual(int(track[1]), mine["track_frames"])
-        self.near(track[2], mine["track_rms_px"])
-        self.near(track[3], mine["track_max_px"])
 
     def test_rough(self):
         out, summary, mine = self.play(37, 4500, 7, *ROUGH)

@@ -6,24 +6,12 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_film.py BORESIG
 import os
 import shutil
 import struct
-import subprocess
 import sys
 import unittest
 
 import runs
+from runs import call, export
 from readers import read_boxes
-
-
-def call(*words, **options):
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120,
-                          **options)
-
-
-def export(*words, **options):
-    result = call("export", *words, **options)
-    if (result.returncode, result.stderr) != (0, ""):
-        raise AssertionError(f"exit code {result.returncode}: {result.stderr}")
-    return result.stdout
 
 
 class Film(unittest.TestCase):

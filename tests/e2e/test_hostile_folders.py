@@ -9,18 +9,13 @@ import os
 import re
 import shutil
 import sqlite3
-import subprocess
 import unittest
 
 import runs
+from runs import call
 
 TABLES = ("--table", "csv", "--tables", "frames")
 FRAMES = ("--frames", "png")
-
-
-def call(*words, **options):
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=60,
-                          **options)
 
 
 def put(name, content):

@@ -13,11 +13,7 @@ import time
 import unittest
 
 import runs
-
-
-def call(*words, **options):
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120,
-                          **options)
+from runs import call
 
 
 def fingerprint(folder):

@@ -48,7 +48,7 @@ class Keys(unittest.TestCase):
         address = f"tcp://127.0.0.1:{free_port()}"
         run = start_run(runs.TRACK, runs.scratch() + "/run", address, "control", "--link-keys",
                         self.keys, duration=3)
-        peer = serve(runs.TRACK, address, "control", "--link-keys", self.keys, "--duration", "3")
+        peer = serve(runs.TRACK, address, "control", "--link-keys", self.keys, duration=3)
         ended(run)
         ended(peer)
         address = ipc()

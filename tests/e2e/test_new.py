@@ -8,7 +8,6 @@ import json
 import os
 import random
 import shutil
-import subprocess
 import sys
 import unittest
 from concurrent.futures import ThreadPoolExecutor
@@ -34,8 +33,7 @@ def numbers():
 
 def call(*words):
     # without the full star catalogue, whether or not it is there: the harder case
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, check=False,
-                          env=dict(os.environ, XDG_DATA_HOME=EMPTY))
+    return runs.call(*words, env=dict(os.environ, XDG_DATA_HOME=EMPTY))
 
 
 def follow(folder, index, pair, *options):

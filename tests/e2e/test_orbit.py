@@ -6,17 +6,13 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_orbit.py BORESI
 import json
 import math
 import os
-import subprocess
 import unittest
 
 import numpy as np
 
 import runs
+from runs import call
 from readers import read_oem, read_tdm, seconds
-
-
-def call(*words):
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120)
 
 
 class Orbit(unittest.TestCase):

@@ -14,7 +14,6 @@ sets and as integrated orbits, by the generator and by images.
 import json
 import os
 import shutil
-import subprocess
 import sys
 import unittest
 
@@ -49,7 +48,7 @@ def settings(name, integrated):
 
 
 def call(*words):
-    result = subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=600)
+    result = runs.call(*words, timeout=600)
     if result.returncode:
         raise AssertionError(result.stderr)
     return result.stdout

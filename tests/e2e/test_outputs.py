@@ -8,15 +8,10 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import unittest
 
 import runs
-
-
-def call(*words, **options):
-    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120,
-                          **options)
+from runs import call
 
 
 class Outputs(unittest.TestCase):
@@ -30,7 +25,7 @@ class Outputs(unittest.TestCase):
                            "2022-06-16T22:00:00Z", "--stop", "2022-06-16T22:00:00Z", "--step", "1"],
              "calframes": ["{scenario}", "--bias", "1", "--dark", "0", "--flat", "0"],
              "link-keys": [],
-             "calibrate-obsgen": ["{scenario}", "--check", "--seeds", "1"], "bench": ["crc32c"],
+             "calibrate-obsgen": ["{scenario}", "--check", "--seeds", "1"], "bench": ["crc32c", "--curve"],
              "new": ["--observer-tle", "{elements}"],
              "study": ["{study}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read

@@ -6,7 +6,6 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_pd.py BORESIGHT
 import json
 import os
 import statistics
-import subprocess
 import unittest
 
 import numpy as np
@@ -17,8 +16,7 @@ NORMAL = statistics.NormalDist()
 
 
 def pd(*words, scenario=runs.STARE):
-    return subprocess.run([runs.BORESIGHT, "pd", scenario, *words], capture_output=True, text=True,
-                          timeout=600)
+    return runs.call("pd", scenario, *words, timeout=600)
 
 
 class Measured(unittest.TestCase):

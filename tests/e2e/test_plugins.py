@@ -64,8 +64,7 @@ class Plugins(unittest.TestCase):
              "-o", path[:-1] + "so"], stderr=subprocess.PIPE, text=True)
 
     def call(self, *words, code=0, **options):
-        result = subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True,
-                                timeout=120, cwd=self.work, **options)
+        result = runs.call(*words, cwd=self.work, **options)
         self.assertEqual(result.returncode, code, result.stderr)
         return result.stdout if code == 0 else result.stderr
 

@@ -10,7 +10,6 @@ intervals lie inside their margins (docs/user_guide.md, "Without images"), and f
 is further off than the known differences.
 """
 import json
-import os
 import subprocess
 import sys
 import unittest

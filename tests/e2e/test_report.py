@@ -37,8 +37,7 @@ CHARTS = ["Timeline of the mode of control", "Distance from the boresight to the
 
 
 def report(run, *words):
-    return subprocess.run([runs.BORESIGHT, "report", run, *words], capture_output=True, text=True,
-                          timeout=120)
+    return runs.call("report", run, *words)
 
 
 class Page(HTMLParser):

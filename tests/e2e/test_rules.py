@@ -14,6 +14,9 @@ MODULES = runs.SENSOR + "/modules"
 CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
          ("element_age", '/epoch_utc="2022-08-16T22:10:00Z"', "2 of 2 element sets of observers and listed objects are more than 14 days"),
          ("earth_orientation", '/epoch_utc="2030-06-16T22:10:00Z"', "/world/earth_orientation"),
+         ("burns", '/world/objects/0/burns=[{"time_s": 300, "dv_rtn_mps": [0, 1, 0]}]',
+          "/world/objects/0/burns/0/time_s: the burn at 300 s is after the run's end at 300 s"),
+         ("lost_frames", runs.SENSOR + "/exposure/dropped_fraction=1", "1 loses every frame"),
          ("modules", MODULES + "={}", "nothing is seen or recorded"),
          ("exposure_period", runs.SENSOR + "/exposure/exposure_s=2", "longer than the period_s of 1 s"),
          ("wide_field", runs.SENSOR + "/camera/pixel_scale_arcsec=300", "diagonal is 93 degrees"),
@@ -29,7 +32,7 @@ CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
 
 
 def check(*words):
-    return subprocess.run([runs.BORESIGHT, "check", *words], capture_output=True, text=True, check=False)
+    return runs.call("check", *words)
 
 
 class Rules(unittest.TestCase):

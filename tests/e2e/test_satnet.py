@@ -6,7 +6,6 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_satnet.py BORES
 import glob
 import json
 import os
-import subprocess
 import unittest
 
 import numpy as np
@@ -14,6 +13,7 @@ from astropy.io import fits
 from astropy.wcs import WCS
 
 import runs
+from runs import call
 
 SCENARIO = "scenarios/frame_by_frame.json"
 # keys of satsim/io/satnet.py, github.com/ssc-ai/satsim
@@ -26,11 +26,6 @@ OBJECT_KEYS = {
 
 def tearDownModule():
     runs.clean()
-
-
-def export(*words):
-    return subprocess.run([runs.BORESIGHT, "export", *words], capture_output=True, text=True,
-                          timeout=120, check=False)
 
 
 def annotations(folder):
@@ -48,14 +43,14 @@ class SatNet(unittest.TestCase):
         cls.made, cls.out = os.path.join(folder, "fly"), os.path.join(folder, "set")
         runs.run(SCENARIO, cls.made, '/record/planes=["segmentation"]',
                  "/world/faint_stars=statistical")
-        result = export(cls.made, "--satnet", cls.out, "--star-limit", "13", "--split", "80,10,10")
+        result = call("export", cls.made, "--satnet", cls.out, "--star-limit", "13", "--split", "80,10,10")
         assert (result.returncode, result.stderr) == (0, ""), result.stderr
 
     def test_in_the_folder_of_out(self):
         folder = runs.scratch()
         for words, where in ((("--satnet", "set", "--out", folder + "/a"), "a/set"),
                              (("--satnet", folder + "/b", "--out", folder + "/c"), "b")):
-            result = export(self.made, "--last", "0", *words)
+            result = call("export", self.made, "--last", "0", *words)
             self.assertEqual((result.returncode, result.stderr), (0, ""))
             self.assertEqual(os.listdir(os.path.join(folder, where, "ImageFiles")),
                              ["fly.0000.fits"])
@@ -143,11 +138,11 @@ class SatNet(unittest.TestCase):
         whole = parts(self.out)
         self.assertEqual(len(whole), 8)
         some = os.path.join(runs.scratch(), "some")
-        self.assertEqual(export(self.made, "--satnet", some, "--split", "80,10,10", "--first", "1",
+        self.assertEqual(call("export", self.made, "--satnet", some, "--split", "80,10,10", "--first", "1",
                                 "--every", "3").returncode, 0)
         self.assertEqual(parts(some), {k: whole[k] for k in parts(some)})
         self.assertEqual(len(parts(some)), 3)
-        self.assertEqual(export(self.made, "--satnet", some, "--split", "0,0,1").returncode, 0)
+        self.assertEqual(call("export", self.made, "--satnet", some, "--split", "0,0,1").returncode, 0)
         self.assertEqual(set(parts(some).values()), {"test"})
 
     def test_cube_of_a_window_and_boxes(self):
@@ -156,7 +151,7 @@ class SatNet(unittest.TestCase):
         runs.run(runs.STARE, made, "/record/frames=cube", f"{runs.SENSOR}/modules=" + json.dumps(
             {"gimbal": {"type": "ideal", "object": "INMARSAT GX5"},
              "scenegen": {"type": "opencl"}}), duration=3)
-        self.assertEqual(export(made, "--satnet", out, "--box", "0").returncode, 0)
+        self.assertEqual(call("export", made, "--satnet", out, "--box", "0").returncode, 0)
         found = annotations(out)
         with fits.open(made + "/frames.fits") as hdus:
             self.assertEqual(len(found), len(hdus[0].data))
@@ -171,12 +166,12 @@ class SatNet(unittest.TestCase):
         for words in (("--split", "80,10,10"), ("--satnet", "x", "--split", "80,10"),
                       ("--satnet", "x", "--split", "0,0,0"), ("--satnet", "x", "--split", "-1,1,1"),
                       ("--satnet", "x", "--box", "-1")):
-            result = export(self.made, *words)
+            result = call("export", self.made, *words)
             self.assertEqual(result.returncode, 2, words)
             self.assertIn(words[-2], result.stderr)
         blind = os.path.join(runs.scratch(), "blind")
         runs.run(SCENARIO, blind, "/record/truth=false", duration=1)
-        result = export(blind, "--satnet", blind + ".set")
+        result = call("export", blind, "--satnet", blind + ".set")
         self.assertEqual(result.returncode, 1)
         self.assertIn("/record/truth=true", result.stderr)
 

@@ -7,7 +7,6 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_skewed_exports.
 import csv
 import json
 import os
-import subprocess
 import unittest
 
 import numpy as np
@@ -15,18 +14,12 @@ import numpy as np
 import figures
 import optics
 import runs
+from runs import call_well
 from optics import ARCSEC, angle, columns, quaternion, rotate, unit
 from readers import read_oem, read_png, read_tdm, seconds
 from skewed_scene import DURATION_S, ELEMENTS, EXPOSURE_S, NAV_GROWTH_MPS, NAV_RTN_M, NAV_RTN_MPS, NORAD, OBSERVER, scenario
 
 SHARED_MOTION_M = 0.5  # what two SGP4s and two rotations to GCRF differ by
-
-
-def call(*words):
-    result = subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120, check=False)
-    if (result.returncode, result.stderr) != (0, ""):
-        raise AssertionError(f"{words}: exit code {result.returncode}: {result.stderr}")
-    return result.stdout
 
 
 class SkewedExports(unittest.TestCase):
@@ -38,7 +31,7 @@ class SkewedExports(unittest.TestCase):
         for words in (("--orbits", "czml", "--step", "3"), ("--orbits", "oem", "--step", "3"), ("--observations", "json"),
                       ("--observations", "csv"), ("--observations", "tdm"),
                       ("--frames", "png", "--annotate", "--first", "30", "--last", "30", "--size", "320")):
-            call("export", cls.made, *words, "--out", cls.out)
+            call_well("export", cls.made, *words, "--out", cls.out)
         cls.db = runs.database(cls.made)
         cls.epoch = cls.db.execute("SELECT epoch_utc FROM run").fetchone()[0]
         with open(os.path.join(cls.made, "scenario.json"), encoding="utf-8") as file:

@@ -45,8 +45,7 @@ def write(folder, **changes):
 
 
 def study(*words, **options):
-    return subprocess.run([runs.BORESIGHT, "study", *words], capture_output=True, text=True,
-                          timeout=900, **options)
+    return runs.call("study", *words, timeout=900, **options)
 
 
 def tables(out):

@@ -39,6 +39,8 @@ import sys
 import tempfile
 import time
 
+import e2e_suite
+
 FOLDERS = ["sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
 # folders whose tests have names of their own: the rest of a path names its tests (tracker/… → tracker_…)
 UNIT_TESTS = {"sim/app": "app|bad_input", "sim/core": "core", "sim/astro": "astro", "sim/world": "world", "sim/io": "io",
@@ -221,7 +223,7 @@ class Tree:
     def tests_for(self, path, suite):
         """Names of the tests that judge a file: those of its folder, or those of the program."""
         if suite == "e2e":
-            names = [n for n, (labels, _, _) in self.tests.items() if "e2e" in labels]
+            return e2e_suite.concerned(path, [n for n, (labels, _, _) in self.tests.items() if "e2e" in labels])
         else:
             folder = os.path.dirname(path)
             prefix = UNIT_TESTS.get(folder, folder.split("/")[0])
