@@ -54,7 +54,9 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     }
     g->response = bst_response_widened(&response, straighten(g));
     g->widening = mean_width(&g->response.source) / mean_width(&response.source);
+    g->known_width = mean_width(&g->response.filter) / mean_width(&response.source);
     g->cross_sigma = mean_width(&g->response.both);
+    g->bias_sigma = mean_width(&response.both);
     g->filter_sigma = mean_width(&g->response.filter);
     /* a place is known by the image's gradient */
     double ratio = g->response.maxima_sigma_px / g->filter_sigma;

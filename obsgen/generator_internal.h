@@ -45,6 +45,11 @@ typedef struct generator_blend {
 /* Half pixels of the longest streak that is filtered for. */
 enum { GENERATOR_STEPS = 258 };
 
+/* Lights that the bias of stars is made for: decades of the brightest pixel over the noise's
+ * variance. */
+enum { GENERATOR_BIASES = 6 };
+#define GENERATOR_FIRST_LIGHT 0.1
+
 struct bst_generator {
     const bst_camera *camera;
     double electrons_per_s_v0; /* onboard zero point */
@@ -68,6 +73,7 @@ struct bst_generator {
         fit_light; /* brightest pixel over the noise's variance, per sqrt(sum p^2) and electron */
     bst_path_px straight_path; /* nearest to the true one */
     double widening;           /* width of the images over the PSF's: the path is not straight */
+    double known_width;        /* width of the filters' images over the PSF's */
     double place_ratio2;       /* variance of a place over that of a Gaussian of the PSF's
                                               noise-equivalent             area */
     double norm_ratio[2];      /* sqrt(sum p^2) of the filters' images over the bound's */
@@ -100,7 +106,9 @@ struct bst_generator {
     double route_box[4];    /* least and greatest x, least and greatest y */
     bst_path_px whole_path; /* from its start to its end */
     struct generator_streaks *streaks;
-    double star_bias[2], object_bias[2]; /* of fits, by how the camera really moved */
+    /* of fits, by how the camera really moved, and by their light */
+    double star_bias[GENERATOR_BIASES][2];
+    double bias_sigma; /* bst_route_point_bias */
     bst_generated *items;
     int count, lost;
 };

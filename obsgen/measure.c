@@ -5,18 +5,20 @@
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* From here on extents and a source's own streak are measured. */
 static const double MOMENTS_SNR = 10.0;
-/* Image processing fits a bright source's width with its place, and takes what the bright ones are
- * wider than the PSF for all, up to this share of its variance. */
-static const double WIDTH_FIT_SNR = 20.0, MOST_WIDENING = 0.5;
 /* Errors do not grow further with what of a source is off the frame. */
 static const double LEAST_SEEN = 0.02;
 
 /* Where fits land in the mean: stars share what the camera's motion does to them, and an object
  * that moved otherwise has its own. */
-static void shared_bias(const bst_generator *g, const generator_source *s, double bias[2]) {
-    bias[0] = g->star_bias[0];
-    bias[1] = g->star_bias[1];
+static void shared_bias(const bst_generator *g, const generator_source *s, double light,
+                        double bias[2]) {
     if (s->star || s->broken || g->path.count < 3) {
+        double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
+        at = fmin(at, GENERATOR_BIASES - 1.001);
+        int i = (int)at;
+        for (int k = 0; k < 2; k++) {
+            bias[k] = g->star_bias[i][k] + (at - i) * (g->star_bias[i + 1][k] - g->star_bias[i][k]);
+        }
         return;
     }
     const bst_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
@@ -27,20 +29,23 @@ static void shared_bias(const bst_generator *g, const generator_source *s, doubl
         g->object_y[k] = g->path_y[k] + u * dy;
     }
     const bst_route_path path = {g->object_x, g->object_y, g->path.count};
-    const bst_path_px model = s->as_streak ? g->star_path : (bst_path_px){0.0, 0.0};
-    bst_route_bias(&path, model.dx, model.dy, s->as_streak ? g->bend_x : 0.0,
-                   s->as_streak ? g->bend_y : 0.0, g->total_sigma, bias);
+    bias[0] = bias[1] = 0.0;
+    if (s->as_streak) {
+        bst_route_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                       g->total_sigma, bias);
+    } else {
+        bst_route_point_bias(&path, &g->blend_weights, light, g->bias_sigma, bias);
+    }
 }
 
-/* Deviation of a place that is fitted with another width than the image's, over that with its own:
- * sum (q')^2 sum (p')^2 over (sum p' q')^2, of Gaussians at rest. */
-static double misfit(const bst_generator *g, double snr) {
+/* Deviation of a place that is fitted with the gradient of another width than the image's, over
+ * that with its own: sum (q')^2 sum (p')^2 over (sum p' q')^2, of Gaussians at rest. The width that
+ * image processing measures is in the model, but not in its gradient. */
+static double misfit(const bst_generator *g) {
     const bst_image_width *p = &g->response.source, *q = &g->response.filter;
     double image = p->across_px * p->along_px, model = q->across_px * q->along_px;
     double both = g->cross_sigma * g->cross_sigma / sqrt(image * model);
-    bool fitted =
-        snr > WIDTH_FIT_SNR || fabs(image - model) < MOST_WIDENING * fmax(model - 1.0 / 12.0, 0.0);
-    return fitted ? 1.0 : both * both;
+    return both * both;
 }
 
 /* Place with error and covariance, along and across the path. */
@@ -59,17 +64,17 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double widen_along =
         b->widen * g->place_ratio2 / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen * g->place_ratio2 / fmax(s->visible, LEAST_SEEN);
-    double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
-    double open = b->drawn ? 0.0 : worse * misfit(g, snr);
-    error[0] *= length > 1.0 ? 1.0 : g->widening;
-    error[1] *= g->widening;
+    /* what of `sharp` is not the wider image, which `truth` is for: the background's place */
+    double sharp = s->sharp * bst_bound_norm(&g->bound, s->length) / truth->norm;
+    double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
+    double open = b->drawn ? 0.0 : worse * misfit(g);
     error[0] *= along * open * b->flat * sqrt(truth->var_along_px2 * widen_along);
     error[1] *= across * open * sqrt(truth->var_across_px2 * widen_across);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
     double bias = cal->phase_bias_px / g->binning, shared[2];
-    shared_bias(g, s, shared);
+    shared_bias(g, s, b->flux_e * truth->norm * g->fit_light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
     double scale = g->binning, a2 = told->var_along_px2 * widen_along * scale * scale,
@@ -125,8 +130,9 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
             : bst_matched_product(s->path, (bst_path_px){0, 0}, g->total_sigma) /
                   bst_matched_product((bst_path_px){0, 0}, (bst_path_px){0, 0}, g->total_sigma);
     double flux = b->flux_e * caught;
-    bst_bound_at truth = bst_bound_of(&g->bound, b->flux_e, g->noise_e, s->length);
-    bst_bound_at fitted = bst_bound_of(&g->bound, flux, g->noise_e, length);
+    /* errors are those of the image; what is said of them, those of the PSF that is known */
+    bst_bound_at truth = bst_bound_wider(&g->bound, b->flux_e, g->noise_e, s->length, g->widening);
+    bst_bound_at fitted = bst_bound_wider(&g->bound, flux, g->noise_e, length, g->known_width);
     /* flux goes with the peak that was detected: nearly the same filter on the same noise */
     const double together = 0.95;
     double noise = together * s->noise +
@@ -136,9 +142,10 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     if (b->drawn) {
         d.flux_e = b->snr * g->noise_e / fitted.norm;
     }
-    bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
+    bst_bound_at told = bst_bound_wider(&g->bound, d.flux_e, g->noise_e, length, g->known_width);
     d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
-    d.snr = d.flux_e * told.norm * g->norm_ratio[own && s->as_streak] / g->noise_e;
+    d.snr = d.flux_e * bst_bound_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak] /
+            g->noise_e;
     measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);
