@@ -78,6 +78,7 @@ struct bst_generator {
                                               noise-equivalent             area */
     double norm_ratio[2];      /* sqrt(sum p^2) of the filters' images over the bound's */
     bst_bound bound;
+    const bst_bound *image_bound, *onboard_bound; /* of the frame; NULL: from `bound` */
     bst_blend_weights blend_weights;
     bst_path_px star_path;
     double bend_x, bend_y;
@@ -107,7 +108,7 @@ struct bst_generator {
     bst_path_px whole_path; /* from its start to its end */
     struct generator_streaks *streaks;
     /* of fits, by how the camera really moved, and by their light */
-    double star_bias[GENERATOR_BIASES][2];
+    double star_bias[GENERATOR_BIASES][2], streak_bias[2];
     double bias_sigma; /* bst_route_point_bias */
     bst_generated *items;
     int count, lost;
@@ -134,6 +135,10 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
 void bst_generator_decide(bst_generator *g);
 /* What is seen in source number i and fitted beside it. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i);
+/* Whether a point fits a star better in its noise than the stars' streak, where the place is not
+ * drawn from the filters' outputs. */
+bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
+                              const generator_blend *b);
 /* The detection of a source that was found. */
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
                                     const generator_blend *b);
@@ -141,7 +146,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
 
 /* Draws of one source. */
-enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_DRAWS = 8 };
+enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_SHAPE, GENERATOR_DRAWS = 8 };
 
 /* Takes a maximum of the filter's output that is not fitted, at its top (x, y), pixels that are
  * read. item: of the truth, or -1. */

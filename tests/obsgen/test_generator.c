@@ -179,6 +179,57 @@ static void errors_and_statements_have_their_own_width(void **state) {
     }
 }
 
+/* SNR of the filter for a point over that of the streak's own, by sums over fine pixels. */
+static double point_share(double sigma, double length) {
+    enum { SUB = 4, REACH = 8 * SUB, PARTS = 40 };
+    double both = 0.0, own = 0.0, point = 0.0, s2 = sigma * sigma + 1.0 / 12.0;
+    for (int i = -REACH; i <= REACH; i++) { /* across the streak both are the same */
+        double x = (double)i / SUB, p = exp(-0.5 * x * x / s2), q = 0.0;
+        for (int k = 0; k < PARTS; k++) {
+            double d = x - length * ((k + 0.5) / PARTS - 0.5);
+            q += exp(-0.5 * d * d / s2) / PARTS;
+        }
+        both += p * q;
+        own += q * q;
+        point += p * p;
+    }
+    return both / sqrt(own * point);
+}
+
+/* Noise decides whether a point fits a short streak better: the difference of the squares is that
+ * of two filters' outputs, normal with 2 (1 - rho) for outputs of correlation rho. */
+static void short_streaks_may_be_points(void **state) {
+    (void)state;
+    const double length = 2.0, snrs[] = {12.0, 20.0, 40.0};
+    scene s;
+    open_scene(&s);
+    s.frame.streak_dx_px = length;
+    start(&s);
+    double rho = point_share(s.frame.sigma_px, length);
+    for (int k = 0; k < 3; k++) {
+        fill(&s, snrs[k]);
+        for (int i = 0; i < s.truth->count; i++) {
+            s.truth->items[i].x_start_px -= 0.5 * length;
+            s.truth->items[i].x_end_px += 0.5 * length;
+        }
+        double points = 0.0, all = 0.0, snr = 0.0;
+        for (int n = 0; n < 3; n++) {
+            bst_generator_result r = run(&s, 10 * k + n);
+            for (int i = 0; i < r.count; i++) {
+                points += !(r.items[i].detection.flags & BST_DETECTION_STREAK);
+                snr += r.items[i].detection.snr;
+                all += 1.0;
+            }
+        }
+        assert_true(all > 2600.0);
+        double asked = 0.5 * erfc(snr / all * sqrt(0.5 * (1.0 - rho)) / sqrt(2.0));
+        /* 2700 draws: 0.009; the mean SNR for each one's */
+        bst_assert_close(points / all, asked, 0.03);
+        assert_true(k > 0 || asked > 0.1);
+    }
+    close_scene(&s);
+}
+
 static void the_phase_bias_is_as_stated(void **state) {
     (void)state;
     scene s;
@@ -464,6 +515,7 @@ int main(void) {
         cmocka_unit_test(detection_follows_the_ideal_law),
         cmocka_unit_test(places_scatter_by_the_bound),
         cmocka_unit_test(errors_and_statements_have_their_own_width),
+        cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(the_phase_bias_is_as_stated),
         cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
         cmocka_unit_test(draws_depend_on_names_alone),
