@@ -38,10 +38,25 @@ void bst_blend_weights_init(bst_blend_weights *out) {
     }
 }
 
+/* Where a light is between the rows of the table. */
+static double row_of(double light) {
+    double row = (log10(fmax(light, 1e-30)) - FIRST_LIGHT) * PER_DECADE;
+    return fmin(fmax(row, 0.0), BST_BLEND_LIGHTS - 1.001);
+}
+
+void bst_blend_weight_row(const bst_blend_weights *w, double light,
+                          float row[BST_BLEND_DISTANCES]) {
+    double bright = row_of(light);
+    int l = (int)bright;
+    float part = (float)(bright - l);
+    for (int k = 0; k < BST_BLEND_DISTANCES; k++) {
+        row[k] = w->weight[l][k] + part * (w->weight[l + 1][k] - w->weight[l][k]);
+    }
+}
+
 double bst_blend_weight(const bst_blend_weights *w, double light, double overlap) {
     double far = 2.0 * PER_SIGMA * sqrt(-log(fmin(fmax(overlap, 1e-30), 1.0)));
-    double bright = (log10(fmax(light, 1e-30)) - FIRST_LIGHT) * PER_DECADE;
-    bright = fmin(fmax(bright, 0.0), BST_BLEND_LIGHTS - 1.001);
+    double bright = row_of(light);
     if (far >= BST_BLEND_DISTANCES - 1) {
         return 0.0;
     }

@@ -24,4 +24,8 @@ void bst_blend_weights_init(bst_blend_weights *weights);
  * unit sigma: w(d) ~ (1/d) integral of x p(x - d) p(x) / (1 + R p(x) / p(0)). */
 double bst_blend_weight(const bst_blend_weights *weights, double light, double overlap);
 
+/* The weights for one light at distances of 0, 0.5, 1, ... sigma, relative to that at 0. */
+void bst_blend_weight_row(const bst_blend_weights *weights, double light,
+                          float row[BST_BLEND_DISTANCES]);
+
 #endif

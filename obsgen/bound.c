@@ -155,3 +155,13 @@ bst_bound_at bst_bound_of(const bst_bound *b, double flux_e, double noise_e, dou
     out.norm = bst_bound_norm(b, length_px);
     return out;
 }
+
+bst_bound_at bst_bound_wider(const bst_bound *bound, double flux_e, double noise_e,
+                             double length_px, double wider) {
+    /* in pixels that are as much larger, with the noise of as many more of them */
+    bst_bound_at b = bst_bound_of(bound, flux_e, noise_e * wider, length_px / wider);
+    b.var_along_px2 *= wider * wider;
+    b.var_across_px2 *= wider * wider;
+    b.norm /= wider;
+    return b;
+}

@@ -28,6 +28,10 @@ typedef struct bst_bound_at {
 
 /* flux_e > 0, noise_e > 0 (sqrt v). */
 bst_bound_at bst_bound_of(const bst_bound *bound, double flux_e, double noise_e, double length_px);
+/* The same for a Gaussian that is `wider` times as wide as the tables', with the pixel's own width:
+ * lengths in units of it, a pixel small beside it. */
+bst_bound_at bst_bound_wider(const bst_bound *bound, double flux_e, double noise_e,
+                             double length_px, double wider);
 /* Only `norm`. */
 double bst_bound_norm(const bst_bound *bound, double length_px);
 

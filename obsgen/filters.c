@@ -54,11 +54,15 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     }
     g->response = bst_response_widened(&response, straighten(g));
     g->widening = mean_width(&g->response.source) / mean_width(&response.source);
+    g->known_width = mean_width(&g->response.filter) / mean_width(&response.source);
     g->cross_sigma = mean_width(&g->response.both);
+    g->bias_sigma = mean_width(&response.both);
     g->filter_sigma = mean_width(&g->response.filter);
     /* a place is known by the image's gradient */
     double ratio = g->response.maxima_sigma_px / g->filter_sigma;
-    g->place_ratio2 = ratio * ratio;
+    g->image_bound = f->image_bound;
+    g->onboard_bound = f->onboard_bound;
+    g->place_ratio2 = g->image_bound && g->onboard_bound ? 1.0 : ratio * ratio;
     const bst_path_px rest = {0.0, 0.0}, paths[2] = {rest, g->star_path};
     for (int k = 0; k < (g->streak > 0.0 ? 2 : 1); k++) {
         g->filters[k] = (bst_generator_filter){

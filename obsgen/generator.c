@@ -210,7 +210,9 @@ static void respond(const bst_generator *g, generator_source *s) {
             efficiency = fmax(other, efficiency);
         }
     }
-    if (g->response.source.across_px != g->response.source.along_px) {
+    if (g->image_bound) {
+        ideal *= bst_bound_norm(g->image_bound, s->length) / bst_bound_norm(&g->bound, s->length);
+    } else if (g->response.source.across_px != g->response.source.along_px) {
         ideal *= bst_response_norm_ratio(&g->response, s->length);
     }
     /* noise lifts the greatest output near a source the more, the flatter the image makes its top
@@ -331,15 +333,11 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
     g->path = (bst_route_path){g->path_x, g->path_y, count};
     g->whole_path =
         (bst_path_px){g->path_x[count - 1] - g->path_x[0], g->path_y[count - 1] - g->path_y[0]};
-    g->star_bias[0] = g->star_bias[1] = 0.0;
+    memset(g->star_bias, 0, sizeof g->star_bias);
+    memset(g->streak_bias, 0, sizeof g->streak_bias);
     g->route_count = 0;
     g->route_top = 0.0;
     if (!g->smeared) {
-        if (known) {
-            bool drawn = g->streak > 0.0;
-            bst_route_bias(&g->path, g->star_path.dx, g->star_path.dy, drawn ? g->bend_x : 0.0,
-                           drawn ? g->bend_y : 0.0, g->total_sigma, g->star_bias);
-        }
         return BST_OK;
     }
     if (!g->route) {
@@ -362,6 +360,24 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
         box[3] = fmax(box[3], n->y);
     }
     return BST_OK;
+}
+
+/* The stars' bias as streaks, and for each of the lights as points. */
+static void set_star_bias(bst_generator *g) {
+    if (g->smeared || g->path.count < 3) {
+        return;
+    }
+    if (g->streak > 0.0) {
+        bst_route_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                       g->total_sigma, g->streak_bias);
+    }
+    double light = GENERATOR_FIRST_LIGHT;
+    for (int i = 0; i < GENERATOR_BIASES; i++, light *= 10.0) {
+        if (i > 0) {
+            memcpy(g->star_bias[i], g->star_bias[i - 1], sizeof g->star_bias[0]);
+        }
+        bst_route_point_bias(&g->path, &g->blend_weights, light, g->bias_sigma, g->star_bias[i]);
+    }
 }
 
 static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
@@ -389,6 +405,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     bst_generator_set_response(g, f);
     BST_TRY(set_path(ctx, g, f));
     bst_generator_set_response(g, f); /* with the path */
+    set_star_bias(g);
     return BST_OK;
 }
 
@@ -500,6 +517,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             keep_whole_rough(g, i);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
+            b.point = b.point || bst_generator_fits_point(g, s, &b);
             bst_generated item = {.detection = bst_generator_measure(g, s, &b),
                                   .item = s->item,
                                   .drawn = s->as_streak && !b.point};

@@ -51,6 +51,9 @@ typedef struct bst_generator_frame {
     double sigma_px; /* of the Gaussian of the true PSF's noise-equivalent area, without the pixel's
                         width; sensor px */
     const bst_response *response; /* of the filter to that PSF; NULL: both are Gaussians */
+    /* of images at rest with that PSF, and with the onboard one with its jitter, where `response`
+     * is given; NULL: of Gaussians with the width of its gradient */
+    const bst_bound *image_bound, *onboard_bound;
     /* path of the stars in the middle of the window and its bend (bst_motion_bend) as image
      * processing takes them from telemetry, sensor px */
     double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;

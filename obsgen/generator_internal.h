@@ -45,6 +45,11 @@ typedef struct generator_blend {
 /* Half pixels of the longest streak that is filtered for. */
 enum { GENERATOR_STEPS = 258 };
 
+/* Lights that the bias of stars is made for: decades of the brightest pixel over the noise's
+ * variance. */
+enum { GENERATOR_BIASES = 6 };
+#define GENERATOR_FIRST_LIGHT 0.1
+
 struct bst_generator {
     const bst_camera *camera;
     double electrons_per_s_v0; /* onboard zero point */
@@ -68,10 +73,12 @@ struct bst_generator {
         fit_light; /* brightest pixel over the noise's variance, per sqrt(sum p^2) and electron */
     bst_path_px straight_path; /* nearest to the true one */
     double widening;           /* width of the images over the PSF's: the path is not straight */
+    double known_width;        /* width of the filters' images over the PSF's */
     double place_ratio2;       /* variance of a place over that of a Gaussian of the PSF's
                                               noise-equivalent             area */
     double norm_ratio[2];      /* sqrt(sum p^2) of the filters' images over the bound's */
     bst_bound bound;
+    const bst_bound *image_bound, *onboard_bound; /* of the frame; NULL: from `bound` */
     bst_blend_weights blend_weights;
     bst_path_px star_path;
     double bend_x, bend_y;
@@ -100,7 +107,9 @@ struct bst_generator {
     double route_box[4];    /* least and greatest x, least and greatest y */
     bst_path_px whole_path; /* from its start to its end */
     struct generator_streaks *streaks;
-    double star_bias[2], object_bias[2]; /* of fits, by how the camera really moved */
+    /* of fits, by how the camera really moved, and by their light */
+    double star_bias[GENERATOR_BIASES][2], streak_bias[2];
+    double bias_sigma; /* bst_route_point_bias */
     bst_generated *items;
     int count, lost;
 };
@@ -126,6 +135,10 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
 void bst_generator_decide(bst_generator *g);
 /* What is seen in source number i and fitted beside it. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i);
+/* Whether a point fits a star better in its noise than the stars' streak, where the place is not
+ * drawn from the filters' outputs. */
+bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
+                              const generator_blend *b);
 /* The detection of a source that was found. */
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
                                     const generator_blend *b);
@@ -133,7 +146,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
 
 /* Draws of one source. */
-enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_DRAWS = 8 };
+enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_SHAPE, GENERATOR_DRAWS = 8 };
 
 /* Takes a maximum of the filter's output that is not fitted, at its top (x, y), pixels that are
  * read. item: of the truth, or -1. */

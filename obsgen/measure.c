@@ -5,18 +5,26 @@
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* From here on extents and a source's own streak are measured. */
 static const double MOMENTS_SNR = 10.0;
-/* Image processing fits a bright source's width with its place, and takes what the bright ones are
- * wider than the PSF for all, up to this share of its variance. */
-static const double WIDTH_FIT_SNR = 20.0, MOST_WIDENING = 0.5;
 /* Errors do not grow further with what of a source is off the frame. */
 static const double LEAST_SEEN = 0.02;
 
 /* Where fits land in the mean: stars share what the camera's motion does to them, and an object
  * that moved otherwise has its own. */
-static void shared_bias(const bst_generator *g, const generator_source *s, double bias[2]) {
-    bias[0] = g->star_bias[0];
-    bias[1] = g->star_bias[1];
-    if (s->star || s->broken || g->path.count < 3) {
+static void shared_bias(const bst_generator *g, const generator_source *s, bool as_streak,
+                        double light, double bias[2]) {
+    bool shared = s->star || s->broken || g->path.count < 3;
+    if (shared && as_streak) {
+        bias[0] = g->streak_bias[0];
+        bias[1] = g->streak_bias[1];
+        return;
+    }
+    if (shared) {
+        double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
+        at = fmin(at, GENERATOR_BIASES - 1.001);
+        int i = (int)at;
+        for (int k = 0; k < 2; k++) {
+            bias[k] = g->star_bias[i][k] + (at - i) * (g->star_bias[i + 1][k] - g->star_bias[i][k]);
+        }
         return;
     }
     const bst_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
@@ -27,20 +35,53 @@ static void shared_bias(const bst_generator *g, const generator_source *s, doubl
         g->object_y[k] = g->path_y[k] + u * dy;
     }
     const bst_route_path path = {g->object_x, g->object_y, g->path.count};
-    const bst_path_px model = s->as_streak ? g->star_path : (bst_path_px){0.0, 0.0};
-    bst_route_bias(&path, model.dx, model.dy, s->as_streak ? g->bend_x : 0.0,
-                   s->as_streak ? g->bend_y : 0.0, g->total_sigma, bias);
+    bias[0] = bias[1] = 0.0;
+    if (as_streak) {
+        bst_route_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                       g->total_sigma, bias);
+    } else {
+        bst_route_point_bias(&path, &g->blend_weights, light, g->bias_sigma, bias);
+    }
 }
 
-/* Deviation of a place that is fitted with another width than the image's, over that with its own:
- * sum (q')^2 sum (p')^2 over (sum p' q')^2, of Gaussians at rest. */
-static double misfit(const bst_generator *g, double snr) {
-    const bst_image_width *p = &g->response.source, *q = &g->response.filter;
-    double image = p->across_px * p->along_px, model = q->across_px * q->along_px;
-    double both = g->cross_sigma * g->cross_sigma / sqrt(image * model);
-    bool fitted =
-        snr > WIDTH_FIT_SNR || fabs(image - model) < MOST_WIDENING * fmax(model - 1.0 / 12.0, 0.0);
-    return fitted ? 1.0 : both * both;
+/* Deviation of a place along an axis that is fitted with the gradient of another width than the
+ * image's, over that with its own: sum (q')^2 sum (p')^2 over (sum p' q')^2, of Gaussians at rest
+ * with these variances along the axis and across it. The width that image processing measures is in
+ * the model, but not in its gradient. */
+static double misfit(const double image[2], const double model[2]) {
+    double along = 0.25 * (image[0] + model[0]) * (image[0] + model[0]) / (image[0] * model[0]);
+    double across = 0.25 * (image[1] + model[1]) * (image[1] + model[1]) / (image[1] * model[1]);
+    return sqrt(along * sqrt(along * across));
+}
+
+/* Bound of an image at rest that the camera's path widens. */
+static bst_bound_at bound_of_image(const bst_generator *g, double flux_e, double length) {
+    const bst_bound *bound = g->image_bound ? g->image_bound : &g->bound;
+    return bst_bound_wider(bound, flux_e, g->noise_e, length, g->widening);
+}
+
+/* Bound of the image that is fitted. */
+static bst_bound_at bound_of_model(const bst_generator *g, double flux_e, double length) {
+    return g->onboard_bound
+               ? bst_bound_of(g->onboard_bound, flux_e, g->noise_e, length)
+               : bst_bound_wider(&g->bound, flux_e, g->noise_e, length, g->known_width);
+}
+
+bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
+                              const generator_blend *b) {
+    if (!s->as_streak || b->drawn) {
+        return false;
+    }
+    const bst_image_width *w = &g->response.filter;
+    const bst_path_px rest = {0.0, 0.0};
+    double common = bst_response_product(w, g->star_path, rest) /
+                    sqrt(bst_response_product(w, rest, rest) *
+                         bst_response_product(w, g->star_path, g->star_path));
+    double point = bst_response_efficiency(&g->response, s->path, rest);
+    double streak = bst_response_efficiency(&g->response, s->path, g->star_path);
+    /* a fit's square is less by the square of its filter's output; the outputs share noise */
+    double better = s->amplitude / streak * (streak - point) / sqrt(2.0 * fmax(1.0 - common, 1e-6));
+    return better < -bst_generator_draw(g, s, GENERATOR_SHAPE);
 }
 
 /* Place with error and covariance, along and across the path. */
@@ -59,17 +100,24 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double widen_along =
         b->widen * g->place_ratio2 / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen * g->place_ratio2 / fmax(s->visible, LEAST_SEEN);
-    double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
-    double open = b->drawn ? 0.0 : worse * misfit(g, snr);
-    error[0] *= length > 1.0 ? 1.0 : g->widening;
-    error[1] *= g->widening;
-    error[0] *= along * open * b->flat * sqrt(truth->var_along_px2 * widen_along);
-    error[1] *= across * open * sqrt(truth->var_across_px2 * widen_across);
+    /* what of `sharp` is not the wider image, which `truth` is for: the background's place */
+    double sharp = s->sharp * bst_bound_norm(&g->bound, s->length) / truth->norm;
+    double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
+    double open = b->drawn ? 0.0 : worse;
+    /* a point that is fitted to a short streak */
+    double streak = length > 0.0 ? 0.0 : s->length * s->length / 12.0;
+    const double model = g->response.filter.across_px * g->response.filter.along_px;
+    const double image = g->response.source.across_px * g->response.source.along_px;
+    const double images[2] = {image + streak, image}, turned[2] = {image, image + streak};
+    const double models[2] = {model, model};
+    error[0] *=
+        along * open * misfit(images, models) * b->flat * sqrt(truth->var_along_px2 * widen_along);
+    error[1] *= across * open * misfit(turned, models) * sqrt(truth->var_across_px2 * widen_across);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
     double bias = cal->phase_bias_px / g->binning, shared[2];
-    shared_bias(g, s, shared);
+    shared_bias(g, s, s->as_streak && !b->point, b->flux_e * truth->norm * g->fit_light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
     double scale = g->binning, a2 = told->var_along_px2 * widen_along * scale * scale,
@@ -79,6 +127,12 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     d->cov_xx = c * c * a2 + n * n * b2;
     d->cov_xy = c * n * (a2 - b2);
     d->cov_yy = n * n * a2 + c * c * b2;
+}
+
+/* Whether image processing would find an image of this length longer than a point. */
+static bool is_drawn_out(const bst_generator *g, const generator_source *s) {
+    double across2 = g->sigma * g->sigma, along2 = across2 + s->length * s->length / 12.0;
+    return FWHM_PER_SIGMA * sqrt(along2) > 1.5 * fmax(FWHM_PER_SIGMA * sqrt(across2), 1.0);
 }
 
 static void set_extent(const bst_generator *g, const generator_source *s, bool as_streak,
@@ -119,14 +173,15 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     double seen = fmax(s->visible, LEAST_SEEN);
     /* a point filter's flux of a streak too faint to be fitted as one is what it caught */
     bool own = !b->point && (s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5);
-    double length = own ? s->length : 0.0;
+    double length = own && (s->as_streak || is_drawn_out(g, s)) ? s->length : 0.0;
     double caught =
         own ? 1.0
             : bst_matched_product(s->path, (bst_path_px){0, 0}, g->total_sigma) /
                   bst_matched_product((bst_path_px){0, 0}, (bst_path_px){0, 0}, g->total_sigma);
     double flux = b->flux_e * caught;
-    bst_bound_at truth = bst_bound_of(&g->bound, b->flux_e, g->noise_e, s->length);
-    bst_bound_at fitted = bst_bound_of(&g->bound, flux, g->noise_e, length);
+    /* errors are those of the image; what is said of them, those of the PSF that is known */
+    bst_bound_at truth = bound_of_image(g, b->flux_e, s->length);
+    bst_bound_at fitted = bound_of_model(g, flux, length);
     /* flux goes with the peak that was detected: nearly the same filter on the same noise */
     const double together = 0.95;
     double noise = together * s->noise +
@@ -136,9 +191,11 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     if (b->drawn) {
         d.flux_e = b->snr * g->noise_e / fitted.norm;
     }
-    bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
+    bst_bound_at told = bound_of_model(g, d.flux_e, length);
     d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
-    d.snr = d.flux_e * told.norm * g->norm_ratio[own && s->as_streak] / g->noise_e;
+    double norm = bst_bound_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
+    d.snr = d.flux_e * (g->onboard_bound ? bst_bound_norm(g->onboard_bound, length) : norm) /
+            g->noise_e;
     measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);

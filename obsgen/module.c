@@ -5,6 +5,7 @@
 #include "obsgen/generator.h"
 #include "obsgen/identify.h"
 #include "obsgen/obsgen.h"
+#include "obsgen/psf_bound.h"
 #include "sim/world/column_level.h"
 #include "sim/world/field.h"
 #include "sim/world/frame_updates.h"
@@ -90,7 +91,8 @@ typedef struct pending {
     bst_truth *truth;
     int room;
     double sigma_px;
-    bst_response response;         /* where `own_response` */
+    bst_response response; /* where `own_response` */
+    bst_bound image_bound, onboard_bound;
     bool own_response;             /* one of the PSFs is no Gaussian */
     double *path_x_px, *path_y_px; /* of a star in the middle, less its mean */
     int path_count, path_room;
@@ -98,6 +100,8 @@ typedef struct pending {
 
 /* Exposures that wait at once, and steps of a path that are kept. */
 enum { PENDING = 16, MOST_STEPS = 1024 };
+/* A PSF's width may change by this share before its bound is tabulated anew. */
+static const double SAME_WIDTH = 0.005;
 
 typedef struct obsgen {
     const obsgen_config *config;
@@ -114,6 +118,8 @@ typedef struct obsgen {
     bst_psf *psf;                 /* of it, if it is wider than the world's */
     double jitter_rad2, sigma_px; /* sigma: of the Gaussian that the PSF is or stands for */
     bst_response response; /* of the onboard filter to it, at response_binning (0: not made) */
+    bst_bound image_bound, onboard_bound; /* at bound_binning (0: not made) */
+    int bound_binning;
     int response_binning;
     bst_photometer photometer;
     pending waiting[PENDING];
@@ -221,16 +227,21 @@ static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, doubl
     return BST_OK;
 }
 
+/* Of the Gaussian with an image's noise-equivalent area, without the pixel's own width, px. */
+static double own_sigma(const bst_image_width *w) {
+    return sqrt(fmax(w->across_px * w->along_px - 1.0 / 12.0, 0.04));
+}
+
 /* Sets the response of the onboard filter to the exposure's PSF where one of them is no Gaussian:
  * the generator has it else. */
-static void set_response(obsgen *o, int binning, pending *p) {
+static bst_status set_response(bst_ctx *ctx, obsgen *o, int binning, pending *p) {
     const bst_camera *known = bst_knowledge_camera(o->knowledge);
     double sigma_px;
     bool gaussian = !o->camera.psf || bst_psf_gaussian(o->camera.psf, &sigma_px);
     const bst_psf *onboard = bst_knowledge_psf(o->knowledge);
     p->own_response = !gaussian || onboard;
     if (!p->own_response) {
-        return;
+        return BST_OK;
     }
     if (o->response_binning != binning) {
         const bst_response_side source = {gaussian ? NULL : o->camera.psf,
@@ -240,9 +251,22 @@ static void set_response(obsgen *o, int binning, pending *p) {
         bst_response_set(&o->response, &source, &filter, binning,
                          0.5 * (double)(o->camera.width_px - 1),
                          0.5 * (double)(o->camera.height_px - 1));
-        o->response_binning = binning;
+        double x = 0.5 * (double)(o->camera.width_px - 1),
+               y = 0.5 * (double)(o->camera.height_px - 1);
+        double width = own_sigma(&o->response.source), model = own_sigma(&o->response.filter);
+        bool binned = o->bound_binning != binning;
+        if (binned || fabs(width - o->image_bound.sigma_px) > SAME_WIDTH * width) {
+            BST_TRY(bst_psf_bound_init(ctx, &source, binning, x, y, width, &o->image_bound));
+        }
+        if (binned) {
+            BST_TRY(bst_psf_bound_init(ctx, &filter, binning, x, y, model, &o->onboard_bound));
+        }
+        o->bound_binning = o->response_binning = binning;
     }
     p->response = o->response;
+    p->image_bound = o->image_bound;
+    p->onboard_bound = o->onboard_bound;
+    return BST_OK;
 }
 
 static double peak_e(const void *user, int index, const bst_truth_item *item) {
@@ -361,7 +385,7 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
     }
     BST_TRY(star_path(ctx, o, &track, options.lead_s, e->window, p));
     p->sigma_px = o->sigma_px;
-    set_response(o, e->binning > 1 ? e->binning : 1, p);
+    BST_TRY(set_response(ctx, o, e->binning > 1 ? e->binning : 1, p));
     BST_TRY(reserve(ctx, p, count));
     if (truth->lost == 0) {
         memcpy(p->truth, truth, sizeof *truth + (size_t)count * sizeof truth->items[0]);
@@ -433,6 +457,8 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
         .exposure_s = (double)(e->end_tick - e->start_tick) / (double)o->tick_rate_hz,
         .sigma_px = p->sigma_px,
         .response = p->own_response ? &p->response : NULL,
+        .image_bound = p->own_response ? &p->image_bound : NULL,
+        .onboard_bound = p->own_response ? &p->onboard_bound : NULL,
         .path_x_px = p->path_x_px,
         .path_y_px = p->path_y_px,
         .path_count = p->path_count};

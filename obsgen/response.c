@@ -52,6 +52,26 @@ static double cutoff(const bst_response_side *side) {
     return side->psf ? fmin(bst_psf_cutoff(side->psf), widened) : widened;
 }
 
+void bst_response_nodes_at(const bst_response_side *side, double x_px, double y_px,
+                           bst_response_nodes *out) {
+    *out = (bst_response_nodes){.count = 0};
+    if (side->psf) {
+        out->count = bst_psf_weights(side->psf, x_px, y_px, out->node, out->weight);
+    }
+}
+
+void bst_response_otf(const bst_response_side *side, const bst_response_nodes *nodes, int binning,
+                      double fx, double fy, double out[2]) {
+    double bin = binning_factor(fx, binning) * binning_factor(fy, binning);
+    transfer(side, nodes->node, nodes->weight, nodes->count, fx, fy, out);
+    out[0] *= bin;
+    out[1] *= bin;
+}
+
+double bst_response_cutoff(const bst_response_side *side) {
+    return cutoff(side);
+}
+
 static void sum_up(spectral_sums *s, const bst_response_side *source,
                    const bst_response_side *filter, int binning, double x_px, double y_px) {
     const bst_response_side *const sides[2] = {source, filter};

@@ -24,6 +24,23 @@ typedef struct bst_response_side {
     double sigma_px;    /* before integration over the pixel; of `psf`: what widens it */
 } bst_response_side;
 
+/* The nodes of its PSF's field grid that mix at a place. */
+typedef struct bst_response_nodes {
+    int node[4], count;
+    double weight[4];
+} bst_response_nodes;
+
+void bst_response_nodes_at(const bst_response_side *side, double x_px, double y_px,
+                           bst_response_nodes *out);
+
+/* OTF of a side's image, with that of a pixel of binning x binning sensor pixels, at a frequency in
+ * cycles per sensor pixel: out = {real, imaginary}. */
+void bst_response_otf(const bst_response_side *side, const bst_response_nodes *nodes, int binning,
+                      double fx, double fy, double out[2]);
+
+/* Frequency beyond which the OTF counts for nothing, cycles per sensor pixel. */
+double bst_response_cutoff(const bst_response_side *side);
+
 /* For a frame that is binned by `binning`. Gaussians in closed form, with 1/12 px^2 for the pixel;
  * a PSF by sums over its OTF (Parseval), which holds the pixel exactly: the mean over places in the
  * pixel of sum p q is the integral of Re(P conj Q) (King 1983, PASP 95, 163), the gradient's

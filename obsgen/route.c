@@ -194,6 +194,27 @@ static void find_curvature(const model *m, double s, double h[3]) {
     }
 }
 
+/* Steps of a path that a point's bias is a mean over: neighbours together where there are more. */
+enum { MOST_STEPS = 512 };
+
+/* The path's steps with the share of the exposure that each holds; their number. */
+static int gather_steps(const bst_route_path *p, float *x, float *y, float *share) {
+    int together = (p->count + MOST_STEPS - 1) / MOST_STEPS, count = 0;
+    for (int from = 0; from < p->count; from += together, count++) {
+        double sum_x = 0.0, sum_y = 0.0, sum = 0.0;
+        for (int k = from; k < from + together && k < p->count; k++) {
+            double w = (k == 0 || k == p->count - 1 ? 0.5 : 1.0) / (p->count - 1);
+            sum_x += w * p->x_px[k];
+            sum_y += w * p->y_px[k];
+            sum += w;
+        }
+        x[count] = (float)(sum_x / sum);
+        y[count] = (float)(sum_y / sum);
+        share[count] = (float)sum;
+    }
+    return count;
+}
+
 /* The first step for a straight model in closed form: to first order that is all. */
 static void straight_bias(const bst_route_path *p, double dx_px, double dy_px, double s,
                           double bias_px[2]) {
@@ -222,6 +243,38 @@ static void straight_bias(const bst_route_path *p, double dx_px, double dy_px, d
     double a = fmax(-s, fmin(along / curve, s)), b = fmax(-s, fmin(across * s * s / value, s));
     bias_px[0] = a * c - b * n;
     bias_px[1] = a * n + b * c;
+}
+
+void bst_route_point_bias(const bst_route_path *p, const bst_blend_weights *weights, double light,
+                          double sigma_px, double bias_px[2]) {
+    enum { ROUNDS = 4 };
+    static const double ENOUGH_PX = 0.002, PER_SIGMA = 2.0;
+    float row[BST_BLEND_DISTANCES];
+    bst_blend_weight_row(weights, light, row);
+    float x[MOST_STEPS], y[MOST_STEPS], share[MOST_STEPS];
+    int count = gather_steps(p, x, y, share);
+    float scale = (float)(PER_SIGMA / sigma_px);
+    for (int round = 0; round < ROUNDS; round++) {
+        float at_x = (float)bias_px[0], at_y = (float)bias_px[1];
+        float sum = 0.0f, pull_x = 0.0f, pull_y = 0.0f;
+        for (int k = 0; k < count; k++) {
+            float dx = x[k] - at_x, dy = y[k] - at_y;
+            float far = sqrtf(dx * dx + dy * dy) * scale;
+            int i = (int)fminf(far, BST_BLEND_DISTANCES - 2);
+            float part = fminf(far - (float)i, 1.0f);
+            float w = share[k] * (row[i] + part * (row[i + 1] - row[i]));
+            sum += w;
+            pull_x += w * dx;
+            pull_y += w * dy;
+        }
+        double step_x = (double)(pull_x / fmaxf(sum, 1e-6f));
+        double step_y = (double)(pull_y / fmaxf(sum, 1e-6f));
+        bias_px[0] += step_x;
+        bias_px[1] += step_y;
+        if (hypot(step_x, step_y) < ENOUGH_PX) {
+            break;
+        }
+    }
 }
 
 void bst_route_bias(const bst_route_path *p, double dx_px, double dy_px, double bend_x_px,

@@ -3,6 +3,7 @@
 #ifndef BST_OBSGEN_ROUTE_H
 #define BST_OBSGEN_ROUTE_H
 
+#include "obsgen/blend_weight.h"
 #include "sim/core/status.h"
 
 enum { BST_ROUTE_NODES = 4096 };
@@ -27,8 +28,24 @@ int bst_route_lay(const bst_route_path *path, double sigma_px, bst_route_node *n
 
 /* How far the fit of a uniform straight streak (dx, dy) with the bend (the coefficient of (3u^2 -
  * 1) / 2, u from -1 to 1) lands from the mean of the path in the mean over noise: where the model
- * overlaps most with the light that is there. (0, 0) and no bend: of a point. */
+ * overlaps most with the light that is there. For a point see bst_route_point_bias. */
 void bst_route_bias(const bst_route_path *path, double dx_px, double dy_px, double bend_x_px,
                     double bend_y_px, double sigma_px, double bias_px[2]);
+
+/* Bias of the least-squares fit of a point source to light that moved along the path: the fitted
+ * place less the mean of the path, in the mean over noise.
+ *
+ * Given:
+ *   weights   see blend_weight.h
+ *   light     brightest pixel of the fitted light over the variance of the noise
+ *   sigma_px  root of the mean of the variances of the fitted PSF and of the image at rest, both
+ *             with the pixel's own, px
+ *   bias_px   where the search begins, (0, 0) or the bias for another light
+ *
+ * Returned: bias_px, the root c of <w(|x(t) - c|) (x(t) - c)> = 0, the mean over the exposure, by
+ * mean shift. Much light: w is even and the bias 0 (the centroid); little: that of the matched
+ * filter. */
+void bst_route_point_bias(const bst_route_path *path, const bst_blend_weights *weights,
+                          double light, double sigma_px, double bias_px[2]);
 
 #endif

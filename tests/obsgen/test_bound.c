@@ -81,6 +81,28 @@ static void streaks_are_those_of_a_sum(void **state) {
     }
 }
 
+/* A wider image has the bound of that width, and is not the narrow one with a factor: by shot noise
+ * alone errors grow with the width, on white noise with its square. */
+static void a_wider_image_has_its_own_bound(void **state) {
+    (void)state;
+    bst_bound narrow, wide;
+    const double sigma = 0.9, wider = 1.5, pixel = 1.0 / 12.0;
+    bst_bound_init(&narrow, sigma);
+    bst_bound_init(&wide, sqrt(wider * wider * (sigma * sigma + pixel) - pixel));
+    const double lengths[] = {0.0, 4.0}, fluxes[] = {150.0, 3000.0, 1e6};
+    for (int l = 0; l < 2; l++) {
+        for (int f = 0; f < 3; f++) {
+            bst_bound_at a = bst_bound_wider(&narrow, fluxes[f], 8.0, lengths[l], wider);
+            bst_bound_at b = bst_bound_of(&wide, fluxes[f], 8.0, lengths[l]);
+            /* pixels are as wide as the narrow image and lengths stand a factor of two apart */
+            bst_assert_close(a.var_along_px2 / b.var_along_px2, 1.0, 0.06);
+            bst_assert_close(a.var_across_px2 / b.var_across_px2, 1.0, 0.06);
+            bst_assert_close(a.flux_variance / b.flux_variance, 1.0, 0.05);
+            bst_assert_close(a.norm / b.norm, 1.0, 0.03);
+        }
+    }
+}
+
 static void long_streaks_and_wide_psfs_stay_finite(void **state) {
     (void)state;
     bst_bound b;
@@ -102,6 +124,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_forms_of_a_point),
         cmocka_unit_test(streaks_are_those_of_a_sum),
+        cmocka_unit_test(a_wider_image_has_its_own_bound),
         cmocka_unit_test(long_streaks_and_wide_psfs_stay_finite),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

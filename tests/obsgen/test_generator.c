@@ -127,6 +127,109 @@ static void places_scatter_by_the_bound(void **state) {
     close_scene(&s);
 }
 
+/* A tremor of 0.7 px at rest: images are wider by it, and so are the errors; what is stated is the
+ * bound of the onboard PSF, with the tremor where image processing's jitter_px has it. */
+static void errors_and_statements_have_their_own_width(void **state) {
+    (void)state;
+    enum { STEPS = 200 };
+    const double jitter = 0.7, snr = 20.0;
+    double x[STEPS + 1], y[STEPS + 1];
+    for (int k = 0; k <= STEPS; k++) {
+        x[k] = jitter * sqrt(2.0) * cos(2.0 * BST_PI * k * 10 / STEPS);
+        y[k] = jitter * sqrt(2.0) * sin(2.0 * BST_PI * k * 10 / STEPS);
+    }
+    for (int known = 0; known < 2; known++) {
+        scene s;
+        open_scene(&s);
+        s.settings.jitter_px = known ? jitter : 0.0;
+        s.frame.path_x_px = x;
+        s.frame.path_y_px = y;
+        s.frame.path_count = STEPS + 1;
+        start(&s);
+        double electrons = electrons_of(&s, snr);
+        fill(&s, snr);
+        double noise = sqrt(36.0 + 64.0 + 1.6 * 1.6 / 12.0), sigma = s.frame.sigma_px;
+        /* as generators see sources: their SNR is that of the wider image */
+        double plain2 = sigma * sigma + 1.0 / 12.0, wide2 = plain2 + jitter * jitter;
+        for (int i = 0; i < s.truth->count; i++) {
+            s.truth->items[i].snr = snr * sqrt(plain2 / wide2);
+        }
+        bst_generator_result r = run(&s, 1);
+        double sum = 0.0, stated = 0.0;
+        for (int i = 0; i < r.count; i++) {
+            const bst_truth_item *t = &s.truth->items[r.items[i].item];
+            double dx = r.items[i].detection.x_px - t->x_centroid_px;
+            double dy = r.items[i].detection.y_px - t->y_centroid_px;
+            sum += 0.5 * (dx * dx + dy * dy) / r.count;
+            stated += r.items[i].detection.cov_xx / r.count;
+        }
+        bst_bound image, onboard;
+        bst_bound_init(&image, sqrt(sigma * sigma + jitter * jitter));
+        bst_bound_init(&onboard, hypot(sigma, s.settings.jitter_px));
+        double error = bst_bound_of(&image, electrons, noise, 0.0).var_along_px2;
+        double told = bst_bound_of(&onboard, electrons, noise, 0.0).var_along_px2;
+        /* the gradient of the narrow PSF on the wide image */
+        double model2 = plain2 + s.settings.jitter_px * s.settings.jitter_px;
+        double misfit = pow(0.5 * (model2 + wide2), 4.0) / (model2 * model2 * wide2 * wide2);
+        assert_true(r.count > 880);
+        /* 1800 places: 3.3 % of a variance, three of them; shares of a table */
+        bst_assert_close(sum / (error * misfit), 1.0, 0.12);
+        bst_assert_close(stated / told, 1.0, 0.12);
+        close_scene(&s);
+    }
+}
+
+/* SNR of the filter for a point over that of the streak's own, by sums over fine pixels. */
+static double point_share(double sigma, double length) {
+    enum { SUB = 4, REACH = 8 * SUB, PARTS = 40 };
+    double both = 0.0, own = 0.0, point = 0.0, s2 = sigma * sigma + 1.0 / 12.0;
+    for (int i = -REACH; i <= REACH; i++) { /* across the streak both are the same */
+        double x = (double)i / SUB, p = exp(-0.5 * x * x / s2), q = 0.0;
+        for (int k = 0; k < PARTS; k++) {
+            double d = x - length * ((k + 0.5) / PARTS - 0.5);
+            q += exp(-0.5 * d * d / s2) / PARTS;
+        }
+        both += p * q;
+        own += q * q;
+        point += p * p;
+    }
+    return both / sqrt(own * point);
+}
+
+/* Noise decides whether a point fits a short streak better: the difference of the squares is that
+ * of two filters' outputs, normal with 2 (1 - rho) for outputs of correlation rho. */
+static void short_streaks_may_be_points(void **state) {
+    (void)state;
+    const double length = 2.0, snrs[] = {12.0, 20.0, 40.0};
+    scene s;
+    open_scene(&s);
+    s.frame.streak_dx_px = length;
+    start(&s);
+    double rho = point_share(s.frame.sigma_px, length);
+    for (int k = 0; k < 3; k++) {
+        fill(&s, snrs[k]);
+        for (int i = 0; i < s.truth->count; i++) {
+            s.truth->items[i].x_start_px -= 0.5 * length;
+            s.truth->items[i].x_end_px += 0.5 * length;
+        }
+        double points = 0.0, all = 0.0, snr = 0.0;
+        for (int n = 0; n < 3; n++) {
+            bst_generator_result r = run(&s, 10 * k + n);
+            for (int i = 0; i < r.count; i++) {
+                points += !(r.items[i].detection.flags & BST_DETECTION_STREAK);
+                snr += r.items[i].detection.snr;
+                all += 1.0;
+            }
+        }
+        assert_true(all > 2600.0);
+        double asked = 0.5 * erfc(snr / all * sqrt(0.5 * (1.0 - rho)) / sqrt(2.0));
+        /* 2700 draws: 0.009; the mean SNR for each one's */
+        bst_assert_close(points / all, asked, 0.03);
+        assert_true(k > 0 || asked > 0.1);
+    }
+    close_scene(&s);
+}
+
 static void the_phase_bias_is_as_stated(void **state) {
     (void)state;
     scene s;
@@ -531,6 +634,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(detection_follows_the_ideal_law),
         cmocka_unit_test(places_scatter_by_the_bound),
+        cmocka_unit_test(errors_and_statements_have_their_own_width),
+        cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(the_phase_bias_is_as_stated),
         cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
         cmocka_unit_test(draws_depend_on_names_alone),

@@ -92,6 +92,65 @@ static void fits_land_where_the_light_overlaps_most(void **state) {
     bst_assert_close(bias[1], best[1], 0.02);
 }
 
+/* Least squares with the weights 1 / (noise + model) on a fine grid: place of the fit of a Gaussian
+ * at rest to light that was at 0 for `rest` of the exposure and then moved evenly to `end`, less
+ * the mean of the path, x. */
+static double fitted_bias(double sigma, double rest, double end, double noise) {
+    enum { SUB = 4, REACH = 3 * SUB * 2, PARTS = 40 };
+    double c = 0.0, flux = 1.0, s2 = sigma * sigma, cell = 1.0 / (SUB * SUB);
+    for (int round = 0; round < 60; round++) {
+        double a[3] = {0.0}, g[2] = {0.0};
+        for (int j = -REACH; j <= REACH; j++) {
+            for (int i = -REACH; i <= REACH; i++) {
+                double x = (double)i / SUB, y = (double)j / SUB, data = 0.0;
+                for (int k = 0; k <= PARTS; k++) {
+                    double at = k == 0 ? 0.0 : end * (k - 0.5) / PARTS;
+                    double share = k == 0 ? rest : (1.0 - rest) / PARTS;
+                    data += share * exp(-0.5 * ((x - at) * (x - at) + y * y) / s2);
+                }
+                data /= 2.0 * BST_PI * s2;
+                double p = exp(-0.5 * ((x - c) * (x - c) + y * y) / s2) / (2.0 * BST_PI * s2);
+                double slope = flux * p * (x - c) / s2, w = cell / (noise + flux * p);
+                a[0] += w * slope * slope;
+                a[1] += w * slope * p;
+                a[2] += w * p * p;
+                g[0] += w * slope * (data - flux * p);
+                g[1] += w * p * (data - flux * p);
+            }
+        }
+        double det = a[0] * a[2] - a[1] * a[1];
+        c += 0.5 * (a[2] * g[0] - a[1] * g[1]) / det;
+        flux += 0.5 * (a[0] * g[1] - a[1] * g[0]) / det;
+    }
+    return c - (1.0 - rest) * 0.5 * end;
+}
+
+static void bright_points_land_nearer_to_the_centroid(void **state) {
+    (void)state;
+    static bst_blend_weights weights;
+    bst_blend_weights_init(&weights);
+    const double sigma = 0.9, rest = 0.6, end = 2.0;
+    path p;
+    for (int k = 0; k < STEPS; k++) {
+        p.x[k] = 0.0;
+        p.y[k] = end * fmax((double)k / (STEPS - 1) - rest, 0.0) / (1.0 - rest);
+    }
+    centre(&p);
+    bst_route_path route = route_of(&p);
+    double before = -INFINITY;
+    /* light on the brightest pixel of 0.02, 2, 200 times the noise's variance */
+    for (double noise = 10.0; noise > 1e-4; noise *= 0.01) {
+        double bias[2] = {0.0, 0.0}, light = 1.0 / (2.0 * BST_PI * sigma * sigma) / noise;
+        bst_route_point_bias(&route, &weights, light, sigma, bias);
+        double fit = fitted_bias(sigma, rest, end, noise);
+        bst_assert_close(bias[0], 0.0, 1e-4);
+        /* the table's distances are half a sigma apart; 41 steps of the fit's light: 0.01 px */
+        bst_assert_close(bias[1], fit, 0.01 + 0.05 * fabs(fit));
+        assert_true(bias[1] > before + 0.01);
+        before = bias[1];
+    }
+}
+
 static void the_way_has_the_light_of_the_path(void **state) {
     (void)state;
     static bst_route_node nodes[BST_ROUTE_NODES];
@@ -122,6 +181,7 @@ static void the_way_has_the_light_of_the_path(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_land_where_the_light_overlaps_most),
+        cmocka_unit_test(bright_points_land_nearer_to_the_centroid),
         cmocka_unit_test(the_way_has_the_light_of_the_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
