@@ -263,7 +263,7 @@ static void test_dispersions(void **state) {
         "2, \"truncate_sigma\": 1.5}";
     const char *table =
         "{\"path\": \"/word\", \"distribution\": \"table\", \"values\": [\"u\", "
-        "\"v\"], \"weights\": [1, 3]}";
+        "\"v\"], \"weights\": [0.2, 0.6]}";
     const char *even =
         "{\"path\": \"/b/c\", \"distribution\": \"log_uniform\", \"from\": 0.01, "
         "\"to\": 100}";
@@ -413,6 +413,12 @@ static void test_errors(void **state) {
         {"\"dispersions\": [{\"path\": \"/a\", \"distribution\": \"table\", \"values\": [1, 2], "
          "\"weights\": [1]}]",
          "/dispersions/0/weights: no weights (found [1]"},
+        {"\"dispersions\": [{\"path\": \"/a\", \"distribution\": \"table\", \"values\": [1, 2], "
+         "\"weights\": [0, 0]}]",
+         "/dispersions/0/weights: no weights (found [0,0]"},
+        {"\"dispersions\": [{\"path\": \"/a\", \"distribution\": \"table\", \"values\": [1, 2], "
+         "\"weights\": [2, -1]}]",
+         "/dispersions/0/weights: no weights (found [2,-1]"},
         {"\"dispersions\": [{\"path\": \"/a\", \"from\": 1, \"to\": 2}, {\"path\": \"/a\", "
          "\"from\": 1, \"to\": 2}]",
          "/dispersions/1/path: \"/a\" is dispersed by /dispersions/0 already"},

@@ -198,6 +198,25 @@ static void noll_indices_and_polynomials_are_the_published_ones(void **state) {
     }
 }
 
+/* Each key is the term that its description says: degree and order by Noll's indices. */
+static void keys_say_their_terms(void **state) {
+    (void)state;
+    const bst_config_desc *terms = NULL;
+    for (const bst_config_desc *d = bst_optics_config_table; d->key; d++) {
+        terms = strcmp(d->key, "zernike_waves") == 0 ? d->children : terms;
+    }
+    assert_non_null(terms);
+    for (int j = 2; j <= 37; j++, terms++) {
+        int key, said, n, m, degree, order;
+        assert_int_equal(sscanf(terms->key, "z%d", &key), 1);
+        assert_int_equal(
+            sscanf(terms->doc, "RMS of Noll's term %d, n = %d, m = %d.", &said, &n, &m), 3);
+        bst_zernike_noll(j, &degree, &order);
+        assert_true(key == j && said == j && n == degree && m == order);
+    }
+    assert_null(terms->key);
+}
+
 static void zernike_terms_are_orthonormal(void **state) {
     (void)state;
     /* Simpson in r^2 would do; the rule here is uniform in angle (exact) and midpoints in r^2 */
@@ -419,6 +438,7 @@ int main(void) {
         cmocka_unit_test(the_clear_circle_has_its_closed_form),
         cmocka_unit_test(the_annulus_has_its_closed_form),
         cmocka_unit_test(noll_indices_and_polynomials_are_the_published_ones),
+        cmocka_unit_test(keys_say_their_terms),
         cmocka_unit_test(zernike_terms_are_orthonormal),
         cmocka_unit_test(defocus_has_its_closed_form_on_the_axis),
         cmocka_unit_test(a_detector_out_of_focus_is_term_4),

@@ -139,6 +139,31 @@ static void test_one_magnitude_only(void **state) {
     assert_true(isnan(no_vt.b_minus_v));
 }
 
+/* A cell's cap lies about the middle of its stars and is no larger than they need; its motion is
+ * that of the fastest. Cell 77 has two stars, 1.1 degrees apart; the second moves by 24.4 mas a
+ * year. */
+static void test_caps_of_cells(void **state) {
+    const sample *s = *state;
+    const bst_star_view *view = bst_stars_records(s->stars);
+    const bst_star_cell *cell = &view->cells[77];
+    assert_int_equal(cell->count, 2);
+    bst_vec3 a = bst_vec3_from_radec(63.94277263 * BST_DEG_RAD, 3.26324035 * BST_DEG_RAD);
+    bst_vec3 b = bst_vec3_from_radec(64.92261166 * BST_DEG_RAD, 3.76889045 * BST_DEG_RAD);
+    bst_vec3 middle = bst_vec3_unit(bst_vec3_add(a, b));
+    bst_vec3 centre = {cell->centre[0], cell->centre[1], cell->centre[2]};
+    /* floats: 6e-8 on each axis, and 1e-6 of room for them */
+    bst_assert_close(bst_vec3_norm(bst_vec3_sub(centre, middle)), 0, 2e-7);
+    bst_assert_close(cell->radius_rad, 0.5 * bst_vec3_angle(a, b) + 1e-6, 2e-7);
+    double mas = BST_ARCSEC_RAD / 1000;
+    /* motions are kept to 0.1 mas */
+    bst_assert_close(cell->pm_max_radpyr, hypot(23.5, 6.6) * mas, 0.1 * mas);
+    cell = &view->cells[5949];
+    assert_int_equal(cell->count, 1);
+    bst_assert_close(cell->radius_rad, 1e-6, 2e-7);
+    bst_assert_close(cell->pm_max_radpyr, hypot(546.0, 1223.1) * mas, 0.1 * mas);
+    assert_int_equal(view->cells[100].count, 0);
+}
+
 static void test_supplement_is_moved_from_its_epoch(void **state) {
     bst_star sirius = find(*state, 5949, 2777, 1, 1991.25);
     assert_at(sirius, 101.28854105, -16.71314306);
@@ -278,6 +303,7 @@ int main(void) {
         cmocka_unit_test(test_main_table),
         cmocka_unit_test(test_no_mean_position_gives_the_observed_one),
         cmocka_unit_test(test_photocentre_gives_the_component),
+        cmocka_unit_test(test_caps_of_cells),
         cmocka_unit_test(test_one_magnitude_only),
         cmocka_unit_test(test_supplement_is_moved_from_its_epoch),
         cmocka_unit_test(test_double_star_with_one_identity),

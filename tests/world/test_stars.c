@@ -94,8 +94,8 @@ static void test_radius_zero_and_pi(void **state) {
                                            f->out, f->count, &count));
     assert_int_equal(count, 0);
     /* A cone of no width around a star's very direction holds that star and nothing that lies
-     * elsewhere. */
-    for (int i = 0; i < f->count; i += 997) {
+     * elsewhere; stars in all parts of the index. */
+    for (int i = 0; i < f->count; i += 17) {
         bool is_there = false;
         bst_assert_ok(&f->ctx, bst_stars_query(&f->ctx, f->stars, f->all[i].icrs, 0.0, INFINITY,
                                                YEAR, f->out, f->count, &count));
