@@ -36,8 +36,8 @@ static void widen(const bst_mtt *m, const bst_mtt_track *track, hypothesis *h) {
     }
 }
 
-/* The likeliest unused detection that steady motion would bring less often than a false event. */
-static choice choose(const bst_mtt *m, int t, const hypothesis *h, double allowed) {
+/* The likeliest unused detection that a manoeuvre explains better than steady motion does. */
+static choice choose(const bst_mtt *m, int t, const hypothesis *h) {
     const bst_mtt_params *p = &m->params;
     const bst_mtt_track *track = &m->tracks[t];
     choice best = {.column = -1, .cost = -log(1.0 - p->detection_probability)};
@@ -54,7 +54,7 @@ static choice choose(const bst_mtt *m, int t, const hypothesis *h, double allowe
                 radius ||
             !bst_filter_evaluate(&m->filter, &track->state, &track->models, &candidate, &quiet) ||
             !bst_filter_evaluate(&m->filter, &h->state, &h->models, &candidate, &fit) ||
-            exp(-0.5 * quiet.chi2) > allowed || fit.chi2 > p->gate_chi2) {
+            quiet.log_likelihood > h->log_prior + fit.log_likelihood || fit.chi2 > p->gate_chi2) {
             continue;
         }
         double cost = -h->log_prior - fit.log_likelihood + log(m->clutter_density) -
@@ -82,7 +82,7 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
         }
         hypothesis h;
         widen(m, track, &h);
-        choice best = choose(m, t, &h, allowed);
+        choice best = choose(m, t, &h);
         if (best.column < 0) {
             continue;
         }
@@ -92,7 +92,8 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
         m->detection_of_track[t] = best.column;
         m->now.used[best.column] = true;
         m->owner[best.column] = t;
-        if ((1.0 - p->detection_probability) * best.alarms < allowed) {
+        if (exp(-0.5 * best.quiet_chi2) < allowed &&
+            (1.0 - p->detection_probability) * best.alarms < allowed) {
             m->departed_chi2[t] = best.quiet_chi2;
         }
     }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/app/check_bodies.h"
+#include "sim/app/check_burns.h"
 #include "sim/app/check_reach.h"
 #include "sim/app/loop_model.h"
 #include "sim/engine/loop_timing.h"
@@ -275,6 +276,8 @@ static const rule rules[] = {
     {"short_times", "times of tracker and control that are over before the frames they wait for",
      NULL, short_times, NULL},
     {"loops", "loops that are unstable or have thin margins", NULL, NULL, loops},
+    {"burns", "burns that turn a target's line of sight faster than its tracker follows", NULL,
+     NULL, bst_check_burns},
     {"reach",
      "times at which the cue is out of reach: Earth, keep-out cones, travel, limits, "
      "keyhole; slews, steps of a search and scans that the mount's limits do not allow",

@@ -19,8 +19,9 @@ ORBIT = {"source": "numerical",
 START_S = 100
 
 
-def held(tracker, mps2, length_s, direction=(0, 1, 0)):
-    """Share of the frames from the burn's start on in which the tracker names the target."""
+def held(tracker, mps2, length_s, direction=(0, 1, 0), more=None):
+    """Share of the frames from the burn's start on in which the tracker names the target, how many
+    it named, and whether the run began with a warning of the burn."""
     duration = START_S + length_s + 60
     sets = {
         "/world/objects/0/orbit": ORBIT,
@@ -30,6 +31,7 @@ def held(tracker, mps2, length_s, direction=(0, 1, 0)):
         "/record/truth_stars": False,
         runs.SENSOR + "/observation_source": "generator",
         MODULES + "/tracker/type": tracker,
+        **(more or {}),
     }
     words = [word for path, value in sets.items()
              for word in ("--set", f"{path}={json.dumps(value)}")]
@@ -43,16 +45,14 @@ def held(tracker, mps2, length_s, direction=(0, 1, 0)):
         frames, named, names = db.execute(
             "select count(*), sum(target_id > 0), count(distinct target_id) from track_frames "
             "where time_s > ?", (START_S,)).fetchone()
-    return named / frames, names
+    return named / frames, names, "/world/objects/0/burns/0" in result.stderr
 
 
 class Manoeuvre(unittest.TestCase):
     def check(self, tracker, cases):
         for mps2, length_s, direction in cases:
             with self.subTest(tracker=tracker, mps2=mps2, length_s=length_s):
-                share, names = held(tracker, mps2, length_s, direction)
-                self.assertEqual(share, 1.0)
-                self.assertEqual(names, 1)
+                self.assertEqual(held(tracker, mps2, length_s, direction), (1.0, 1, False))
 
     def test_imm(self):
         self.check("imm", ((0.1, 200, (0, 1, 0)), (10, 200, (0, 1, 0)), (10, 200, (0, 0, 1)),
@@ -64,6 +64,25 @@ class Manoeuvre(unittest.TestCase):
 
     def test_ukf(self):
         self.check("ukf", ((10, 200, (0, 0, -1)), (30, 200, (0, 1, 0))))
+
+
+class Limits(unittest.TestCase):
+    """At 40,000 km across the line of sight, 1 frame/s, gate 16: the quiet model, 0.02 arcsec/s^1.5, follows
+    0.08 arcsec/s^2, 15 m/s^2; one of 1 arcsec/s^1.5 is found up to 1.15 arcsec/s^2, 220 m/s^2, and
+    followed up to 4 arcsec/s^2. What is held is not warned of, what is lost is."""
+
+    def both(self, key, value, followed, lost):
+        more = {MODULES + "/tracker/" + key: value}
+        self.assertEqual(held("ekf", followed, 60, (0, 0, 1), more), (1.0, 1, False))
+        share, _, warned = held("ekf", lost, 60, (0, 0, 1), more)
+        self.assertTrue(warned)
+        self.assertLess(share, 0.9)
+
+    def test_quiet_model(self):
+        self.both("false_events_per_hour", 0, 8, 30)
+
+    def test_manoeuvring_model(self):
+        self.both("manoeuvre_noise_arcsec_per_s15", 1, 200, 800)
 
 
 def tearDownModule():
