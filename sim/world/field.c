@@ -454,9 +454,9 @@ static bst_image_moments smear_of(const bst_field *field, const bst_source *sour
 }
 
 /* Variance that a path has beyond a straight one, over the PSF's, from which on it is followed:
- * what a bend across is taken for a Gaussian's then makes 2 % of a long streak's signal-to-noise
+ * what a bend across is taken for a Gaussian's then makes 3 % of a long streak's signal-to-noise
  * ratio. */
-static const double BENT = 0.08;
+static const double BENT = 0.12;
 
 /* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
  * pixel's own width, widened along and across the way from the first to the last

@@ -128,17 +128,39 @@ double bst_image_squared(double along, double across, double length) {
     return line / (2.0 * root_pi * across);
 }
 
+/* Variance of what is independent from place to place, both axes, px^2: of white errors second
+ * differences have 6 times that; smooth paths have hardly any. */
+static double roughness(const double *x, const double *y, int count) {
+    double sum = 0.0;
+    for (int k = 1; k + 1 < count; k++) {
+        double dx = x[k - 1] - 2.0 * x[k] + x[k + 1], dy = y[k - 1] - 2.0 * y[k] + y[k + 1];
+        sum += (dx * dx + dy * dy) / (6.0 * (count - 2));
+    }
+    return sum;
+}
+
 double bst_image_squared_path(const bst_camera *camera, const bst_los_track *track,
                               const bst_source *source, double u0, double u1,
                               const bst_image_moments *moments, double excess_px2,
                               double variance_px2) {
-    enum { FEWEST = 64, MOST = 256 };
+    enum { COARSE = 9, FEWEST = 20, MOST = 256 };
     const double step_px = 1.5;
+    double x[MOST], y[MOST], w[MOST], total = 0.0, length = 0.0, line = 0.0;
+    double duration = track->time_s[track->count - 1], before = bst_source_light(source, u0);
+    for (int k = 0; k < COARSE; k++) { /* most jitter shows in a few places */
+        double u = u0 + (u1 - u0) * ((k + 0.5) / COARSE);
+        bst_quat q = bst_track_attitude(track, u * duration);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x[k],
+                                &y[k])) {
+            return NAN;
+        }
+    }
+    if (roughness(x, y, COARSE) > 0.5 * excess_px2) {
+        return NAN;
+    }
     /* twice the length of a straight path with these moments */
     double wanted = 2.0 * sqrt(12.0 * (moments->xx + moments->yy)) / step_px;
     int count = wanted < FEWEST ? FEWEST : wanted < MOST ? (int)wanted : MOST;
-    double x[MOST], y[MOST], w[MOST], total = 0.0, length = 0.0, line = 0.0;
-    double duration = track->time_s[track->count - 1], before = bst_source_light(source, u0);
     for (int k = 0; k < count; k++) {
         double u = u0 + (u1 - u0) * ((k + 0.5) / count);
         double after = bst_source_light(source, u0 + (u1 - u0) * ((k + 1.0) / count));
@@ -160,13 +182,7 @@ double bst_image_squared_path(const bst_camera *camera, const bst_los_track *tra
     if (!(total > 0.0)) {
         return NAN;
     }
-    /* second differences: 6 times the variance of what is independent from place to place */
-    double rough = 0.0;
-    for (int k = 1; k + 1 < count; k++) {
-        double dx = x[k - 1] - 2.0 * x[k] + x[k + 1], dy = y[k - 1] - 2.0 * y[k] + y[k + 1];
-        rough += (dx * dx + dy * dy) / (6.0 * (count - 2));
-    }
-    if (rough > 0.5 * excess_px2) {
+    if (roughness(x, y, count) > 0.5 * excess_px2) {
         return NAN;
     }
     double norm = 1.0 / (total * total);
