@@ -512,6 +512,67 @@ static void edges_are_drawn_pixel_by_pixel(void **state) {
     bst_world_free(world);
 }
 
+/* The limb's glow is drawn pixel by pixel up to where it is 2 % of the sky: with 15 scale heights
+ * instead of 22 the coarse map is wrong by 12 % of the sky between its nodes. */
+static void the_limb_fades_into_the_sky(void **state) {
+    (void)state;
+#define SKY_ONLY "\"model\": \"sky\", \"moon\": false, \"sun\": false"
+    bst_world *worlds[2] = {test_world(SKY_WORLD("300", SKY_ONLY)),
+                            test_world(SKY_WORLD("300", SKY_ONLY ", \"earth\": false"))};
+    const bst_camera *camera = bst_world_camera(worlds[0], 0, 0);
+    double scale = bst_camera_scale_rad(camera), limb = asin(BST_EARTH_RADIUS_M / 7.2e6);
+    bst_surroundings around = look_down((bst_vec3){7.2e6, 0, 0}, 0);
+    double sun_e = bst_camera_electrons_per_s(camera, 0) * scale * scale * around.exposure_s;
+    int followed = 0, beyond = 0;
+    for (int k = 0; k <= BST_DISC_PARTS; k++) { /* a scale height is 25 px: 13 to 25 of them */
+        bst_vec3 turn = {0, -limb - 475 * scale, 0};
+        around.q[k] = bst_quat_mul(bst_quat_from_rotvec(turn), around.q[k]);
+    }
+    bst_skylight *s[2];
+    const bst_skylight_map *map[2];
+    for (int i = 0; i < 2; i++) {
+        map[i] = make(worlds[i], &around, (bst_window){0, 0, 300, 300}, &s[i]);
+    }
+    bst_discs discs;
+    bst_discs_make(camera, &around, &discs);
+    for (int i = 0; i < 300 * 300; i += 7) {
+        int x = i % 300, y = i / 300;
+        bst_disc_light light = bst_discs_light(&discs, bst_camera_unproject(camera, x, y));
+        double sky = bst_skylight_at(map[1], x, y), glow = sun_e * light.sunlight;
+        followed += glow > 0.2 * sky;
+        beyond += glow < 0.02 * sky;
+        /* what is left of the glow, and 2e-3 between the sky's nodes */
+        bst_assert_close(bst_skylight_at(map[0], x, y), sky + glow, 0.03 * sky + 1e-5 * glow);
+    }
+    assert_true(followed > 1000 && beyond > 1000);
+    for (int i = 0; i < 2; i++) {
+        bst_skylight_free(s[i]);
+        bst_world_free(worlds[i]);
+    }
+}
+
+/* The Earth is found that only a turn of the camera brings near the sensor, at the exposure's ends.
+ */
+static void bodies_are_found_wherever_the_camera_turns(void **state) {
+    (void)state;
+    bst_camera camera = test_camera(20);
+    double half = bst_camera_half_diagonal_rad(&camera), r = 4.2164e7;
+    for (int i = 0; i < 60; i++) {
+        double turn = 0.02 * (i % 6), away = half * (0.25 * (i / 6) + 0.2);
+        bst_surroundings around = look_down((bst_vec3){r, 0, 0}, 0);
+        for (int k = 0; k <= BST_DISC_PARTS; k++) {
+            double to = asin(BST_EARTH_RADIUS_M / r) + away + turn * (1 - fabs(k - 4.0) / 4);
+            around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
+        }
+        bst_discs discs;
+        bst_discs_make(&camera, &around, &discs);
+        bool present = discs.body[BST_BODY_EARTH].present;
+        assert_true(present || away > half);
+        /* 44 px of limb, 45 px of wings, flattening */
+        assert_true(!present || away < half + 110.0 * bst_camera_scale_rad(&camera));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_of_windows),
@@ -528,6 +589,8 @@ int main(void) {
         cmocka_unit_test(gradients_are_polynomials),
         cmocka_unit_test(windows_and_interpolation),
         cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
+        cmocka_unit_test(the_limb_fades_into_the_sky),
+        cmocka_unit_test(bodies_are_found_wherever_the_camera_turns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
