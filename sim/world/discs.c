@@ -6,8 +6,10 @@
  * being infinitely bright. */
 #define MOON_EVEN 0.01
 
-/* The Earth's limb is followed up to this many scale heights, where e-15 of its light is left. */
-#define LIMB_HEIGHTS 15.0
+/* The Earth's limb is followed up to this many scale heights. The sunlit Earth (V = 2.4 per square
+ * arcsecond at an albedo of 0.3) is e^18 times a dark sky of 22: of the limb's glow 2 % of that sky
+ * are left there (tests/world/test_skylight.c). */
+#define LIMB_HEIGHTS 22.0
 
 static double sun_radiance_scale(double sun_distance_m) {
     double au = sun_distance_m / BST_AU_M;
@@ -76,6 +78,11 @@ static void choose_parts(bst_body_disc *d, int body, double scale_rad, double se
     }
 }
 
+/* Angle of a scale height at the limb, seen from so many Earth radii. */
+static double limb_fade_rad(const bst_discs *discs, double distance) {
+    return discs->limb_scale / sqrt(fmax(distance * distance - 1.0, 1e-4));
+}
+
 static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_discs *out) {
     bst_body_disc *d = &out->body[BST_BODY_EARTH];
     d->present = camera->background.earth;
@@ -107,11 +114,7 @@ static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_
         d->centre[k] = bst_quat_rotate(a->q[k], bst_vec3_scale(bst_vec3_unit(eye), -1.0));
         d->sun[k] = bst_vec3_unit(bst_mat3_mul_vec(&a->itrf_from_gcrf, a->bodies.sun_m));
     }
-    /* on the way to the limb */
-    double distance = bst_vec3_norm(d->eye[BST_DISC_PARTS / 2]);
-    double way = sqrt(fmax(distance * distance - 1.0, 1e-4));
-    out->limb_scale = camera->background.limb_scale_height_m / BST_EARTH_RADIUS_M;
-    double fade_px = out->limb_scale / way / out->scale_rad;
+    double fade_px = limb_fade_rad(out, bst_vec3_norm(d->eye[BST_DISC_PARTS / 2])) / out->scale_rad;
     /* where the limb fades slowly the coarse map follows it by itself */
     d->reach_px = fade_px < 128.0 ? LIMB_HEIGHTS * fade_px : 0.0;
 }
@@ -144,27 +147,75 @@ static void make_round(const bst_camera *camera, const bst_surroundings *a, int 
     d->radiance = pow(10.0, -0.4 * bst_moon_v_mag(from_eye, to_sun)) / (solid * (even + MOON_EVEN));
 }
 
+/* How far beyond a body's edge the boresight may be for its light to reach the sensor, rad. */
+static double reach_rad(const bst_camera *camera, const bst_discs *discs, int body,
+                        double distance) {
+    double limb = body == BST_BODY_EARTH ? LIMB_HEIGHTS * limb_fade_rad(discs, distance) : 0.0;
+    return bst_camera_half_diagonal_rad(camera) + limb + 50.0 * discs->sigma_px * discs->scale_rad;
+}
+
+/* Angle of the camera's turn from mid-exposure, at most. */
+static double largest_turn_rad(const bst_surroundings *a) {
+    bst_quat mid = bst_quat_unit(a->q[BST_DISC_PARTS / 2]);
+    double least = 1.0;
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        bst_quat q = bst_quat_unit(a->q[k]);
+        least = fmin(least, fabs(q.x * mid.x + q.y * mid.y + q.z * mid.z + q.w * mid.w));
+    }
+    return 2.0 * acos(least);
+}
+
+/* Whether a body stays out of the field, from its place at mid-exposure alone and bounds of what
+ * else moves its edge: the camera's turn, the observer's way, aberration (twice that of Earth and
+ * observer) and, of the Earth, the difference between its own coordinates and those in which it is
+ * a sphere. */
+static bool stays_away(const bst_camera *camera, const bst_surroundings *a, const bst_discs *discs,
+                       int body, double turn_rad) {
+    static const double TURN_MARGIN = 1e-6;
+    const double radii[] = {BST_EARTH_RADIUS_M, BST_MOON_RADIUS_M, BST_SUN_RADIUS_M};
+    bst_vec3 places[] = {{0, 0, 0}, a->bodies.moon_m, a->bodies.sun_m};
+    bst_vec3 to = bst_vec3_sub(places[body], a->eye_m);
+    double distance = bst_vec3_norm(to), r = bst_vec3_norm(a->eye_m), half = 0.5 * a->exposure_s;
+    double moved = half * (bst_vec3_norm(a->eye_mps) +
+                           (r > 0.0 ? 0.5 * half * BST_EARTH_MU_M3PS2 / (r * r) : 0.0));
+    double nearest = distance - radii[body] - moved;
+    if (!(nearest > 0.01 * radii[body])) {
+        return false;
+    }
+    double speed = bst_vec3_norm(a->eye_mps) + bst_vec3_norm(a->light.velocity_mps);
+    double margin = turn_rad + TURN_MARGIN + moved / nearest + 2.0 * speed / BST_LIGHT_SPEED_MPS +
+                    (body == BST_BODY_EARTH ? 2.0 * BST_EARTH_FLATTENING : 0.0);
+    bst_vec3 boresight =
+        bst_quat_rotate(bst_quat_conj(a->q[BST_DISC_PARTS / 2]), (bst_vec3){0, 0, 1});
+    double edge = bst_vec3_angle(boresight, to) - asin(radii[body] / distance);
+    double nearest_radii = 1.0 + nearest / radii[body];
+    return edge - margin > reach_rad(camera, discs, body, nearest_radii);
+}
+
 void bst_discs_make(const bst_camera *camera, const bst_surroundings *around, bst_discs *out) {
-    *out = (bst_discs){.scale_rad = bst_camera_scale_rad(camera)};
     double sigma = bst_camera_psf_sigma_px(camera);
-    out->sigma_px = sqrt(sigma * sigma + 1.0 / 12.0);
-    make_earth(camera, around, out);
-    make_round(camera, around, BST_BODY_MOON, out);
-    make_round(camera, around, BST_BODY_SUN, out);
-    double half = bst_camera_half_diagonal_rad(camera);
     double sensor_px = hypot((double)camera->width_px, (double)camera->height_px);
+    double turn_rad = largest_turn_rad(around);
+    *out = (bst_discs){.scale_rad = bst_camera_scale_rad(camera),
+                       .sigma_px = sqrt(sigma * sigma + 1.0 / 12.0),
+                       .limb_scale = camera->background.limb_scale_height_m / BST_EARTH_RADIUS_M};
     for (int i = 0; i < BST_BODY_COUNT; i++) {
         bst_body_disc *d = &out->body[i];
-        double nearest = INFINITY;
+        if (stays_away(camera, around, out, i, turn_rad)) {
+            continue;
+        }
+        if (i == BST_BODY_EARTH) {
+            make_earth(camera, around, out);
+        } else {
+            make_round(camera, around, i, out);
+        }
+        double nearest = INFINITY, distance = 1.0;
         for (int k = 0; k <= BST_DISC_PARTS; k++) {
             nearest = fmin(nearest, edge_at(d, i, k, (bst_vec3){0, 0, 1}));
         }
         choose_parts(d, i, out->scale_rad, sensor_px);
-        double beyond = i == BST_BODY_EARTH
-                            ? LIMB_HEIGHTS * out->limb_scale /
-                                  sqrt(fmax(bst_vec3_dot(d->eye[4], d->eye[4]) - 1.0, 1e-4))
-                            : 0.0;
-        d->near = nearest < half + beyond + 50.0 * out->sigma_px * out->scale_rad;
+        distance = i == BST_BODY_EARTH ? bst_vec3_norm(d->eye[BST_DISC_PARTS / 2]) : distance;
+        d->near = nearest < reach_rad(camera, out, i, distance);
         d->present = d->present && d->near;
     }
 }
