@@ -69,9 +69,9 @@ class SameResults(unittest.TestCase):
 class Replay(unittest.TestCase):
     """A recorded run without its peers."""
 
-    def replayed(self, scenario, recorded, *more, frames=False):
+    def replayed(self, scenario, recorded, *more, frames=False, duration=6):
         again = runs.scratch() + "/again"
-        words = runs.command(scenario, again, *([] if frames else [runs.NO_FRAMES]), duration=6)
+        words = runs.command(scenario, again, *([] if frames else [runs.NO_FRAMES]), duration=duration)
         result = subprocess.run(words + ["--replay", recorded, *more], capture_output=True,
                                 text=True, timeout=60)
         return again, result
@@ -101,7 +101,7 @@ class Replay(unittest.TestCase):
         self.same(out, again)
         self.assertFalse(os.path.exists(again + "/link.packets"))
         # what is not the recorded run is told, not taken
-        _, result = self.replayed(out + "/scenario.json", out, "--duration", "9")
+        _, result = self.replayed(out + "/scenario.json", out, duration=9)
         self.assertEqual(result.returncode, 1)
         self.assertIn("the recorded run was shorter", result.stderr)
         _, result = self.replayed(out + "/scenario.json", out, "--set",

@@ -79,7 +79,8 @@ class Measured(unittest.TestCase):
             self.assertIn("gnuplot", self.result.stderr)
 
     def test_the_same_seed_gives_the_same(self):
-        again = pd(*self.words[:-1], self.path + ".2", "--threads", "2")
+        other = {"--threads": "2", "--json": self.path + ".2"}
+        again = pd(*[other.get(before, word) for before, word in zip(("", *self.words), self.words)])
         self.assertEqual(again.returncode, 0, again.stderr)
         with open(self.path + ".2") as file:
             out = json.load(file)
@@ -160,7 +161,7 @@ class WrongCalls(unittest.TestCase):
                                   (["--snr", "2:9:1", "--magnitude", "12:15:1"], 2, "not both"),
                                   (["--known-rate"], 2, "--streak"),
                                   (["--trials", "0"], 2, "trials"),
-                                  (["--sensor", "nobody"], 1, "OBSERVER/SENSOR"),
+                                  (["--sensor", "nobody"], 1, "(allowed: neossat/telescope)"),
                                   (["--stars", "--background", "9"], 2, "give one"),
                                   (["--star-streak", "9", "--streak", "9", "--known-rate"], 2,
                                    "leave out --star-streak"),

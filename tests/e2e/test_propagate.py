@@ -291,11 +291,15 @@ class CommandLine(unittest.TestCase):
         self.fails(2, "did you mean --norad?", *sets, "--nrad", "3", *self.window)
         self.fails(2, "--frame j2000: give one of teme|gcrf", *sets, "--frame", "j2000",
                    *self.window)
-        self.fails(2, "--step 0: give a number from 1e-06", *sets, *self.window, "--step", "0")
-        self.fails(2, "is before --start", *sets, *self.window, "--stop", "2022-06-16T22:09:59Z")
-        self.fails(2, "--start: \"yesterday\" is not a UTC time", *sets, *self.window, "--start",
-                   "yesterday")
-        self.fails(2, "give whole microseconds", *sets, *self.window, "--step", "1.00000005")
+
+        def but(option, value):
+            words = list(self.window)
+            words[words.index(option) + 1] = value
+            return words
+        self.fails(2, "--step 0: give a number from 1e-06", *sets, *but("--step", "0"))
+        self.fails(2, "is before --start", *sets, *but("--stop", "2022-06-16T22:09:59Z"))
+        self.fails(2, "--start: \"yesterday\" is not a UTC time", *sets, *but("--start", "yesterday"))
+        self.fails(2, "give whole microseconds", *sets, *but("--step", "1.00000005"))
 
     def test_failures(self):
         self.fails(1, "no_such_file.tle", "--tle", "no_such_file.tle", *self.window)

@@ -151,9 +151,8 @@ class RandomLabels(FigureChecks, unittest.TestCase):
               f"centroid off {np.median(off, axis=0) if len(off) else '-'}")
         # radiation hits in a box and hot pixels in a ring
         self.assertGreaterEqual(sources, 0.97 * len(ratios) - 1)
-        if len(ratios) > 20:
-            self.assertTrue(0.9 < np.median(ratios) < 1.02, np.median(ratios))
-            # of few stars in a stare the median is that of what stands beside them
+        self.assertTrue(not ratios or 0.9 < np.median(ratios) < 1.04, np.median(ratios or [1]))
+        if len(stars) > 20:  # of few stars in a crowded stare it is that of what stands beside them
             self.assertLess(np.hypot(*np.median(off, axis=0)), 0.03 + 0.25 / np.sqrt(len(stars)))
         return sources
 
