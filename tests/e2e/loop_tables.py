@@ -117,9 +117,10 @@ class LoopTables:
         pulls = np.array(pulls)
         print("attitude from stars in its sigmas, RMS about x, y, z:", np.sqrt(np.mean(pulls ** 2, axis=0)).round(2))
         self.assertGreater(len(pulls), 30)
-        # 34 frames: a standard deviation is known to 12 %; the attitude of a mean is that of a shaken exposure
+        # 34 frames: a standard deviation from a median is known to 20 %, and the attitude of a mean is that of a shaken
+        # exposure: 1.2 (900 frames of the targets of test_orbit_consistency.py have 1.0 to 1.2) within three sigma
         for k in range(3):
-            self.assertTrue(0.6 < np.sqrt(np.median(pulls[:, k] ** 2) / 0.455) < 1.8, (k, pulls[:, k]))
+            self.assertTrue(0.6 < np.sqrt(np.median(pulls[:, k] ** 2) / 0.455) < 2.0, (k, pulls[:, k]))
 
     def test_tracks(self):
         nees, seen, kept = [], {}, {}
