@@ -179,57 +179,6 @@ static void errors_and_statements_have_their_own_width(void **state) {
     }
 }
 
-/* SNR of the filter for a point over that of the streak's own, by sums over fine pixels. */
-static double point_share(double sigma, double length) {
-    enum { SUB = 4, REACH = 8 * SUB, PARTS = 40 };
-    double both = 0.0, own = 0.0, point = 0.0, s2 = sigma * sigma + 1.0 / 12.0;
-    for (int i = -REACH; i <= REACH; i++) { /* across the streak both are the same */
-        double x = (double)i / SUB, p = exp(-0.5 * x * x / s2), q = 0.0;
-        for (int k = 0; k < PARTS; k++) {
-            double d = x - length * ((k + 0.5) / PARTS - 0.5);
-            q += exp(-0.5 * d * d / s2) / PARTS;
-        }
-        both += p * q;
-        own += q * q;
-        point += p * p;
-    }
-    return both / sqrt(own * point);
-}
-
-/* Noise decides whether a point fits a short streak better: the difference of the squares is that
- * of two filters' outputs, normal with 2 (1 - rho) for outputs of correlation rho. */
-static void short_streaks_may_be_points(void **state) {
-    (void)state;
-    const double length = 2.0, snrs[] = {12.0, 20.0, 40.0};
-    scene s;
-    open_scene(&s);
-    s.frame.streak_dx_px = length;
-    start(&s);
-    double rho = point_share(s.frame.sigma_px, length);
-    for (int k = 0; k < 3; k++) {
-        fill(&s, snrs[k]);
-        for (int i = 0; i < s.truth->count; i++) {
-            s.truth->items[i].x_start_px -= 0.5 * length;
-            s.truth->items[i].x_end_px += 0.5 * length;
-        }
-        double points = 0.0, all = 0.0, snr = 0.0;
-        for (int n = 0; n < 3; n++) {
-            bst_generator_result r = run(&s, 10 * k + n);
-            for (int i = 0; i < r.count; i++) {
-                points += !(r.items[i].detection.flags & BST_DETECTION_STREAK);
-                snr += r.items[i].detection.snr;
-                all += 1.0;
-            }
-        }
-        assert_true(all > 2600.0);
-        double asked = 0.5 * erfc(snr / all * sqrt(0.5 * (1.0 - rho)) / sqrt(2.0));
-        /* 2700 draws: 0.009; the mean SNR for each one's */
-        bst_assert_close(points / all, asked, 0.03);
-        assert_true(k > 0 || asked > 0.1);
-    }
-    close_scene(&s);
-}
-
 static void the_phase_bias_is_as_stated(void **state) {
     (void)state;
     scene s;
@@ -386,82 +335,6 @@ static void close_sources_are_one(void **state) {
     close_scene(&s);
 }
 
-/* A streak cut by the frame's edge is fitted with its known path, so that place and flux are those
- * of the whole, from half the light; what lies mostly beyond the edge is a point on it; one beside
- * the frame shows nothing. */
-static void the_edge_cuts(void **state) {
-    (void)state;
-    scene s;
-    open_scene(&s);
-    start(&s);
-    double light = electrons_of(&s, 400.0);
-    bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
-    item->x_start_px = -20.0;
-    item->x_centroid_px = 0.0;
-    item->x_end_px = 20.0;
-    s.frame.streak_dx_px = 40.0;
-    bst_generator_result r = run(&s, 0);
-    assert_int_equal(r.count, 1);
-    const bst_detection *d = &r.items[0].detection;
-    assert_true(d->flags & BST_DETECTION_EDGE);
-    assert_true(d->flags & BST_DETECTION_STREAK);
-    /* six times the bound of half the light at SNR 400 and 40 px */
-    bst_assert_close(d->x_px, 0.0, 0.2);
-    bst_assert_close(d->flux_e, light, 0.05 * light);
-    item->x_start_px = -36.0;
-    item->x_centroid_px = -16.0;
-    item->x_end_px = 4.0;
-    r = run(&s, 0);
-    assert_int_equal(r.count, 1);
-    d = &r.items[0].detection;
-    assert_false(d->flags & BST_DETECTION_STREAK);
-    /* -0.5 to 4 are on the frame */
-    bst_assert_close(d->x_px, 1.75, 1.0);
-    item->x_start_px = -60.0;
-    item->x_centroid_px = -40.0;
-    item->x_end_px = -20.0;
-    assert_int_equal(run(&s, 0).count, 0);
-    s.frame.streak_dx_px = 100.0;
-    assert_true(run(&s, 0).smeared);
-    close_scene(&s);
-}
-
-/* A streak longer than is filtered for is seen in parts: on its path, above the threshold, more of
- * them where the light is near the threshold than where it is far above. */
-static void long_streaks_are_seen_in_parts(void **state) {
-    (void)state;
-    scene s;
-    open_scene(&s);
-    start(&s);
-    int parts[2] = {0, 0};
-    for (int bright = 0; bright < 2; bright++) {
-        for (int f = 0; f < 20; f++) {
-            s.truth->count = 0;
-            bst_truth_item *item =
-                add_source(&s, 1, 500.0, 500.0, electrons_of(&s, bright ? 8000.0 : 500.0));
-            item->x_start_px = 420.0;
-            item->x_end_px = 580.0;
-            item->y_start_px = 440.0;
-            item->y_end_px = 560.0;
-            s.frame.streak_dx_px = 160.0;
-            s.frame.streak_dy_px = 120.0;
-            bst_generator_result r = run(&s, f);
-            assert_true(r.smeared);
-            for (int i = 0; i < r.count; i++) {
-                const bst_detection *d = &r.items[i].detection;
-                double along = 0.8 * (d->x_px - 500.0) + 0.6 * (d->y_px - 500.0);
-                double across = 0.8 * (d->y_px - 500.0) - 0.6 * (d->x_px - 500.0);
-                /* half of 200 px and the PSF; six standard deviations of a place at SNR 5 */
-                assert_true(fabs(along) < 105.0 && fabs(across) < 1.5);
-                assert_true(d->snr > r.threshold_snr);
-            }
-            parts[bright] += r.count;
-        }
-    }
-    assert_true(parts[1] >= 20 && parts[0] > parts[1]);
-    close_scene(&s);
-}
-
 /* Every part of a pixel's variance by itself, binned two by two: what is added before the read-out
  * grows with the pixels, what the read-out adds does not. */
 static void a_pixels_noise_is_the_sum_of_its_parts(void **state) {
@@ -539,49 +412,6 @@ static void light_below_the_clip_is_background(void **state) {
     }
 }
 
-/* While the stars are long streaks a source at rest stands at the top of the filter's output: noise
- * of unit variance has a gradient of 1 / (sqrt(2) sigma), the top a curvature of SNR / (2 sigma^2).
- */
-static void tops_at_rest_scatter_evenly(void **state) {
-    (void)state;
-    scene s;
-    open_scene(&s);
-    s.frame.streak_dx_px = 160.0;
-    s.frame.streak_dy_px = 120.0;
-    start(&s);
-    fill(&s, 40.0);
-    bst_generator_result r = run(&s, 1);
-    assert_true(r.smeared && r.count >= 890);
-    double sum[2] = {0.0}, square[3] = {0.0}, snr = 0.0, n = r.count;
-    for (int i = 0; i < r.count; i++) {
-        const bst_detection *d = &r.items[i].detection;
-        const bst_truth_item *item = &s.truth->items[r.items[i].item];
-        double x = d->x_px - item->x_mid_px, y = d->y_px - item->y_mid_px;
-        sum[0] += x / n;
-        sum[1] += y / n;
-        square[0] += x * x / n;
-        square[1] += x * y / n;
-        square[2] += y * y / n;
-        snr += d->snr / n;
-        /* what it says of itself: a pixel, no better; flux by its SNR */
-        assert_true(d->cov_xx == 1.0 && d->cov_yy == 1.0);
-        double sigma = d->flux_e / d->snr;
-        bst_assert_close(d->flux_sigma_e, sqrt(sigma * sigma + d->flux_e), 1e-9 * d->flux_e);
-    }
-    /* seen on the brightest pixel, which is off the top by up to half a pixel */
-    assert_true(snr > 34.0 && snr < 41.0);
-    double width = sqrt(s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0);
-    double sigma = sqrt(2.0) * width / 40.0;
-    /* four standard errors of a variance, a mean and a covariance; widths of a Gaussian's: 3 % */
-    double error = 4.0 * sqrt(2.0 / n) + 0.06;
-    bst_assert_close(square[0] / (sigma * sigma), 1.0, error);
-    bst_assert_close(square[2] / (sigma * sigma), 1.0, error);
-    bst_assert_close(square[1] / (sigma * sigma), 0.0, 4.0 / sqrt(n));
-    bst_assert_close(sum[0] / sigma, 0.0, 4.0 / sqrt(n));
-    bst_assert_close(sum[1] / sigma, 0.0, 4.0 / sqrt(n));
-    close_scene(&s);
-}
-
 static void room_is_for_the_brightest(void **state) {
     (void)state;
     scene s;
@@ -635,16 +465,12 @@ int main(void) {
         cmocka_unit_test(detection_follows_the_ideal_law),
         cmocka_unit_test(places_scatter_by_the_bound),
         cmocka_unit_test(errors_and_statements_have_their_own_width),
-        cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(the_phase_bias_is_as_stated),
         cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
         cmocka_unit_test(draws_depend_on_names_alone),
         cmocka_unit_test(close_sources_are_one),
-        cmocka_unit_test(the_edge_cuts),
-        cmocka_unit_test(long_streaks_are_seen_in_parts),
         cmocka_unit_test(a_pixels_noise_is_the_sum_of_its_parts),
         cmocka_unit_test(light_below_the_clip_is_background),
-        cmocka_unit_test(tops_at_rest_scatter_evenly),
         cmocka_unit_test(room_is_for_the_brightest),
         cmocka_unit_test(hits_come_at_the_detectors_rate),
     };
