@@ -4,15 +4,11 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "sim/core/vec.h"
-
 /* Parts of the others' errors that meet where the worst source's error is greatest: of an error
  * that is told by its greatest value, and of a border's length that passes within its own thickness
  * of a place. */
 #define REST 0.4f
 #define BORDERS 0.1f
-/* Radius of a border, in sigma of the PSF. */
-#define BORDER_SIGMAS 3.5
 
 /* Cells as far as two stamps' radii, four standard deviations of the PSF each and more, go; and up
  * to how many cells are searched for crossings of borders. */
@@ -89,20 +85,11 @@ bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool
         .width_px = high[1] - low[1] + roll};
 }
 
-double bst_crowd_reach_px2(const bst_crowd_motion *motion) {
-    double psf = 3.0 * motion->sigma_px + 1.0; /* three by three cells of half a box */
-    return 2.25 * (motion->length_px + psf) * (motion->width_px + psf);
-}
-
 void bst_crowd_begin(bst_crowd *c, const bst_crowd_motion *motion) {
     c->motion = *motion;
     double psf = 3.0 * motion->sigma_px + 1.0;
-    double box = (motion->length_px + psf) * (motion->width_px + psf);
-    c->motion.overlap = fmin(1.0, (motion->way_px + psf) * psf / box);
-    /* of a still star the border is a circle, of a streak two lines besides; the root, for their
-     * number at a place is random */
-    double longer = 1.0 + motion->way_px / (BORDER_SIGMAS * BST_PI * motion->sigma_px);
-    c->motion.border_part = sqrt(fmin(1.0, longer * psf * psf / box));
+    c->motion.overlap = fmin(
+        1.0, (motion->way_px + psf) * psf / ((motion->length_px + psf) * (motion->width_px + psf)));
     c->count = 0;
     c->missing_e = 0.0;
     c->error = -1.0;
@@ -247,8 +234,7 @@ static float box_error(const bst_crowd *c, const cell *middle) {
     float others = sqrtf(part * fmaxf(sum.squares - sum.worst * sum.worst, 0.0f));
     float excess = sum.worst_excess + part * (sum.excess - sum.worst_excess);
     return fmaxf(sum.worst + excess, sum.worst_border) + sum.shared +
-           REST * fmaxf(others, sum.second) +
-           BORDERS * (float)c->motion.border_part * (sum.border - sum.worst_border);
+           REST * fmaxf(others, sum.second) + BORDERS * (sum.border - sum.worst_border);
 }
 
 /* Error where the border of the stamps in a cell meets another, as two circles do that are no
@@ -276,17 +262,12 @@ double bst_crowd_error_sigma(bst_crowd *c) {
             worst = fmaxf(worst, box_error(c, p));
             border = fmaxf(border, p->worst_border);
         }
-        /* the greater border of a pair is more than half of what the pair comes to */
-        int searched = 0;
-        for (int i = 0; i < cells && searched <= MOST_CROSSINGS; i++) {
-            const cell *p = &c->cells[c->used[i]];
-            if (2.0f * p->worst_border > worst) {
-                worst = fmaxf(worst, crossing_error(c, p));
-                searched++;
-            }
-        }
-        if (searched > MOST_CROSSINGS) { /* some of the worst do */
+        if (cells > MOST_CROSSINGS) { /* some of the worst do */
             worst = fmaxf(worst, 2.0f * border);
+        }
+        for (int i = 0; i < cells && 2.0f * border > worst; i++) {
+            const cell *p = &c->cells[c->used[i]];
+            worst = p->worst_border + border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;
         }
         c->error = fmaxf(worst, apart) + REST * fminf(worst, apart) +
                    c->missing_e / sqrt(c->motion.dark_variance_e2);

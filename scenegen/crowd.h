@@ -21,7 +21,6 @@ typedef struct bst_crowd_motion {
     double length_px, width_px; /* along it and across */
     double way_px;              /* length of the way, at most */
     double overlap;             /* part of length times width that a star's light falls on */
-    double border_part;         /* of the share of borders that meet, over that of still stars */
     double sigma_px;            /* of the PSF */
     double dark_variance_e2;    /* noise of a dark pixel */
 } bst_crowd_motion;
@@ -40,9 +39,6 @@ typedef struct bst_crowd_source {
     float border_e;   /* missing next to the stamp */
     bool apart;       /* moves further than the stars do */
 } bst_crowd_source;
-
-/* Area of the box in which sources count as neighbours of one another, px^2. */
-double bst_crowd_reach_px2(const bst_crowd_motion *motion);
 
 bst_status bst_crowd_create(bst_ctx *ctx, bst_crowd **out) BST_MUST_CHECK;
 void bst_crowd_free(bst_crowd *crowd);

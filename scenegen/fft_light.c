@@ -171,7 +171,7 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
     BST_TRY(choose_tiles(ctx, device, l, &threads));
     BST_TRY(bst_parallel_create(ctx, threads, &l->pool));
     BST_TRY(build(ctx, device, l));
-    BST_TRY(bst_light_band_measure(ctx, l->psf, 0.1 * FINER * l->options.tolerance, &l->band));
+    BST_TRY(bst_light_band_measure(ctx, l->psf, 0.1 * l->options.tolerance, &l->band));
     l->widest = BST_WIDEST;
     l->margin = (l->band.reach_px + 15) / 16 * 16;
     for (int q = 0; q < QUALITIES; q++) {

@@ -15,14 +15,11 @@ enum { FEW_CELLS = 6, MANY_CELLS = 96, ANCHORS = 48, FEW_SOURCES = 256 };
 #define UNLIKE_MANY 0.06
 /* Nodes that are nearer to each other than this, in sigma, give no scale. */
 #define LEAST_STEP 0.02
-/* exp(-20) of a node's light is none. */
-#define MOST_EXPONENT 20.0
 
 /* A node as the map needs it. */
 typedef struct turn {
     double m[9]; /* as in the table */
     double weight, roll_rad, tilt_px, p[3];
-    double way; /* to the next node, in the path's px */
 } turn;
 
 /* Place of the present cell's middle at a node. */
@@ -38,7 +35,6 @@ struct bst_motion_map {
     int count, capacity;
     int side; /* cells per axis */
     double cell_px;
-    double other; /* most that stars one px apart may move differently */
     unsigned frame, filled[MANY_CELLS * MANY_CELLS];
     bst_star_motion_cell cells[MANY_CELLS * MANY_CELLS];
 };
@@ -61,9 +57,7 @@ void bst_motion_map_free(bst_motion_map *map) {
 static double other_motion(const bst_motion_map *map, const turn *a, const turn *b,
                            double apart_px) {
     double tangent = map->f.reach_px * map->f.scale_rad;
-    double tilt = sqrt((a->p[0] - b->p[0]) * (a->p[0] - b->p[0]) +
-                       (a->p[1] - b->p[1]) * (a->p[1] - b->p[1])) /
-                  map->f.tilt_px;
+    double tilt = hypot(a->p[0] - b->p[0], a->p[1] - b->p[1]) / map->f.tilt_px;
     return apart_px * (fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad);
 }
 
@@ -104,17 +98,11 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
         from.roll_rad = low[2] / frame->roll_px;
         to.roll_rad = high[2] / frame->roll_px;
     }
-    for (int n = 0; n + 1 < frame->count; n++) {
-        const double *a = map->turns[n].p, *b = map->turns[n + 1].p;
-        map->turns[n].way = sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
-                                 (a[2] - b[2]) * (a[2] - b[2]));
-    }
     double length =
         sqrt((high[0] - low[0]) * (high[0] - low[0]) + (high[1] - low[1]) * (high[1] - low[1]) +
              (high[2] - low[2]) * (high[2] - low[2]));
-    map->other = other_motion(map, &from, &to, 1.0);
     double side =
-        sqrt(2.0) * frame->reach_px * map->other /
+        sqrt(2.0) * other_motion(map, &from, &to, frame->reach_px) /
         ((frame->sources <= FEW_SOURCES ? UNLIKE : UNLIKE_MANY) * fmax(length, map->f.sigma_px));
     map->side = (int)fmin(fmax(ceil(side), FEW_CELLS), MANY_CELLS);
     map->cell_px = 2.0 * frame->reach_px / map->side;
@@ -142,22 +130,16 @@ double bst_motion_pixel_share(double sigma_px, int binning, double *spread_px) {
 static double cell_share(const bst_motion_map *map, int binning, double radius_px) {
     double spread, line = bst_motion_pixel_share(map->f.sigma_px, binning, &spread);
     double per = 1.0 / (spread * sqrt(2.0)), best = 0.0;
-    /* nodes further than this share no pixel */
-    double reach = (sqrt(MOST_EXPONENT) / per + map->other * radius_px) / map->f.shrink;
     int stride = map->count / ANCHORS + 1;
     for (int a = 0; a < map->count; a += stride) {
         const place *at = &map->places[a];
         double sum = 0.0;
         for (int n = 0; n < map->count && at->front; n++) {
             const place *p = &map->places[n];
-            double dx = p->x - at->x, dy = p->y - at->y, d2 = dx * dx + dy * dy;
-            if (!p->front || d2 > reach * reach) {
-                continue;
-            }
-            double d = sqrt(d2) * map->f.shrink -
-                       other_motion(map, &map->turns[a], &map->turns[n], radius_px);
+            double dx = p->x - at->x, dy = p->y - at->y, d = sqrt(dx * dx + dy * dy);
+            d = d * map->f.shrink - other_motion(map, &map->turns[a], &map->turns[n], radius_px);
             double q = d > 0.0 ? d * d * per * per : 0.0;
-            sum += q < MOST_EXPONENT ? map->turns[n].weight * exp(-q) : 0.0;
+            sum += p->front && q < 20.0 ? map->turns[n].weight * exp(-q) : 0.0;
         }
         best = fmax(best, sum);
     }
@@ -171,13 +153,15 @@ static double cell_scale(const bst_motion_map *map, double radius_px) {
     for (int n = 0; n + 1 < map->count; n++) {
         const place *p = &map->places[n], *q = p + 1;
         const turn *a = &map->turns[n], *b = a + 1;
-        if (!p->front || !q->front || a->way < LEAST_STEP * map->f.sigma_px ||
-            (p->x * p->x + p->y * p->y > far * far && q->x * q->x + q->y * q->y > far * far)) {
+        double step = sqrt((a->p[0] - b->p[0]) * (a->p[0] - b->p[0]) +
+                           (a->p[1] - b->p[1]) * (a->p[1] - b->p[1]) +
+                           (a->p[2] - b->p[2]) * (a->p[2] - b->p[2]));
+        if (!p->front || !q->front || step < LEAST_STEP * map->f.sigma_px ||
+            fmin(hypot(p->x, p->y), hypot(q->x, q->y)) > far) {
             continue;
         }
-        double dx = p->x - q->x, dy = p->y - q->y;
-        double moved = sqrt(dx * dx + dy * dy) + other_motion(map, a, b, radius_px);
-        worst = fmax(worst, moved * map->f.stretch / a->way);
+        double moved = hypot(p->x - q->x, p->y - q->y) + other_motion(map, a, b, radius_px);
+        worst = fmax(worst, moved * map->f.stretch / step);
         any = true;
     }
     return any ? worst : 1.0;
@@ -190,9 +174,7 @@ static void fill_cell(bst_motion_map *map, bst_star_motion_cell *cell, double x,
     if (map->f.binning > 1) {
         cell->read_share = cell_share(map, map->f.binning, radius);
     }
-    double step = ceil(BST_SCALE_STEPS * log2(fmax(cell_scale(map, radius), 1e-9)) - 1e-9);
-    cell->step = (int)fmin(fmax(step, BST_SCALE_LEAST), BST_SCALE_MOST);
-    cell->scale = exp2((double)cell->step / BST_SCALE_STEPS);
+    cell->scale = cell_scale(map, radius);
     turn still = {.weight = 0.0};
     for (int n = 0; n < map->count; n++) {
         const place *p = &map->places[n];

@@ -10,15 +10,11 @@
 
 typedef struct bst_motion_map bst_motion_map;
 
-/* Scales of motion are rounded up to so many steps per octave, between these ones. */
-enum { BST_SCALE_STEPS = 32, BST_SCALE_LEAST = -160, BST_SCALE_MOST = 256 };
-
 /* What holds for all stars of a cell. */
 typedef struct bst_star_motion_cell {
     double share;           /* at most, of a star's light on one pixel */
     double read_share;      /* the same of a pixel that is read, binned from the sensor's */
-    double scale;           /* at most, of its motion over the path's: 2^(step / */
-    int step;               /* BST_SCALE_STEPS), from BST_SCALE_LEAST to BST_SCALE_MOST */
+    double scale;           /* at most, of its motion over the path's */
     double low[2], high[2]; /* box of its places about the place at the reference attitude, px */
 } bst_star_motion_cell;
 

@@ -56,11 +56,8 @@ typedef struct planning {
     const bst_fft_light *fft_light;
     const bst_render_request *request;
     double dark_e2;
-    double beyond; /* light that a pixel gets of a source beyond the margin, s */
-    int blocks;    /* at most */
-    int64_t most_nodes;
-    double sensor_px2;
-    double first_aim;  /* part of the tolerance with which planning begins */
+    double beyond;     /* light that a pixel gets of a source beyond the margin, s */
+    int blocks;        /* at most */
     bool fine;         /* with the finer grid */
     double grid_sigma; /* largest error by the grid */
 } planning;
@@ -122,50 +119,32 @@ static int blocks_of(int64_t nodes, int sources, int most_blocks) {
     return (int)(blocks < most_blocks ? blocks : most_blocks);
 }
 
-/* Stamps take all of their share of the tolerance first: it is a small one. */
-static void restart(planning *m, double aim) {
-    bst_smear_restart(m->smear, aim, aim / m->first_aim);
-}
-
-/* Part of the tolerance to begin with: errors of sources whose light meets add up, and planning
- * twice takes longer than some nodes more. */
-static double first_aim(const planning *m) {
-    /* few are soon planned again; for pairs here and there, and where every star has neighbours */
-    enum { FEW = 500 };
-    static const double PAIR_AIM = 0.72, CROWD_AIM = 0.5, NEIGHBOURS = 0.3;
-    if (m->request->count <= FEW) {
-        return 1.0;
-    }
-    bst_crowd_motion motion = bst_smear_motion(m->smear);
-    double neighbours = m->request->count * bst_crowd_reach_px2(&motion) / m->sensor_px2;
-    double pairs = 0.5 * m->request->count * neighbours;
-    return neighbours > NEIGHBOURS ? CROWD_AIM : pairs > 1.0 ? PAIR_AIM : 1.0;
-}
-
 /* Plans until the predicted error is within the tolerance: each time at a smaller part of it, as
  * far as that helps; or, where there are too many nodes, at a larger one. */
 static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m, double tolerance,
                                     int most_blocks) {
-    enum { ROUNDS = 8, TOO_MANY = 20000 };
+    enum { ROUNDS = 8, CROWD = 500, TOO_MANY = 20000 };
+    /* So many stars have some so near each other that their errors add up: at half the tolerance
+     * they need not be planned twice. */
+    static const double CROWD_AIM = 0.45;
     /* LESS: below the part that the prediction asks for; GAIN: what a round or the next must bring,
      * as levels of detail go by halves; GRID_SHARE: of the tolerance, beyond which the grid is
      * worth its refinement */
     static const double LESS = 0.97, GAIN = 0.98, MOST_STEP = 0.2, LEAST_STEP = 0.85,
                         GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
-    m->blocks = blocks_of(m->most_nodes, m->request->count, most_blocks);
-    double aim = m->first_aim = first_aim(m), before = INFINITY;
+    m->blocks = blocks_of(BST_SCENE_MOST_NODES, m->request->count, most_blocks);
+    double aim = m->request->count > CROWD ? CROWD_AIM : 1.0, before = INFINITY;
     bool fits, coarse = false;
-    p->bounded = false;
-    restart(m, aim);
+    bst_smear_restart(m->smear, aim);
     BST_TRY(plan_sources(ctx, p, m, &fits));
     if (!fits) { /* crowds along the paths of a slew, which no tolerance makes shorter */
-        coarse = p->bounded = true;
-        m->blocks = blocks_of(BST_SCENE_SLEW * m->most_nodes, m->request->count, most_blocks);
-        restart(m, aim);
+        coarse = true;
+        m->blocks = blocks_of(BST_SCENE_SLEW_NODES, m->request->count, most_blocks);
+        bst_smear_restart(m->smear, aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
     }
     for (; !fits && aim < COARSEST; aim *= COARSER) {
-        restart(m, COARSER * aim);
+        bst_smear_restart(m->smear, COARSER * aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
     }
     if (!fits) {
@@ -175,7 +154,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
                         "draw fewer stars (v_limit)",
                         p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks);
     }
-    /* the errors of very many sources take as long to add up as the frame to draw: the
+    /* the errors of very many sources take as long to add up as the frame to draw: at CROWD_AIM the
      * prediction, made when it is asked for, says what came of it */
     coarse = coarse || m->request->count > TOO_MANY;
     for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
@@ -190,11 +169,10 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
         } else {
             aim *= fmin(fmax(LESS * tolerance / error, MOST_STEP), LEAST_STEP);
         }
-        restart(m, aim);
+        bst_smear_restart(m->smear, aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
         if (!fits) { /* as it was before */
-            p->bounded = true;
-            restart(m, last);
+            bst_smear_restart(m->smear, last);
             return plan_sources(ctx, p, m, &fits);
         }
     }
@@ -225,8 +203,6 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                   .fft_light = fft_light,
                   .request = q,
                   .dark_e2 = dark_e2,
-                  .most_nodes = limits->nodes > 0 ? limits->nodes : BST_SCENE_MOST_NODES,
-                  .sensor_px2 = (double)camera->width_px * (double)camera->height_px,
                   .beyond = fft_light ? bst_fft_light_band(fft_light)->beyond * binning * binning *
                                             q->track->time_s[q->track->count - 1]
                                       : 0.0};

@@ -17,9 +17,6 @@
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
 
-/* Stars from which on levels are made that no star asks for, as they may serve more. */
-enum { CROWD = 1000 };
-
 enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
@@ -165,12 +162,8 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                               TABLE_FLOATS * sizeof(float)));
-    out->first_block = s->table_blocks;
-    out->blocks = blocks;
-    out->profile_error = profile_error(s, list);
-    for (int k = 0; k <= BST_SCALE_MOST - BST_SCALE_LEAST; k++) {
-        out->step_error[k] = -1.0;
-    }
+    *out = (bst_smear_level){
+        .first_block = s->table_blocks, .blocks = blocks, .profile_error = profile_error(s, list)};
     double part = bst_nodes_error_part(list->items, list->count, s->sigma_px);
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         out->error[k] = part * list->error[k];
@@ -356,7 +349,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
         bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
     }
     s->sources = frame->sources;
-    s->aim = s->cut_aim = 1.0;
+    s->aim = 1.0;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
@@ -400,9 +393,8 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     return BST_OK;
 }
 
-void bst_smear_restart(bst_smear *s, double aim, double cut_aim) {
+void bst_smear_restart(bst_smear *s, double aim) {
     s->aim = aim;
-    s->cut_aim = cut_aim;
     s->table_blocks = s->levels[0].first_block + s->levels[0].blocks;
     for (int n = 1; n < BST_SMEAR_LEVELS; n++) {
         s->levels[n].blocks = 0;
@@ -415,44 +407,35 @@ double bst_smear_allowed(const bst_smear *s, double peak_e) {
 }
 
 int bst_smear_choose_level(const bst_smear *s, double scale) {
-    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e) - s->point_error;
+    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
+    int n = 0;
     if (s->options.temporal_oversample > 0) {
-        return 0;
-    }
-    if (!(allowed > 0.0)) {
-        return BST_SMEAR_LEVELS - 1;
+        return n;
     }
     /* mostly three nodes: errors of sixth order, of motions up to the path's */
     double power = scale * scale * scale, part = fmin(power * power, 1.0);
-    int n;
-    double left = frexp(part * s->tolerance[0] / allowed, &n);
-    n = left > 0.5 ? n : n - 1; /* halvings */
-    return n < 0 ? 0 : n < BST_SMEAR_LEVELS ? n : BST_SMEAR_LEVELS - 1;
+    while (n + 1 < BST_SMEAR_LEVELS && part * s->tolerance[n] + s->point_error > allowed) {
+        n++;
+    }
+    return n;
 }
 
 /* The level for a star: from the one that its tolerance promises on, the first that keeps it. */
-static bst_status star_level(bst_ctx *ctx, bst_smear *s, double scale, int step, int *out) {
+static bst_status star_level(bst_ctx *ctx, bst_smear *s, double scale,
+                             const bst_smear_level **out) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
     int n = bst_smear_choose_level(s, scale);
     BST_TRY(make_level(ctx, s, n));
     while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 &&
-           bst_smear_level_error(&s->levels[n], step) > allowed) {
+           bst_smear_level_error(&s->levels[n], scale) > allowed) {
         BST_TRY(make_level(ctx, s, ++n));
     }
-    /* as exact as the same number of blocks may be */
-    while (s->sources > CROWD && n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0) {
-        BST_TRY(make_level(ctx, s, n + 1));
-        if (s->levels[n + 1].blocks > s->levels[n].blocks) {
-            break;
-        }
-        n++;
-    }
-    *out = n;
+    *out = &s->levels[n];
     return BST_OK;
 }
 
 static int choose_radius(const bst_smear *s, double peak_e) {
-    double limit = CUT_SHARE * s->cut_aim * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
+    double limit = CUT_SHARE * s->aim * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
     int most = s->options.taps / 2 - 1, asked = s->options.stamp_radius_px;
     return asked > 0 ? (asked < most ? asked : most)
                      : bst_stamp_radius(&s->stamp, peak_e, limit, most);
@@ -492,14 +475,12 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         return BST_OK;
     }
     double scale = 1.0;
-    int step = 0;
     double low[2] = {s->low[0], s->low[1]}, high[2] = {s->high[0], s->high[1]};
     if (!moving) {
         double share = s->star_share, read_share = s->read_share;
         if (!s->single) {
             const bst_star_motion_cell *cell = bst_motion_map_at(s->map, x, y);
             scale = cell->scale;
-            step = cell->step;
             share = cell->share;
             read_share = cell->read_share;
             memcpy(low, cell->low, sizeof low);
@@ -512,7 +493,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
             return BST_OK;
         }
     }
-    bst_smear_level *used = &s->own_level;
+    bst_smear_level own;
+    const bst_smear_level *used;
     double travel_px = s->travel_px;
     if (moving) {
         /* nodes are kept as small floats relative to a place on the sensor */
@@ -530,17 +512,17 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
             travel_px = fmax(travel_px, fabs(p[0]) + fabs(p[1]));
         }
         bst_smear_nodes_box(s, low, high);
-        BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, used));
+        BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
+        used = &own;
     } else {
-        int level;
-        BST_TRY(star_level(ctx, s, scale, step, &level));
-        used = &s->levels[level];
+        BST_TRY(star_level(ctx, s, scale, &used));
     }
     int radius = choose_radius(s, s->last_peak_e * s->binning);
     bst_smear_drawn drawn = {.x = x,
                              .y = y,
+                             .scale = scale,
                              .travel_px = travel_px,
-                             .error = bst_smear_level_error(used, step),
+                             .level = used,
                              .radius = radius,
                              .moving = moving};
     memcpy(drawn.low, low, sizeof low);

@@ -54,9 +54,8 @@ typedef struct bst_smear_frame {
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear,
                            const bst_smear_frame *frame) BST_MUST_CHECK;
 
-/* Starts again with the sources, aiming at a part of the tolerance (0 to 1) with nodes and at
- * another with stamps. */
-void bst_smear_restart(bst_smear *smear, double aim, double cut_aim);
+/* Starts again with the sources, aiming at `aim` (0 to 1) of the tolerance. */
+void bst_smear_restart(bst_smear *smear, double aim);
 
 /* The frame's stars follow one track as a shift. */
 bool bst_smear_single(const bst_smear *smear);

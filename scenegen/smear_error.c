@@ -29,13 +29,9 @@ void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
     }
 }
 
-double bst_smear_level_error(bst_smear_level *level, int step) {
-    double *error = &level->step_error[step - BST_SCALE_LEAST];
-    if (*error < 0.0) {
-        double scale = exp2((double)step / BST_SCALE_STEPS);
-        *error = bst_nodes_error(level->error, scale) + level->profile_error;
-    }
-    return *error;
+/* A level's error for an image that moves by `scale` of the path, over the peak. */
+double bst_smear_level_error(const bst_smear_level *level, double scale) {
+    return bst_nodes_error(level->error, scale) + level->profile_error;
 }
 
 /* Error of a star `from_boresight_px` away that follows the boresight's track, in sigma of its
@@ -53,7 +49,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     int radius = d->radius;
     double travel_px = d->travel_px;
     double lost = bst_stamp_excess(&s->stamp, radius), peak_e = s->last_read_e;
-    double error = d->error + s->chord_error;
+    double error = bst_smear_level_error(d->level, d->scale) + s->chord_error;
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
     /* places in parts of a pixel, the way to the node in float, and some additions of light */
     double rounded = 0.86 / s->sigma_px * (1.0 / s->place_parts + 0x1p-24 * travel_px) + 0x1p-22;

@@ -19,8 +19,6 @@ typedef struct bst_smear_level {
     int first_block, blocks; /* blocks 0: not made in this frame */
     /* expected, of the smeared image's peak: for motions as in bst_nodes_error, and of profiles */
     double error[BST_NODE_SCALES], profile_error;
-    /* all of it for the steps of bst_star_motion_cell; negative: not known yet */
-    double step_error[BST_SCALE_MOST - BST_SCALE_LEAST + 1];
 } bst_smear_level;
 
 struct bst_smear {
@@ -42,7 +40,7 @@ struct bst_smear {
     double margin_px, dark_variance_e2, duration_s;
     int binning, sources;
     double pixel_part[3]; /* as in bst_node_aim */
-    double aim, cut_aim;  /* parts of the tolerance: of nodes, of stamps */
+    double aim;           /* part of the tolerance */
     bst_quat q_reference;
     bst_quat *turn; /* attitude at each point of the path */
     int *parts;     /* straight parts of the path from each sample of the track */
@@ -59,7 +57,7 @@ struct bst_smear {
     double chord_error;     /* of the last source's path, over its peak */
     double low[2], high[2]; /* box of one track's places about a star's, px */
     bst_crowd_source last_error;
-    bst_smear_level levels[BST_SMEAR_LEVELS], own_level;
+    bst_smear_level levels[BST_SMEAR_LEVELS];
 
     bst_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
@@ -106,19 +104,18 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *
 /* The parts of bst_node_aim for a Gaussian whose pixels are binned. */
 void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]);
 
-/* A level's error for an image that moves by 2^(step / BST_SCALE_STEPS) of the path, over the
- * peak. */
-double bst_smear_level_error(bst_smear_level *level, int step);
+/* A level's error for an image that moves by `scale` of the path, over the peak. */
+double bst_smear_level_error(const bst_smear_level *level, double scale);
 
 /* Error of a star so far from the boresight that follows its track, in sigma of its worst pixel. */
 double bst_smear_single_error(const bst_smear *s, double peak_e, double from_boresight_px);
 
 /* The last source's drawing: its place (px from the boresight), nodes, and motion over theirs. */
 typedef struct bst_smear_drawn {
-    double x, y, travel_px;
+    double x, y, scale, travel_px;
     double low[2], high[2]; /* box of its places about (x, y) */
-    double error;           /* of its nodes and profiles, over the peak */
-    int radius;             /* of the stamp */
+    const bst_smear_level *level;
+    int radius; /* of the stamp */
     bool moving;
 } bst_smear_drawn;
 

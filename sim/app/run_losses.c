@@ -111,9 +111,6 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
         {"tolerance_missed", BST_SEVERITY_WARNING,
          "the image's predicted error (error_sigma) is above fidelity.tolerance_sigma", "frame",
          "frames"},
-        {"nodes_bounded", BST_SEVERITY_NOTE,
-         "the image would have taken more than fidelity.most_nodes to be within the tolerance",
-         "frame", "frames"},
         {"saturated", BST_SEVERITY_NOTE, "full pixels in the image", "frame", "frames"},
     };
     char text[300], amount[64];
