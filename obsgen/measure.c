@@ -54,9 +54,15 @@ static double misfit(const double image[2], const double model[2]) {
     return sqrt(along * sqrt(along * across));
 }
 
-/* Bound of an image at rest that the camera's path widens. */
+/* Bound of an image at rest that the camera's path widens, or of a streak: what a path of the stars'
+ * own length bends widens it across, not along. */
 static bst_bound_at bound_of_image(const bst_generator *g, double flux_e, double length) {
     const bst_bound *bound = g->image_bound ? g->image_bound : &g->bound;
+    if (length > 1.0) {
+        bst_bound_at b = bst_bound_of(bound, flux_e, g->noise_e, length);
+        b.var_across_px2 *= g->widening * g->widening;
+        return b;
+    }
     return bst_bound_wider(bound, flux_e, g->noise_e, length, g->widening);
 }
 
@@ -110,9 +116,12 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     const double image = g->response.source.across_px * g->response.source.along_px;
     const double images[2] = {image + streak, image}, turned[2] = {image, image + streak};
     const double models[2] = {model, model};
-    error[0] *=
-        along * open * misfit(images, models) * b->flat * sqrt(truth->var_along_px2 * widen_along);
-    error[1] *= across * open * misfit(turned, models) * sqrt(truth->var_across_px2 * widen_across);
+    /* a streak's place comes from its ends and flanks, whatever bends it */
+    bool at_rest = length <= 1.0;
+    error[0] *= along * open * (at_rest ? misfit(images, models) : 1.0) * b->flat *
+                sqrt(truth->var_along_px2 * widen_along);
+    error[1] *= across * open * (at_rest ? misfit(turned, models) : 1.0) *
+                sqrt(truth->var_across_px2 * widen_across);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];

@@ -21,7 +21,7 @@ import tempfile
 from astropy.io import fits
 
 DURATIONS_S = {"constellation_images": 12, "constellation_quick": 600, "day_constellation": 600, "day_eclipse": 1200,
-               "day_generator": 1200, "day_images": 60, "day_plant": 300, "frame_by_frame": 20, "galactic_core": 6}
+               "day_generator": 1200, "day_images": 60, "day_plant": 300, "frame_by_frame": 7, "galactic_core": 6}
 PEERS = {"link_realtime"}  # needs another program
 CLOCK = re.compile(r"(seconds|wall|cpu|rate_hz_real|real_time|speed|rss|memory|processor|started|finished|late|version|"
                    r"program|revision|host|created|build|device|path|took)", re.I)

@@ -57,7 +57,7 @@ VALUES = [
     (MODULES + "/tracker/type", "ukff", 'there is no tracker of type "ukff" (allowed: '),
     (MODULES + "/control/delay_s", {"trakcs": 1}, "trakcs: not an input of this module (allowed: "),
     (MODULES + "/gimbal/platform/jitter_high_band_hz", [200, 5], "is empty; give the lower"),
-    (TARGET + "/orbit", {}, 'source "sgp4" needs "elements_file" and "norad"'),
+    (TARGET + "/orbit", {}, 'source "sgp4" needs either "elements_file" and "norad", or "tle_line1"'),
     (TARGET + "/orbit/position_gcrf_m", [7e6, 0, 0], "unknown key (allowed: source, "),
     (TARGET + "/orbit/norad", -1, "out of range (found -1; allowed: "),
     (TARGET + "/orbit/elements_file", "a\nb.tle", "a?b.tle: cannot be opened: No such file"),

@@ -9,6 +9,7 @@ import os
 import random
 import shutil
 import sys
+import subprocess
 import unittest
 from concurrent.futures import ThreadPoolExecutor
 
