@@ -54,8 +54,8 @@ static double misfit(const double image[2], const double model[2]) {
     return sqrt(along * sqrt(along * across));
 }
 
-/* Bound of an image at rest that the camera's path widens, or of a streak: what a path of the stars'
- * own length bends widens it across, not along. */
+/* Bound of an image at rest that the camera's path widens, or of a streak: what a path of the
+ * stars' own length bends widens it across, not along. */
 static bst_bound_at bound_of_image(const bst_generator *g, double flux_e, double length) {
     const bst_bound *bound = g->image_bound ? g->image_bound : &g->bound;
     if (length > 1.0) {
