@@ -9,8 +9,9 @@ include(CMakePackageConfigHelpers)
 # Sanitized and fuzzed builds are for this tree's own tests and have none.
 if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   set(BST_VISIBLE ${PROJECT_SOURCE_DIR}/cmake/libboresight.map)
-  set(parts bst_core bst_astro bst_device bst_world bst_io bst_link bst_engine bst_eval bst_scenegen
-    bst_gimbal bst_imgproc bst_tracker bst_control bst_obsgen bst_registry)
+  set(parts bst_core bst_messages bst_dynamics bst_astro bst_device bst_catalogue bst_optics bst_world
+    bst_onboard bst_io bst_link bst_engine bst_eval bst_scenegen bst_gimbal
+    bst_imgproc bst_tracker bst_control bst_obsgen bst_registry)
   # all objects of each part, not only what others call; the archives then add nothing but what the
   # parts themselves link
   list(TRANSFORM parts REPLACE ".+" "$<TARGET_OBJECTS:\\0>" OUTPUT_VARIABLE objects)
@@ -47,13 +48,20 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   install(DIRECTORY sim DESTINATION ${headers}
     FILES_MATCHING PATTERN "*.h"
     PATTERN "*_internal.h" EXCLUDE
+    PATTERN "sim/cli" EXCLUDE
+    PATTERN "sim/run" EXCLUDE
+    PATTERN "sim/analysis" EXCLUDE
+    PATTERN "sim/export" EXCLUDE
+    PATTERN "sim/report" EXCLUDE
+    PATTERN "sim/study_kinds" EXCLUDE
+    PATTERN "sim/bench" EXCLUDE
     PATTERN "sim/app" EXCLUDE
     PATTERN "sim/astro/eop_table.h" EXCLUDE
     PATTERN "sim/*/data" EXCLUDE
     ${inner})
   foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h
-      imgproc/pixel_learner_config.h imgproc/stack.h obsgen/obsgen.h
-      scenegen/module.h sim/app/registry.h tracker/module.h)
+      imgproc/calibrate/pixel_learner_config.h imgproc/stack/stack.h obsgen/obsgen.h
+      scenegen/module.h sim/registry/registry.h tracker/module.h)
     get_filename_component(folder ${header} DIRECTORY)
     install(FILES ${header} DESTINATION ${headers}/${folder})
   endforeach()

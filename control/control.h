@@ -3,15 +3,15 @@
 #ifndef BST_CONTROL_CONTROL_H
 #define BST_CONTROL_CONTROL_H
 
-#include "control/guidance.h"
-#include "control/image_loop.h"
-#include "control/model_error.h"
-#include "control/pointing_error.h"
-#include "control/search.h"
+#include "control/guidance/guidance.h"
+#include "control/loop/image_loop.h"
+#include "control/loop/model_error.h"
+#include "control/loop/pointing_error.h"
+#include "control/modes/search_pattern.h"
 #include "sim/core/config.h"
-#include "sim/core/messages.h"
 #include "sim/core/quintic.h"
-#include "sim/world/knowledge.h"
+#include "sim/messages/messages.h"
+#include "sim/onboard/knowledge.h"
 
 typedef enum bst_control_strategy {
     BST_CONTROL_TRACK = 0, /* closed loop */

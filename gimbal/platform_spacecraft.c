@@ -1,7 +1,7 @@
 #include <stdlib.h>
 
 #include "gimbal/platform.h"
-#include "sim/world/knowledge.h"
+#include "sim/onboard/knowledge.h"
 #include "sim/world/world.h"
 
 /* What a spacecraft sees of the world, and knows of it. */

@@ -1,6 +1,6 @@
+#include "imgproc/detect/plugin_detector.h"
 #include "imgproc/imgproc.h"
-#include "imgproc/plugged.h"
-#include "sim/world/column_level.h"
+#include "sim/optics/column_level.h"
 
 static const bst_config_desc bad_pixel_table[] = {
     BST_INT(bst_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),

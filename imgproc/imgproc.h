@@ -6,14 +6,14 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
-#include "imgproc/pixel_learner_config.h"
-#include "imgproc/stack.h"
-#include "sim/core/messages.h"
-#include "sim/core/module.h"
+#include "imgproc/calibrate/pixel_learner_config.h"
+#include "imgproc/stack/stack.h"
 #include "sim/core/stage.h"
-#include "sim/world/camera.h"
-#include "sim/world/motion.h"
-#include "sim/world/photometry.h"
+#include "sim/messages/messages.h"
+#include "sim/messages/module.h"
+#include "sim/onboard/camera_motion.h"
+#include "sim/optics/camera.h"
+#include "sim/optics/photometry.h"
 
 typedef struct bst_bad_pixel {
     int64_t x, y; /* full-sensor coordinates */
@@ -32,7 +32,7 @@ typedef struct bst_imgproc_config {
     int64_t window_px, window_stars, full_every, full_frames;
     bst_stack_config stack;
     bst_pixel_learner_config bad_pixel_learning;
-    int column_level;           /* see sim/world/column_level.h */
+    int column_level;           /* see sim/optics/column_level.h */
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
@@ -53,7 +53,7 @@ typedef struct bst_imgproc_maps {
     const float *dark_e_per_s; /* dark signal's departure from its mean; taken off */
     const float *flat;         /* relative response, > 0; divided by */
     const uint8_t *bad;        /* non-zero: pixel is left out */
-    const struct bst_psf *psf; /* see sim/world/psf.h */
+    const struct bst_psf *psf; /* see sim/optics/psf.h */
     struct bst_psf *own_psf;   /* bst_calibration_psf: what bst_calibration_free frees of it */
 } bst_imgproc_maps;
 

@@ -2,17 +2,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/calibration.h"
-#include "imgproc/discriminate.h"
+#include "imgproc/calibrate/calibration.h"
+#include "imgproc/calibrate/pixel_learning.h"
+#include "imgproc/detect/plugin_detector.h"
+#include "imgproc/detect/psf_wings.h"
+#include "imgproc/detect/region_of_interest.h"
+#include "imgproc/identify/predicted_stars.h"
 #include "imgproc/imgproc.h"
-#include "imgproc/pixel_step.h"
-#include "imgproc/plugged.h"
-#include "imgproc/sky.h"
-#include "imgproc/windows.h"
-#include "imgproc/wings.h"
-#include "sim/world/knowledge.h"
-#include "sim/world/nav_motion.h"
-#include "sim/world/photometry.h"
+#include "imgproc/measure/discriminate.h"
+#include "sim/onboard/knowledge.h"
+#include "sim/onboard/nav_motion.h"
+#include "sim/optics/photometry.h"
 
 enum { PORT_FRAME, PORT_PREDICTIONS, PORT_POINTING, PORT_NAV, PORT_DETECTIONS, PORT_COUNT };
 

@@ -5,7 +5,7 @@
 #include "obsgen/generator_internal.h"
 #include "sim/core/threshold_statistics.h"
 #include "sim/core/vec.h"
-#include "sim/world/column_level.h"
+#include "sim/optics/column_level.h"
 
 /* Shot noise of a source through its own filter, times the noise of a pixel, over sqrt(sum p^2):
  * the sum of k^2 p for a Gaussian at rest, and for a long line of it. */

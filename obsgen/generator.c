@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "obsgen/clutter.h"
-#include "obsgen/fragments.h"
 #include "obsgen/generator_internal.h"
-#include "sim/world/column_level.h"
-#include "sim/world/motion.h"
+#include "obsgen/model/false_alarms.h"
+#include "obsgen/streak/streak_breakup.h"
+#include "sim/onboard/camera_motion.h"
+#include "sim/optics/column_level.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* In a smeared frame, sources that move less are seen as one. */

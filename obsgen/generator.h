@@ -2,13 +2,13 @@
 #ifndef BST_OBSGEN_GENERATOR_H
 #define BST_OBSGEN_GENERATOR_H
 
-#include "obsgen/bound.h"
 #include "obsgen/calibration.h"
-#include "obsgen/matched.h"
-#include "obsgen/response.h"
-#include "sim/core/messages.h"
+#include "obsgen/model/crlb_table.h"
+#include "obsgen/model/matched_filter_theory.h"
+#include "obsgen/model/response.h"
 #include "sim/core/rng.h"
-#include "sim/world/camera.h"
+#include "sim/messages/messages.h"
+#include "sim/optics/camera.h"
 
 /* Settings of the image path that the generator follows. */
 typedef struct bst_generator_settings {
@@ -17,7 +17,7 @@ typedef struct bst_generator_settings {
     double jitter_px;                    /* RMS per axis, sensor px: widens the onboard PSF */
     double streak_min_px, streak_max_px; /* star streaks that are filtered for */
     int mesh_px;                         /* side of the meshes of background and noise; 0: 64 */
-    int column_level;                    /* see sim/world/column_level.h */
+    int column_level;                    /* see sim/optics/column_level.h */
 } bst_generator_settings;
 
 /* A detection with where it comes from. */

@@ -2,10 +2,10 @@
 #ifndef BST_OBSGEN_GENERATOR_INTERNAL_H
 #define BST_OBSGEN_GENERATOR_INTERNAL_H
 
-#include "obsgen/blend_weight.h"
 #include "obsgen/generator.h"
-#include "obsgen/route.h"
-#include "obsgen/wander.h"
+#include "obsgen/model/blend_weight.h"
+#include "obsgen/streak/star_trail.h"
+#include "obsgen/streak/streak_centroid_error.h"
 
 /* A source of the truth on the frame, in pixels that are read. */
 typedef struct generator_source {

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/world/photometry.h"
+#include "sim/optics/photometry.h"
 
 /* Image processing's: brightest of each kind that vote, side of a cell of votes, chance allowed,
  * radius that is tried first when the error is known. */

@@ -3,7 +3,7 @@
 #define BST_OBSGEN_IDENTIFY_H
 
 #include "obsgen/generator.h"
-#include "sim/world/stars.h"
+#include "sim/catalogue/stars.h"
 
 typedef struct bst_identify_options {
     const bst_stars *catalogue, *world_catalogue; /* onboard and true; may be the same */

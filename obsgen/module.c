@@ -4,17 +4,17 @@
 
 #include "obsgen/generator.h"
 #include "obsgen/identify.h"
+#include "obsgen/model/psf_bound.h"
 #include "obsgen/obsgen.h"
-#include "obsgen/psf_bound.h"
-#include "sim/world/column_level.h"
-#include "sim/world/field.h"
+#include "sim/onboard/camera_motion.h"
+#include "sim/onboard/knowledge.h"
+#include "sim/optics/column_level.h"
+#include "sim/optics/photometry.h"
+#include "sim/optics/psf.h"
 #include "sim/world/frame_updates.h"
-#include "sim/world/knowledge.h"
-#include "sim/world/los_track.h"
-#include "sim/world/motion.h"
-#include "sim/world/photometry.h"
-#include "sim/world/psf.h"
-#include "sim/world/truth_list.h"
+#include "sim/world/scene/field.h"
+#include "sim/world/scene/los_track.h"
+#include "sim/world/scene/truth_list.h"
 
 typedef struct obsgen_config {
     char calibration_file[512];

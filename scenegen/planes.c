@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/skylight.h"
+#include "sim/world/scene/skylight.h"
 
 enum {
     CELL_PX = 16, /* boxes are kept apart on a grid this coarse */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/disc.h"
+#include "sim/world/scene/disc.h"
 
 /* Beyond this many standard deviations a Gaussian's tail is under 1e-21. */
 #define REACH_SIGMAS 9.5

@@ -7,8 +7,8 @@
 #ifndef BST_SCENEGEN_REFERENCE_H
 #define BST_SCENEGEN_REFERENCE_H
 
-#include "sim/world/field.h"
-#include "sim/world/psf.h"
+#include "sim/optics/psf.h"
+#include "sim/world/scene/field.h"
 
 /* Expected electrons of the sources (no background) on `window`, [height][width], added to `image`.
  * Between LOS samples the attitude is slerped; a source's direction is that of

@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-#include "scenegen/detector.h"
-#include "sim/world/skylight.h"
+#include "scenegen/detector/detector.h"
+#include "sim/world/scene/skylight.h"
 
 bst_status bst_render_camera_check(bst_ctx *ctx, const bst_camera *c) {
     if (c->width_px < 1 || c->height_px < 1 || c->width_px > 65536 || c->height_px > 65536 ||

@@ -5,7 +5,7 @@
 
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/renderer.h"
-#include "sim/world/skylight.h"
+#include "sim/world/scene/skylight.h"
 
 /* BST_ERR_ARGUMENT as bst_renderer_create says. */
 bst_status bst_render_camera_check(bst_ctx *ctx, const bst_camera *camera) BST_MUST_CHECK;

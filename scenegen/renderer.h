@@ -9,10 +9,10 @@
 #ifndef BST_SCENEGEN_RENDERER_H
 #define BST_SCENEGEN_RENDERER_H
 
-#include "scenegen/smear.h"
+#include "scenegen/smear/smear.h"
 #include "sim/core/rng.h"
 #include "sim/device/device.h"
-#include "sim/world/field.h"
+#include "sim/world/scene/field.h"
 
 typedef struct bst_renderer bst_renderer;
 
@@ -23,8 +23,8 @@ typedef struct bst_renderer_options {
     bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
     /* Knobs that the tolerance chooses when they are 0. Equal parts of the exposure per star; parts
      * of a pixel per axis to whose centres nodes are moved; px that stamps reach beyond a node's
-     * two nearest pixels; odd degree of the PSF's profile (scenegen/profile_law.h); taps of the
-     * Fourier path's spreading (4, 6 or 8). */
+     * two nearest pixels; odd degree of the PSF's profile (scenegen/stamp/profile_law.h); taps of
+     * the Fourier path's spreading (4, 6 or 8). */
     int temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
     bool saturation_flags;              /* kept of the latest frame, for bst_renderer_flags */
     int pool_frames;                    /* frames that may be alive at a time (4) */

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "scenegen/place.h"
-#include "scenegen/vignetting.h"
-#include "sim/world/skylight.h"
+#include "scenegen/detector/vignetting.h"
+#include "scenegen/stamp/fixed_point_px.h"
+#include "sim/world/scene/skylight.h"
 
 void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
                              int taps, int law_degree, double law_widest, bool fft_light,

@@ -3,7 +3,7 @@
 #ifndef BST_SCENEGEN_SCENE_OPTIONS_H
 #define BST_SCENEGEN_SCENE_OPTIONS_H
 
-#include "scenegen/detector.h"
+#include "scenegen/detector/detector.h"
 #include "scenegen/renderer.h"
 
 /* Writes them to text[bytes]; 2048 bytes do. taps: of the longest stamp; law_degree: of the

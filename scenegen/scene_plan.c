@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "scenegen/source_order.h"
-#include "sim/world/skylight.h"
+#include "sim/world/scene/skylight.h"
 
 _Static_assert(BST_SPECTRA == (int)BST_PSF_SPECTRA, "the deposit kernel's shares are the PSF's");
 

@@ -2,10 +2,10 @@
 #ifndef BST_SCENEGEN_SCENE_PLAN_H
 #define BST_SCENEGEN_SCENE_PLAN_H
 
-#include "scenegen/crowd.h"
-#include "scenegen/fft_light.h"
+#include "scenegen/fourier/fourier_render.h"
 #include "scenegen/renderer.h"
-#include "scenegen/smear.h"
+#include "scenegen/smear/error_budget.h"
+#include "scenegen/smear/smear.h"
 
 typedef struct bst_scene_plan {
     bst_scene_source *sources;    /* [count] that are drawn, in the order of bst_source_order */

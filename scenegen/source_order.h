@@ -3,7 +3,7 @@
 #define BST_SCENEGEN_SOURCE_ORDER_H
 
 #include "scenegen/kernels/scene_shared.h"
-#include "sim/world/camera.h"
+#include "sim/optics/camera.h"
 
 /* Writes the `count` sources to `sorted` by the cells of the sensor that they are in, those of one
  * cell as they come, so that what a tile draws lies together in memory. The order of two sources

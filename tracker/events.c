@@ -1,5 +1,5 @@
 /* Manoeuvres and changes of brightness, told from the innovations of a track. */
-#include "tracker/multitarget_internal.h"
+#include "tracker/mtt/multitarget_internal.h"
 
 static bool is_told(const bst_mtt_params *params) {
     return params->event_window > 0 && params->false_events_per_hour > 0.0;

@@ -2,8 +2,8 @@
 
 #include <stdlib.h>
 
-#include "sim/world/knowledge.h"
-#include "tracker/photocentre.h"
+#include "sim/onboard/knowledge.h"
+#include "tracker/attitude/photocentre.h"
 #include "tracker/tracker.h"
 
 enum {

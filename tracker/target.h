@@ -3,7 +3,7 @@
 #define BST_TRACKER_TARGET_H
 
 #include "sim/astro/belt.h"
-#include "tracker/multitarget.h"
+#include "tracker/mtt/multitarget.h"
 
 typedef struct bst_target_params {
     double direction_chi2;   /* largest misfit of the cue's direction, 2 degrees of freedom */

@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/nav_motion.h"
-#include "tracker/sky_of_detection.h"
+#include "sim/onboard/nav_motion.h"
+#include "tracker/attitude/sky_of_detection.h"
 
 /* Least SNR of a source, share of the threshold that its maximum passed: 2.5 sigma below, at 5. */
 static const double LEAST_SNR_SHARE = 0.5;

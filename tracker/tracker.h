@@ -8,9 +8,9 @@
 
 #include "sim/astro/belt.h"
 #include "sim/core/config.h"
-#include "sim/core/messages.h"
-#include "sim/world/camera.h"
-#include "tracker/filter.h"
+#include "sim/messages/messages.h"
+#include "sim/optics/camera.h"
+#include "tracker/mtt/filter.h"
 
 /* Values of a scenario's tracker block; the table says what each is. */
 typedef struct bst_tracker_config {

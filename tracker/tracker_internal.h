@@ -3,9 +3,9 @@
 #define BST_TRACKER_TRACKER_INTERNAL_H
 
 #include "sim/astro/bodies.h"
-#include "tracker/attitude.h"
-#include "tracker/attitude_error.h"
-#include "tracker/attitude_shared.h"
+#include "tracker/attitude/attitude.h"
+#include "tracker/attitude/attitude_error.h"
+#include "tracker/attitude/attitude_shared.h"
 #include "tracker/target.h"
 #include "tracker/tracker.h"
 

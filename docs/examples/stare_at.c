@@ -9,7 +9,7 @@
 #include <stdlib.h>
 
 #include "sim/astro/bodies.h"
-#include "sim/core/module.h"
+#include "sim/messages/module.h"
 
 /* 1. The configuration: a struct and a table that fills it from the scenario. */
 typedef struct stare_at_config {

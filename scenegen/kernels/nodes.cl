@@ -1,7 +1,7 @@
 /* A source's nodes, from its place and the node table: nodes_of, which makes a block of them where
  * they are drawn (splat.cl, deposit.cl), and a kernel that finds the boxes of pixels that blocks,
  * sources and groups of sources touch, one work-item per source. Options: PLACE_BITS
- * (scenegen/place.h), SPATIAL_OVERSAMPLE (parts of a pixel per axis), DISTORTED (with K1, K2, K3,
+ * (scenegen/stamp/fixed_point_px.h), SPATIAL_OVERSAMPLE (parts of a pixel per axis), DISTORTED (with K1, K2, K3,
  * P1, P2 and FOLD2), FFT_LIGHT (nodes are spread on a grid, else they get stamps). */
 
 /* any(), by halves: some compilers test lane after lane. */
@@ -48,7 +48,7 @@ static float16 width_of(float16 widening) {
 #endif
 
 #ifdef DISTORTED
-/* Distortion (sim/world/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
+/* Distortion (sim/optics/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
  * beyond the fold gives no light on the sensor. */
 static void add_distortion(float16 x, float16 y, float16 *dx, float16 *dy, float16 *stretch2) {
     float16 s = x * x + y * y;

@@ -1,7 +1,7 @@
 /* Light on one tile: makes the nodes of the sources that touch it (nodes.cl) and sums their
  * pixel-integrated profiles. Options: TILE_W, TILE_H (pixels), TAPS (of the longest profile, a
  * multiple of 16), EDGE_SCALE (1 / (sqrt(2) sigma of the PSF), 1/px), DEGREE and BARELY_WIDER (of
- * the profile law, scenegen/profile_law.h; without them there is none).
+ * the profile law, scenegen/stamp/profile_law.h; without them there is none).
  *
  * Every pixel receives its nodes in the order of sources, blocks and nodes, whatever the tile, so
  * the float sum is the same for every window and work-group size. */

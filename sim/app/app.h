@@ -4,15 +4,8 @@
 #ifndef BST_APP_APP_H
 #define BST_APP_APP_H
 
-#include "sim/app/registry.h"
-
-enum {
-    BST_EXIT_OK = 0,
-    BST_EXIT_FAILED = 1,
-    BST_EXIT_USAGE = 2,
-    BST_EXIT_RUNS_FAILED = 4, /* a study is complete, but some of its runs failed by themselves */
-    BST_EXIT_INTERRUPTED = 130
-};
+#include "sim/cli/cli.h"
+#include "sim/registry/registry.h"
 
 int bst_cmd_new(int argc, char **argv);
 int bst_cmd_run(int argc, char **argv);
@@ -33,8 +26,5 @@ int bst_cmd_bench(int argc, char **argv);
 int bst_cmd_pd(int argc, char **argv);
 int bst_cmd_calibrate_obsgen(int argc, char **argv);
 int bst_cmd_study(int argc, char **argv);
-
-/* Log sink that writes to standard error: "boresight: warning: ...". */
-void bst_app_log(void *user, bst_log_level level, const char *message);
 
 #endif

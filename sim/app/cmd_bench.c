@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "sim/app/app.h"
-#include "sim/app/bench.h"
-#include "sim/app/load.h"
-#include "sim/app/shipped.h"
+#include "sim/bench/bench.h"
+#include "sim/cli/load.h"
+#include "sim/cli/shipped.h"
 #include "sim/io/manifest.h"
 
 static const bst_bench benches[] = {

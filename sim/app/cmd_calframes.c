@@ -7,11 +7,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "scenegen/detector.h"
+#include "scenegen/detector/detector.h"
 #include "scenegen/renderer.h"
 #include "sim/app/app.h"
-#include "sim/app/load.h"
-#include "sim/app/stop_signals.h"
+#include "sim/cli/load.h"
+#include "sim/cli/stop_signals.h"
 #include "sim/core/draft.h"
 #include "sim/core/folder.h"
 #include "sim/core/text.h"

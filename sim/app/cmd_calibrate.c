@@ -3,13 +3,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/analysis/calibration/calibrate.h"
+#include "sim/analysis/calibration/obsgen_validation.h"
+#include "sim/analysis/calibration/watch.h"
 #include "sim/app/app.h"
-#include "sim/app/calibrate.h"
-#include "sim/app/equivalence.h"
-#include "sim/app/load.h"
-#include "sim/app/registry.h"
-#include "sim/app/watch.h"
+#include "sim/cli/load.h"
 #include "sim/core/version.h"
+#include "sim/registry/registry.h"
 
 typedef struct errand {
     const char *out, *calibration, *device, *json;

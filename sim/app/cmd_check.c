@@ -3,10 +3,10 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
-#include "sim/app/load.h"
-#include "sim/app/plugins.h"
-#include "sim/app/scenario_rules.h"
+#include "sim/cli/load.h"
+#include "sim/cli/plugins.h"
 #include "sim/engine/simulation.h"
 
 static int print_json(cJSON *node) {

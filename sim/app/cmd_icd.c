@@ -1,7 +1,7 @@
 #include <stdio.h>
 
 #include "sim/app/app.h"
-#include "sim/app/options.h"
+#include "sim/cli/options.h"
 #include "sim/link/icd.h"
 
 int bst_cmd_icd(int argc, char **argv) {

@@ -9,9 +9,9 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
-#include "sim/app/json_number.h"
-#include "sim/app/options.h"
 #include "sim/astro/time.h"
+#include "sim/cli/options.h"
+#include "sim/core/json_number.h"
 #include "sim/core/text.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/run_reader.h"

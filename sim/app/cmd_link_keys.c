@@ -1,7 +1,7 @@
 #include <stdio.h>
 
 #include "sim/app/app.h"
-#include "sim/app/options.h"
+#include "sim/cli/options.h"
 #include "sim/link/curve_keys.h"
 
 int bst_cmd_link_keys(int argc, char **argv) {

@@ -6,9 +6,9 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/analysis/loop/loop_model.h"
 #include "sim/app/app.h"
-#include "sim/app/load.h"
-#include "sim/app/loop_model.h"
+#include "sim/cli/load.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/plot.h"
 

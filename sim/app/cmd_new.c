@@ -6,14 +6,14 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
 #include "sim/app/new_scene.h"
-#include "sim/app/options.h"
-#include "sim/app/outputs.h"
-#include "sim/app/plugins.h"
-#include "sim/app/scenario_rules.h"
-#include "sim/app/shipped.h"
 #include "sim/astro/tle.h"
+#include "sim/cli/options.h"
+#include "sim/cli/outputs.h"
+#include "sim/cli/plugins.h"
+#include "sim/cli/shipped.h"
 #include "sim/core/text.h"
 #include "sim/engine/simulation.h"
 #include "sim/io/draft_file.h"

@@ -6,19 +6,19 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/analysis/orbit/orbit_choice.h"
 #include "sim/app/app.h"
-#include "sim/app/json_number.h"
-#include "sim/app/options.h"
-#include "sim/app/orbit_choice.h"
-#include "sim/app/track_files.h"
 #include "sim/astro/bodies.h"
 #include "sim/astro/sgp4_fit.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/cli/options.h"
+#include "sim/core/json_number.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/oem_writer.h"
 #include "sim/io/omm_writer.h"
 #include "sim/io/tdm_writer.h"
-#include "tracker/orbit_initial.h"
+#include "sim/run/track_files.h"
+#include "tracker/orbit/orbit_initial.h"
 
 static const char help_text[] =
     "usage: boresight orbit RUN [options]\n"

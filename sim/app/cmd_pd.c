@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/analysis/pd/pd.h"
 #include "sim/app/app.h"
-#include "sim/app/load.h"
-#include "sim/app/pd.h"
-#include "sim/app/stop_signals.h"
+#include "sim/cli/load.h"
+#include "sim/cli/stop_signals.h"
 #include "sim/io/manifest.h"
 #include "sim/io/plot.h"
 

@@ -6,11 +6,11 @@
 #include <time.h>
 
 #include "sim/app/app.h"
-#include "sim/app/options.h"
 #include "sim/astro/frames.h"
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
 #include "sim/astro/tle.h"
+#include "sim/cli/options.h"
 #include "sim/io/czml_writer.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/oem_writer.h"

@@ -4,9 +4,10 @@
 #include <sys/stat.h>
 
 #include "sim/app/app.h"
-#include "sim/app/options.h"
-#include "sim/app/report_study.h"
+#include "sim/cli/options.h"
+#include "sim/cli/stop_signals.h"
 #include "sim/io/draft_file.h"
+#include "sim/report/report_study.h"
 
 static const char help_text[] =
     "usage: boresight report RUN|STUDY [options]\n"

@@ -1,12 +1,12 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
-#include "sim/app/load.h"
-#include "sim/app/run_link.h"
-#include "sim/app/run_scenario.h"
-#include "sim/app/scenario_rules.h"
-#include "sim/app/stop_signals.h"
+#include "sim/cli/load.h"
+#include "sim/cli/stop_signals.h"
+#include "sim/run/run_link.h"
+#include "sim/run/run_scenario.h"
 
 static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"

@@ -2,9 +2,9 @@
 #include <stdlib.h>
 
 #include "sim/app/app.h"
-#include "sim/app/link_host.h"
-#include "sim/app/load.h"
-#include "sim/app/stop_signals.h"
+#include "sim/cli/load.h"
+#include "sim/cli/stop_signals.h"
+#include "sim/run/link_host.h"
 
 static const char help_text[] =
     "usage: boresight serve SCENARIO.json --part MODULE --link ADDRESS [options]\n"

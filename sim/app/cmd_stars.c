@@ -4,12 +4,12 @@
 #include <unistd.h>
 
 #include "sim/app/cmd_stars.h"
-#include "sim/app/outputs.h"
+#include "sim/catalogue/star_fetch.h"
+#include "sim/catalogue/star_import.h"
+#include "sim/catalogue/stars.h"
+#include "sim/cli/outputs.h"
 #include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
-#include "sim/world/star_fetch.h"
-#include "sim/world/star_import.h"
-#include "sim/world/stars.h"
 
 static const char HELP[] =
     "boresight stars: the star catalogue (Tycho-2)\n"

@@ -14,11 +14,8 @@
 #include "sim/core/text.h"
 
 #include "sim/app/app.h"
-#include "sim/app/cmd_study.h"
-#include "sim/app/options.h"
-#include "sim/app/stop_signals.h"
-#include "sim/app/study_devices.h"
-#include "sim/app/study_plugins.h"
+#include "sim/cli/options.h"
+#include "sim/cli/stop_signals.h"
 #include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/io/draft_file.h"
@@ -28,6 +25,9 @@
 #include "sim/studies/local_pool.h"
 #include "sim/studies/shard_run.h"
 #include "sim/studies/tables.h"
+#include "sim/study_kinds/study_devices.h"
+#include "sim/study_kinds/study_kinds.h"
+#include "sim/study_kinds/study_plugins.h"
 
 enum { FAILURES_SHOWN = 5 };
 /* How long a shard takes. Slurm needs a while to start each, PoCL and the star catalogue too. */
@@ -39,12 +39,6 @@ typedef struct study_request {
     bool resume, dry_run, quiet, schema, help, unpinned, slurm;
     bst_study_devices devices; /* of `device` */
 } study_request;
-
-const bst_study_kind *bst_app_study_kind(int kind) {
-    return kind == BST_STUDY_PD      ? &bst_app_study_pd
-           : kind == BST_STUDY_CUBES ? &bst_app_study_cubes
-                                     : &bst_app_study_loop;
-}
 
 /* ------------------------------------------------------------------ the folder */
 

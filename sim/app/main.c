@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "sim/app/app.h"
-#include "sim/app/plugins.h"
-#include "sim/app/stack.h"
+#include "sim/cli/plugins.h"
+#include "sim/cli/stack.h"
 #include "sim/core/text.h"
 #include "sim/core/version.h"
 
@@ -37,16 +37,6 @@ static const command commands[] = {
     {"study", bst_cmd_study, "many runs of varied scenarios, as tables"},
     {"pd", bst_cmd_pd, "measure detection, false alarms and location against theory"},
 };
-
-void bst_app_log(void *user, bst_log_level level, const char *message) {
-    (void)user;
-    static const char *const names[] = {"error", "warning", "info", "debug"};
-    if (level == BST_LOG_INFO) {
-        fprintf(stderr, "boresight: %s\n", message);
-    } else {
-        fprintf(stderr, "boresight: %s: %s\n", names[level], message);
-    }
-}
 
 static void usage(FILE *stream) {
     fprintf(stream,

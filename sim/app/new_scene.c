@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "sim/app/new_sensor.h"
-#include "sim/app/plugins.h"
+#include "sim/cli/plugins.h"
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
 

@@ -20,3 +20,10 @@ void bst_bodies_at(bst_time t, bst_bodies *out) {
     eraPmat06(tt1, tt2, of_date);
     out->pole = scaled(of_date[2], 1.0);
 }
+
+double bst_sphere_phase(double specular_fraction, double phase_rad) {
+    double phi = fabs(phase_rad);
+    double diffuse =
+        phi < BST_PI ? 2.0 / (3.0 * BST_PI * BST_PI) * ((BST_PI - phi) * cos(phi) + sin(phi)) : 0.0;
+    return (1.0 - specular_fraction) * fmax(diffuse, 0.0) + specular_fraction / (4.0 * BST_PI);
+}

@@ -135,4 +135,10 @@ static inline bst_vec3 bst_light_path(const bst_bodies *bodies, bst_vec3 object_
                          bodies->earth_bary_mps);
 }
 
+/* Reflected irradiance over incident irradiance, times range^2 / (albedo * area), of a sphere with
+ * cross-section `area` (McCue, Williams and Morford, Planetary and Space Science 19, 851, 1971):
+ * (1 - s) 2 / (3 pi^2) ((pi - phi) cos phi + sin phi) + s / (4 pi). 0 at a phase of pi and beyond
+ * for the diffuse part. */
+double bst_sphere_phase(double specular_fraction, double phase_rad);
+
 #endif

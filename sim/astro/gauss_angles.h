@@ -29,7 +29,7 @@ int bst_gauss_roots(double a, double b, double c, double roots[BST_GAUSS_ROOTS])
 /* The orbits about a centre of gravitational parameter mu (m^3/s^2) that Gauss's method gives for
  * three directions at rising times: one for each positive root of its equation of 8th degree at
  * which all three ranges are positive. First order in mu/r^3, so near for arcs of up to some 20
- * degrees, and the ranges are to be refined (tracker/orbit_initial.h). *count may be 0.
+ * degrees, and the ranges are to be refined (tracker/orbit/orbit_initial.h). *count may be 0.
  * Light time and aberration are the caller's. BST_ERR_ARGUMENT for times that do not rise or
  * numbers that are not finite; BST_ERR_NUMERIC when the three directions lie in one plane (to 1e-9
  * of their spread), as they do when the observer is in the body's orbital plane: then they do not

@@ -3,7 +3,7 @@
  *
  * A file of kernels is compiled once for each width:
  *
- *     #define BST_SIMD_KERNELS "imgproc/fit_kernels.inc"
+ *     #define BST_SIMD_KERNELS "imgproc/measure/fit_kernels.inc"
  *     #include "sim/core/simd_each.inc"
  *
  * In it bst_floats is a vector of BST_WIDTH floats and bst_ints its comparison's, and
@@ -12,7 +12,7 @@
  * on processors without registers for them goes through memory, five times slower.
  *
  * Contraction is off for the whole project, so that all widths round alike; a kernel that sums does
- * so in BST_LANES separate sums (imgproc/lanes.h), whatever the width. */
+ * so in BST_LANES separate sums (imgproc/detect/simd_layout.h), whatever the width. */
 #ifndef BST_CORE_SIMD_H
 #define BST_CORE_SIMD_H
 

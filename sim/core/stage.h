@@ -1,5 +1,5 @@
 /* A stage: a part of a module that a user's plug-in can take the place of, the rest of the module
- * staying as it is. Which kinds there are, and what functions each has: sim/world/stages.h. */
+ * staying as it is. Which kinds there are, and what functions each has: sim/onboard/stages.h. */
 #ifndef BST_CORE_STAGE_H
 #define BST_CORE_STAGE_H
 

@@ -7,12 +7,12 @@
 #include <unistd.h>
 
 #include "sim/device/device.h"
-#include "sim/engine/exposure_clock.h"
-#include "sim/engine/loop_timing.h"
-#include "sim/engine/recorder.h"
+#include "sim/engine/kernel/exposure_clock.h"
+#include "sim/engine/recorder/recorder.h"
+#include "sim/engine/scenario/loop_timing.h"
 #include "sim/io/psf_fits.h"
 #include "sim/io/wcs.h"
-#include "sim/world/knowledge.h"
+#include "sim/onboard/knowledge.h"
 
 struct bst_simulation {
     bst_world *world;

@@ -2,7 +2,7 @@
 #ifndef BST_ENGINE_SIMULATION_H
 #define BST_ENGINE_SIMULATION_H
 
-#include "sim/engine/scenario.h"
+#include "sim/engine/scenario/scenario.h"
 
 typedef struct bst_simulation bst_simulation;
 struct bst_device;

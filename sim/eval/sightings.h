@@ -2,7 +2,7 @@
 #ifndef BST_EVAL_SIGHTINGS_H
 #define BST_EVAL_SIGHTINGS_H
 
-#include "sim/core/messages.h"
+#include "sim/messages/messages.h"
 #include "sim/world/world.h"
 
 /* Errors against the truth, arcsec. */

@@ -4,7 +4,7 @@
 #define BST_IO_PSF_FITS_H
 
 #include "sim/core/status.h"
-#include "sim/world/psf.h"
+#include "sim/optics/psf.h"
 
 /* Longest side of the image. */
 #define BST_PSF_LONGEST_SIDE 4096

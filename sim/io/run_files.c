@@ -7,7 +7,8 @@
 
 #include "sim/core/draft.h"
 
-/* Frames and planes of a sensor of several are WHAT_OBSERVER_SENSOR.fits (sim/engine/recorder.c).
+/* Frames and planes of a sensor of several are WHAT_OBSERVER_SENSOR.fits
+ * (sim/engine/recorder/recorder.c).
  */
 static const char *const run_names[] = {"run.sqlite",
                                         "run.sqlite-wal",

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 
 #include "sim/astro/bodies.h"
-#include "sim/world/camera.h"
+#include "sim/optics/camera.h"
 
 #define BST_SIP_ORDER 9 /* the highest that readers know */
 #define BST_SIP_TERMS 55

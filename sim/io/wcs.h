@@ -4,9 +4,9 @@
 #define BST_IO_WCS_H
 
 #include "sim/astro/bodies.h"
-#include "sim/core/messages.h"
 #include "sim/io/sip.h"
-#include "sim/world/camera.h"
+#include "sim/messages/messages.h"
+#include "sim/optics/camera.h"
 
 /* FITS pixels count from 1. xi, eta (deg, east and north on the tangent plane at crval) =
  * cd * (pixel - crpix), the pixel undistorted by `sip`. Calabretta and Greisen (2002), section

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "sim/link/link.h"
-#include "sim/world/knowledge.h"
+#include "sim/onboard/knowledge.h"
 
 enum {
     MOST_PORTS = 8,

@@ -4,9 +4,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/subprocess.h"
 #include "sim/core/wall_clock.h"
 #include "sim/studies/slurm_internal.h"
-#include "sim/world/child.h"
 
 enum { MOST_WORDS = 96 };
 

@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/constellation.h"
-#include "sim/world/steering.h"
+#include "sim/world/external_states.h"
+#include "sim/world/orbit/constellation.h"
 #include "sim/world/world_build.h"
 
 /* One satellite of a catalogue. */

@@ -2,10 +2,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/constellation.h"
-#include "sim/world/ephemeris.h"
-#include "sim/world/psf.h"
-#include "sim/world/stray.h"
+#include "sim/optics/psf.h"
+#include "sim/world/orbit/constellation.h"
+#include "sim/world/orbit/ephemeris.h"
+#include "sim/world/scene/stray.h"
 #include "sim/world/world_build.h"
 
 static bst_status open_stars(const bst_world_builder *b, const char *name, const char *where,

@@ -5,10 +5,10 @@
 
 #include "sim/astro/bodies.h"
 #include "sim/astro/forces.h"
+#include "sim/catalogue/stars.h"
 #include "sim/core/config.h"
-#include "sim/world/brightness.h"
-#include "sim/world/camera.h"
-#include "sim/world/stars.h"
+#include "sim/optics/camera.h"
+#include "sim/world/scene/brightness.h"
 
 typedef struct bst_world bst_world; /* immutable once made; shareable between threads */
 

@@ -3,11 +3,12 @@
 #define BST_WORLD_WORLD_CONFIG_H
 
 #include "sim/astro/time.h"
+#include "sim/catalogue/stars.h"
 #include "sim/core/config.h"
-#include "sim/core/messages.h"
-#include "sim/world/brightness_config.h"
-#include "sim/world/camera.h"
-#include "sim/world/region.h"
+#include "sim/messages/messages.h"
+#include "sim/onboard/region.h"
+#include "sim/optics/camera.h"
+#include "sim/world/scene/brightness_config.h"
 
 enum {
     BST_ORBIT_SGP4,
@@ -159,12 +160,6 @@ typedef struct bst_exposure_config {
  * BST_ERR_CONFIG: it does not lie within the sensor. */
 bst_status bst_exposure_window(bst_ctx *ctx, const bst_exposure_config *config, int64_t width_px,
                                int64_t height_px, bst_window *out) BST_MUST_CHECK;
-
-/* Errors of the onboard star catalogue; a star's fate follows from its identity and the seed. */
-typedef struct bst_star_errors_config {
-    double dropped_fraction, displaced_fraction, displaced_sigma_arcsec;
-    uint64_t seed;
-} bst_star_errors_config;
 
 /* How the onboard camera differs from the true one. */
 typedef struct bst_camera_errors_config {

@@ -2,15 +2,15 @@
 #ifndef BST_WORLD_WORLD_INTERNAL_H
 #define BST_WORLD_WORLD_INTERNAL_H
 
-#include "sim/astro/injected.h"
 #include "sim/astro/oem.h"
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/astro/state_table.h"
 #include "sim/astro/trajectory.h"
-#include "sim/world/faint_stars.h"
-#include "sim/world/knowledge.h"
+#include "sim/catalogue/faint_stars.h"
+#include "sim/catalogue/star_index.h"
 #include "sim/world/name_index.h"
-#include "sim/world/star_index.h"
+#include "sim/world/world.h"
 #include "sim/world/world_config.h"
 
 /* A burn with what it has made of the orbit; worked out once. */
@@ -109,20 +109,6 @@ struct bst_world {
     struct bst_ephemeris *ephemeris;
 };
 
-struct bst_knowledge {
-    const bst_world
-        *world;           /* for the nominal orbits and Earth orientation only; never handed out */
-    bst_stars *own_stars; /* NULL: the world's */
-    bst_stars *altered;   /* those with the catalogue's errors; NULL: it has none */
-    bst_camera camera;
-    const struct bst_psf *psf; /* lent by the world; NULL: the camera's Gaussian */
-    int observer, sensor;
-    double julian_year;
-};
-
-/* The catalogue's cells and records; lent. */
-const bst_star_view *bst_stars_records(const bst_stars *stars);
-
 /* State at `seconds` after the scenario's epoch; `with_burns` false gives the orbit as catalogued.
  */
 bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
@@ -196,11 +182,5 @@ double bst_believed_seconds(const bst_world *world, int observer, int sensor, do
  * which the onboard side of a sensor knows it. */
 void bst_believe(const bst_world *world, int observer, int sensor, double believed_s,
                  bst_state *state);
-
-/* The same stars with errors: those of `stars` that are dropped are not found, the displaced ones
- * lie elsewhere. Shares the memory of `stars`, which must outlive *out. */
-bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
-                                 const bst_star_errors_config *errors,
-                                 bst_stars **out) BST_MUST_CHECK;
 
 #endif

@@ -1,7 +1,7 @@
 /* Gauss's method and Lambert's problem, against examples that textbooks print. */
 #include "sim/astro/gauss_angles.h"
+#include "sim/astro/kepler.h"
 #include "sim/astro/lambert.h"
-#include "sim/world/kepler.h"
 #include "tests/test_support.h"
 
 static const double MU = 3.986004418e14;

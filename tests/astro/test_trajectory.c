@@ -6,7 +6,7 @@
 
 #include "sim/astro/atmosphere.h"
 #include "sim/astro/bodies.h"
-#include "sim/world/kepler.h"
+#include "sim/astro/kepler.h"
 #include "tests/test_support.h"
 
 typedef struct orbit_state {

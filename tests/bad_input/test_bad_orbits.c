@@ -1,8 +1,8 @@
 /* Orbit files that are wrong as files: OMM, OEM, injected states. What is wrong in their content,
  * field by field: tests/astro. */
 #include "sim/astro/elements.h"
-#include "sim/astro/injected.h"
 #include "sim/astro/oem.h"
+#include "sim/astro/state_table.h"
 #include "tests/bad_input/faults.h"
 
 static bst_status read_elements(bst_ctx *ctx, const char *path) {

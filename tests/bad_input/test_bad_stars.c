@@ -1,7 +1,7 @@
 /* Star catalogues and what they are made from, when they are wrong. The catalogue file's own
- * damage, field by field: tests/world/test_star_file.c. */
-#include "sim/world/star_import.h"
-#include "sim/world/stars.h"
+ * damage, field by field: tests/catalogue/test_star_file.c. */
+#include "sim/catalogue/star_import.h"
+#include "sim/catalogue/stars.h"
 #include "tests/bad_input/faults.h"
 
 static bst_status read_stars(bst_ctx *ctx, const char *path) {
@@ -44,7 +44,7 @@ static void paths(void **state) {
 static void truncated_catalogue(void **state) {
     (void)state;
     char data[sizeof(bst_star_header) + 100], message[200];
-    FILE *file = fopen("sim/world/data/embedded.stars", "rb");
+    FILE *file = fopen("sim/catalogue/data/embedded.stars", "rb");
     assert_non_null(file);
     assert_int_equal(fread(data, 1, sizeof data, file), sizeof data);
     fseek(file, 0, SEEK_END);

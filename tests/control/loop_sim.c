@@ -1,4 +1,5 @@
 #include "tests/control/loop_sim.h"
+#include "sim/onboard/knowledge.h"
 
 #include <stdlib.h>
 

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 
 #include "control/control.h"
-#include "gimbal/two_axis.h"
+#include "gimbal/mount/second_order.h"
 
 #define SIM_TICKS_PER_S 6000
 #define SIM_STEP_TICKS 6

@@ -1,5 +1,5 @@
 /* Commanded directions by time, against the motion that they were taken from. */
-#include "control/aim_history.h"
+#include "control/modes/aim_history.h"
 
 #include <math.h>
 

@@ -2,8 +2,8 @@
  * boresight stays out of, and what is told beforehand. */
 #include <string.h>
 
-#include "control/guidance.h"
-#include "gimbal/two_axis.h"
+#include "control/guidance/guidance.h"
+#include "gimbal/mount/second_order.h"
 #include "sim/astro/bodies.h"
 #include "tests/test_support.h"
 

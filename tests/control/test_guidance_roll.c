@@ -1,5 +1,5 @@
 /* The body on its way to a roll, and the least roll that keeps a pass off the mount's pole. */
-#include "control/guidance.h"
+#include "control/guidance/guidance.h"
 #include "tests/test_support.h"
 
 #define DEG BST_DEG_RAD

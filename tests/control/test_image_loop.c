@@ -1,6 +1,6 @@
 /* The correction by image error in a loop without dynamics: the camera points at once where it is
  * told, wrong by a rotation that the loop has to find. */
-#include "control/image_loop.h"
+#include "control/loop/image_loop.h"
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
 

@@ -1,6 +1,7 @@
 /* A command holds at the time at which it takes effect, at any latency: what the gimbal sees then
  * is on the aim, also when that is several frames and control periods later. */
 #include "control/control.h"
+#include "sim/onboard/knowledge.h"
 #include "tests/test_support.h"
 
 #define TICKS 1000

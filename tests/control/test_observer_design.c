@@ -1,9 +1,9 @@
 /* Default gains of the observer: margins at frame periods from 0.2 to 5 s and latencies from a
  * tenth of a period to ten, by the loop with the mount's true response. */
-#include "control/observer_design.h"
+#include "control/loop/observer_design.h"
 
 #include "control/control.h"
-#include "gimbal/axis.h"
+#include "gimbal/mount/axis.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"
 

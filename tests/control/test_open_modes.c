@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "control/control.h"
+#include "sim/onboard/knowledge.h"
 #include "tests/test_support.h"
 
 #define TICKS 1000

@@ -1,5 +1,5 @@
 /* The pointing-error compensator: steady gains, jitter left over, large errors, signs, outliers. */
-#include "control/pointing_error.h"
+#include "control/loop/pointing_error.h"
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
 

@@ -1,5 +1,5 @@
 /* Slews against closed forms and the bounds of what limits allow. */
-#include "control/slew.h"
+#include "control/guidance/slew.h"
 #include "sim/core/rng.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"

@@ -1,5 +1,5 @@
 /* Margins against closed forms, and stability against the roots of the closed loop. */
-#include "control/stability.h"
+#include "control/loop/stability.h"
 #include "sim/core/rng.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"

@@ -1,5 +1,6 @@
 /* The rule that gives sensors their targets, on a small catalogue. */
-#include "control/tasking.h"
+#include "control/tasking/tasking.h"
+#include "sim/onboard/knowledge.h"
 #include "tests/world/world_support.h"
 
 #define FILE_ "\"elements_file\": \"scenarios/catalogue_2022-06.tle\""

@@ -6,7 +6,7 @@
 
 #include "sim/core/draft.h"
 #include "sim/core/file.h"
-#include "sim/core/messages.h"
+#include "sim/messages/messages.h"
 #include "tests/test_support.h"
 
 static char folder[BST_TEST_PATH];

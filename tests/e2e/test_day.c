@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "sim/app/app.h"
-#include "sim/engine/recorder.h"
+#include "sim/engine/recorder/recorder.h"
 #include "sim/engine/simulation.h"
 #include "tests/io/scratch.h"
 

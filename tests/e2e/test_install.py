@@ -196,7 +196,7 @@ class Installed(unittest.TestCase):
         headers = sorted(os.path.relpath(path, include)
                          for path in glob.glob(include + "/**/*.h", recursive=True))
         self.assertGreater(len(headers), 40)
-        self.assertIn("sim/app/registry.h", headers)
+        self.assertIn("sim/registry/registry.h", headers)
         self.assertIn("imgproc/imgproc.h", headers)
         self.assertEqual([h for h in headers if "_internal" in h or "kernels" in h], [])
         source = os.path.join(self.folder, "headers.c")

@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-#include "sim/engine/engine.h"
+#include "sim/engine/kernel/engine.h"
 #include "tests/test_support.h"
 
 typedef struct fake {

@@ -3,7 +3,7 @@
 #ifndef BST_TESTS_ENGINE_ONBOARD_H
 #define BST_TESTS_ENGINE_ONBOARD_H
 
-#include "sim/world/knowledge.h"
+#include "sim/onboard/knowledge.h"
 #include "sim/world/world_config.h"
 #include "tests/engine/fake_module.h"
 

@@ -1,5 +1,5 @@
 /* The exposure clock inside a simulation: exact ticks, latching, clipping, dropped frames. */
-#include "sim/engine/exposure_clock.h"
+#include "sim/engine/kernel/exposure_clock.h"
 #include "sim/engine/simulation.h"
 #include "tests/test_support.h"
 

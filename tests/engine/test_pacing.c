@@ -2,7 +2,7 @@
  * exact, and every figure follows by hand. */
 #include <time.h>
 
-#include "sim/engine/engine_internal.h"
+#include "sim/engine/kernel/engine_internal.h"
 #include "tests/engine/fake_module.h"
 
 /* Seconds of the clock. A binary fraction, so that times add up without rounding. */

@@ -1,5 +1,5 @@
 /* The recorder: messages in, tables and FITS out. */
-#include "sim/engine/recorder.h"
+#include "sim/engine/recorder/recorder.h"
 
 #include <fitsio.h>
 #include <sqlite3.h>

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "sim/engine/scenario.h"
+#include "sim/engine/scenario/scenario.h"
 #include "tests/test_support.h"
 
 typedef struct gadget {

@@ -2,9 +2,9 @@
  * over from those that it stands in for. No two sensors are alike. */
 #include "sim/engine/simulation.h"
 
-#include "sim/engine/loop_timing.h"
-#include "sim/engine/stand_in.h"
-#include "sim/world/knowledge.h"
+#include "sim/engine/scenario/loop_timing.h"
+#include "sim/engine/scenario/module_substitution.h"
+#include "sim/onboard/knowledge.h"
 #include "tests/test_support.h"
 
 typedef struct settings {

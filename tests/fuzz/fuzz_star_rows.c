@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/star_import.h"
+#include "sim/catalogue/star_import.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 

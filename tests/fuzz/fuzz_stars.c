@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/star_index.h"
+#include "sim/catalogue/star_index.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 

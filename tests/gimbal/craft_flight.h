@@ -2,7 +2,7 @@
 #ifndef BST_TESTS_CRAFT_FLIGHT_H
 #define BST_TESTS_CRAFT_FLIGHT_H
 
-#include "gimbal/spacecraft.h"
+#include "gimbal/spacecraft/spacecraft.h"
 #include "sim/astro/bodies.h"
 #include "tests/test_support.h"
 

@@ -1,9 +1,9 @@
-#include "gimbal/attitude_filter.h"
-#include "gimbal/attitude_sensors.h"
+#include "gimbal/spacecraft/attitude_filter.h"
+#include "gimbal/spacecraft/attitude_sensors.h"
 #include "sim/core/symmetric.h"
 #include "tests/test_support.h"
 
-#include "gimbal/spacecraft_config.h"
+#include "gimbal/spacecraft/spacecraft_config.h"
 
 static bst_ctx ctx;
 

@@ -1,5 +1,5 @@
 /* One axis: the servo against the closed form, limits, slew time, lag. */
-#include "gimbal/axis.h"
+#include "gimbal/mount/axis.h"
 #include "sim/core/rng.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"

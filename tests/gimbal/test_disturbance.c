@@ -1,5 +1,5 @@
-#include "gimbal/disturbance.h"
-#include "gimbal/pointing_law.h"
+#include "gimbal/spacecraft/disturbance.h"
+#include "gimbal/spacecraft/pointing_law.h"
 #include "sim/astro/bodies.h"
 #include "sim/astro/forces.h"
 #include "tests/test_support.h"

@@ -1,7 +1,7 @@
 /* Jitter: RMS, spectrum, independence of the order of calls, a day without drift. */
 #include <stdlib.h>
 
-#include "gimbal/jitter.h"
+#include "gimbal/jitter/jitter.h"
 #include "sim/core/vec.h"
 #include "tests/gimbal/periodogram.h"
 #include "tests/test_support.h"

@@ -3,8 +3,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "gimbal/jitter_noise.h"
-#include "gimbal/jitter_spectrum.h"
+#include "gimbal/jitter/jitter_noise.h"
+#include "gimbal/jitter/jitter_spectrum.h"
 #include "sim/core/vec.h"
 #include "tests/gimbal/periodogram.h"
 #include "tests/test_support.h"

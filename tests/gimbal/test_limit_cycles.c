@@ -1,8 +1,8 @@
 /* Limit cycles of a mount's servo, which its linear margins do not tell: saturation beyond the gain
  * margin against the describing function, hunting by stiction against its closed form, and what
  * does not hunt. */
-#include "control/stability.h"
-#include "gimbal/mount.h"
+#include "control/loop/stability.h"
+#include "gimbal/mount/mount.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3

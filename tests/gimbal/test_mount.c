@@ -1,6 +1,6 @@
 /* The full mounts: geometry, following with all that is in the plant, keyhole with and without a
  * third axis, wrap, stops, faults, what is refused. */
-#include "gimbal/mount.h"
+#include "gimbal/mount/mount.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3

@@ -1,7 +1,7 @@
 /* A day of a full mount at 1 kHz: three axes with friction, cables and modes follow a direction
  * that goes round every 90 minutes and past the pole each time. Argument: seconds (default 86400).
  */
-#include "gimbal/mount.h"
+#include "gimbal/mount/mount.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3

@@ -1,5 +1,5 @@
 /* Joints of the full mounts against closed forms: springs, modes, friction, stops, momentum. */
-#include "gimbal/mount_joints.h"
+#include "gimbal/mount/mount_joints.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3

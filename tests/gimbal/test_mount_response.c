@@ -1,6 +1,6 @@
 /* The linear model of a mount's axis against the plant itself: responses, and where the servo's
  * loop becomes unstable. */
-#include "gimbal/mount.h"
+#include "gimbal/mount/mount.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3

@@ -1,7 +1,7 @@
 /* Step size against error of the joints' integrators: the table in docs/equations.md. */
 #include <time.h>
 
-#include "gimbal/mount_joints.h"
+#include "gimbal/mount/mount_joints.h"
 #include "tests/test_support.h"
 
 /* Three stages with cables, a flexible mode of 30 Hz on the inner one, on a body that sways;

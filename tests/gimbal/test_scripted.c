@@ -4,7 +4,7 @@
 
 #include "gimbal/modules.h"
 #include "sim/engine/simulation.h"
-#include "sim/world/field.h"
+#include "sim/world/scene/field.h"
 #include "tests/io/scratch.h"
 
 static const bst_module_desc *const modules[] = {&bst_gimbal_scripted_module};

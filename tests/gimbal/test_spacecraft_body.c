@@ -1,4 +1,4 @@
-#include "gimbal/spacecraft_body.h"
+#include "gimbal/spacecraft/spacecraft_body.h"
 #include "tests/test_support.h"
 
 /* The free rigid body in Jacobi's elliptic functions (Landau and Lifshitz, Mechanics, section 37),

@@ -1,7 +1,7 @@
 /* One step of the spacecraft's attitude law in all its branches, against numbers that numpy worked
  * out with rotation matrices from the formulas of Wie (see the header): no axis, wheel or product
  * of inertia is zero, and none equals another. */
-#include "gimbal/spacecraft_control.h"
+#include "gimbal/spacecraft/spacecraft_control.h"
 #include "tests/test_support.h"
 
 /* natural 0.3 rad/s, damping 0.8: the slope is 0.1875 per s; 70 % of 0.004 rad/s^2 give a straight

@@ -1,6 +1,6 @@
 /* Days of a spacecraft at 1 kHz; with an argument, fewer seconds: `test_gimbal_spacecraft_day 30`.
  */
-#include "gimbal/spacecraft.h"
+#include "gimbal/spacecraft/spacecraft.h"
 #include "sim/astro/bodies.h"
 #include "tests/test_support.h"
 

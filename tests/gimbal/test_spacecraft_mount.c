@@ -1,6 +1,6 @@
 /* A full mount on a free spacecraft: what one turns, the other turns back. */
-#include "gimbal/mount.h"
-#include "gimbal/mount_geometry.h"
+#include "gimbal/mount/mount.h"
+#include "gimbal/mount/mount_geometry.h"
 #include "gimbal/platform.h"
 #include "tests/test_support.h"
 

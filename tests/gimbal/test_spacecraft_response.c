@@ -1,5 +1,5 @@
 /* The attitude loop in the frequency domain against the whole spacecraft in time. */
-#include "gimbal/spacecraft_response.h"
+#include "gimbal/spacecraft/spacecraft_response.h"
 #include "tests/gimbal/craft_flight.h"
 
 /* The gain of the loop raised until it diverges: at the response's gain margin. */

@@ -1,4 +1,4 @@
-#include "gimbal/wheels.h"
+#include "gimbal/spacecraft/wheels.h"
 #include "tests/test_support.h"
 
 static bst_ctx ctx;

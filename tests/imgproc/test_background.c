@@ -1,6 +1,6 @@
 #include <stdlib.h>
 
-#include "imgproc/background.h"
+#include "imgproc/detect/background.h"
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
 

@@ -2,7 +2,7 @@
  * photometry. */
 #include <fitsio.h>
 
-#include "imgproc/calibration.h"
+#include "imgproc/calibrate/calibration.h"
 #include "tests/imgproc/module_support.h"
 #include "tests/io/scratch.h"
 

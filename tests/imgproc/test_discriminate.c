@@ -1,8 +1,8 @@
 /* What earlier frames say about a detection: fields of known sources, seen by a turning camera. */
 #include <stdlib.h>
 
-#include "imgproc/discriminate.h"
-#include "imgproc/pixel_learner.h"
+#include "imgproc/calibrate/pixel_learner.h"
+#include "imgproc/measure/discriminate.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

@@ -1,5 +1,5 @@
 /* The streak filter's output between the pixels. */
-#include "imgproc/filter.h"
+#include "imgproc/detect/filter.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 64, MIDDLE = SIDE / 2 };

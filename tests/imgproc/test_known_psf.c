@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/image.h"
-#include "imgproc/low_rank.h"
+#include "imgproc/detect/low_rank.h"
+#include "imgproc/measure/source_profile.h"
 #include "sim/core/simd.h"
-#include "sim/world/psf_image.h"
+#include "sim/optics/psf_image.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

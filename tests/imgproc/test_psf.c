@@ -1,6 +1,6 @@
 #include <stdlib.h>
 
-#include "imgproc/psf.h"
+#include "imgproc/detect/psf.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 48, PIXELS = SIDE * SIDE };

@@ -1,7 +1,7 @@
 /* Charge and light told apart by shape, on random frames with fixed seeds. */
 #include <stdlib.h>
 
-#include "imgproc/sharpness.h"
+#include "imgproc/measure/sharpness.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

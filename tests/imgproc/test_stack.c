@@ -2,8 +2,8 @@
  * among stars, hits and hot pixels, under a camera that turns, and at the edges. */
 #include <stdlib.h>
 
-#include "imgproc/background.h"
-#include "imgproc/stack.h"
+#include "imgproc/detect/background.h"
+#include "imgproc/stack/stack.h"
 #include "sim/core/rng.h"
 #include "sim/core/threshold_statistics.h"
 #include "tests/test_support.h"

@@ -1,6 +1,6 @@
 #include <stdlib.h>
 
-#include "imgproc/starid.h"
+#include "imgproc/identify/starid.h"
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
 

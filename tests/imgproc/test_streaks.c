@@ -2,7 +2,7 @@
  * alarms, places, stars left alone. */
 #include <stdlib.h>
 
-#include "imgproc/streak_search.h"
+#include "imgproc/streak/streak_search.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

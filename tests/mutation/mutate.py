@@ -3,7 +3,7 @@
 
     tests/mutation/mutate.py --count 60 --seed 1                  bugs anywhere in the sources
     tests/mutation/mutate.py --since v0.1.0 --count 60            only in files that changed since a revision
-    tests/mutation/mutate.py --files tracker/sky_filter.c         only in these files
+    tests/mutation/mutate.py --files tracker/mtt/sky_filter.c         only in these files
     tests/mutation/mutate.py --suite e2e --count 30               judged by the tests of the whole program
     tests/mutation/mutate.py --coverage build-cov --count 100     many bugs: only the tests that execute a bug's line run
     tests/mutation/mutate.py --coverage build-cov --unexecuted sim/world    lines that no unit test of the folder executes
@@ -43,9 +43,10 @@ import e2e_suite
 
 FOLDERS = ["sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
 # folders whose tests have names of their own: the rest of a path names its tests (tracker/… → tracker_…)
-UNIT_TESTS = {"sim/app": "app|bad_input", "sim/core": "core", "sim/astro": "astro", "sim/world": "world", "sim/io": "io",
-              "sim/link": "link", "sim/engine": "engine", "sim/eval": "eval", "sim/studies": "studies",
-              "sim/device": "device"}
+UNIT_TESTS = {f"sim/{name}": name for name in (
+    "core", "messages", "dynamics", "astro", "device", "catalogue", "optics", "world", "onboard", "io", "link",
+    "engine", "eval", "studies", "registry", "cli", "run", "analysis", "export", "report", "study_kinds", "bench")}
+UNIT_TESTS["sim/app"] = "app|bad_input"
 
 AXES = [(r"\.x\b", ".y"), (r"\.y\b", ".x"), (r"\.z\b", ".y"), (r"\[0\]", "[1]"), (r"\[1\]", "[0]"), (r"\[2\]", "[1]"),
         (r"\b(\w+)_x\b", r"\1_y"), (r"\b(\w+)_y\b", r"\1_x"), (r"\bx_px\b", "y_px"), (r"\by_px\b", "x_px"),

@@ -1,5 +1,5 @@
 /* Where one source fitted to two lands, against the fit on pixels. */
-#include "obsgen/blend_weight.h"
+#include "obsgen/model/blend_weight.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"
 

@@ -1,5 +1,5 @@
 /* Background and noise that long streaks are part of, against clipped pixels. */
-#include "obsgen/local_sky.h"
+#include "obsgen/model/local_sky.h"
 #include "sim/core/rng.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"

@@ -1,5 +1,5 @@
 /* The tabulated bound of a PSF against that of a Gaussian and against sums over its OTF. */
-#include "obsgen/psf_bound.h"
+#include "obsgen/model/psf_bound.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"
 

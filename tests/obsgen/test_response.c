@@ -1,7 +1,7 @@
 /* The answer of a filter to images that it was not made for, against sums over pixels. */
-#include "obsgen/response.h"
+#include "obsgen/model/response.h"
 #include "sim/core/vec.h"
-#include "sim/world/psf_image.h"
+#include "sim/optics/psf_image.h"
 #include "tests/test_support.h"
 
 static double pixel_share(double from, double sigma) {

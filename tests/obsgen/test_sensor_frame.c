@@ -1,6 +1,6 @@
 /* The generator where frames are cut, binned, smeared or noisy in rows and columns, and where the
  * filter was made for another PSF: against numbers that the test makes itself. */
-#include "sim/world/column_level.h"
+#include "sim/optics/column_level.h"
 #include "tests/obsgen/generator_scene.h"
 
 static double above(double z) {

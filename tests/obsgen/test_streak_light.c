@@ -1,5 +1,5 @@
 /* The light of long streaks as it is added up, against sums over all places in double precision. */
-#include "obsgen/streak_light.h"
+#include "obsgen/streak/streak_light.h"
 
 #include <stdlib.h>
 #include <string.h>

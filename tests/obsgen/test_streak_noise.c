@@ -1,6 +1,6 @@
 /* The sums along a streak that the generator draws its fragments from: noise of the filter's
  * variance and correlation, that belongs to the pixels. */
-#include "obsgen/streak_noise.h"
+#include "obsgen/streak/streak_noise.h"
 
 #include <stdlib.h>
 #include <string.h>

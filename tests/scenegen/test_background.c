@@ -1,6 +1,6 @@
 /* A background that differs from pixel to pixel, on its way through the kernels. */
 #include "scenegen/renderer.h"
-#include "sim/world/skylight.h"
+#include "sim/world/scene/skylight.h"
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"

@@ -2,7 +2,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-#include "scenegen/batch_fft.h"
+#include "scenegen/fourier/batch_fft.h"
 #include "sim/core/vec.h"
 #include "tests/test_support.h"
 

@@ -1,8 +1,8 @@
 /* Each effect of the detector against its closed form or exact statistics. */
 #include <unistd.h>
 
-#include "scenegen/detector.h"
-#include "scenegen/pattern.h"
+#include "scenegen/detector/detector.h"
+#include "scenegen/detector/fixed_pattern_noise.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 

@@ -5,7 +5,7 @@
 #include "gimbal/platform.h"
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
-#include "sim/world/psf.h"
+#include "sim/optics/psf.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 

@@ -1,7 +1,7 @@
 /* What a Gaussian PSF asks of stamps and of the Fourier path: closed forms by the error function,
  * and sums over a fine grid of frequencies by numpy. No device. */
-#include "scenegen/light_grid.h"
-#include "scenegen/stamp.h"
+#include "scenegen/fourier/fourier_grid.h"
+#include "scenegen/stamp/stamp.h"
 #include "tests/test_support.h"
 
 static const double SIGMA = 1.019186160345623; /* of a FWHM of 2.4 px */

@@ -10,7 +10,7 @@
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
 #include "scenegen/scene_plan.h"
-#include "sim/world/psf.h"
+#include "sim/optics/psf.h"
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"

@@ -2,7 +2,7 @@
 #ifndef BST_TESTS_GEO_LOOK_H
 #define BST_TESTS_GEO_LOOK_H
 
-#include "sim/world/kepler.h"
+#include "sim/astro/kepler.h"
 #include "tests/tracker/orbit_scene.h"
 
 static const bst_vec3 earth_mps = {-12e3, 25e3, 11e3};

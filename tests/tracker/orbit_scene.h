@@ -7,8 +7,8 @@
 #include "sim/astro/bodies.h"
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
-#include "tracker/orbit_initial.h"
-#include "tracker/tangent.h"
+#include "tracker/mtt/tangent.h"
+#include "tracker/orbit/orbit_initial.h"
 
 typedef struct scene {
     bst_od_motion motion;

@@ -3,7 +3,7 @@
 #define BST_TESTS_PIXEL_TRACKER_H
 
 #include "tests/test_support.h"
-#include "tracker/multitarget.h"
+#include "tracker/mtt/multitarget.h"
 
 #define AS BST_ARCSEC_RAD
 #define PX (3.0 * AS)

@@ -4,7 +4,7 @@
 
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
-#include "tracker/multitarget.h"
+#include "tracker/mtt/multitarget.h"
 
 #define AS BST_ARCSEC_RAD
 #define SIGMA (0.3 * AS)

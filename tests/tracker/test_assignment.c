@@ -3,7 +3,7 @@
 
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
-#include "tracker/assignment.h"
+#include "tracker/mtt/assignment.h"
 
 enum { MAX_ROWS = 6, MAX_COLUMNS = 6 };
 

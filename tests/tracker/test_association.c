@@ -1,7 +1,7 @@
 /* Gates, the search among a frame's detections, and the count of false alarms: one track set by
  * hand, whose covariance has two very different axes. */
 #include "tests/tracker/sky_bench.h"
-#include "tracker/multitarget_internal.h"
+#include "tracker/mtt/multitarget_internal.h"
 
 static void put(bst_mtt *mtt, bst_vec3 direction, double sigma) {
     mtt->now.used[mtt->now.count] = false;

@@ -1,8 +1,8 @@
 /* Attitude from stars against its bound, with wrong identities, and where it must say no. */
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
-#include "tracker/attitude.h"
-#include "tracker/attitude_error.h"
+#include "tracker/attitude/attitude.h"
+#include "tracker/attitude/attitude_error.h"
 
 #define AS BST_ARCSEC_RAD
 #define MAX_STARS 10000

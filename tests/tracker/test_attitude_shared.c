@@ -1,5 +1,5 @@
 /* The share of an attitude's errors that stays with its stars, against its closed form. */
-#include "tracker/attitude_shared.h"
+#include "tracker/attitude/attitude_shared.h"
 
 #include <string.h>
 

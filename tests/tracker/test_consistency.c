@@ -4,7 +4,7 @@
 #include "sim/eval/consistency.h"
 #include "sim/eval/track_bound.h"
 #include "tests/test_support.h"
-#include "tracker/multitarget.h"
+#include "tracker/mtt/multitarget.h"
 
 #define AS BST_ARCSEC_RAD
 #define HALF_AS 8.0 /* half width of the sky in which false alarms are drawn */

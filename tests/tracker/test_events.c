@@ -1,7 +1,7 @@
 /* Events told from innovations, and tracks that are places of the sensor: statistics by closed
  * forms, with correlated innovations and places that differ in x and y. */
 #include "tests/tracker/sky_bench.h"
-#include "tracker/multitarget_internal.h"
+#include "tracker/mtt/multitarget_internal.h"
 
 /* The sum of n innovations of one covariance S has n S: (sum nu)^T S^-1 (sum nu) / n. */
 static double statistic_of(const double (*nu)[2], int n, const double s[3]) {

@@ -5,7 +5,7 @@
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
 #include "tests/tracker/sky_bench.h"
-#include "tracker/multitarget.h"
+#include "tracker/mtt/multitarget.h"
 
 /* Every filter and association through the poles, the wrap of right ascension and a direction
  * overhead of any site, at rates from none to 5 degrees a second. */

@@ -1,11 +1,11 @@
 /* Tracks on orbits: consistent while they are seen, and over gaps in which a constant rate is lost.
  */
+#include "sim/astro/kepler.h"
 #include "sim/core/rng.h"
-#include "sim/world/kepler.h"
 #include "tests/test_support.h"
 #include "tests/tracker/geo_look.h"
-#include "tracker/multitarget.h"
-#include "tracker/orbit_track.h"
+#include "tracker/mtt/multitarget.h"
+#include "tracker/orbit/orbit_track.h"
 
 #define AS BST_ARCSEC_RAD
 #define SIGMA (0.3 * AS)

@@ -1,5 +1,5 @@
 #include "tests/test_support.h"
-#include "tracker/photocentre.h"
+#include "tracker/attitude/photocentre.h"
 
 #define AS BST_ARCSEC_RAD
 

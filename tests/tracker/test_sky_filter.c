@@ -1,7 +1,7 @@
 /* The filter on the sphere: motion, covariance, consistency, and the places where angles fail. */
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
-#include "tracker/sky_filter.h"
+#include "tracker/mtt/sky_filter.h"
 
 #define AS BST_ARCSEC_RAD
 

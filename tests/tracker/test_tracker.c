@@ -6,7 +6,7 @@
 #include "sim/astro/bodies.h"
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
-#include "tracker/tangent.h"
+#include "tracker/mtt/tangent.h"
 #include "tracker/tracker.h"
 
 #define AS BST_ARCSEC_RAD

@@ -1,10 +1,10 @@
 /* Brightness of objects: phase laws, standard magnitudes, light curves, Earthshine, emission; and
  * through an exposure. */
-#include "sim/world/brightness.h"
+#include "sim/world/scene/brightness.h"
 
 #include <unistd.h>
 
-#include "sim/world/field_objects.h"
+#include "sim/world/scene/field_objects.h"
 #include "tests/world/world_support.h"
 
 static const double pi = BST_PI;

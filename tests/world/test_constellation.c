@@ -1,5 +1,6 @@
 /* Walker constellations: elements by Walker's definition, and the satellites in a world. */
-#include "sim/world/constellation.h"
+#include "sim/onboard/knowledge.h"
+#include "sim/world/orbit/constellation.h"
 
 #include "tests/world/world_support.h"
 

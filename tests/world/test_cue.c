@@ -1,5 +1,6 @@
 /* Regions of the sky and errors of the cue, against spherical trigonometry by astropy 5.2
  * (SkyCoord.directional_offset_by) and places over the turning Earth. */
+#include "sim/onboard/knowledge.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"

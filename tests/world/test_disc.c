@@ -1,5 +1,5 @@
 /* A lit sphere as a disc against sums over its surface. */
-#include "sim/world/disc.h"
+#include "sim/world/scene/disc.h"
 
 #include "tests/world/lit_sphere.h"
 

@@ -1,13 +1,13 @@
 /* The shared ephemeris against direct evaluation, and the field query over candidates against brute
  * force. */
-#include "sim/world/ephemeris.h"
+#include "sim/world/orbit/ephemeris.h"
 
 #include <pthread.h>
 #include <stdlib.h>
 #include <unistd.h>
 
 #include "sim/core/rng.h"
-#include "sim/world/field_objects.h"
+#include "sim/world/scene/field_objects.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"

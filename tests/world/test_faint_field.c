@@ -2,8 +2,9 @@
  * does not know them. */
 #include <stdlib.h>
 
-#include "sim/world/faint_stars.h"
-#include "sim/world/field.h"
+#include "sim/catalogue/faint_stars.h"
+#include "sim/onboard/knowledge.h"
+#include "sim/world/scene/field.h"
 #include "tests/world/world_support.h"
 
 static bst_world *world_with_faint(const char *faint) {

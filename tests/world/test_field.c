@@ -1,6 +1,6 @@
 /* The field query against brute force. */
-#include "sim/world/field.h"
-#include "sim/world/psf.h"
+#include "sim/optics/psf.h"
+#include "sim/world/scene/field.h"
 
 #include <stdlib.h>
 

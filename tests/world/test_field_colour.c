@@ -1,8 +1,8 @@
 /* What the field query says of the colour of each source's light. */
 #include <stdlib.h>
 
-#include "sim/world/field.h"
-#include "sim/world/psf.h"
+#include "sim/optics/psf.h"
+#include "sim/world/scene/field.h"
 #include "tests/world/world_support.h"
 
 enum { RATE = 6000, END = 600, MOST = 4096 };

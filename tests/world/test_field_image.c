@@ -1,8 +1,8 @@
 /* Moments of a source's image: over a crooked track with changing light, of a disc, under
  * vignetting, and what a matched filter gathers; against sums and integrals made here. */
-#include "sim/world/field_image.h"
+#include "sim/world/scene/field_image.h"
 
-#include "sim/world/camera.h"
+#include "sim/optics/camera.h"
 #include "tests/world/lit_sphere.h"
 
 #define SCALE (5.0 * BST_ARCSEC_RAD)

@@ -1,5 +1,5 @@
 /* Orbits from files: an OEM observer looking at an injected target. */
-#include "sim/world/kepler.h"
+#include "sim/astro/kepler.h"
 #include "tests/io/scratch.h"
 #include "tests/world/world_support.h"
 

@@ -1,11 +1,11 @@
 /* A rolling shutter's times: closed forms, and the truth that follows from them. */
-#include "sim/world/row_exposure.h"
+#include "sim/world/scene/row_exposure.h"
 
 #include <stdlib.h>
 
 #include "sim/core/rng.h"
-#include "sim/world/field.h"
-#include "sim/world/los_track.h"
+#include "sim/world/scene/field.h"
+#include "sim/world/scene/los_track.h"
 #include "tests/world/world_support.h"
 
 /* A part of a source's time is the same motion and the same light. */

@@ -1,4 +1,5 @@
 /* What an observer sees of an object, and what it is told to look for. */
+#include "sim/onboard/knowledge.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"

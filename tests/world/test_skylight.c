@@ -1,8 +1,8 @@
 /* Background of the sky against published numbers and closed forms. */
-#include "sim/world/skylight.h"
+#include "sim/world/scene/skylight.h"
 
-#include "sim/world/stray.h"
-#include "sim/world/zodiacal.h"
+#include "sim/world/scene/stray.h"
+#include "sim/world/scene/zodiacal.h"
 #include "tests/world/world_support.h"
 
 #define FULL_SUN pow(10.0, 0.4 * 26.74)

@@ -1,6 +1,6 @@
 /* Which sources get room in a truth message, and which of them saturate: limits computed here from
  * the camera's numbers, light of binned pixels by numerical integration. */
-#include "sim/world/truth_list.h"
+#include "sim/world/scene/truth_list.h"
 
 #include "tests/world/world_support.h"
 

@@ -1,7 +1,7 @@
 /* Zodiacal light and the Moon's phases against published numbers. */
-#include "sim/world/zodiacal.h"
+#include "sim/world/scene/zodiacal.h"
 
-#include "sim/world/stray.h"
+#include "sim/world/scene/stray.h"
 #include "tests/world/world_support.h"
 
 /* Leinert et al. 1998, table 16, and section 8.3 for the pole. */

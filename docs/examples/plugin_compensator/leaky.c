@@ -7,7 +7,7 @@
  *
  *   "control": {"type": "standard", "compensator": {"plugin": "leaky.so", "gain_per_s": 0.4}}
  */
-#include "sim/world/stages.h"
+#include "sim/onboard/stages.h"
 
 /* 1. What a scenario may set. */
 typedef struct config {

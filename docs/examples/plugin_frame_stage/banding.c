@@ -11,7 +11,7 @@
 #include <stdlib.h>
 
 #include "sim/core/rng.h"
-#include "sim/world/stages.h"
+#include "sim/onboard/stages.h"
 
 /* 1. What a scenario may set. */
 typedef struct config {

@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/app/registry.h"
 #include "sim/core/version.h"
 #include "sim/engine/simulation.h"
+#include "sim/registry/registry.h"
 
 /* What the hooks below need from one message to the next. */
 typedef struct watch {

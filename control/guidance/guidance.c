@@ -1,0 +1,452 @@
+#include "control/guidance/guidance.h"
+
+/* Cones are widened for planning by this: aberration, and what mounts overshoot by. */
+#define WIDER_RAD (0.05 * BST_DEG_RAD)
+/* Half the interval over which a slew's rate and acceleration are taken. */
+#define DIFFERENCE_S 0.01
+/* Places along a motion of the axes that are looked at for cones, and a path's nodes. */
+#define SAMPLES 96
+#define PATH_NODES 385
+/* Of limits_share, along paths: their nodes hold the limits, what lies between to a few percent. */
+#define PATH_SHARE 0.9
+/* Angles that tell which way and turn is meant are worked out anew this far on. */
+#define NEAR_RAD 1e-4
+/* Directions to come that a turn is chosen by. */
+#define COMING 256
+
+void bst_guidance_init(bst_guidance *g, const bst_guidance_config *config,
+                       const bst_guidance_env *env) {
+    *g = (bst_guidance){
+        .config = *config, .env = *env, .told_from_s = INFINITY, .told_until_s = INFINITY};
+}
+
+void bst_guidance_telemetry(bst_guidance *g, const bst_mount_status *mount) {
+    if (mount) {
+        g->mount = *mount;
+        g->mount_known = true;
+    }
+}
+
+int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,
+                       bst_zone zones[BST_ZONE_KINDS]) {
+    const bst_guidance_config *c = &g->config;
+    const bst_exclusion exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
+                                     .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,
+                                     .earth = c->earth_keep_out,
+                                     .earth_limb_rad = c->earth_limb_keep_out_deg * BST_DEG_RAD,
+                                     .limb_altitude_m = 1e3 * c->earth_limb_altitude_km};
+    return bst_exclusion_zones(&exclusion, nav->position_gcrf_m, nav->sun_m, nav->moon_m, zones);
+}
+
+bst_quat bst_guidance_body(const bst_guidance *g, int64_t tick) {
+    double dt = (double)(tick - g->mount.tick) / g->env.tick_rate_hz;
+    if (g->roll_given) {
+        return bst_guidance_rolled(g, dt, g->roll_rad);
+    }
+    bst_vec3 turn = bst_vec3_scale(g->mount.rate_body_radps, -dt);
+    return bst_quat_mul(bst_quat_from_rotvec(turn), g->mount.q_body_from_gcrf);
+}
+
+static void tell(bst_guidance *g, bst_guidance_event event) {
+    if (g->event_count < BST_GUIDANCE_EVENTS) {
+        g->events[g->event_count++] = event;
+    }
+}
+
+/* Whether two unit vectors are farther apart than an angle of up to 1 rad; the chord tells most. */
+static bool is_beyond(bst_vec3 a, bst_vec3 b, double angle_rad) {
+    bst_vec3 chord = bst_vec3_sub(a, b);
+    return !(bst_vec3_dot(chord, chord) < 0.9 * angle_rad * angle_rad) &&
+           bst_vec3_angle(a, b) > angle_rad;
+}
+
+static bst_vec3 unit_after(bst_vec3 d, bst_vec3 rate, double seconds) {
+    return bst_vec3_unit(bst_vec3_axpy(d, seconds, rate));
+}
+
+/* ---- slews ---- */
+
+/* Direction of the slew under way, `seconds` after its start. */
+static bst_vec3 slew_at(const bst_guidance *g, double seconds, double near_rad[BST_MOUNT_AXES]) {
+    const bst_guidance_slew *slew = &g->slew;
+    double s, rate, accel, angle[BST_MOUNT_AXES] = {0.0};
+    bst_vec3 tangent, bend;
+    if (slew->along_path) {
+        bst_slew_path_at(&slew->speed, seconds, &s, &rate, &accel);
+        return bst_path_at(&slew->path, s, &tangent, &bend);
+    }
+    for (int i = 0; i < g->mount.axes; i++) {
+        bst_slew_axis_at(&slew->axis[i], seconds, &angle[i], &rate, &accel);
+        if (near_rad) {
+            near_rad[i] = angle[i];
+        }
+    }
+    int64_t tick = slew->start_tick + (int64_t)llround(seconds * g->env.tick_rate_hz);
+    return bst_quat_rotate(bst_quat_conj(bst_guidance_body(g, tick)),
+                           bst_mount_boresight(&g->mount, angle));
+}
+
+/* The angles to end a slew at: of the turn that serves what is to come, where that is looked at. */
+static bst_status target_angles(bst_ctx *ctx, const bst_guidance *g, int64_t tick,
+                                bst_vec3 direction, const double present[],
+                                double angle[BST_MOUNT_AXES], bool *found) {
+    bst_vec3 coming[COMING] = {bst_quat_rotate(bst_guidance_body(g, tick), direction)};
+    int count = 1;
+    double step = g->config.look_ahead_s / (COMING - 1);
+    for (; g->config.look_ahead_s > 0.0 && count < COMING; count++) {
+        int64_t then = tick + (int64_t)llround(count * step * g->env.tick_rate_hz);
+        bool valid;
+        BST_TRY(g->env.aim(g->env.user, ctx, then, &valid, &direction));
+        if (!valid) {
+            break;
+        }
+        coming[count] = bst_quat_rotate(bst_guidance_body(g, then), direction);
+    }
+    bst_mount_status mount = g->mount;
+    for (int i = 0; i < mount.axes; i++) {
+        mount.axis[i].angle_rad = present[i];
+    }
+    bst_wrap_choice choice;
+    *found = bst_wrap_choose(&mount, coming, count, &choice);
+    for (int i = 0; *found && i < BST_MOUNT_AXES; i++) {
+        angle[i] = choice.angle_rad[i];
+    }
+    return BST_OK;
+}
+
+/* Where the aim will be at a tick, out of the cones, and how fast it moves there. */
+static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick, const bst_zone *zones,
+                         int zone_count, bst_vec3 towards, bool *valid, bst_vec3 *d,
+                         bst_vec3 *rate) {
+    int64_t half = (int64_t)llround(0.1 * g->env.tick_rate_hz);
+    half = half > 0 ? half : 1;
+    bst_vec3 ahead, behind, free;
+    bool both[2];
+    BST_TRY(g->env.aim(g->env.user, ctx, tick, valid, d));
+    BST_TRY(g->env.aim(g->env.user, ctx, tick + half, &both[0], &ahead));
+    BST_TRY(g->env.aim(g->env.user, ctx, tick - half, &both[1], &behind));
+    if (!*valid) {
+        return BST_OK;
+    }
+    *rate = both[0] && both[1] ? bst_vec3_scale(bst_vec3_sub(ahead, behind),
+                                                0.5 * g->env.tick_rate_hz / (double)half)
+                               : (bst_vec3){0.0, 0.0, 0.0};
+    if (!bst_exclusion_nearest(zones, zone_count, *d, towards, &free)) {
+        *valid = false;
+    } else if (bst_vec3_angle(free, *d) > 0.0) {
+        *d = free;
+        *rate = (bst_vec3){0.0, 0.0, 0.0};
+    }
+    return BST_OK;
+}
+
+/* Angles and rates of the axes as the slew under way or, without one, the encoders have them. */
+static void present_axes(const bst_guidance *g, int64_t tick, double angle[], double rate[]) {
+    double since = (double)(tick - g->slew.start_tick) / g->env.tick_rate_hz;
+    double dt = (double)(tick - g->mount.tick) / g->env.tick_rate_hz, accel;
+    for (int i = 0; i < BST_MOUNT_AXES; i++) {
+        angle[i] = rate[i] = 0.0;
+        if (i < g->mount.axes && g->slew.active && !g->slew.along_path) {
+            bst_slew_axis_at(&g->slew.axis[i], since, &angle[i], &rate[i], &accel);
+        } else if (i < g->mount.axes) {
+            rate[i] = g->mount.axis[i].rate_radps;
+            angle[i] = g->mount.axis[i].angle_rad + rate[i] * dt;
+        }
+    }
+}
+
+/* The fastest motion of the axes onto the moving aim; *made false when it cannot be or would cross
+ * a cone. */
+static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, const bst_zone *zones,
+                            int zone_count, bst_vec3 from, bool *made) {
+    *made = false;
+    if (!g->mount_known || !bst_mount_steers(&g->mount)) {
+        return BST_OK;
+    }
+    double angle[BST_MOUNT_AXES], rate[BST_MOUNT_AXES];
+    double to[BST_MOUNT_AXES], ways[2][BST_MOUNT_AXES];
+    present_axes(g, tick, angle, rate);
+    bst_guidance_slew slew = {.active = true, .start_tick = tick};
+    for (int round = 0; round < 4; round++) {
+        int64_t arrival = tick + (int64_t)llround(slew.duration_s * g->env.tick_rate_hz);
+        bst_vec3 d, r;
+        bool valid, found;
+        BST_TRY(aim_at(ctx, g, arrival, zones, zone_count, from, &valid, &d, &r));
+        if (!valid) {
+            return BST_OK;
+        }
+        BST_TRY(target_angles(ctx, g, arrival, d, angle, to, &found));
+        bst_quat body = bst_guidance_body(g, arrival + (int64_t)(0.1 * g->env.tick_rate_hz));
+        bst_vec3 next = bst_quat_rotate(body, unit_after(d, r, 0.1));
+        if (!found || bst_mount_angles(&g->mount, next, to, ways) == 0) {
+            return BST_OK;
+        }
+        double duration = 0.0;
+        slew.arrival = d;
+        for (int i = 0; i < g->mount.axes; i++) {
+            const bst_mount_axis *axis = &g->mount.axis[i];
+            double share = g->config.limits_share, limit = share * axis->rate_limit_radps;
+            /* near the pole the aim may be faster than the axis: then it is met at rest */
+            double moving = (ways[0][i] - to[i]) / 0.1;
+            moving = limit > 0.0 && fabs(moving) > 0.9 * limit ? 0.0 : moving;
+            if (!bst_slew_axis_plan(angle[i], rate[i], to[i] - moving * slew.duration_s, moving,
+                                    limit, share * axis->accel_limit_radps2, &slew.axis[i])) {
+                return BST_OK;
+            }
+            duration = fmax(duration, slew.axis[i].duration_s);
+        }
+        slew.duration_s = duration;
+    }
+    bst_guidance_slew before = g->slew;
+    g->slew = slew;
+    for (int k = 0; k <= SAMPLES && zone_count > 0; k++) {
+        double depth;
+        bst_vec3 d = slew_at(g, slew.duration_s * k / SAMPLES, NULL);
+        if (bst_exclusion_inside(zones, zone_count, d, &depth) >= 0) {
+            g->slew = before;
+            return BST_OK;
+        }
+    }
+    *made = true;
+    return BST_OK;
+}
+
+/* The axis angles along a path; for a mount whose axes are not known, the way itself. */
+static void path_nodes(const bst_guidance *g, const bst_path *path, int64_t tick,
+                       bst_slew_nodes *nodes, bst_slew_limits *limits) {
+    bool steers = g->mount_known && bst_mount_steers(&g->mount);
+    double near[BST_MOUNT_AXES], rate[BST_MOUNT_AXES], ways[2][BST_MOUNT_AXES];
+    bst_quat body = steers ? bst_guidance_body(g, tick) : BST_QUAT_IDENTITY;
+    bst_vec3 tangent, bend, before = {0.0, 0.0, 0.0};
+    present_axes(g, tick, near, rate);
+    nodes->count = PATH_NODES;
+    nodes->step = path->length_rad / (PATH_NODES - 1);
+    *limits = (bst_slew_limits){.axes = steers ? g->mount.axes : 1};
+    for (int i = 0; i < limits->axes; i++) {
+        double share = PATH_SHARE * g->config.limits_share;
+        double hard = steers ? share * g->mount.axis[i].accel_limit_radps2 : 0.0;
+        limits->rate_radps[i] = steers ? share * g->mount.axis[i].rate_limit_radps : 0.0;
+        limits->accel_radps2[i] = hard > 0.0 ? hard : 1.0;
+    }
+    for (int j = 0; j < PATH_NODES; j++) {
+        bst_vec3 d = bst_path_at(path, j * nodes->step, &tangent, &bend);
+        /* within a step an arc turns by no more than its own curvature makes it; beside an end,
+         * which is passed slowly anyway, the angles' second differences are enough */
+        nodes->corner[j] = j > 2 && j < PATH_NODES - 3 && !nodes->corner[j - 1] &&
+                           bst_vec3_dot(tangent, before) < 0.9;
+        before = tangent;
+        if (!steers) {
+            nodes->angle_rad[j][0] = j * nodes->step;
+            continue;
+        }
+        bool solved = bst_mount_nearest(&g->mount, bst_quat_rotate(body, d), near, ways[0]);
+        for (int i = 0; i < BST_MOUNT_AXES; i++) {
+            near[i] = solved ? ways[0][i] : near[i];
+            nodes->angle_rad[j][i] = near[i];
+        }
+    }
+}
+
+/* The shortest way round the cones, as fast as the axes allow. */
+static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick, const bst_zone *zones,
+                            int zone_count, bst_vec3 from, bst_vec3 from_rate, bool *made) {
+    bst_guidance_slew *slew = &g->slew;
+    bst_guidance_slew before = *slew;
+    double duration = 0.0;
+    *made = false;
+    for (int round = 0; round < 3; round++) {
+        int64_t arrival = tick + (int64_t)llround(duration * g->env.tick_rate_hz);
+        bst_vec3 d, r, tangent, end, bend;
+        bst_slew_limits limits;
+        bool valid;
+        *slew = before;
+        BST_TRY(aim_at(ctx, g, arrival, zones, zone_count, from, &valid, &d, &r));
+        if (!valid || !bst_exclusion_path(zones, zone_count, from, d, &slew->path)) {
+            *slew = before;
+            return BST_OK;
+        }
+        if (slew->path.count == 0) {
+            *slew = before;
+            return BST_OK;
+        }
+        (void)bst_path_at(&slew->path, 0.0, &tangent, &bend);
+        (void)bst_path_at(&slew->path, slew->path.length_rad, &end, &bend);
+        path_nodes(g, &slew->path, tick, &g->nodes, &limits);
+        if (!bst_slew_path_plan(&g->nodes, &limits, fmax(bst_vec3_dot(from_rate, tangent), 0.0),
+                                fmax(bst_vec3_dot(r, end), 0.0), &slew->speed)) {
+            *slew = before;
+            return BST_OK;
+        }
+        slew->active = slew->along_path = true;
+        slew->start_tick = tick;
+        slew->duration_s = duration = slew->speed.duration_s;
+        slew->arrival = d;
+    }
+    *made = true;
+    if (slew->path.count > 1) {
+        tell(g, (bst_guidance_event){.kind = BST_GUIDANCE_DETOUR,
+                                     .from_s = (double)tick / g->env.tick_rate_hz,
+                                     .until_s = (double)tick / g->env.tick_rate_hz + duration,
+                                     .length_rad = slew->path.length_rad});
+    }
+    return BST_OK;
+}
+
+/* The slew's command at a tick. */
+static void command_slew(const bst_guidance *g, int64_t tick, bst_los_command *command) {
+    double t = (double)(tick - g->slew.start_tick) / g->env.tick_rate_hz, h = DIFFERENCE_S;
+    double late[BST_MOUNT_AXES] = {0.0};
+    *command = (bst_los_command){.tick = tick};
+    bst_vec3 d = slew_at(g, t, command->near_rad);
+    bst_vec3 ahead = slew_at(g, t + h, late), behind = slew_at(g, fmax(t - h, 0.0), NULL);
+    double span = t + h - fmax(t - h, 0.0);
+    bst_vec3 rate = bst_vec3_scale(bst_vec3_sub(ahead, behind), 1.0 / span);
+    command->direction_gcrf = d;
+    command->rate_gcrf_radps = bst_vec3_axpy(rate, -bst_vec3_dot(rate, d), d);
+    command->near_given = !g->slew.along_path;
+    for (int i = 0; i < BST_MOUNT_AXES; i++) {
+        command->near_radps[i] = (late[i] - command->near_rad[i]) / h;
+    }
+}
+
+/* Keeps to the way and turn that a slew has chosen. */
+static void keep_turn(bst_guidance *g, bst_los_command *command) {
+    if (!g->near_known) {
+        return;
+    }
+    double ways[2][BST_MOUNT_AXES];
+    bst_vec3 body = bst_quat_rotate(bst_guidance_body(g, command->tick), command->direction_gcrf);
+    bst_vec3 moved = bst_vec3_sub(body, g->near_body);
+    /* which way and turn is meant does not depend on the last digits; a redundant axis does */
+    if (g->mount.axes > 2 || bst_vec3_dot(moved, moved) > NEAR_RAD * NEAR_RAD) {
+        if (bst_mount_angles(&g->mount, body, g->near_rad, ways) == 0) {
+            return;
+        }
+        for (int i = 0; i < BST_MOUNT_AXES; i++) {
+            g->near_rad[i] = ways[0][i];
+        }
+        g->near_body = body;
+    }
+    command->near_given = true;
+    for (int i = 0; i < BST_MOUNT_AXES; i++) {
+        command->near_rad[i] = g->near_rad[i];
+    }
+}
+
+/* Whether the slew under way still ends on the aim. */
+static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, const bst_zone *zones,
+                               int zone_count, bst_vec3 from, bool *out) {
+    int64_t arrival =
+        g->slew.start_tick + (int64_t)llround(g->slew.duration_s * g->env.tick_rate_hz);
+    bst_vec3 d, rate;
+    bool valid;
+    BST_TRY(aim_at(ctx, g, arrival, zones, zone_count, from, &valid, &d, &rate));
+    *out = valid && bst_vec3_angle(d, g->slew.arrival) <= g->config.slew_above_deg * BST_DEG_RAD;
+    return BST_OK;
+}
+
+/* Whether there is a choice among turns to be made. */
+static bool turns_matter(const bst_guidance *g) {
+    bool matter = false;
+    for (int i = 0; g->config.look_ahead_s > 0.0 && g->mount_known && i < g->mount.axes; i++) {
+        matter = matter || g->mount.axis[i].max_rad - g->mount.axis[i].min_rad > 2.0 * BST_PI;
+    }
+    return matter;
+}
+
+static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
+                        bst_los_command *command, bool *give) {
+    const bst_zone *zones = g->zones;
+    int zone_count = g->zone_count;
+    if (zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
+        return BST_OK;
+    }
+    int64_t tick = command->tick;
+    bst_vec3 from, from_rate = {0.0, 0.0, 0.0}, target = command->direction_gcrf;
+    if (g->commanded) {
+        double dt = (double)(tick - g->last.tick) / g->env.tick_rate_hz;
+        from_rate = g->last.rate_gcrf_radps;
+        from = unit_after(g->last.direction_gcrf, from_rate, dt);
+    } else if (boresight) {
+        from = *boresight;
+    } else {
+        *give = false;
+        return BST_OK;
+    }
+    if (g->slew.active) {
+        double t = (double)(tick - g->slew.start_tick) / g->env.tick_rate_hz;
+        bool wanted;
+        BST_TRY(still_wanted(ctx, g, zones, zone_count, from, &wanted));
+        if (wanted && t < g->slew.duration_s) {
+            command_slew(g, tick, command);
+            return BST_OK;
+        }
+        if (wanted) {
+            g->near_known = !g->slew.along_path;
+            g->near_body = (bst_vec3){0.0, 0.0, 0.0};
+            for (int i = 0; i < g->mount.axes && g->near_known; i++) {
+                double rate, accel;
+                bst_slew_axis_at(&g->slew.axis[i], t, &g->near_rad[i], &rate, &accel);
+            }
+            g->slew.active = false;
+        }
+    }
+    double depth;
+    bool inside = bst_exclusion_inside(zones, zone_count, target, &depth) >= 0;
+    bool blocked = inside && !bst_exclusion_nearest(zones, zone_count, target, from, &target);
+    bool made = false;
+    if (!blocked && is_beyond(from, target, g->config.slew_above_deg * BST_DEG_RAD)) {
+        BST_TRY(plan_axes(ctx, g, tick, zones, zone_count, from, &made));
+        if (!made) {
+            BST_TRY(plan_path(ctx, g, tick, zones, zone_count, from, from_rate, &made));
+        }
+        blocked = !made && zone_count > 0;
+    }
+    if (blocked && !g->no_way) {
+        tell(g, (bst_guidance_event){.kind = BST_GUIDANCE_NO_WAY,
+                                     .from_s = (double)tick / g->env.tick_rate_hz});
+    }
+    g->no_way = blocked;
+    if (made) {
+        command_slew(g, tick, command);
+    } else if (blocked || inside) {
+        *command = (bst_los_command){.tick = tick, .direction_gcrf = blocked ? from : target};
+        g->slew.active = false;
+    } else {
+        g->slew.active = false;
+        keep_turn(g, command);
+    }
+    return BST_OK;
+}
+
+void bst_guidance_see_sky(bst_guidance *g, const bst_nav_telemetry *nav, bst_quat error) {
+    g->nav = *nav;
+    g->nav_known = true;
+    g->nav.position_gcrf_m = bst_quat_rotate(error, nav->position_gcrf_m);
+    g->nav.velocity_gcrf_mps = bst_quat_rotate(error, nav->velocity_gcrf_mps);
+    g->nav.sun_m = bst_quat_rotate(error, nav->sun_m);
+    g->nav.moon_m = bst_quat_rotate(error, nav->moon_m);
+    g->zone_count = bst_guidance_zones(g, &g->nav, g->zones);
+    for (int i = 0; i < g->zone_count; i++) {
+        double *half = &g->zones[i].half_angle_rad;
+        *half = fmin(*half + WIDER_RAD, BST_PI - 1e-6);
+    }
+}
+
+bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
+                                bst_los_command *command, bool *give) {
+    *give = true;
+    if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
+        g->ahead_tick =
+            command->tick + (int64_t)llround(g->config.look_ahead_every_s * g->env.tick_rate_hz);
+        BST_TRY(bst_guidance_look_ahead(ctx, g, command->tick));
+    }
+    BST_TRY(shape(ctx, g, boresight, command, give));
+    if (*give) {
+        command->roll_given = g->roll_given;
+        command->roll_rad = g->roll_rad;
+        g->last = *command;
+        g->commanded = true;
+    }
+    return BST_OK;
+}

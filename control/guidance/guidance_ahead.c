@@ -1,0 +1,152 @@
+/* What guidance sees coming. */
+#include <stdio.h>
+
+#include "control/guidance/guidance.h"
+#include "sim/astro/bodies.h"
+#include "sim/astro/kepler.h"
+
+/* Steps of the look: a thousandth of it within these. */
+#define LEAST_STEP_S 1.0
+#define MOST_STEP_S 10.0
+/* The chase starts so long before the limits are met, when the mount is still on its target. */
+#define RUN_UP_S 5.0
+/* A predicted loss that moves by more than this share of its length is told again. */
+#define CHANGED 0.1
+
+typedef struct looking {
+    bst_guidance *g;
+    int64_t tick; /* of now: seconds count from it */
+} looking;
+
+static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+    const looking *l = user;
+    bst_guidance *g = l->g;
+    int64_t tick = l->tick + (int64_t)llround(seconds * g->env.tick_rate_hz);
+    *out = (bst_reach_look){.valid = false};
+    BST_TRY(g->env.aim(g->env.user, ctx, tick, &out->valid, &out->direction_gcrf));
+    if (!out->valid) {
+        return BST_OK;
+    }
+    if (g->env.range) {
+        BST_TRY(g->env.range(g->env.user, ctx, tick, &out->range_m));
+    }
+    bst_ctx quiet = {0}; /* telemetry that is no orbit is no failure of the run */
+    bst_nav_telemetry nav = g->nav;
+    double ahead = (double)(tick - nav.tick) / g->env.tick_rate_hz;
+    if (bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, g->nav.position_gcrf_m,
+                             g->nav.velocity_gcrf_mps, ahead, &nav.position_gcrf_m,
+                             &nav.velocity_gcrf_mps) != BST_OK) {
+        nav.position_gcrf_m = g->nav.position_gcrf_m;
+    }
+    out->position_m = nav.position_gcrf_m;
+    out->q_body_from_gcrf = g->mount_known ? bst_guidance_body(g, tick) : BST_QUAT_IDENTITY;
+    out->zone_count = bst_guidance_zones(g, &nav, out->zones);
+    return BST_OK;
+}
+
+static void tell(bst_guidance *g, int kind, int reason, double from_s, double until_s) {
+    if (g->event_count < BST_GUIDANCE_EVENTS) {
+        g->events[g->event_count++] = (bst_guidance_event){
+            .kind = kind, .reason = reason, .from_s = from_s, .until_s = until_s};
+    }
+}
+
+static bool moved(double a, double b, double span) {
+    return isinf(a) != isinf(b) || (isfinite(a) && fabs(a - b) > CHANGED * span);
+}
+
+/* Tells what comes at `from` (seconds from now) unless that has been told. */
+static void tell_ahead(bst_guidance *g, double now_s, int kind, int reason, double from,
+                       double until) {
+    double span = isfinite(until) ? until - from : 10.0;
+    if (moved(now_s + from, g->told_from_s, span) || moved(now_s + until, g->told_until_s, span)) {
+        g->told_from_s = now_s + from;
+        g->told_until_s = now_s + until;
+        tell(g, kind, reason, g->told_from_s, g->told_until_s);
+    }
+}
+
+bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) {
+    looking user = {g, tick};
+    const bst_reach_problem problem = {.look = look,
+                                       .user = &user,
+                                       .mount = g->mount_known ? &g->mount : NULL,
+                                       .limits_share = g->config.limits_share};
+    double horizon = g->config.look_ahead_s, now_s = (double)tick / g->env.tick_rate_hz;
+    double step = fmin(fmax(1e-3 * horizon, LEAST_STEP_S), MOST_STEP_S);
+    double when = 0.0, until = INFINITY;
+    bst_reach reach, why;
+    bool found;
+    BST_TRY(bst_reach_at(ctx, &problem, 0.0, &reach));
+    if (reach != BST_REACH_OK) {
+        if ((int)reach != g->reach) {
+            BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, step, true, &found, &when, NULL));
+            tell(g, BST_GUIDANCE_UNREACHABLE, reach, now_s, found ? now_s + when : INFINITY);
+        }
+        g->reach = reach;
+        return BST_OK;
+    }
+    if (g->reach != BST_REACH_OK) {
+        tell(g, BST_GUIDANCE_REACHABLE, g->reach, now_s, now_s);
+    }
+    g->reach = BST_REACH_OK;
+    BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, step, false, &found, &when, &why));
+    if (!found) {
+        return BST_OK;
+    }
+    if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
+        bst_reach_loss loss;
+        int losses;
+        double from = fmax(when - RUN_UP_S, 0.0);
+        BST_TRY(bst_reach_chase(ctx, &problem, from, horizon,
+                                g->config.loss_tolerance_px * g->env.pixel_rad, &loss, 1, &losses));
+        bool rolls = false;
+        double before = g->roll_rad;
+        if (losses > 0 && g->config.body_roll) {
+            BST_TRY(bst_guidance_choose_roll(ctx, g, &problem, horizon, &rolls));
+        }
+        if (rolls && g->event_count < BST_GUIDANCE_EVENTS) {
+            g->events[g->event_count++] = (bst_guidance_event){
+                .kind = BST_GUIDANCE_ROLL, .reason = why, .length_rad = g->roll_rad - before};
+        } else if (losses > 0) {
+            tell_ahead(g, now_s, BST_GUIDANCE_LOSS, why, loss.from_s, loss.until_s);
+        }
+        return BST_OK;
+    }
+    BST_TRY(bst_reach_next(ctx, &problem, when, horizon, step, true, &found, &until, NULL));
+    tell_ahead(g, now_s, BST_GUIDANCE_AHEAD, why, when, found ? until : INFINITY);
+    return BST_OK;
+}
+
+void bst_guidance_describe(const bst_guidance_event *event, char *text, size_t bytes) {
+    char until[48] = "for as long as is looked ahead";
+    const char *why = bst_reach_reason(event->reason);
+    if (isfinite(event->until_s)) {
+        snprintf(until, sizeof until, "until %.1f s", event->until_s);
+    }
+    switch (event->kind) {
+        case BST_GUIDANCE_UNREACHABLE:
+            snprintf(text, bytes, "unreachable %s: %s", until, why);
+            break;
+        case BST_GUIDANCE_REACHABLE:
+            snprintf(text, bytes, "within reach again, no longer %s", why);
+            break;
+        case BST_GUIDANCE_AHEAD:
+            snprintf(text, bytes, "unreachable from %.1f s %s: %s", event->from_s, until, why);
+            break;
+        case BST_GUIDANCE_LOSS:
+            snprintf(text, bytes, "will be lost from %.1f s %s: %s", event->from_s, until, why);
+            break;
+        case BST_GUIDANCE_DETOUR:
+            snprintf(text, bytes, "slew round keep-out cones by %.1f deg %s",
+                     event->length_rad / BST_DEG_RAD, until);
+            break;
+        case BST_GUIDANCE_ROLL:
+            snprintf(text, bytes, "the body rolls by %.1f deg, lest the target be %s",
+                     event->length_rad / BST_DEG_RAD, why);
+            break;
+        default:
+            snprintf(text, bytes, "keep-out cones leave no way to the aim");
+            break;
+    }
+}

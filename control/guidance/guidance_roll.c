@@ -1,0 +1,62 @@
+/* The body rolled out of the way of the mount's pole. */
+#include "control/guidance/guidance.h"
+
+/* Of the mount's limits, for the choice, so that what is chosen holds with errors and lags. */
+#define SHARE 0.8
+/* Of the body's own limits, in the prediction. */
+#define BODY_SHARE 0.9
+#define STEP_RAD (5.0 * BST_DEG_RAD)
+enum { MOST_STEPS = 18 };
+
+bst_quat bst_guidance_rolled(const bst_guidance *g, double seconds, double roll_rad) {
+    const bst_body_roll *roll = &g->mount.roll;
+    double angle = roll->angle_rad + roll->rate_radps * seconds, rate, accel;
+    bst_slew_axis slew;
+    if (bst_slew_axis_plan(roll->angle_rad, roll->rate_radps, roll_rad, 0.0,
+                           BODY_SHARE * roll->rate_limit_radps,
+                           BODY_SHARE * roll->accel_limit_radps2, &slew)) {
+        bst_slew_axis_at(&slew, seconds, &angle, &rate, &accel);
+    }
+    /* what it does without rolling, then the rest of the roll */
+    bst_vec3 base = bst_vec3_axpy(g->mount.rate_body_radps, -roll->rate_radps, roll->axis_body);
+    bst_quat q = bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(base, -seconds)),
+                              g->mount.q_body_from_gcrf);
+    bst_vec3 turn = bst_vec3_scale(roll->axis_body, roll->angle_rad - angle);
+    return bst_quat_mul(bst_quat_from_rotvec(turn), q);
+}
+
+bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *g, const bst_reach_problem *problem,
+                                    double horizon_s, bool *found) {
+    const bst_body_roll *roll = &g->mount.roll;
+    *found = false;
+    if (!g->mount_known || bst_vec3_norm(roll->axis_body) == 0.0) {
+        return BST_OK;
+    }
+    bool given = g->roll_given;
+    double before = g->roll_rad, from = given ? before : roll->angle_rad;
+    bst_reach_problem careful = *problem;
+    careful.limits_share *= SHARE;
+    g->roll_given = true;
+    for (int i = 1; i <= MOST_STEPS && !*found; i++) {
+        for (int side = -1; side <= 1 && !*found; side += 2) {
+            bst_reach_loss loss;
+            bool out;
+            double when;
+            int losses;
+            g->roll_rad = from + side * i * STEP_RAD;
+            BST_TRY(bst_reach_next(ctx, &careful, 0.0, horizon_s, 0.5, false, &out, &when, NULL));
+            if (out) {
+                continue;
+            }
+            BST_TRY(bst_reach_chase(ctx, &careful, 0.0, horizon_s,
+                                    g->config.loss_tolerance_px * g->env.pixel_rad, &loss, 1,
+                                    &losses));
+            *found = losses == 0;
+        }
+    }
+    if (!*found) {
+        g->roll_given = given;
+        g->roll_rad = before;
+    }
+    return BST_OK;
+}

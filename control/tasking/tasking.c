@@ -1,0 +1,313 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "control/tasking/tasking_internal.h"
+
+/* How much longer than wished counts. */
+#define URGENCY_MOST 4.0
+/* Looks at single objects in one plan: what is not found by then is left to the next. */
+enum { TRIES = 200 };
+/* An object that is hidden, too fast or out of reach is tried again after this time. */
+#define HIDDEN_RETRY_S 120.0
+
+static double seconds_of(const bst_tasking *t, int64_t tick) {
+    return (double)tick / t->tick_rate_hz;
+}
+
+static const bst_tasking_line *line_of(const bst_tasking *t, int object) {
+    return (const bst_tasking_line *)t->config.targets.items + t->line[object];
+}
+
+static bool fits(const bst_tasking_line *line, double perigee_km, double apogee_km) {
+    return !*line->object && perigee_km >= line->perigee_km[0] &&
+           perigee_km <= line->perigee_km[1] && apogee_km >= line->apogee_km[0] &&
+           apogee_km <= line->apogee_km[1];
+}
+
+static bst_status list_targets(bst_ctx *ctx, bst_tasking *t) {
+    const bst_tasking_line *lines = t->config.targets.items;
+    bst_knowledge_view *view = t->sensors[0].view;
+    for (int i = 0; i < t->object_count; i++) {
+        double perigee_m, apogee_m;
+        t->line[i] = -1;
+        bool known = bst_knowledge_apsides(view, i, &perigee_m, &apogee_m);
+        double low = 1e-3 * (perigee_m - BST_EARTH_RADIUS_M),
+               high = 1e-3 * (apogee_m - BST_EARTH_RADIUS_M);
+        for (int k = 0; known && t->line[i] < 0 && k < t->config.targets.count; k++) {
+            t->line[i] = (int16_t)(fits(&lines[k], low, high) ? k : -1);
+        }
+    }
+    /* a line of its own goes before those by orbit that come after it */
+    for (int k = t->config.targets.count - 1; k >= 0; k--) {
+        if (!*lines[k].object) {
+            continue;
+        }
+        int object = bst_knowledge_find_object(t->sensors[0].knowledge, lines[k].object);
+        if (object < 0) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "targets/%d/object: there is no object \"%s\" in the world", k,
+                            lines[k].object);
+        }
+        if (t->line[object] < 0 || t->line[object] > k) {
+            t->line[object] = (int16_t)k;
+        }
+    }
+    for (int i = 0; i < t->object_count; i++) {
+        if (t->line[i] >= 0 && !(line_of(t, i)->priority > 0.0)) {
+            t->line[i] = -1;
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status take_members(bst_ctx *ctx, bst_tasking *t, const bst_fleet_member *members) {
+    for (int s = 0; s < t->sensor_count; s++) {
+        bst_tasking_sensor *sensor = &t->sensors[s];
+        *sensor = (bst_tasking_sensor){.knowledge = members[s].knowledge,
+                                       .exposure_s = members[s].frame_exposure_s,
+                                       .period_s = members[s].frame_period_s,
+                                       .task = {.object = -1}};
+        bst_tasking_noise(sensor);
+        BST_TRY(bst_knowledge_view_create(ctx, sensor->knowledge, &sensor->view));
+    }
+    return BST_OK;
+}
+
+bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *t, const bst_tasking_config *config,
+                            const bst_fleet_member *members, int member_count,
+                            double tick_rate_hz) {
+    *t = (bst_tasking){.config = *config,
+                       .tick_rate_hz = tick_rate_hz,
+                       .sensor_count = member_count,
+                       .object_count = bst_knowledge_object_count(members[0].knowledge)};
+    size_t n = (size_t)t->object_count + 1;
+    t->sensors = calloc((size_t)member_count, sizeof *t->sensors);
+    t->line = calloc(n, sizeof *t->line);
+    t->seen_s = calloc(n, sizeof *t->seen_s);
+    t->holder = calloc(n, sizeof *t->holder);
+    t->not_before = calloc(n * (size_t)member_count, sizeof *t->not_before);
+    t->place_m[0] = calloc(3 * n, sizeof *t->place_m[0]);
+    t->choices = calloc(n, sizeof *t->choices);
+    if (!t->sensors || !t->line || !t->seen_s || !t->holder || !t->not_before || !t->place_m[0] ||
+        !t->choices) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the tasks of %d objects",
+                        t->object_count);
+    }
+    t->place_m[1] = t->place_m[0] + n;
+    t->place_m[2] = t->place_m[1] + n;
+    for (int i = 0; i < t->object_count; i++) {
+        t->seen_s[i] = -1.0;
+        t->holder[i] = -1;
+    }
+    BST_TRY(take_members(ctx, t, members));
+    return list_targets(ctx, t);
+}
+
+void bst_tasking_free(bst_tasking *t) {
+    for (int s = 0; t->sensors && s < t->sensor_count; s++) {
+        bst_knowledge_view_free(t->sensors[s].view);
+    }
+    free(t->sensors);
+    free(t->line);
+    free(t->seen_s);
+    free(t->holder);
+    free(t->not_before);
+    free(t->place_m[0]);
+    free(t->choices);
+    *t = (bst_tasking){.sensor_count = 0};
+}
+
+void bst_tasking_tracks(bst_tasking *t, int sensor, const bst_tracks *tracks) {
+    bst_tasking_sensor *s = &t->sensors[sensor];
+    if (s->task.object < 0 || tracks->tick <= s->task.tick) {
+        return;
+    }
+    for (int i = 0; i < tracks->count; i++) {
+        const bst_track *track = &tracks->items[i];
+        if (track->target_of_interest && track->status == BST_TRACK_CONFIRMED &&
+            track->misses_in_row == 0) {
+            s->frames++;
+            s->last_seen_s = seconds_of(t, tracks->tick);
+            t->seen_s[s->task.object] = s->last_seen_s;
+        }
+    }
+}
+
+static float *not_before(bst_tasking *t, int sensor, int object) {
+    return &t->not_before[(size_t)sensor * (size_t)t->object_count + (size_t)object];
+}
+
+/* How the sensor's task has ended, BST_TASK_NONE: not yet. */
+static bst_task_end ending(const bst_tasking *t, const bst_tasking_sensor *s, double now_s) {
+    if (s->frames >= s->frames_wanted) {
+        return BST_TASK_DONE;
+    }
+    if (s->frames > 0) {
+        return now_s > s->last_seen_s + t->config.find_timeout_s ? BST_TASK_LOST : BST_TASK_NONE;
+    }
+    return now_s > s->arrival_s + t->config.find_timeout_s ? BST_TASK_NOT_FOUND : BST_TASK_NONE;
+}
+
+/* Greatest value first, then the order of the catalogue. */
+static int compare_choices(const void *a, const void *b) {
+    const bst_tasking_choice *x = a, *y = b;
+    if (x->value != y->value) {
+        return x->value > y->value ? -1 : 1;
+    }
+    return (x->object > y->object) - (x->object < y->object);
+}
+
+/* Lists what is due, free, and at first sight visible. */
+static int list_choices(bst_tasking *t, int sensor, double now_s) {
+    const bst_tasking_sensor *s = &t->sensors[sensor];
+    const bst_tasking_config *c = &t->config;
+    int count = 0;
+    (void)bst_knowledge_places(s->knowledge, now_s, t->place_m[0], t->place_m[1], t->place_m[2]);
+    for (int i = 0; i < t->object_count; i++) {
+        if (t->line[i] < 0 || t->holder[i] >= 0 || *not_before(t, sensor, i) > (float)now_s) {
+            continue;
+        }
+        const bst_tasking_line *line = line_of(t, i);
+        /* one that was never seen is due from the start, and the more so the longer it lasts */
+        double since = t->seen_s[i] < 0.0 ? now_s + line->revisit_s : now_s - t->seen_s[i];
+        if (since < line->revisit_s) {
+            continue;
+        }
+        bst_vec3 place = {t->place_m[0][i], t->place_m[1][i], t->place_m[2][i]};
+        bst_vec3 direction = s->direction;
+        if (!isnan(place.x) && (bst_vec3_norm(place) == 0.0 ||
+                                bst_tasking_glance(s, place, &direction) != BST_WHY_NOT)) {
+            continue;
+        }
+        double turn = s->pointed ? bst_vec3_angle(s->direction, direction) : 0.0;
+        double slew_s = turn / (c->slew_rate_deg_per_s * BST_DEG_RAD);
+        double work_s = slew_s + c->settle_s + (double)line->frames * s->period_s;
+        t->choices[count++] = (bst_tasking_choice){
+            .object = i,
+            .value = line->priority * fmin(since / line->revisit_s, URGENCY_MOST) / work_s,
+            .slew_s = slew_s};
+    }
+    qsort(t->choices, (size_t)count, sizeof *t->choices, compare_choices);
+    return count;
+}
+
+/* Whether the sensor sees an object from its arrival to the last frame wanted. */
+static bst_status sees(bst_ctx *ctx, const bst_tasking *t, int sensor,
+                       const bst_tasking_choice *choice, double now_s, bst_tasking_why *why,
+                       bst_sight *first, double *snr) {
+    const bst_tasking_sensor *s = &t->sensors[sensor];
+    double from_s = now_s + choice->slew_s + t->config.settle_s;
+    double until_s = from_s + (double)line_of(t, choice->object)->frames * s->period_s, worst;
+    BST_TRY(bst_tasking_look(ctx, t, sensor, choice->object, from_s, why, first, snr));
+    if (*why == BST_WHY_NOT) {
+        BST_TRY(bst_tasking_look(ctx, t, sensor, choice->object, until_s, why, NULL, &worst));
+        *snr = fmin(*snr, worst);
+    }
+    return BST_OK;
+}
+
+static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
+                 const bst_tasking_choice *choice, const bst_sight *sight, double snr) {
+    const bst_tasking_config *c = &t->config;
+    bst_tasking_sensor *s = &t->sensors[sensor];
+    double now_s = seconds_of(t, tick);
+    s->task = (bst_task){.id = s->task.id + 1, .tick = tick, .object = -1, .before = before};
+    s->given_s = s->arrival_s = now_s;
+    s->frames = 0;
+    if (choice) {
+        s->task.object = choice->object;
+        s->task.norad = bst_knowledge_object(s->knowledge, choice->object)->norad;
+        s->task.sigma_rad = c->sigma_deg * BST_DEG_RAD;
+        s->task.rate_sigma_radps = c->rate_sigma_arcsec_per_s * BST_ARCSEC_RAD;
+        s->task.v_mag = sight->v_mag;
+        s->task.v_mag_sigma = c->v_mag_sigma;
+        s->task.snr = snr;
+        s->arrival_s = now_s + choice->slew_s + c->settle_s;
+        s->frames_wanted = line_of(t, choice->object)->frames;
+        s->direction = sight->geometric;
+        s->pointed = true;
+        t->holder[choice->object] = sensor;
+    }
+}
+
+/* The best that the sensor can see, -1: none. */
+static bst_status choose(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s, int *chosen,
+                         bst_sight *sight, double *snr) {
+    int count = list_choices(t, sensor, now_s);
+    *chosen = -1;
+    for (int i = 0; i < count && i < TRIES && *chosen < 0; i++) {
+        bst_tasking_why why = BST_WHY_NOT;
+        BST_TRY(sees(ctx, t, sensor, &t->choices[i], now_s, &why, sight, snr));
+        if (why == BST_WHY_NOT) {
+            *chosen = i;
+        } else {
+            double wait_s = why == BST_WHY_FAINT    ? t->config.retry_s
+                            : why == BST_WHY_ITSELF ? INFINITY
+                                                    : HIDDEN_RETRY_S;
+            *not_before(t, sensor, t->choices[i].object) = (float)(now_s + wait_s);
+        }
+    }
+    return BST_OK;
+}
+
+/* Until when it is certain that the sensor's task goes on: the frames that it still wants take
+ * their time, a search may last until its timeout. */
+static double certain_until_s(const bst_tasking *t, const bst_tasking_sensor *s, double now_s) {
+    if (s->task.object < 0) {
+        return s->next_plan_s;
+    }
+    double frames_s = (double)(s->frames_wanted - s->frames - 1) * s->period_s;
+    double seen_s = s->frames > 0 ? s->last_seen_s : fmin(s->arrival_s, now_s);
+    return fmin(now_s + frames_s, seen_s + t->config.find_timeout_s);
+}
+
+int64_t bst_tasking_quiet_until(const bst_tasking *t, int sensor) {
+    return t->sensors[sensor].quiet_until;
+}
+
+/* Ends the task when that is due, and chooses the next. */
+static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
+    bst_tasking_sensor *s = &t->sensors[sensor];
+    double now_s = seconds_of(t, tick), snr = 0.0;
+    bst_task_end before = BST_TASK_NONE;
+    bst_sight sight;
+    int chosen;
+    if (s->task.object >= 0) {
+        before = ending(t, s, now_s);
+        if (before == BST_TASK_NONE) {
+            return BST_OK;
+        }
+        t->holder[s->task.object] = -1;
+        if (before != BST_TASK_DONE) {
+            *not_before(t, sensor, s->task.object) = (float)(now_s + t->config.retry_s);
+        }
+    }
+    BST_TRY(choose(ctx, t, sensor, now_s, &chosen, &sight, &snr));
+    if (chosen >= 0) {
+        give(t, sensor, tick, before, &t->choices[chosen], &sight, snr);
+        *given = true;
+    } else {
+        *given = s->task.object >= 0;
+        if (*given) {
+            give(t, sensor, tick, before, NULL, NULL, 0.0);
+        }
+        s->next_plan_s = now_s + t->config.idle_s;
+    }
+    return BST_OK;
+}
+
+bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
+    bst_tasking_sensor *s = &t->sensors[sensor];
+    double now_s = seconds_of(t, tick);
+    *given = false;
+    if (!s->nav_known || (s->task.object < 0 && now_s < s->next_plan_s)) {
+        return BST_OK;
+    }
+    if (tick >= s->quiet_until) {
+        BST_TRY(change(ctx, t, sensor, tick, given));
+    }
+    int64_t until = (int64_t)fmin(certain_until_s(t, s, now_s) * t->tick_rate_hz, 9e15);
+    s->quiet_until = until > s->quiet_until ? until : s->quiet_until;
+    return BST_OK;
+}

@@ -1,0 +1,136 @@
+/* Which sensor looks for which object: a rule of priority, visibility and keep-out angles.
+ *
+ * It knows what is known on board: the catalogue, where the spacecraft believe to be, their mounts,
+ * and what their trackers tell. A target is due once it has not been seen for as long as its line
+ * of the list wishes. A sensor that is free takes, of all targets that are due and that nobody else
+ * has, the one with the greatest
+ *
+ *   priority * min(time since seen / revisit wish, 4) / (slew + settling + frames to be taken)
+ *
+ * that it can see from its arrival until the frames are taken. */
+#ifndef BST_CONTROL_TASKING_TASKING_H
+#define BST_CONTROL_TASKING_TASKING_H
+
+#include "control/guidance/keep_out.h"
+#include "sim/core/config.h"
+#include "sim/messages/module.h"
+#include "sim/onboard/knowledge.h"
+
+/* A line of the list of targets: an object, or all whose apsides lie within bounds. */
+typedef struct bst_tasking_line {
+    char object[64];                    /* "": by orbit */
+    double perigee_km[2], apogee_km[2]; /* altitudes over the equatorial radius */
+    double priority;
+    double revisit_s;
+    int64_t frames;
+} bst_tasking_line;
+
+typedef struct bst_tasking_config {
+    bst_config_list targets; /* bst_tasking_line; the first that fits an object counts */
+    double sun_keep_out_deg, moon_keep_out_deg, earth_limb_keep_out_deg, earth_limb_altitude_km;
+    double min_snr, max_rate_arcsec_per_s;
+    double slew_rate_deg_per_s, settle_s;
+    double find_timeout_s, retry_s, idle_s;
+    double sigma_deg, rate_sigma_arcsec_per_s, v_mag_sigma;
+    double report_every_s;
+} bst_tasking_config;
+
+extern const bst_config_desc bst_tasking_config_table[];
+
+/* Why an object is not looked at, the first reason in this order. */
+typedef enum bst_tasking_why {
+    BST_WHY_NOT = 0, /* it can be seen */
+    BST_WHY_NO_ORBIT,
+    BST_WHY_ITSELF,
+    BST_WHY_EARTH, /* behind the Earth, or too near its limb */
+    BST_WHY_SUN,
+    BST_WHY_MOON,
+    BST_WHY_SHADOW,
+    BST_WHY_FAINT,
+    BST_WHY_RATE,  /* it moves too fast */
+    BST_WHY_MOUNT, /* the mount does not follow it there */
+    BST_WHY_COUNT
+} bst_tasking_why;
+
+/* "behind the Earth or near its limb" for BST_WHY_EARTH, and so on. */
+const char *bst_tasking_reason(int why);
+
+/* What the rule knows of a sensor. */
+typedef struct bst_tasking_sensor {
+    const bst_knowledge *knowledge;
+    bst_knowledge_view *view;
+    double exposure_s, period_s;
+    double noise_e, pixels; /* of a pixel; squared inverse of sum s^2, what a point's light fills */
+    bool nav_known, mount_known;
+    bst_nav_telemetry nav;
+    bst_mount_status mount;
+    bst_zone zones[BST_ZONE_KINDS]; /* at the last nav */
+    double zone_cosines[BST_ZONE_KINDS];
+    int zone_count;
+    /* the task */
+    bst_task task; /* as told; object -1: the own cue */
+    bool pointed;
+    bst_vec3 direction;            /* of the last target, when it was given */
+    double given_s, arrival_s;     /* when it was given; when the sensor should be there */
+    int64_t frames, frames_wanted; /* in which it was seen */
+    double last_seen_s, next_plan_s;
+    int64_t quiet_until; /* a tick before which the task does not change */
+} bst_tasking_sensor;
+
+typedef struct bst_tasking_choice {
+    int object;
+    double value, slew_s;
+} bst_tasking_choice;
+
+typedef struct bst_tasking {
+    bst_tasking_config config;
+    double tick_rate_hz;
+    bst_tasking_sensor *sensors;
+    int sensor_count;
+    int object_count;
+    int16_t *line;      /* [object] of config.targets, -1: none */
+    double *seen_s;     /* [object] when it was seen last; below 0: not yet */
+    int *holder;        /* [object] the sensor that has it, -1: none */
+    float *not_before;  /* [sensor][object] s: it is not to be tried before */
+    double *place_m[3]; /* [object] */
+    bst_tasking_choice *choices;
+    double next_report_s;
+} bst_tasking;
+
+/* A summary of what cannot be seen by any sensor. */
+typedef struct bst_tasking_report {
+    int targets, seen, visible; /* of the list; seen so far; those that some sensor can see now */
+    int why[BST_WHY_COUNT];     /* of the others, the least of the sensors' reasons' order */
+} bst_tasking_report;
+
+/* `members`: as in bst_module_env; outlive the rule. Free in any case. BST_ERR_CONFIG: a line names
+ * no object. */
+bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *tasking, const bst_tasking_config *config,
+                            const bst_fleet_member *members, int member_count,
+                            double tick_rate_hz) BST_MUST_CHECK;
+void bst_tasking_free(bst_tasking *tasking);
+
+/* Takes in what a sensor tells (NULL: nothing new). */
+void bst_tasking_telemetry(bst_tasking *tasking, int sensor, const bst_nav_telemetry *nav,
+                           const bst_mount_status *mount);
+/* A frame's tracks. */
+void bst_tasking_tracks(bst_tasking *tasking, int sensor, const bst_tracks *tracks);
+
+/* Ends the sensor's task when that is due, and gives the next. *given: the task has changed. */
+bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *tasking, int sensor, int64_t tick,
+                            bool *given) BST_MUST_CHECK;
+
+/* A tick before which plans of the sensor change nothing, whatever it tells until then. */
+int64_t bst_tasking_quiet_until(const bst_tasking *tasking, int sensor);
+
+/* Whether an object can be seen by a sensor at a time, by what is known; *sight (may be NULL) and
+ * *snr of a frame as far as they were worked out. */
+bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *tasking, int sensor, int object,
+                            double seconds, bst_tasking_why *why, bst_sight *sight,
+                            double *snr) BST_MUST_CHECK;
+
+/* Looks from all sensors at all targets of the list. */
+bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *tasking, double seconds,
+                              bst_tasking_report *out) BST_MUST_CHECK;
+
+#endif

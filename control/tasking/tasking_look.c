@@ -1,0 +1,201 @@
+/* Who can see what: the catalogue from where a spacecraft believes to be. */
+#include "control/guidance/pointing_feasibility.h"
+#include "control/tasking/tasking_internal.h"
+#include "sim/optics/streak_image.h"
+
+const char *bst_tasking_reason(int why) {
+    static const char *const reasons[BST_WHY_COUNT] = {
+        [BST_WHY_NOT] = "visible",
+        [BST_WHY_NO_ORBIT] = "without an orbit",
+        [BST_WHY_ITSELF] = "the spacecraft itself",
+        [BST_WHY_EARTH] = "behind the Earth or near its limb",
+        [BST_WHY_SUN] = "near the Sun",
+        [BST_WHY_MOON] = "near the Moon",
+        [BST_WHY_SHADOW] = "in the Earth's shadow",
+        [BST_WHY_FAINT] = "too faint",
+        [BST_WHY_RATE] = "too fast",
+        [BST_WHY_MOUNT] = "out of the mount's reach"};
+    return why >= 0 && why < BST_WHY_COUNT ? reasons[why] : "unknown";
+}
+
+static int zones_at(const bst_tasking_config *c, bst_vec3 position_m, bst_vec3 to_sun,
+                    bst_vec3 to_moon, bst_zone zones[BST_ZONE_KINDS]) {
+    bst_exclusion exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
+                               .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,
+                               .earth = true,
+                               .earth_limb_rad = c->earth_limb_keep_out_deg * BST_DEG_RAD,
+                               .limb_altitude_m = 1e3 * c->earth_limb_altitude_km};
+    return bst_exclusion_zones(&exclusion, position_m, to_sun, to_moon, zones);
+}
+
+static void cosines_of(const bst_zone *zones, int count, double cosines[BST_ZONE_KINDS]) {
+    for (int i = 0; i < count; i++) {
+        cosines[i] = cos(zones[i].half_angle_rad);
+    }
+}
+
+void bst_tasking_telemetry(bst_tasking *t, int sensor, const bst_nav_telemetry *nav,
+                           const bst_mount_status *mount) {
+    bst_tasking_sensor *s = &t->sensors[sensor];
+    if (nav) {
+        s->nav = *nav;
+        s->nav_known = true;
+        s->zone_count =
+            zones_at(&t->config, nav->position_gcrf_m, nav->sun_m, nav->moon_m, s->zones);
+        cosines_of(s->zones, s->zone_count, s->zone_cosines);
+    }
+    if (mount) {
+        s->mount = *mount;
+        s->mount_known = true;
+    }
+}
+
+static bst_tasking_why zone_reason(const bst_zone *zones, const double *cosines, int count,
+                                   bst_vec3 direction) {
+    static const bst_tasking_why reasons[BST_ZONE_KINDS] = {[BST_ZONE_SUN] = BST_WHY_SUN,
+                                                            [BST_ZONE_MOON] = BST_WHY_MOON,
+                                                            [BST_ZONE_EARTH] = BST_WHY_EARTH};
+    bst_tasking_why why = BST_WHY_NOT;
+    for (int i = 0; i < count; i++) {
+        if (bst_vec3_dot(zones[i].axis, direction) > cosines[i] &&
+            (why == BST_WHY_NOT || reasons[zones[i].kind] < why)) {
+            why = reasons[zones[i].kind];
+        }
+    }
+    return why;
+}
+
+bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *s, bst_vec3 place_m,
+                                   bst_vec3 *direction) {
+    bst_vec3 line = bst_vec3_sub(place_m, s->nav.position_gcrf_m);
+    *direction = bst_vec3_unit(line);
+    bst_tasking_why why = zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
+    if (why == BST_WHY_NOT) {
+        bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
+        why = bst_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5 ? BST_WHY_NOT
+                                                                           : BST_WHY_SHADOW;
+    }
+    return why;
+}
+
+/* For bst_reach_at. */
+typedef struct reach_user {
+    const bst_tasking *tasking;
+    const bst_tasking_sensor *sensor;
+    int object;
+} reach_user;
+
+static bst_status reach_look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+    const reach_user *r = user;
+    bst_state eye;
+    bst_bodies bodies;
+    bst_sight sight;
+    BST_TRY(bst_knowledge_eye_at(ctx, r->sensor->view, seconds, &eye, &bodies));
+    BST_TRY(bst_knowledge_sight_at(ctx, r->sensor->view, r->object, seconds, &sight));
+    double dt = seconds - (double)r->sensor->mount.tick / r->tasking->tick_rate_hz;
+    bst_quat turn = bst_quat_from_rotvec(bst_vec3_scale(r->sensor->mount.rate_body_radps, -dt));
+    *out = (bst_reach_look){
+        .valid = true,
+        .direction_gcrf = sight.apparent,
+        .position_m = eye.position_m,
+        .q_body_from_gcrf = bst_quat_unit(bst_quat_mul(turn, r->sensor->mount.q_body_from_gcrf))};
+    return BST_OK;
+}
+
+static bst_status mount_reaches(bst_ctx *ctx, const bst_tasking *t, const bst_tasking_sensor *s,
+                                int object, double seconds, bool *reached) {
+    *reached = true;
+    if (!s->mount_known || s->mount.axes == 0) {
+        return BST_OK;
+    }
+    reach_user user = {t, s, object};
+    bst_reach_problem problem = {
+        .look = reach_look, .user = &user, .mount = &s->mount, .limits_share = 0.9};
+    bst_reach reach;
+    BST_TRY(bst_reach_at(ctx, &problem, seconds, &reach));
+    *reached = reach == BST_REACH_OK;
+    return BST_OK;
+}
+
+bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
+                            double seconds, bst_tasking_why *why, bst_sight *sight, double *snr) {
+    const bst_tasking_sensor *s = &t->sensors[sensor];
+    const double step_s = 1.0; /* over which the rate is taken */
+    bst_ctx quiet = {0};       /* an orbit that has ended is no error here */
+    bst_sight now, later;
+    bst_state eye;
+    bst_bodies bodies;
+    *snr = 0.0;
+    if (bst_knowledge_is_itself(s->knowledge, object)) {
+        *why = BST_WHY_ITSELF;
+        return BST_OK;
+    }
+    BST_TRY(bst_knowledge_eye_at(ctx, s->view, seconds, &eye, &bodies));
+    if (bst_knowledge_sight_at(&quiet, s->view, object, seconds, &now) != BST_OK ||
+        bst_knowledge_sight_at(&quiet, s->view, object, seconds + step_s, &later) != BST_OK) {
+        *why = BST_WHY_NO_ORBIT;
+        return BST_OK;
+    }
+    if (sight) {
+        *sight = now;
+    }
+    bst_zone zones[BST_ZONE_KINDS];
+    int count = zones_at(&t->config, eye.position_m, bst_vec3_sub(bodies.sun_m, eye.position_m),
+                         bst_vec3_sub(bodies.moon_m, eye.position_m), zones);
+    double cosines[BST_ZONE_KINDS];
+    cosines_of(zones, count, cosines);
+    *why = zone_reason(zones, cosines, count, now.apparent);
+    *why = now.occulted && *why == BST_WHY_NOT ? BST_WHY_EARTH : *why;
+    *why = *why == BST_WHY_NOT && now.sunlit_fraction < 0.5 ? BST_WHY_SHADOW : *why;
+    if (*why != BST_WHY_NOT) {
+        return BST_OK;
+    }
+    const bst_camera *camera = bst_knowledge_camera(s->knowledge);
+    double electrons = bst_glow_electrons_per_s(camera, &now.glow, NULL) * s->exposure_s;
+    *snr = electrons / (s->noise_e * sqrt(s->pixels));
+    bool reached = true;
+    if (*snr < t->config.min_snr) {
+        *why = BST_WHY_FAINT;
+    } else if (bst_vec3_angle(now.geometric, later.geometric) >
+               t->config.max_rate_arcsec_per_s * BST_ARCSEC_RAD * step_s) {
+        *why = BST_WHY_RATE;
+    } else {
+        BST_TRY(mount_reaches(ctx, t, s, object, seconds, &reached));
+        *why = reached ? BST_WHY_NOT : BST_WHY_MOUNT;
+    }
+    return BST_OK;
+}
+
+void bst_tasking_noise(bst_tasking_sensor *s) {
+    const bst_camera *camera = bst_knowledge_camera(s->knowledge);
+    double sigma2 = bst_camera_psf_sigma_px(camera) * bst_camera_psf_sigma_px(camera) + 1.0 / 12.0;
+    double light = bst_camera_background_e_per_s(camera) + bst_camera_dark_e_per_s(camera);
+    s->noise_e = sqrt(light * s->exposure_s + camera->read_noise_e * camera->read_noise_e);
+    s->pixels = 1.0 / bst_image_squared(sqrt(sigma2), sqrt(sigma2), 0.0);
+}
+
+bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
+                              bst_tasking_report *out) {
+    *out = (bst_tasking_report){.targets = 0};
+    for (int i = 0; i < t->object_count; i++) {
+        if (t->line[i] < 0) {
+            continue;
+        }
+        out->targets++;
+        out->seen += t->seen_s[i] >= 0.0;
+        bst_tasking_why best = BST_WHY_COUNT;
+        for (int s = 0; s < t->sensor_count && best != BST_WHY_NOT; s++) {
+            bst_tasking_why why = BST_WHY_NOT;
+            double snr;
+            BST_TRY(bst_tasking_look(ctx, t, s, i, seconds, &why, NULL, &snr));
+            /* the nearest to being seen */
+            best = why == BST_WHY_NOT || best == BST_WHY_COUNT || why > best ? why : best;
+        }
+        if (best == BST_WHY_NOT) {
+            out->visible++;
+        } else if (best < BST_WHY_COUNT) {
+            out->why[best]++;
+        }
+    }
+    return BST_OK;
+}

@@ -1,0 +1,94 @@
+/* Dynamics of a spacecraft: a rigid hub, reaction wheels in it and flexible modes on it.
+ *
+ * With pi the whole angular momentum, w the body's rate, W_i the wheels' speeds against the body
+ * along unit axes a_i, n_k the modes' coordinates and d_k their coupling vectors:
+ *     pi = I w + sum a_i J_i W_i + sum d_k n_k',   pi' + w x pi = T
+ *     J_i (W_i' + a_i . w') = u_i - friction_i
+ *     n_k'' + 2 z_k f_k n_k' + f_k^2 n_k = -d_k . w'
+ * (Likins, JPL TR 32-1329 (1970), hybrid coordinates; Hughes, Spacecraft Attitude Dynamics,
+ * sections 3.4 and 4.4). The state holds pi in GCRF, the wheels' absolute momenta g_i = J_i (W_i +
+ * a_i . w) and the modes' momenta p_k = n_k' + d_k . w, by which w = M (pi - sum a_i g_i - sum d_k
+ * p_k) with the constant M = (I - sum J_i a_i a_i' - sum d_k d_k')^-1. */
+#ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_BODY_H
+#define BST_GIMBAL_SPACECRAFT_SPACECRAFT_BODY_H
+
+#include "gimbal/spacecraft/body_state.h"
+#include "sim/core/status.h"
+#include "sim/dynamics/integrators.h"
+
+#define BST_WHEELS_MOST 8
+#define BST_MODES_MOST 6
+
+typedef struct bst_craft_wheel {
+    bst_vec3 axis; /* unit, body */
+    double inertia_kgm2;
+} bst_craft_wheel;
+
+typedef struct bst_craft_mode {
+    double frequency_radps; /* of the appendage on a fixed hub */
+    double damping;         /* ratio */
+    bst_vec3 coupling;      /* sqrt(kg) m, body axes */
+} bst_craft_mode;
+
+typedef struct bst_craft_spec {
+    double inertia_kgm2[6]; /* of all, wheels and appendages at rest: xx, yy, zz, xy, xz, yz; the
+                               tensor's elements, so xy is minus the integral of x y dm */
+    int wheels, modes;
+    bst_craft_wheel wheel[BST_WHEELS_MOST];
+    bst_craft_mode mode[BST_MODES_MOST];
+    bst_integrator integrator;
+    double dt_s;
+} bst_craft_spec;
+
+/* All but the members that its functions return are its own. */
+typedef struct bst_craft_body {
+    bst_craft_spec spec;
+    bst_mat3 inertia;                                               /* body axes */
+    bst_quat q_principal_from_body;                                 /* principal axes of M */
+    bst_vec3 wheel_axis[BST_WHEELS_MOST], coupling[BST_MODES_MOST]; /* principal axes */
+    double per_moment[3];
+    /* modes over half a step: (n, p) = keep (n, p) + drive M (pi - sum a g) */
+    double keep[2 * BST_MODES_MOST][2 * BST_MODES_MOST], drive[2 * BST_MODES_MOST][3];
+    double free_radps[BST_MODES_MOST]; /* of the modes on the free craft, ascending */
+    /* state */
+    bst_quat q; /* principal from GCRF */
+    bst_vec3 momentum_gcrf;
+    double wheel_momentum[BST_WHEELS_MOST], mode_place[BST_MODES_MOST],
+        mode_momentum[BST_MODES_MOST];
+    bst_vec3 rate_principal;
+} bst_craft_body;
+
+/* At rest in its modes, turning at rate_radps (body axes), wheels at wheel_radps. BST_ERR_CONFIG
+ * with the reason: an inertia that is none (not positive definite, or a principal moment above the
+ * sum of the two others), wheels or appendages with more inertia than the whole, and a step in
+ * which the fastest mode of the free craft turns by more than BST_MODE_STEP_CYCLES of its cycle:
+ * the message has the longest step allowed. */
+bst_status bst_craft_body_init(bst_ctx *ctx, bst_craft_body *body, const bst_craft_spec *spec,
+                               bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
+                               const double *wheel_radps) BST_MUST_CHECK;
+
+#define BST_MODE_STEP_CYCLES 0.1
+
+/* One step of dt_s under a torque on the body (N m, body axes) and motor torques on the wheels,
+ * friction in them, both held over the step. Half the torques' impulse comes first and half last;
+ * in between the modes step exactly (matrix exponential, the body's momentum held), the body turns
+ * (spec.integrator), the modes step again: second order, symmetric in time, and without torques
+ * and damping momentum and energy are kept to the order of the integrator. With rk4 all variables
+ * are stepped by it at once. */
+void bst_craft_body_step(bst_craft_body *body, bst_vec3 torque_nm, const double *wheel_torque_nm);
+
+bst_quat bst_craft_body_attitude(const bst_craft_body *body); /* q_body_from_gcrf */
+bst_vec3 bst_craft_body_rate(const bst_craft_body *body);     /* body axes */
+double bst_craft_body_wheel_radps(const bst_craft_body *body, int wheel);
+/* Inertia that a motor torque on a wheel turns: its own against the body that gives way. */
+double bst_craft_body_wheel_load_kgm2(const bst_craft_body *body, int wheel);
+
+/* Angular momentum in GCRF, N m s, from attitude, rates and modes; kinetic and elastic energy, J.
+ */
+bst_vec3 bst_craft_body_momentum(const bst_craft_body *body);
+double bst_craft_body_energy(const bst_craft_body *body);
+
+/* The symmetric matrix of six elements in the order of bst_craft_spec. */
+bst_mat3 bst_inertia_matrix(const double inertia_kgm2[6]);
+
+#endif

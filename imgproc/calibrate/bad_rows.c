@@ -1,0 +1,71 @@
+#include "imgproc/calibrate/bad_rows.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity,
+                               bst_bad_rows *out) {
+    *out = (bst_bad_rows){.width = width, .height = height, .capacity = capacity};
+    out->first = calloc((size_t)height + 1, sizeof *out->first);
+    out->column = calloc((size_t)capacity + 1, sizeof *out->column);
+    if (!out->first || !out->column) {
+        bst_bad_rows_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a map of %d bad pixels", capacity);
+    }
+    return BST_OK;
+}
+
+void bst_bad_rows_free(bst_bad_rows *rows) {
+    free(rows->first);
+    free(rows->column);
+    *rows = (bst_bad_rows){0};
+}
+
+void bst_bad_rows_begin(bst_bad_rows *rows) {
+    rows->count = 0;
+    memset(rows->first, 0, ((size_t)rows->height + 1) * sizeof *rows->first);
+}
+
+void bst_bad_rows_add(bst_bad_rows *rows, int32_t pixel) {
+    if (rows->count < rows->capacity) {
+        rows->first[pixel / rows->width + 1]++;
+        rows->column[rows->count++] = pixel % rows->width;
+    }
+}
+
+void bst_bad_rows_end(bst_bad_rows *rows) {
+    for (int y = 0; y < rows->height; y++) {
+        rows->first[y + 1] += rows->first[y];
+    }
+}
+
+/* The first entry of row y from column x on. */
+static int first_from(const bst_bad_rows *rows, int y, int x) {
+    int lo = rows->first[y], hi = rows->first[y + 1];
+    while (lo < hi) {
+        int mid = lo + (hi - lo) / 2;
+        if (rows->column[mid] < x) {
+            lo = mid + 1;
+        } else {
+            hi = mid;
+        }
+    }
+    return lo;
+}
+
+bool bst_bad_rows_hold(const bst_bad_rows *rows, int32_t pixel) {
+    int y = pixel / rows->width, x = pixel % rows->width, i = first_from(rows, y, x);
+    return i < rows->first[y + 1] && rows->column[i] == x;
+}
+
+void bst_bad_rows_mask(const bst_bad_rows *rows, const bst_window *window, int binning, int y,
+                       int x, int count, float value, float *out) {
+    int top = window->y0 + y * binning, left = window->x0 + x * binning;
+    int right = left + count * binning;
+    for (int v = top; v < top + binning; v++) {
+        for (int i = first_from(rows, v, left); i < rows->first[v + 1] && rows->column[i] < right;
+             i++) {
+            out[(rows->column[i] - left) / binning] = value;
+        }
+    }
+}

@@ -1,0 +1,34 @@
+/* A sparse bad-pixel map of the sensor: the bad columns of each row. */
+#ifndef BST_IMGPROC_CALIBRATE_BAD_ROWS_H
+#define BST_IMGPROC_CALIBRATE_BAD_ROWS_H
+
+#include "sim/core/status.h"
+#include "sim/messages/messages.h"
+
+typedef struct bst_bad_rows {
+    int width, height, capacity, count;
+    int *first;      /* [height + 1]: the row's first entry in `column` */
+    int32_t *column; /* [capacity], ascending within a row */
+} bst_bad_rows;
+
+/* Makes an empty map of a sensor of width x height pixels with room for `capacity`. BST_ERR_MEMORY.
+ */
+bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity,
+                               bst_bad_rows *out) BST_MUST_CHECK;
+void bst_bad_rows_free(bst_bad_rows *rows);
+
+/* Empties the map; then pixels are added in ascending order of y * width + x, those beyond the
+ * capacity are left out; bst_bad_rows_end completes it. */
+void bst_bad_rows_begin(bst_bad_rows *rows);
+void bst_bad_rows_add(bst_bad_rows *rows, int32_t pixel);
+void bst_bad_rows_end(bst_bad_rows *rows);
+
+/* Whether pixel y * width + x of the sensor is in the map. */
+bool bst_bad_rows_hold(const bst_bad_rows *rows, int32_t pixel);
+
+/* Sets to `value` those of the `count` pixels of row y of a window, from its column x on, that hold
+ * a bad pixel of the sensor. The window is read out with binning x binning. */
+void bst_bad_rows_mask(const bst_bad_rows *rows, const bst_window *window, int binning, int y,
+                       int x, int count, float value, float *out);
+
+#endif

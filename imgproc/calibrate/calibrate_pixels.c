@@ -1,0 +1,50 @@
+#include "imgproc/calibrate/calibrate_pixels.h"
+
+#include "imgproc/detect/background.h"
+
+/* Dark, flat and bad pixels of part of a binned row, from the full-sensor maps. */
+static void correct(const bst_electrons *e, int y, int first, int count, float *out) {
+    const bst_imgproc_frame *frame = e->frame;
+    int b = frame->binning;
+    size_t stride = (size_t)e->camera->width_px;
+    float share = 1.0f / (float)(b * b);
+    for (int x = 0; x < count; x++) {
+        float dark = 0.0f, flat = 0.0f;
+        bool bad = false;
+        for (int j = 0; j < b; j++) {
+            size_t k = (size_t)(frame->window.y0 + y * b + j) * stride +
+                       (size_t)(frame->window.x0 + (first + x) * b);
+            for (int i = 0; i < b; i++, k++) {
+                dark += e->maps->dark_e_per_s ? e->maps->dark_e_per_s[k] : 0.0f;
+                flat += e->maps->flat ? e->maps->flat[k] : 1.0f;
+                bad = bad || (e->bad && e->bad[k]);
+            }
+        }
+        bad = bad || !(flat > 0.0f);
+        out[x] = bad ? BST_PIXEL_BAD : (out[x] - dark * (float)frame->exposure_s) / (flat * share);
+    }
+}
+
+bool bst_electrons_plain(const bst_electrons *e, bst_row_gain *gain) {
+    *gain = (bst_row_gain){(float)e->camera->offset_dn, (float)e->camera->gain_e_per_dn};
+    return !e->maps->dark_e_per_s && !e->maps->flat && !e->bad && !e->columns;
+}
+
+void bst_electrons_read(const void *electrons, int y, int x, int count, float *out) {
+    const bst_electrons *e = electrons;
+    bst_row_gain gain;
+    (void)bst_electrons_plain(e, &gain);
+    int width = e->frame->window.width / e->frame->binning;
+    bst_row_electrons(e->frame->pixels + (size_t)y * (size_t)width + (size_t)x, count, gain.offset,
+                      gain.gain, out);
+    for (int i = 0; e->columns && i < count; i++) {
+        out[i] -= e->columns->level_e[e->first_column + x + i];
+    }
+    if (e->maps->dark_e_per_s || e->maps->flat || e->bad) {
+        correct(e, y, x, count, out);
+    }
+    if (e->learned && e->learned->count > 0) {
+        bst_bad_rows_mask(e->learned, &e->frame->window, e->frame->binning, y, x, count,
+                          BST_PIXEL_BAD, out);
+    }
+}

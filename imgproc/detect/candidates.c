@@ -1,0 +1,232 @@
+#include "imgproc/detect/candidates.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    CELL_PX = 16,
+    SOON = 8 /* rows */
+};
+
+static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
+
+bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bst_candidates *out) {
+    /* maxima of an 8-connected neighbourhood cannot be denser than one in four */
+    *out = (bst_candidates){.capacity = ((max_width + 1) / 2) * ((max_height + 1) / 2)};
+    size_t n = (size_t)out->capacity;
+    out->items = calloc(n, sizeof *out->items);
+    out->order = calloc(n, sizeof *out->order);
+    out->maxima = calloc(n, sizeof *out->maxima);
+    out->by_cell = calloc(n, sizeof *out->by_cell);
+    out->cell = calloc((size_t)(max_width / CELL_PX + 1) * (size_t)(max_height / CELL_PX + 1) + 1,
+                       sizeof *out->cell);
+    out->stands = calloc(n, sizeof *out->stands);
+    out->order_swap = calloc(n, sizeof *out->order_swap);
+    out->key = calloc(n, sizeof *out->key);
+    out->key_swap = calloc(n, sizeof *out->key_swap);
+    if (!out->items || !out->order || !out->maxima || !out->by_cell || !out->cell || !out->stands ||
+        !out->order_swap || !out->key || !out->key_swap) {
+        bst_candidates_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
+                        max_width, max_height);
+    }
+    return BST_OK;
+}
+
+void bst_candidates_free(bst_candidates *c) {
+    free(c->items);
+    free(c->order);
+    free(c->maxima);
+    free(c->by_cell);
+    free(c->cell);
+    free(c->stands);
+    free(c->order_swap);
+    free(c->key);
+    free(c->key_swap);
+    *c = (bst_candidates){0};
+}
+
+typedef struct search {
+    bst_candidates *c;
+    const bst_filter *f;
+    const float *map; /* the greater output of pixel 0, 0; NULL: made where it is asked for */
+    int reach, rows;  /* rows of squares */
+    float floor, certain;
+    bst_candidate_fn accept;
+    const void *user;
+} search;
+
+/* Whether the SNR stays above `least` on the pixels nearest to the straight way between two. */
+static bool is_ridge(const search *s, const bst_candidate *a, const bst_candidate *b, float least) {
+    int dx = b->x - a->x, dy = b->y - a->y;
+    int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+    float slope_x = (float)dx / (float)steps, slope_y = (float)dy / (float)steps;
+    const float *map = s->map ? s->map + (long)a->y * s->f->stride + a->x : NULL;
+    for (int i = 1; i < steps; i++) {
+        /* rounded; what is added keeps it positive */
+        int x = (int)((float)i * slope_x + 4096.5f) - 4096;
+        int y = (int)((float)i * slope_y + 4096.5f) - 4096;
+        float snr =
+            map ? map[(long)y * s->f->stride + x] : bst_filter_best_at(s->f, a->x + x, a->y + y);
+        if (!(snr > least)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Whether a maximum is the lesser of the two, of equals the later, and they are near. Without
+ * branches, which nobody could foretell. */
+static bool is_lesser(const search *s, const bst_candidate *m, const bst_candidate *other) {
+    bool before = (other->y < m->y) | ((other->y == m->y) & (other->x < m->x));
+    bool higher = (other->snr > m->snr) | ((other->snr == m->snr) & before);
+    return higher & (abs(other->x - m->x) <= s->reach) & (abs(other->y - m->y) <= s->reach);
+}
+
+static bool stands_alone(const search *s, const bst_candidate *m) {
+    enum { A_TIME = 32 };
+    const bst_candidates *c = s->c;
+    float least = fmaxf(m->snr - fmaxf(SADDLE_SIGMA, SADDLE_SHARE * m->snr), s->floor);
+    int left = m->x > s->reach ? (m->x - s->reach) / CELL_PX : 0;
+    int right = (m->x + s->reach) / CELL_PX, bottom = (m->y + s->reach) / CELL_PX;
+    right = right < c->columns ? right : c->columns - 1;
+    bottom = bottom < s->rows ? bottom : s->rows - 1;
+    for (int v = m->y > s->reach ? (m->y - s->reach) / CELL_PX : 0; v <= bottom; v++) {
+        int next = c->cell[v * c->columns + left], end = c->cell[v * c->columns + right + 1];
+        while (next < end) {
+            int some = end - next < A_TIME ? end : next + A_TIME, count = 0, near[A_TIME];
+            for (; next < some; next++) {
+                near[count] = next;
+                count += is_lesser(s, m, &c->by_cell[next]);
+            }
+            for (int k = 0; k < count; k++) {
+                if (is_ridge(s, m, &c->by_cell[near[k]], least)) {
+                    return false;
+                }
+            }
+        }
+    }
+    return true;
+}
+
+/* Brings rows `from` to `last` of the map into the cache, in the order in which they lie: in a
+ * crowd ways lead everywhere. Reads, since the processor foresees how they go on, as it does not
+ * for prefetches. Returns the next row. */
+static int read_ahead(const search *s, int from, int last) {
+    enum { LINE = 16 };
+    int y = from;
+    for (; y <= last && y < s->f->height; y++) {
+        const float *row = s->map + (long)y * s->f->stride;
+        for (int x = 0; x < s->f->width; x += LINE) {
+            (void)*(const volatile float *)(row + x);
+        }
+    }
+    return y;
+}
+
+static void decide(void *user, int begin, int end) {
+    const search *s = user;
+    int read = 0;
+    for (int i = begin; i < end; i++) {
+        const bst_candidate *m = &s->c->maxima[i];
+        if (s->f->crowded && s->map) {
+            int first = m->y > s->reach ? m->y - s->reach : 0;
+            read = read_ahead(s, read > first ? read : first, m->y + s->reach);
+        }
+        s->c->stands[i] =
+            stands_alone(s, m) && (m->snr > s->certain || s->accept(s->user, m)) ? 1 : 0;
+    }
+}
+
+/* order: by falling SNR, of equals as they are: of many by a stable radix sort. The bits of
+ * positive floats sort as the floats do. */
+static void sort_items(bst_candidates *c) {
+    enum { BITS = 11, BINS = 1 << BITS, PASSES = 3, FEW = 64 };
+    if (c->count < FEW) {
+        for (int i = 0; i < c->count; i++) {
+            int at = i;
+            for (; at > 0 && c->items[c->order[at - 1]].snr < c->items[i].snr; at--) {
+                c->order[at] = c->order[at - 1];
+            }
+            c->order[at] = i;
+        }
+        return;
+    }
+    for (int i = 0; i < c->count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &c->items[i].snr, sizeof bits);
+        c->key[i] = ~bits;
+        c->order[i] = i;
+    }
+    for (int pass = 0; pass < PASSES; pass++) {
+        int bins[BINS] = {0}, sum = 0;
+        for (int i = 0; i < c->count; i++) {
+            bins[c->key[i] >> (pass * BITS) & (BINS - 1)]++;
+        }
+        for (int b = 0; b < BINS; b++) {
+            int n = bins[b];
+            bins[b] = sum;
+            sum += n;
+        }
+        for (int i = 0; i < c->count; i++) {
+            int to = bins[c->key[i] >> (pass * BITS) & (BINS - 1)]++;
+            c->key_swap[to] = c->key[i];
+            c->order_swap[to] = c->order[i];
+        }
+        uint32_t *key = c->key;
+        int *order = c->order;
+        c->key = c->key_swap;
+        c->order = c->order_swap;
+        c->key_swap = key;
+        c->order_swap = order;
+    }
+}
+
+/* by_cell: the maxima of each square together, by counting. */
+static void sort_by_cell(bst_candidates *c, int maxima, int cells) {
+    memset(c->cell, 0, ((size_t)cells + 1) * sizeof *c->cell);
+    for (int i = 0; i < maxima; i++) {
+        c->cell[c->maxima[i].y / CELL_PX * c->columns + c->maxima[i].x / CELL_PX + 1]++;
+    }
+    for (int k = 0; k < cells; k++) {
+        c->cell[k + 1] += c->cell[k];
+    }
+    /* filled from the back, each square's first moves to where it belongs */
+    for (int i = maxima - 1; i >= 0; i--) {
+        int k = c->maxima[i].y / CELL_PX * c->columns + c->maxima[i].x / CELL_PX;
+        c->by_cell[--c->cell[k + 1]] = c->maxima[i];
+    }
+    memmove(c->cell, c->cell + 1, (size_t)cells * sizeof *c->cell);
+    c->cell[cells] = maxima;
+}
+
+void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f, int reach_px,
+                         float floor, float certain, bst_candidate_fn accept, const void *user) {
+    int maxima = 0, rows = (f->height + CELL_PX - 1) / CELL_PX;
+    c->columns = (f->width + CELL_PX - 1) / CELL_PX;
+    for (int y = 0; y < f->height; y++) {
+        size_t at = (size_t)y * (size_t)f->max_width;
+        if (y + SOON < f->height) { /* a row's maxima lie far from the next one's */
+            __builtin_prefetch(f->maximum_x + at + (size_t)(SOON * f->max_width));
+            __builtin_prefetch(f->maximum_snr + at + (size_t)(SOON * f->max_width));
+        }
+        for (int i = 0; i < f->maxima[y]; i++) {
+            c->maxima[maxima++] =
+                (bst_candidate){f->maximum_x[at + (size_t)i], y, f->maximum_snr[at + (size_t)i]};
+        }
+    }
+    sort_by_cell(c, maxima, c->columns * rows);
+    const float *map = !f->streak ? f->point : f->kept ? f->best : NULL;
+    map = map ? map + (long)f->pad * f->stride + f->pad : NULL;
+    search s = {c, f, map, reach_px, rows, floor, certain, accept, user};
+    /* long parts where each reads the rows about it */
+    bst_parallel_for(pool, maxima, f->crowded ? 1024 : 256, decide, &s);
+    c->count = 0;
+    for (int i = 0; i < maxima; i++) {
+        if (c->stands[i]) {
+            c->items[c->count++] = c->maxima[i];
+        }
+    }
+    sort_items(c);
+}

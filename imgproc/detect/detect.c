@@ -1,0 +1,548 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "imgproc/calibrate/bad_map.h"
+#include "imgproc/calibrate/pixel_learner.h"
+#include "imgproc/detect/detect_internal.h"
+#include "imgproc/detect/region_of_interest.h"
+#include "imgproc/detect/row_kernels.h"
+#include "imgproc/measure/sensor_order.h"
+#include "imgproc/streak/streak_locate.h"
+#include "imgproc/streak/streak_motion.h"
+#include "sim/core/pages.h"
+#include "sim/core/threshold_statistics.h"
+#include "sim/optics/column_level.h"
+
+/* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
+static const double LOOK_SHARE = 0.65;
+/* Bend of the stars' path that jitter of 1 px RMS has: that of noise that is flat from 2.5 to 100
+ * cycles an exposure. */
+static const double JITTER_BEND = 0.075;
+/* What telemetry may not know of the camera's motion: drift, in px an exposure. */
+static const double DRIFT_PX = 1.0;
+/* In a crowd light is what the filter says so much of; what it says is little there, since noise is
+ * told too high. */
+static const float STAR_SNR = 3.0f;
+/* Share of a crowded frame that is taken for open sky at the least. */
+static const double LEAST_OPEN = 0.02;
+/* Above the threshold by this no skewness of noise matters. */
+static const double CERTAIN_ABOVE = 1.5;
+
+static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
+    int width = (int)ip->camera.width_px, height = (int)ip->camera.height_px;
+    if (ip->maps.psf) {
+        BST_TRY(bst_known_psf_create(ctx, ip->maps.psf, width, height, ip->config.jitter_px,
+                                     &ip->known));
+    }
+    double fwhm = ip->camera.psf_fwhm_px, streak = ip->config.streak_max_px;
+    int side = (int)ceil(streak + 6.0 * fwhm) + 14;
+    side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
+    int capacity = (int)ip->config.capacity;
+    ip->electrons = bst_pages_alloc((size_t)width * (size_t)height * sizeof(float));
+    ip->order = calloc((size_t)capacity, sizeof(int));
+    ip->order_swap = calloc((size_t)capacity, sizeof(int));
+    ip->row = calloc((size_t)height + 1, sizeof(int));
+    ip->cropped = calloc((size_t)width * (size_t)height, sizeof *ip->cropped);
+    if (!ip->electrons || !ip->order || !ip->order_swap || !ip->row || !ip->cropped) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
+    }
+    BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
+    if (bst_column_level_wanted(ip->config.column_level, &ip->camera)) {
+        BST_TRY(bst_columns_create(ctx, width, &ip->columns));
+    }
+    BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
+    BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
+                                  bst_parallel_threads(ip->pool), &ip->background));
+    BST_TRY(bst_filter_create(ctx, ip->known, width, height, streak, bst_parallel_threads(ip->pool),
+                              &ip->filter));
+    BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
+    BST_TRY(bst_locator_create(ctx, ip->known, bst_parallel_threads(ip->pool), capacity, width,
+                               height, side, &ip->locator));
+    ip->locator.most_fits = (int)ip->config.most_fits;
+    BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
+    return ip->config.streak_search_px > 0.0
+               ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
+                                           ip->config.streak_search_px, &ip->streaks)
+               : BST_OK;
+}
+
+bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
+                              const bst_imgproc_config *config, const bst_imgproc_maps *maps,
+                              bst_imgproc **out) {
+    *out = NULL;
+    if (camera->width_px < 1 || camera->height_px < 1 || camera->width_px > 32768 ||
+        camera->height_px > 32768 || !(camera->psf_fwhm_px > 0.0) || camera->psf_fwhm_px > 16.0 ||
+        !(camera->gain_e_per_dn > 0.0) || config->capacity < 1 || config->mesh_px < 4 ||
+        !(config->false_alarms_per_frame > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "image processing needs 1 to 32768 pixels a side, a PSF of up to 16 px "
+                        "FWHM, a positive gain, room for a detection, meshes of at least 4 px and "
+                        "a positive false-alarm rate");
+    }
+    bst_imgproc *ip = calloc(1, sizeof *ip);
+    if (!ip) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for image processing");
+    }
+    ip->camera = *camera;
+    ip->config = *config;
+    ip->electrons_per_s_v0 = electrons_per_s_v0;
+    if (maps) {
+        ip->maps = *maps;
+    }
+    bst_status status = allocate(ctx, ip);
+    if (status != BST_OK) {
+        bst_imgproc_free(ip);
+        return status;
+    }
+    *out = ip;
+    return BST_OK;
+}
+
+void bst_imgproc_free(bst_imgproc *ip) {
+    if (!ip) {
+        return;
+    }
+    free(ip->bad);
+    free(ip->electrons);
+    free(ip->order);
+    free(ip->order_swap);
+    free(ip->row);
+    free(ip->cropped);
+    bst_background_free(&ip->background);
+    bst_filter_free(&ip->filter);
+    bst_candidates_free(&ip->candidates);
+    bst_locator_free(&ip->locator);
+    bst_streak_motion_free(&ip->streak_motion);
+    bst_streak_locator_free(&ip->streaks);
+    bst_parallel_free(ip->pool);
+    bst_known_psf_free(ip->known);
+    bst_pixel_shows_free(&ip->shows);
+    bst_columns_free(&ip->columns);
+    free(ip);
+}
+
+typedef struct sparing_reader {
+    bst_electrons read;
+    const bst_filter *filter;
+} sparing_reader;
+
+/* Without the stars that the filter found. */
+static void read_between_stars(const void *user, int y, int x, int count, float *out) {
+    const sparing_reader *r = user;
+    bst_electrons_read(&r->read, y, x, count, out);
+    bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
+}
+
+/* The noise of a row's columns, and its learned bad pixels where bst_electrons_read did not read
+ * it.
+ */
+static void correct_row(const void *user, int y, int width, float *signal, float *normalised) {
+    const bst_electrons *e = user;
+    for (int x = 0; e->columns && x < width; x++) {
+        normalised[x] /= e->columns->noise[e->first_column + x];
+    }
+    if (!e->learned) {
+        return;
+    }
+    const bst_window *w = &e->frame->window;
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, BST_PIXEL_BAD, signal);
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, 0.0f, normalised);
+}
+
+/* What tells noise from a source. */
+typedef struct judge {
+    const bst_imgproc *ip;
+    const float *column_noise; /* see bst_locate_frame */
+    double threshold;
+    double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
+} judge;
+
+static bool exceeds(double peak, const judge *g, const bst_threshold_weights *weights,
+                    const bst_threshold_noise *noise) {
+    return peak > g->threshold && peak > bst_threshold_quantile(g->threshold, weights, noise);
+}
+
+/* A maximum counts when the output between the pixels exceeds what the noise there exceeds as
+ * rarely as normal noise the threshold. */
+static bool stands_out(const void *user, const bst_candidate *c) {
+    const judge *g = user;
+    const bst_filter *f = &g->ip->filter;
+    double noise_e = bst_background_noise_at(&g->ip->background, c->x, c->y);
+    noise_e *= g->column_noise ? (double)g->column_noise[c->x] : 1.0;
+    double level_e = bst_background_level_at(&g->ip->background, c->x, c->y);
+    double variance = noise_e * noise_e, counted = fmax(variance - g->normal_variance, 0.0);
+    if (g->normal_variance < 1.0) {
+        /* steps wider than the noise of reading add none: what is counted is the level then */
+        counted = fmax(counted, fmin(level_e, variance));
+    }
+    bst_threshold_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
+    double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
+    if (exceeds(point, g, &f->point_weights, &noise)) {
+        return true;
+    }
+    return f->streak && exceeds(bst_filter_peak(f, g->ip->electrons, noise_e, true, c->x, c->y), g,
+                                &f->streak_weights, &noise);
+}
+
+/* The digital number from which a pixel no longer measures: the converter's end or the full well.
+ */
+static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) {
+    double top = ldexp(1.0, frame->bits) - 1.0;
+    double well = ip->camera.full_well_e * frame->binning * frame->binning;
+    double full = ip->camera.offset_dn + 0.98 * well / ip->camera.gain_e_per_dn;
+    return (int)fmin(top, fmax(full, 1.0));
+}
+
+/* Least signal of a pixel of that number, above the background of the frame. */
+static double saturation_e(const bst_imgproc *ip, int saturated_dn) {
+    const bst_camera *c = &ip->camera;
+    double level = (saturated_dn - c->offset_dn) * c->gain_e_per_dn;
+    bool overflows = c->detector.full_well == BST_WELL_BLOOM;
+    return overflows ? 0.0 : fmax(level - (double)ip->background.median_level, 0.0);
+}
+
+/* The path of stars on the window's middle, on a grid of half a pixel: small changes of the
+ * telemetry leave the filter as it is. 0, 0 when too short or too long to filter for. */
+static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
+                        double *dx, double *dy) {
+    *dx = *dy = 0.0;
+    ip->smeared = false;
+    if (!motion) {
+        return;
+    }
+    const bst_window *w = &frame->window;
+    bst_motion_streak(motion, &ip->camera, w->x0 + 0.5 * (w->width - 1),
+                      w->y0 + 0.5 * (w->height - 1), dx, dy);
+    double bend_x, bend_y;
+    bst_motion_bend(motion, &ip->camera, &bend_x, &bend_y);
+    double length = hypot(*dx, *dy) / frame->binning;
+    double bend = hypot(bend_x, bend_y) / frame->binning;
+    ip->smeared = length + 2.0 * bend > ip->config.streak_max_px;
+    if (length < ip->config.streak_min_px || length > ip->config.streak_max_px) {
+        *dx = *dy = 0.0;
+        return;
+    }
+    *dx = 0.5 * round(2.0 * *dx / frame->binning);
+    *dy = 0.5 * round(2.0 * *dy / frame->binning);
+}
+
+static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_imgproc_frame *f) {
+    const bst_window *w = &f->window;
+    if (f->binning < 1 || w->x0 < 0 || w->y0 < 0 || w->width < f->binning ||
+        w->height < f->binning || w->width > ip->camera.width_px - w->x0 ||
+        w->height > ip->camera.height_px - w->y0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "window %d x %d at (%d, %d) with binning %d does not fit a sensor of %lld "
+                        "x %lld",
+                        w->width, w->height, w->x0, w->y0, f->binning,
+                        (long long)ip->camera.width_px, (long long)ip->camera.height_px);
+    }
+    if (f->bits < 1 || f->bits > 16 || !(f->exposure_s >= 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "a frame of %d bits and %g s: 1 to 16 bits, 0 s up",
+                        f->bits, f->exposure_s);
+    }
+    return BST_OK;
+}
+
+static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f, const bst_shape *shape,
+                          bst_detection *d) {
+    if (f->motion) {
+        double x, y;
+        bst_motion_bend(f->motion, &ip->camera, &x, &y);
+        bst_motion_widen(x, y, f->binning * shape->bend_x_px, f->binning * shape->bend_y_px, d);
+    }
+}
+
+static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
+                            const bst_found *found) {
+    const bst_source *s = &found->source;
+    double b = f->binning;
+    bst_detection d = {0};
+    d.x_px = f->origin_x_px + b * s->shape.x_px;
+    d.y_px = f->origin_y_px + b * s->shape.y_px;
+    d.cov_xx = b * b * s->cov_xx;
+    d.cov_xy = b * b * s->cov_xy;
+    d.cov_yy = b * b * s->cov_yy;
+    d.flux_e = s->flux_e;
+    d.flux_sigma_e = sqrt(s->flux_variance);
+    d.snr = found->snr;
+    d.length_px = b * found->length_px;
+    d.width_px = b * found->width_px;
+    d.angle_rad = found->angle_rad;
+    double rate = s->flux_e / fmax(ip->exposure_s, 1e-9);
+    d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
+    d.flags = found->flags;
+    widen_by_bend(ip, f, &s->shape, &d);
+    d.label = found->label;
+    d.label_probability = found->label_probability;
+    return d;
+}
+
+/* The output from which maxima are looked at in between the pixels. */
+static double look_from(const bst_imgproc *ip, double threshold) {
+    return ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
+}
+
+/* How a frame, or a window of one, was searched. */
+typedef struct part {
+    double threshold, false_alarms;
+    bool search;
+} part;
+
+/* What the locator and stacks see of a frame that was searched. */
+static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
+                     double sigma, const float *column_noise, bst_parallel *pool) {
+    if (motion) {
+        ip->motion = *motion;
+    }
+    ip->view = (bst_locate_frame){.signal = ip->electrons,
+                                  .width = frame->window.width / frame->binning,
+                                  .height = frame->window.height / frame->binning,
+                                  .background = &ip->background,
+                                  .filter = &ip->filter,
+                                  .column_noise = column_noise,
+                                  .sigma_px = sigma,
+                                  .motion = motion ? &ip->motion : NULL,
+                                  .camera = &ip->camera,
+                                  .binning = frame->binning,
+                                  .pool = pool};
+    ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
+    ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    ip->left = (bst_stack_frame){.signal = ip->electrons,
+                                 .background = &ip->background,
+                                 .width = frame->window.width / frame->binning,
+                                 .height = frame->window.height / frame->binning,
+                                 .sigma_px = sigma,
+                                 .origin_x_px = ip->view.origin_x_px,
+                                 .origin_y_px = ip->view.origin_y_px,
+                                 .binning = frame->binning};
+}
+
+/* Finds the candidates of `frame` and sets ip->view. `whole` is the frame of which it is a window,
+ * itself else: the density of false alarms and the filter are the whole frame's. */
+static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
+                 const bst_motion *motion, bst_parallel *pool, part *out) {
+    int width = frame->window.width / frame->binning;
+    int height = frame->window.height / frame->binning;
+    double sigma = ip->known ? ip->known->sigma_px
+                             : hypot(bst_camera_psf_sigma_px(&ip->camera), ip->config.jitter_px);
+    sigma = fmax(sigma / frame->binning, 0.2);
+    ip->exposure_s = frame->exposure_s;
+    ip->binning = frame->binning;
+
+    const bst_bad_rows *learned = ip->map && ip->map->rows.count > 0 ? &ip->map->rows : NULL;
+    const bst_columns *columns = ip->columns.count > 0 ? &ip->columns : NULL;
+    int first_column = (frame->window.x0 - whole->window.x0) / frame->binning;
+    sparing_reader sparing = {
+        {&ip->camera, &ip->maps, ip->bad, frame, learned, columns, first_column}, &ip->filter};
+    ip->filter.correct_row = learned || columns ? correct_row : NULL;
+    ip->filter.correct_user = &sparing.read;
+    const bst_electrons *read = &sparing.read;
+    bst_row_gain by_gain;
+    const bst_row_gain *plain = bst_electrons_plain(read, &by_gain) ? &by_gain : NULL;
+    double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
+    double read_variance = read_noise * read_noise + gain * gain / 12.0;
+    bst_background_steps steps = {gain, -ip->camera.offset_dn * gain};
+    bst_background_read(&ip->background, pool, bst_electrons_read, read, width, height, &steps,
+                        read_noise * read_noise);
+    double dx, dy;
+    filter_path(ip, whole, motion, &dx, &dy);
+    ip->streak_px = hypot(dx, dy) * frame->binning;
+    bst_filter_set(&ip->filter, sigma, frame->binning, dx, dy);
+    /* stars are points: what else there is may be a streak */
+    bool search =
+        ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared && frame == whole;
+    double pixels = (double)(whole->window.width / whole->binning) *
+                    (double)(whole->window.height / whole->binning);
+    double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
+    double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
+    int saturated_dn = saturation_dn(ip, frame);
+    bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
+                   plain, ip->electrons, width, height, saturated_dn,
+                   (float)look_from(ip, threshold));
+    if (ip->filter.crowded && !ip->smeared) {
+        double share = bst_background_read_again(&ip->background, pool, read_between_stars,
+                                                 &sparing, &steps, read_noise * read_noise);
+        /* where there are stars noise makes no detections of its own */
+        pixels *= fmax(share, LEAST_OPEN);
+        threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
+        bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
+                       plain, ip->electrons, width, height, saturated_dn,
+                       (float)look_from(ip, threshold));
+    }
+    double look = look_from(ip, threshold);
+    const float *column_noise = columns ? columns->noise + first_column : NULL;
+    judge noise = {ip, column_noise, threshold, read_variance};
+    double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
+    bst_candidates_find(&ip->candidates, pool, &ip->filter,
+                        (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
+                        stands_out, &noise);
+    set_view(ip, frame, motion, sigma, column_noise, pool);
+    ip->view.full_e = saturation_e(ip, saturated_dn);
+    *out = (part){threshold, false_alarms, search};
+}
+
+/* Corrects a motion by the streaks that were added to ip->streak_motion. */
+static void correct_motion(bst_imgproc *ip, double binning, bst_motion *motion) {
+    double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
+                           motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
+    (void)bst_streak_motion_solve(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
+                                  &ip->camera, DRIFT_PX / binning, bend_px / binning, motion);
+}
+
+/* Locates the candidates of a part and adds them to `out`. */
+static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capacity) {
+    if (ip->smeared) {
+        bst_locate_roughly(&ip->locator, &ip->view, &ip->candidates);
+    } else {
+        bst_locate(&ip->locator, &ip->view, &ip->candidates);
+    }
+    int kept = 0, room = capacity - out->count;
+    room = room < ip->locator.capacity ? room : ip->locator.capacity;
+    int lost = ip->candidates.count - ip->locator.count;
+    if (p->search) {
+        bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, p->false_alarms, &ip->locator);
+    }
+    for (int i = 0; i < ip->locator.count; i++) {
+        if (ip->locator.found[i].dropped) {
+            continue;
+        }
+        if (kept < room) {
+            ip->order[kept++] = i;
+        } else {
+            lost++;
+        }
+    }
+    bst_sensor_order(ip->locator.found, kept, ip->view.height, ip->order, ip->order_swap, ip->row);
+    for (int i = 0; i < kept; i++) {
+        out->items[out->count++] = report(ip, &ip->view, &ip->locator.found[ip->order[i]]);
+    }
+    out->lost += lost;
+    out->threshold_snr = p->threshold;
+}
+
+static void measure_columns(bst_imgproc *ip, bst_parallel *pool, const bst_imgproc_frame *frame) {
+    if (ip->columns.capacity > 0) {
+        bst_columns_measure(&ip->columns, pool, &ip->camera, frame);
+    }
+}
+
+static void empty(bst_detections *out) {
+    out->background_e = out->noise_e = out->threshold_snr = 0.0;
+    out->stars_identified = 0;
+    out->count = 0;
+    out->lost = 0;
+}
+
+bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                              const bst_motion *motion, bst_detections *out, int capacity) {
+    BST_TRY(check_frame(ctx, ip, frame));
+    /* a pool that has to wait for processors is slower than one thread that has one */
+    bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
+    part whole;
+    empty(out);
+    measure_columns(ip, alone ? NULL : ip->pool, frame);
+    ip->windowed = false;
+    find(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
+    if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view)) {
+        bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
+        correct_motion(ip, frame->binning, &ip->motion);
+    }
+    bst_imgproc_begin_shows(ip);
+    bst_imgproc_add_shows(ip, frame, frame);
+    bst_pixel_shows_sort(&ip->shows);
+    take(ip, &whole, out, capacity);
+    out->background_e = (double)ip->background.median_level;
+    out->noise_e = (double)ip->background.median_noise;
+    return BST_OK;
+}
+
+/* Whether the windows' streaks are to tell the motion: looks for them in all windows. */
+static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                               const bst_window *windows, int count, const bst_motion *motion) {
+    for (int i = 0; i < count; i++) {
+        part p;
+        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        find(ip, &window, frame, motion, NULL, &p);
+        if (i == 0 && (ip->smeared || !bst_streak_motion_begin(&ip->streak_motion, &ip->view))) {
+            return false;
+        }
+        bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
+    }
+    return count > 0;
+}
+
+bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                      const bst_window *windows, int count,
+                                      const bst_motion *motion, bst_detections *out, int capacity) {
+    BST_TRY(check_frame(ctx, ip, frame));
+    double pixels = 0.0;
+    bst_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
+    empty(out);
+    measure_columns(ip, ip->pool, frame);
+    ip->windowed = true;
+    if (motion) {
+        used = *motion;
+        if (measure_in_windows(ip, frame, windows, count, motion)) {
+            correct_motion(ip, frame->binning, &used);
+        }
+    }
+    bst_imgproc_begin_shows(ip);
+    for (int i = 0; i < count; i++) {
+        part p;
+        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
+        bst_imgproc_add_shows(ip, &window, frame);
+        take(ip, &p, out, capacity);
+        double n = (double)windows[i].width * (double)windows[i].height;
+        pixels += n;
+        out->background_e += n * (double)ip->background.median_level;
+        out->noise_e += n * (double)ip->background.median_noise;
+    }
+    bst_pixel_shows_sort(&ip->shows);
+    if (pixels > 0.0) {
+        out->background_e /= pixels;
+        out->noise_e /= pixels;
+    }
+    return BST_OK;
+}
+
+void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
+                        const bst_zero_point *zero_point) {
+    bst_detection *item = &detections->items[index];
+    const bst_found *found = &ip->locator.found[ip->order[index]];
+    if (ip->windowed || !found->rough) {
+        return;
+    }
+    bst_locate_again(&ip->locator, &ip->view, ip->order[index]);
+    bst_detection fitted = report(ip, &ip->view, found), before = *item;
+    bst_photometry_correct(zero_point, &fitted);
+    fitted.label = before.label;
+    fitted.label_probability = before.label_probability;
+    fitted.star_id = before.star_id;
+    *item = fitted;
+}
+
+double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {
+    const bst_filter *f = &ip->filter;
+    double norm = f->streak ? f->streak_norm : f->norm;
+    double electrons = snr * (double)ip->background.median_noise / norm;
+    return -2.5 * log10(electrons / (fmax(ip->exposure_s, 1e-9) * ip->electrons_per_s_v0));
+}
+
+void bst_imgproc_ground(const bst_imgproc *ip, double x_px, double y_px, double *level_e,
+                        double *noise_e) {
+    double x = (x_px - ip->view.origin_x_px) / ip->view.binning;
+    double y = (y_px - ip->view.origin_y_px) / ip->view.binning;
+    *level_e = bst_background_level_at(&ip->background, x, y);
+    *noise_e = bst_background_noise_at(&ip->background, x, y);
+}
+
+double bst_imgproc_streak_px(const bst_imgproc *ip) {
+    return ip->streak_px;
+}
+
+bool bst_imgproc_smeared(const bst_imgproc *ip) {
+    return ip->smeared;
+}

@@ -1,0 +1,46 @@
+/* What the parts of bst_imgproc share. */
+#ifndef BST_IMGPROC_DETECT_DETECT_INTERNAL_H
+#define BST_IMGPROC_DETECT_DETECT_INTERNAL_H
+
+#include "imgproc/calibrate/calibrate_pixels.h"
+#include "imgproc/calibrate/pixel_learner.h"
+#include "imgproc/imgproc.h"
+#include "imgproc/measure/locate.h"
+#include "imgproc/streak/streak_locate.h"
+#include "imgproc/streak/streak_motion.h"
+
+struct bst_imgproc {
+    bst_camera camera;
+    bst_imgproc_config config;
+    bst_imgproc_maps maps;
+    uint8_t *bad; /* [height_px][width_px]: the maps' and the list's bad pixels; NULL: none */
+    double electrons_per_s_v0;
+    float *electrons; /* [height][width] of the frame; signal once filtered */
+    bst_background background;
+    bst_filter filter;
+    bst_candidates candidates;
+    bst_locator locator;
+    bst_streak_motion streak_motion;
+    bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
+    bst_parallel *pool;
+    int *order, *order_swap, *row;
+    uint16_t *cropped; /* a window's pixels */
+    /* of the latest frame */
+    bst_locate_frame view;
+    bst_motion motion;
+    double exposure_s, binning, streak_px;
+    bool smeared, windowed;
+    bst_stack_frame left;
+    bst_known_psf *known;     /* NULL: the PSF is a Gaussian */
+    const bst_pixel_map *map; /* learned; NULL: none */
+    bst_columns columns;      /* of the latest frame; capacity 0: not wanted, count 0 */
+    bst_pixel_shows shows;    /* of the latest frame; capacity 0: not wanted */
+};
+
+/* Empties ip->shows before a frame. */
+void bst_imgproc_begin_shows(bst_imgproc *ip);
+/* Adds the evidence of defective pixels in a frame, or a window of one, that was searched. */
+void bst_imgproc_add_shows(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                           const bst_imgproc_frame *whole);
+
+#endif

@@ -1,0 +1,98 @@
+#include "imgproc/detect/low_rank.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { ITERATIONS = 24 };
+
+/* Below this share of its length before, what is left of a vector is rounding. */
+static const double NOTHING = 1e-10;
+
+static double dot(const double *a, const double *b, int n) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        sum += a[i] * b[i];
+    }
+    return sum;
+}
+
+/* Makes the rows orthonormal, one after the other; those that depend on rows before become 0. */
+static void orthonormalise(double *v, int count, int side) {
+    for (int t = 0; t < count; t++) {
+        double *row = v + t * side, before = sqrt(dot(row, row, side));
+        for (int again = 0; again < 2; again++) {
+            for (int u = 0; u < t; u++) {
+                double share = dot(row, v + u * side, side);
+                for (int i = 0; i < side; i++) {
+                    row[i] -= share * v[u * side + i];
+                }
+            }
+        }
+        double left = sqrt(dot(row, row, side));
+        double scale = left > NOTHING * before ? 1.0 / left : 0.0;
+        for (int i = 0; i < side; i++) {
+            row[i] *= scale;
+        }
+    }
+}
+
+/* out[t][i] = sum over j of v[t][j] image[j][i] */
+static void project(const double *v, int count, const double *image, int side, double *out) {
+    memset(out, 0, (size_t)count * (size_t)side * sizeof *out);
+    for (int j = 0; j < side; j++) {
+        for (int t = 0; t < count; t++) {
+            double by = v[t * side + j];
+            for (int i = 0; i < side; i++) {
+                out[t * side + i] += by * image[j * side + i];
+            }
+        }
+    }
+}
+
+/* v becomes the sum over images of image image^T v */
+static void iterate(const double *images, int planes, int side, int most, double *v, double *next,
+                    double *across) {
+    memset(next, 0, (size_t)most * (size_t)side * sizeof *next);
+    for (int p = 0; p < planes; p++) {
+        const double *image = images + (size_t)p * (size_t)side * (size_t)side;
+        project(v, most, image, side, across);
+        for (int t = 0; t < most; t++) {
+            for (int j = 0; j < side; j++) {
+                next[t * side + j] += dot(image + j * side, across + t * side, side);
+            }
+        }
+    }
+    memcpy(v, next, (size_t)most * (size_t)side * sizeof *v);
+    orthonormalise(v, most, side);
+}
+
+int bst_low_rank(const double *images, int planes, int side, int most, double tolerance,
+                 double *down, double *across, double *work) {
+    /* any start will do that no singular vector is at right angles to */
+    unsigned state = 1;
+    for (int i = 0; i < most * side; i++) {
+        state = state * 1664525u + 1013904223u;
+        down[i] = (double)(state >> 8) / 16777216.0 - 0.5;
+    }
+    orthonormalise(down, most, side);
+    for (int k = 0; k < ITERATIONS; k++) {
+        iterate(images, planes, side, most, down, work, across);
+    }
+    int terms = 1;
+    for (int p = 0; p < planes; p++) {
+        const double *image = images + (size_t)p * (size_t)side * (size_t)side;
+        project(down, most, image, side, across);
+        double left = dot(image, image, side * side), least = tolerance * left;
+        for (int t = 0; t < most; t++) {
+            left -= dot(across + t * side, across + t * side, side);
+            if (left > least && t + 2 > terms) {
+                terms = t + 2 < most ? t + 2 : most;
+            }
+        }
+    }
+    for (int p = 0; p < planes; p++) {
+        project(down, terms, images + (size_t)p * (size_t)side * (size_t)side, side,
+                across + (size_t)p * (size_t)terms * (size_t)side);
+    }
+    return terms;
+}

@@ -1,0 +1,155 @@
+#include "imgproc/detect/psf.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "sim/core/vec.h"
+
+/* Nodes of the rule with n nodes start at n (n - 1) / 2. Roots of the Legendre polynomial by Newton
+ * from the asymptotic guess (Abramowitz and Stegun 25.4.29 and 22.16.6). */
+static void legendre_rule(int n, double *node, double *weight) {
+    for (int i = 0; i < n; i++) {
+        double x = cos(BST_PI * (i + 0.75) / (n + 0.5)), slope = 1.0;
+        for (int iteration = 0; iteration < 20; iteration++) {
+            double p0 = 1.0, p1 = x;
+            for (int k = 2; k <= n; k++) {
+                double p2 = ((2 * k - 1) * x * p1 - (k - 1) * p0) / k;
+                p0 = p1;
+                p1 = p2;
+            }
+            slope = n * (x * p1 - p0) / (x * x - 1.0);
+            double step = p1 / slope;
+            x -= step;
+            if (fabs(step) < 1e-15) {
+                break;
+            }
+        }
+        node[i] = -0.5 * x;
+        weight[i] = 1.0 / ((1.0 - x * x) * slope * slope);
+    }
+}
+
+void bst_gauss_init(bst_gauss *psf) {
+    for (int i = 0; i < BST_PSF_TABLE_SIZE; i++) {
+        double t = (double)i / BST_PSF_TABLE_PER_SIGMA - BST_PSF_REACH_SIGMA;
+        psf->cdf[i] = 0.5 * erfc(-t / sqrt(2.0));
+        psf->pdf[i] = exp(-0.5 * t * t) / sqrt(2.0 * BST_PI);
+    }
+    for (int n = 1; n <= BST_PSF_MAX_NODES; n++) {
+        legendre_rule(n, psf->node + n * (n - 1) / 2, psf->weight + n * (n - 1) / 2);
+    }
+}
+
+typedef struct profile {
+    int first, count;
+    double share[BST_PSF_MAX_SIDE], slope[BST_PSF_MAX_SIDE], curvature[BST_PSF_MAX_SIDE];
+} profile;
+
+/* Normal distribution and density at t (in sigma) by cubic Hermite interpolation. */
+static void normal_at(const bst_gauss *psf, double t, double *cdf, double *pdf) {
+    double u = (t + BST_PSF_REACH_SIGMA) * BST_PSF_TABLE_PER_SIGMA;
+    if (!(u > 0.0)) {
+        *cdf = *pdf = 0.0;
+        return;
+    }
+    if (u >= BST_PSF_TABLE_SIZE - 1) {
+        *cdf = 1.0;
+        *pdf = 0.0;
+        return;
+    }
+    int i = (int)u;
+    double s = u - i, h = 1.0 / BST_PSF_TABLE_PER_SIGMA;
+    double t0 = i * h - BST_PSF_REACH_SIGMA, t1 = t0 + h;
+    double b = s * s * (3.0 - 2.0 * s), c = s * (1.0 - s) * (1.0 - s) * h,
+           d = -s * s * (1.0 - s) * h;
+    double g0 = psf->pdf[i], g1 = psf->pdf[i + 1];
+    *cdf = psf->cdf[i] + b * (psf->cdf[i + 1] - psf->cdf[i]) + c * g0 + d * g1;
+    *pdf = g0 + b * (g1 - g0) - c * t0 * g0 - d * t1 * g1;
+}
+
+/* The 1-D pixel-integrated Gaussian about `centre` over pixels 0..side-1, and its derivatives by
+ * the centre, first and second; only the pixels within reach. */
+static void make_profile(const bst_gauss *psf, double centre, double sigma, int side,
+                         profile *out) {
+    double reach = BST_PSF_REACH_SIGMA * sigma;
+    double lo = floor(centre - reach + 0.5), hi = floor(centre + reach + 0.5);
+    int first = lo < 0.0 ? 0 : lo > side ? side : (int)lo;
+    int last = hi < 0.0 ? -1 : hi > side - 1 ? side - 1 : (int)hi;
+    out->first = first;
+    out->count = last >= first ? last - first + 1 : 0;
+    double inverse = 1.0 / sigma, c0, g0, d0;
+    double t = (first - 0.5 - centre) * inverse;
+    normal_at(psf, t, &c0, &g0);
+    d0 = t * g0;
+    for (int i = 0; i < out->count; i++) {
+        double c1, g1, d1;
+        t = (first + i + 0.5 - centre) * inverse;
+        normal_at(psf, t, &c1, &g1);
+        d1 = t * g1;
+        out->share[i] = c1 - c0;
+        out->slope[i] = (g0 - g1) * inverse;
+        out->curvature[i] = (d0 - d1) * inverse * inverse;
+        c0 = c1;
+        g0 = g1;
+        d0 = d1;
+    }
+}
+
+static int node_count(const bst_shape *shape) {
+    /* path at the greatest speed, which is at an end */
+    double length =
+        (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
+        shape->sigma_px;
+    return length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
+}
+
+void bst_gauss_profile(const bst_gauss *psf, double centre, double sigma, int side, double *share,
+                       double *slope, double *curvature) {
+    profile p;
+    make_profile(psf, centre, sigma, side, &p);
+    for (int i = 0; i < side; i++) {
+        bool in = i >= p.first && i < p.first + p.count;
+        share[i] = in ? p.share[i - p.first] : 0.0;
+        slope[i] = in ? p.slope[i - p.first] : 0.0;
+        curvature[i] = in ? p.curvature[i - p.first] : 0.0;
+    }
+}
+
+void bst_gauss_render(const bst_gauss *psf, const bst_shape *shape, const bst_stamp *stamp,
+                      double *share, double *by_x, double *by_y, double *by_variance) {
+    size_t bytes = (size_t)stamp->width * (size_t)stamp->height * sizeof(double);
+    memset(share, 0, bytes);
+    memset(by_x, 0, bytes);
+    memset(by_y, 0, bytes);
+    memset(by_variance, 0, bytes);
+    int nodes = node_count(shape);
+    const double *node = psf->node + nodes * (nodes - 1) / 2;
+    const double *weight = psf->weight + nodes * (nodes - 1) / 2;
+    profile px, py;
+    for (int k = 0; k < nodes; k++) {
+        double bow = 6.0 * node[k] * node[k] - 0.5;
+        double x = shape->x_px + node[k] * shape->dx_px + bow * shape->bend_x_px;
+        double y = shape->y_px + node[k] * shape->dy_px + bow * shape->bend_y_px;
+        make_profile(psf, x - stamp->x0, shape->sigma_px, stamp->width, &px);
+        make_profile(psf, y - stamp->y0, shape->sigma_px, stamp->height, &py);
+        for (int j = 0; j < py.count; j++) {
+            double p = weight[k] * py.share[j], d = weight[k] * py.slope[j];
+            double half_p = 0.5 * p, half_c = 0.5 * weight[k] * py.curvature[j];
+            size_t row = (size_t)(py.first + j) * (size_t)stamp->width + (size_t)px.first;
+            double *s = share + row, *sx = by_x + row, *sy = by_y + row, *sv = by_variance + row;
+            for (int i = 0; i < px.count; i++) {
+                s[i] += p * px.share[i];
+                sx[i] += p * px.slope[i];
+                sy[i] += d * px.share[i];
+                sv[i] += half_p * px.curvature[i] + half_c * px.share[i];
+            }
+        }
+    }
+}
+
+void bst_shape_path_variance(const bst_shape *s, double out[3]) {
+    out[0] = s->dx_px * s->dx_px / 12.0 + s->bend_x_px * s->bend_x_px / 5.0;
+    out[1] = s->dx_px * s->dy_px / 12.0 + s->bend_x_px * s->bend_y_px / 5.0;
+    out[2] = s->dy_px * s->dy_px / 12.0 + s->bend_y_px * s->bend_y_px / 5.0;
+}

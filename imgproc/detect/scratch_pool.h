@@ -1,0 +1,35 @@
+/* Work spaces that the threads of a loop take in turn. What a work space held before must not
+ * matter: which one a part of the loop gets is left to chance. */
+#ifndef BST_IMGPROC_DETECT_SCRATCH_POOL_H
+#define BST_IMGPROC_DETECT_SCRATCH_POOL_H
+
+#include <stdatomic.h>
+
+enum { BST_BORROW_MOST = 33 };
+
+typedef struct bst_borrow {
+    atomic_flag taken[BST_BORROW_MOST];
+    int count; /* at least as many as threads */
+} bst_borrow;
+
+static inline void bst_borrow_init(bst_borrow *b, int count) {
+    b->count = count < BST_BORROW_MOST ? count : BST_BORROW_MOST;
+    for (int i = 0; i < b->count; i++) {
+        atomic_flag_clear(&b->taken[i]);
+    }
+}
+
+/* Index of a work space that nobody else has. */
+static inline int bst_borrow_take(bst_borrow *b) {
+    for (int i = 0;; i = i + 1 < b->count ? i + 1 : 0) {
+        if (!atomic_flag_test_and_set_explicit(&b->taken[i], memory_order_acquire)) {
+            return i;
+        }
+    }
+}
+
+static inline void bst_borrow_give(bst_borrow *b, int index) {
+    atomic_flag_clear_explicit(&b->taken[index], memory_order_release);
+}
+
+#endif

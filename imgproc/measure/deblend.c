@@ -1,0 +1,151 @@
+#include "imgproc/measure/deblend.h"
+
+#include <math.h>
+
+#include "imgproc/measure/cosmic_ray.h"
+
+double bst_company_reach(const bst_locate_frame *f) {
+    return fmax(3.0, ceil(3.6 * f->sigma_px));
+}
+
+double bst_company_fit_limit(const bst_locate_frame *f, double path_px) {
+    return 1.5 + f->sigma_px + 0.4 * path_px;
+}
+
+bst_stamp bst_company_stamp(const bst_locator *l, const bst_locate_frame *f, const bst_source *s) {
+    return bst_fit_stamp(s, bst_company_reach(f), l->max_side, f->width, f->height);
+}
+
+void bst_company_index(bst_locator *l, const bst_locate_frame *f) {
+    l->columns = f->width / BST_LOCATE_CELL_PX + 1;
+    l->rows = f->height / BST_LOCATE_CELL_PX + 1;
+    for (int i = 0; i < l->columns * l->rows; i++) {
+        l->cell[i] = -1;
+    }
+    for (int i = l->count - 1; i >= 0; i--) {
+        int *cell = &l->cell[l->found[i].peak_y / BST_LOCATE_CELL_PX * l->columns +
+                             l->found[i].peak_x / BST_LOCATE_CELL_PX];
+        l->found[i].next = *cell;
+        *cell = i;
+    }
+}
+
+/* Cells, first and last, that hold all maxima within margin_px of a range of pixels. */
+static void cell_range(double from, double to, double margin_px, int cells, int *first, int *last) {
+    double lo = floor((from - margin_px) / BST_LOCATE_CELL_PX),
+           hi = floor((to + margin_px) / BST_LOCATE_CELL_PX);
+    *first = lo < 0.0 ? 0 : lo > cells - 1 ? cells - 1 : (int)lo;
+    *last = hi < 0.0 ? 0 : hi > cells - 1 ? cells - 1 : (int)hi;
+}
+
+void bst_company_gather(const bst_locator *l, const bst_locate_frame *f, int i,
+                        const bst_source *own, const bst_stamp *stamp, bst_company *out) {
+    out->free[0] = own;
+    out->free_count = 1;
+    out->fixed_count = 0;
+    /* a fit moves a source from its maximum by its limit at most */
+    double margin =
+        bst_company_reach(f) + 1.8 * l->longest_px + bst_company_fit_limit(f, 0.0) + 1.0;
+    int first_column, last_column, first_row, last_row;
+    cell_range(stamp->x0, stamp->x0 + stamp->width, margin, l->columns, &first_column,
+               &last_column);
+    cell_range(stamp->y0, stamp->y0 + stamp->height, margin, l->rows, &first_row, &last_row);
+    int near[BST_COMPANY_MAX_FIXED + BST_FIT_MAX_FREE], count = 0,
+                                                        across = last_column - first_column + 1;
+    for (int c = 0; c < across * (last_row - first_row + 1); c++) {
+        int cell = (first_row + c / across) * l->columns + first_column + c % across;
+        for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
+            if (k == i || l->found[k].dropped || bst_charge_label(l->found[k].label)) {
+                continue;
+            }
+            bst_stamp other = bst_fit_stamp(&l->found[k].source, bst_company_reach(f), l->max_side,
+                                            f->width, f->height);
+            if (other.x0 >= stamp->x0 + stamp->width || stamp->x0 >= other.x0 + other.width ||
+                other.y0 >= stamp->y0 + stamp->height || stamp->y0 >= other.y0 + other.height) {
+                continue;
+            }
+            /* keep the brightest, in order of number */
+            int at = count;
+            while (at > 0 && near[at - 1] > k) {
+                at--;
+            }
+            if (count == BST_COMPANY_MAX_FIXED + BST_FIT_MAX_FREE && at == count) {
+                continue;
+            }
+            count += count < BST_COMPANY_MAX_FIXED + BST_FIT_MAX_FREE;
+            for (int m = count - 1; m > at; m--) {
+                near[m] = near[m - 1];
+            }
+            near[at] = k;
+        }
+    }
+    for (int n = 0; n < count; n++) {
+        const bst_source *s = &l->found[near[n]].source;
+        /* a centre just outside still has half its light inside */
+        bool inside = s->shape.x_px >= stamp->x0 - 1.5 && s->shape.y_px >= stamp->y0 - 1.5 &&
+                      s->shape.x_px <= stamp->x0 + stamp->width + 0.5 &&
+                      s->shape.y_px <= stamp->y0 + stamp->height + 0.5;
+        if (inside && out->free_count < BST_FIT_MAX_FREE) {
+            out->free[out->free_count++] = s;
+        } else if (out->fixed_count < BST_COMPANY_MAX_FIXED) {
+            out->fixed[out->fixed_count++] = s;
+        }
+    }
+}
+
+bool bst_company_fit(const bst_worker *w, int i, bst_found *found, const bst_stamp *stamp,
+                     bool free_width) {
+    const bst_locate_frame *f = w->f;
+    bst_company c;
+    bst_company_gather(w->l, f, i, &found->source, stamp, &c);
+    bst_source copies[BST_FIT_MAX_FREE];
+    bst_source *free_sources[BST_FIT_MAX_FREE];
+    for (int k = 0; k < c.free_count; k++) {
+        copies[k] = *c.free[k];
+        free_sources[k] = &copies[k];
+    }
+    bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
+    double limit = bst_company_fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px));
+    bool ok = bst_fit_run(w->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
+                          free_width && c.free_count == 1, limit);
+    if (!ok && c.free_count > 1) {
+        /* the pixels do not determine a neighbour, as at the stamp's edge: it stays as it is */
+        int fixed_count = c.fixed_count;
+        for (int k = 1; k < c.free_count && fixed_count < BST_COMPANY_MAX_FIXED; k++) {
+            c.fixed[fixed_count++] = c.free[k];
+        }
+        copies[0] = *c.free[0];
+        ok = bst_fit_run(w->fit, &data, stamp, free_sources, 1, c.fixed, fixed_count, false, limit);
+    }
+    if (ok) {
+        found->source = copies[0];
+    }
+    found->company = c.free_count - 1 + c.fixed_count;
+    if (c.free_count > 1) {
+        found->flags |= BST_DETECTION_BLEND;
+    }
+    return ok;
+}
+
+void bst_company_drop_doubles(bst_locator *l, const bst_locate_frame *f, int end) {
+    double radius = 0.6 * BST_FWHM_PER_SIGMA * f->sigma_px;
+    double margin = radius + 1.8 * l->longest_px + 2.0 * bst_company_fit_limit(f, 0.0);
+    for (int i = 0; i < end; i++) {
+        const bst_shape *a = &l->found[i].source.shape;
+        int x0, x1, y0, y1;
+        cell_range(a->x_px, a->x_px, margin, l->columns, &x0, &x1);
+        cell_range(a->y_px, a->y_px, margin, l->rows, &y0, &y1);
+        for (int c = 0; c < (x1 - x0 + 1) * (y1 - y0 + 1); c++) {
+            int cell = (y0 + c / (x1 - x0 + 1)) * l->columns + x0 + c % (x1 - x0 + 1);
+            for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
+                const bst_shape *b = &l->found[k].source.shape;
+                /* numbers are by brightness: the fainter goes */
+                if (k < i && !l->found[k].dropped &&
+                    bst_charge_label(l->found[k].label) == bst_charge_label(l->found[i].label) &&
+                    hypot(a->x_px - b->x_px, a->y_px - b->y_px) < radius) {
+                    l->found[i].dropped = true;
+                }
+            }
+        }
+    }
+}

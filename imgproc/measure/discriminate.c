@@ -1,0 +1,474 @@
+#include "imgproc/measure/discriminate.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "imgproc/calibrate/pixel_learner.h"
+#include "imgproc/measure/cosmic_ray.h"
+#include "imgproc/measure/heapsort.h"
+#include "sim/optics/photometry.h"
+
+enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
+
+static const double EXPECTED_OBJECTS = 10.0; /* in a frame that nothing is known of */
+static const double PLACE_SIGMA_PX = 0.15;   /* of a place from one frame to another, besides its
+                                                covariance: attitude, distortion, pixels */
+static const double SAME_SIGMAS = 4.0;
+static const double SAME_MAG = 0.75;
+static const double MAX_GATE_PX = 3.0;
+static const double STREAK_PX = 3.0;  /* stars that move further are told from points */
+static const double LONG_SHARE = 3.0; /* length over width that no pair of points has */
+/* Odds of 200: of light at rest in the frame at most one in two hundred is ever taken for a hot
+ * pixel. */
+static const double SUSPICIOUS = 5.3;
+static const double FAINT_SNR = 8.0; /* below, a hot pixel may look like light */
+static const double STAR_REDETECTED = 0.6;
+
+/* A source of earlier frames. */
+typedef struct remembered {
+    bst_vec3 first, latest;       /* apparent directions */
+    double first_var, latest_var; /* rad^2 per axis */
+    double v_mag;
+    int seen, missed; /* frames */
+    bool moved;
+    bool fresh; /* new where an earlier frame had looked, and not yet judged by the next frame */
+    bool blend;
+    /* in the present frame */
+    double x_px, y_px;
+    bool inside, taken;
+    int next; /* in the band of its row */
+} remembered;
+
+/* Charge of earlier frames at a pixel. */
+typedef struct charged {
+    int64_t pixel;
+    int seen, missed;
+} charged;
+
+/* Of new sources of one brightness: how many were judged by the next frame, how many stayed. */
+typedef struct fate {
+    double judged, stayed;
+} fate;
+
+struct bst_discriminator {
+    bst_camera camera;
+    int capacity, room;
+    remembered *sources; /* [room] */
+    int count;
+    charged *charge, *merged; /* [room], by pixel */
+    int charge_count;
+    int *keys_order;
+    int *again; /* [capacity]: number of the remembered source that a detection is, -1: none */
+    int64_t *keys;
+    int *band;
+    int bands;
+    fate fates[2][MAG_BINS]; /* alone, blended */
+    /* of the latest oriented frame, and of the latest frame at all */
+    bool covered, charge_covered;
+    bst_quat q_cam_from_gcrf;
+    bst_window window, charge_window;
+};
+
+bst_status bst_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
+                                    bst_discriminator **out) {
+    *out = NULL;
+    bst_discriminator *d = calloc(1, sizeof *d);
+    if (!d) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for discrimination");
+    }
+    d->camera = *camera;
+    d->capacity = capacity;
+    d->room = 3 * capacity;
+    d->bands = (int)camera->height_px / BAND + 1;
+    size_t room = (size_t)d->room;
+    d->sources = calloc(room, sizeof *d->sources);
+    d->charge = calloc(room, sizeof *d->charge);
+    d->merged = calloc(room, sizeof *d->merged);
+    d->keys = calloc((size_t)capacity, sizeof *d->keys);
+    d->keys_order = calloc((size_t)capacity, sizeof *d->keys_order);
+    d->again = calloc((size_t)capacity, sizeof *d->again);
+    d->band = calloc((size_t)d->bands, sizeof *d->band);
+    if (!d->sources || !d->charge || !d->merged || !d->keys || !d->keys_order || !d->again ||
+        !d->band) {
+        bst_discriminator_free(d);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory to remember %d detections", capacity);
+    }
+    *out = d;
+    return BST_OK;
+}
+
+void bst_discriminator_free(bst_discriminator *d) {
+    if (!d) {
+        return;
+    }
+    free(d->sources);
+    free(d->charge);
+    free(d->merged);
+    free(d->keys);
+    free(d->keys_order);
+    free(d->again);
+    free(d->band);
+    free(d);
+}
+
+static void say(bst_detection *d, bst_label label, double probability) {
+    d->label = (int32_t)label;
+    d->label_probability = fmin(fmax(probability, 0.0), 1.0);
+}
+
+static bool in_window(const bst_window *w, double x, double y, double margin) {
+    return x >= w->x0 + margin && y >= w->y0 + margin && x <= w->x0 + w->width - 1 - margin &&
+           y <= w->y0 + w->height - 1 - margin;
+}
+
+/* ---- charge: the same pixel again, or not ---- */
+
+static int64_t pixel_of(const bst_discriminator *d, const bst_detection *item) {
+    return (int64_t)llround(item->y_px) * d->camera.width_px + (int64_t)llround(item->x_px);
+}
+
+static bool key_less(const void *context, int a, int b) {
+    const int64_t *keys = context;
+    return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
+}
+
+/* In how many frames a pixel held charge. */
+static int times_charged(const bst_discriminator *d, int64_t pixel) {
+    int lo = 0, hi = d->charge_count;
+    while (lo < hi) {
+        int mid = lo + (hi - lo) / 2;
+        if (d->charge[mid].pixel < pixel) {
+            lo = mid + 1;
+        } else {
+            hi = mid;
+        }
+    }
+    return lo < d->charge_count && d->charge[lo].pixel == pixel ? d->charge[lo].seen : 0;
+}
+
+/* Log-odds that a maximum is that of a pixel that learning suspects. */
+static double suspicion(const bst_discriminator *d, const bst_frame_knowledge *f,
+                        const bst_detection *item) {
+    return f->learned
+               ? bst_pixel_learner_suspicion(f->learned, f->left_out, (int32_t)pixel_of(d, item))
+               : 0.0;
+}
+
+static void label_charge(const bst_discriminator *d, const bst_frame_knowledge *f,
+                         bst_detection *item) {
+    int64_t pixel = pixel_of(d, item);
+    bool again = times_charged(d, pixel) > 0 || suspicion(d, f, item) >= SUSPICIOUS;
+    if (item->label == BST_LABEL_HIT && !again) {
+        /* the centroid of several pixels may round to another */
+        const int64_t row = d->camera.width_px;
+        again = times_charged(d, pixel - 1) + times_charged(d, pixel + 1) +
+                    times_charged(d, pixel - row) + times_charged(d, pixel + row) >
+                0;
+    }
+    bool looked = d->charge_covered && in_window(&d->charge_window, item->x_px, item->y_px, 0.0);
+    double charge = item->label_probability; /* that it is no light */
+    if (again) {
+        say(item, BST_LABEL_HOT_PIXEL, 0.99 * charge);
+    } else if (looked) {
+        say(item, BST_LABEL_HIT, 0.95 * charge);
+    } else if (item->label == BST_LABEL_HIT) {
+        say(item, BST_LABEL_HIT, 0.8 * charge);
+    } else {
+        say(item, BST_LABEL_HOT_PIXEL, 0.5 * charge);
+    }
+}
+
+/* Merges the frame's charge into the memory; both are in order of pixel. */
+static void remember_charge(bst_discriminator *d, const bst_window *window,
+                            const bst_detections *out) {
+    int fresh = 0;
+    for (int i = 0; i < out->count && fresh < d->capacity; i++) {
+        if (bst_charge_label(out->items[i].label)) {
+            d->keys_order[fresh] = fresh;
+            d->keys[fresh++] = pixel_of(d, &out->items[i]);
+        }
+    }
+    bst_heapsort_indices(d->keys_order, fresh, key_less, d->keys);
+    int a = 0, b = 0, count = 0;
+    while ((a < d->charge_count || b < fresh) && count < d->room) {
+        int64_t old = a < d->charge_count ? d->charge[a].pixel : INT64_MAX;
+        int64_t now = b < fresh ? d->keys[d->keys_order[b]] : INT64_MAX;
+        charged c = {now, 1, 0};
+        if (old <= now) {
+            c = d->charge[a++];
+            if (old == now) {
+                c.seen++;
+                c.missed = 0;
+            } else {
+                c.missed += in_window(window, (double)(old % d->camera.width_px),
+                                      (double)(old / d->camera.width_px), 0.0);
+            }
+        }
+        while (b < fresh && d->keys[d->keys_order[b]] == c.pixel) {
+            b++;
+        }
+        if (c.missed < (c.seen > 1 ? KEEP_CHARGE : KEEP_MISSED)) {
+            d->merged[count++] = c;
+        }
+    }
+    charged *swap = d->charge;
+    d->charge = d->merged;
+    d->merged = swap;
+    d->charge_count = count;
+    d->charge_covered = true;
+    d->charge_window = *window;
+}
+
+/* ---- sources: the same place of the sky again, or not ---- */
+
+static bool project(const bst_discriminator *d, bst_quat q, bst_vec3 direction, double *x,
+                    double *y) {
+    return bst_camera_project(&d->camera, bst_quat_rotate(q, direction), x, y);
+}
+
+/* Puts what is remembered on this frame. */
+static void place_memory(bst_discriminator *d, const bst_frame_knowledge *f) {
+    for (int i = 0; i < d->bands; i++) {
+        d->band[i] = -1;
+    }
+    for (int i = d->count - 1; i >= 0; i--) {
+        remembered *r = &d->sources[i];
+        r->taken = false;
+        r->inside = project(d, f->q_cam_from_gcrf, r->latest, &r->x_px, &r->y_px) &&
+                    in_window(&f->window, r->x_px, r->y_px, 0.0);
+        int band = (int)(r->y_px / BAND);
+        if (r->inside && band >= 0 && band < d->bands) {
+            r->next = d->band[band];
+            d->band[band] = i;
+        }
+    }
+}
+
+static double place_variance(const bst_detection *item) {
+    return fmax(item->cov_xx, item->cov_yy) + PLACE_SIGMA_PX * PLACE_SIGMA_PX;
+}
+
+static double mag_sigma(const bst_detection *item) {
+    return fmin(bst_photometry_noise_mag(item), 1.0);
+}
+
+/* Number of the nearest remembered source of like brightness; -1: none. */
+static int recall(bst_discriminator *d, const bst_detection *item) {
+    double scale = bst_camera_scale_rad(&d->camera), closest = 1.0;
+    int best = -1;
+    int band = (int)(item->y_px / BAND);
+    for (int b = band - 1; b <= band + 1; b++) {
+        for (int i = b >= 0 && b < d->bands ? d->band[b] : -1; i >= 0; i = d->sources[i].next) {
+            remembered *r = &d->sources[i];
+            if (r->taken || fabs(r->v_mag - item->v_mag) > SAME_MAG + 3.0 * mag_sigma(item)) {
+                continue;
+            }
+            double variance = place_variance(item) + r->latest_var / (scale * scale);
+            double gate = fmin(SAME_SIGMAS * sqrt(variance), MAX_GATE_PX);
+            double distance = hypot(item->x_px - r->x_px, item->y_px - r->y_px) / gate;
+            if (distance < closest) {
+                closest = distance;
+                best = i;
+            }
+        }
+    }
+    return best;
+}
+
+static fate *fate_of(bst_discriminator *d, double v_mag, bool blend) {
+    int bin = (int)floor(2.0 * (v_mag + 5.0));
+    return &d->fates[blend][bin < 0 ? 0 : bin >= MAG_BINS ? MAG_BINS - 1 : bin];
+}
+
+static bool is_source(const bst_detection *item) {
+    return !bst_charge_label(item->label) && item->label != BST_LABEL_ARTEFACT;
+}
+
+/* Notes that an earlier source was seen again. */
+static void note_again(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
+                       remembered *r) {
+    double scale = bst_camera_scale_rad(&d->camera);
+    double variance = place_variance(item) * scale * scale;
+    double away = bst_vec3_angle(direction, r->first);
+    r->moved = r->moved || away * away > SAME_SIGMAS * SAME_SIGMAS * (variance + r->first_var);
+    r->taken = true;
+    r->seen++;
+    r->missed = 0;
+    r->latest = direction;
+    r->latest_var = variance;
+}
+
+static bst_vec3 direction_of(const bst_discriminator *d, const bst_frame_knowledge *f,
+                             const bst_detection *item) {
+    return bst_quat_rotate(bst_quat_conj(f->q_cam_from_gcrf),
+                           bst_camera_unproject(&d->camera, item->x_px, item->y_px));
+}
+
+/* Finds the sources that were there before, and judges what was new in the frame before. */
+static void look_back(bst_discriminator *d, const bst_frame_knowledge *f,
+                      const bst_detections *out) {
+    for (int i = 0; i < out->count && i < d->capacity; i++) {
+        d->again[i] = is_source(&out->items[i]) ? recall(d, &out->items[i]) : -1;
+        if (d->again[i] >= 0) {
+            note_again(d, &out->items[i], direction_of(d, f, &out->items[i]),
+                       &d->sources[d->again[i]]);
+        }
+    }
+    for (int i = 0; i < d->count; i++) {
+        remembered *r = &d->sources[i];
+        if (r->fresh && r->inside) {
+            fate *t = fate_of(d, r->v_mag, r->blend);
+            t->judged += 1.0;
+            t->stayed += r->taken && !r->moved ? 1.0 : 0.0;
+            r->fresh = false;
+        }
+    }
+}
+
+static void remember(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
+                     bool fresh) {
+    if (d->count >= d->room) {
+        return;
+    }
+    double scale = bst_camera_scale_rad(&d->camera);
+    double variance = place_variance(item) * scale * scale;
+    d->sources[d->count++] = (remembered){.first = direction,
+                                          .latest = direction,
+                                          .first_var = variance,
+                                          .latest_var = variance,
+                                          .v_mag = item->v_mag,
+                                          .seen = 1,
+                                          .fresh = fresh,
+                                          .blend = (item->flags & BST_DETECTION_BLEND) != 0,
+                                          .taken = true,
+                                          .next = -1};
+}
+
+/* Forgets what was not seen for long, or is far from what is looked at. */
+static void forget(bst_discriminator *d) {
+    int kept = 0;
+    for (int i = 0; i < d->count; i++) {
+        remembered *r = &d->sources[i];
+        r->missed += !r->taken;
+        if (r->missed <= KEEP_MISSED) {
+            d->sources[kept++] = *r;
+        }
+    }
+    d->count = kept;
+}
+
+/* The probability that a source which no earlier frame had there is a star all the same. */
+static double new_star_probability(bst_discriminator *d, const bst_detection *item) {
+    const fate *t = fate_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
+    /* two that moved are believed in beforehand */
+    double stayed = t->stayed / (t->judged + 2.0);
+    return fmin(stayed / STAR_REDETECTED, 0.98);
+}
+
+/* ---- the frame ---- */
+
+/* Numbers of the detections that lie where moving tracks are expected get label OBJECT. */
+static void label_predicted(const bst_discriminator *d, const bst_frame_knowledge *f,
+                            bst_detections *out) {
+    double scale = bst_camera_scale_rad(&d->camera);
+    for (int p = 0; f->predictions && p < f->predictions->count; p++) {
+        const bst_prediction *track = &f->predictions->items[p];
+        bst_vec3 direction = bst_vec3_unit(
+            bst_vec3_axpy(track->direction_gcrf, f->predictions_age_s, track->rate_gcrf_radps));
+        double x, y, closest = fmin(1.0 + 3.0 * track->sigma_rad / scale, 2.0 * MAX_GATE_PX);
+        if (!project(d, f->q_cam_from_gcrf, bst_light_aberrate(&f->light, direction), &x, &y)) {
+            continue;
+        }
+        int best = -1;
+        for (int i = 0; i < out->count; i++) {
+            double distance = hypot(out->items[i].x_px - x, out->items[i].y_px - y);
+            if (out->items[i].label == BST_LABEL_UNKNOWN && distance < closest) {
+                closest = distance;
+                best = i;
+            }
+        }
+        if (best >= 0) {
+            say(&out->items[best], BST_LABEL_OBJECT, 0.98);
+        }
+    }
+}
+
+/* Drawn further than stars that lie close together in a frame of points. */
+static bool is_long_streak(const bst_detection *item) {
+    return (item->flags & BST_DETECTION_STREAK) && !(item->flags & BST_DETECTION_BLEND) &&
+           item->length_px > LONG_SHARE * item->width_px;
+}
+
+static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, double unlisted,
+                         int again, bst_detection *item) {
+    bool open = item->label == BST_LABEL_UNKNOWN;
+    double star = 0.0;
+    if (again >= 0) {
+        const remembered *r = &d->sources[again];
+        star = r->moved ? 0.05 : 1.0 - 0.1 / r->seen;
+    } else {
+        bst_vec3 direction = direction_of(d, f, item);
+        double x, y;
+        bool looked = d->covered && project(d, d->q_cam_from_gcrf, direction, &x, &y) &&
+                      in_window(&d->window, x, y, MAX_GATE_PX);
+        star = looked ? new_star_probability(d, item)
+                      : 1.0 - fmin(EXPECTED_OBJECTS / (EXPECTED_OBJECTS + unlisted), 0.9);
+        remember(d, item, direction, looked);
+    }
+    if (!open) {
+        return;
+    }
+    if (item->flags & BST_DETECTION_EDGE) {
+        say(item, BST_LABEL_ARTEFACT, 0.9);
+    } else if (f->streak_px >= STREAK_PX) {
+        bool drawn = (item->flags & BST_DETECTION_STREAK) != 0;
+        say(item, drawn ? BST_LABEL_STAR : BST_LABEL_OBJECT, drawn ? 0.9 : 0.95);
+    } else if ((again < 0 || d->sources[again].moved) && is_long_streak(item)) {
+        say(item, BST_LABEL_OBJECT, 0.95);
+    } else if (star > 0.5) {
+        say(item, BST_LABEL_STAR, star);
+    } else {
+        say(item, BST_LABEL_OBJECT, 1.0 - star);
+    }
+}
+
+void bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *f,
+                             bst_detections *out) {
+    double unlisted = 0.0;
+    for (int i = 0; i < out->count; i++) {
+        bst_detection *item = &out->items[i];
+        double odds = item->label == BST_LABEL_UNKNOWN ? suspicion(d, f, item) : 0.0;
+        if (bst_charge_label(item->label)) {
+            label_charge(d, f, item);
+        } else if (odds >= SUSPICIOUS) {
+            say(item, BST_LABEL_HOT_PIXEL, 1.0 - exp(-odds));
+        } else if (item->label == BST_LABEL_UNKNOWN && item->snr < FAINT_SNR &&
+                   times_charged(d, pixel_of(d, item)) > 1) {
+            say(item, BST_LABEL_HOT_PIXEL, 0.8);
+        }
+        unlisted += item->label == BST_LABEL_UNKNOWN;
+    }
+    remember_charge(d, &f->window, out);
+    for (int i = 0; i < out->count && !f->oriented; i++) {
+        bst_detection *item = &out->items[i];
+        if (item->label == BST_LABEL_UNKNOWN && (item->flags & BST_DETECTION_EDGE)) {
+            say(item, BST_LABEL_ARTEFACT, 0.9);
+        }
+    }
+    if (!f->oriented) {
+        return;
+    }
+    label_predicted(d, f, out);
+    place_memory(d, f);
+    look_back(d, f, out);
+    for (int i = 0; i < out->count && i < d->capacity; i++) {
+        if (is_source(&out->items[i])) {
+            label_source(d, f, unlisted, d->again[i], &out->items[i]);
+        }
+    }
+    forget(d);
+    d->covered = true;
+    d->q_cam_from_gcrf = f->q_cam_from_gcrf;
+    d->window = f->window;
+}

@@ -1,0 +1,283 @@
+#include "imgproc/measure/fit.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "imgproc/detect/background.h"
+#include "sim/core/cholesky.h"
+
+enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PARAMETERS + 3) / 2 };
+
+/* steps below this share of the standard deviation, and for neighbours, whose values are not kept:
+ * what is left after such a step is a small part of it */
+/* of a pivot, as a share of its diagonal element */
+static const double LEAST_PIVOT = 1e-11;
+static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
+
+bst_status bst_fit_create(bst_ctx *ctx, const bst_gauss *psf, const bst_profiles *profiles,
+                          int max_side, bst_fit *out) {
+    size_t plane = (size_t)max_side * (size_t)bst_lanes_up(max_side);
+    *out = (bst_fit){.psf = psf, .profiles = profiles, .max_side = max_side};
+    out->value = calloc(plane, sizeof(float));
+    out->fixed = calloc(plane, sizeof(float));
+    out->valid = calloc(plane, sizeof(float));
+    out->model = calloc(plane * 4 * BST_FIT_MAX_FREE, sizeof(float));
+    out->scratch = calloc(bst_image_scratch(max_side), sizeof(float));
+    if (!out->value || !out->fixed || !out->valid || !out->model || !out->scratch) {
+        bst_fit_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a fit on %d x %d pixels", max_side,
+                        max_side);
+    }
+    return BST_OK;
+}
+
+void bst_fit_free(bst_fit *fit) {
+    free(fit->value);
+    free(fit->fixed);
+    free(fit->valid);
+    free(fit->model);
+    free(fit->scratch);
+    *fit = (bst_fit){0};
+}
+
+bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side, int width,
+                        int height) {
+    const bst_shape *s = &source->shape;
+    double limit = 0.5 * (max_side - 2);
+    double rx = fmin(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + reach_px, limit);
+    double ry = fmin(0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + reach_px, limit);
+    int x0 = (int)fmax(floor(s->x_px - rx + 0.5), 0.0);
+    int y0 = (int)fmax(floor(s->y_px - ry + 0.5), 0.0);
+    int x1 = (int)fmin(floor(s->x_px + rx + 0.5), width - 1.0);
+    int y1 = (int)fmin(floor(s->y_px + ry + 0.5), height - 1.0);
+    return (bst_stamp){x0, y0, x1 >= x0 ? x1 - x0 + 1 : 0, y1 >= y0 ? y1 - y0 + 1 : 0};
+}
+
+static int plane_of(const bst_stamp *stamp) {
+    return bst_lanes_up(stamp->width) * stamp->height;
+}
+
+static bool fits_in(const bst_fit *fit, const bst_stamp *stamp) {
+    return stamp->width > 0 && stamp->height > 0 && stamp->width <= fit->max_side &&
+           stamp->height <= fit->max_side;
+}
+
+/* Renders a source into slot k of the work space. */
+static float *render(const bst_fit *fit, const bst_stamp *stamp, const bst_source *source, int k) {
+    float *m = fit->model + (size_t)k * 4 * (size_t)plane_of(stamp);
+    bst_image_render(fit->profiles, fit->psf, &source->shape, stamp, fit->scratch, m);
+    return m;
+}
+
+/* What the normal equations are summed from. */
+typedef struct terms {
+    const float *value, *fixed, *valid;
+    const float *model[BST_FIT_MAX_FREE]; /* by x, by y and by variance follow at n, 2 n, 3 n */
+    float flux[BST_FIT_MAX_FREE], widening[BST_FIT_MAX_FREE];
+    int n;
+    float noise2;
+} terms;
+
+#define BST_SIMD_KERNELS "imgproc/measure/fit_kernels.inc"
+#include "sim/core/simd_each.inc"
+
+/* Loads pixels and the fixed sources' light; returns the number of pixels that count. */
+static int load(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
+                const bst_source *const *fixed, int fixed_count) {
+    int n = plane_of(stamp);
+    memset(fit->fixed, 0, (size_t)n * sizeof(float));
+    for (int s = 0; s < fixed_count; s++) {
+        const float *m = render(fit, stamp, fixed[s], 0);
+        BST_SIMD_PICK(add_light)
+        (fit->fixed, m, n, (float)fixed[s]->flux_e, (float)fixed[s]->widening_px2);
+    }
+    return BST_SIMD_PICK(load_pixels)(fit, data, stamp);
+}
+
+/* Normal equations at the current sources. Parameters: x, y, flux of each, then the product of flux
+ * and widening of the first (only when it is alone). Returns chi-square. */
+static double accumulate(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
+                         bst_source *const *free, int count, bool free_width,
+                         double a[][BST_FIT_MAX_PARAMETERS], double *g) {
+    terms t = {.value = fit->value,
+               .fixed = fit->fixed,
+               .valid = fit->valid,
+               .n = plane_of(stamp),
+               .noise2 = (float)(data->noise_e * data->noise_e)};
+    for (int s = 0; s < count; s++) {
+        t.model[s] = render(fit, stamp, free[s], s);
+        t.flux[s] = (float)free[s]->flux_e;
+        t.widening[s] = (float)free[s]->widening_px2;
+    }
+    float sums[(MAX_SUMS + 1) * BST_LANES];
+    BST_SIMD_PICK(sum_terms)(&t, count, free_width, sums);
+    const float *at = sums;
+    for (int p = 0; p < 3 * count + (free_width ? 1 : 0); p++) {
+        for (int q = 0; q <= p; q++, at += BST_LANES) {
+            a[p][q] = bst_lane_sum(at);
+        }
+        g[p] = bst_lane_sum(at);
+        at += BST_LANES;
+    }
+    return bst_lane_sum(at);
+}
+
+static double clamp(double v, double lo, double hi) {
+    return v < lo ? lo : v > hi ? hi : v;
+}
+
+bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
+                 bst_source *const *free, int free_count, const bst_source *const *fixed,
+                 int fixed_count, bool free_width, double limit_px) {
+    free_width = free_width && free_count == 1;
+    int parameters = 3 * free_count + (free_width ? 1 : 0);
+    if (!fits_in(fit, stamp) || free_count < 1 || free_count > BST_FIT_MAX_FREE) {
+        return false;
+    }
+    int pixels = load(fit, data, stamp, fixed, fixed_count);
+    if (pixels < parameters + 1) {
+        return false;
+    }
+    double a[BST_FIT_MAX_PARAMETERS][BST_FIT_MAX_PARAMETERS], g[BST_FIT_MAX_PARAMETERS];
+    bst_source start[BST_FIT_MAX_FREE];
+    for (int s = 0; s < free_count; s++) {
+        start[s] = *free[s];
+    }
+    bool good = true, settled = false;
+    double chi = 0.0;
+    double widest = 0.6 * free[0]->shape.sigma_px * free[0]->shape.sigma_px;
+    /* a streak's ends tell of a shift only as far as the PSF reaches: it is found step by step */
+    double path = hypot(free[0]->shape.dx_px, free[0]->shape.dy_px);
+    int iterations = MAX_ITERATIONS + (int)fmin(path, BST_PSF_MAX_SIDE);
+    for (int iteration = 0; iteration < iterations && good && !settled; iteration++) {
+        chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
+        good = bst_cholesky_factor(a[0], BST_FIT_MAX_PARAMETERS, parameters, LEAST_PIVOT);
+        if (!good) {
+            break;
+        }
+        double gradient[BST_FIT_MAX_PARAMETERS];
+        memcpy(gradient, g, sizeof gradient);
+        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, g);
+        double gain = 0.0;
+        for (int k = 0; k < parameters; k++) {
+            gain += gradient[k] * g[k];
+        }
+        settled = iteration > 0;
+        for (int s = 0; s < free_count; s++) {
+            const double *step = g + 3 * s;
+            bst_source *f = free[s];
+            double x = clamp(f->shape.x_px + clamp(step[0], -0.7, 0.7),
+                             start[s].shape.x_px - limit_px, start[s].shape.x_px + limit_px);
+            double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7),
+                             start[s].shape.y_px - limit_px, start[s].shape.y_px + limit_px);
+            /* of the standard deviation that the diagonal promises, at least 1e-5 px */
+            double share = s == 0 ? SETTLED : NEIGHBOUR_SETTLED;
+            double slack_x = fmax(1e-5, share / a[3 * s][3 * s]);
+            double slack_y = fmax(1e-5, share / a[3 * s + 1][3 * s + 1]);
+            settled =
+                settled && fabs(x - f->shape.x_px) < slack_x && fabs(y - f->shape.y_px) < slack_y;
+            double product = f->flux_e * f->widening_px2;
+            double flux = f->flux_e + step[2];
+            flux = flux > 0.1 * f->flux_e ? flux : 0.1 * f->flux_e;
+            settled = settled && fabs(flux - f->flux_e) < share / a[3 * s + 2][3 * s + 2];
+            f->shape.x_px = x;
+            f->shape.y_px = y;
+            f->flux_e = flux;
+            if (s == 0 && free_width) {
+                product += g[3 * free_count];
+                f->widening_px2 = clamp(product / flux, -widest, 3.0 * widest);
+            }
+        }
+        chi -= settled ? gain : 0.0; /* what so small a step still brings */
+    }
+    if (good && !settled) {
+        /* the covariance belongs to the place where the fit ended */
+        chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
+        good = bst_cholesky_factor(a[0], BST_FIT_MAX_PARAMETERS, parameters, LEAST_PIVOT);
+    }
+    for (int s = 0; s < free_count; s++) {
+        good = good && isfinite(free[s]->shape.x_px) && isfinite(free[s]->shape.y_px) &&
+               isfinite(free[s]->flux_e) && free[s]->flux_e > 0.0;
+    }
+    if (!good) {
+        for (int s = 0; s < free_count; s++) {
+            *free[s] = start[s];
+        }
+        return false;
+    }
+    double column[3][BST_FIT_MAX_PARAMETERS];
+    for (int c = 0; c < 3; c++) {
+        memset(column[c], 0, sizeof column[c]);
+        column[c][c] = 1.0;
+        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, column[c]);
+    }
+    free[0]->cov_xx = column[0][0];
+    free[0]->cov_xy = column[0][1];
+    free[0]->cov_yy = column[1][1];
+    free[0]->flux_variance = column[2][2];
+    if (free_width) {
+        double last[BST_FIT_MAX_PARAMETERS] = {0};
+        last[parameters - 1] = 1.0;
+        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, last);
+        free[0]->widening_variance = last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
+    }
+    free[0]->chi_square = chi;
+    free[0]->pixels = pixels;
+    free[0]->fitted = true;
+    return true;
+}
+
+double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
+    double sum = 0.0;
+    int stride = bst_lanes_up(stamp->width);
+    for (int j = 0; j < stamp->height; j++) {
+        for (int i = 0; i < stamp->width; i++) {
+            double m = (double)fit->model[j * stride + i];
+            sum += m * m;
+        }
+    }
+    return sqrt(sum);
+}
+
+bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
+                     const bst_source *source, const bst_source *const *fixed, int fixed_count,
+                     double out[3]) {
+    if (!fits_in(fit, stamp) ||
+        load(fit, data, stamp, fixed, fixed_count) < stamp->width * stamp->height) {
+        return false;
+    }
+    const bst_shape *s = &source->shape;
+    double base = s->sigma_px * s->sigma_px + fmax(source->widening_px2, 0.0) + 1.0 / 12.0;
+    double path[3];
+    bst_shape_path_variance(s, path);
+    double wxx = 2.0 * (base + path[0]), wxy = 2.0 * path[1], wyy = 2.0 * (base + path[2]);
+    double det = wxx * wyy - wxy * wxy;
+    double ixx = wyy / det, iyy = wxx / det, ixy = -wxy / det;
+    float sums[4 * BST_LANES];
+    BST_SIMD_PICK(sum_moments)
+    (fit, stamp, (const double[2]){s->x_px - stamp->x0, s->y_px - stamp->y0},
+     (const double[3]){ixx, ixy, iyy}, sums);
+    double sum = bst_lane_sum(sums), mxx = bst_lane_sum(sums + BST_LANES);
+    double mxy = bst_lane_sum(sums + 2 * BST_LANES), myy = bst_lane_sum(sums + 3 * BST_LANES);
+    if (!(sum > 0.0)) {
+        return false;
+    }
+    mxx /= sum;
+    mxy /= sum;
+    myy /= sum;
+    double m = mxx * myy - mxy * mxy;
+    if (!(mxx > 0.0 && myy > 0.0 && m > 0.0)) {
+        return false;
+    }
+    /* a Gaussian under a Gaussian window: inverse covariances add */
+    double cxx = myy / m - ixx, cyy = mxx / m - iyy, cxy = -mxy / m - ixy;
+    double c = cxx * cyy - cxy * cxy;
+    if (!(cxx > 0.0 && cyy > 0.0 && c > 1e-6)) {
+        return false;
+    }
+    out[0] = cyy / c;
+    out[1] = -cxy / c;
+    out[2] = cxx / c;
+    return true;
+}

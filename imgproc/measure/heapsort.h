@@ -1,0 +1,38 @@
+/* In-place sort of indices that allocates nothing, unlike the C library's qsort. */
+#ifndef BST_IMGPROC_MEASURE_HEAPSORT_H
+#define BST_IMGPROC_MEASURE_HEAPSORT_H
+
+#include <stdbool.h>
+
+/* True when index a comes before index b; a strict total order gives one result only. */
+typedef bool (*bst_index_before)(const void *context, int a, int b);
+
+static inline void bst_heapsort_sift(int *items, int root, int count, bst_index_before before,
+                                     const void *context) {
+    int moved = items[root];
+    for (int child; (child = 2 * root + 1) < count; root = child) {
+        if (child + 1 < count && before(context, items[child], items[child + 1])) {
+            child++;
+        }
+        if (!before(context, moved, items[child])) {
+            break;
+        }
+        items[root] = items[child];
+    }
+    items[root] = moved;
+}
+
+static inline void bst_heapsort_indices(int *items, int count, bst_index_before before,
+                                        const void *context) {
+    for (int i = count / 2 - 1; i >= 0; i--) {
+        bst_heapsort_sift(items, i, count, before, context);
+    }
+    for (int end = count - 1; end > 0; end--) {
+        int swap = items[0];
+        items[0] = items[end];
+        items[end] = swap;
+        bst_heapsort_sift(items, 0, end, before, context);
+    }
+}
+
+#endif

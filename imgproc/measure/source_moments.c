@@ -1,0 +1,98 @@
+#include "imgproc/measure/source_moments.h"
+
+#include <math.h>
+
+#include "imgproc/measure/cosmic_ray.h"
+
+bool bst_extent_measure(const bst_worker *w, int i, bst_found *found, double wider) {
+    const bst_locate_frame *f = w->f;
+    const bst_shape *s = &found->source.shape;
+    double base = s->sigma_px * s->sigma_px + fmax(found->source.widening_px2, 0.0);
+    double m[3];
+    bst_shape_path_variance(s, m);
+    m[0] += base;
+    m[2] += base;
+    bool measured = false;
+    if (found->snr >= BST_EXTENT_SNR && !(found->flags & BST_DETECTION_EDGE)) {
+        bst_stamp stamp = bst_fit_stamp(&found->source, bst_company_reach(f) + wider,
+                                        w->l->max_side, f->width, f->height);
+        bst_company c;
+        c.free_count = c.fixed_count = 0;
+        if (!found->rough) {
+            bst_company_gather(w->l, f, i, &found->source, &stamp, &c);
+        }
+        const bst_source *others[BST_FIT_MAX_FREE + BST_COMPANY_MAX_FIXED];
+        int count = 0;
+        for (int k = 1; k < c.free_count; k++) {
+            others[count++] = c.free[k];
+        }
+        for (int k = 0; k < c.fixed_count; k++) {
+            others[count++] = c.fixed[k];
+        }
+        bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
+        double d[3];
+        if (bst_fit_moments(w->fit, &data, &stamp, &found->source, others, count, d)) {
+            /* the pixel's own variance off */
+            d[0] = fmax(d[0] - 1.0 / 12.0, 0.01);
+            d[2] = fmax(d[2] - 1.0 / 12.0, 0.01);
+            if (d[0] * d[2] > d[1] * d[1]) {
+                m[0] = d[0];
+                m[1] = d[1];
+                m[2] = d[2];
+                measured = true;
+            }
+        }
+    }
+    double mean = 0.5 * (m[0] + m[2]), half = hypot(0.5 * (m[0] - m[2]), m[1]);
+    double limit = 0.5 * w->l->max_side;
+    found->length_px = fmin(BST_FWHM_PER_SIGMA * sqrt(mean + half), limit);
+    found->width_px = fmin(BST_FWHM_PER_SIGMA * sqrt(fmax(mean - half, 0.0)), limit);
+    found->angle_rad = half > 1e-9 * mean ? 0.5 * atan2(2.0 * m[1], m[0] - m[2]) : 0.0;
+    return measured;
+}
+
+/* Fits *found with its path set to `path` px along `angle`; chi-square, or infinity. */
+static double try_path(const bst_worker *w, int i, bst_found *found, const bst_stamp *stamp,
+                       const bst_source *start_from, double path, double angle) {
+    found->source = *start_from;
+    found->source.shape.dx_px = path * cos(angle);
+    found->source.shape.dy_px = path * sin(angle);
+    return bst_company_fit(w, i, found, stamp, false) ? found->source.chi_square : INFINITY;
+}
+
+void bst_extent_own_streak(const bst_worker *w, int i, bst_found *found) {
+    const bst_locate_frame *f = w->f;
+    double psf_fwhm = BST_FWHM_PER_SIGMA * f->sigma_px;
+    for (int round = 0; round < 4; round++) {
+        if (!bst_extent_measure(w, i, found, 2.0 * bst_company_reach(f)) ||
+            found->length_px < 1.5 * psf_fwhm) {
+            return;
+        }
+        double spread = (found->length_px * found->length_px - psf_fwhm * psf_fwhm) /
+                        (BST_FWHM_PER_SIGMA * BST_FWHM_PER_SIGMA);
+        double path = fmin(sqrt(12.0 * spread), 0.4 * w->l->max_side), angle = found->angle_rad;
+        bst_found before = *found;
+        bst_source longest = before.source;
+        longest.shape.dx_px = 1.2 * path * cos(angle);
+        longest.shape.dy_px = 1.2 * path * sin(angle);
+        bst_stamp stamp = bst_company_stamp(w->l, f, &longest);
+        double old_path = hypot(before.source.shape.dx_px, before.source.shape.dy_px);
+        double old_angle = atan2(before.source.shape.dy_px, before.source.shape.dx_px);
+        double old_chi = try_path(w, i, found, &stamp, &before.source, old_path, old_angle);
+        double low = try_path(w, i, found, &stamp, &before.source, 0.8 * path, angle);
+        double high = try_path(w, i, found, &stamp, &before.source, 1.2 * path, angle);
+        double chi = try_path(w, i, found, &stamp, &before.source, path, angle);
+        double bend = low + high - 2.0 * chi, step = 0.0;
+        if (isfinite(bend)) {
+            step = bend > 0.0 ? 0.1 * (low - high) / bend : low < high ? -0.2 : 0.2;
+            step = fmax(-0.2, fmin(step, 0.2));
+            chi = try_path(w, i, found, &stamp, &before.source, path * (1.0 + step), angle);
+        }
+        if (!(chi < old_chi - 9.0)) {
+            *found = before;
+            return;
+        }
+        found->streak = true;
+        found->snr = found->source.flux_e * bst_fit_norm(w->fit, &stamp) / found->noise_e;
+    }
+}

@@ -1,0 +1,70 @@
+/* Images of sources in single precision, for fits: many a frame, all of one PSF. */
+#ifndef BST_IMGPROC_MEASURE_SOURCE_PROFILE_H
+#define BST_IMGPROC_MEASURE_SOURCE_PROFILE_H
+
+#include <stdbool.h>
+
+#include "imgproc/detect/known_psf.h"
+#include "imgproc/detect/psf.h"
+#include "imgproc/detect/simd_layout.h"
+#include "sim/core/status.h"
+
+enum {
+    BST_PROFILE_PHASES = 128,
+    BST_PROFILE_LENGTH = 96, /* the most */
+};
+
+/* The pixel-integrated PSF along one axis at centres of 1/128 px apart: share, slope and half the
+ * curvature by centre. A Gaussian has one profile for both axes; a known PSF `terms` of them for
+ * each, those of x by node of the field grid. */
+typedef struct bst_profiles {
+    const bst_known_psf *known; /* NULL: a Gaussian */
+    double sigma_px;            /* that they were made for */
+    int length, half;           /* pixels of a row: a multiple of 16; of them before the centre's */
+    int reach;                  /* pixels about the centre's that count */
+    int pitch;                  /* floats from a row to the next: lanes before and after are 0 */
+    float *rows;                /* lanes, [PHASES + 1][nodes][terms][3][pitch] */
+    float *down;                /* of a known PSF along y: lanes, [PHASES + 1][terms][3][pitch] */
+    /* the frame: full-sensor place = origin + binning * its pixel */
+    double origin_x_px, origin_y_px;
+    int binning, made_binning;
+} bst_profiles;
+
+/* known: lent, NULL for a Gaussian. */
+bst_status bst_profiles_create(bst_ctx *ctx, const bst_known_psf *known,
+                               bst_profiles *out) BST_MUST_CHECK;
+void bst_profiles_free(bst_profiles *profiles);
+/* Where on the sensor the sources of a frame are. */
+void bst_profiles_on(bst_profiles *profiles, double origin_x_px, double origin_y_px, int binning);
+/* Makes them for a Gaussian of sigma_px, at most 9, or the known PSF, which sigma_px is the like
+ * of; at once when they are there. */
+void bst_profiles_set(bst_profiles *profiles, const bst_gauss *psf, double sigma_px);
+
+/* Work space of bst_image_render for stamps of up to max_side, floats. */
+size_t bst_image_scratch(int max_side);
+
+/* As bst_gauss_render, for the PSF of `profiles`: four planes [height][stride] one after the other,
+ * share, by x, by y and by variance; stride: the stamp's width rounded up to lanes, what is beyond
+ * the stamp is of no meaning. Errors stay below 2e-4 of the peak: half of it the sum along the
+ * path, the rest the straight lines between the profiles' centres and, for sigma beyond 1.5 px, the
+ * light beyond 4.5 sigma; of a known PSF, what its sums miss. */
+void bst_image_render(const bst_profiles *profiles, const bst_gauss *psf, const bst_shape *shape,
+                      const bst_stamp *stamp, float *scratch, float *planes);
+
+/* The planes of a path's own changes, after the four: by its length in direction (ex, ey), by its
+ * end minus start across that, (-ey, ex), and by its bend in direction (ex, ey). */
+enum { BST_IMAGE_BY_LENGTH = 4, BST_IMAGE_BY_ACROSS, BST_IMAGE_BY_BEND, BST_IMAGE_MOTION_PLANES };
+
+/* As bst_image_render, with the planes of changes that all streaks of a frame share. */
+void bst_image_render_motion(const bst_profiles *profiles, const bst_gauss *psf,
+                             const bst_shape *shape, const bst_stamp *stamp, double ex, double ey,
+                             float *scratch, float *planes);
+
+/* The same two for a known PSF; moved: with the planes of changes, else ex and ey are not used. */
+void bst_image_render_known(const bst_profiles *profiles, const bst_gauss *psf,
+                            const bst_shape *shape, const bst_stamp *stamp, bool moved, double ex,
+                            double ey, float *scratch, float *planes);
+/* Fills the profiles of a known PSF for the frame's binning. */
+void bst_profiles_set_known(bst_profiles *profiles);
+
+#endif

@@ -1,0 +1,400 @@
+#include "imgproc/streak/streak_locate.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "imgproc/measure/cosmic_ray.h"
+#include "sim/core/vec.h"
+#include "sim/messages/messages.h"
+
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+/* A point this many times brighter than the streak under it is a source of its own. */
+enum { MOST_PIECES = 64 };
+/* Points per pixel from which bright streaks are no longer looked for among them. */
+static const double CROWD_PER_PX = 0.0015;
+/* From here a source is a point unless it covers that much more than a point's pixels. */
+static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
+static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
+
+bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_gauss *psf, bst_parallel *pool,
+                                     int max_width, int max_height, double fwhm_px, double max_px,
+                                     bst_streak_locator *out) {
+    *out = (bst_streak_locator){0};
+    int side = (int)ceil(1.25 * max_px + 6.0 * fwhm_px) + 14;
+    side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
+    bst_status status =
+        bst_streak_search_create(ctx, pool, max_width, max_height, max_px, &out->search);
+    if (status == BST_OK) {
+        status = bst_streak_fit_create(ctx, psf, side, &out->fit);
+    }
+    if (status == BST_OK) {
+        out->excluded = calloc((size_t)side * (size_t)side, 1);
+        out->pieces = calloc(MOST_PIECES, sizeof *out->pieces);
+        if (!out->excluded || !out->pieces) {
+            status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for a stamp of %d px", side);
+        }
+    }
+    if (status != BST_OK) {
+        bst_streak_locator_free(out);
+    }
+    return status;
+}
+
+void bst_streak_locator_free(bst_streak_locator *l) {
+    bst_streak_search_free(&l->search);
+    bst_streak_fit_free(&l->fit);
+    free(l->excluded);
+    free(l->pieces);
+    *l = (bst_streak_locator){0};
+}
+
+/* Where the filtered image of a point of this SNR falls below half a standard deviation, and a
+ * little more for a PSF that is not quite the one known. */
+static double disc_radius(double snr, double sigma_px) {
+    return 2.3 * sigma_px * sqrt(log(2.0 * fmax(snr, 2.0))) + 0.5;
+}
+
+/* Distance from the line and place along it, 0 to 1. */
+static double across(const bst_streak_line *line, double x, double y, double *along) {
+    double ux = line->x1 - line->x0, uy = line->y1 - line->y0;
+    double length = fmax(hypot(ux, uy), 1e-6);
+    double px = x - line->x0, py = y - line->y0;
+    *along = (px * ux + py * uy) / (length * length);
+    return fabs(px * uy - py * ux) / length;
+}
+
+/* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance, up to
+ * beyond_px past its ends; returns how many, and marks them by `pieces`. */
+static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
+                       const bst_streak_line *line, double sigma_px, double piece_snr,
+                       double beyond_px) {
+    double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
+    int pieces = 0;
+    for (int i = 0; i < count && pieces < MOST_PIECES; i++) {
+        bst_found *f = &found->found[i];
+        double along, distance = across(line, f->source.shape.x_px, f->source.shape.y_px, &along);
+        double beyond = fmax(-along, along - 1.0) * length;
+        bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < beyond_px;
+        bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
+        if (inside && !own && !f->dropped && !bst_charge_label(f->label)) {
+            f->dropped = true;
+            l->pieces[pieces++] = i;
+        }
+    }
+    return pieces;
+}
+
+/* Leaves out pixels with the light of other sources. */
+static void exclude(bst_streak_locator *l, const bst_locate_frame *f, const bst_locator *found,
+                    int count, const bst_stamp *stamp) {
+    memset(l->excluded, 0, (size_t)stamp->width * (size_t)stamp->height);
+    for (int i = 0; i < count; i++) {
+        const bst_found *o = &found->found[i];
+        double x = o->source.shape.x_px - stamp->x0, y = o->source.shape.y_px - stamp->y0;
+        double radius = disc_radius(o->snr, f->sigma_px);
+        if (o->dropped || bst_charge_label(o->label) || x < -radius || y < -radius ||
+            x > stamp->width + radius || y > stamp->height + radius) {
+            continue;
+        }
+        int top = (int)fmax(ceil(y - radius), 0.0);
+        int bottom = (int)fmin(floor(y + radius), stamp->height - 1.0);
+        int left = (int)fmax(ceil(x - radius), 0.0);
+        int right = (int)fmin(floor(x + radius), stamp->width - 1.0);
+        for (int v = top; v <= bottom; v++) {
+            for (int u = left; u <= right; u++) {
+                if (hypot(u - x, v - y) <= radius) {
+                    l->excluded[v * stamp->width + u] = 1;
+                }
+            }
+        }
+    }
+}
+
+static bool at_edge(const bst_locate_frame *f, const bst_shape *s) {
+    double x = 0.5 * fabs(s->dx_px) + 2.0 * f->sigma_px;
+    double y = 0.5 * fabs(s->dy_px) + 2.0 * f->sigma_px;
+    return s->x_px - x < -0.5 || s->y_px - y < -0.5 || s->x_px + x > f->width - 0.5 ||
+           s->y_px + y > f->height - 0.5;
+}
+
+/* What a line whose fit fails is worth: across it as a point of its SNR, along it a third of its
+ * length. */
+static void claim_line(const bst_locate_frame *f, const bst_streak_line *line, bst_found *out) {
+    bst_source *s = &out->source;
+    double length = hypot(s->shape.dx_px, s->shape.dy_px);
+    double c = s->shape.dx_px / length, d = s->shape.dy_px / length;
+    double across2 = 2.0 * f->sigma_px * f->sigma_px / (line->snr * line->snr) + 0.04;
+    double along2 = length * length / 9.0;
+    s->cov_xx = along2 * c * c + across2 * d * d;
+    s->cov_xy = (along2 - across2) * c * d;
+    s->cov_yy = along2 * d * d + across2 * c * c;
+    s->flux_variance = s->flux_e * s->flux_e / (line->snr * line->snr);
+}
+
+/* The source that a line tells of; false when the fit fails and the line itself is all there is. */
+static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_locator *found,
+                    int count, const bst_streak_line *line, double beyond_px, bst_found *out,
+                    bst_stamp *stamp) {
+    *out = (bst_found){.peak_snr = (float)line->snr, .streak = true};
+    bst_source *s = &out->source;
+    s->shape = (bst_shape){.x_px = 0.5 * (line->x0 + line->x1),
+                           .y_px = 0.5 * (line->y0 + line->y1),
+                           .dx_px = line->x1 - line->x0,
+                           .dy_px = line->y1 - line->y0,
+                           .sigma_px = f->sigma_px};
+    s->widening_px2 =
+        found->widening_weight > 0.0 ? found->widening_sum / found->widening_weight : 0.0;
+    out->noise_e = bst_background_noise_at(f->background, s->shape.x_px, s->shape.y_px);
+    double length = hypot(s->shape.dx_px, s->shape.dy_px);
+    /* norm of a streak that is long against the PSF: 1 / sqrt(2 sqrt(pi) sigma length) */
+    double norm = 1.0 / sqrt(2.0 * sqrt(BST_PI) * f->sigma_px * (length + 2.0));
+    s->flux_e = line->snr * out->noise_e / norm;
+    double reach = fmax(3.0, ceil(3.6 * f->sigma_px)) + 0.1 * length + beyond_px;
+    *stamp = bst_fit_stamp(s, reach, l->fit.max_side, f->width, f->height);
+    bst_fit_data data = {f->signal, f->width, f->height, out->noise_e};
+    exclude(l, f, found, count, stamp);
+    bool fitted = bst_streak_fit_run(&l->fit, &data, stamp, l->excluded, s, &norm);
+    if (!fitted) {
+        claim_line(f, line, out);
+    }
+    out->peak_x = (int)floor(s->shape.x_px + 0.5);
+    out->peak_y = (int)floor(s->shape.y_px + 0.5);
+    out->snr = s->flux_e * norm / out->noise_e;
+    double path = hypot(s->shape.dx_px, s->shape.dy_px);
+    double variance = f->sigma_px * f->sigma_px;
+    out->length_px = FWHM_PER_SIGMA * sqrt(path * path / 12.0 + variance);
+    out->width_px = FWHM_PER_SIGMA * f->sigma_px;
+    double angle = atan2(s->shape.dy_px, s->shape.dx_px);
+    out->angle_rad = angle > 0.5 * BST_PI     ? angle - BST_PI
+                     : angle <= -0.5 * BST_PI ? angle + BST_PI
+                                              : angle;
+    out->flags = BST_DETECTION_STREAK;
+    if (at_edge(f, &s->shape)) {
+        out->flags |= BST_DETECTION_EDGE;
+    }
+    const bst_shape *p = &s->shape;
+    if (p->x_px < -0.5 || p->y_px < -0.5 || p->x_px > f->width - 0.5 || p->y_px > f->height - 0.5) {
+        out->label = BST_LABEL_ARTEFACT;
+        out->label_probability = 0.9;
+    }
+    return fitted;
+}
+
+/* Chi-square of the dropped pieces as sources of their own, on the stamp of the latest fit. */
+static double chi_of_pieces(bst_streak_locator *l, const bst_locate_frame *f,
+                            const bst_locator *found, int pieces, const bst_stamp *stamp,
+                            double noise) {
+    size_t n = (size_t)stamp->width * (size_t)stamp->height;
+    double *total = l->fit.image, *share = total + n, chi = 0.0;
+    memset(total, 0, n * sizeof(double));
+    for (int i = 0; i < pieces; i++) {
+        const bst_source *s = &found->found[l->pieces[i]].source;
+        bst_gauss_render(l->fit.psf, &s->shape, stamp, share, share + n, share + 2 * n,
+                         share + 3 * n);
+        for (size_t k = 0; k < n; k++) {
+            total[k] += s->flux_e * (share[k] + s->widening_px2 * share[k + 3 * n]);
+        }
+    }
+    for (int j = 0; j < stamp->height; j++) {
+        const float *row =
+            f->signal + (size_t)(stamp->y0 + j) * (size_t)f->width + (size_t)stamp->x0;
+        for (int i = 0; i < stamp->width; i++) {
+            size_t k = (size_t)j * (size_t)stamp->width + (size_t)i;
+            if (!l->excluded[k] && row[i] > BST_PIXEL_NONE) {
+                double r = (double)row[i] - total[k];
+                chi += r * r / (noise * noise + fmax(total[k], 0.0));
+            }
+        }
+    }
+    return chi;
+}
+
+/* SNR of the two brightest points on the line together; in the map they are cut down. */
+static double snr_of_points(const bst_streak_locator *l, const bst_locator *found, int pieces,
+                            const bst_streak_line *line) {
+    double first = line->point_snr[0], second = line->point_snr[1];
+    for (int i = 0; i < pieces; i++) {
+        const bst_found *f = &found->found[l->pieces[i]];
+        double snr = f->streak ? 0.0 : f->snr;
+        if (snr > first) {
+            second = i > 0 ? first : second;
+            first = snr;
+        } else if (snr > second) {
+            second = snr;
+        }
+    }
+    return hypot(first, second);
+}
+
+/* Whether the fit went to a streak that is there already. */
+static bool is_known(const bst_locate_frame *f, const bst_locator *found, int points,
+                     const bst_found *streak) {
+    for (int i = points; i < found->count; i++) {
+        const bst_shape *s = &found->found[i].source.shape;
+        bst_streak_line line = {.x0 = s->x_px - 0.5 * s->dx_px,
+                                .y0 = s->y_px - 0.5 * s->dy_px,
+                                .x1 = s->x_px + 0.5 * s->dx_px,
+                                .y1 = s->y_px + 0.5 * s->dy_px};
+        const bst_shape *n = &streak->source.shape;
+        double along, distance = across(&line, n->x_px, n->y_px, &along);
+        double turn =
+            fabs(s->dx_px * n->dy_px - s->dy_px * n->dx_px) / fmax(hypot(s->dx_px, s->dy_px), 1.0);
+        if (distance < 3.0 * f->sigma_px && along > -0.1 && along < 1.1 &&
+            turn < 8.0 * f->sigma_px) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Takes a line for a streak with the points up to beyond_px past its ends as its pieces, unless
+ * `bare`, then those that are not too bright for it; false, and all as it was, when they are better
+ * explained as points. */
+static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_locator *found,
+                     int points, const bst_streak_line *line, double beyond_px, bool bare) {
+    double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
+    double piece =
+        bare ? line->snr * sqrt(3.5 * f->sigma_px / (length + 3.5 * f->sigma_px)) : INFINITY;
+    int pieces = drop_pieces(l, found, points, line, f->sigma_px, piece, beyond_px);
+    bst_found streak;
+    bst_stamp stamp;
+    bool fitted = measure(l, f, found, points, line, beyond_px, &streak, &stamp);
+    /* a line that owes its SNR to light of others keeps little of it without that */
+    bool good = fitted ? streak.snr > line->snr - LOST_SNR : bare && pieces == 0;
+    good = good && !is_known(f, found, points, &streak);
+    if (good && pieces > 0) {
+        /* points have three parameters, streaks five */
+        int parameters = 0;
+        for (int k = 0; k < pieces; k++) {
+            parameters += found->found[l->pieces[k]].streak ? 5 : 3;
+        }
+        double chi = chi_of_pieces(l, f, found, pieces, &stamp, streak.noise_e);
+        good = streak.snr > snr_of_points(l, found, pieces, line) &&
+               streak.source.chi_square + 5.0 <= chi + parameters;
+    }
+    for (int k = 0; k < pieces; k++) {
+        found->found[l->pieces[k]].dropped = good;
+    }
+    if (good) {
+        found->found[found->count++] = streak;
+    }
+    return good;
+}
+
+static void add(bst_streak_locator *l, const bst_locate_frame *f, bst_locator *found, int points,
+                int lines) {
+    for (int i = 0; i < lines && found->count < found->capacity; i++) {
+        const bst_streak_line *line = &l->search.found[i];
+        /* a point may be all that shows of the streak there, or a star on it or beside it */
+        double hidden = 2.0 * disc_radius(line->snr, f->sigma_px);
+        if (!add_line(l, f, found, points, line, hidden, false)) {
+            add_line(l, f, found, points, line, 3.0 * f->sigma_px, true);
+        }
+    }
+}
+
+static void blank_point(bst_streak_locator *l, double x, double y, double snr, double sigma,
+                        double widen) {
+    bst_streak_map_blank(&l->search.map, x, y, x, y, widen * disc_radius(snr, sigma));
+}
+
+/* Takes charge out: what is left of its track beside the pixels that were left out. */
+static void blank_charge(bst_streak_locator *l, const bst_found *o) {
+    /* a track of even charge, by its second moment */
+    double half = 0.5 * sqrt(12.0) / FWHM_PER_SIGMA * o->length_px;
+    double dx = half * cos(o->angle_rad), dy = half * sin(o->angle_rad);
+    double x = o->source.shape.x_px, y = o->source.shape.y_px;
+    bst_streak_map_blank(&l->search.map, x - dx, y - dy, x + dx, y + dy,
+                         3.0 * o->source.shape.sigma_px + 1.5);
+}
+
+/* The run of pixels above the threshold of row y that touches *lo to *hi and takes its place; their
+ * number, 0 when there is none. */
+static int lit_in_row(const bst_filter *filter, double threshold, int y, int *lo, int *hi) {
+    int first = *lo - 1, last = *hi + 1, count = 0;
+    while (first <= last && !(first >= 0 && first < filter->width &&
+                              (double)bst_filter_point_at(filter, first, y) > threshold)) {
+        first++;
+    }
+    while (last >= first && !(last >= 0 && last < filter->width &&
+                              (double)bst_filter_point_at(filter, last, y) > threshold)) {
+        last--;
+    }
+    if (first > last) {
+        return 0;
+    }
+    while (first > 0 && (double)bst_filter_point_at(filter, first - 1, y) > threshold) {
+        first--;
+    }
+    while (last < filter->width - 1 &&
+           (double)bst_filter_point_at(filter, last + 1, y) > threshold) {
+        last++;
+    }
+    for (int x = first; x <= last; x++) {
+        count += (double)bst_filter_point_at(filter, x, y) > threshold;
+    }
+    *lo = first;
+    *hi = last;
+    return count;
+}
+
+/* Pixels above the threshold that are joined to a maximum, row by row; counting ends at `enough`.
+ */
+static int lit_pixels(const bst_filter *filter, double threshold, int x, int y, double enough) {
+    int lo = x, hi = x, count = lit_in_row(filter, threshold, y, &lo, &hi);
+    for (int step = -1; step <= 1; step += 2) {
+        int l = lo, h = hi, more = count;
+        for (int v = y + step; more > 0 && v >= 0 && v < filter->height && count < enough;
+             v += step) {
+            more = lit_in_row(filter, threshold, v, &l, &h);
+            count += more;
+        }
+    }
+    return count;
+}
+
+/* Whether a source is too bright for a piece of a streak of that many pixels: filtered, a point is
+ * above a threshold t on 4 pi sigma^2 ln(snr / t) pixels. */
+static bool is_bright_point(const bst_locate_frame *f, const bst_found *o) {
+    double snr = (double)o->peak_snr, threshold = f->filter->threshold;
+    if (o->streak || (o->flags & BST_DETECTION_BLEND) || !(snr > BRIGHT_POINT_SNR)) {
+        return false;
+    }
+    double area = 4.0 * BST_PI * f->sigma_px * f->sigma_px * log(fmax(snr / threshold, 1.0));
+    double most = AREA_SHARE * area + AREA_PIXELS;
+    return lit_pixels(f->filter, threshold, o->peak_x, o->peak_y, most) < most;
+}
+
+void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
+                       const bst_candidates *candidates, double false_alarms, bst_locator *found) {
+    int points = found->count;
+    bst_streak_search_fill(&l->search, f->signal, f->width, f->height, f->background, f->sigma_px);
+    for (int i = 0; i < points; i++) {
+        const bst_found *o = &found->found[i];
+        bool saturated = o->flags & BST_DETECTION_SATURATED;
+        if (bst_charge_label(o->label)) {
+            blank_charge(l, o);
+        } else if (saturated || is_bright_point(f, o)) {
+            blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
+                        saturated ? 1.5 : 1.0);
+        }
+    }
+    /* among so many points chains of them are everywhere */
+    if (candidates->count < CROWD_PER_PX * (double)f->width * (double)f->height) {
+        add(l, f, found, points, bst_streak_search_bright(&l->search));
+    }
+    int light = 0;
+    for (int i = 0; i < points; i++) {
+        const bst_found *o = &found->found[i];
+        if (!o->dropped && !bst_charge_label(o->label)) {
+            light++;
+            blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
+        }
+    }
+    for (int i = points; i < candidates->count; i++) {
+        const bst_candidate *c = &candidates->items[candidates->order[i]];
+        blank_point(l, c->x, c->y, (double)c->snr, f->sigma_px, 1.0);
+    }
+    add(l, f, found, points, bst_streak_search_faint(&l->search, false_alarms, light));
+}

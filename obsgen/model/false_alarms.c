@@ -1,0 +1,153 @@
+#include "obsgen/model/false_alarms.h"
+
+#include <math.h>
+
+#include "obsgen/generator_internal.h"
+
+/* Draws of clutter begin beyond those of sources, whose names have 33 bits. */
+static const uint64_t FALSE_ALARM = (uint64_t)1 << 40, HIT = (uint64_t)1 << 41;
+/* Image processing takes a source for an artefact whose brightest pixel stands so far above its
+ * peak: HOT_SHARE of it and HOT_SIGMA. */
+static const double HOT_SHARE = 1.1, HOT_SIGMA = 2.5;
+
+static double uniform(const bst_generator *g, uint64_t draw) {
+    return bst_rng_uniform(g->key, (uint64_t)g->exposure_id, draw);
+}
+
+bst_detection bst_generator_point(const bst_generator *g, double x, double y, double snr,
+                                  double length) {
+    bst_detection d = {0};
+    double norm = bst_bound_norm(&g->bound, length), b = g->binning;
+    d.flux_e = snr * g->noise_e / norm;
+    bst_bound_at bound = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
+    double c = length > 0.0 ? g->star_path.dx / g->streak : 1.0;
+    double s = length > 0.0 ? g->star_path.dy / g->streak : 0.0;
+    double a2 = bound.var_along_px2 * b * b, b2 = bound.var_across_px2 * b * b;
+    d.x_px = g->origin_x + b * x;
+    d.y_px = g->origin_y + b * y;
+    d.cov_xx = c * c * a2 + s * s * b2;
+    d.cov_xy = c * s * (a2 - b2);
+    d.cov_yy = s * s * a2 + c * c * b2;
+    d.flux_sigma_e = sqrt(bound.flux_variance);
+    d.snr = snr;
+    const double fwhm = 2.3548200450309493;
+    d.width_px = b * fwhm * g->sigma;
+    d.length_px = b * fwhm * sqrt(g->sigma * g->sigma + length * length / 12.0);
+    d.angle_rad = length > 0.0 ? atan(s / c) : 0.0;
+    d.flags = length > 0.0 ? BST_DETECTION_STREAK : 0u;
+    d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
+    double edge_x = 2.0 * g->sigma + 0.5 * length * fabs(c);
+    double edge_y = 2.0 * g->sigma + 0.5 * length * fabs(s);
+    if (x < edge_x - 0.5 || y < edge_y - 0.5 || x > g->width - 0.5 - edge_x ||
+        y > g->height - 0.5 - edge_y) {
+        d.flags |= BST_DETECTION_EDGE;
+    }
+    return d;
+}
+
+/* False alarms where offsets of rows and columns are part of the noise, over those of white noise
+ * of the same variance, which the threshold is for: the output varies by more, but less from one
+ * row or column to the next. */
+static double more_alarms(const bst_generator *g) {
+    double more = 0.0;
+    for (int k = 0; k < 2; k++) {
+        double share = k == 1 ? g->streak_share : 1.0 - g->streak_share;
+        double v = g->filters[k].variance, t = g->threshold;
+        if (!(g->streak > 0.0)) {
+            share = k == 0 ? 1.0 : 0.0;
+        }
+        /* maxima go with sqrt(det of the gradient's covariance) u exp(-u^2 / 2), u in deviations;
+         * the offsets' part has no gradient along them */
+        more += share * sqrt(g->white_share / v) / sqrt(v) * exp(0.5 * t * t * (1.0 - 1.0 / v));
+    }
+    return more;
+}
+
+void bst_generator_false_alarms(bst_generator *g) {
+    double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
+    /* background that is found too bright takes from noise */
+    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    expected *= exp(-taken * (g->threshold + 0.5 * taken));
+    expected *= more_alarms(g);
+    if (g->smeared) { /* nothing is looked at between the pixels */
+        double least = g->threshold * g->noise_e / g->dark_noise_e +
+                       g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->dark_noise_e);
+        least /= sqrt(g->filters[0].variance);
+        expected = bst_matched_pixel_maxima(g->filter_sigma, least) * g->width * g->height;
+    }
+    double arrival = 0.0;
+    for (uint64_t i = 0; i < 1000000; i++) {
+        uint64_t draw = FALSE_ALARM + 8 * i;
+        arrival -= log(uniform(g, draw));
+        if (arrival > expected) {
+            return;
+        }
+        double x = g->width * uniform(g, draw + 1) - 0.5;
+        double y = g->height * uniform(g, draw + 2) - 0.5;
+        bool streak = g->streak > 0.0 && uniform(g, draw + 4) < g->streak_share;
+        const bst_generator_filter *filter = &g->filters[streak];
+        double energy = -2.0 * log(uniform(g, draw + 3)) / g->calibration.false_alarm_tail;
+        double snr = sqrt(filter->threshold * filter->threshold + filter->variance * energy);
+        if (g->smeared) {
+            bst_generator_keep_rough(g, (int)lround(x), (int)lround(y), snr, -1);
+            continue;
+        }
+        bst_generated item = {
+            .detection = bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0),
+            .item = -1,
+            .drawn = streak};
+        bst_generator_keep(g, &item);
+    }
+}
+
+void bst_generator_hits(bst_generator *g) {
+    const bst_hits_config *h = &g->camera->detector.hits;
+    if (!(h->rate_per_cm2_s > 0.0)) {
+        return;
+    }
+    double pixel_cm2 = h->pixel_pitch_um * h->pixel_pitch_um * 1e-8 * g->binning * g->binning;
+    double expected =
+        h->rate_per_cm2_s * pixel_cm2 * g->width * g->height * (g->exposure_s + h->frame_s);
+    /* a point of one electron at the filter's output: its kernel's greatest value over the noise */
+    double kernel = 1.0 / (2.0 * BST_PI * g->total_sigma * g->total_sigma) /
+                    bst_bound_norm(&g->bound, 0.0) / g->noise_e;
+    double arrival = 0.0;
+    for (uint64_t i = 0; i < 1000000; i++) {
+        uint64_t draw = HIT + 16 * i;
+        arrival -= log(uniform(g, draw));
+        if (arrival > expected) {
+            return;
+        }
+        double mu = sqrt(uniform(g, draw + 1));
+        double z = bst_rng_normal(g->key, (uint64_t)g->exposure_id, draw + 2);
+        double charge =
+            h->e_per_um * h->depth_um / mu * fmax(1.0 - h->straggling * log(z * z), 0.0);
+        double length = h->depth_um / (h->pixel_pitch_um * g->binning) * sqrt(1.0 - mu * mu) / mu;
+        double angle = 2.0 * BST_PI * uniform(g, draw + 3);
+        double x = g->width * uniform(g, draw + 4) - 0.5 + 0.5 * length * cos(angle);
+        double y = g->height * uniform(g, draw + 5) - 0.5 + 0.5 * length * sin(angle);
+        /* the track as the filter sees it at its middle */
+        double s = g->total_sigma * sqrt(2.0);
+        double seen = length > 0.05 ? s * sqrt(BST_PI) * erf(0.5 * length / s) / length : 1.0;
+        double snr = charge * kernel * fmin(seen, 1.0);
+        double peak = snr + bst_rng_normal(g->key, (uint64_t)g->exposure_id, draw + 6);
+        if (!(peak > g->filters[0].threshold) || x < -0.5 || y < -0.5 || x > g->width - 0.5 ||
+            y > g->height - 0.5) {
+            continue;
+        }
+        bst_generated item = {
+            .detection = bst_generator_point(g, x, y, peak, 0.0), .item = -1, .hit = true};
+        bst_detection *d = &item.detection;
+        double hottest = charge / fmax(length, 1.0) / g->noise_e;
+        bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;
+        if (stands_out && uniform(g, draw + 7) < g->calibration.hit_told_probability) {
+            d->label = BST_LABEL_HIT;
+        }
+        if (length > 1.5 * d->width_px / g->binning) {
+            d->length_px = g->binning * length;
+            d->angle_rad = atan(tan(angle));
+            d->flags |= BST_DETECTION_STREAK;
+        }
+        bst_generator_keep(g, &item);
+    }
+}

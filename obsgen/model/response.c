@@ -1,0 +1,190 @@
+#include "obsgen/model/response.h"
+
+#include <math.h>
+
+#include "sim/core/vec.h"
+
+static const double PIXEL_VARIANCE = 1.0 / 12.0;
+/* Steps of the sums over an OTF: an image that ends within REACH_PX is exact to its square there.
+ */
+enum { REACH_PX = 24 };
+/* OTF without the pixel below which frequencies count for nothing. */
+static const double LEAST_OTF = 1e-4;
+
+/* Sums over frequencies of the products of source and filter: at rest, and on a line. */
+typedef struct spectral_sums {
+    double point[3], line[3];     /* source by source, filter by filter, source by filter */
+    double gradient[3], filtered; /* filter's: xx, xy, yy */
+} spectral_sums;
+
+/* Of a pixel of b x b sensor pixels instead of one of them, at f cycles per sensor pixel. */
+static double binning_factor(double f, int b) {
+    double s = sin(BST_PI * f);
+    return b == 1 || fabs(s) < 1e-9 ? 1.0 : sin(BST_PI * f * b) / (b * s);
+}
+
+static double sinc(double x) {
+    return fabs(x) < 1e-9 ? 1.0 : sin(BST_PI * x) / (BST_PI * x);
+}
+
+static void transfer(const bst_response_side *side, const int *node, const double *weight,
+                     int nodes, double fx, double fy, double out[2]) {
+    double blur =
+        exp(-2.0 * BST_PI * BST_PI * side->sigma_px * side->sigma_px * (fx * fx + fy * fy));
+    if (!side->psf) {
+        out[0] = blur * sinc(fx) * sinc(fy);
+        out[1] = 0.0;
+        return;
+    }
+    out[0] = out[1] = 0.0;
+    for (int n = 0; n < nodes; n++) {
+        double at[2];
+        bst_psf_otf(side->psf, node[n], fx, fy, at);
+        out[0] += weight[n] * blur * at[0];
+        out[1] += weight[n] * blur * at[1];
+    }
+}
+
+/* Beyond it the OTF of a side counts for nothing, cycles per sensor pixel. */
+static double cutoff(const bst_response_side *side) {
+    double widened =
+        side->sigma_px > 0.0 ? sqrt(-log(LEAST_OTF) / 2.0) / (BST_PI * side->sigma_px) : INFINITY;
+    return side->psf ? fmin(bst_psf_cutoff(side->psf), widened) : widened;
+}
+
+void bst_response_nodes_at(const bst_response_side *side, double x_px, double y_px,
+                           bst_response_nodes *out) {
+    *out = (bst_response_nodes){.count = 0};
+    if (side->psf) {
+        out->count = bst_psf_weights(side->psf, x_px, y_px, out->node, out->weight);
+    }
+}
+
+void bst_response_otf(const bst_response_side *side, const bst_response_nodes *nodes, int binning,
+                      double fx, double fy, double out[2]) {
+    double bin = binning_factor(fx, binning) * binning_factor(fy, binning);
+    transfer(side, nodes->node, nodes->weight, nodes->count, fx, fy, out);
+    out[0] *= bin;
+    out[1] *= bin;
+}
+
+double bst_response_cutoff(const bst_response_side *side) {
+    return cutoff(side);
+}
+
+static void sum_up(spectral_sums *s, const bst_response_side *source,
+                   const bst_response_side *filter, int binning, double x_px, double y_px) {
+    const bst_response_side *const sides[2] = {source, filter};
+    int node[2][4] = {{0}}, nodes[2] = {0, 0};
+    double weight[2][4] = {{0.0}}, step = 0.5 / (REACH_PX * binning);
+    double limit = fmin(fmax(cutoff(source), cutoff(filter)), 3.0);
+    for (int k = 0; k < 2; k++) {
+        if (sides[k]->psf) {
+            nodes[k] = bst_psf_weights(sides[k]->psf, x_px, y_px, node[k], weight[k]);
+        }
+    }
+    *s = (spectral_sums){.filtered = 0.0};
+    int count = (int)ceil(limit / step);
+    for (int j = 0; j <= count; j++) { /* half the plane: the images are real */
+        for (int i = -count; i <= count; i++) {
+            double fx = i * step, fy = j * step, f = hypot(fx, fy), at[2][2];
+            if (f > limit) {
+                continue;
+            }
+            double bin = binning_factor(fx, binning) * binning_factor(fy, binning);
+            double area = (j == 0 ? 1.0 : 2.0) * step * step * binning * binning * bin * bin;
+            for (int k = 0; k < 2; k++) {
+                transfer(sides[k], node[k], weight[k], nodes[k], fx, fy, at[k]);
+            }
+            const double products[3] = {
+                at[0][0] * at[0][0] + at[0][1] * at[0][1],
+                at[1][0] * at[1][0] + at[1][1] * at[1][1],
+                at[0][0] * at[1][0] + at[0][1] * at[1][1],
+            };
+            /* mean over all directions of the integral along a line through the origin: 1 / (pi f)
+             * of the plane; at the origin the mean of 1 / (pi f) over the cell */
+            double line = i == 0 && j == 0 ? 4.0 * log(1.0 + sqrt(2.0)) / (BST_PI * step)
+                                           : 1.0 / (BST_PI * f);
+            for (int k = 0; k < 3; k++) {
+                s->point[k] += area * products[k];
+                s->line[k] += area * line / binning * products[k];
+            }
+            double turn = 2.0 * BST_PI * binning;
+            s->gradient[0] += area * products[1] * turn * turn * fx * fx;
+            s->gradient[1] += area * products[1] * turn * turn * fx * fy;
+            s->gradient[2] += area * products[1] * turn * turn * fy * fy;
+        }
+    }
+    s->filtered = s->point[1];
+}
+
+static bst_image_width width_of(double point, double line) {
+    bst_image_width w = {.across_px = 1.0 / (2.0 * sqrt(BST_PI) * line)};
+    w.along_px = 1.0 / (4.0 * BST_PI * point * w.across_px);
+    return w;
+}
+
+static bst_image_width even(double variance_px2) {
+    return (bst_image_width){sqrt(variance_px2), sqrt(variance_px2)};
+}
+
+void bst_response_set(bst_response *out, const bst_response_side *source,
+                      const bst_response_side *filter, int binning, double x_px, double y_px) {
+    if (!source->psf && !filter->psf) {
+        double scale = 1.0 / ((double)binning * binning);
+        double s = source->sigma_px * source->sigma_px * scale + PIXEL_VARIANCE;
+        double f = filter->sigma_px * filter->sigma_px * scale + PIXEL_VARIANCE;
+        *out = (bst_response){even(s), even(f), even(0.5 * (s + f)), sqrt(f)};
+        return;
+    }
+    spectral_sums sums;
+    sum_up(&sums, source, filter, binning, x_px, y_px);
+    out->source = width_of(sums.point[0], sums.line[0]);
+    out->filter = width_of(sums.point[1], sums.line[1]);
+    out->both = width_of(sums.point[2], sums.line[2]);
+    double steep =
+        sqrt(fmax(sums.gradient[0] * sums.gradient[2] - sums.gradient[1] * sums.gradient[1], 0.0)) /
+        sums.filtered;
+    out->maxima_sigma_px = sqrt(0.5 / fmax(steep, 1e-6));
+}
+
+static bst_image_width widen(bst_image_width w, double variance_px2) {
+    return (bst_image_width){sqrt(w.across_px * w.across_px + variance_px2),
+                             sqrt(w.along_px * w.along_px + variance_px2)};
+}
+
+bst_response bst_response_widened(const bst_response *r, double variance_px2) {
+    bst_response out = *r;
+    out.source = widen(r->source, variance_px2);
+    out.both = widen(r->both, 0.5 * variance_px2);
+    return out;
+}
+
+double bst_response_product(const bst_image_width *w, bst_path_px p, bst_path_px q) {
+    double ratio = w->across_px / w->along_px;
+    bst_path_px longer = hypot(p.dx, p.dy) > hypot(q.dx, q.dy) ? p : q;
+    double length = hypot(longer.dx, longer.dy);
+    if (ratio != 1.0 && length > 0.0) { /* along shrunk until both widths are one */
+        double c = longer.dx / length, s = longer.dy / length;
+        bst_path_px *const both[2] = {&p, &q};
+        for (int k = 0; k < 2; k++) {
+            double along = (both[k]->dx * c + both[k]->dy * s) * (ratio - 1.0);
+            both[k]->dx += along * c;
+            both[k]->dy += along * s;
+        }
+    }
+    return ratio * bst_matched_product(p, q, w->across_px);
+}
+
+double bst_response_efficiency(const bst_response *r, bst_path_px source, bst_path_px filter) {
+    double own = bst_response_product(&r->source, source, source) *
+                 bst_response_product(&r->filter, filter, filter);
+    return fmin(bst_response_product(&r->both, source, filter) / sqrt(own), 1.0);
+}
+
+double bst_response_norm_ratio(const bst_response *r, double length_px) {
+    double sigma = sqrt(r->source.across_px * r->source.along_px);
+    bst_path_px path = {length_px, 0.0};
+    return sqrt(bst_response_product(&r->source, path, path) /
+                bst_matched_product(path, path, sigma));
+}

@@ -1,0 +1,321 @@
+#include "obsgen/streak/star_trail.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "sim/core/vec.h"
+
+static double density(double z) {
+    return exp(-0.5 * z * z) / 2.5066282746310002;
+}
+static double below(double z) {
+    return 0.5 * erfc(-z * 0.70710678118654752);
+}
+
+/* Beyond so many deviations a normal distribution is 0 or 1 to double precision. */
+static const double ALL_SIGMAS = 9.0;
+/* Bends that are none. */
+static const double STRAIGHT_PX = 0.2;
+/* Ends of a path that stands still: this far on, light is gone. */
+static const double BEYOND_SIGMAS = 4.0;
+/* Places that are closer along either axis are one. */
+static const double SAME_PX = 0.7;
+
+enum { GROUP = 8 };
+
+/* Nodes as they are laid, and the least box about each GROUP of them. */
+typedef struct laying {
+    bst_route_node *nodes;
+    int count;
+    struct group_box {
+        double x0, x1, y0, y1;
+    } box[BST_ROUTE_NODES / GROUP];
+} laying;
+
+/* Whether one of the nodes from number `first` on is at a place. */
+static bool is_laid(const laying *l, int first, double x, double y) {
+    for (int from = first / GROUP * GROUP; from < l->count; from += GROUP) {
+        const struct group_box *b = &l->box[from / GROUP];
+        if (!(x > b->x0 - 1.0 && x < b->x1 + 1.0 && y > b->y0 - 1.0 && y < b->y1 + 1.0)) {
+            continue;
+        }
+        for (int i = from > first ? from : first; i < from + GROUP && i < l->count; i++) {
+            if (fabs(l->nodes[i].x - x) < SAME_PX && fabs(l->nodes[i].y - y) < SAME_PX) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static void add_node(laying *l, double x, double y, double time) {
+    enum { BACK = 48 }; /* further back a path that returns is another part of the way */
+    if (l->count == BST_ROUTE_NODES || is_laid(l, l->count > BACK ? l->count - BACK : 0, x, y)) {
+        return;
+    }
+    struct group_box *b = &l->box[l->count / GROUP];
+    if (l->count % GROUP == 0) {
+        *b = (struct group_box){x, x, y, y};
+    }
+    b->x0 = x < b->x0 ? x : b->x0;
+    b->x1 = x > b->x1 ? x : b->x1;
+    b->y0 = y < b->y0 ? y : b->y0;
+    b->y1 = y > b->y1 ? y : b->y1;
+    l->nodes[l->count++] = (bst_route_node){x, y, time, 0.0};
+}
+
+/* Straight on from one node, away from another. */
+static void lay_on(laying *l, int end, int before, double sigma_px, double time) {
+    const bst_route_node e = l->nodes[end], b = l->nodes[before];
+    double dx = e.x - b.x, dy = e.y - b.y, length = hypot(dx, dy);
+    for (int i = 1; i <= (int)ceil(BEYOND_SIGMAS * sigma_px) && length > 0.0; i++) {
+        add_node(l, e.x + i * dx / length, e.y + i * dy / length, time);
+    }
+}
+
+/* A piece of a path: a uniform segment. */
+typedef struct piece {
+    double x, y, cx, cy; /* middle; direction */
+    double half, near;   /* length; as far as its light counts along either axis */
+    double height;       /* of its light beside its middle: an equal share for each piece */
+} piece;
+
+static piece piece_of(const bst_route_path *p, int k, double s) {
+    double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
+    double length = hypot(dx, dy), share = 1.0 / (p->count - 1);
+    piece out = {.x = 0.5 * (p->x_px[k] + p->x_px[k - 1]),
+                 .y = 0.5 * (p->y_px[k] + p->y_px[k - 1]),
+                 .half = 0.5 * length / s,
+                 .near = 6.0 * s + 0.5 * length,
+                 .height = share};
+    if (length >= 0.3 * s) {
+        out.cx = dx / (length * s);
+        out.cy = dy / (length * s);
+        out.height = share * (s / length) * 2.5066282746310002;
+    }
+    return out;
+}
+
+/* Light of a piece at a place (x, y) from its middle. */
+static double piece_light(const piece *p, double x, double y, double s) {
+    if (p->cx == 0.0 && p->cy == 0.0) { /* a point */
+        return p->height * exp(-0.5 * (x * x + y * y) / (s * s));
+    }
+    double u = x * p->cx + y * p->cy, v = y * p->cx - x * p->cy;
+    double high = u + p->half, low = u - p->half;
+    double within = high > ALL_SIGMAS && low < -ALL_SIGMAS ? 1.0 : below(high) - below(low);
+    return p->height * exp(-0.5 * v * v) * within;
+}
+
+/* Adds the light of the whole path at its nodes. */
+static void add_light(const bst_route_path *path, double s, bst_route_node *nodes, int count) {
+    for (int k = 1; k < path->count; k++) {
+        piece p = piece_of(path, k, s);
+        for (int i = 0; i < count; i++) {
+            double x = nodes[i].x - p.x, y = nodes[i].y - p.y;
+            if (fabs(x) <= p.near && fabs(y) <= p.near) {
+                nodes[i].light += piece_light(&p, x, y, s);
+            }
+        }
+    }
+}
+
+int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *nodes) {
+    laying l = {.nodes = nodes};
+    add_node(&l, p->x_px[0], p->y_px[0], 0.0);
+    for (int k = 1; k < p->count; k++) {
+        double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
+        int steps = (int)fmin(ceil(hypot(dx, dy)), BST_ROUTE_NODES);
+        for (int i = 1; i <= steps; i++) {
+            double part = (double)i / steps;
+            add_node(&l, p->x_px[k - 1] + part * dx, p->y_px[k - 1] + part * dy,
+                     (k - 1 + part) / (p->count - 1));
+        }
+    }
+    int last = l.count - 1;
+    if (last > 0) {
+        lay_on(&l, last, last > 2 ? last - 3 : 0, sigma_px, 1.0);
+        /* those before the start go first, so that nodes stay in the order of the way */
+        int laid = l.count;
+        lay_on(&l, 0, last > 2 ? 3 : last, sigma_px, 0.0);
+        int more = l.count - laid;
+        for (int i = 0; i < more; i++) {
+            bst_route_node moved = nodes[l.count - 1];
+            memmove(nodes + i + 1, nodes + i, (size_t)(l.count - 1 - i) * sizeof *nodes);
+            nodes[i] = moved;
+        }
+    }
+    add_light(p, sigma_px * sqrt(2.0), nodes, l.count);
+    return l.count;
+}
+
+/* The model's places at even times. */
+enum { MOST_PLACES = 48, MOST_SAMPLES = 128 };
+typedef struct model {
+    double x[MOST_PLACES], y[MOST_PLACES];
+    int count;
+} model;
+
+static model make_model(double dx, double dy, double bend_x, double bend_y, double s) {
+    model m;
+    double length = hypot(dx, dy) + 2.0 * hypot(bend_x, bend_y);
+    m.count = (int)fmin(ceil(1.5 * length / s) + 1.0, MOST_PLACES);
+    for (int i = 0; i < m.count; i++) {
+        double u = m.count > 1 ? (i + 0.5) / m.count * 2.0 - 1.0 : 0.0;
+        double bent = 0.5 * (3.0 * u * u - 1.0);
+        m.x[i] = 0.5 * u * dx + bent * bend_x;
+        m.y[i] = 0.5 * u * dy + bent * bend_y;
+    }
+    return m;
+}
+
+/* Gradient of the overlap of a place's light with the model moved by `at`, added up. */
+static void add_pull(const model *m, double x, double y, double s, double weight, double pull[2]) {
+    for (int i = 0; i < m->count; i++) {
+        double dx = x - m->x[i], dy = y - m->y[i];
+        double w = weight * exp(-0.5 * (dx * dx + dy * dy) / (s * s));
+        pull[0] += w * dx;
+        pull[1] += w * dy;
+    }
+}
+
+/* Minus the Hessian of the model's overlap with itself. */
+static void find_curvature(const model *m, double s, double h[3]) {
+    h[0] = h[1] = h[2] = 0.0;
+    for (int i = 0; i < m->count; i++) {
+        for (int k = 0; k < m->count; k++) {
+            double dx = m->x[i] - m->x[k], dy = m->y[i] - m->y[k];
+            double w = exp(-0.5 * (dx * dx + dy * dy) / (s * s)) / m->count;
+            h[0] += w * (1.0 - dx * dx / (s * s));
+            h[1] -= w * dx * dy / (s * s);
+            h[2] += w * (1.0 - dy * dy / (s * s));
+        }
+    }
+}
+
+/* Steps of a path that a point's bias is a mean over: neighbours together where there are more. */
+enum { MOST_STEPS = 512 };
+
+/* The path's steps with the share of the exposure that each holds; their number. */
+static int gather_steps(const bst_route_path *p, float *x, float *y, float *share) {
+    int together = (p->count + MOST_STEPS - 1) / MOST_STEPS, count = 0;
+    for (int from = 0; from < p->count; from += together, count++) {
+        double sum_x = 0.0, sum_y = 0.0, sum = 0.0;
+        for (int k = from; k < from + together && k < p->count; k++) {
+            double w = (k == 0 || k == p->count - 1 ? 0.5 : 1.0) / (p->count - 1);
+            sum_x += w * p->x_px[k];
+            sum_y += w * p->y_px[k];
+            sum += w;
+        }
+        x[count] = (float)(sum_x / sum);
+        y[count] = (float)(sum_y / sum);
+        share[count] = (float)sum;
+    }
+    return count;
+}
+
+/* The first step for a straight model in closed form: to first order that is all. */
+static void straight_bias(const bst_route_path *p, double dx_px, double dy_px, double s,
+                          double bias_px[2]) {
+    double length = hypot(dx_px, dy_px), along = 0.0, across = 0.0, value = 0.0;
+    double c = length > 0.0 ? dx_px / length : 1.0, n = length > 0.0 ? dy_px / length : 0.0;
+    bool drawn = length > 0.3 * s;
+    for (int k = 0; k < p->count; k++) {
+        double weight = (k == 0 || k == p->count - 1 ? 0.5 : 1.0) / (p->count - 1);
+        double u = p->x_px[k] * c + p->y_px[k] * n, v = p->y_px[k] * c - p->x_px[k] * n;
+        double fall = weight * exp(-0.5 * v * v / (s * s)), inside;
+        if (drawn) {
+            double high = (u + 0.5 * length) / s, low = (u - 0.5 * length) / s;
+            inside = fall * (below(high) - below(low));
+            along += fall * (density(low) - density(high)) / s;
+        } else {
+            inside = fall * exp(-0.5 * u * u / (s * s));
+            along += inside * u / (s * s);
+        }
+        across += inside * v / (s * s);
+        value += inside;
+    }
+    value = fmax(value, 1e-6);
+    /* of a streak minus the second derivative of its autocorrelation */
+    double curve =
+        drawn ? 2.0 * (density(0.0) - density(length / s)) / (s * length) : value / (s * s);
+    double a = fmax(-s, fmin(along / curve, s)), b = fmax(-s, fmin(across * s * s / value, s));
+    bias_px[0] = a * c - b * n;
+    bias_px[1] = a * n + b * c;
+}
+
+void bst_route_point_bias(const bst_route_path *p, const bst_blend_weights *weights, double light,
+                          double sigma_px, double bias_px[2]) {
+    enum { ROUNDS = 4 };
+    static const double ENOUGH_PX = 0.002, PER_SIGMA = 2.0;
+    float row[BST_BLEND_DISTANCES];
+    bst_blend_weight_row(weights, light, row);
+    float x[MOST_STEPS], y[MOST_STEPS], share[MOST_STEPS];
+    int count = gather_steps(p, x, y, share);
+    float scale = (float)(PER_SIGMA / sigma_px);
+    for (int round = 0; round < ROUNDS; round++) {
+        float at_x = (float)bias_px[0], at_y = (float)bias_px[1];
+        float sum = 0.0f, pull_x = 0.0f, pull_y = 0.0f;
+        for (int k = 0; k < count; k++) {
+            float dx = x[k] - at_x, dy = y[k] - at_y;
+            float far = sqrtf(dx * dx + dy * dy) * scale;
+            int i = (int)fminf(far, BST_BLEND_DISTANCES - 2);
+            float part = fminf(far - (float)i, 1.0f);
+            float w = share[k] * (row[i] + part * (row[i + 1] - row[i]));
+            sum += w;
+            pull_x += w * dx;
+            pull_y += w * dy;
+        }
+        double step_x = (double)(pull_x / fmaxf(sum, 1e-6f));
+        double step_y = (double)(pull_y / fmaxf(sum, 1e-6f));
+        bias_px[0] += step_x;
+        bias_px[1] += step_y;
+        if (hypot(step_x, step_y) < ENOUGH_PX) {
+            break;
+        }
+    }
+}
+
+void bst_route_bias(const bst_route_path *p, double dx_px, double dy_px, double bend_x_px,
+                    double bend_y_px, double sigma_px, double bias_px[2]) {
+    enum { ROUNDS = 6 };
+    double s = sigma_px * sqrt(2.0), h[3], total = 0.0;
+    if (hypot(bend_x_px, bend_y_px) < STRAIGHT_PX) {
+        straight_bias(p, dx_px, dy_px, s, bias_px);
+        return;
+    }
+    model m = make_model(dx_px, dy_px, bend_x_px, bend_y_px, s);
+    find_curvature(&m, s, h);
+    double determinant = fmax(h[0] * h[2] - h[1] * h[1], 1e-12);
+    /* means over as many samples as show the trembling; their own mean is that of the path */
+    int samples = p->count < MOST_SAMPLES ? p->count : MOST_SAMPLES;
+    double x[MOST_SAMPLES], y[MOST_SAMPLES], weight[MOST_SAMPLES];
+    for (int i = 0; i < samples; i++) {
+        x[i] = y[i] = weight[i] = 0.0;
+    }
+    for (int k = 0; k < p->count; k++) {
+        int i = (int)((long)k * samples / p->count);
+        double w = k == 0 || k == p->count - 1 ? 0.5 : 1.0;
+        x[i] += w * p->x_px[k];
+        y[i] += w * p->y_px[k];
+        weight[i] += w;
+        total += w;
+    }
+    bias_px[0] = bias_px[1] = 0.0;
+    for (int round = 0; round < ROUNDS; round++) {
+        double pull[2] = {0.0, 0.0};
+        for (int i = 0; i < samples; i++) {
+            add_pull(&m, x[i] / weight[i] - bias_px[0], y[i] / weight[i] - bias_px[1], s,
+                     weight[i] / total, pull);
+        }
+        double step[2] = {(h[2] * pull[0] - h[1] * pull[1]) / determinant,
+                          (h[0] * pull[1] - h[1] * pull[0]) / determinant};
+        double far = hypot(step[0], step[1]), share = far > s ? s / far : 1.0;
+        bias_px[0] += share * step[0];
+        bias_px[1] += share * step[1];
+        if (far < 0.005) {
+            break;
+        }
+    }
+}

@@ -1,0 +1,297 @@
+#include "scenegen/detector/detector.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "scenegen/detector/fixed_pattern_noise.h"
+#include "scenegen/kernels/scene_shared.h"
+
+struct bst_detector {
+    bst_camera camera;
+    bst_rng_key pattern;
+    int stride; /* of the maps: the sensor's width, rounded up to chunks */
+    cl_context context;
+    cl_command_queue queue;
+    cl_mem gain, dark, overlay, offsets, codes, flags;
+    cl_mem deposits; /* of the present frame; borrowed */
+    cl_kernel deposit_kernel;
+    bst_hits *hits;
+    bst_hits_summary summary;
+    float *rows; /* fixed offsets and those of one frame, DN: [2][height] */
+};
+
+double bst_detector_near_full_e(double full_well_e) {
+    return full_well_e - 8.0 * sqrt(full_well_e) - 20.0;
+}
+
+bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name) {
+    return bst_rng_make_key(camera->detector.pattern_seed, 0, name, "pattern");
+}
+
+bool bst_detector_whole_columns(const bst_detector *detector) {
+    return bst_detector_config_whole_columns(&detector->camera.detector);
+}
+
+static bool has_offsets(const bst_detector_config *d) {
+    return d->column_offset_rms_e > 0.0 || d->row_offset_rms_e > 0.0 || d->row_noise_e > 0.0;
+}
+
+/* Whether the amplifier bends so much that read noise must not go through it: the bend changes the
+ * read noise's share of the variance by more than 3e-5. */
+static bool charge_first(const bst_camera *c) {
+    const double *n = c->detector.nonlinearity;
+    double bend = 2.0 * fabs(n[0]) + 3.0 * fabs(n[1]) + 4.0 * fabs(n[2]);
+    return 2.0 * bend * c->read_noise_e * c->read_noise_e / c->full_well_e > 3e-5;
+}
+
+int bst_detector_options(const bst_detector *detector, char *text, size_t bytes) {
+    const bst_camera *c = &detector->camera;
+    const bst_detector_config *d = &c->detector;
+    const double *n = d->nonlinearity;
+    double read = c->read_noise_e;
+    int order = read >= 5.0 ? 2 : read >= 3.0 ? 3 : 4;
+    bool alone = charge_first(c) || read < 0.75;
+    const char *from = alone ? "INFINITY -DSEARCH" : read >= 2.0 ? "-1.0f" : "30.0f -DSEARCH";
+    char bend[128] = "", tail[128] = "", transfer[64] = "";
+    if (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0) {
+        snprintf(bend, sizeof bend, " -DNONLINEAR -DC1=%.9ef -DC2=%.9ef -DC3=%.9ef", n[0], n[1],
+                 n[2]);
+    }
+    if (d->read_tail_fraction > 0.0 && d->read_tail_rms_e > 0.0) {
+        snprintf(tail, sizeof tail, " -DTAIL -DTAIL_GAP=%.9ef -DTAIL_RMS=%.9ef",
+                 -0.5 / log1p(-d->read_tail_fraction), d->read_tail_rms_e);
+    }
+    if (d->frame_transfer_s > 0.0) {
+        snprintf(transfer, sizeof transfer, " -DTRANSFER_ROW_S=%.9ef",
+                 d->frame_transfer_s / (double)c->height_px);
+    }
+    return snprintf(
+        text, bytes,
+        " -DCF_ORDER=%d -DSINGLE_FROM=%s -DMAP_STRIDE=%d -DMAP_CELLS=%lld%s%s%s%s%s%s%s%s%s%s",
+        order, from, detector->stride, (long long)detector->stride * c->height_px,
+        detector->gain ? " -DGAIN_MAP" : "", detector->dark ? " -DDARK_MAP" : "",
+        detector->overlay ? " -DOVERLAY" : "", detector->offsets ? " -DOFFSETS" : "",
+        detector->codes ? " -DCODES" : "", bend, tail, transfer,
+        d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
+}
+
+static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, const void *data,
+                              cl_mem *out) {
+    return bst_device_buffer(ctx, d->context, bytes, data, "allocating a map of the detector", out);
+}
+
+static bst_status make_map(bst_ctx *ctx, bst_detector *d,
+                           bst_status (*make)(bst_ctx *, const bst_camera *, bst_rng_key, int,
+                                              float *),
+                           cl_mem *out) {
+    size_t count = (size_t)d->stride * (size_t)d->camera.height_px;
+    count += make ? 0 : count / 64; /* the overlay's marks */
+    float *map = calloc(count, sizeof *map);
+    if (!map) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a map of the detector");
+    }
+    bst_status status = make ? make(ctx, &d->camera, d->pattern, d->stride, map) : BST_OK;
+    if (status == BST_OK) {
+        status = make_buffer(ctx, d, count * sizeof *map, map, out);
+    }
+    free(map);
+    return status;
+}
+
+static bst_status make_offsets(bst_ctx *ctx, bst_detector *d) {
+    size_t height = (size_t)d->camera.height_px, count = (size_t)d->stride + height;
+    float *offsets = calloc(count, sizeof *offsets);
+    d->rows = calloc(2 * height, sizeof *d->rows);
+    bst_status status = BST_ERR_MEMORY;
+    if (offsets && d->rows) {
+        bst_pattern_offsets(&d->camera, d->pattern, "columns", (int)d->camera.width_px, offsets);
+        bst_pattern_offsets(&d->camera, d->pattern, "rows", (int)height, d->rows);
+        memcpy(offsets + d->stride, d->rows, height * sizeof *offsets);
+        status = make_buffer(ctx, d, count * sizeof *offsets, offsets, &d->offsets);
+    } else {
+        status = bst_fail(ctx, status, "no memory for the offsets of columns and rows");
+    }
+    free(offsets);
+    return status;
+}
+
+static bst_status make_codes(bst_ctx *ctx, bst_detector *d) {
+    uint16_t *codes = malloc(65536 * sizeof *codes);
+    if (!codes) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a table of codes");
+    }
+    bst_status status = bst_pattern_codes(ctx, &d->camera, codes);
+    if (status == BST_OK) {
+        status = make_buffer(ctx, d, sizeof *codes << d->camera.bits, codes, &d->codes);
+    }
+    free(codes);
+    return status;
+}
+
+static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
+    const bst_detector_config *c = &d->camera.detector;
+    if (bst_pattern_has_gain(&d->camera)) {
+        BST_TRY(make_map(ctx, d, bst_pattern_gain, &d->gain));
+    }
+    if (bst_pattern_has_dark(&d->camera)) {
+        BST_TRY(make_map(ctx, d, bst_pattern_dark, &d->dark));
+    }
+    if (has_offsets(c)) {
+        BST_TRY(make_offsets(ctx, d));
+    }
+    if (c->quantisation.model != BST_QUANTISE_UNIFORM) {
+        BST_TRY(make_codes(ctx, d));
+    }
+    if (c->hits.rate_per_cm2_s > 0.0) {
+        BST_TRY(make_map(ctx, d, NULL, &d->overlay));
+        BST_TRY(bst_hits_create(ctx, &c->hits, (int)d->camera.width_px, (int)d->camera.height_px,
+                                d->stride, &d->hits));
+    }
+    return BST_OK;
+}
+
+bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                               bst_rng_key pattern, bst_detector **out) {
+    *out = NULL;
+    bst_detector *d = calloc(1, sizeof *d);
+    if (!d) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the detector");
+    }
+    d->camera = *camera;
+    d->pattern = pattern;
+    d->stride = (int)((camera->width_px + 63) / 64 * 64);
+    d->context = bst_device_context(device);
+    d->queue = bst_device_queue(device);
+    clRetainContext(d->context);
+    clRetainCommandQueue(d->queue);
+    bst_status status = make_all(ctx, d);
+    if (status != BST_OK) {
+        bst_detector_free(d);
+        return status;
+    }
+    *out = d;
+    return BST_OK;
+}
+
+void bst_detector_free(bst_detector *d) {
+    if (!d) {
+        return;
+    }
+    cl_mem buffers[] = {d->gain, d->dark, d->overlay, d->offsets, d->codes, d->flags};
+    for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
+        if (buffers[i]) {
+            clReleaseMemObject(buffers[i]);
+        }
+    }
+    if (d->deposit_kernel) {
+        clReleaseKernel(d->deposit_kernel);
+    }
+    bst_hits_free(d->hits);
+    clReleaseCommandQueue(d->queue);
+    clReleaseContext(d->context);
+    free(d->rows);
+    free(d);
+}
+
+bst_status bst_detector_set_program(bst_ctx *ctx, bst_detector *d, cl_program program) {
+    cl_int code = CL_SUCCESS;
+    if (d->hits) {
+        d->deposit_kernel = clCreateKernel(program, "bst_detector_deposit", &code);
+    }
+    return bst_device_check(ctx, code, "bst_detector_deposit");
+}
+
+bst_status bst_detector_keep_flags(bst_ctx *ctx, bst_detector *d) {
+    return make_buffer(ctx, d, (size_t)d->camera.width_px * (size_t)d->camera.height_px, NULL,
+                       &d->flags);
+}
+
+bst_status bst_detector_flags(bst_ctx *ctx, const bst_detector *d, size_t count, uint8_t *out) {
+    return bst_device_check(
+        ctx, clEnqueueReadBuffer(d->queue, d->flags, CL_TRUE, 0, count, out, 0, NULL, NULL),
+        "reading the flags of saturated pixels");
+}
+
+void bst_detector_buffers(const bst_detector *d, cl_mem out[BST_DETECTOR_BUFFERS]) {
+    out[0] = d->gain;
+    out[1] = d->dark;
+    out[2] = d->overlay;
+    out[3] = d->offsets;
+    out[4] = d->codes;
+    out[5] = d->flags;
+}
+
+/* Adds the exposure's deposits to the overlay (sign 1), or sets their pixels to 0 again (sign 0).
+ */
+static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
+    if (d->summary.pixels == 0) {
+        return BST_OK;
+    }
+    /* a size of work-groups of its own for each count would have the kernel built for each */
+    size_t local = BST_HIT_GROUP, global = ((size_t)d->summary.pixels + local - 1) / local * local;
+    cl_int count = d->summary.pixels;
+    cl_kernel k = d->deposit_kernel;
+    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, sizeof(cl_mem), &d->deposits),
+                             "setting a kernel argument"));
+    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 1, sizeof sign, &sign),
+                             "setting a kernel argument"));
+    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 2, sizeof(cl_mem), &d->overlay),
+                             "setting a kernel argument"));
+    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 3, sizeof count, &count),
+                             "setting a kernel argument"));
+    return bst_device_check(
+        ctx, clEnqueueNDRangeKernel(d->queue, k, 1, NULL, &global, &local, 0, NULL, NULL),
+        "placing radiation hits");
+}
+
+static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+                             int64_t exposure_id, double collect_s) {
+    const bst_hit_pixel *pixels;
+    BST_TRY(bst_hits_draw(ctx, d->hits, key, exposure_id, collect_s, &pixels, &d->summary));
+    size_t bytes = (size_t)d->summary.pixels * sizeof *pixels;
+    BST_TRY(bst_stage_put(ctx, stage, BST_STAGE_HITS, pixels, bytes, &d->deposits));
+    return deposit(ctx, d, 1.0f);
+}
+
+static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+                             int64_t exposure_id) {
+    size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);
+    float *sum = d->rows + height;
+    double rms = d->camera.detector.row_noise_e / d->camera.gain_e_per_dn;
+    for (size_t y = 0; y < height; y++) {
+        sum[y] = d->rows[y] + (float)(rms * bst_rng_normal(key, (uint64_t)exposure_id, y));
+    }
+    cl_mem sent;
+    BST_TRY(bst_stage_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
+    return bst_device_check(
+        ctx,
+        clEnqueueCopyBuffer(d->queue, sent, d->offsets, 0, (size_t)d->stride * sizeof(float), bytes,
+                            0, NULL, NULL),
+        "sending the rows' offsets");
+}
+
+bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+                              int64_t exposure_id, double exposure_s) {
+    const bst_detector_config *c = &d->camera.detector;
+    uint64_t run = ((uint64_t)key.k[1] << 32) | key.k[0];
+    d->summary = (bst_hits_summary){0};
+    if (d->hits) {
+        BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
+                           exposure_s + c->hits.frame_s));
+    }
+    if (c->row_noise_e > 0.0) {
+        BST_TRY(begin_rows(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "row_noise"),
+                           exposure_id));
+    }
+    return BST_OK;
+}
+
+bst_status bst_detector_end(bst_ctx *ctx, bst_detector *d) {
+    return deposit(ctx, d, 0.0f);
+}
+
+bst_hits_summary bst_detector_hits(const bst_detector *d) {
+    return d->summary;
+}

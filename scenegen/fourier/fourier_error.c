@@ -1,0 +1,139 @@
+#include "scenegen/fourier/fourier_error.h"
+
+#include <fftw3.h>
+#include <math.h>
+#include <string.h>
+
+/* Frequencies per axis over all that the PSF has, and samples of the image from them: four per
+ * period of the highest frequency. */
+enum { LATTICE = 96, SIDE = 192 };
+
+/* What is imaged: all of the OTF, what the grid's first aliases along x and y add, and what lies
+ * beyond the cut-off. */
+enum { WHOLE, ALIAS_X, ALIAS_Y, LOST, IMAGES };
+
+/* First class of what lies beside a point: a Gaussian three sigma away is at 0.011. */
+enum { WINGS = 7 };
+
+typedef struct lattice {
+    const bst_psf *psf;
+    double step, cutoff, alias[2][LATTICE];
+    fftw_complex *room;
+    fftw_plan plan;
+    double *image; /* [IMAGES][SIDE][SIDE] */
+} lattice;
+
+static double frequency(const lattice *l, int i) {
+    return (i - LATTICE / 2) * l->step;
+}
+
+/* The kernel's values are floats: their rounding, of its transform at 0. */
+#define ROUNDED 0x1p-24
+
+/* Transforms of the alias of order 1 over the kernel's own, at the lattice's frequencies along an
+ * axis. A point between the samples turns its phase and nothing else. */
+static void find_aliases(lattice *l, const bst_light_axis *axis, int a) {
+    double density = (double)axis->samples / axis->pixels;
+    double whole = bst_spread_transform(&axis->spread, 0.0);
+    for (int i = 0; i < LATTICE; i++) {
+        double nu = frequency(l, i) / density;
+        double own = fabs(bst_spread_transform(&axis->spread, nu));
+        /* beyond the grid's band all is lost */
+        l->alias[a][i] =
+            fabs(nu) >= 0.5
+                ? 1.0
+                : fmin(
+                      (fabs(bst_spread_transform(&axis->spread, nu + 1.0)) + ROUNDED * whole) / own,
+                      1.0);
+    }
+}
+
+static void make_image(lattice *l, int node, int what) {
+    double area = l->step * l->step, *image = l->image + what * SIDE * SIDE;
+    memset(l->room, 0, sizeof *l->room * SIDE * SIDE);
+    for (int j = 0; j < LATTICE; j++) {
+        for (int i = 0; i < LATTICE; i++) {
+            double v[2], fx = frequency(l, i), fy = frequency(l, j), f = area;
+            bool kept = hypot(fx, fy) <= l->cutoff;
+            if (what != WHOLE && kept != (what != LOST)) {
+                continue;
+            }
+            f *= what == ALIAS_X ? l->alias[0][i] : what == ALIAS_Y ? l->alias[1][j] : 1.0;
+            bst_psf_otf(l->psf, node, fx, fy, v);
+            fftw_complex *z = &l->room[((j - LATTICE / 2 + SIDE) % SIDE) * SIDE +
+                                       (i - LATTICE / 2 + SIDE) % SIDE];
+            (*z)[0] = v[0] * f;
+            (*z)[1] = v[1] * f;
+        }
+    }
+    fftw_execute(l->plan);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        image[i] = what == WHOLE ? l->room[i][0] : hypot(l->room[i][0], l->room[i][1]);
+    }
+}
+
+/* Faint pixels along a column of the star's were found to have up to 1.7 times this error
+ * (tests/scenegen/test_tolerance_sweep.c, scene 171). */
+#define SAFE 1.7
+
+/* Raises the errors of the classes by those of a field node. */
+static void take_node(lattice *l, int node, double peak, bst_light_error *out) {
+    double top = 0.0;
+    for (int what = 0; what < IMAGES; what++) {
+        make_image(l, node, what);
+    }
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        top = fmax(top, l->image[i]);
+    }
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        int exponent;
+        (void)frexp(fmax(l->image[i] / top, 1e-12), &exponent); /* in [2^(e-1), 2^e) */
+        int k = exponent > 0 ? 0 : -exponent;
+        k = k < BST_LIGHT_CLASSES ? k : BST_LIGHT_CLASSES - 1;
+        const double *at = l->image + i;
+        /* aliases of orders 1 and -1 are each other's conjugates */
+        double error = SAFE * 2.0 * (at[ALIAS_X * SIDE * SIDE] + at[ALIAS_Y * SIDE * SIDE]) +
+                       at[LOST * SIDE * SIDE];
+        out->most[k] = fmax(out->most[k], error / peak);
+    }
+}
+
+bst_status bst_light_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_light_band *band,
+                                   const bst_light_axis axis[2], bst_light_error *out) {
+    lattice l = {.psf = psf,
+                 .step = 2.0 * fmax(bst_psf_cutoff(psf), band->cutoff) / LATTICE,
+                 .cutoff = band->cutoff,
+                 .room = fftw_malloc(sizeof *l.room * SIDE * SIDE),
+                 .image = fftw_malloc(sizeof *l.image * IMAGES * SIDE * SIDE)};
+    *out = (bst_light_error){{0.0}};
+    if (l.room && l.image) {
+        l.plan = fftw_plan_dft_2d(SIDE, SIDE, l.room, l.room, FFTW_BACKWARD, FFTW_ESTIMATE);
+    }
+    for (int a = 0; a < 2 && l.plan; a++) {
+        find_aliases(&l, &axis[a], a);
+    }
+    for (int n = 0; n < bst_psf_nodes(psf) && l.plan; n++) {
+        take_node(&l, n, band->peak, out);
+    }
+    bst_status status =
+        l.plan ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the error of a grid");
+    if (l.plan) {
+        fftw_destroy_plan(l.plan);
+    }
+    fftw_free(l.room);
+    fftw_free(l.image);
+    return status;
+}
+
+double bst_light_error_sigma(const bst_light_error *error, bool wings, double peak_e,
+                             double dark_variance_e2) {
+    double worst = 0.0, light_e = peak_e;
+    for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
+        light_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;
+        if (wings && k < WINGS) {
+            continue;
+        }
+        worst = fmax(worst, error->most[k] * peak_e / sqrt(light_e + dark_variance_e2));
+    }
+    return worst;
+}

@@ -1,0 +1,288 @@
+#include "scenegen/fourier/fourier_grid.h"
+
+#include <fftw3.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "scenegen/fourier/batch_fft.h"
+
+enum {
+    LATTICE = 128, /* frequencies per axis over the kept band */
+    IMAGE = 256,   /* PSF samples per axis from it: four per period of the highest frequency */
+    WIDE = 256,    /* coarse image of the wings */
+    DIRECTIONS = 8
+};
+
+static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 3e-7, LEAST_DENSITY = 0.25,
+                    MOST_DENSITY = 5.0;
+
+/* Derivatives of order 2, 4 and 6 of a Gaussian at sigma 1, over its peak. */
+static const double GAUSSIAN[3] = {1.0, 3.0, 15.0};
+
+/* Sums of moduli bound the derivatives; what was measured of 200 random scenes
+ * (tests/scenegen/test_tolerance_sweep.c) is at most 0.65 of it. */
+static const double BOUND = 0.85;
+
+static double modulus(const bst_psf *psf, int node, double fx, double fy) {
+    double v[2];
+    bst_psf_otf(psf, node, fx, fy, v);
+    return hypot(v[0], v[1]);
+}
+
+/* The band is cut where what lies beyond is a `tolerance` of the peak's bound. The pixel's own sinc
+ * keeps this finite for optics that pass far more than the pixels resolve. */
+static void find_cutoff(const bst_psf *psf, double tolerance, bst_light_band *out) {
+    enum { RINGS = 256, SECTORS = 24 };
+    double most = bst_psf_cutoff(psf), step = most / RINGS, ring[RINGS], total = 0.0;
+    for (int i = 0; i < RINGS; i++) {
+        double f = (i + 0.5) * step, largest = 0.0;
+        for (int n = 0; n < bst_psf_nodes(psf); n++) {
+            double sum = 0.0;
+            for (int k = 0; k < SECTORS; k++) {
+                double a = BST_PI * (k + 0.5) / SECTORS;
+                sum += modulus(psf, n, f * cos(a), f * sin(a)) / SECTORS;
+            }
+            largest = fmax(largest, sum);
+        }
+        ring[i] = 2.0 * BST_PI * f * step * largest;
+        total += ring[i];
+    }
+    int keep = RINGS;
+    double lost = 0.0;
+    while (keep > 1 && lost + ring[keep - 1] <= tolerance * total) {
+        lost += ring[--keep];
+    }
+    out->cutoff = keep * step;
+    out->lost = lost; /* over the peak below */
+}
+
+/* Inverse transform in place of a Hermitian lattice [n][n] given in natural wrap-around order. */
+static bst_status invert(bst_ctx *ctx, fftwf_complex *data, int n) {
+    fftwf_plan plan = fftwf_plan_dft_2d(n, n, data, data, FFTW_BACKWARD, FFTW_ESTIMATE);
+    if (!plan) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transform of a PSF");
+    }
+    fftwf_execute(plan);
+    fftwf_destroy_plan(plan);
+    return BST_OK;
+}
+
+/* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their middle. */
+static double binned(double f, int binning) {
+    double s = sin(BST_PI * f);
+    return fabs(s) < 1e-9 ? 1.0 : sin(BST_PI * binning * f) / (binning * s);
+}
+
+/* Raises the parts of all binnings, over those of none, by those of a field node: the image's
+ * derivatives are at most the sums of moduli, and its peak is at least what binned pixels about the
+ * PSF's peak have. */
+static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
+                          bst_light_band *out) {
+    enum { SIDE = LATTICE / 2 };
+    double along[BST_PIXEL_PARTS][DIRECTIONS][3];
+    double step = 2.0 * out->cutoff / SIDE, top[BST_PIXEL_PARTS] = {0.0};
+    memset(along, 0, sizeof along);
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        double fx = (k % SIDE - SIDE / 2) * step, fy = (k / SIDE - SIDE / 2) * step, v[2];
+        double phase = 2.0 * BST_PI * (fx * peak_px[0] + fy * peak_px[1]);
+        bst_psf_otf(psf, node, fx, fy, v);
+        double light = v[0] * cos(phase) - v[1] * sin(phase), size = hypot(v[0], v[1]);
+        double w2[DIRECTIONS];
+        for (int d = 0; d < DIRECTIONS; d++) {
+            double angle = BST_PI * d / DIRECTIONS;
+            double w = 2.0 * BST_PI * (fx * cos(angle) + fy * sin(angle));
+            w2[d] = w * w;
+        }
+        for (int b = 0; b < BST_PIXEL_PARTS; b++) {
+            double mean = binned(fx, b + 1) * binned(fy, b + 1), m = size * fabs(mean);
+            top[b] += mean * light;
+            for (int d = 0; d < DIRECTIONS; d++) {
+                along[b][d][0] += w2[d] * m;
+                along[b][d][1] += w2[d] * w2[d] * m;
+                along[b][d][2] += w2[d] * w2[d] * w2[d] * m;
+            }
+        }
+    }
+    for (int b = 0; b < BST_PIXEL_PARTS; b++) {
+        for (int d = 0; d < DIRECTIONS; d++) {
+            for (int k = 0; k < 3; k++) {
+                double part = BOUND * along[b][d][k] / along[0][d][k] * top[0] / top[b];
+                out->pixel_part[b][k] = fmax(out->pixel_part[b][k], part);
+            }
+        }
+    }
+}
+
+/* Peak, sensitivity to coarse nodes and the strength of frequencies along x and y. */
+static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
+                               bst_light_band *out) {
+    double step = 2.0 * out->cutoff / LATTICE, area = step * step, peak = 0.0;
+    double(*peak_px)[2] = calloc((size_t)bst_psf_nodes(psf), sizeof *peak_px);
+    if (!peak_px) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");
+    }
+    out->node_sigma_px = INFINITY;
+    for (int a = 0; a < 2; a++) {
+        out->axis[a].step = out->cutoff / BST_SPREAD_BINS;
+        memset(out->axis[a].weight, 0, sizeof out->axis[a].weight);
+    }
+    for (int n = 0; n < bst_psf_nodes(psf); n++) {
+        double along[DIRECTIONS][3] = {{0}};
+        memset(room, 0, sizeof(fftwf_complex) * IMAGE * IMAGE);
+        for (int j = -LATTICE / 2; j < LATTICE / 2; j++) {
+            for (int i = -LATTICE / 2; i < LATTICE / 2; i++) {
+                double fx = i * step, fy = j * step, v[2];
+                bst_psf_otf(psf, n, fx, fy, v);
+                fftwf_complex *z = &room[((j + IMAGE) % IMAGE) * IMAGE + (i + IMAGE) % IMAGE];
+                (*z)[0] = (float)(v[0] * area);
+                (*z)[1] = (float)(v[1] * area);
+                double m = hypot(v[0], v[1]) * area, f[2] = {fabs(fx), fabs(fy)};
+                for (int a = 0; a < 2; a++) {
+                    int bin = (int)(f[a] / out->axis[a].step);
+                    out->axis[a].weight[bin < BST_SPREAD_BINS ? bin : BST_SPREAD_BINS - 1] += m;
+                }
+                for (int d = 0; d < DIRECTIONS; d++) {
+                    double angle = BST_PI * d / DIRECTIONS;
+                    double w = 2.0 * BST_PI * (fx * cos(angle) + fy * sin(angle));
+                    along[d][0] += w * w * m;
+                    along[d][1] += w * w * w * w * m;
+                    along[d][2] += w * w * w * w * w * w * m;
+                }
+            }
+        }
+        bst_status status = invert(ctx, room, IMAGE);
+        if (status != BST_OK) {
+            free(peak_px);
+            return status;
+        }
+        double top = 0.0;
+        for (int i = 0; i < IMAGE * IMAGE; i++) {
+            if (room[i][0] > top) {
+                int x = i % IMAGE, y = i / IMAGE;
+                top = room[i][0];
+                peak_px[n][0] = (x < IMAGE / 2 ? x : x - IMAGE) / (IMAGE * step);
+                peak_px[n][1] = (y < IMAGE / 2 ? y : y - IMAGE) / (IMAGE * step);
+            }
+        }
+        peak = fmax(peak, top);
+        for (int d = 0; d < DIRECTIONS; d++) {
+            for (int k = 0; k < 3; k++) {
+                double sigma = pow(GAUSSIAN[k] * top / along[d][k], 0.5 / (k + 1));
+                out->node_sigma_px = fmin(out->node_sigma_px, sigma);
+            }
+        }
+    }
+    memset(out->pixel_part, 0, sizeof out->pixel_part);
+    for (int n = 0; n < bst_psf_nodes(psf); n++) {
+        measure_parts(psf, n, peak_px[n], out);
+    }
+    free(peak_px);
+    out->peak = peak;
+    out->lost /= peak;
+    for (int a = 0; a < 2; a++) {
+        for (int i = 0; i < BST_SPREAD_BINS; i++) {
+            out->axis[a].weight[i] /= peak * bst_psf_nodes(psf);
+        }
+    }
+    double low = 0.01, high = 100.0;
+    for (int k = 0; k < 60; k++) {
+        double mid = sqrt(low * high), line = erf(0.5 / (mid * sqrt(2.0)));
+        *(line * line > peak ? &low : &high) = mid;
+    }
+    out->share_sigma_px = low;
+    return BST_OK;
+}
+
+/* The smallest distance beyond which the wings, smoothed over a few px, stay below REACH_SHARE. */
+static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
+                                bst_light_band *out) {
+    double step = 1.0 / (WIDE * WIDE_CELL_PX), area = step * step, reach = 0.0;
+    enum { RINGS = WIDE };
+    double ring[RINGS] = {0.0}; /* by whole cells of distance */
+    for (int n = 0; n < bst_psf_nodes(psf); n++) {
+        for (int j = -WIDE / 2; j < WIDE / 2; j++) {
+            for (int i = -WIDE / 2; i < WIDE / 2; i++) {
+                double fx = i * step, fy = j * step, v[2];
+                /* smoothed by a Gaussian of one cell, so that the band's end leaves no ripples */
+                double s = 2.0 * BST_PI * BST_PI * WIDE_CELL_PX * WIDE_CELL_PX,
+                       smooth = exp(-s * (fx * fx + fy * fy));
+                bst_psf_otf(psf, n, fx, fy, v);
+                fftwf_complex *z = &room[((j + WIDE) % WIDE) * WIDE + (i + WIDE) % WIDE];
+                (*z)[0] = (float)(v[0] * smooth * area);
+                (*z)[1] = (float)(v[1] * smooth * area);
+            }
+        }
+        BST_TRY(invert(ctx, room, WIDE));
+        for (int j = -WIDE / 2; j < WIDE / 2; j++) {
+            for (int i = -WIDE / 2; i < WIDE / 2; i++) {
+                float p = room[((j + WIDE) % WIDE) * WIDE + (i + WIDE) % WIDE][0];
+                double share = fabs((double)p), cells = hypot(i, j);
+                if (share > REACH_SHARE) {
+                    reach = fmax(reach, WIDE_CELL_PX * cells);
+                }
+                ring[(int)cells] = fmax(ring[(int)cells], share);
+            }
+        }
+    }
+    out->reach_px = (int)fmin(fmax(ceil(reach), 16.0), 160.0);
+    out->beyond = 0.0;
+    for (int k = (int)(out->reach_px / WIDE_CELL_PX); k < RINGS; k++) {
+        out->beyond = fmax(out->beyond, ring[k]);
+    }
+    return BST_OK;
+}
+
+bst_status bst_light_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
+                                  bst_light_band *out) {
+    fftwf_complex *room = fftwf_malloc(sizeof *room * IMAGE * IMAGE);
+    if (!room) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");
+    }
+    find_cutoff(psf, tolerance, out);
+    bst_status status = measure_core(ctx, psf, room, out);
+    if (status == BST_OK) {
+        status = measure_reach(ctx, psf, room, out);
+    }
+    fftwf_free(room);
+    return status;
+}
+
+double bst_light_density(const bst_light_band *band, int axis, int taps, double tolerance) {
+    bst_spread spread = {taps, 0.0};
+    double low = fmax(0.5 * band->cutoff, LEAST_DENSITY), high = MOST_DENSITY;
+    if (bst_spread_choose(&spread, &band->axis[axis], high) > tolerance) {
+        return high;
+    }
+    for (int k = 0; k < 10; k++) {
+        double mid = 0.5 * (low + high);
+        *(bst_spread_choose(&spread, &band->axis[axis], mid) > tolerance ? &low : &high) = mid;
+    }
+    return high;
+}
+
+bst_light_axis bst_light_axis_choose(const bst_light_band *band, int axis, int taps, int least,
+                                     double density) {
+    bst_light_axis best = {0};
+    double lowest = INFINITY;
+    int most = 32 + least + least / 3;
+    for (int pixels = (least + 15) / 16 * 16; pixels <= most; pixels += 16) {
+        double inverse = bst_batch_fft_cost(pixels);
+        if (isinf(inverse)) {
+            continue;
+        }
+        int first = 16 * (int)ceil(fmax(density * pixels, 64.0) / 16.0 - 1e-9);
+        for (int samples = first; samples <= 32 + first + first / 3; samples += 16) {
+            double sum = inverse + bst_batch_fft_cost(samples);
+            if (sum < lowest) {
+                lowest = sum;
+                best.pixels = pixels;
+                best.samples = samples;
+            }
+        }
+    }
+    best.spread.taps = taps;
+    best.error =
+        bst_spread_choose(&best.spread, &band->axis[axis], (double)best.samples / best.pixels);
+    return best;
+}

@@ -1,0 +1,425 @@
+#include "scenegen/fourier/fourier_render.h"
+
+#include <fftw3.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bst_scenegen_kernels.h"
+#include "scenegen/fourier/fourier_error.h"
+#include "scenegen/fourier/otf_convolve.h"
+#include "scenegen/kernels/deposit_shared.h"
+#include "scenegen/scene_options.h"
+
+enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96, DENSITY_PX = 100000 };
+
+/* Error of a widened node's image that is allowed, over its peak. */
+static const double WIDEN_ERROR = 1e-3;
+
+/* Grids: the one for the tolerance, and a finer one for frames with brighter points. */
+enum { PLAIN, FINE, QUALITIES };
+
+/* Errors of the fine grid over those of the plain one. */
+static const double FINER = 1.0 / 16.0;
+
+/* What is ready for windows of one size. */
+typedef struct setup {
+    int width, height, quality;
+    long long used; /* number of the call that used it last */
+    bst_light_fft *fft;
+    cl_mem table; /* [2][BST_SPREAD_TABLE] */
+    cl_mem grid;
+} setup;
+
+struct bst_fft_light {
+    bst_camera camera;
+    const bst_psf *psf;
+    bst_fft_light_options options;
+    bst_light_band band;
+    double density[QUALITIES][2];
+    /* of any window, and of the whole sensor, whose grid is denser */
+    bst_light_error error[QUALITIES][2];
+    double widest; /* widening of nodes that the spreading kernel takes, of the node variance */
+    int margin;
+    bst_parallel *pool;
+    cl_context context;
+    cl_program program;
+    cl_kernel kernel;
+    int tile_width, tile_height, group;
+    setup setups[SETUPS];
+    long long calls;
+    int nodes, field_nodes, field_x, field_y; /* of the PSF; of its field; lattice of weights */
+    cl_mem *fields;                           /* [field_nodes] */
+};
+
+bst_fft_light_options bst_fft_light_default_options(void) {
+    return (bst_fft_light_options){.taps = 8, .tolerance = 3e-5};
+}
+
+/* Tiles for the deposit, and threads for the transforms: as many as the device has, if it is the
+ * host's processor. */
+static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fft_light *l, int *threads) {
+    cl_device_type type = 0;
+    cl_ulong local_bytes = 0;
+    cl_uint units = 0;
+    cl_device_id id = bst_device_id(device);
+    BST_TRY(bst_device_check(ctx, clGetDeviceInfo(id, CL_DEVICE_TYPE, sizeof type, &type, NULL),
+                             "asking for the device's type"));
+    BST_TRY(bst_device_check(
+        ctx, clGetDeviceInfo(id, CL_DEVICE_LOCAL_MEM_SIZE, sizeof local_bytes, &local_bytes, NULL),
+        "asking for the device's local memory"));
+    BST_TRY(bst_device_check(
+        ctx, clGetDeviceInfo(id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL),
+        "asking for the device's compute units"));
+    bool cpu = (type & CL_DEVICE_TYPE_CPU) != 0, large = cpu && local_bytes >= 128 * 1024;
+    /* of a core's second cache rather than the first: fewer blocks lie on two tiles */
+    l->tile_width = large ? local_bytes >= 512 * 1024 ? 256 : 64 : 16;
+    l->tile_height = large ? 256 : 32;
+    l->group = large ? 1 : 4;
+    *threads = cpu ? (int)units : 0;
+    return BST_OK;
+}
+
+static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
+    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
+                                          &bst_kernel_deposit_shared, &bst_kernel_deposit};
+    char options[1024];
+    int length = snprintf(
+        options, sizeof options,
+        "-cl-std=CL1.2 -DFFT_LIGHT -DDEPOSIT_W=%d -DDEPOSIT_H=%d "
+        "-DDEPOSIT_GROUP=%d%s%s%s",
+        l->tile_width, l->tile_height, l->group, l->field_nodes > 1 ? " -DFIELD" : "",
+        l->nodes > l->field_nodes ? " -DSPECTRA" : "", l->group == 1 ? " -DNEAR_CACHE" : "");
+    bst_scene_node_options(&l->camera, l->options.spatial_oversample, options + length,
+                           sizeof options - (size_t)length);
+    BST_TRY(bst_device_build(ctx, device, sources, 4, options, &l->program));
+    cl_int code;
+    l->kernel = clCreateKernel(l->program, "bst_light_deposit", &code);
+    return bst_device_check(ctx, code, "bst_light_deposit");
+}
+
+/* The field nodes' weights on a lattice, which the kernel interpolates again. */
+static bst_status make_fields(bst_ctx *ctx, bst_fft_light *l) {
+    l->field_x = (int)l->camera.width_px / FIELD_STEP_PX + 2;
+    l->field_y = (int)l->camera.height_px / FIELD_STEP_PX + 2;
+    size_t places = (size_t)l->field_x * (size_t)l->field_y;
+    float *weights = calloc(places * (size_t)l->field_nodes, sizeof *weights);
+    l->fields = calloc((size_t)l->field_nodes, sizeof *l->fields);
+    if (!weights || !l->fields) {
+        free(weights);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the weights of the PSF's field");
+    }
+    for (int j = 0; j < l->field_y; j++) {
+        for (int i = 0; i < l->field_x; i++) {
+            int node[4];
+            double weight[4];
+            int count = bst_psf_weights(
+                l->psf, (double)i * (double)(l->camera.width_px - 1) / (l->field_x - 1),
+                (double)j * (double)(l->camera.height_px - 1) / (l->field_y - 1), node, weight);
+            for (int k = 0; k < count; k++) {
+                weights[(size_t)node[k] * places + (size_t)(j * l->field_x + i)] +=
+                    (float)weight[k];
+            }
+        }
+    }
+    bst_status status = BST_OK;
+    for (int n = 0; n < l->field_nodes && status == BST_OK; n++) {
+        cl_int code;
+        l->fields[n] =
+            clCreateBuffer(l->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR,
+                           places * sizeof *weights, weights + (size_t)n * places, &code);
+        status = bst_device_check(ctx, code, "allocating the weights of the PSF's field");
+    }
+    free(weights);
+    return status;
+}
+
+/* The grid of a window of so many pixels. */
+static void choose_axes(const bst_fft_light *l, int quality, int width, int height,
+                        bst_light_axis axis[2]) {
+    /* the least distance from which wings wrap around; nearer ones are not smooth */
+    int taps = l->options.taps, pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
+    axis[0] = bst_light_axis_choose(&l->band, 0, taps, width + pad, l->density[quality][0]);
+    axis[1] = bst_light_axis_choose(&l->band, 1, taps, height + pad, l->density[quality][1]);
+}
+
+/* Densities and errors of a grid; widenings that it takes. */
+static bst_status prepare_quality(bst_ctx *ctx, bst_fft_light *l, int quality) {
+    double tolerance = 0.45 * l->options.tolerance * (quality == FINE ? FINER : 1.0);
+    bst_light_axis axis[2]; /* as sparse as any window's */
+    for (int a = 0; a < 2; a++) {
+        bst_spread spread = {.taps = l->options.taps};
+        bst_spread_shape shape;
+        double density = bst_light_density(&l->band, a, l->options.taps, tolerance);
+        l->density[quality][a] = density;
+        (void)bst_spread_choose(&spread, &l->band.axis[a], density);
+        axis[a] = (bst_light_axis){DENSITY_PX, (int)floor(DENSITY_PX * density), spread, 0.0};
+        double sigma = l->band.node_sigma_px * density;
+        while (bst_spread_widen(&spread, &l->band.axis[a], density, l->widest * sigma * sigma,
+                                &shape) > WIDEN_ERROR) {
+            l->widest *= 0.8;
+        }
+    }
+    BST_TRY(bst_light_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][0]));
+    choose_axes(l, quality, (int)l->camera.width_px, (int)l->camera.height_px, axis);
+    return bst_light_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][1]);
+}
+
+static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
+    int threads;
+    BST_TRY(choose_tiles(ctx, device, l, &threads));
+    BST_TRY(bst_parallel_create(ctx, threads, &l->pool));
+    BST_TRY(build(ctx, device, l));
+    BST_TRY(bst_light_band_measure(ctx, l->psf, 0.1 * l->options.tolerance, &l->band));
+    l->widest = BST_WIDEST;
+    l->margin = (l->band.reach_px + 15) / 16 * 16;
+    for (int q = 0; q < QUALITIES; q++) {
+        BST_TRY(prepare_quality(ctx, l, q));
+    }
+    return make_fields(ctx, l);
+}
+
+bst_status bst_fft_light_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                                const bst_psf *psf, const bst_fft_light_options *options,
+                                bst_fft_light **out) {
+    *out = NULL;
+    bst_fft_light_options o = options ? *options : bst_fft_light_default_options();
+    if ((o.taps != 4 && o.taps != 6 && o.taps != 8) || !(o.tolerance > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a spreading kernel of %d taps for a tolerance of %g: allowed are 4, 6 and "
+                        "8 taps and tolerances above 0",
+                        o.taps, o.tolerance);
+    }
+    bst_fft_light *l = calloc(1, sizeof *l);
+    if (!l) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for light through a general PSF");
+    }
+    /* several simulations of one process may plan at a time */
+    fftwf_make_planner_thread_safe();
+    fftw_make_planner_thread_safe();
+    l->camera = *camera;
+    l->psf = psf;
+    l->options = o;
+    l->nodes = bst_psf_nodes(psf);
+    l->field_nodes = l->nodes / bst_psf_spectra(psf);
+    l->context = bst_device_context(device);
+    clRetainContext(l->context);
+    bst_status status = prepare(ctx, device, l);
+    if (status != BST_OK) {
+        bst_fft_light_free(l);
+        return status;
+    }
+    *out = l;
+    return BST_OK;
+}
+
+static void release(cl_mem *buffer) {
+    if (*buffer) {
+        clReleaseMemObject(*buffer);
+        *buffer = NULL;
+    }
+}
+
+static void free_setup(setup *s) {
+    bst_light_fft_free(s->fft);
+    release(&s->table);
+    release(&s->grid);
+    *s = (setup){0};
+}
+
+void bst_fft_light_free(bst_fft_light *l) {
+    if (!l) {
+        return;
+    }
+    for (int i = 0; i < SETUPS; i++) {
+        free_setup(&l->setups[i]);
+    }
+    for (int n = 0; l->fields && n < l->field_nodes; n++) {
+        release(&l->fields[n]);
+    }
+    if (l->kernel) {
+        clReleaseKernel(l->kernel);
+    }
+    if (l->program) {
+        clReleaseProgram(l->program);
+    }
+    bst_parallel_free(l->pool);
+    clReleaseContext(l->context);
+    free(l->fields);
+    free(l);
+}
+
+const bst_light_band *bst_fft_light_band(const bst_fft_light *l) {
+    return &l->band;
+}
+
+int bst_fft_light_margin_px(const bst_fft_light *l) {
+    return l->margin;
+}
+
+double bst_fft_light_density(const bst_fft_light *l) {
+    return fmin(l->density[PLAIN][0], l->density[PLAIN][1]);
+}
+
+void bst_fft_light_stamp(const bst_fft_light *l, bst_scene_source *source) {
+    double least = bst_fft_light_density(l);
+    source->radius = (int)ceil(0.5 * l->options.taps / least) + 1;
+}
+
+double bst_fft_light_widest(const bst_fft_light *l) {
+    return l->widest;
+}
+
+int bst_fft_light_spectra(const bst_fft_light *l) {
+    return l->nodes / l->field_nodes;
+}
+
+double bst_fft_light_error_sigma(const bst_fft_light *l, bool fine, bool wings, bst_window window,
+                                 double peak_e, double dark_variance_e2) {
+    bool whole = window.width == l->camera.width_px && window.height == l->camera.height_px;
+    return bst_light_error_sigma(&l->error[fine ? FINE : PLAIN][whole], wings, peak_e,
+                                 dark_variance_e2);
+}
+
+double bst_fft_light_mixing_error(const bst_fft_light *l) {
+    return bst_psf_mixing_error(l->psf);
+}
+
+/* Table of the spreading kernel for a point `phase` samples right of sample taps / 2 - 1, and of
+ * kernels for nodes that are wider by (n / BST_WIDTHS)^2 BST_WIDEST of the node variance. */
+static void tabulate(const bst_fft_light *l, int a, const bst_light_axis *axis, float *table) {
+    double density = (double)axis->samples / axis->pixels;
+    int first = BST_SPREAD_TAPS / 2 - axis->spread.taps / 2;
+    memset(table, 0, BST_SPREAD_TABLE * sizeof *table);
+    for (int n = 0; n <= BST_WIDTHS; n++) {
+        double share = (double)n / BST_WIDTHS, sigma = share * l->band.node_sigma_px * density;
+        double variance = BST_WIDEST * sigma * sigma;
+        bst_spread_shape shape;
+        bst_spread_widen(&axis->spread, &l->band.axis[a], density, variance, &shape);
+        for (int p = 0; p <= BST_SPREAD_PHASES; p++) {
+            float *row = table + (n * (BST_SPREAD_PHASES + 1) + p) * BST_SPREAD_TAPS;
+            for (int j = first; j < first + axis->spread.taps; j++) {
+                double t = j - (BST_SPREAD_TAPS / 2 - 1) - (double)p / BST_SPREAD_PHASES;
+                row[j] = (float)bst_spread_shape_value(&axis->spread, &shape, t);
+            }
+        }
+    }
+}
+
+static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_window window,
+                             setup *s) {
+    bst_light_shape shape = {.width = window.width, .height = window.height, .margin = l->margin};
+    bst_light_axis axis[2];
+    choose_axes(l, quality, window.width, window.height, axis);
+    shape.x = axis[0];
+    shape.y = axis[1];
+    BST_TRY(bst_light_fft_create(ctx, l->psf, l->band.cutoff, &shape, l->pool, &s->fft));
+    s->width = window.width;
+    s->height = window.height;
+    s->quality = quality;
+    size_t table_bytes = 2 * BST_SPREAD_TABLE * sizeof(float);
+    float *table = malloc(table_bytes);
+    if (!table) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the spreading kernel's table");
+    }
+    tabulate(l, 0, &shape.x, table);
+    tabulate(l, 1, &shape.y, table + BST_SPREAD_TABLE);
+    cl_int code;
+    s->table = clCreateBuffer(l->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, table_bytes,
+                              table, &code);
+    free(table);
+    BST_TRY(bst_device_check(ctx, code, "allocating the spreading kernel's table"));
+    size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
+    return bst_device_buffer(ctx, l->context, bytes, NULL, "allocating the light's grid", &s->grid);
+}
+
+/* The setup for a window's size; an old one makes room for a new one. */
+static bst_status find_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_window window,
+                             setup **out) {
+    setup *oldest = &l->setups[0];
+    l->calls++;
+    for (int i = 0; i < SETUPS; i++) {
+        setup *s = &l->setups[i];
+        if (s->fft && s->width == window.width && s->height == window.height &&
+            s->quality == quality) {
+            s->used = l->calls;
+            *out = s;
+            return BST_OK;
+        }
+        oldest = s->used < oldest->used ? s : oldest;
+    }
+    free_setup(oldest);
+    bst_status status = make_setup(ctx, l, quality, window, oldest);
+    if (status != BST_OK) {
+        free_setup(oldest);
+        return status;
+    }
+    oldest->used = l->calls;
+    *out = oldest;
+    return BST_OK;
+}
+
+static bst_status deposit(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue, bst_window window,
+                          const bst_fft_light_nodes *nodes, const setup *s, int node) {
+    const bst_light_shape *shape = bst_light_fft_shape(s->fft);
+    bst_deposit_params p = {
+        .x0 = (float)(window.x0 - shape->margin),
+        .y0 = (float)(window.y0 - shape->margin),
+        .density_x = (float)((double)shape->x.samples / shape->x.pixels),
+        .density_y = (float)((double)shape->y.samples / shape->y.pixels),
+        .samples_x = shape->x.samples,
+        .samples_y = shape->y.samples,
+        .tiles_x = (shape->x.samples + l->tile_width - 1) / l->tile_width,
+        .tiles_y = (shape->y.samples + l->tile_height - 1) / l->tile_height,
+        .source_groups = nodes->source_groups,
+        .spectrum = node / l->field_nodes,
+        .field_x = l->field_x,
+        .field_y = l->field_y,
+        .field_per_px_x = (float)((l->field_x - 1) / fmax((double)l->camera.width_px - 1.0, 1.0)),
+        .field_per_px_y = (float)((l->field_y - 1) / fmax((double)l->camera.height_px - 1.0, 1.0)),
+    };
+    const void *values[] = {&p,
+                            &nodes->sources,
+                            &nodes->table,
+                            &nodes->block_box,
+                            &nodes->source_box,
+                            &s->table,
+                            &l->fields[node % l->field_nodes],
+                            &s->grid,
+                            &nodes->shares};
+    cl_uint count = (cl_uint)(sizeof values / sizeof *values) - (l->nodes == l->field_nodes);
+    for (cl_uint i = 0; i < count; i++) {
+        size_t bytes = i == 0 ? sizeof p : sizeof(cl_mem);
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(l->kernel, i, bytes, values[i]),
+                                 "setting a kernel argument"));
+    }
+    size_t group = (size_t)l->group, tiles = (size_t)p.tiles_x * (size_t)p.tiles_y;
+    size_t global = (tiles + group - 1) / group * group;
+    return bst_device_check(
+        ctx, clEnqueueNDRangeKernel(queue, l->kernel, 1, NULL, &global, &group, 0, NULL, NULL),
+        "spreading the light's nodes");
+}
+
+bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue,
+                                bst_window window, const bst_fft_light_nodes *nodes,
+                                bst_fft_light_image *out) {
+    setup *s;
+    BST_TRY(find_setup(ctx, l, nodes->fine ? FINE : PLAIN, window, &s));
+    size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
+    for (int n = 0; n < l->nodes; n++) {
+        BST_TRY(deposit(ctx, l, queue, window, nodes, s, n));
+        cl_int code;
+        float *grid = clEnqueueMapBuffer(queue, s->grid, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE, 0,
+                                         bytes, 0, NULL, NULL, &code);
+        BST_TRY(bst_device_check(ctx, code, "mapping the light's grid"));
+        bst_light_fft_add(s->fft, n, n == 0, n == l->nodes - 1, grid);
+        if (n == l->nodes - 1) {
+            bst_light_fft_finish(s->fft, grid);
+        }
+        BST_TRY(bst_device_check(ctx, clEnqueueUnmapMemObject(queue, s->grid, grid, 0, NULL, NULL),
+                                 "unmapping the light's grid"));
+    }
+    *out = (bst_fft_light_image){s->grid, 0, bst_light_fft_pitch(s->fft)};
+    return BST_OK;
+}

@@ -1,0 +1,81 @@
+/* Light through a general PSF: aberrated, not separable, its wings not cut.
+ *
+ * The frame's nodes are spread on a grid of the density that the PSF's band asks for, on the
+ * device; the grid is convolved by FFT on the host's threads (a CPU device's memory is used in
+ * place), and the image goes to the tile kernel. The cost depends on the window and the number of
+ * nodes, hardly on the PSF; a field-dependent PSF costs one grid per field node, and one with
+ * several spectra that many of each. */
+#ifndef BST_SCENEGEN_FOURIER_FOURIER_RENDER_H
+#define BST_SCENEGEN_FOURIER_FOURIER_RENDER_H
+
+#include "scenegen/fourier/fourier_grid.h"
+#include "scenegen/kernels/deposit_shared.h"
+#include "scenegen/kernels/scene_shared.h"
+#include "sim/device/device.h"
+#include "sim/messages/messages.h"
+
+typedef struct bst_fft_light bst_fft_light;
+
+typedef struct bst_fft_light_options {
+    int taps;               /* of the spreading kernel: 4, 6 or 8 */
+    double tolerance;       /* error of the grid in any pixel, over the PSF's peak */
+    int spatial_oversample; /* as the renderer's */
+} bst_fft_light_options;
+
+bst_fft_light_options bst_fft_light_default_options(void);
+
+/* Measures the PSF and builds the kernel. The PSF is borrowed. `options` may be NULL. */
+bst_status bst_fft_light_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                                const bst_psf *psf, const bst_fft_light_options *options,
+                                bst_fft_light **out) BST_MUST_CHECK;
+void bst_fft_light_free(bst_fft_light *light);
+
+const bst_light_band *bst_fft_light_band(const bst_fft_light *light);
+
+/* Pixels outside the window from which a source's light is still drawn. */
+int bst_fft_light_margin_px(const bst_fft_light *light);
+
+/* Least samples of its grid per px and axis. */
+double bst_fft_light_density(const bst_fft_light *light);
+
+/* Sets the part of a source's record that says how far its nodes reach. */
+void bst_fft_light_stamp(const bst_fft_light *light, bst_scene_source *source);
+
+/* By how many node variances (bst_light_band) a node may be widened. */
+double bst_fft_light_widest(const bst_fft_light *light);
+
+/* Spectra of the PSF (bst_psf_spectra). */
+int bst_fft_light_spectra(const bst_fft_light *light);
+
+/* Bound of an image's error by grid and cut-off, in sigma of the worst pixel, of a source with
+ * `peak_e` electrons in its brightest one (fourier_error.h). fine: with the finer of two grids.
+ * wings: the window has no more than them of it. */
+double bst_fft_light_error_sigma(const bst_fft_light *light, bool fine, bool wings,
+                                 bst_window window, double peak_e, double dark_variance_e2);
+
+/* Bound of its error by mixing spectra (bst_psf_mixing_error), over the peak of a source that has
+ * one of its own. */
+double bst_fft_light_mixing_error(const bst_fft_light *light);
+
+/* The frame's sources and node table on the device, and the boxes that the nodes kernel made. */
+typedef struct bst_fft_light_nodes {
+    cl_mem sources, table, block_box, source_box;
+    cl_mem shares; /* float [sources][BST_SPECTRA], where the PSF has several spectra */
+    int source_groups;
+    bool fine; /* on the finer grid */
+} bst_fft_light_nodes;
+
+/* Expected electrons of the window's pixels: pixel (i, j) at buffer[first + j * pitch + i]. Valid
+ * until the next call. */
+typedef struct bst_fft_light_image {
+    cl_mem buffer;
+    int first, pitch;
+} bst_fft_light_image;
+
+/* Makes the image of a window. Waits for the nodes on `queue`. Prepares for a window of a new size
+ * first, which takes longer than the image itself; the latest few sizes are kept. */
+bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *light, cl_command_queue queue,
+                                bst_window window, const bst_fft_light_nodes *nodes,
+                                bst_fft_light_image *out) BST_MUST_CHECK;
+
+#endif

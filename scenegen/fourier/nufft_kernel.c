@@ -1,0 +1,111 @@
+#include "scenegen/fourier/nufft_kernel.h"
+
+#include <math.h>
+
+#include "sim/core/vec.h"
+
+enum { QUADRATURE = 40, TRIALS = 16 };
+
+double bst_spread_value(const bst_spread *spread, double t) {
+    double z = 2.0 * t / spread->taps, q = 1.0 - z * z;
+    return q > 0.0 ? exp(spread->beta * (sqrt(q) - 1.0)) : 0.0;
+}
+
+double bst_spread_transform(const bst_spread *spread, double nu) {
+    /* t = taps / 2 sin(a): the midpoint rule in a converges exponentially down to exp(-beta) */
+    double half = 0.5 * spread->taps, sum = 0.0;
+    for (int i = 0; i < QUADRATURE; i++) {
+        double a = 0.5 * BST_PI * (i + 0.5) / QUADRATURE, c = cos(a);
+        sum += exp(spread->beta * (c - 1.0)) * c * cos(2.0 * BST_PI * nu * half * sin(a));
+    }
+    return sum * BST_PI * half / QUADRATURE;
+}
+
+/* Error of one choice: what the neighbouring bands leak into the PSF's frequencies. */
+static double leak(const bst_spread *spread, const bst_spread_band *band, double density) {
+    double sum = 0.0;
+    for (int i = 0; i < BST_SPREAD_BINS; i++) {
+        double nu = (i + 0.5) * band->step / density;
+        if (!(band->weight[i] > 0.0)) {
+            continue;
+        }
+        if (nu >= 0.5) { /* lost */
+            sum += band->weight[i];
+            continue;
+        }
+        double own = fabs(bst_spread_transform(spread, nu)), others = 0.0;
+        for (int m = 1; m <= 2; m++) {
+            others += fabs(bst_spread_transform(spread, nu - m)) +
+                      fabs(bst_spread_transform(spread, nu + m));
+        }
+        sum += band->weight[i] * fmin(others / own, 2.0);
+    }
+    return sum;
+}
+
+double bst_spread_choose(bst_spread *spread, const bst_spread_band *band, double density) {
+    double best = INFINITY, beta = 0.0;
+    for (int n = 0; n < TRIALS; n++) {
+        spread->beta = spread->taps * (0.8 + 1.8 * n / (TRIALS - 1));
+        double error = leak(spread, band, density);
+        if (error < best) {
+            best = error;
+            beta = spread->beta;
+        }
+    }
+    spread->beta = beta;
+    return best;
+}
+
+/* Transforms of phi(t) z^(2k) at nu, k = 0 to 2. */
+static void transforms(const bst_spread *spread, double nu, double out[3]) {
+    double half = 0.5 * spread->taps;
+    out[0] = out[1] = out[2] = 0.0;
+    for (int i = 0; i < QUADRATURE; i++) {
+        double a = 0.5 * BST_PI * (i + 0.5) / QUADRATURE, c = cos(a), z = sin(a);
+        double v = exp(spread->beta * (c - 1.0)) * c * cos(2.0 * BST_PI * nu * half * z);
+        for (int k = 0; k < 3; k++, v *= z * z) {
+            out[k] += v * BST_PI * half / QUADRATURE;
+        }
+    }
+}
+
+double bst_spread_shape_value(const bst_spread *spread, const bst_spread_shape *shape, double t) {
+    double z = 2.0 * t / spread->taps, q = z * z;
+    return bst_spread_value(spread, t) * (shape->c[0] + q * (shape->c[1] + q * shape->c[2]));
+}
+
+double bst_spread_widen(const bst_spread *spread, const bst_spread_band *band, double density,
+                        double variance, bst_spread_shape *out) {
+    *out = (bst_spread_shape){{1.0, 0.0, 0.0}};
+    if (!(variance > 0.0)) {
+        return 0.0;
+    }
+    /* The light is kept: c0 = 1 - (c1 T1(0) + c2 T2(0)) / T0(0), so that two unknowns are left with
+     * the functions D_k(nu) = T_k(nu) - T_k(0) / T0(0) T0(nu). */
+    double zero[3], normal[2][2] = {{0}}, right[2] = {0};
+    transforms(spread, 0.0, zero);
+    double a[BST_SPREAD_BINS][2], aim[BST_SPREAD_BINS];
+    for (int i = 0; i < BST_SPREAD_BINS; i++) {
+        double nu = (i + 0.5) * band->step / density, own[3];
+        transforms(spread, nu, own);
+        aim[i] = exp(-2.0 * BST_PI * BST_PI * variance * nu * nu) - 1.0;
+        for (int k = 0; k < 2; k++) {
+            a[i][k] = (own[k + 1] - zero[k + 1] / zero[0] * own[0]) / own[0];
+        }
+        for (int k = 0; k < 2 && nu < 0.5; k++) {
+            right[k] += band->weight[i] * a[i][k] * aim[i];
+            normal[k][0] += band->weight[i] * a[i][k] * a[i][0];
+            normal[k][1] += band->weight[i] * a[i][k] * a[i][1];
+        }
+    }
+    double det = normal[0][0] * normal[1][1] - normal[0][1] * normal[1][0];
+    double c1 = (right[0] * normal[1][1] - right[1] * normal[0][1]) / det;
+    double c2 = (normal[0][0] * right[1] - normal[1][0] * right[0]) / det;
+    *out = (bst_spread_shape){{1.0 - (c1 * zero[1] + c2 * zero[2]) / zero[0], c1, c2}};
+    double error = 0.0;
+    for (int i = 0; i < BST_SPREAD_BINS; i++) {
+        error += band->weight[i] * fabs(c1 * a[i][0] + c2 * a[i][1] - aim[i]);
+    }
+    return error;
+}

@@ -1,0 +1,276 @@
+#include "scenegen/smear/error_budget.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+/* Parts of the others' errors that meet where the worst source's error is greatest: of an error
+ * that is told by its greatest value, and of a border's length that passes within its own thickness
+ * of a place. */
+#define REST 0.4f
+#define BORDERS 0.1f
+
+/* Cells as far as two stamps' radii, four standard deviations of the PSF each and more, go; and up
+ * to how many cells are searched for crossings of borders. */
+enum { REACH = 5, MOST_CROSSINGS = 1000 };
+
+/* Sources in one place. */
+typedef struct spot {
+    int64_t key;
+    unsigned frame; /* that it was filled in; an older one is empty */
+    float x, y, peak, nodes, shared, excess, border;
+} spot;
+
+/* What lies in half a box, in sigma. */
+typedef struct cell {
+    int64_t key;
+    unsigned frame;
+    int u, v;
+    float squares, worst, second, shared, excess, worst_excess, border, worst_border;
+} cell;
+
+struct bst_crowd {
+    bst_crowd_motion motion;
+    bst_crowd_source *sources;
+    int count, capacity;
+    spot *spots;
+    cell *cells;
+    int *used; /* the frame's spots, then its cells */
+    unsigned frame, mask;
+    double missing_e; /* everywhere */
+    double error;     /* negative: not known yet */
+};
+
+bst_status bst_crowd_create(bst_ctx *ctx, bst_crowd **out) {
+    *out = calloc(1, sizeof **out);
+    return *out ? BST_OK
+                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the predicted error of a frame");
+}
+
+void bst_crowd_free(bst_crowd *c) {
+    if (c) {
+        free(c->sources);
+        free(c->spots);
+        free(c->cells);
+        free(c->used);
+        free(c);
+    }
+}
+
+bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool shift) {
+    const double *from = path[0].p, *to = path[count - 1].p;
+    double chord[2] = {to[0] - from[0], to[1] - from[1]}, low[3] = {0}, high[3] = {0};
+    double length = hypot(chord[0], chord[1]);
+    double along[2] = {length > 0.0 ? chord[0] / length : 1.0,
+                       length > 0.0 ? chord[1] / length : 0.0};
+    for (int k = 0; k < count; k++) {
+        const double *p = path[k].p;
+        double at[3] = {p[0] * along[0] + p[1] * along[1], p[1] * along[0] - p[0] * along[1], p[2]};
+        for (int i = 0; i < 3; i++) {
+            low[i] = k == 0 ? at[i] : fmin(low[i], at[i]);
+            high[i] = k == 0 ? at[i] : fmax(high[i], at[i]);
+        }
+    }
+    /* a tilt about x moves the image against y, one about y along x; roll moves corners any way */
+    double roll = high[2] - low[2], way = 0.0;
+    for (int k = 0; k + 1 < count; k++) {
+        const double *p = path[k].p, *q = path[k + 1].p;
+        way += sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
+                    (p[2] - q[2]) * (p[2] - q[2]));
+    }
+    return (bst_crowd_motion){
+        .way_px = way,
+        .direction = {shift ? along[0] : along[1], shift ? along[1] : -along[0]},
+        .length_px = high[0] - low[0] + roll,
+        .width_px = high[1] - low[1] + roll};
+}
+
+void bst_crowd_begin(bst_crowd *c, const bst_crowd_motion *motion) {
+    c->motion = *motion;
+    double psf = 3.0 * motion->sigma_px + 1.0;
+    c->motion.overlap = fmin(
+        1.0, (motion->way_px + psf) * psf / ((motion->length_px + psf) * (motion->width_px + psf)));
+    c->count = 0;
+    c->missing_e = 0.0;
+    c->error = -1.0;
+}
+
+void bst_crowd_miss(bst_crowd *c, double electrons) {
+    c->missing_e += electrons;
+    c->error = -1.0;
+}
+
+bst_status bst_crowd_add(bst_ctx *ctx, bst_crowd *c, const bst_crowd_source *source) {
+    if (c->count == c->capacity) {
+        int capacity = c->capacity > 0 ? 2 * c->capacity : 1024;
+        bst_crowd_source *sources = realloc(c->sources, (size_t)capacity * sizeof *sources);
+        c->sources = sources ? sources : c->sources;
+        /* twice as many places as entries, so that searches are short; the old content is done with
+         */
+        free(c->spots);
+        free(c->cells);
+        free(c->used);
+        c->spots = calloc((size_t)capacity, 2 * sizeof *c->spots);
+        c->cells = calloc((size_t)capacity, 2 * sizeof *c->cells);
+        c->used = malloc((size_t)capacity * sizeof *c->used);
+        c->frame = 0;
+        c->mask = 2 * (unsigned)capacity - 1;
+        c->capacity = sources && c->spots && c->cells && c->used ? capacity : 0;
+        if (c->capacity == 0) {
+            c->count = 0;
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the errors of %d sources",
+                            capacity);
+        }
+    }
+    c->sources[c->count++] = *source;
+    return BST_OK;
+}
+
+static int64_t key_of(int u, int v) {
+    return (int64_t)((uint64_t)(uint32_t)u << 32 | (uint32_t)v);
+}
+
+static unsigned place_of(int64_t key) {
+    return (unsigned)((uint64_t)key * 0x9E3779B97F4A7C15u >> 32);
+}
+
+/* Number of the entry with this key, or of the empty one where it belongs. */
+static int find_spot(const bst_crowd *c, int64_t key) {
+    unsigned i = place_of(key) & c->mask;
+    while (c->spots[i].frame == c->frame && c->spots[i].key != key) {
+        i = (i + 1) & c->mask;
+    }
+    return (int)i;
+}
+
+static int find_cell(const bst_crowd *c, int64_t key) {
+    unsigned i = place_of(key) & c->mask;
+    while (c->cells[i].frame == c->frame && c->cells[i].key != key) {
+        i = (i + 1) & c->mask;
+    }
+    return (int)i;
+}
+
+/* Sources into spots; returns how many. *apart: the worst of those that move by themselves. */
+static int fill_spots(bst_crowd *c, float *apart) {
+    float per_px = 1.0f / fmaxf((float)c->motion.sigma_px, 1.0f);
+    float dark = (float)c->motion.dark_variance_e2;
+    int spots = 0;
+    for (int i = 0; i < c->count; i++) {
+        const bst_crowd_source *s = &c->sources[i];
+        if (s->apart) {
+            float e = (s->nodes_e + s->excess_e + s->shared_e) / sqrtf(s->peak_e + dark);
+            *apart = fmaxf(*apart, fmaxf(e, s->border_e / sqrtf(dark)));
+            continue;
+        }
+        int64_t key = key_of((int)floorf(s->x_px * per_px), (int)floorf(s->y_px * per_px));
+        int n = find_spot(c, key);
+        spot *p = &c->spots[n];
+        if (p->frame != c->frame) {
+            *p = (spot){.key = key, .frame = c->frame, .x = s->x_px, .y = s->y_px};
+            c->used[spots++] = n;
+        }
+        p->peak += s->peak_e;
+        p->nodes += s->nodes_e;
+        p->shared += s->shared_e;
+        p->excess += s->excess_e;
+        p->border += s->border_e;
+    }
+    return spots;
+}
+
+/* Spots into cells, whose numbers take the spots' place in `used`; returns how many. */
+static int fill_cells(bst_crowd *c, int spots) {
+    const bst_crowd_motion *m = &c->motion;
+    float psf = 3.0f * (float)m->sigma_px + 1.0f, dark = (float)m->dark_variance_e2;
+    float per_u = 2.0f / ((float)m->length_px + psf), per_v = 2.0f / ((float)m->width_px + psf);
+    float dx = (float)m->direction[0], dy = (float)m->direction[1], quiet = 1.0f / sqrtf(dark);
+    int cells = 0;
+    for (int i = 0; i < spots; i++) {
+        const spot *s = &c->spots[c->used[i]];
+        int u = (int)floorf((s->x * dx + s->y * dy) * per_u);
+        int v = (int)floorf((s->y * dx - s->x * dy) * per_v);
+        int64_t key = key_of(u, v);
+        int n = find_cell(c, key);
+        cell *p = &c->cells[n];
+        if (p->frame != c->frame) {
+            *p = (cell){.key = key, .frame = c->frame, .u = u, .v = v};
+            c->used[cells++] = n;
+        }
+        float lit = 1.0f / sqrtf(s->peak + dark), nodes = s->nodes * lit;
+        p->squares += nodes * nodes;
+        p->second = fmaxf(p->second, fminf(p->worst, nodes));
+        p->worst = fmaxf(p->worst, nodes);
+        p->shared += s->shared * lit;
+        p->excess += s->excess * lit;
+        p->worst_excess = fmaxf(p->worst_excess, s->excess * lit);
+        p->border += s->border * quiet;
+        p->worst_border = fmaxf(p->worst_border, s->border * quiet);
+    }
+    return cells;
+}
+
+/* Error of the box about a cell. */
+static float box_error(const bst_crowd *c, const cell *middle) {
+    cell sum = {.key = 0};
+    for (int u = -1; u <= 1; u++) {
+        for (int v = -1; v <= 1; v++) {
+            const cell *p = u == 0 && v == 0
+                                ? middle
+                                : &c->cells[find_cell(c, key_of(middle->u + u, middle->v + v))];
+            if (p->frame == c->frame) {
+                sum.squares += p->squares;
+                sum.second = fmaxf(fmaxf(sum.second, p->second), fminf(sum.worst, p->worst));
+                sum.worst = fmaxf(sum.worst, p->worst);
+                sum.shared += p->shared;
+                sum.excess += p->excess;
+                sum.worst_excess = fmaxf(sum.worst_excess, p->worst_excess);
+                sum.border += p->border;
+                sum.worst_border = fmaxf(sum.worst_border, p->worst_border);
+            }
+        }
+    }
+    float part = (float)c->motion.overlap;
+    float others = sqrtf(part * fmaxf(sum.squares - sum.worst * sum.worst, 0.0f));
+    float excess = sum.worst_excess + part * (sum.excess - sum.worst_excess);
+    return fmaxf(sum.worst + excess, sum.worst_border) + sum.shared +
+           REST * fmaxf(others, sum.second) + BORDERS * (sum.border - sum.worst_border);
+}
+
+/* Error where the border of the stamps in a cell meets another, as two circles do that are no
+ * further apart than the sum of their radii. */
+static float crossing_error(const bst_crowd *c, const cell *middle) {
+    float other = fminf(middle->border - middle->worst_border, middle->worst_border);
+    for (int u = -REACH; u <= REACH; u++) {
+        for (int v = -REACH; v <= REACH; v++) {
+            const cell *p = &c->cells[find_cell(c, key_of(middle->u + u, middle->v + v))];
+            if (p->frame == c->frame && (u != 0 || v != 0)) {
+                other = fmaxf(other, p->worst_border);
+            }
+        }
+    }
+    return middle->worst_border + other;
+}
+
+double bst_crowd_error_sigma(bst_crowd *c) {
+    if (c->error < 0.0) {
+        float worst = 0.0f, apart = 0.0f, border = 0.0f;
+        c->frame++;
+        int cells = fill_cells(c, fill_spots(c, &apart));
+        for (int i = 0; i < cells; i++) {
+            const cell *p = &c->cells[c->used[i]];
+            worst = fmaxf(worst, box_error(c, p));
+            border = fmaxf(border, p->worst_border);
+        }
+        if (cells > MOST_CROSSINGS) { /* some of the worst do */
+            worst = fmaxf(worst, 2.0f * border);
+        }
+        for (int i = 0; i < cells && 2.0f * border > worst; i++) {
+            const cell *p = &c->cells[c->used[i]];
+            worst = p->worst_border + border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;
+        }
+        c->error = fmaxf(worst, apart) + REST * fminf(worst, apart) +
+                   c->missing_e / sqrt(c->motion.dark_variance_e2);
+    }
+    return c->error;
+}

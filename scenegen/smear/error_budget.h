@@ -1,0 +1,57 @@
+/* The error of a frame from the errors of its sources, where their images lie on one another.
+ *
+ * All stars move alike, so that those that may light one pixel have places in one box, as long and
+ * wide as the motion and the PSF. Sources are sorted into cells of half a box; the error of three
+ * by three cells is that of their worst source and what the others add, see docs/equations.md.
+ * Sources within one standard deviation of the PSF count as one, with the sum of their errors. Time
+ * and memory go with the number of sources. */
+#ifndef BST_SCENEGEN_SMEAR_ERROR_BUDGET_H
+#define BST_SCENEGEN_SMEAR_ERROR_BUDGET_H
+
+#include <stdbool.h>
+
+#include "scenegen/smear/smear_quadrature.h"
+#include "sim/core/status.h"
+
+typedef struct bst_crowd bst_crowd;
+
+/* How the stars of a frame move. */
+typedef struct bst_crowd_motion {
+    double direction[2];        /* unit vector */
+    double length_px, width_px; /* along it and across */
+    double way_px;              /* length of the way, at most */
+    double overlap;             /* part of length times width that a star's light falls on */
+    double sigma_px;            /* of the PSF */
+    double dark_variance_e2;    /* noise of a dark pixel */
+} bst_crowd_motion;
+
+/* Direction and extent of a path of tilts about x and y and roll (px in the sensor's corners), or
+ * of shifts along x and y. */
+bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool shift);
+
+/* Error of one source's image. */
+typedef struct bst_crowd_source {
+    float x_px, y_px; /* anywhere on its way, the same instant for all */
+    float peak_e;     /* largest light in one pixel */
+    float nodes_e;    /* error by nodes, profiles and rounding where it is greatest, e- */
+    float shared_e;   /* by a track that is not its own */
+    float excess_e;   /* light from beyond the stamp, on it */
+    float border_e;   /* missing next to the stamp */
+    bool apart;       /* moves further than the stars do */
+} bst_crowd_source;
+
+bst_status bst_crowd_create(bst_ctx *ctx, bst_crowd **out) BST_MUST_CHECK;
+void bst_crowd_free(bst_crowd *crowd);
+
+/* Starts a frame. */
+void bst_crowd_begin(bst_crowd *crowd, const bst_crowd_motion *motion);
+bst_status bst_crowd_add(bst_ctx *ctx, bst_crowd *crowd,
+                         const bst_crowd_source *source) BST_MUST_CHECK;
+
+/* Adds light that any pixel may lack, e-: of sources too far away to be drawn. */
+void bst_crowd_miss(bst_crowd *crowd, double electrons);
+
+/* Largest error expected in any pixel, in its sigma. The work is done at the first call. */
+double bst_crowd_error_sigma(bst_crowd *crowd);
+
+#endif

@@ -1,0 +1,101 @@
+#include "scenegen/smear/motion.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "sim/core/vec.h"
+
+double bst_motion_spread_px(const bst_path_point *path, int count, double scale_rad, double stretch,
+                            double roll_px, double corner_px) {
+    double corner = corner_px * scale_rad, worst = 0.0;
+    for (int k = 0; k < count; k++) {
+        double tilt = hypot(path[k].p[0], path[k].p[1]) * scale_rad / stretch;
+        double roll = fabs(path[k].p[2]) / roll_px;
+        /* first order, then what is left of products of turns */
+        double moved = roll * corner + tilt * corner * (corner + tilt);
+        moved += 0.5 * roll * (roll * corner + tilt) + tilt * roll * corner * (1.0 + corner);
+        worst = fmax(worst, moved);
+    }
+    return worst / scale_rad;
+}
+
+void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch, double roll_px) {
+    double tilt = scale_rad / stretch;
+    bst_quat q = bst_quat_from_rotvec(
+        (bst_vec3){point->p[0] * tilt, point->p[1] * tilt, point->p[2] / roll_px});
+    bst_vec3 v = bst_quat_rotate(q, (bst_vec3){0.0, 0.0, 1.0});
+    double f = v.z > 1e-6 ? 1.0 / (v.z * tilt) : 1e6 / tilt;
+    *point = (bst_path_point){{v.x * f, v.y * f, 0.0}, point->s};
+}
+
+bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
+                                bst_node_list *list) {
+    if (list->count + parts > list->capacity) {
+        int capacity = list->count + parts;
+        bst_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
+        if (!items) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of a smear", capacity);
+        }
+        list->items = items;
+        list->capacity = capacity;
+    }
+    double from = path[0].s, total = path[count - 1].s - from;
+    for (int n = 0, k = 0; n < parts; n++) {
+        double s = from + total * (n + 0.5) / parts;
+        while (k + 2 < count && path[k + 1].s < s) {
+            k++;
+        }
+        double length = path[k + 1].s - path[k].s;
+        double u = length > 0.0 ? (s - path[k].s) / length : 0.0;
+        bst_node *node = &list->items[list->count++];
+        *node = (bst_node){.weight = 1.0 / parts};
+        for (int i = 0; i < 3; i++) {
+            node->p[i] = path[k].p[i] + u * (path[k + 1].p[i] - path[k].p[i]);
+        }
+    }
+    return BST_OK;
+}
+
+/* Light is uniform between the points of a path: where it changes they are so many in an exposure,
+ * and as close as it changes by this share of the mean. */
+enum { RATE_PARTS = 512 };
+#define RATE_STEP 0.02
+
+double bst_motion_stretch(const bst_source *source, double begin_s, double length_s,
+                          double duration_s, double from, int *parts) {
+    const bst_source_rate *r = source->rate;
+    *parts = 1;
+    if (!r || !(length_s > 0.0) || !(duration_s > 0.0)) {
+        return 1.0;
+    }
+    double start = (begin_s + from * length_s) / duration_s, per = length_s / duration_s;
+    double to = 1.0;
+    for (int n = 0; n < r->count; n++) {
+        if (r->u[n] > start + 1e-9 * per) {
+            to = fmin(1.0, from + (r->u[n] - start) / per);
+            break;
+        }
+    }
+    to = to > 1.0 - 1e-9 ? 1.0 : to;
+    double end = start + (to - from) * per;
+    double change = fabs(bst_source_rate_at(source, end) - bst_source_rate_at(source, start));
+    double wanted = fmin(fmax(change / RATE_STEP, (end - start) * RATE_PARTS), 1000.0);
+    *parts = wanted > 1.0 ? (int)ceil(wanted) : 1;
+    return to;
+}
+
+double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px) {
+    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), best = 0.0;
+    int stride = count / 128 + 1;
+    for (int a = 0; a < count; a += stride) {
+        double sum = 0.0;
+        for (int n = 0; n < count; n++) {
+            double dx = nodes[n].p[0] - nodes[a].p[0], dy = nodes[n].p[1] - nodes[a].p[1];
+            double q = (dx * dx + dy * dy) * scale;
+            sum += q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
+        }
+        best = fmax(best, sum);
+    }
+    double line = erf(0.5 / (psf_sigma_px * sqrt(2.0)));
+    return best * line * line;
+}

@@ -1,0 +1,580 @@
+#include "scenegen/smear/smear.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "scenegen/kernels/deposit_shared.h"
+#include "scenegen/reference.h"
+#include "scenegen/smear/motion.h"
+#include "scenegen/smear/smear_internal.h"
+#include "scenegen/stamp/fixed_point_px.h"
+#include "scenegen/stamp/profile_law.h"
+
+/* Shares of the tolerance: for nodes, for the border of the stamp, and for a track that stars
+ * share. */
+#define NODE_SHARE 0.85
+#define CUT_SHARE 0.3
+#define SINGLE_SHARE 0.1
+
+enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
+
+bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
+                            const bst_smear_options *options, bst_smear **out) {
+    bst_smear *s = calloc(1, sizeof *s);
+    *out = s;
+    if (!s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the smear of an exposure");
+    }
+    s->camera = *camera;
+    s->options = *options;
+    s->sigma_px =
+        options->node_sigma_px > 0.0 ? options->node_sigma_px : bst_camera_psf_sigma_px(camera);
+    s->widest = options->widest > 0.0 ? options->widest : BST_NODE_WIDEST;
+    s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
+    bst_stamp_init(&s->stamp, s->sigma_px, options->node_sigma_px > 0.0);
+    /* of the error function 2.3e-7 are missed on each axis, of nodes in reach of a pixel whose
+     * light there is a quarter of the centre's on average */
+    s->edge_error = 2.0 * 4.0 * 2.3e-7 / bst_reference_pixel_share(0.0, s->sigma_px, 0);
+    s->edge_error = options->node_sigma_px > 0.0 ? 0.0 : s->edge_error;
+    s->point_error = options->law_widest > 0.0 ? 2.0 * options->law_error : s->edge_error;
+    for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
+        s->tolerance[n] = 0.08 * pow(2.0, -n);
+    }
+    s->stretch = bst_camera_stretch(camera);
+    s->far_px = bst_place_far_px(camera);
+    s->place_parts = ldexp(1.0, bst_place_bits(camera));
+    s->half_diagonal_px =
+        tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
+    if (!camera->geometry.general) {
+        s->half_diagonal_px =
+            0.5 * hypot((double)camera->width_px + 2.0 * fabs(camera->boresight_offset_px[0]),
+                        (double)camera->height_px + 2.0 * fabs(camera->boresight_offset_px[1]));
+    }
+    /* a tilt by t moves the image at the tangent R by (1 + R^2) t along the way from the boresight,
+     * and what is left of the second order by R (1 + R^2) t^2 */
+    double tangent = s->half_diagonal_px / s->stretch * bst_camera_scale_rad(camera);
+    s->wide_field = 1.0 + tangent * tangent;
+    s->curvature = 2.0 * tangent / s->wide_field * bst_camera_scale_rad(camera) +
+                   camera->geometry.curvature * bst_camera_scale_rad(camera) / s->stretch;
+    bst_status status = bst_motion_map_create(ctx, &s->map);
+    if (status != BST_OK) {
+        bst_smear_free(s);
+        *out = NULL;
+    }
+    return status;
+}
+
+void bst_smear_free(bst_smear *s) {
+    if (s) {
+        free(s->path);
+        free(s->own_path);
+        free(s->turn);
+        free(s->parts);
+        free(s->nodes.items);
+        free(s->points.items);
+        free(s->table);
+        bst_motion_map_free(s->map);
+        free(s);
+    }
+}
+
+bst_status bst_smear_reserve(bst_ctx *ctx, void **items, int *capacity, int need, size_t bytes) {
+    if (need <= *capacity) {
+        return BST_OK;
+    }
+    int grown = need > 2 * *capacity ? need : 2 * *capacity;
+    void *p = realloc(*items, (size_t)grown * bytes);
+    if (!p) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d points of a smear", grown);
+    }
+    *items = p;
+    *capacity = grown;
+    return BST_OK;
+}
+
+/* Into how many straight parts the path from sample k to k + 1 goes: the attitude turns about one
+ * axis, the image of it bends. */
+static int parts_of(const bst_smear *s, int k) {
+    const bst_quat *q = s->track.q_cam_from_gcrf;
+    bst_quat d = bst_quat_mul(q[k + 1], bst_quat_conj(q[k]));
+    if (d.x * d.x + d.y * d.y + d.z * d.z < 2.4e-7 * d.w * d.w) { /* less than 0.98e-3 */
+        return 1;
+    }
+    bst_vec3 r = bst_quat_to_rotvec(d);
+    double n = ceil(bst_vec3_norm(r) / 1e-3);
+    return n > 64.0 ? 64 : n < 1.0 ? 1 : (int)n;
+}
+
+static bst_quat attitude_at(const bst_los_track *track, double time_s) {
+    int k = 0;
+    while (k + 2 < track->count && track->time_s[k + 1] < time_s) {
+        k++;
+    }
+    double dt = track->time_s[k + 1] - track->time_s[k];
+    double u = dt > 0.0 ? (time_s - track->time_s[k]) / dt : 0.0;
+    return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+}
+
+/* Turns a vector from camera axes to those of the focal plane (sign +1) or back (-1). */
+static bst_vec3 turned(const bst_smear *s, bst_vec3 v, double sign) {
+    if (!s->camera.geometry.general) {
+        return v;
+    }
+    double cs = s->camera.geometry.cos_rotation, sn = sign * s->camera.geometry.sin_rotation;
+    return (bst_vec3){cs * v.x + sn * v.y, cs * v.y - sn * v.x, v.z};
+}
+
+/* The camera's turn from the reference attitude as a path point, in the focal plane's axes: two
+ * tilts in pixels of image motion where the distortion stretches most, and roll by what it moves in
+ * the sensor's corners. */
+static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time) {
+    bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(s->q_reference)));
+    r = turned(s, r, 1.0);
+    double scale = 1.0 / bst_camera_scale_rad(&s->camera) * s->stretch;
+    return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
+}
+
+/* What the nodes' profiles miss of their image, over its peak. */
+static double profile_error(const bst_smear *s, const bst_node_list *list) {
+    double psf = s->sigma_px * s->stretch, widest = 0.0, table = 0.0;
+    for (int n = 0; n < list->count; n++) {
+        double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
+        widest = fmax(widest, w);
+        table = fmax(table, 0.75 * w / (wide * wide));
+    }
+    if (s->options.node_sigma_px > 0.0) {
+        /* by the widths of the Fourier path, and by the phases of its kernel, between which linear
+         * interpolation widens by up to a quarter of a step squared, a half of that on each axis */
+        double step = 1.0 / (BST_SPREAD_PHASES * s->options.grid_per_px * s->sigma_px);
+        return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
+    }
+    if (widest > s->options.law_widest) {
+        return fmax(s->edge_error, s->point_error);
+    }
+    return widest > 0.0 ? fmax(2.0 * BST_LAW_ERROR, s->point_error) : s->point_error;
+}
+
+/* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
+static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *list,
+                               void (*to_table)(const bst_smear *, const bst_node *, float *),
+                               bst_smear_level *out) {
+    int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
+    BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
+                              TABLE_FLOATS * sizeof(float)));
+    *out = (bst_smear_level){
+        .first_block = s->table_blocks, .blocks = blocks, .profile_error = profile_error(s, list)};
+    double part = bst_nodes_error_part(list->items, list->count, s->sigma_px);
+    for (int k = 0; k < BST_NODE_SCALES; k++) {
+        out->error[k] = part * list->error[k];
+    }
+    s->table_blocks += blocks;
+    for (int n = 0; n < blocks * BST_BLOCK; n++) {
+        float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
+        /* the last block is filled up with dark copies of the last node */
+        to_table(s, &list->items[n < list->count ? n : list->count - 1], block + n % BST_BLOCK);
+        if (n >= list->count) {
+            block[9 * BST_BLOCK + n % BST_BLOCK] = 0.0f;
+        }
+    }
+    return BST_OK;
+}
+
+/* A node's widening in PSF variances, before the distortion stretches it. */
+static double widening(const bst_smear *s, const bst_node *node) {
+    double psf = s->sigma_px * s->stretch;
+    return node->variance / (psf * psf);
+}
+
+/* Node of the camera's turn: v_node = M v_reference as a map of the undistorted tangent plane, in
+ * pixels and the focal plane's axes,
+ * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
+static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t) {
+    double a = bst_camera_scale_rad(&s->camera), tilt = a / (s->stretch * s->wide_field);
+    bst_quat q = bst_quat_from_rotvec(
+        (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
+    bst_mat3 m = bst_quat_to_mat3(q);
+    double rows[BST_TABLE_ROWS] = {
+        m.m[0][0] - m.m[2][2], m.m[0][1],     m.m[0][2] / a, m.m[1][0], m.m[1][1] - m.m[2][2],
+        m.m[1][2] / a,         m.m[2][0] * a, m.m[2][1] * a, m.m[2][2], node->weight,
+        widening(s, node)};
+    for (int i = 0; i < BST_TABLE_ROWS; i++) {
+        t[i * BST_BLOCK] = (float)rows[i];
+    }
+}
+
+/* Node of an own path: a shift of the image. */
+static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
+    double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
+    double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight, widening(s, node)};
+    for (int i = 0; i < BST_TABLE_ROWS; i++) {
+        t[i * BST_BLOCK] = (float)rows[i];
+    }
+}
+
+double bst_smear_largest_share(bst_smear *s, double *read_share) {
+    double least = bst_camera_shrink(&s->camera) / s->stretch;
+    for (int n = 0; n < s->nodes.count && least < 1.0; n++) {
+        s->nodes.items[n].p[0] *= least;
+        s->nodes.items[n].p[1] *= least;
+    }
+    double share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
+    *read_share = share;
+    if (s->binning > 1) {
+        double spread, own, pixel = bst_motion_pixel_share(s->share_sigma_px, s->binning, &spread);
+        double wider = bst_motion_pixel_share(spread, 1, &own);
+        *read_share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, spread) * pixel / wider;
+    }
+    return share;
+}
+
+void bst_smear_nodes_box(const bst_smear *s, double low[2], double high[2]) {
+    for (int i = 0; i < 2; i++) {
+        low[i] = INFINITY;
+        high[i] = -INFINITY;
+        for (int n = 0; n < s->nodes.count; n++) {
+            low[i] = fmin(low[i], s->nodes.items[n].p[i] / s->stretch);
+            high[i] = fmax(high[i], s->nodes.items[n].p[i] / s->stretch);
+        }
+    }
+}
+
+bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
+                                double part, bool turns, double tolerance) {
+    double parts = ceil(part * s->options.temporal_oversample - 1e-9);
+    if (parts > 0.0) {
+        return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
+    }
+    bst_node_aim aim = {.psf_sigma_px = s->sigma_px,
+                        .tolerance = tolerance,
+                        .widest = s->widest,
+                        .wide_field = turns ? s->wide_field : 1.0,
+                        .curvature = turns ? s->curvature : 0.0};
+    memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
+    return bst_nodes_from_path(ctx, path, count, &aim, &s->nodes);
+}
+
+static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
+    if (s->levels[n].blocks == 0) {
+        bst_nodes_clear(&s->nodes);
+        BST_TRY(
+            bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]));
+        BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
+                             &s->levels[n]));
+    }
+    return BST_OK;
+}
+
+/* Lets the stars share one track where that is asked for, or good enough for the brightest. */
+static void choose_motion(bst_smear *s, double brightest_e_per_s) {
+    double scale = bst_camera_scale_rad(&s->camera), roll_px = s->half_diagonal_px;
+    double half_turn_px = 1.0 / scale;
+    bool small = true;
+    s->single = false;
+    if (s->options.motion == BST_STAR_MOTION_MULTI) {
+        return;
+    }
+    s->spread_px =
+        bst_motion_spread_px(s->path, s->path_count, scale, s->stretch, roll_px, roll_px);
+    for (int k = 0; k < s->path_count; k++) {
+        small &= hypot(s->path[k].p[0], s->path[k].p[1]) < half_turn_px;
+    }
+    double line = bst_reference_pixel_share(0.0, s->share_sigma_px, 0);
+    double peak_e = brightest_e_per_s * s->duration_s * line * line * s->binning * s->binning;
+    s->single = s->options.motion == BST_STAR_MOTION_SINGLE ||
+                (small && bst_smear_single_error(s, peak_e, s->half_diagonal_px) <=
+                              SINGLE_SHARE * s->options.tolerance_sigma);
+    for (int k = 0; s->single && k < s->path_count; k++) {
+        bst_motion_to_shift(&s->path[k], scale, s->stretch, roll_px);
+    }
+}
+
+static void measure_turn(bst_smear *s) {
+    double tilt2 = 0.0, roll = 0.0;
+    for (int k = 0; k < s->path_count; k++) {
+        const double *p = s->path[k].p;
+        tilt2 = fmax(tilt2, p[0] * p[0] + p[1] * p[1]);
+        roll = fmax(roll, fabs(p[2]));
+    }
+    s->tilt_rad = sqrt(tilt2) * bst_camera_scale_rad(&s->camera) / s->stretch;
+    s->roll_rad = s->half_diagonal_px > 0.0 ? roll / s->half_diagonal_px : 0.0;
+}
+
+/* Whether a star at (x, y) px from the boresight stays too far from the window to light it. Asked
+ * where a turn moves places by little more than to first order. */
+static bool stays_beside(const bst_smear *s, double x, double y) {
+    double scale = bst_camera_scale_rad(&s->camera), r = sqrt(x * x + y * y) * scale;
+    if (s->camera.geometry.general || s->tilt_rad + s->roll_rad > 0.05 || r > 2.0) {
+        return false;
+    }
+    double moved = 1.2 * (s->tilt_rad * (1.0 + r * r) + s->roll_rad * r) / scale;
+    double far = moved + s->margin_px + 2.0;
+    x += bst_camera_centre_x(&s->camera) - s->window.x0;
+    y += bst_camera_centre_y(&s->camera) - s->window.y0;
+    return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
+}
+
+/* The map of how stars move, from the nodes of the coarsest level, which were made last. */
+static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
+    double tilt = s->tilt_rad / bst_camera_scale_rad(&s->camera) * s->wide_field;
+    double from = s->half_diagonal_px / s->stretch;
+    bst_motion_map_frame frame = {
+        .nodes = s->nodes.items,
+        .count = s->nodes.count,
+        .table = s->table + (size_t)s->levels[0].first_block * TABLE_FLOATS,
+        .scale_rad = bst_camera_scale_rad(&s->camera),
+        .tilt_px = s->stretch * s->wide_field,
+        .roll_px = s->half_diagonal_px,
+        .reach_px = fmin(from + tilt, 4.0 * s->far_px),
+        .sensor_px = from + 6.0 * s->sigma_px,
+        .binning = s->binning,
+        .sources = s->sources,
+        .shrink = bst_camera_shrink(&s->camera),
+        .stretch = s->stretch,
+        .sigma_px = s->share_sigma_px};
+    return bst_motion_map_begin(ctx, s->map, &frame);
+}
+
+bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
+    const bst_los_track *track = frame->track;
+    s->track = *track;
+    s->window = frame->window;
+    s->margin_px = frame->margin_px;
+    s->dark_variance_e2 = fmax(frame->dark_variance_e2, 1e-2);
+    s->binning = frame->binning > 1 ? frame->binning : 1;
+    int binned = s->binning < BST_PIXEL_PARTS ? s->binning : BST_PIXEL_PARTS;
+    if (s->options.node_sigma_px > 0.0) {
+        memcpy(s->pixel_part, s->options.pixel_part[binned - 1], sizeof s->pixel_part);
+    } else {
+        bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
+    }
+    s->sources = frame->sources;
+    s->aim = 1.0;
+    s->duration_s = track->time_s[track->count - 1];
+    s->q_reference = attitude_at(track, 0.5 * s->duration_s);
+    s->table_blocks = s->path_count = 0;
+    s->travel_px = 0.0;
+    for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
+        s->levels[n].blocks = 0;
+    }
+    double inverse = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
+    BST_TRY(bst_smear_reserve(ctx, (void **)&s->parts, &s->parts_capacity, track->count,
+                              sizeof *s->parts));
+    for (int k = 0; k + 1 < track->count; k++) {
+        int parts = s->parts[k] = parts_of(s, k);
+        int points = s->path_count + parts + 1;
+        BST_TRY(
+            bst_smear_reserve(ctx, (void **)&s->path, &s->path_capacity, points, sizeof *s->path));
+        BST_TRY(
+            bst_smear_reserve(ctx, (void **)&s->turn, &s->turn_capacity, points, sizeof *s->turn));
+        for (int n = 0; n < parts + (k + 2 == track->count); n++) {
+            double u = (double)n / parts;
+            const bst_quat *ends = &track->q_cam_from_gcrf[k];
+            bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
+            double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
+            s->turn[s->path_count] = q;
+            bst_path_point *p = &s->path[s->path_count++];
+            *p = attitude_point(s, q, t * inverse);
+            s->travel_px = fmax(s->travel_px, fabs(p->p[0]) + fabs(p->p[1]) + fabs(p->p[2]));
+        }
+    }
+    measure_turn(s);
+    choose_motion(s, frame->brightest_e_per_s);
+    for (int k = 0; k < s->path_count && !s->single; k++) {
+        s->path[k].p[0] *= s->wide_field;
+        s->path[k].p[1] *= s->wide_field;
+    }
+    BST_TRY(make_level(ctx, s, 0));
+    if (!s->single) {
+        return begin_map(ctx, s);
+    }
+    bst_smear_nodes_box(s, s->low, s->high);
+    s->star_share = bst_smear_largest_share(s, &s->read_share);
+    return BST_OK;
+}
+
+void bst_smear_restart(bst_smear *s, double aim) {
+    s->aim = aim;
+    s->table_blocks = s->levels[0].first_block + s->levels[0].blocks;
+    for (int n = 1; n < BST_SMEAR_LEVELS; n++) {
+        s->levels[n].blocks = 0;
+    }
+}
+
+double bst_smear_allowed(const bst_smear *s, double peak_e) {
+    return s->aim * s->options.tolerance_sigma * sqrt(FLANK * peak_e + s->dark_variance_e2) /
+           fmax(peak_e, 1e-9);
+}
+
+int bst_smear_choose_level(const bst_smear *s, double scale) {
+    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
+    int n = 0;
+    if (s->options.temporal_oversample > 0) {
+        return n;
+    }
+    /* mostly three nodes: errors of sixth order, of motions up to the path's */
+    double power = scale * scale * scale, part = fmin(power * power, 1.0);
+    while (n + 1 < BST_SMEAR_LEVELS && part * s->tolerance[n] + s->point_error > allowed) {
+        n++;
+    }
+    return n;
+}
+
+/* The level for a star: from the one that its tolerance promises on, the first that keeps it. */
+static bst_status star_level(bst_ctx *ctx, bst_smear *s, double scale,
+                             const bst_smear_level **out) {
+    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
+    int n = bst_smear_choose_level(s, scale);
+    BST_TRY(make_level(ctx, s, n));
+    while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 &&
+           bst_smear_level_error(&s->levels[n], scale) > allowed) {
+        BST_TRY(make_level(ctx, s, ++n));
+    }
+    *out = &s->levels[n];
+    return BST_OK;
+}
+
+static int choose_radius(const bst_smear *s, double peak_e) {
+    double limit = CUT_SHARE * s->aim * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
+    int most = s->options.taps / 2 - 1, asked = s->options.stamp_radius_px;
+    return asked > 0 ? (asked < most ? asked : most)
+                     : bst_stamp_radius(&s->stamp, peak_e, limit, most);
+}
+
+bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
+    bst_vec3 c = bst_quat_rotate(q, v);
+    if (s->camera.geometry.general) {
+        c = turned(s, c, 1.0);
+        double f = 1.0 / (bst_camera_scale_rad(&s->camera) * c.z);
+        *x = c.x * f;
+        *y = c.y * f;
+        return c.z > 0.0 && fabs(*x) < 1e6 && fabs(*y) < 1e6;
+    }
+    if (!bst_camera_project(&s->camera, c, x, y)) {
+        return false;
+    }
+    *x -= bst_camera_centre_x(&s->camera);
+    *y -= bst_camera_centre_y(&s->camera);
+    return fabs(*x) < 1e6 && fabs(*y) < 1e6;
+}
+
+bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
+                            bst_scene_source *out, bool *visible) {
+    double x, y, electrons = source->electrons_per_s * s->duration_s;
+    s->last_peak_e = s->last_read_e = s->chord_error = 0.0;
+    s->last_leaves = true;
+    bool moving = source->path || source->rate || source->shape;
+    s->disc_px =
+        source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
+    bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
+    /* a star that only a wide turn brings into the field is no small float from its place there */
+    double wide = 4.0 * (s->far_px + s->disc_px);
+    moving = moving || !front || x * x + y * y > wide * wide;
+    *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
+    if (!*visible) {
+        return BST_OK;
+    }
+    double scale = 1.0;
+    double low[2] = {s->low[0], s->low[1]}, high[2] = {s->high[0], s->high[1]};
+    if (!moving) {
+        double share = s->star_share, read_share = s->read_share;
+        if (!s->single) {
+            const bst_star_motion_cell *cell = bst_motion_map_at(s->map, x, y);
+            scale = cell->scale;
+            share = cell->share;
+            read_share = cell->read_share;
+            memcpy(low, cell->low, sizeof low);
+            memcpy(high, cell->high, sizeof high);
+        }
+        s->last_peak_e = electrons * share;
+        s->last_read_e = electrons * read_share;
+        *visible = !stays_beside(s, x, y);
+        if (!*visible) {
+            return BST_OK;
+        }
+    }
+    bst_smear_level own;
+    const bst_smear_level *used;
+    double travel_px = s->travel_px;
+    if (moving) {
+        /* nodes are kept as small floats relative to a place on the sensor */
+        double far = s->far_px;
+        x = front ? fmin(fmax(x, -far), far) : 0.0;
+        y = front ? fmin(fmax(y, -far), far) : 0.0;
+        BST_TRY(bst_smear_moving_nodes(ctx, s, source, electrons, x, y));
+        if (s->nodes.count == 0) {
+            *visible = false;
+            return BST_OK;
+        }
+        travel_px = 0.0;
+        for (int n = 0; n < s->nodes.count; n++) {
+            const double *p = s->nodes.items[n].p;
+            travel_px = fmax(travel_px, fabs(p[0]) + fabs(p[1]));
+        }
+        bst_smear_nodes_box(s, low, high);
+        BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
+        used = &own;
+    } else {
+        BST_TRY(star_level(ctx, s, scale, &used));
+    }
+    int radius = choose_radius(s, s->last_peak_e * s->binning);
+    bst_smear_drawn drawn = {.x = x,
+                             .y = y,
+                             .scale = scale,
+                             .travel_px = travel_px,
+                             .level = used,
+                             .radius = radius,
+                             .moving = moving};
+    memcpy(drawn.low, low, sizeof low);
+    memcpy(drawn.high, high, sizeof high);
+    bst_smear_set_error(s, &drawn);
+    bst_smear_bring_to_window(s, &drawn);
+    double parts = s->place_parts;
+    /* what the stamp leaves out is put on the stamp, so that no light is lost */
+    electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];
+    *out = (bst_scene_source){.x_px = (float)x,
+                              .y_px = (float)y,
+                              .place_x = (int)lrint((x + bst_camera_centre_x(&s->camera)) * parts),
+                              .place_y = (int)lrint((y + bst_camera_centre_y(&s->camera)) * parts),
+                              .electrons = (float)electrons,
+                              .first_table = used->first_block,
+                              .blocks = used->blocks,
+                              .radius = radius};
+    return BST_OK;
+}
+
+bool bst_smear_single(const bst_smear *s) {
+    return s->single;
+}
+
+double bst_smear_last_peak_e(const bst_smear *s) {
+    return s->last_peak_e;
+}
+
+double bst_smear_last_read_e(const bst_smear *s) {
+    return s->last_read_e;
+}
+
+double bst_smear_last_presence(const bst_smear *s) {
+    return s->last_presence;
+}
+
+bool bst_smear_last_leaves(const bst_smear *s) {
+    return s->last_leaves;
+}
+
+const bst_crowd_source *bst_smear_last_error(const bst_smear *s) {
+    return &s->last_error;
+}
+
+bst_crowd_motion bst_smear_motion(const bst_smear *s) {
+    bst_crowd_motion motion = bst_crowd_motion_of(s->path, s->path_count, s->single);
+    motion.sigma_px = s->sigma_px;
+    motion.dark_variance_e2 = s->dark_variance_e2;
+    return motion;
+}
+
+const float *bst_smear_table(const bst_smear *s, int *blocks) {
+    *blocks = s->table_blocks;
+    return s->table;
+}

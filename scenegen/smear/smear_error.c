@@ -1,0 +1,112 @@
+/* Errors of a source's image, from those of its nodes. */
+#include <math.h>
+
+#include "scenegen/smear/smear_internal.h"
+
+enum { MAX_TAPS = BST_PLACE_TAPS };
+
+/* The parts of bst_node_aim for a Gaussian: its derivatives and itself, means over the side of
+ * `binning` pixels; integrals of Hermite functions are those of the order below. */
+void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
+    enum { STEPS = 48 };
+    static const double greatest[3] = {1.0, 3.0, 15.0};
+    double half = 0.5 * binning / sigma_px, most[3] = {0.0};
+    for (int k = 0; k <= STEPS; k++) {
+        double at = 3.5 * k / STEPS, side[2][3];
+        for (int end = 0; end < 2; end++) {
+            double x = at + (end ? half : -half), y = x * x, g = exp(-0.5 * y);
+            side[end][0] = -x * g;
+            side[end][1] = -(y - 3.0) * x * g;
+            side[end][2] = -((y - 10.0) * y + 15.0) * x * g;
+        }
+        for (int n = 0; n < 3; n++) {
+            most[n] = fmax(most[n], fabs(side[1][n] - side[0][n]));
+        }
+    }
+    double peak = sqrt(2.0 * BST_PI) * erf(half / sqrt(2.0));
+    for (int n = 0; n < 3; n++) {
+        part[n] = most[n] / (greatest[n] * peak);
+    }
+}
+
+/* A level's error for an image that moves by `scale` of the path, over the peak. */
+double bst_smear_level_error(const bst_smear_level *level, double scale) {
+    return bst_nodes_error(level->error, scale) + level->profile_error;
+}
+
+/* Error of a star `from_boresight_px` away that follows the boresight's track, in sigma of its
+ * worst pixel: a Gaussian of amplitude A on dark noise d changes by at most 0.86 / sigma of A /
+ * sqrt(A + d^2) per px of shift, and by all of its light when it lies elsewhere. */
+double bst_smear_single_error(const bst_smear *s, double peak_e, double from_boresight_px) {
+    double part = s->half_diagonal_px > 0.0 ? from_boresight_px / s->half_diagonal_px : 0.0;
+    double moved = s->spread_px * part * fmax(part, 1.0) * s->stretch;
+    return fmin(0.86 * moved / s->sigma_px * peak_e / sqrt(peak_e + s->dark_variance_e2),
+                peak_e / sqrt(s->dark_variance_e2));
+}
+
+/* Errors of the image of a source at (x, y), wherever it falls. */
+void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
+    int radius = d->radius;
+    double travel_px = d->travel_px;
+    double lost = bst_stamp_excess(&s->stamp, radius), peak_e = s->last_read_e;
+    double error = bst_smear_level_error(d->level, d->scale) + s->chord_error;
+    int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
+    /* places in parts of a pixel, the way to the node in float, and some additions of light */
+    double rounded = 0.86 / s->sigma_px * (1.0 / s->place_parts + 0x1p-24 * travel_px) + 0x1p-22;
+    double shared = s->single && !d->moving
+                        ? bst_smear_single_error(s, peak_e, sqrt(d->x * d->x + d->y * d->y))
+                        : 0.0;
+    double sigma_e = sqrt(peak_e + s->dark_variance_e2);
+    double flank = sigma_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
+    /* a border crosses a pixel that is read along its side at most */
+    double tail = s->stamp.tail[border] * s->binning;
+    s->last_error = (bst_crowd_source){.x_px = (float)d->x,
+                                       .y_px = (float)d->y,
+                                       .peak_e = (float)peak_e,
+                                       .nodes_e = (float)((flank * error + rounded) * peak_e),
+                                       .shared_e = (float)(shared * sigma_e),
+                                       .excess_e = (float)(lost * peak_e),
+                                       .border_e = (float)(s->last_peak_e * tail),
+                                       .apart = d->moving && travel_px > s->travel_px};
+}
+
+/* Beyond this many sigma of a node its errors fall: those of a Gaussian, the sixth derivative of
+ * which is 0.07 of its greatest there, by more than the sixth power of the distance, those in the
+ * wings of diffraction by the third. */
+#define NEAR_SIGMAS 3.0
+
+/* What of the last source's errors reaches the window, from where its places lie. */
+void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
+    const double *low = d->low, *high = d->high;
+    bst_crowd_source *e = &s->last_error;
+    bool gaussian = s->options.node_sigma_px <= 0.0;
+    s->last_presence = 1.0;
+    s->last_leaves = true;
+    if (bst_camera_distorted(&s->camera)) {
+        return;
+    }
+    double px = d->x + bst_camera_centre_x(&s->camera) - s->window.x0,
+           py = d->y + bst_camera_centre_y(&s->camera) - s->window.y0;
+    double far = s->margin_px - 1.0;
+    s->last_leaves = px + low[0] < -far || py + low[1] < -far ||
+                     px + high[0] > s->window.width - 1.0 + far ||
+                     py + high[1] > s->window.height - 1.0 + far;
+    double gap_x = fmax(px + low[0] - s->window.width, -1.0 - px - high[0]),
+           gap_y = fmax(py + low[1] - s->window.height, -1.0 - py - high[1]);
+    double gap = fmax(gap_x, gap_y), near = NEAR_SIGMAS * s->sigma_px;
+    if (gap <= near) {
+        return;
+    }
+    double presence = gaussian ? 0.1 * pow(near / gap, 6.0) : 0.3 * pow(near / gap, 3.0);
+    /* there is none of its light's noise */
+    if (presence * sqrt((double)e->peak_e + s->dark_variance_e2) > sqrt(s->dark_variance_e2)) {
+        return;
+    }
+    s->last_presence = presence;
+    e->nodes_e *= (float)presence;
+    e->shared_e *= (float)presence;
+    e->peak_e = 0.0f;
+    if (gaussian && gap > d->radius + 2.0) {
+        e->excess_e = 0.0f;
+    }
+}

@@ -1,0 +1,81 @@
+#include <math.h>
+#include <string.h>
+
+#include "scenegen/smear/motion.h"
+#include "scenegen/smear/smear_quadrature.h"
+#include "scenegen/smear/smear_quadrature_internal.h"
+
+/* By squaring the matrix over and over, until one column is left. */
+void bst_nodes_main_axis(double a[3][3], double axis[3]) {
+    double p[3][3];
+    memcpy(p, a, sizeof p);
+    for (int round = 0; round < 6; round++) {
+        double q[3][3], trace = p[0][0] + p[1][1] + p[2][2], scale = 1.0 / (trace * trace);
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) {
+                q[i][j] = (p[i][0] * p[0][j] + p[i][1] * p[1][j] + p[i][2] * p[2][j]) * scale;
+            }
+        }
+        memcpy(p, q, sizeof p);
+    }
+    int most = p[1][1] > p[0][0] ? 1 : 0;
+    most = p[2][2] > p[most][most] ? 2 : most;
+    double length = 0.0;
+    for (int i = 0; i < 3; i++) {
+        axis[i] = p[i][most];
+        length += axis[i] * axis[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        axis[i] /= sqrt(length);
+    }
+}
+
+double bst_nodes_error(const double error[BST_NODE_SCALES], double scale) {
+    double k = 2.0 * log2(fmax(scale, 1e-9)) + BST_NODE_SCALES - 2;
+    if (k <= 0.0) {
+        return error[0];
+    }
+    int n = (int)fmin(k, BST_NODE_SCALES - 1.0);
+    if (n == BST_NODE_SCALES - 1) { /* nor any more than the sixth */
+        return error[n] * exp2(3.0 * (k - n));
+    }
+    /* sums of powers are convex in logarithms: a chord is no less */
+    return error[n] > 0.0 ? error[n] * pow(error[n + 1] / error[n], k - n) : error[n + 1];
+}
+
+void bst_nodes_clear(bst_node_list *list) {
+    list->count = 0;
+    memset(list->error, 0, sizeof list->error);
+}
+
+double bst_nodes_error_part(const bst_node *nodes, int count, double psf_sigma_px) {
+    enum { ANCHORS = 24 };
+    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst = 0.0, least = INFINITY;
+    int brightest = 0;
+    for (int n = 0; n < count; n++) {
+        double error = nodes[n].error * nodes[n].weight;
+        brightest = error > nodes[brightest].error * nodes[brightest].weight ? n : brightest;
+        worst = fmax(worst, nodes[n].error);
+        least = fmin(least, nodes[n].error);
+    }
+    if (!(worst > 0.0) || least > 0.9 * worst) {
+        return 1.0;
+    }
+    double light = 0.0, error = 0.0;
+    int stride = count / ANCHORS + 1;
+    for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
+        const bst_node *at = &nodes[a < 0 ? brightest : a];
+        double here = 0.0, missed = 0.0;
+        for (int n = 0; n < count; n++) {
+            const double *p = nodes[n].p;
+            double dx = p[0] - at->p[0], dy = p[1] - at->p[1], dz = p[2] - at->p[2];
+            double q = (dx * dx + dy * dy + dz * dz) * scale;
+            double share = q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
+            here += share;
+            missed += share * nodes[n].error;
+        }
+        light = fmax(light, here);
+        error = fmax(error, missed);
+    }
+    return fmin(error / (worst * light), 1.0);
+}

@@ -1,0 +1,191 @@
+#include <math.h>
+
+#include "sim/analysis/calibration/calibrate_internal.h"
+#include "sim/core/vec.h"
+
+/* Least numbers for a fit. */
+enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30 };
+
+/* Log-likelihood of the trials of one streak length. */
+static double likelihood(const bst_calibrator *c, int node, double gain, double slope) {
+    double sum = 0.0;
+    for (long i = 0; i < c->trial_count; i++) {
+        const calibrate_trial *t = &c->trials[i];
+        int own = 0;
+        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
+            bool nearer = fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[n])) <
+                          fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[own]));
+            own = nearer ? n : own;
+        }
+        if (own != node) {
+            continue;
+        }
+        double snr = gain * (double)t->amplitude;
+        double z = slope * (snr - (double)t->threshold) /
+                   sqrt((double)t->variance + (double)t->shot * snr);
+        double p = 0.5 * erfc(-z * 0.70710678118654752);
+        sum += log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* a few are paired by mistake */
+    }
+    return sum;
+}
+
+/* The gain of one streak length at a slope, by golden section. */
+static double best_gain(const bst_calibrator *c, int node, double slope, double *value) {
+    const double part = 0.38196601125010515;
+    double low = 0.5, high = 1.3, a = low + part * (high - low), b = high - part * (high - low);
+    double at_a = likelihood(c, node, a, slope), at_b = likelihood(c, node, b, slope);
+    for (int i = 0; i < 22; i++) {
+        if (at_a > at_b) {
+            high = b;
+            b = a;
+            at_b = at_a;
+            a = low + part * (high - low);
+            at_a = likelihood(c, node, a, slope);
+        } else {
+            low = a;
+            a = b;
+            at_a = at_b;
+            b = high - part * (high - low);
+            at_b = likelihood(c, node, b, slope);
+        }
+    }
+    *value = fmax(at_a, at_b);
+    return 0.5 * (low + high);
+}
+
+static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) {
+    long count[BST_OBSGEN_LENGTHS] = {0};
+    for (long i = 0; i < c->trial_count; i++) {
+        int own = 0;
+        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
+            bool nearer =
+                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[n])) <
+                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[own]));
+            own = nearer ? n : own;
+        }
+        count[own]++;
+    }
+    double best = -INFINITY;
+    for (double slope = 0.7; slope <= 1.301; slope += 0.02) {
+        double total = 0.0, gain[BST_OBSGEN_LENGTHS] = {0};
+        for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+            double value = 0.0;
+            /* a length that only few frames had would be told by their oddities */
+            if (count[n] >= LEAST_SOURCES && count[n] >= c->trial_count / 50) {
+                gain[n] = best_gain(c, n, slope, &value);
+            }
+            total += value;
+        }
+        if (total > best) {
+            best = total;
+            out->slope = slope;
+            for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+                out->gain[n] = gain[n];
+            }
+        }
+    }
+    /* a length that was not seen has the gain of the nearest one that was */
+    double seen[BST_OBSGEN_LENGTHS];
+    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+        seen[n] = out->gain[n];
+    }
+    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+        for (int away = 1; away < BST_OBSGEN_LENGTHS && out->gain[n] <= 0.0; away++) {
+            int low = n - away, high = n + away;
+            out->gain[n] = low >= 0 && seen[low] > 0.0 ? seen[low]
+                           : high < BST_OBSGEN_LENGTHS ? seen[high]
+                                                       : 0.0;
+        }
+    }
+}
+
+/* The distance at which the generator tells as many apart as the image path; fewer, the further. */
+static double fit_blends(const bst_calibrator *c) {
+    double image = (double)c->beside[CALIBRATE_BLENDS];
+    if (c->beside[CALIBRATE_BLENDS] < LEAST_SOURCES) {
+        return 1.0;
+    }
+    for (int n = 1; n < CALIBRATE_BLENDS; n++) {
+        double near = (double)c->beside[n - 1], far = (double)c->beside[n];
+        if (image >= far && near > far) {
+            double part = fmin((near - image) / (near - far), 1.0);
+            return calibrate_blend_factors[n - 1] +
+                   fmax(part, 0.0) * (calibrate_blend_factors[n] - calibrate_blend_factors[n - 1]);
+        }
+    }
+    return calibrate_blend_factors[CALIBRATE_BLENDS - 1];
+}
+
+/* Standard deviation of normal errors of which those beyond CALIBRATE_MOST_SIGMAS were left out,
+ * from the mean square of the rest: f^2 (1 - 2 c phi(c) / (2 Phi(c) - 1)), c =
+ * CALIBRATE_MOST_SIGMAS / f. */
+static double uncut(double square) {
+    double low = 0.1, high = 5.0;
+    for (int i = 0; i < 40; i++) {
+        double f = 0.5 * (low + high), c = CALIBRATE_MOST_SIGMAS / f;
+        double cut = 1.0 - 2.0 * c * exp(-0.5 * c * c) / sqrt(2.0 * BST_PI) / erf(c * sqrt(0.5));
+        *(f * f * cut < square ? &low : &high) = f;
+    }
+    return 0.5 * (low + high);
+}
+
+static void fit_places(const calibrate_mean *seen, double *factors) {
+    double before = 1.0;
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        if (seen[i].count >= LEAST_PLACES) {
+            before = uncut(seen[i].sum / (double)seen[i].count);
+        }
+        factors[i] = fmin(fmax(before, 0.1), 20.0);
+    }
+}
+
+bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibration *out,
+                              bst_calibration_counts *counts) {
+    *counts = (bst_calibration_counts){.frames = c->frames,
+                                       .sources = c->trial_count,
+                                       .detected = c->detected,
+                                       .false_alarms = c->alarm_count};
+    bst_obsgen_calibration_theory(out);
+    if (c->trial_count < LEAST_SOURCES || c->alarm_count < LEAST_ALARMS) {
+        return bst_fail(ctx, BST_ERR_STATE,
+                        "%ld stars near the detection limit and %ld false alarms are too few for a "
+                        "calibration (needed: %d and %d); give --seeds more, or scenarios with "
+                        "world/faint_stars = \"statistical\" and a scenegen/v_limit beyond the "
+                        "limit of detection",
+                        c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
+    }
+    fit_detection(c, out);
+    out->blend_distance_factor = fit_blends(c);
+    fit_places(c->across, out->across_factor);
+    fit_places(c->along, out->along_factor);
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        counts->places += c->across[i].count;
+    }
+    out->phase_bias_px = c->bias_weight > 0.0 ? c->bias_sum / c->bias_weight : 0.0;
+    out->threshold_offset = c->threshold_offset / (double)c->frames;
+    /* noise^2 = factor^2 theory^2 + crowding light */
+    double determinant = c->nn * c->qq - c->nq * c->nq;
+    double flat = c->ny / c->nn, crowding = out->crowding;
+    if (determinant > 1e-9 * c->nn * c->qq) {
+        crowding = fmin(fmax((c->nn * c->qy - c->nq * c->ny) / determinant, 0.0), 2.0);
+    }
+    flat = (c->ny - crowding * c->nq) / c->nn;
+    out->crowding = crowding;
+    if (c->light_square > 1e-6 * (double)c->frames) {
+        out->background_share = fmin(fmax(c->light_bias / c->light_square, 0.0), 2.0);
+    }
+    out->noise_factor = sqrt(fmax(flat, 0.01));
+    out->false_alarm_factor = (double)c->alarm_count / c->alarms_expected;
+    double energy = 0.0;
+    for (long i = 0; i < c->alarm_count; i++) {
+        energy += fmin(c->alarm_energy[i], 10.0);
+    }
+    out->false_alarm_tail = fmin((double)c->alarm_count / fmax(energy, 1e-3), 10.0);
+    if (c->identifiable >= LEAST_PLACES) {
+        out->star_id_probability = (double)c->identified / (double)c->identifiable;
+    }
+    if (c->hits >= LEAST_SOURCES) {
+        out->hit_told_probability = (double)c->hits_told / (double)c->hits;
+    }
+    return BST_OK;
+}

@@ -1,0 +1,83 @@
+#include "sim/analysis/calibration/pairing.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+void bst_pairing_free(bst_pairing *p) {
+    free(p->detection_of);
+    free(p->item_of);
+    free(p->order);
+    *p = (bst_pairing){0};
+}
+
+static bst_status reserve(bst_ctx *ctx, bst_pairing *p, int items, int detections) {
+    if (items > p->items || detections > p->detections) {
+        bst_pairing_free(p);
+        p->items = 2 * items + 16;
+        p->detections = 2 * detections + 16;
+        p->detection_of = malloc((size_t)p->items * sizeof(int));
+        p->order = malloc((size_t)p->items * sizeof(int));
+        p->item_of = malloc((size_t)p->detections * sizeof(int));
+        if (!p->detection_of || !p->order || !p->item_of) {
+            bst_pairing_free(p);
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory to pair %d sources", items);
+        }
+    }
+    return BST_OK;
+}
+
+/* Distance of a detection from a source in units of what is allowed; above 1: not its. */
+static double off(const bst_truth_item *t, const bst_detection *d, double fwhm_px) {
+    double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
+    double lx = t->x_end_px - t->x_start_px, ly = t->y_end_px - t->y_start_px;
+    double length = hypot(lx, ly), c = length > 0.0 ? lx / length : 1.0,
+           s = length > 0.0 ? ly / length : 0.0;
+    double along = (dx * c + dy * s) / (fwhm_px + 0.5 * length), across = dy * c - dx * s;
+    return hypot(along, across / fwhm_px);
+}
+
+bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *p, const bst_truth *truth,
+                            const bst_detections *detections, double fwhm_px) {
+    BST_TRY(reserve(ctx, p, truth->count, detections->count));
+    int n = 0;
+    for (int i = 0; i < truth->count; i++) {
+        const bst_truth_item *t = &truth->items[i];
+        p->detection_of[i] = -1;
+        bool shows = (t->flags & BST_TRUTH_IN_FIELD) && !(t->flags & BST_TRUTH_OCCULTED) &&
+                     t->snr > 0.0 && isfinite(t->x_start_px) && isfinite(t->x_end_px);
+        if (!shows) {
+            continue;
+        }
+        int at = n++; /* by brightness: few are out of the catalogue's order */
+        while (at > 0 && truth->items[p->order[at - 1]].snr < t->snr) {
+            p->order[at] = p->order[at - 1];
+            at--;
+        }
+        p->order[at] = i;
+    }
+    for (int i = 0; i < detections->count; i++) {
+        p->item_of[i] = -1;
+    }
+    for (int k = 0; k < n; k++) {
+        const bst_truth_item *t = &truth->items[p->order[k]];
+        double nearest = 1.0,
+               length = hypot(t->x_end_px - t->x_start_px, t->y_end_px - t->y_start_px);
+        double reach = fwhm_px + 0.5 * length;
+        for (int i = 0; i < detections->count; i++) {
+            const bst_detection *d = &detections->items[i];
+            if (p->item_of[i] >= 0 || fabs(d->x_px - t->x_centroid_px) > reach ||
+                fabs(d->y_px - t->y_centroid_px) > reach) {
+                continue;
+            }
+            double distance = off(t, d, fwhm_px);
+            if (distance < nearest) {
+                nearest = distance;
+                p->detection_of[p->order[k]] = i;
+            }
+        }
+        if (p->detection_of[p->order[k]] >= 0) {
+            p->item_of[p->detection_of[p->order[k]]] = p->order[k];
+        }
+    }
+    return BST_OK;
+}

@@ -1,0 +1,22 @@
+/* Which detection is which source of the truth. */
+#ifndef BST_ANALYSIS_CALIBRATION_PAIRING_H
+#define BST_ANALYSIS_CALIBRATION_PAIRING_H
+
+#include "sim/messages/messages.h"
+
+/* Room for one frame's pairs. All zero: empty. */
+typedef struct bst_pairing {
+    int *detection_of; /* [truth->count] -1: none */
+    int *item_of;      /* [detections->count] -1: none */
+    int *order;
+    int items, detections;
+} bst_pairing;
+
+/* From the brightest source down, each takes the nearest free detection within fwhm_px of its place
+ * (along a streak: within its half length more). Sources outside the field or without light take
+ * none. BST_ERR_MEMORY. */
+bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *pairing, const bst_truth *truth,
+                            const bst_detections *detections, double fwhm_px) BST_MUST_CHECK;
+void bst_pairing_free(bst_pairing *pairing);
+
+#endif

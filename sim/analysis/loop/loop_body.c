@@ -1,0 +1,57 @@
+/* The attitude loop of a spacecraft that has one, and what its knowledge and its wheels add to the
+ * disturbances. */
+#include "gimbal/spacecraft/spacecraft_response.h"
+#include "sim/analysis/loop/loop_model.h"
+
+static double complex body_open(const void *user, double omega) {
+    const bst_loop_body *body = user;
+    bst_craft_response r =
+        bst_craft_response_at(body->config, body->number, omega / (2.0 * BST_PI));
+    return (r.plant[0] + I * r.plant[1]) * (r.controller[0] + I * r.controller[1]);
+}
+
+bst_status bst_loop_build_body(bst_ctx *ctx, const bst_craft_config *config,
+                               bst_loop_model *model) {
+    static const char *const names[BST_LOOP_BODY] = {"x", "y", "z"};
+    if (config->type != BST_CRAFT_RIGID_BODY || config->attitude.law == BST_LAW_FREE) {
+        return BST_OK;
+    }
+    const bst_mode_config *modes = config->modes.items;
+    for (int i = 0; i < BST_LOOP_BODY; i++) {
+        bst_loop_body *body = &model->body[i];
+        body->name = names[i];
+        body->number = i;
+        body->config = config;
+        int hints = 0;
+        for (int k = 0; k < config->modes.count && hints < BST_LOOP_HINTS; k++) {
+            body->hint_hz[hints++] = modes[k].frequency_hz;
+        }
+        body->loop = (bst_loop){.open = body_open,
+                                .user = body,
+                                .dt_s = bst_attitude_control_of(config).dt_s,
+                                .hint_hz = body->hint_hz,
+                                .hints = hints};
+        BST_TRY(bst_loop_analyse(ctx, &body->loop, &body->margins));
+    }
+    model->bodies = BST_LOOP_BODY;
+    return BST_OK;
+}
+
+/* The mount points by the believed attitude: its error moves the line of sight as jitter does, in
+ * bands from a day's to ten times a second's. */
+void bst_loop_body_bands(const bst_craft_config *config, int body_axis, double pixel_rad,
+                         bst_loop_axis *axis) {
+    if (config->type != BST_CRAFT_RIGID_BODY) {
+        return;
+    }
+    enum { BANDS = 60 };
+    const double lowest_hz = 1e-5, ratio = pow(1e6, 1.0 / BANDS);
+    double low = 0.0, high = lowest_hz;
+    for (int i = 0; i <= BANDS; i++) {
+        double middle = i == 0 ? 0.5 * high : sqrt(low * high);
+        double density = bst_craft_noise_at(config, body_axis, middle).knowledge;
+        bst_loop_add_band(axis, low, high, density * (high - low) / (pixel_rad * pixel_rad));
+        low = high;
+        high *= ratio;
+    }
+}

@@ -1,0 +1,141 @@
+#include "sim/analysis/orbit/tdm_observations.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/astro/bodies.h"
+#include "sim/astro/oem.h"
+#include "sim/astro/tdm.h"
+
+static bool is_same(const bst_tdm_pair *a, const bst_tdm_pair *b) {
+    return strcmp(a->observer, b->observer) == 0 && strcmp(a->object, b->object) == 0;
+}
+
+static int64_t count_of(const bst_tdm *tdm, const bst_tdm_pair *pair) {
+    int64_t count = 0;
+    for (int i = 0; i < bst_tdm_pair_count(tdm); i++) {
+        const bst_tdm_pair *p = bst_tdm_pair_at(tdm, i);
+        count += is_same(p, pair) ? p->count : 0;
+    }
+    return count;
+}
+
+/* The pair of participants that is asked for, or that has the most angles. */
+static bst_status choose_pair(bst_ctx *ctx, const bst_tdm_request *q, const bst_tdm *tdm,
+                              const bst_tdm_pair **out) {
+    int64_t most = 0;
+    *out = NULL;
+    for (int i = 0; i < bst_tdm_pair_count(tdm); i++) {
+        const bst_tdm_pair *p = bst_tdm_pair_at(tdm, i);
+        int64_t count = count_of(tdm, p);
+        if ((!q->object || strcmp(q->object, p->object) == 0) && p->count > 0 && count > most) {
+            most = count;
+            *out = p;
+        }
+    }
+    return *out ? BST_OK
+                : bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: has no angles of \"%s\"", q->path,
+                           q->object ? q->object : "");
+}
+
+static int by_time(const void *a, const void *b) {
+    double d = bst_time_diff(((const bst_run_observation *)a)->time,
+                             ((const bst_run_observation *)b)->time);
+    return (d > 0.0) - (d < 0.0);
+}
+
+/* The observer's state when the light came, and the direction as a track has it. */
+static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const bst_oem *oem, int object,
+                           bst_sky_clock *clock, const bst_tdm_angles *a, bst_time epoch,
+                           bst_run_observation *o) {
+    bst_bodies bodies;
+    bst_od_observer *eye = &o->od.observer;
+    double variance = q->sigma_rad * q->sigma_rad;
+    *o = (bst_run_observation){.time = a->time, .v_mag = a->mag, .snr = NAN};
+    BST_TRY(bst_oem_state(ctx, oem, object, clock, a->time, &eye->position_m, &eye->velocity_mps));
+    bst_bodies_at(a->time, &bodies);
+    eye->time_s = bst_time_diff(a->time, epoch);
+    eye->earth_bary_mps = bodies.earth_bary_mps;
+    o->od.cov_11 = o->od.cov_22 = variance;
+    o->od.direction = bst_vec3_from_radec(a->ra_rad, a->dec_rad);
+    if (q->aberrated) {
+        bst_light light = bst_light_at(&bodies, eye->position_m, eye->velocity_mps);
+        o->od.direction = bst_light_unaberrate(&light, o->od.direction);
+    }
+    return BST_OK;
+}
+
+static bst_status gather(bst_ctx *ctx, const bst_tdm_request *q, const bst_tdm *tdm,
+                         const bst_oem *oem, bst_sky_clock *clock, bst_export_sensor *sensor,
+                         bst_run_observation *items, const bst_tdm_pair *pair) {
+    int object;
+    const char *name = q->observer_name ? q->observer_name : pair->observer;
+    if (!q->observer_name && bst_oem_object_count(oem) == 1) {
+        name = ""; /* the only one, whatever it is called */
+    }
+    bst_status status = bst_oem_find(ctx, oem, name, &object);
+    if (status != BST_OK) {
+        return bst_fail_prefix(ctx, status, "%s", q->observer);
+    }
+    bst_time epoch = pair->items[0].time;
+    for (int i = 0; i < bst_tdm_pair_count(tdm); i++) {
+        const bst_tdm_pair *p = bst_tdm_pair_at(tdm, i);
+        if (is_same(p, pair) && p->count > 0 && bst_time_diff(p->items[0].time, epoch) < 0.0) {
+            epoch = p->items[0].time;
+        }
+    }
+    int64_t n = 0;
+    for (int i = 0; i < bst_tdm_pair_count(tdm); i++) {
+        const bst_tdm_pair *p = bst_tdm_pair_at(tdm, i);
+        for (int64_t k = 0; k < p->count && is_same(p, pair); k++, n++) {
+            status = complete(ctx, q, oem, object, clock, &p->items[k], epoch, &items[n]);
+            if (status != BST_OK) {
+                return bst_fail_prefix(ctx, status, "%s", q->observer);
+            }
+        }
+    }
+    qsort(items, (size_t)n, sizeof *items, by_time);
+    *sensor = (bst_export_sensor){.index = -1};
+    snprintf(sensor->observer, sizeof sensor->observer, "%.79s", pair->observer);
+    snprintf(sensor->name, sizeof sensor->name, "TDM");
+    snprintf(sensor->target, sizeof sensor->target, "%.79s", pair->object);
+    return BST_OK;
+}
+
+bst_status bst_tdm_observations(bst_ctx *ctx, const bst_tdm_request *q, bst_export_sensor *sensor,
+                                bst_run_observation **items, int64_t *count) {
+    bst_tdm *tdm = NULL;
+    bst_oem *oem = NULL;
+    bst_eop *eop = NULL;
+    bst_sky_clock *clock = NULL;
+    const bst_tdm_pair *pair = NULL;
+    *items = NULL;
+    *count = 0;
+    if (!q->observer) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%s: angles of a TDM need the observer's states: add --observer FILE.oem",
+                        q->path);
+    }
+    bst_status status = bst_tdm_load(ctx, q->path, &tdm);
+    status = status == BST_OK ? bst_oem_load(ctx, q->observer, &oem) : status;
+    status = status == BST_OK ? bst_eop_builtin(ctx, &eop) : status;
+    status = status == BST_OK ? bst_sky_clock_create(ctx, eop, &clock) : status;
+    status = status == BST_OK ? choose_pair(ctx, q, tdm, &pair) : status;
+    if (status == BST_OK) {
+        *count = count_of(tdm, pair);
+        *items = malloc((size_t)*count * sizeof **items);
+        status = *items ? gather(ctx, q, tdm, oem, clock, sensor, *items, pair)
+                        : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for angles");
+    }
+    if (status != BST_OK) {
+        free(*items);
+        *items = NULL;
+    }
+    bst_sky_clock_free(clock);
+    bst_eop_free(eop);
+    bst_oem_free(oem);
+    bst_tdm_free(tdm);
+    return status;
+}

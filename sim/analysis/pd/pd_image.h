@@ -1,0 +1,26 @@
+/* Images of targets by a PSF that is no Gaussian, for their signal-to-noise ratio and bound. */
+#ifndef BST_ANALYSIS_PD_PD_IMAGE_H
+#define BST_ANALYSIS_PD_PD_IMAGE_H
+
+#include "sim/eval/location_bound.h"
+#include "sim/eval/target_match.h"
+#include "sim/optics/psf.h"
+
+typedef struct bst_pd_image bst_pd_image;
+
+/* Tables of the PSF, for targets that move by up to longest_px during an exposure. `psf` must
+ * outlive them. BST_ERR_MEMORY. */
+bst_status bst_pd_image_create(bst_ctx *ctx, const bst_psf *psf, double longest_px,
+                               bst_pd_image **out) BST_MUST_CHECK;
+void bst_pd_image_free(bst_pd_image *image);
+
+/* Sums of share^2 and share^3 over the pixels of a target of unit flux, at its own place in the
+ * field and in the pixel (to 1/32 px). */
+void bst_pd_image_powers(bst_pd_image *image, const bst_match_target *place, double out[2]);
+
+/* As bst_location_bound_of, of a target with flux_e. */
+bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *image, const bst_match_target *place,
+                              double flux_e, const bst_bound_noise *noise,
+                              bst_location_bound *out) BST_MUST_CHECK;
+
+#endif

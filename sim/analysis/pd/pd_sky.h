@@ -1,0 +1,43 @@
+/* The scenario's stars and sky behind the targets of pd. */
+#ifndef BST_ANALYSIS_PD_PD_SKY_H
+#define BST_ANALYSIS_PD_PD_SKY_H
+
+#include "sim/eval/target_match.h"
+#include "sim/world/scene/field.h"
+
+struct bst_pd_scene;
+
+/* Stars that a detector may find in one frame: those of at least BST_PD_STAR_SNR, in cells. */
+#define BST_PD_STAR_SNR 1.0
+typedef struct bst_pd_stars {
+    bst_match_target *places; /* [count] by cell */
+    int *first;               /* [columns * rows + 1] of each cell */
+    int count, room, columns, rows;
+    double cell_px;
+} bst_pd_stars;
+
+typedef struct bst_pd_sky bst_pd_sky;
+
+/* Opens the sky that the scenario's sensor sees at the epoch, where it is cued to look. */
+bst_status bst_pd_sky_open(bst_ctx *ctx, const struct bst_pd_scene *scene,
+                           bst_pd_sky **out) BST_MUST_CHECK;
+void bst_pd_sky_close(bst_pd_sky *sky);
+/* Attitude in which the camera looks there, turned about the boresight by `roll_rad`. */
+bst_quat bst_pd_sky_attitude(const bst_pd_sky *sky, double roll_rad);
+/* Looks: stars and background along `track`, held in `sky` until the next look. */
+bst_status bst_pd_sky_look(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
+                           const bst_source **stars, int *count) BST_MUST_CHECK;
+/* Places of those that can be found, into `out`, which grows. */
+bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
+                            const bst_source *stars, int count, bst_pd_stars *out) BST_MUST_CHECK;
+void bst_pd_stars_free(bst_pd_stars *stars);
+/* Expected electrons of sky in a pixel of the latest look, and its map (NULL: the same all over).
+ */
+double bst_pd_sky_e(const bst_pd_sky *sky, double x_px, double y_px);
+const struct bst_skylight_map *bst_pd_sky_map(const bst_pd_sky *sky);
+
+/* Whether a detection may be a star: it lies within reach_px of one, of a streak as targets are
+ * matched, or is a streak itself on which one lies; twice that at an edge. */
+bool bst_pd_is_star(const bst_pd_stars *stars, double reach_px, const bst_detection *detection);
+
+#endif

@@ -1,0 +1,170 @@
+#include "sim/catalogue/star_index.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#define REMEDY "run `boresight stars fetch` to make it again"
+
+static const double TURN_PER_UNIT = 1.0 / 4294967296.0;
+static const double PM_UNIT_RADPYR = 1e-4 * BST_ARCSEC_RAD;
+
+static uint32_t pack_pm(int pm) {
+    return (uint32_t)pm << 14;
+}
+
+/* The upper 18 bits as a signed number. */
+static int32_t unpack_pm(uint32_t word) {
+    return (int32_t)(word >> 14) - (word >> 31 ? 1 << 18 : 0);
+}
+
+bst_status bst_star_pack(bst_ctx *ctx, const bst_star_values *v, bst_star_record *out) {
+    int vt = v->vt_mmag + BST_STAR_VT_OFFSET;
+    int colour = v->colour_mmag + BST_STAR_COLOUR_OFFSET;
+    int limit = BST_STAR_PM_LIMIT;
+    if (vt < 0 || vt > 0xFFFF || colour < 0 || colour > 0x3FFF || v->pm_ra_cosdec < -limit ||
+        v->pm_ra_cosdec > limit || v->pm_dec < -limit || v->pm_dec > limit) {
+        return bst_fail(ctx, BST_ERR_RANGE,
+                        "magnitude or proper motion outside what a star record holds: VT %d mmag, "
+                        "BT-VT %d mmag, proper motion %d, %d (0.1 mas/yr)",
+                        v->vt_mmag, v->colour_mmag, v->pm_ra_cosdec, v->pm_dec);
+    }
+    double ra_turn = v->ra_rad / (2.0 * BST_PI);
+    ra_turn -= floor(ra_turn);
+    /* Rounding up to a whole turn wraps to 0 through the conversion. */
+    out->ra = (uint32_t)(uint64_t)floor(ra_turn / TURN_PER_UNIT + 0.5);
+    out->dec = (int32_t)lround(v->dec_rad / (2.0 * BST_PI) / TURN_PER_UNIT);
+    out->tyc_vt = (v->id & 0xFFFFu) | (uint32_t)vt << 16;
+    out->pm_ra_colour = pack_pm(v->pm_ra_cosdec) | (uint32_t)colour;
+    out->pm_dec_flags = pack_pm(v->pm_dec) | (v->has_colour ? 0u : BST_STAR_NO_COLOUR);
+    return BST_OK;
+}
+
+bst_vec3 bst_star_record_direction(const bst_star_record *r, double years) {
+    double ra = r->ra * (2.0 * BST_PI * TURN_PER_UNIT);
+    double dec = r->dec * (2.0 * BST_PI * TURN_PER_UNIT);
+    double sin_ra = sin(ra), cos_ra = cos(ra), sin_dec = sin(dec), cos_dec = cos(dec);
+    double east = unpack_pm(r->pm_ra_colour) * PM_UNIT_RADPYR * years;
+    double north = unpack_pm(r->pm_dec_flags) * PM_UNIT_RADPYR * years;
+    bst_vec3 p = {cos_dec * cos_ra - east * sin_ra - north * sin_dec * cos_ra,
+                  cos_dec * sin_ra + east * cos_ra - north * sin_dec * sin_ra,
+                  sin_dec + north * cos_dec};
+    /* u and mu are perpendicular, so |u + t mu| needs no sum of squares of p. */
+    return bst_vec3_scale(p, 1.0 / sqrt(1.0 + east * east + north * north));
+}
+
+uint64_t bst_star_checksum(const void *data, size_t bytes) {
+    const unsigned char *p = data;
+    const uint64_t prime = UINT64_C(0x9E3779B185EBCA87);
+    uint64_t lane[4] = {1, 2, 3, 4};
+    size_t done = 0;
+    for (; done + 32 <= bytes; done += 32) {
+        uint64_t w[4];
+        memcpy(w, p + done, 32);
+        for (int i = 0; i < 4; i++) {
+            uint64_t x = (lane[i] ^ w[i]) * prime;
+            lane[i] = x ^ x >> 29;
+        }
+    }
+    uint64_t tail[4] = {0, 0, 0, 0};
+    memcpy(tail, p + done, bytes - done);
+    uint64_t sum = (uint64_t)bytes;
+    for (int i = 0; i < 4; i++) {
+        uint64_t x = (lane[i] ^ tail[i]) * prime;
+        sum = (sum ^ x ^ x >> 29) * prime;
+    }
+    return sum ^ sum >> 32;
+}
+
+static bool is_finite_cell(const bst_star_cell *c) {
+    return isfinite(c->centre[0]) && isfinite(c->centre[1]) && isfinite(c->centre[2]) &&
+           isfinite(c->radius_rad) && isfinite(c->pm_max_radpyr);
+}
+
+static bst_status check_patches(bst_ctx *ctx, const char *label, const bst_star_view *view) {
+    for (uint32_t i = 0; i < view->header->patch_count; i++) {
+        const bst_star_patch *p = &view->patches[i];
+        if (!(p->ra_deg >= 0.0 && p->ra_deg < 360.0 && fabs(p->dec_deg) <= 90.0 &&
+              p->radius_deg > 0.0 && p->radius_deg <= 180.0 && isfinite(p->v_mag))) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "star catalogue %s is damaged (patch %" PRIu32 "): " REMEDY, label, i);
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status check_cells(bst_ctx *ctx, const char *label, const bst_star_view *view) {
+    uint64_t next = 0;
+    for (uint32_t i = 0; i < view->header->cell_count; i++) {
+        if (view->cells[i].first != next || !is_finite_cell(&view->cells[i])) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "star catalogue %s is damaged (sky cell %" PRIu32 "): " REMEDY, label,
+                            i);
+        }
+        next += view->cells[i].count;
+    }
+    if (next != view->header->star_count) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "star catalogue %s is damaged (cells hold %" PRIu64 " stars of %" PRIu64
+                        "): " REMEDY,
+                        label, next, view->header->star_count);
+    }
+    return BST_OK;
+}
+
+bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
+                              bst_star_view *out) {
+    const bst_star_header *h = data;
+    if (bytes < sizeof h->magic || memcmp(h->magic, BST_STAR_MAGIC, sizeof h->magic) != 0) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%s is not a Boresight star catalogue: run `boresight stars fetch` to make "
+                        "one",
+                        label);
+    }
+    if (bytes < sizeof *h) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "star catalogue %s is truncated (%" PRIu64 " bytes): " REMEDY, label,
+                        bytes);
+    }
+    if (h->endian != BST_STAR_ENDIAN) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "star catalogue %s was written on a machine of the other byte "
+                        "order: " REMEDY,
+                        label);
+    }
+    if (h->version != BST_STAR_VERSION) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "star catalogue %s has format version %" PRIu32
+                        ", this program reads %u: " REMEDY,
+                        label, h->version, BST_STAR_VERSION);
+    }
+    if (bytes != h->file_bytes) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "star catalogue %s is truncated or overlong (%" PRIu64 " bytes of %" PRIu64
+                        "): " REMEDY,
+                        label, bytes, h->file_bytes);
+    }
+    size_t skip = offsetof(bst_star_header, checksum) + sizeof h->checksum;
+    uint64_t sum = bst_star_checksum((const unsigned char *)data + skip, (size_t)(bytes - skip));
+    if (sum != h->checksum) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "star catalogue %s is damaged (checksum %016" PRIx64
+                        ", expected %016" PRIx64 "): " REMEDY,
+                        label, sum, h->checksum);
+    }
+    if (h->cell_count != BST_STAR_CELLS || h->patch_count > BST_STAR_PATCHES_MAX ||
+        h->star_count > UINT32_MAX || !isfinite(h->complete_to_v_mag) ||
+        bytes != sizeof *h + h->patch_count * sizeof(bst_star_patch) +
+                     h->cell_count * sizeof(bst_star_cell) +
+                     h->star_count * sizeof(bst_star_record)) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "star catalogue %s is damaged (numbers in the header): " REMEDY, label);
+    }
+    out->header = h;
+    out->patches = (const bst_star_patch *)(h + 1);
+    out->cells = (const bst_star_cell *)(out->patches + h->patch_count);
+    out->records = (const bst_star_record *)(out->cells + h->cell_count);
+    BST_TRY(check_patches(ctx, label, out));
+    return check_cells(ctx, label, out);
+}

@@ -1,0 +1,118 @@
+/* The star catalogue's file format: what is mapped, what is embedded and what the importer writes.
+ *
+ * header | patches | cells | records, in the byte order of the machine that wrote it (checked). The
+ * sky cells are the 9,537 regions of the Guide Star Catalog that Tycho-2 numbers its stars by
+ * (TYC1), so a star's identity names its cell. Each cell carries the cap that holds its stars, and
+ * its stars lie brightest first. */
+#ifndef BST_CATALOGUE_STAR_INDEX_H
+#define BST_CATALOGUE_STAR_INDEX_H
+
+#include <stdint.h>
+
+#include "sim/core/status.h"
+#include "sim/core/vec.h"
+
+#define BST_STAR_MAGIC "BSTSTARS"
+#define BST_STAR_ENDIAN 0x01020304u
+#define BST_STAR_VERSION 1u
+#define BST_STAR_CELLS 9538u /* one per TYC1, 1 to 9537; cell 0 is empty */
+#define BST_STAR_PATCHES_MAX 64u
+#define BST_STAR_EPOCH_YEAR 2000.0 /* Julian year of the stored positions */
+
+typedef struct bst_star_header {
+    char magic[8];
+    uint32_t endian;
+    uint32_t version;
+    uint64_t file_bytes;
+    uint64_t checksum; /* bst_star_checksum of all bytes after this field */
+    uint64_t star_count;
+    uint32_t cell_count;
+    uint32_t patch_count;
+    double complete_to_v_mag; /* over the whole sky */
+    char source[40];          /* zero-terminated */
+} bst_star_header;
+
+/* A cap of the sky in which the file goes fainter than elsewhere. */
+typedef struct bst_star_patch {
+    double ra_deg;
+    double dec_deg;
+    double radius_deg;
+    double v_mag;
+} bst_star_patch;
+
+typedef struct bst_star_cell {
+    float centre[3];     /* ICRS unit vector */
+    float radius_rad;    /* every star of the cell lies within it, J2000 */
+    float pm_max_radpyr; /* largest total proper motion in the cell */
+    uint32_t first;      /* index of the cell's first record */
+    uint32_t count;
+} bst_star_cell;
+
+/* One star in 20 bytes. Magnitudes and proper motions are the catalogue's own digits. */
+typedef struct bst_star_record {
+    uint32_t ra;           /* ICRS, J2000, 2^32 to the turn (0.30 mas) */
+    int32_t dec;           /* the same unit */
+    uint32_t tyc_vt;       /* low 16 bits of the identity, then VT in mmag + BST_STAR_VT_OFFSET */
+    uint32_t pm_ra_colour; /* pm_ra cos(dec), 0.1 mas/yr, 18 bits; BT-VT, mmag + offset, 14 bits */
+    uint32_t pm_dec_flags; /* pm_dec, 0.1 mas/yr, 18 bits; BST_STAR_NO_COLOUR and spare bits */
+} bst_star_record;
+
+#define BST_STAR_VT_OFFSET 3000
+#define BST_STAR_COLOUR_OFFSET 4000
+#define BST_STAR_PM_LIMIT 131071 /* 0.1 mas/yr */
+#define BST_STAR_NO_COLOUR 1u    /* BT-VT is assumed, not measured */
+
+_Static_assert(sizeof(bst_star_header) == 96, "file layout");
+_Static_assert(sizeof(bst_star_patch) == 32, "file layout");
+_Static_assert(sizeof(bst_star_cell) == 28, "file layout");
+_Static_assert(sizeof(bst_star_record) == 20, "file layout");
+
+/* A star's catalogue values before packing. */
+typedef struct bst_star_values {
+    double ra_rad, dec_rad; /* ICRS, J2000 */
+    int pm_ra_cosdec;       /* 0.1 mas/yr */
+    int pm_dec;             /* 0.1 mas/yr */
+    int vt_mmag;
+    int colour_mmag; /* BT-VT */
+    int has_colour;  /* 0: colour_mmag is assumed */
+    uint32_t id;     /* bst_star_id_make */
+} bst_star_values;
+
+/* Pointers into a catalogue's bytes; lends, owns nothing. */
+typedef struct bst_star_view {
+    const bst_star_header *header;
+    const bst_star_patch *patches;
+    const bst_star_cell *cells;
+    const bst_star_record *records;
+} bst_star_view;
+
+/* Packs one star. BST_ERR_RANGE when a value does not fit the record's fields (VT -3 to 62 mag,
+ * BT-VT -4 to 12 mag, proper motion up to 13.1 arcsec/yr per axis). */
+bst_status bst_star_pack(bst_ctx *ctx, const bst_star_values *values,
+                         bst_star_record *out) BST_MUST_CHECK;
+
+/* V in units of 1e-5 mag, exact: V = VT - 0.090 (BT - VT) (Tycho-2 ReadMe, note 7). */
+static inline int32_t bst_star_record_v(const bst_star_record *r) {
+    return (int32_t)(r->tyc_vt >> 16) * 100 - 100 * BST_STAR_VT_OFFSET -
+           9 * ((int32_t)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET);
+}
+
+/* ICRS unit vector at `years` Julian years after J2000: (u + t mu) / |u + t mu|, the motion of a
+ * star on a straight line without radial velocity. */
+bst_vec3 bst_star_record_direction(const bst_star_record *r, double years);
+
+/* Checksum of `bytes` bytes: four interleaved multiply-xor lanes of 64-bit words, folded. Any
+ * change within a single 8-byte word changes it. */
+uint64_t bst_star_checksum(const void *data, size_t bytes);
+
+/* Checks a catalogue of `bytes` bytes (aligned to 8) and points *out into it. `label` names it in
+ * messages. BST_ERR_FORMAT: foreign, of another version or byte order, truncated or damaged; the
+ * message says how to make it again. */
+bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
+                              bst_star_view *out) BST_MUST_CHECK;
+
+struct bst_stars;
+/* The catalogue's cells and records; lent. */
+const bst_star_view *bst_stars_records(const struct bst_stars *stars);
+
+#endif

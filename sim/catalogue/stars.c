@@ -1,0 +1,420 @@
+#include "sim/catalogue/stars.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "sim/catalogue/bright_stars.h"
+#include "sim/catalogue/star_index.h"
+#include "sim/core/file.h"
+#include "sim/core/rng.h"
+
+#define MAX_FILE_BYTES ((uint64_t)1 << 30)
+
+/* Defined in stars_embedded.S. */
+extern const unsigned char bst_stars_embedded_begin[];
+extern const unsigned char bst_stars_embedded_end[];
+
+/* A point and a distance from it that hold all cells of a group: cells of consecutive numbers are
+ * neighbours, so that a query passes by most of the sky a group at a time. */
+typedef struct cell_group {
+    double centre[3], radius, pm_max_radpyr;
+} cell_group;
+
+enum { GROUP = 32, GROUPS = (BST_STAR_CELLS + GROUP - 1) / GROUP };
+
+struct bst_stars {
+    bst_star_view view;
+    cell_group groups[GROUPS];
+    void *mapping; /* NULL when embedded */
+    size_t mapping_bytes;
+    char path[512];
+    bool borrowed; /* the mapping is another catalogue's */
+    bool altered;
+    bst_star_errors_config errors;
+    bst_rng_key key;
+};
+
+static void group_cells(bst_stars *s) {
+    for (uint32_t g = 0; g < GROUPS; g++) {
+        cell_group *group = &s->groups[g];
+        uint32_t first = g * GROUP, last = first + GROUP;
+        uint32_t end = last < BST_STAR_CELLS ? last : BST_STAR_CELLS;
+        *group = (cell_group){.radius = -1.0}; /* no star */
+        int filled = 0;
+        for (uint32_t c = first; c < end; c++) {
+            const bst_star_cell *cell = &s->view.cells[c];
+            filled += cell->count > 0;
+            for (int k = 0; k < 3 && cell->count > 0; k++) {
+                group->centre[k] += cell->centre[k];
+            }
+        }
+        for (int k = 0; k < 3 && filled > 0; k++) {
+            group->centre[k] /= filled;
+        }
+        for (uint32_t c = first; c < end; c++) {
+            const bst_star_cell *cell = &s->view.cells[c];
+            if (cell->count > 0) {
+                double dx = cell->centre[0] - group->centre[0],
+                       dy = cell->centre[1] - group->centre[1],
+                       dz = cell->centre[2] - group->centre[2];
+                double away = sqrt(dx * dx + dy * dy + dz * dz);
+                group->radius = fmax(group->radius, away + cell->radius_rad + 1e-9);
+                group->pm_max_radpyr = fmax(group->pm_max_radpyr, cell->pm_max_radpyr);
+            }
+        }
+    }
+}
+
+/* Beyond this many standard deviations nothing is drawn: Box and Muller of 53 bits end at 8.6. */
+#define MOST_SIGMAS 9.0
+
+/* Draws of one star. */
+enum { DRAW_DROPPED, DRAW_DISPLACED, DRAW_OFFSET };
+
+/* Gives a star the errors of this catalogue; false when it is dropped. */
+static bool alter(const bst_stars *s, uint32_t id, bst_vec3 *direction) {
+    const bst_star_errors_config *e = &s->errors;
+    if (bst_rng_uniform(s->key, id, DRAW_DROPPED) < e->dropped_fraction) {
+        return false;
+    }
+    if (bst_rng_uniform(s->key, id, DRAW_DISPLACED) < e->displaced_fraction) {
+        double offset[2], sigma = e->displaced_sigma_arcsec * BST_ARCSEC_RAD;
+        bst_rng_normal2(s->key, id, DRAW_OFFSET, offset);
+        bst_vec3 a = bst_vec3_perpendicular(*direction), b = bst_vec3_cross(*direction, a);
+        *direction = bst_vec3_unit(
+            bst_vec3_axpy(bst_vec3_axpy(*direction, sigma * offset[0], a), sigma * offset[1], b));
+    }
+    return true;
+}
+
+bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
+                                 const bst_star_errors_config *errors, bst_stars **out) {
+    *out = malloc(sizeof **out);
+    if (!*out) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    **out = *stars;
+    (*out)->borrowed = (*out)->altered = true;
+    (*out)->errors = *errors;
+    (*out)->key = bst_rng_make_key(errors->seed, 0, "knowledge", "stars");
+    return BST_OK;
+}
+
+bst_status bst_stars_share(bst_ctx *ctx, const bst_stars *stars, bst_stars **out) {
+    *out = malloc(sizeof **out);
+    if (!*out) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    **out = *stars;
+    (*out)->borrowed = true;
+    return BST_OK;
+}
+
+bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) {
+    const char *data = getenv("XDG_DATA_HOME");
+    const char *home = getenv("HOME");
+    int n;
+    /* The XDG base directory specification: a relative path is to be ignored. */
+    if (data && data[0] == '/') {
+        n = snprintf(buffer, bytes, "%s/boresight/tycho2.stars", data);
+    } else if (home && home[0] == '/') {
+        n = snprintf(buffer, bytes, "%s/.local/share/boresight/tycho2.stars", home);
+    } else {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "no user's data directory: set HOME or XDG_DATA_HOME to an absolute path");
+    }
+    if (n < 0 || (size_t)n >= bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the path of the user's data directory is longer than %zu bytes", bytes);
+    }
+    return BST_OK;
+}
+
+static bst_status open_file(bst_ctx *ctx, const char *path, bst_stars *s) {
+    int fd;
+    uint64_t bytes;
+    bst_status status = bst_file_open(ctx, path, MAX_FILE_BYTES,
+                                      "a star catalogue: `boresight stars fetch` makes the full "
+                                      "one, and \"embedded\" names the one in the program",
+                                      &fd, &bytes);
+    if (status != BST_OK) {
+        return bst_fail_prefix(ctx, status, "star catalogue");
+    }
+    if (bytes < 8) {
+        /* An empty file cannot be mapped; a zero header gives the message for a foreign one. */
+        uint64_t none = 0;
+        status = bst_star_view_init(ctx, path, &none, sizeof none, &s->view);
+    } else {
+        s->mapping_bytes = (size_t)bytes;
+        void *p = mmap(NULL, s->mapping_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
+        if (p == MAP_FAILED) {
+            status = bst_fail(ctx, BST_ERR_IO, "star catalogue %s: %s", path, strerror(errno));
+        } else {
+            s->mapping = p;
+            status = bst_star_view_init(ctx, path, p, s->mapping_bytes, &s->view);
+        }
+    }
+    close(fd);
+    return status;
+}
+
+static bst_status open_embedded(bst_ctx *ctx, bst_stars *s) {
+    size_t bytes = (size_t)(bst_stars_embedded_end - bst_stars_embedded_begin);
+    return bst_star_view_init(ctx, "embedded in the program", bst_stars_embedded_begin, bytes,
+                              &s->view);
+}
+
+bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
+    *out = NULL;
+    bst_stars *s = calloc(1, sizeof *s);
+    if (!s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    bst_status status = BST_OK;
+    bool use_default = strcmp(name, "default") == 0;
+    if (use_default) {
+        status = bst_stars_default_path(ctx, s->path, sizeof s->path);
+        /* Without a home directory there is no full catalogue either. */
+        if (status != BST_OK || access(s->path, F_OK) != 0) {
+            s->path[0] = '\0';
+            status = BST_OK;
+        }
+    } else if (!*name) {
+        status = bst_fail(ctx, BST_ERR_ARGUMENT,
+                          "the star catalogue's name is empty (allowed: \"default\", "
+                          "\"embedded\" or a path)");
+    } else if (strcmp(name, "embedded") != 0) {
+        int n = snprintf(s->path, sizeof s->path, "%s", name);
+        if (n < 0 || (size_t)n >= sizeof s->path) {
+            status =
+                bst_fail(ctx, BST_ERR_ARGUMENT,
+                         "the star catalogue's path is longer than %zu bytes", sizeof s->path - 1);
+        }
+    }
+    if (status == BST_OK) {
+        status = s->path[0] ? open_file(ctx, s->path, s) : open_embedded(ctx, s);
+    }
+    if (status != BST_OK) {
+        bst_stars_close(s);
+        return status;
+    }
+    group_cells(s);
+    if (use_default && !s->mapping) {
+        bst_log(ctx, BST_LOG_WARNING,
+                "the full star catalogue is not there: using the stars embedded in the program "
+                "(all to V %.1f, fainter in %u patches of sky only); `boresight stars fetch` gets "
+                "the full one",
+                s->view.header->complete_to_v_mag, s->view.header->patch_count);
+    }
+    *out = s;
+    return BST_OK;
+}
+
+void bst_stars_close(bst_stars *stars) {
+    if (stars && stars->mapping && !stars->borrowed) {
+        munmap(stars->mapping, stars->mapping_bytes);
+    }
+    free(stars);
+}
+
+void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
+    const bst_star_header *h = stars->view.header;
+    memset(out, 0, sizeof *out);
+    out->embedded = stars->mapping == NULL;
+    if (out->embedded) {
+        snprintf(out->source, sizeof out->source, "embedded default");
+    } else {
+        snprintf(out->source, sizeof out->source, "%.*s", (int)sizeof h->source, h->source);
+    }
+    snprintf(out->path, sizeof out->path, "%s", stars->path);
+    out->count = (long long)h->star_count;
+    out->complete_to_v_mag = h->complete_to_v_mag;
+    out->patches = (int)h->patch_count;
+}
+
+const bst_star_view *bst_stars_records(const bst_stars *stars) {
+    return &stars->view;
+}
+
+void bst_stars_patch(const bst_stars *stars, int index, bst_vec3 *centre, double *radius_rad,
+                     double *v_mag) {
+    const bst_star_patch *p = &stars->view.patches[index];
+    *centre = bst_vec3_from_radec(p->ra_deg * BST_DEG_RAD, p->dec_deg * BST_DEG_RAD);
+    *radius_rad = p->radius_deg * BST_DEG_RAD;
+    *v_mag = p->v_mag;
+}
+
+double bst_stars_complete_to(const bst_stars *stars, bst_vec3 centre, double radius_rad) {
+    double best = stars->view.header->complete_to_v_mag;
+    for (uint32_t i = 0; i < stars->view.header->patch_count; i++) {
+        bst_vec3 c;
+        double radius, v;
+        bst_stars_patch(stars, (int)i, &c, &radius, &v);
+        if (v > best && bst_vec3_angle(c, centre) + radius_rad <= radius) {
+            best = v;
+        }
+    }
+    return best;
+}
+
+/* A box in stored right ascension and declination that holds the cone of radius_rad around centre:
+ * integer comparisons drop most of a cell's stars before any trigonometry. */
+typedef struct radec_box {
+    int64_t dec_min, dec_max;
+    uint32_t ra_min, ra_width;
+} radec_box;
+
+static radec_box box_around(bst_vec3 centre, double radius_rad) {
+    const double unit = 4294967296.0 / (2.0 * BST_PI);
+    double ra, dec;
+    bst_vec3_to_radec(centre, &ra, &dec);
+    radius_rad += 1e-8; /* rounding of the stored positions and of what follows */
+    radec_box box = {(int64_t)floor((dec - radius_rad) * unit),
+                     (int64_t)ceil((dec + radius_rad) * unit), 0, UINT32_MAX};
+    if (fabs(dec) + radius_rad < BST_PI / 2.0 - 1e-6) {
+        /* The cone's largest difference in right ascension: sin(dra) = sin(r) / cos(dec). */
+        double half = asin(fmin(1.0, sin(radius_rad) / cos(dec))) * unit + 2.0;
+        if (half < 2147483647.0) {
+            box.ra_min = (uint32_t)(int64_t)floor(ra * unit - half);
+            box.ra_width = (uint32_t)ceil(2.0 * half);
+        }
+    }
+    return box;
+}
+
+/* Tycho-2's V less the published one, at most. */
+#define MOST_WRONG_MAG 0.5
+
+/* Whether the star has its magnitudes from the table of bright stars. */
+static bool unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, bst_star *out) {
+    int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
+    out->icrs = direction;
+    out->v_mag = (float)(bst_star_record_v(r) / 1e5);
+    /* B-V = 0.850 (BT-VT): Tycho-2 ReadMe, note 7. */
+    out->b_minus_v = r->pm_dec_flags & BST_STAR_NO_COLOUR ? NAN : (float)(0.850 * colour / 1000.0);
+    out->id = tyc1 << 16 | (r->tyc_vt & 0xFFFFu);
+    /* a file may have been imported before there was a table */
+    return (double)out->v_mag < BST_BRIGHT_STARS_V &&
+           bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
+}
+
+/* Moves the last of count stars to its place among them, brightest first; Tycho-2's order is that
+ * but for stars of the table. */
+static void put_in_order(bst_star *stars, int count) {
+    for (int k = count - 1; k > 0 && stars[k - 1].v_mag > stars[k].v_mag; k--) {
+        bst_star swap = stars[k];
+        stars[k] = stars[k - 1];
+        stars[k - 1] = swap;
+    }
+}
+
+/* Whether a star of the group may lie within radius_rad of a unit vector after so many years. */
+static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_rad, double years) {
+    double reach = radius_rad + group->radius + group->pm_max_radpyr * years;
+    bst_vec3 d = {centre.x - group->centre[0], centre.y - group->centre[1],
+                  centre.z - group->centre[2]};
+    return group->radius >= 0.0 && bst_vec3_dot(d, d) <= reach * reach;
+}
+
+bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
+                           double v_limit, double julian_year, bst_star *out, int capacity,
+                           int *count) {
+    *count = 0;
+    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) || !isfinite(julian_year) ||
+        !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) || capacity < 0 || (!out && capacity > 0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "star query: radius %g rad (0 to pi), limit V %g, year %g, |centre| %g "
+                        "(1), room for %d stars",
+                        radius_rad, v_limit, julian_year, bst_vec3_norm(centre), capacity);
+    }
+    double years = julian_year - BST_STAR_EPOCH_YEAR;
+    double chord = 2.0 * sin(radius_rad / 2.0);
+    /* Rounding must not lose the antipode. */
+    double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
+    /* what is displaced may come from outside */
+    double slack = stars->altered && stars->errors.displaced_fraction > 0.0
+                       ? MOST_SIGMAS * stars->errors.displaced_sigma_arcsec * BST_ARCSEC_RAD
+                       : 0.0;
+    int found = 0;
+    for (uint32_t c = 0; c < BST_STAR_CELLS; c++) {
+        if (c % GROUP == 0 &&
+            !may_reach(&stars->groups[c / GROUP], centre, radius_rad + slack, fabs(years))) {
+            c += GROUP - 1;
+            continue;
+        }
+        const bst_star_cell *cell = &stars->view.cells[c];
+        double drift = cell->pm_max_radpyr * fabs(years);
+        double reach = radius_rad + cell->radius_rad + drift + slack;
+        bst_vec3 d = {centre.x - cell->centre[0], centre.y - cell->centre[1],
+                      centre.z - cell->centre[2]};
+        /* A chord is shorter than its angle: no cell is missed. */
+        if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
+            continue;
+        }
+        radec_box box = box_around(centre, radius_rad + drift + slack);
+        bool out_of_order = false;
+        const int first = found;
+        const bst_star_record *r = stars->view.records + cell->first;
+        for (const bst_star_record *end = r + cell->count; r < end; r++) {
+            double v_mag = bst_star_record_v(r) / 1e5;
+            if (v_mag > v_limit &&
+                (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG)) {
+                break; /* brightest first */
+            }
+            if (r->dec < box.dec_min || r->dec > box.dec_max || r->ra - box.ra_min > box.ra_width) {
+                continue;
+            }
+            bst_vec3 direction = bst_star_record_direction(r, years);
+            if (stars->altered && !alter(stars, c << 16 | (r->tyc_vt & 0xFFFFu), &direction)) {
+                continue;
+            }
+            d = bst_vec3_sub(direction, centre);
+            bst_star star;
+            if (bst_vec3_dot(d, d) > chord2) {
+                continue;
+            }
+            bool published = unpack(r, c, direction, &star);
+            if (published ? (double)star.v_mag > v_limit : v_mag > v_limit) {
+                continue;
+            }
+            if (found < capacity) {
+                out[found] = star;
+                out_of_order = out_of_order || published;
+                if (out_of_order) {
+                    put_in_order(out + first, found - first + 1);
+                }
+            }
+            found++;
+        }
+    }
+    *count = found;
+    return BST_OK;
+}
+
+bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
+                          bst_star *out) {
+    uint32_t c = id >> 16;
+    if (c < BST_STAR_CELLS && isfinite(julian_year)) {
+        const bst_star_cell *cell = &stars->view.cells[c];
+        for (uint32_t i = 0; i < cell->count; i++) {
+            const bst_star_record *r = &stars->view.records[cell->first + i];
+            if ((r->tyc_vt & 0xFFFFu) == (id & 0xFFFFu)) {
+                bst_vec3 direction =
+                    bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR);
+                if (stars->altered && !alter(stars, id, &direction)) {
+                    break;
+                }
+                (void)unpack(r, c, direction, out);
+                return BST_OK;
+            }
+        }
+    }
+    unsigned tyc1, tyc2, tyc3;
+    bst_star_id_split(id, &tyc1, &tyc2, &tyc3);
+    return bst_fail(ctx, BST_ERR_NOT_FOUND, "star TYC %u-%u-%u is not in the catalogue", tyc1, tyc2,
+                    tyc3);
+}

@@ -1,0 +1,105 @@
+/* The star catalogue: one memory-mapped, sky-indexed file, or the stars embedded in the program. */
+#ifndef BST_CATALOGUE_STARS_H
+#define BST_CATALOGUE_STARS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sim/core/status.h"
+#include "sim/core/vec.h"
+
+/* A star as a query returns it. */
+typedef struct bst_star {
+    bst_vec3 icrs; /* unit vector, ICRS, barycentric, proper motion applied to the query's epoch */
+    float v_mag;   /* Johnson V */
+    float b_minus_v; /* Johnson B-V; NAN where the catalogue has one colour only */
+    uint32_t id;     /* Tycho-2 identity, see bst_star_id_make */
+} bst_star;
+
+/* Tycho-2 identity TYC tyc1-tyc2-tyc3 in 30 bits, and back. Tycho-2 itself gives 254 identities to
+ * both components of a double star (one in its main table, one in supplement 1). */
+static inline uint32_t bst_star_id_make(unsigned tyc1, unsigned tyc2, unsigned tyc3) {
+    return (uint32_t)(tyc1 << 16 | tyc2 << 2 | (tyc3 & 3u));
+}
+static inline void bst_star_id_split(uint32_t id, unsigned *tyc1, unsigned *tyc2, unsigned *tyc3) {
+    *tyc1 = id >> 16;
+    *tyc2 = id >> 2 & 0x3FFFu;
+    *tyc3 = (id & 3u) ? (id & 3u) : 4u;
+}
+
+/* An open catalogue; immutable, shareable between threads. */
+typedef struct bst_stars bst_stars;
+
+typedef struct bst_stars_info {
+    char source[64];          /* "Tycho-2" or "embedded default" */
+    char path[512];           /* "" when embedded */
+    long long count;          /* stars */
+    double complete_to_v_mag; /* whole sky */
+    int patches;              /* caps of the sky in which it goes fainter, see bst_stars_patch */
+    bool embedded;
+} bst_stars_info;
+
+/* Opens a catalogue: "embedded", "default" (the user's full catalogue when it is there, else the
+ * embedded one, which is logged as a warning that says how to fetch the full one), or a path. The
+ * file's checksum is verified. *out is the caller's, to be closed with bst_stars_close.
+ * BST_ERR_NOT_FOUND: no such file; BST_ERR_FORMAT: not a catalogue, truncated or damaged. */
+bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) BST_MUST_CHECK;
+
+/* Another handle on an open catalogue, which is to be closed after it. */
+bst_status bst_stars_share(bst_ctx *ctx, const bst_stars *stars, bst_stars **out) BST_MUST_CHECK;
+
+/* Closes a catalogue; NULL is allowed. */
+void bst_stars_close(bst_stars *stars);
+
+/* What a catalogue is and how far it goes. */
+void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out);
+
+/* Cap number `index` (0 to info.patches - 1): its centre (unit, ICRS), radius in rad, and the V to
+ * which all of the source's stars in it are there. */
+void bst_stars_patch(const bst_stars *stars, int index, bst_vec3 *centre, double *radius_rad,
+                     double *v_mag);
+
+/* The V to which the catalogue is complete all over the cone of radius_rad around `centre` (unit,
+ * ICRS): the whole sky's, or that of a single patch that holds the whole cone. A cone that only
+ * several patches together cover gets the whole sky's. */
+double bst_stars_complete_to(const bst_stars *stars, bst_vec3 centre, double radius_rad);
+
+/* The path of the user's full catalogue, whether or not it exists: tycho2.stars in
+ * $XDG_DATA_HOME/boresight or ~/.local/share/boresight. BST_ERR_NOT_FOUND when neither variable is
+ * set, BST_ERR_ARGUMENT when the buffer is too small. */
+bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) BST_MUST_CHECK;
+
+/* Stars within radius_rad (0 to pi) of `centre` (unit, ICRS) that are not fainter than v_limit,
+ * with proper motion to julian_year (for example 2022.46). Writes at most `capacity` stars, in the
+ * catalogue's order (by sky cell, brightest first in each, ties by identity), and returns in *count
+ * how many there are in all (may exceed capacity: then those written are the first ones met and the
+ * caller asks again with more room). `out` may be NULL when capacity is 0. No allocation.
+ *
+ * Motion is uniform along the great circle's tangent, without radial velocity and parallax: over 35
+ * years that is right to 1 mas but for the nearest stars, where the neglected change of perspective
+ * grows to 0.7 arcsec (Barnard's star; all others under 0.2). Tycho-2 itself has no proper motion
+ * for 5 % of its stars, those without a mean position (109,445) and Tycho-1's (13,082): they stay
+ * where they were observed about 1991.5, fast ones such as Polaris, 61 Cygni and GJ 887 among them.
+ */
+bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
+                           double v_limit, double julian_year, bst_star *out, int capacity,
+                           int *count) BST_MUST_CHECK;
+
+/* Looks a star up by identity (the brighter one where two share it); BST_ERR_NOT_FOUND. */
+bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
+                          bst_star *out) BST_MUST_CHECK;
+
+/* Errors of the onboard star catalogue; a star's fate follows from its identity and the seed. */
+typedef struct bst_star_errors_config {
+    double dropped_fraction, displaced_fraction, displaced_sigma_arcsec;
+    uint64_t seed;
+} bst_star_errors_config;
+
+/* The same stars with errors: those of `stars` that are dropped are not found, the displaced ones
+ * lie elsewhere. Shares the memory of `stars`, which must outlive *out. */
+bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
+                                 const bst_star_errors_config *errors,
+                                 bst_stars **out) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,18 @@
+/* What all commands share: exit codes and the log on standard error. */
+#ifndef BST_CLI_CLI_H
+#define BST_CLI_CLI_H
+
+#include "sim/core/status.h"
+
+enum {
+    BST_EXIT_OK = 0,
+    BST_EXIT_FAILED = 1,
+    BST_EXIT_USAGE = 2,
+    BST_EXIT_RUNS_FAILED = 4, /* a study is complete, but some of its runs failed by themselves */
+    BST_EXIT_INTERRUPTED = 130
+};
+
+/* Log sink that writes to standard error: "boresight: warning: ...". */
+void bst_app_log(void *user, bst_log_level level, const char *message);
+
+#endif

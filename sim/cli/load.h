@@ -1,0 +1,102 @@
+/* Reading a scenario as the command line asks: file, overrides, shortcuts. */
+#ifndef BST_CLI_LOAD_H
+#define BST_CLI_LOAD_H
+
+#include "sim/cli/options.h"
+#include "sim/engine/scenario/scenario.h"
+
+/* What several commands take. */
+typedef struct bst_load_options {
+    bst_option_list set;
+    const char *seed;
+    double duration_s;       /* < 0: as the scenario says */
+    int64_t run;             /* < 0: as the scenario says */
+    const char *link;        /* address of the link; NULL: as the scenario says */
+    const char *link_keys;   /* file; NULL: as the scenario says */
+    const char *external;    /* modules that become "external", with commas between; NULL: none */
+    const char *pacing;      /* mode; NULL: as the scenario says */
+    const bst_option *table; /* of the command, for its outputs; bst_load_check sets it */
+} bst_load_options;
+
+/* The same of those runs that can have modules outside. */
+#define BST_LINK_OPTIONS(load)                                                                   \
+    {.name = "link",                                                                             \
+     .kind = BST_OPTION_TEXT,                                                                    \
+     .target = &(load).link,                                                                     \
+     .argument = "ADDRESS",                                                                      \
+     .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},        \
+        {.name = "link-keys",                                                                    \
+         .kind = BST_OPTION_TEXT,                                                                \
+         .target = &(load).link_keys,                                                            \
+         .path = BST_PATH_INPUT,                                                                 \
+         .argument = "FILE",                                                                     \
+         .doc = "keys of boresight link-keys that peers must have"},                             \
+        {.name = "external",                                                                     \
+         .kind = BST_OPTION_TEXT,                                                                \
+         .target = &(load).external,                                                             \
+         .argument = "MODULE,...",                                                               \
+         .doc = "modules that peers play: imgproc, tracker, control, gimbal"},                   \
+    {                                                                                            \
+        .name = "pacing", .kind = BST_OPTION_TEXT, .target = &(load).pacing, .argument = "MODE", \
+        .doc = "lockstep (default), realtime, or fast"                                           \
+    }
+
+/* Entries of an options table that fill a bst_load_options named `load`. */
+#define BST_LOAD_OPTIONS(load)                                                                 \
+    {.name = "set",                                                                            \
+     .kind = BST_OPTION_LIST,                                                                  \
+     .target = &(load).set,                                                                    \
+     .argument = "/PATH=VALUE",                                                                \
+     .doc = "override a value of the scenario; may be given several times"},                   \
+        {.name = "seed",                                                                       \
+         .kind = BST_OPTION_TEXT,                                                              \
+         .target = &(load).seed,                                                               \
+         .argument = "SEED",                                                                   \
+         .doc = "master seed, for example 42 or 0x2A"},                                        \
+        {.name = "duration",                                                                   \
+         .kind = BST_OPTION_REAL,                                                              \
+         .target = &(load).duration_s,                                                         \
+         .argument = "S",                                                                      \
+         .doc = "simulated time in seconds",                                                   \
+         .minimum = 0,                                                                         \
+         .maximum = 1e9},                                                                      \
+    {                                                                                          \
+        .name = "run-number", .kind = BST_OPTION_INT, .target = &(load).run, .argument = "N",  \
+        .doc = "number of the run in a study: other random numbers, same scene", .minimum = 0, \
+        .maximum = 9e15                                                                        \
+    }
+
+#define BST_LOAD_DEFAULTS \
+    { .duration_s = -1.0, .run = -1 }
+
+/* Entries of an options table that choose the OpenCL device: `device_` is a const char *,
+ * `threads_` an int64_t. */
+#define BST_DEVICE_OPTIONS(device_, threads_)                                                \
+    {.name = "device",                                                                       \
+     .kind = BST_OPTION_TEXT,                                                                \
+     .target = &(device_),                                                                   \
+     .argument = "NAME",                                                                     \
+     .doc = "OpenCL device: part of its name, or PLATFORM:DEVICE by number (default PoCL)"}, \
+    {                                                                                        \
+        .name = "threads", .kind = BST_OPTION_INT, .target = &(threads_), .argument = "N",   \
+        .doc = "threads for the OpenCL device (default all)", .minimum = 1, .maximum = 1024  \
+    }
+
+/* Whether the overrides have the form /path=value; BST_ERR_ARGUMENT when one has not: the command
+ * was called wrongly. `table`: the command's options, kept in *options: bst_load_scenario looks at
+ * its outputs. */
+bst_status bst_load_check(bst_ctx *ctx, bst_load_options *options,
+                          const bst_option *table) BST_MUST_CHECK;
+
+/* Whether a scenario has the sensor OBSERVER/SENSOR; BST_ERR_NOT_FOUND with the names of those that
+ * it has. `name` may be NULL: BST_OK. */
+bst_status bst_load_check_sensor(bst_ctx *ctx, const bst_scenario *scenario,
+                                 const char *name) BST_MUST_CHECK;
+
+/* Loads `path`, applies the options, reads the scenario. *json is kept for as long as the scenario;
+ * free both. BST_ERR_ARGUMENT also when an output of the command is a file that the scenario is
+ * made of or names. */
+bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
+                             bst_json **json, bst_scenario *out) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,13 @@
+#include <stdio.h>
+
+#include "sim/cli/cli.h"
+
+void bst_app_log(void *user, bst_log_level level, const char *message) {
+    (void)user;
+    static const char *const names[] = {"error", "warning", "info", "debug"};
+    if (level == BST_LOG_INFO) {
+        fprintf(stderr, "boresight: %s\n", message);
+    } else {
+        fprintf(stderr, "boresight: %s: %s\n", names[level], message);
+    }
+}

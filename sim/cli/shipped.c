@@ -1,0 +1,21 @@
+#include "sim/cli/shipped.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+void bst_app_shipped_file(const char *name, char *path, size_t bytes) {
+    static const char *const places[] = {"../share/boresight", ".."};
+    char folder[4096];
+    ssize_t length = readlink("/proc/self/exe", folder, sizeof folder - 1);
+    folder[length > 0 ? length : 0] = '\0';
+    char *slash = strrchr(folder, '/');
+    for (size_t i = 0; slash && i < sizeof places / sizeof *places; i++) {
+        *slash = '\0';
+        int n = snprintf(path, bytes, "%s/%s/%s", folder, places[i], name);
+        if (n > 0 && (size_t)n < bytes && access(path, R_OK) == 0) {
+            return;
+        }
+    }
+    snprintf(path, bytes, "%s", name);
+}

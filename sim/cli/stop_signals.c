@@ -1,0 +1,38 @@
+#include "sim/cli/stop_signals.h"
+
+#include <signal.h>
+#include <stddef.h>
+
+static volatile sig_atomic_t stop_requested;
+
+static const int stop_signals[] = {SIGINT, SIGTERM, SIGHUP};
+enum { STOP_SIGNALS = sizeof stop_signals / sizeof *stop_signals };
+
+/* The first one asks the run to end; the second one, of whatever kind, ends the process. */
+static void on_signal(int number) {
+    (void)number;
+    stop_requested = 1;
+    for (int i = 0; i < STOP_SIGNALS; i++) {
+        signal(stop_signals[i], SIG_DFL);
+    }
+}
+
+void bst_stop_catch_signals(void) {
+    stop_requested = 0;
+    for (int i = 0; i < STOP_SIGNALS; i++) {
+        struct sigaction action = {.sa_handler = on_signal}, before;
+        /* nohup has the program ignore the end of the terminal */
+        if (stop_signals[i] != SIGHUP ||
+            (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)) {
+            sigaction(stop_signals[i], &action, NULL);
+        }
+    }
+    /* a limit on the size of files and a reader that went away are errors of a write, not the end
+     * of the process */
+    signal(SIGXFSZ, SIG_IGN);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+bool bst_stop_requested(void) {
+    return stop_requested != 0;
+}

@@ -1,0 +1,353 @@
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "sim/engine/kernel/engine_internal.h"
+
+void bst_engine_count(bst_engine *engine, const char *what) {
+    pthread_mutex_lock(&engine->counting);
+    int i = 0, order = 1;
+    while (i < engine->counter_count && (order = strncmp(engine->counters[i].name, what,
+                                                         sizeof engine->counters->name - 1)) < 0) {
+        i++;
+    }
+    counter *c = &engine->counters[i];
+    if (i < engine->counter_count && order == 0) {
+        c->count++;
+    } else if (engine->counter_count < MAX_COUNTERS) {
+        memmove(c + 1, c, (size_t)(engine->counter_count - i) * sizeof *c);
+        snprintf(c->name, sizeof c->name, "%s", what);
+        c->count = 1;
+        engine->counter_count++;
+    }
+    pthread_mutex_unlock(&engine->counting);
+}
+
+bst_ctx *bst_step_ctx(struct bst_step *step) {
+    return step->ctx;
+}
+int64_t bst_step_tick(const struct bst_step *step) {
+    return step->tick;
+}
+double bst_step_seconds(const struct bst_step *step) {
+    return (double)step->tick / (double)step->engine->tick_rate_hz;
+}
+
+int bst_step_lane(const struct bst_step *step) {
+    return step->job ? bst_overlap_lane(step->job) : 0;
+}
+
+bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, const void *payload,
+                             int64_t written_tick, int64_t sequence) {
+    bst_sample sample = {payload, written_tick, sequence, false};
+    if (port->max_age_ticks > 0 && step->tick - written_tick > port->max_age_ticks) {
+        sample.stale = true;
+        if (!step->ahead) {
+            bst_engine_count(step->engine, "stale_input");
+        }
+    }
+    return sample;
+}
+
+static bst_sample sample_at(struct bst_step *step, const channel *ch, const port_state *port,
+                            int64_t sequence) {
+    const bst_sample none = {NULL, 0, -1, true};
+    if (sequence < 0) {
+        return none;
+    }
+    const slot *s = bst_engine_slot(ch, sequence);
+    return bst_engine_sample(step, port, s->payload, s->written_tick, sequence);
+}
+
+int64_t bst_engine_newest(const channel *ch, const port_state *port, int64_t tick) {
+    int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
+    for (int64_t sequence = ch->written - 1; sequence >= oldest; sequence--) {
+        if (bst_engine_slot(ch, sequence)->written_tick + port->delay_ticks <= tick) {
+            return sequence;
+        }
+    }
+    return -1;
+}
+
+int64_t bst_engine_unread(bst_engine *engine, const channel *ch, port_state *port, int64_t tick) {
+    int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
+    while (port->cursor < oldest) {
+        port->cursor++;
+        bst_engine_count(engine, "queue_overflow");
+    }
+    return port->cursor < ch->written &&
+                   bst_engine_slot(ch, port->cursor)->written_tick + port->delay_ticks <= tick
+               ? port->cursor
+               : -1;
+}
+
+bool bst_engine_pass_trigger(const channel *ch, port_state *port, int64_t tick) {
+    int64_t before = port->trigger_cursor;
+    if (port->trigger_cursor < ch->written - ch->depth) {
+        port->trigger_cursor = ch->written - ch->depth;
+    }
+    while (port->trigger_cursor < ch->written &&
+           bst_engine_slot(ch, port->trigger_cursor)->written_tick + port->delay_ticks <= tick) {
+        port->trigger_cursor++;
+    }
+    return port->trigger_cursor > before;
+}
+
+bst_sample bst_step_latest(struct bst_step *step, int port_index) {
+    port_state *port = &step->self->ports[port_index];
+    if (port->channel < 0) {
+        return (bst_sample){NULL, 0, -1, true};
+    }
+    const channel *ch = &step->engine->channels[port->channel];
+    if (step->job && !ch->apart) {
+        return bst_overlap_latest(step, port_index);
+    }
+    if (step->self->reads_aside) {
+        return bst_islands_latest(step, port_index);
+    }
+    const slot *s = bst_engine_slot(ch, ch->written - 1);
+    if (ch->written > 0 && port->max_age_ticks == 0 &&
+        s->written_tick + port->delay_ticks <= step->tick) {
+        return (bst_sample){s->payload, s->written_tick, ch->written - 1, false}; /* as mostly */
+    }
+    return sample_at(step, ch, port, bst_engine_newest(ch, port, step->tick));
+}
+
+bst_sample bst_step_next(struct bst_step *step, int port_index) {
+    port_state *port = &step->self->ports[port_index];
+    if (port->channel < 0) {
+        return (bst_sample){NULL, 0, -1, true};
+    }
+    const channel *ch = &step->engine->channels[port->channel];
+    if (step->job && !ch->apart) {
+        return bst_overlap_next(step, port_index);
+    }
+    if (step->self->reads_aside) {
+        return bst_islands_next(step, port_index);
+    }
+    int64_t sequence = bst_engine_unread(step->engine, ch, port, step->tick);
+    port->cursor += sequence >= 0;
+    return sample_at(step, ch, port, sequence);
+}
+
+bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine, bst_status status) {
+    const bst_ctx *own = engine->hooks.ctx;
+    return status == BST_OK || !own || own == ctx ? status
+                                                  : bst_fail(ctx, status, "%s", own->message);
+}
+
+/* Lets go of what a slot owns. */
+static void release_slot(const channel *ch, slot *s) {
+    if (s->owned && ch->type->release) {
+        ch->type->release(s->payload);
+    }
+    s->owned = false;
+}
+
+static void fail_in_step(struct bst_step *step, const char *what) {
+    if (step->hook_status == BST_OK) {
+        step->hook_status = bst_fail(step->ctx, BST_ERR_STATE, "%s %s", step->self->name, what);
+    }
+}
+
+void bst_step_promise(struct bst_step *step, int port_index, int64_t tick) {
+    port_state *port = &step->self->ports[port_index];
+    if (!(step->self->spec.desc->flags & BST_MODULE_PROMISES)) {
+        fail_in_step(step, "promises and does not say that it does (BST_MODULE_PROMISES)");
+    }
+    port->silent_until = tick > port->silent_until ? tick : port->silent_until;
+}
+
+/* Of a message that is shown without what it owns. */
+enum { BARE_BYTES = 256 };
+
+/* Shows a message to the hooks. */
+static bst_status tell(struct bst_step *step, channel *ch, const void *payload) {
+    bst_engine *engine = step->engine;
+    const bst_engine_hooks *hooks = &engine->hooks;
+    if (!hooks->message || step->tick < ch->mark.unwanted_before) {
+        return BST_OK;
+    }
+    if (hooks->wants &&
+        !hooks->wants(hooks->user, ch->scope, ch->type->name, payload, step->tick, &ch->mark)) {
+        return BST_OK;
+    }
+    _Alignas(max_align_t) char bare[BARE_BYTES];
+    if (ch->mark.bare && ch->type->release && ch->payload_bytes <= sizeof bare) {
+        memcpy(bare, payload, ch->payload_bytes);
+        ch->type->retain(bare);
+        ch->type->release(bare); /* the copy's */
+        payload = bare;
+    }
+    if (engine->islands) {
+        return bst_islands_message(step, ch, payload);
+    }
+    return engine->overlap && !step->job
+               ? bst_overlap_message(step->ctx, engine, ch, payload, step->tick)
+               : bst_engine_heard(
+                     step->ctx, engine,
+                     hooks->message(hooks->user, ch->scope, ch->type->name, payload, step->tick));
+}
+
+static bst_status publish(struct bst_step *step, int port_index) {
+    bst_engine *engine = step->engine;
+    channel *ch = &engine->channels[step->self->ports[port_index].channel];
+    slot *s = &ch->slots[ch->head];
+    s->written_tick = step->tick;
+    s->owned = ch->type->release != NULL;
+    ch->written++;
+    ch->head = ch->head + 1 == ch->depth ? 0 : ch->head + 1;
+    step->self->ports[port_index].writing = false;
+    step->writing--;
+    if (ch->paced) {
+        bst_pacing_done(step, ch, s->payload);
+    }
+    for (int r = 0; ch->triggers && r < ch->reader_count; r++) {
+        int index = ch->readers[r].instance, p = ch->readers[r].port;
+        const instance *other = engine->instances[index];
+        /* a step behind the stepping thread sees to its own readers */
+        if (!step->job && (bst_instance_port(other, p)->flags & BST_PORT_TRIGGER)) {
+            int64_t visible = step->tick + other->ports[p].delay_ticks;
+            if (visible < engine->due[index]) {
+                bst_engine_set_due(engine, index, visible);
+            }
+        }
+    }
+    return tell(step, ch, s->payload);
+}
+
+bst_status bst_engine_commit(struct bst_step *step) {
+    BST_TRY(step->hook_status);
+    for (int p = 0; step->writing > 0; p++) {
+        if (step->self->ports[p].writing) {
+            BST_TRY(publish(step, p));
+        }
+    }
+    return BST_OK;
+}
+
+void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
+    port_state *port = &step->self->ports[port_index];
+    channel *ch = &step->engine->channels[port->channel];
+    if (step->tick < port->silent_until) {
+        fail_in_step(step, "writes what it has promised not to write yet");
+    }
+    if (port->writing) {
+        /* a second message in one step: the first goes out */
+        bst_status status = publish(step, port_index);
+        if (step->hook_status == BST_OK) {
+            step->hook_status = status;
+        }
+    }
+    slot *s = &ch->slots[ch->head];
+    release_slot(ch, s);
+    if (ch->type->kind == BST_CHANNEL_LATEST && ch->depth > 1 && ch->written > 0) {
+        memcpy(s->payload, bst_engine_slot(ch, ch->written - 1)->payload, ch->payload_bytes);
+    }
+    port->writing = true;
+    step->writing++;
+    if (capacity) {
+        *capacity = ch->capacity;
+    }
+    return s->payload;
+}
+
+void *bst_step_modify(struct bst_step *step, int port_index) {
+    const port_state *port = &step->self->ports[port_index];
+    if (port->channel < 0) {
+        return NULL;
+    }
+    const channel *ch = &step->engine->channels[port->channel];
+    if (ch->written == 0) {
+        return NULL;
+    }
+    slot *s = bst_engine_slot(ch, ch->written - 1);
+    return s->written_tick == step->tick ? s->payload : NULL;
+}
+
+/* Frames go back to their pool as soon as every reader has read them. */
+void bst_engine_release_read(bst_engine *engine) {
+    for (int k = 0; k < engine->releasable_count; k++) {
+        channel *ch = &engine->channels[engine->releasable[k]];
+        if (ch->released == ch->written) {
+            continue;
+        }
+        int64_t read_by_all = ch->written;
+        for (int r = 0; r < ch->reader_count; r++) {
+            const instance *other = engine->instances[ch->readers[r].instance];
+            int p = ch->readers[r].port;
+            if (bst_instance_port(other, p)->direction == BST_PORT_IN &&
+                other->ports[p].cursor < read_by_all) {
+                read_by_all = other->ports[p].cursor;
+            }
+        }
+        int64_t oldest = ch->written - ch->depth;
+        if (ch->released < oldest) {
+            ch->released = oldest; /* writing over them has let them go */
+        }
+        for (; ch->released < read_by_all; ch->released++) {
+            release_slot(ch, bst_engine_slot(ch, ch->released));
+        }
+    }
+}
+
+void bst_step_wake_at(struct bst_step *step, int64_t tick) {
+    if (step->self->spec.desc->flags & BST_MODULE_PROMISES) {
+        fail_in_step(step, "asks to be woken, which a module does not that promises");
+    } else if (tick > step->tick && tick < step->self->wake) {
+        step->self->wake = tick;
+    }
+}
+
+void bst_step_event(struct bst_step *step, const char *kind, const char *format, ...) {
+    bst_engine *engine = step->engine;
+    if (!engine->hooks.event) {
+        return;
+    }
+    char text[400];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    bst_status status =
+        engine->islands ? bst_islands_event(step, kind, text)
+        : engine->overlap && !step->job
+            ? bst_overlap_event(step->ctx, engine, step->tick, step->self->name, kind, text)
+            : bst_engine_heard(step->ctx, engine,
+                               engine->hooks.event(engine->hooks.user, step->tick, step->self->name,
+                                                   kind, text));
+    if (step->hook_status == BST_OK) {
+        step->hook_status = status;
+    }
+}
+
+void bst_step_count(struct bst_step *step, const char *what) {
+    bst_engine_count(step->engine, what);
+}
+
+void bst_env_set_capacity(const bst_module_env *env, int port, int items) {
+    instance *self = env->engine_private;
+    self->ports[port].capacity = items;
+}
+
+bool bst_env_writes(const bst_module_env *env, int port) {
+    const instance *self = env->engine_private;
+    return self->ports[port].channel >= 0;
+}
+
+void bst_env_ignore(const bst_module_env *env, int port) {
+    instance *self = env->engine_private;
+    self->ports[port].channel = -1;
+    int kept = 0;
+    for (int t = 0; t < self->trigger_count; t++) {
+        if (self->triggers[t] != port) {
+            self->triggers[kept++] = self->triggers[t];
+        }
+    }
+    self->trigger_count = kept;
+}
+
+void bst_env_set_rate(const bst_module_env *env, double rate_hz) {
+    instance *self = env->engine_private;
+    self->own_rate_hz = rate_hz;
+}

@@ -1,0 +1,306 @@
+#include "sim/engine/kernel/exposure_clock.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "sim/engine/kernel/engine_internal.h"
+#include "sim/world/frame_updates.h"
+#include "sim/world/world.h"
+#include "sim/world/world_config.h"
+
+enum { PORT_COMMAND, PORT_EXPOSURE };
+
+typedef struct exposure_clock {
+    int64_t tick_rate_hz;
+    int64_t exposure_ticks, period_ticks;
+    bst_window full, own, window; /* of the sensor, of the scenario, of the exposure */
+    int binning;
+    double pixel_scale_arcsec; /* 0: the camera's */
+    bst_frame_cursor
+        updates; /* what drives the sensor frame by frame; none: updates.updates NULL */
+    double dropped_fraction;
+    double burst_begins, burst_ends; /* probability from one frame to the next; ends 0: no bursts */
+    bool in_burst;                   /* the frame before was lost */
+    bst_rng_key drop_key;
+    int64_t id;
+    int64_t start_tick; /* of the running or the next exposure */
+    int64_t next_start_tick;
+    bool open;
+    /* rolling shutter: an exposure opens lead_ticks before start_tick, which is that of its middle
+     * row, and is told when its last row's is over and the line of sight is known until then */
+    double row_time_s;
+    int64_t lead_ticks, los_period_ticks, los_offset_ticks;
+} exposure_clock;
+
+/* From one exposure's start to the next one's. */
+static int64_t cycle_of(const exposure_clock *clock) {
+    int64_t busy = clock->exposure_ticks + 2 * clock->lead_ticks;
+    return busy > clock->period_ticks ? busy : clock->period_ticks;
+}
+
+/* Every exposure and period of a file is whole ticks. */
+static bst_status check_updates(const bst_module_env *env, const bst_frame_updates *updates) {
+    for (int i = 0; i < bst_frame_updates_count(updates); i++) {
+        const bst_frame_update *u = bst_frame_updates_item(updates, i);
+        int64_t ticks;
+        const char *key = "exposure_s";
+        bst_status status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz,
+                                                 u->exposure_s > 0.0 ? u->exposure_s : 0.0, &ticks);
+        if (status == BST_OK) {
+            key = "period_s";
+            status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, u->period_s, &ticks);
+        }
+        if (status != BST_OK) {
+            return bst_fail_prefix(env->ctx, status, "%s: /frames/%d (frame %lld)/%s",
+                                   bst_frame_updates_name(updates), i, (long long)u->frame, key);
+        }
+    }
+    return BST_OK;
+}
+
+/* A rolling shutter opens before the exposure's ticks, and closes after them. */
+static bst_status check_rows(const bst_module_env *env, const exposure_clock *clock) {
+    double rate = (double)env->tick_rate_hz, lead_s = (double)clock->lead_ticks / rate;
+    if (clock->start_tick < clock->lead_ticks) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "first_s: with the detector's row_time_s the first row is exposed %.9g s "
+                        "before the middle one, whose times are the exposure's: give %.9g or more "
+                        "(found %.9g)",
+                        lead_s, lead_s, (double)clock->start_tick / rate);
+    }
+    bst_frame_cursor c = clock->updates;
+    if (!c.updates || bst_frame_updates_count(c.updates) == 0) {
+        return BST_OK;
+    }
+    const bst_frame_update *last =
+        bst_frame_updates_item(c.updates, bst_frame_updates_count(c.updates) - 1);
+    for (; c.frame <= last->frame; bst_frame_cursor_next(&c)) {
+        if (c.exposure_ticks + 2 * clock->lead_ticks > c.period_ticks) {
+            return bst_fail(env->ctx, BST_ERR_CONFIG,
+                            "%s: frame %lld: a period_s of %.9g is too short (allowed: at least "
+                            "%.9g, from the start of the first row to the end of the last one with "
+                            "the detector's row_time_s)",
+                            bst_frame_updates_name(c.updates), (long long)c.frame, c.period_s,
+                            c.exposure_s + 2.0 * lead_s);
+        }
+    }
+    return BST_OK;
+}
+
+/* Gilbert's channel: a frame is lost when the state is "burst". Bursts end with probability 1/L
+ * from one frame to the next, so that they last L frames on average, and begin as often as gives
+ * the fraction. Source: E. N. Gilbert, "Capacity of a Burst-Noise Channel", Bell System Technical
+ * Journal 39 (1960), with all frames lost in the bad state and none in the good one. */
+static bst_status set_losses(const bst_module_env *env, const bst_exposure_config *c,
+                             exposure_clock *clock) {
+    double share = c->dropped_fraction, frames = c->dropped_burst_frames;
+    clock->dropped_fraction = share;
+    clock->drop_key = bst_env_rng(env, "dropped_frames");
+    if (frames == 0.0 || share == 0.0 || share == 1.0) {
+        return BST_OK;
+    }
+    /* between two bursts there is one frame at least */
+    double fewest = fmax(1.0, share / (1.0 - share));
+    if (frames < fewest) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "dropped_burst_frames: %.9g (allowed: 0, or %.9g and more, with a "
+                        "frame between two bursts and a dropped_fraction of %.9g)",
+                        frames, fewest, share);
+    }
+    clock->burst_ends = 1.0 / frames;
+    clock->burst_begins = share / (1.0 - share) * clock->burst_ends;
+    return BST_OK;
+}
+
+/* Whether the frame that ends is lost. */
+static bool loses_frame(exposure_clock *clock) {
+    if (!(clock->dropped_fraction > 0.0)) {
+        return false;
+    }
+    double u = bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0);
+    if (clock->burst_ends == 0.0 || clock->id == 0) {
+        clock->in_burst = u < clock->dropped_fraction;
+    } else {
+        clock->in_burst = clock->in_burst ? u >= clock->burst_ends : u < clock->burst_begins;
+    }
+    return clock->in_burst;
+}
+
+static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    const bst_exposure_config *c = config;
+    exposure_clock *clock = calloc(1, sizeof *clock);
+    if (!clock) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for the exposure clock");
+    }
+    const bst_camera *camera = bst_world_camera(env->world, env->observer, env->sensor);
+    clock->tick_rate_hz = env->tick_rate_hz;
+    clock->full = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
+    clock->binning = c->binning > 1 ? (int)c->binning : 1;
+    bst_status status = set_losses(env, c, clock);
+    if (status == BST_OK) {
+        status = bst_exposure_window(env->ctx, c, camera->width_px, camera->height_px, &clock->own);
+    }
+    clock->window = clock->own;
+    if (status == BST_OK) {
+        status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->exposure_s,
+                                      &clock->exposure_ticks);
+    }
+    if (status == BST_OK) {
+        status =
+            bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->period_s, &clock->period_ticks);
+    }
+    if (status == BST_OK) {
+        status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->first_s, &clock->start_tick);
+    }
+    const bst_frame_updates *updates =
+        bst_world_frame_updates(env->world, env->observer, env->sensor);
+    if (status == BST_OK && updates) {
+        status = check_updates(env, updates);
+        clock->updates = bst_frame_cursor_begin(updates, camera, c, (double)env->tick_rate_hz);
+    }
+    if (status == BST_OK && camera->detector.row_time_s != 0.0) {
+        clock->row_time_s = camera->detector.row_time_s;
+        clock->lead_ticks = bst_detector_lead_ticks(&camera->detector, (int)camera->height_px,
+                                                    (double)env->tick_rate_hz);
+        clock->los_period_ticks = env->los_period_ticks;
+        clock->los_offset_ticks = env->los_offset_ticks;
+        status = check_rows(env, clock);
+    }
+    if (status != BST_OK) {
+        free(clock);
+        return status;
+    }
+    double cycle_s = (double)cycle_of(clock) / (double)env->tick_rate_hz, longest_s;
+    if (updates) {
+        bst_frame_updates_limits(updates, camera, c, &longest_s, &cycle_s);
+    }
+    bst_env_set_rate(env, 1.0 / cycle_s);
+    *self = clock;
+    return BST_OK;
+}
+
+/* Tick at which all of the open exposure is over and known. */
+static int64_t told_tick(const exposure_clock *clock) {
+    int64_t tick = clock->start_tick + clock->exposure_ticks;
+    if (clock->row_time_s != 0.0) {
+        tick += clock->lead_ticks;
+        int64_t period = clock->los_period_ticks, past = tick - clock->los_offset_ticks;
+        tick += period > 0 && past % period > 0 ? period - past % period : 0;
+    }
+    return tick;
+}
+
+/* Whole ticks of a commanded time; no exposure or period is longer than a day. */
+static int64_t commanded_ticks(const exposure_clock *clock, double seconds) {
+    return (int64_t)floor(fmin(seconds, 86400.0) * (double)clock->tick_rate_hz + 0.5);
+}
+
+static int clip_end(int start, int length, int limit) {
+    int64_t end = (int64_t)start + length;
+    return end < limit ? (int)end : limit;
+}
+
+/* Takes what control asked for, clipped to what the sensor can do. */
+static void latch(exposure_clock *clock, const bst_sensor_command *command) {
+    if (command->exposure_s > 0.0) {
+        clock->exposure_ticks = commanded_ticks(clock, command->exposure_s);
+    }
+    if (command->period_s > 0.0) {
+        int64_t period = commanded_ticks(clock, command->period_s);
+        clock->period_ticks = period > 0 ? period : 1;
+    }
+    if (command->binning > 0) {
+        clock->binning = command->binning;
+    }
+    if (command->pixel_scale_arcsec > 0.0) {
+        clock->pixel_scale_arcsec = command->pixel_scale_arcsec;
+    }
+    const bst_window *w = &command->window;
+    clock->window = clock->own;
+    if (w->width > 0 && w->height > 0) {
+        int x0 = w->x0 < 0 ? 0 : w->x0, y0 = w->y0 < 0 ? 0 : w->y0;
+        int x1 = clip_end(w->x0, w->width, clock->full.width);
+        int y1 = clip_end(w->y0, w->height, clock->full.height);
+        if (x1 > x0 && y1 > y0) {
+            clock->window = (bst_window){x0, y0, x1 - x0, y1 - y0};
+        }
+    }
+    int side =
+        clock->window.width < clock->window.height ? clock->window.width : clock->window.height;
+    clock->binning = clock->binning < side ? clock->binning : side;
+}
+
+static void open_exposure(exposure_clock *clock, bst_sample command) {
+    if (clock->updates.updates) { /* the file alone decides: what is commanded is not heard */
+        clock->exposure_ticks = clock->updates.exposure_ticks;
+        clock->period_ticks = clock->updates.period_ticks;
+        clock->window = clock->updates.window;
+        clock->binning = clock->updates.binning;
+        clock->pixel_scale_arcsec = clock->updates.pixel_scale_arcsec;
+    } else if (command.payload && !command.stale) {
+        latch(clock, command.payload);
+    }
+    clock->next_start_tick = clock->start_tick + cycle_of(clock);
+    clock->open = true;
+}
+
+/* `late`: the run is behind its clock, and does without the frame. */
+static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) {
+    bool lost = loses_frame(clock);
+    *out = (bst_exposure){.id = clock->id,
+                          .start_tick = clock->start_tick,
+                          .end_tick = clock->start_tick + clock->exposure_ticks,
+                          .window = clock->window,
+                          .binning = clock->binning,
+                          .pixel_scale_arcsec = clock->pixel_scale_arcsec,
+                          .dropped = late || lost};
+    if (clock->updates.updates) {
+        bst_frame_cursor_next(&clock->updates);
+    }
+    clock->id++;
+    clock->open = false;
+    clock->start_tick = clock->next_start_tick;
+}
+
+static bst_status step(void *self, struct bst_step *step) {
+    exposure_clock *clock = self;
+    int64_t tick = bst_step_tick(step);
+    /* in one tick an exposure may end and the next one begin, and end too when it has no length */
+    for (;;) {
+        int64_t open_tick = clock->start_tick - clock->lead_ticks;
+        if (!clock->open && open_tick <= tick) {
+            open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
+        }
+        if (!clock->open || told_tick(clock) > tick) {
+            bst_step_wake_at(step, clock->open ? told_tick(clock) : open_tick);
+            return BST_OK;
+        }
+        bool late = bst_pacing_frame(step, clock->id);
+        close_exposure(clock, late, bst_step_write(step, PORT_EXPOSURE, NULL));
+    }
+}
+
+static void destroy(void *self) {
+    free(self);
+}
+
+static const bst_port ports[] = {
+    [PORT_COMMAND] = {.channel = BST_CHANNEL_SENSOR_COMMAND,
+                      .direction = BST_PORT_IN,
+                      .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
+    [PORT_EXPOSURE] = {.channel = BST_CHANNEL_EXPOSURE, .direction = BST_PORT_OUT},
+};
+
+const bst_module_desc bst_exposure_clock_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "exposure",
+    .type = "clock",
+    .doc = "Opens and closes exposures at exact ticks.",
+    .flags = BST_MODULE_READS_TRUTH,
+    .config_bytes = sizeof(bst_exposure_config),
+    .ports = ports,
+    .port_count = sizeof ports / sizeof *ports,
+    .create = create,
+    .step = step,
+    .destroy = destroy,
+};

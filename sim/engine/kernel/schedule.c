@@ -1,0 +1,74 @@
+/* Which instance is stepped next: a binary heap ordered by tick, then by place in the stepping
+ * order. */
+#include <stdlib.h>
+
+#include "sim/engine/kernel/engine_internal.h"
+
+bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) {
+    size_t n = (size_t)engine->instance_count + 1;
+    engine->due = calloc(n, sizeof *engine->due);
+    engine->heap.items = calloc(n, sizeof *engine->heap.items);
+    engine->heap.count = engine->instance_count;
+    engine->place = calloc(n, sizeof *engine->place);
+    if (!engine->due || !engine->heap.items || !engine->place) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the schedule");
+    }
+    for (int i = 0; i < engine->instance_count; i++) {
+        engine->due[i] = INT64_MAX;
+        engine->heap.items[i] = i;
+        engine->instances[i]->heap = &engine->heap;
+        engine->place[i] = i;
+    }
+    for (int i = 0; i < engine->instance_count; i++) {
+        bst_engine_set_due(engine, i, bst_engine_earliest(engine, engine->instances[i]));
+    }
+    return BST_OK;
+}
+
+int64_t bst_engine_earliest(const bst_engine *engine, const instance *self) {
+    int64_t due = self->next_period < self->wake ? self->next_period : self->wake;
+    for (int t = 0; t < self->trigger_count; t++) {
+        const port_state *port = &self->ports[self->triggers[t]];
+        const channel *ch = &engine->channels[port->channel];
+        if (engine->overlap && ch->apart) {
+            continue; /* seen to behind the stepping thread */
+        }
+        if (port->trigger_cursor < ch->written) {
+            int64_t oldest = ch->written - ch->depth;
+            int64_t next = port->trigger_cursor > oldest ? port->trigger_cursor : oldest;
+            int64_t visible = bst_engine_slot(ch, next)->written_tick + port->delay_ticks;
+            due = visible < due ? visible : due;
+        }
+    }
+    return due;
+}
+
+static bool before(const bst_engine *engine, int a, int b) {
+    return engine->due[a] < engine->due[b] || (engine->due[a] == engine->due[b] && a < b);
+}
+
+static void put(bst_engine *engine, bst_heap *heap, int place, int i) {
+    heap->items[place] = i;
+    engine->place[i] = place;
+}
+
+void bst_engine_set_due(bst_engine *engine, int i, int64_t due) {
+    engine->due[i] = due;
+    bst_heap *heap = engine->instances[i]->heap;
+    int place = engine->place[i], n = heap->count;
+    while (place > 0 && before(engine, i, heap->items[(place - 1) / 2])) {
+        put(engine, heap, place, heap->items[(place - 1) / 2]);
+        place = (place - 1) / 2;
+    }
+    for (int child = 2 * place + 1; child < n; child = 2 * place + 1) {
+        if (child + 1 < n && before(engine, heap->items[child + 1], heap->items[child])) {
+            child++;
+        }
+        if (!before(engine, heap->items[child], i)) {
+            break;
+        }
+        put(engine, heap, place, heap->items[child]);
+        place = child;
+    }
+    put(engine, heap, place, i);
+}

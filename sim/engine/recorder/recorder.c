@@ -1,0 +1,448 @@
+#include "sim/engine/recorder/recorder.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/engine/recorder/recorder_internal.h"
+#include "sim/world/frame_updates.h"
+
+static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
+
+static const char *const detection_choices[] = {"all", "no_stars", "objects", NULL};
+
+/* bst_fits_compression, and auto */
+static const char *const compression_choices[] = {"none", "rice", "auto", NULL};
+
+/* in the order of bst_plane; also the names of their files */
+static const char *const plane_choices[] = {"stars",        "targets",    "background",
+                                            "segmentation", "saturation", NULL};
+static const char *const plane_names[] = {"STARS", "TARGETS", "BACKGROUND", "SEGMENTATION",
+                                          "SATURATION"};
+static const bst_fits_content plane_contents[] = {
+    BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ITEMS, BST_FITS_FLAGS};
+
+const bst_config_desc bst_record_config_table[] = {
+    BST_ENUM(bst_record_config, frames, frame_choices, "\"extensions\"",
+             "Frames in FITS: an image extension each, one datacube with a table of times and "
+             "WCS, or none."),
+    BST_ENUM(bst_record_config, compression, compression_choices, "\"auto\"",
+             "Of frames in extensions: \"rice\" is lossless FITS tile compression, done beside "
+             "the simulation by a thread of its own; \"auto\" is rice for extensions and none for "
+             "a cube."),
+    BST_BOOL(bst_record_config, checksums, "true",
+             "CHECKSUM and DATASUM in each HDU; they take about 0.1 ms per million pixels."),
+    BST_CHOICES(
+        bst_record_config, planes, plane_choices, "[]",
+        "Noise-free images beside each frame, a FITS file each: expected electrons of the "
+        "stars, of the targets, of sky and dark current; the mask of who each pixel belongs "
+        "to; and which of the frame's own pixels are saturated."),
+    BST_REAL(bst_record_config, mask_threshold_sigma, "sigma", 1e-3, 1e6, "1",
+             "planes segmentation: least light of a source in a pixel of its own, in the noise of "
+             "a pixel without sources."),
+    BST_BOOL(bst_record_config, truth, "true", "True exposures and sources."),
+    BST_BOOL(bst_record_config, truth_stars, "true", "Stars among the true sources."),
+    BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
+    BST_ENUM(bst_record_config, detections_of, detection_choices, "\"all\"",
+             "Which of the detections: all, all but those labelled star, or only those labelled "
+             "object."),
+    BST_BOOL(bst_record_config, tracks, "true", "Tracks and the attitude from stars."),
+    BST_BOOL(bst_record_config, commands, "true", "Commands to gimbal and sensor."),
+    BST_BOOL(bst_record_config, events, "true", "Events, and tasks where sensors are given any."),
+    BST_BOOL(
+        bst_record_config, sightings, "true",
+        "Who saw what: the objects' passes through the fields, and their sums, against truth."),
+    BST_REAL(bst_record_config, custody_s, "s", 0, 1e9, "21600",
+             "sightings: an object counts as in custody for this long after each detection."),
+    BST_REAL(bst_record_config, telemetry_hz, "Hz", 0.0, 1e6, "1",
+             "Rate at which telemetry, control status and the true line of sight are kept; 0: "
+             "not at all."),
+    BST_CONFIG_END,
+};
+
+bool bst_record_compresses(const bst_record_config *config) {
+    return config->frames == BST_RECORD_EXTENSIONS && config->compression != BST_FITS_RAW;
+}
+
+bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config) {
+    if (config->compression == BST_FITS_RICE && config->frames == BST_RECORD_CUBE) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "/record/compression: \"rice\" compresses frames in extensions only; give "
+            "/record/frames \"extensions\", or /record/compression \"auto\" or \"none\"");
+    }
+    return BST_OK;
+}
+
+/* A channel that is recorded: what of it needs which table. */
+typedef struct channel_rows {
+    const char *channel;
+    bst_record_table table;
+    bst_status (*rows)(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                       int64_t written_tick);
+} channel_rows;
+
+static bst_status take_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                             int64_t written_tick);
+static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                             int64_t written_tick);
+
+static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                              int64_t written_tick);
+
+static const channel_rows channels[] = {
+    {BST_CHANNEL_FRAME, BST_TABLE_FRAMES, take_frame},
+    {BST_CHANNEL_TRUTH, BST_TABLE_FRAMES, take_truth},
+    {BST_CHANNEL_PLANES, BST_TABLE_FRAMES, take_planes},
+    {BST_CHANNEL_LOS_HISTORY, BST_TABLE_LOS_TRUTH, bst_recorder_los_rows},
+    {BST_CHANNEL_DETECTIONS, BST_TABLE_DETECTIONS, bst_recorder_detection_rows},
+    {BST_CHANNEL_TRACKS, BST_TABLE_TRACKS, bst_recorder_track_rows},
+    {BST_CHANNEL_LOS_COMMAND, BST_TABLE_LOS_COMMANDS, bst_recorder_los_command_rows},
+    {BST_CHANNEL_SENSOR_COMMAND, BST_TABLE_SENSOR_COMMANDS, bst_recorder_sensor_command_rows},
+    {BST_CHANNEL_POINTING_TELEMETRY, BST_TABLE_POINTING, bst_recorder_pointing_rows},
+    {BST_CHANNEL_MOUNT_STATUS, BST_TABLE_MOUNT, bst_recorder_mount_rows},
+    {BST_CHANNEL_NAV_TELEMETRY, BST_TABLE_NAV, bst_recorder_nav_rows},
+    {BST_CHANNEL_CONTROL_STATUS, BST_TABLE_CONTROL, bst_recorder_control_rows},
+    {BST_CHANNEL_TASK, BST_TABLE_TASKS, bst_recorder_task_rows},
+};
+
+static const channel_rows *find_channel(const bst_recorder *recorder, const char *channel) {
+    for (size_t i = 0; i < sizeof channels / sizeof *channels; i++) {
+        if (strcmp(channels[i].channel, channel) == 0) {
+            return recorder->tables[channels[i].table] ? &channels[i] : NULL;
+        }
+    }
+    return NULL;
+}
+
+bool bst_recorder_wants(const bst_recorder *recorder, const char *channel) {
+    return find_channel(recorder, channel) != NULL;
+}
+
+int bst_recorder_find(const bst_recorder *recorder, const char *observer, const char *sensor) {
+    for (int i = 0; i < recorder->sensor_count; i++) {
+        if (strcmp(recorder->sensors[i].observer, observer) == 0 &&
+            strcmp(recorder->sensors[i].sensor, sensor) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+static bst_status copy_name(bst_ctx *ctx, char *to, size_t bytes, const char *from) {
+    int n = snprintf(to, bytes, "%s", from ? from : "");
+    if (n < 0 || (size_t)n >= bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "'%s': the name is longer than %zu characters", from,
+                        bytes - 1);
+    }
+    return BST_OK;
+}
+
+/* "frames.fits", or one file per sensor; `what` is "frames" or a plane. */
+static void frames_file(const bst_recorder *recorder, const bst_recorder_state *s, const char *what,
+                        char *name, size_t bytes) {
+    if (recorder->sensor_count == 1) {
+        snprintf(name, bytes, "%s.fits", what);
+        return;
+    }
+    snprintf(name, bytes, "%s_%s_%s.fits", what, s->observer, s->sensor);
+    for (char *c = name; *c; c++) {
+        if (!isalnum((unsigned char)*c) && !strchr("._-", *c)) {
+            *c = '_';
+        }
+    }
+}
+
+static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_info *info) {
+    BST_TRY(copy_name(ctx, recorder->program, sizeof recorder->program, info->program));
+    for (int i = 0; i < info->sensor_count; i++) {
+        const bst_recorder_sensor *from = &info->sensors[i];
+        bst_recorder_state *s = &recorder->sensors[i];
+        BST_TRY(copy_name(ctx, s->observer, sizeof s->observer, from->observer));
+        BST_TRY(copy_name(ctx, s->sensor, sizeof s->sensor, from->sensor));
+        BST_TRY(copy_name(ctx, s->target, sizeof s->target, from->target));
+        s->camera = *from->camera;
+        s->has_truth = from->has_truth;
+        s->last_los = s->last_pointing = s->last_mount = s->last_nav = s->last_control = -1;
+        s->last_mode = -1;
+        s->shown.id = -1;
+        s->last_target = -1;
+    }
+    BST_TRY(bst_recorder_make_tables(ctx, recorder));
+    BST_TRY(bst_recorder_run_row(ctx, recorder));
+    for (int i = 0; i < recorder->sensor_count; i++) {
+        char name[256];
+        frames_file(recorder, &recorder->sensors[i], "frames", name, sizeof name);
+        bool kept = recorder->config.frames != BST_RECORD_NO_FRAMES;
+        BST_TRY(bst_recorder_sensor_row(ctx, recorder, i, kept ? name : NULL));
+    }
+    return bst_run_commit(ctx, recorder->run);
+}
+
+/* Rows are committed after the frames that they speak of. */
+static bst_status flush_frames(bst_ctx *ctx, void *user) {
+    bst_recorder *recorder = user;
+    for (int i = 0; i < recorder->sensor_count; i++) {
+        BST_TRY(bst_fits_flush(ctx, recorder->sensors[i].fits));
+    }
+    return BST_OK;
+}
+
+bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_config *config,
+                               const bst_recorder_info *info, bst_recorder **out) {
+    *out = NULL;
+    if (info->sensor_count < 1 || info->tick_rate_hz < 1) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "a record needs a sensor and a tick rate");
+    }
+    size_t bytes = sizeof(bst_recorder) + (size_t)info->sensor_count * sizeof(bst_recorder_state);
+    bst_recorder *recorder = calloc(1, bytes);
+    if (!recorder) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    recorder->run = run;
+    recorder->config = *config;
+    recorder->epoch = info->epoch;
+    recorder->tick_rate_hz = info->tick_rate_hz;
+    recorder->sensor_count = info->sensor_count;
+    recorder->world = info->world;
+    bst_status status = bst_record_config_check(ctx, config);
+    if (info->world) {
+        recorder->object_seen =
+            calloc((size_t)bst_world_object_count(info->world) + 1, sizeof *recorder->object_seen);
+        if (!recorder->object_seen) {
+            status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+        }
+    }
+    if (status == BST_OK) {
+        status = fill(ctx, recorder, info);
+    }
+    if (status != BST_OK) {
+        free(recorder->object_seen);
+        free(recorder);
+        return status;
+    }
+    bst_run_set_before_commit(run, flush_frames, recorder);
+    *out = recorder;
+    return BST_OK;
+}
+
+static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_state *s,
+                            const char *what, bst_fits_content content, bst_fits **out) {
+    char name[256], path[4096];
+    frames_file(recorder, s, what, name, sizeof name);
+    BST_TRY(bst_run_file(ctx, recorder->run, name, path, sizeof path));
+    bool frames = content == BST_FITS_COUNTS;
+    bst_fits_info info = {.observer = s->observer,
+                          .instrument = s->sensor,
+                          .object = s->target,
+                          .program = recorder->program,
+                          .camera = &s->camera,
+                          .checksums = recorder->config.checksums,
+                          .compression = frames && bst_record_compresses(&recorder->config)
+                                             ? BST_FITS_RICE
+                                             : BST_FITS_RAW,
+                          .content = content};
+    bst_fits_layout layout =
+        frames && recorder->config.frames == BST_RECORD_CUBE ? BST_FITS_CUBE : BST_FITS_EXTENSIONS;
+    return bst_fits_create(ctx, path, layout, &info, out);
+}
+
+/* Fits the frame's WCS; a field too wide for one gets none, and is told of once. */
+static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_truth_head *head,
+                      bst_fits_frame *frame) {
+    bst_camera camera = s->camera;
+    if (head->pixel_scale_arcsec > 0.0 &&
+        head->pixel_scale_arcsec != s->camera.pixel_scale_arcsec &&
+        bst_camera_at_scale(ctx, &s->camera, head->pixel_scale_arcsec, &camera) != BST_OK) {
+        camera = s->camera; /* cannot be: the frame was rendered so */
+    }
+    frame->pixel_scale_arcsec = camera.pixel_scale_arcsec;
+    frame->has_wcs =
+        bst_wcs_fit(ctx, &camera, head->q_cam_from_gcrf_mean, &head->light, &frame->wcs) == BST_OK;
+    if (!frame->has_wcs && !s->wcs_warned) {
+        bst_log(ctx, BST_LOG_WARNING, "%s/%s: frames get no WCS: %s", s->observer, s->sensor,
+                ctx ? ctx->message : "");
+        s->wcs_warned = true;
+    }
+    frame->has_observer = true;
+    frame->observer_gcrf_m = head->observer_gcrf_m;
+    frame->observer_gcrf_mps = head->observer_gcrf_mps;
+    memcpy(frame->body_fraction, head->body_fraction, sizeof frame->body_fraction);
+}
+
+/* Writes a frame and its row. head NULL: its truth never came. */
+static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                              const bst_frame_message *m, const bst_truth_head *head) {
+    bst_recorder_state *s = &recorder->sensors[sensor];
+    bst_fits_frame frame = {
+        .id = m->exposure_id,
+        .start = bst_time_at_tick(recorder->epoch, m->start_tick, recorder->tick_rate_hz),
+        .exposure_s = (double)(m->end_tick - m->start_tick) / (double)recorder->tick_rate_hz,
+        .window = m->window,
+        .binning = m->binning,
+        .bits = m->bits};
+    if (head) {
+        solve_wcs(ctx, s, head, &frame);
+    }
+    int64_t index = -1;
+    if (recorder->config.frames != BST_RECORD_NO_FRAMES) {
+        if (!s->fits) {
+            BST_TRY(open_file(ctx, recorder, s, "frames", BST_FITS_COUNTS, &s->fits));
+        }
+        const uint16_t *pixels;
+        BST_TRY(bst_frame_map(m->frame, ctx, &pixels));
+        bst_status status =
+            bst_fits_write(ctx, s->fits, &frame, pixels, m->frame->width, m->frame->height, &index);
+        bst_frame_unmap(m->frame);
+        BST_TRY(status);
+    }
+    s->shown = frame;
+    return bst_recorder_frame_row(ctx, recorder, sensor, m, frame.has_wcs ? &frame.wcs : NULL,
+                                  index);
+}
+
+/* Writes the frame that waits, with or without its truth, and lets go of it. */
+static bst_status write_waiting(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                const bst_truth_head *head) {
+    bst_recorder_state *s = &recorder->sensors[sensor];
+    if (!s->frame_waits) {
+        return BST_OK;
+    }
+    s->frame_waits = false;
+    bst_status status = write_frame(ctx, recorder, sensor, &s->frame, head);
+    bst_frame_release(s->frame.frame);
+    return status;
+}
+
+/* Planes come right after their frame, and have its keys. */
+static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                              int64_t written_tick) {
+    (void)written_tick;
+    const bst_planes *p = payload;
+    bst_recorder_state *s = &recorder->sensors[sensor];
+    if (s->shown.id != p->exposure_id) {
+        return bst_fail(ctx, BST_ERR_STATE, "%s/%s: planes of exposure %lld without its frame",
+                        s->observer, s->sensor, (long long)p->exposure_id);
+    }
+    for (int k = 0; k < BST_PLANE_COUNT; k++) {
+        const void *pixels = k == BST_PLANE_SEGMENTATION ? (const void *)p->segmentation
+                             : k == BST_PLANE_SATURATION ? (const void *)p->saturation
+                                                         : (const void *)p->electrons[k];
+        if (!pixels) {
+            continue;
+        }
+        if (!s->planes[k]) {
+            BST_TRY(
+                open_file(ctx, recorder, s, plane_choices[k], plane_contents[k], &s->planes[k]));
+        }
+        BST_TRY(bst_fits_write_plane(ctx, s->planes[k], &s->shown, plane_names[k], pixels, p->width,
+                                     p->height, NULL));
+    }
+    return BST_OK;
+}
+
+static bst_truth_head *find_head(bst_recorder_state *s, int64_t exposure_id) {
+    for (int i = 0; i < BST_TRUTH_HEADS; i++) {
+        if (s->heads[i].valid && s->heads[i].exposure_id == exposure_id) {
+            return &s->heads[i];
+        }
+    }
+    return NULL;
+}
+
+static bst_status take_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                             int64_t written_tick) {
+    (void)written_tick;
+    const bst_frame_message *m = payload;
+    bst_recorder_state *s = &recorder->sensors[sensor];
+    if (s->frame_waits) {
+        bst_log(ctx, BST_LOG_WARNING, "%s/%s: frame %lld has no truth and gets no WCS", s->observer,
+                s->sensor, (long long)s->frame.exposure_id);
+        BST_TRY(write_waiting(ctx, recorder, sensor, NULL));
+    }
+    bst_truth_head *head = find_head(s, m->exposure_id);
+    if (head || !s->has_truth) {
+        bst_status status = write_frame(ctx, recorder, sensor, m, head);
+        if (head) {
+            head->valid = false;
+        }
+        return status;
+    }
+    s->frame = *m;
+    s->frame_waits = true;
+    if (m->frame) {
+        bst_frame_retain(m->frame);
+    }
+    return BST_OK;
+}
+
+static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                             int64_t written_tick) {
+    const bst_truth *t = payload;
+    bst_recorder_state *s = &recorder->sensors[sensor];
+    bst_truth_head head = {.valid = true,
+                           .exposure_id = t->exposure_id,
+                           .q_cam_from_gcrf_mean = t->q_cam_from_gcrf_mean,
+                           .observer_gcrf_m = t->observer_gcrf_m,
+                           .observer_gcrf_mps = t->observer_gcrf_mps,
+                           .pixel_scale_arcsec = t->pixel_scale_arcsec,
+                           .body_fraction = {t->earth_fraction, t->moon_fraction, t->sun_fraction},
+                           .light = {.velocity_mps = t->velocity_bary_mps, .sun_m = t->sun_m}};
+    if (s->frame_waits && s->frame.exposure_id == t->exposure_id) {
+        BST_TRY(write_waiting(ctx, recorder, sensor, &head));
+    } else if (!t->dropped) {
+        s->heads[s->next_head] = head;
+        s->next_head = (s->next_head + 1) % BST_TRUTH_HEADS;
+    }
+    return recorder->tables[BST_TABLE_TRUTH]
+               ? bst_recorder_truth_rows(ctx, recorder, sensor, payload, written_tick)
+               : BST_OK;
+}
+
+bst_status bst_recorder_channel(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                const char *channel, const void *payload, int64_t written_tick) {
+    if (sensor < 0 || sensor >= recorder->sensor_count) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "sensor %d of %d is not recorded", sensor,
+                        recorder->sensor_count);
+    }
+    const channel_rows *found = find_channel(recorder, channel);
+    return found ? found->rows(ctx, recorder, sensor, payload, written_tick) : BST_OK;
+}
+
+bst_status bst_recorder_event(bst_ctx *ctx, bst_recorder *recorder, int64_t tick,
+                              const char *source, const char *kind, const char *text) {
+    if (!recorder->tables[BST_TABLE_EVENTS]) {
+        return BST_OK;
+    }
+    const bst_value cells[] = {bst_int_value(tick),
+                               bst_real_value((double)tick / (double)recorder->tick_rate_hz),
+                               bst_text_value(source), bst_text_value(kind), bst_text_value(text)};
+    return bst_table_append(ctx, recorder->tables[BST_TABLE_EVENTS], cells);
+}
+
+bst_status bst_recorder_close(bst_ctx *ctx, bst_recorder *recorder) {
+    if (!recorder) {
+        return BST_OK;
+    }
+    bst_status status = BST_OK;
+    for (int i = 0; i < recorder->sensor_count; i++) {
+        bst_status waiting = write_waiting(status == BST_OK ? ctx : NULL, recorder, i, NULL);
+        status = status == BST_OK ? waiting : status; /* the first failure's message is kept */
+    }
+    bst_status committed = bst_run_commit(status == BST_OK ? ctx : NULL, recorder->run);
+    status = status == BST_OK ? committed : status;
+    bst_run_set_before_commit(recorder->run, NULL, NULL);
+    for (int i = 0; i < recorder->sensor_count; i++) {
+        bst_status closed =
+            bst_fits_close(status == BST_OK ? ctx : NULL, recorder->sensors[i].fits);
+        status = status == BST_OK ? closed : status;
+        for (int k = 0; k < BST_PLANE_COUNT; k++) {
+            closed = bst_fits_close(status == BST_OK ? ctx : NULL, recorder->sensors[i].planes[k]);
+            status = status == BST_OK ? closed : status;
+        }
+    }
+    free(recorder->object_seen);
+    free(recorder);
+    return status;
+}

@@ -1,0 +1,103 @@
+/* What recorder.c (channels, frames) and recorder_rows.c (tables) share. */
+#ifndef BST_ENGINE_RECORDER_RECORDER_INTERNAL_H
+#define BST_ENGINE_RECORDER_RECORDER_INTERNAL_H
+
+#include "sim/engine/recorder/recorder.h"
+#include "sim/io/fits_frames.h"
+#include "sim/world/world.h"
+
+typedef enum bst_record_table {
+    BST_TABLE_RUN,
+    BST_TABLE_SENSORS,
+    BST_TABLE_FRAMES,
+    BST_TABLE_EXPOSURES,
+    BST_TABLE_TRUTH,
+    BST_TABLE_OBJECTS,
+    BST_TABLE_LOS_TRUTH,
+    BST_TABLE_DETECTION_FRAMES,
+    BST_TABLE_DETECTIONS,
+    BST_TABLE_TRACK_FRAMES,
+    BST_TABLE_TRACKS,
+    BST_TABLE_LOS_COMMANDS,
+    BST_TABLE_SENSOR_COMMANDS,
+    BST_TABLE_POINTING,
+    BST_TABLE_MOUNT,
+    BST_TABLE_NAV,
+    BST_TABLE_CONTROL,
+    BST_TABLE_EVENTS,
+    BST_TABLE_TASKS,
+    BST_TABLE_COUNT
+} bst_record_table;
+
+/* What a frame's header needs of its truth. */
+typedef struct bst_truth_head {
+    bool valid;
+    int64_t exposure_id;
+    bst_quat q_cam_from_gcrf_mean;
+    bst_vec3 observer_gcrf_m, observer_gcrf_mps;
+    bst_light light;
+    double pixel_scale_arcsec;
+    double body_fraction[3]; /* as bst_fits_frame */
+} bst_truth_head;
+
+/* Truth may run ahead of its frame by the readout delay: so many exposures at most. */
+#define BST_TRUTH_HEADS 64
+
+typedef struct bst_recorder_state {
+    char observer[64], sensor[64], target[64];
+    bst_camera camera;
+    bool has_truth;
+    bst_fits *fits; /* made with the first frame */
+    bst_fits *planes[BST_PLANE_COUNT];
+    bst_fits_frame shown; /* what was last written of a frame */
+    bool wcs_warned;
+    bool frame_waits;
+    bst_frame_message frame; /* one reference held while frame_waits */
+    bst_truth_head heads[BST_TRUTH_HEADS];
+    int next_head;
+    /* the last period of the telemetry's grid in which each of these was recorded */
+    int64_t last_los, last_pointing, last_mount, last_nav, last_control;
+    int32_t last_mode;
+    int64_t last_target;
+} bst_recorder_state;
+
+struct bst_recorder {
+    bst_run *run;
+    bst_record_config config;
+    bst_time epoch;
+    int64_t tick_rate_hz;
+    char program[64];
+    const struct bst_world *world;      /* NULL: objects have no names */
+    bool *object_seen;                  /* [objects of the world] */
+    bst_table *tables[BST_TABLE_COUNT]; /* NULL: not wanted */
+    int sensor_count;
+    bst_recorder_state sensors[];
+};
+
+bst_status bst_recorder_make_tables(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_CHECK;
+
+/* The row of a frame; fits_index < 0 and wcs NULL when there are none. */
+bst_status bst_recorder_frame_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                  const bst_frame_message *message, const bst_wcs *wcs,
+                                  int64_t fits_index) BST_MUST_CHECK;
+bst_status bst_recorder_run_row(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_CHECK;
+bst_status bst_recorder_sensor_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                   const char *file) BST_MUST_CHECK;
+
+/* Rows of one message. */
+#define BST_RECORDER_ROWS(name)                                                            \
+    bst_status name(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload, \
+                    int64_t written_tick) BST_MUST_CHECK
+BST_RECORDER_ROWS(bst_recorder_truth_rows);
+BST_RECORDER_ROWS(bst_recorder_los_rows);
+BST_RECORDER_ROWS(bst_recorder_detection_rows);
+BST_RECORDER_ROWS(bst_recorder_track_rows);
+BST_RECORDER_ROWS(bst_recorder_los_command_rows);
+BST_RECORDER_ROWS(bst_recorder_sensor_command_rows);
+BST_RECORDER_ROWS(bst_recorder_pointing_rows);
+BST_RECORDER_ROWS(bst_recorder_mount_rows);
+BST_RECORDER_ROWS(bst_recorder_nav_rows);
+BST_RECORDER_ROWS(bst_recorder_control_rows);
+BST_RECORDER_ROWS(bst_recorder_task_rows);
+
+#endif

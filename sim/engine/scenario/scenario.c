@@ -1,0 +1,212 @@
+#include "sim/engine/scenario/scenario.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/core/text.h"
+#include "sim/engine/scenario/scenario_internal.h"
+#include "sim/link/endpoint.h"
+
+enum { FORMAT_VERSION = 1 };
+
+const bst_config_desc bst_scenario_table[] = {
+    {.key = "boresight",
+     .type = BST_CONFIG_INT,
+     .unit = "",
+     .minimum = FORMAT_VERSION,
+     .maximum = FORMAT_VERSION,
+     .doc = "Version of the scenario format.",
+     .offset = offsetof(bst_scenario, format),
+     .size = sizeof(int64_t)},
+    {.key = "extends",
+     .type = BST_CONFIG_RAW,
+     .doc = "A scenario file, relative to this one's folder, whose values hold where this one says "
+            "nothing else: each key beside replaces that file's whole key."},
+    {.key = "set",
+     .type = BST_CONFIG_RAW,
+     .doc = "Only with extends: single values in place of that file's, by JSON pointer, as --set "
+            "takes them: {\"/observers/0/sensors/0/cue/offset_deg\": 0.1}."},
+    BST_STRING(bst_scenario, name, "\"scenario\"", "Name of the scenario."),
+    BST_STRING(bst_scenario, epoch_utc, NULL,
+               "Start of the simulated time, UTC: YYYY-MM-DDThh:mm:ss[.f]Z."),
+    BST_REAL(bst_scenario, duration_s, "s", 0, 1e9, NULL, "Length of the simulated time."),
+    BST_INT(bst_scenario, tick_rate_hz, "Hz", 1, 1000000, "6000",
+            "Ticks per second; every rate must divide it."),
+    BST_SEED(bst_scenario, seed, "\"0x1\"",
+             "Master seed of all random numbers: \"0x2A\", \"42\" or 42."),
+    BST_INT(bst_scenario, run, "", 0, 9e15, "0",
+            "Number of the run in a study: other random numbers, same scene."),
+    BST_OBJECT(bst_scenario, world, bst_world_config_table, "{}", "What is out there."),
+    BST_LIST(bst_scenario, observers, bst_observer_config, bst_observer_config_table, 1, 1000, NULL,
+             "The spacecraft that look."),
+    {.key = "tasking",
+     .type = BST_CONFIG_RAW,
+     .doc = "The module that gives the sensors their targets: {\"type\": ...}; left out: each has "
+            "its cue alone."},
+    BST_OBJECT(bst_scenario, record, bst_record_config_table, "{}",
+               "What is written to the run's folder."),
+    BST_OBJECT(bst_scenario, link, bst_link_config_table, "{}",
+               "Where other programs connect that play modules of type \"external\"."),
+    BST_OBJECT(bst_scenario, pacing, bst_pacing_config_table, "{}",
+               "How simulated time goes by the wall clock in boresight run."),
+    BST_CONFIG_END,
+};
+
+/* Names are parts of instance names and file names. */
+static bst_status check_name(bst_ctx *ctx, const bst_scenario *s, const char *path,
+                             const char *name) {
+    const char *allowed = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+    if (!*name || strspn(name, allowed) != strlen(name)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s: \"%s\" is no name (allowed: letters, digits, _ - .)", s->file,
+                        path, name);
+    }
+    return BST_OK;
+}
+
+static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
+    const bst_observer_config *observers = s->observers.items;
+    for (int i = 0; i < s->observers.count; i++) {
+        for (int k = 0; k < observers[i].sensors.count; k++) {
+            bst_camera *camera = &((bst_sensor_config *)observers[i].sensors.items)[k].camera;
+            if (bst_camera_resolve_scale(ctx, camera) != BST_OK) {
+                return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /observers/%d/sensors/%d/camera",
+                                       s->file, i, k);
+            }
+            bool image = bst_camera_prepare(ctx, camera) == BST_OK;
+            if (!image || bst_detector_config_check(ctx, &camera->detector) != BST_OK) {
+                return bst_fail_prefix(ctx, BST_ERR_CONFIG,
+                                       "%s: /observers/%d/sensors/%d/camera/%s", s->file, i, k,
+                                       image ? "detector" : "distortion");
+            }
+        }
+    }
+    return BST_OK;
+}
+
+/* Fills in what Keplerian elements leave open, so that the resolved scenario shows it. */
+static bst_status resolve_state(bst_ctx *ctx, const bst_scenario *s, const char *list, int index,
+                                bst_orbit_config *orbit) {
+    bool keplerian =
+        orbit->source == BST_ORBIT_NUMERICAL && orbit->state.from == BST_STATE_KEPLERIAN;
+    if (keplerian && bst_keplerian_resolve(ctx, &orbit->state) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/%d/orbit/state", s->file, list, index);
+    }
+    return BST_OK;
+}
+
+static bst_status resolve_states(bst_ctx *ctx, bst_scenario *s) {
+    bst_observer_config *observers = s->observers.items;
+    bst_object_config *objects = s->world.objects.items;
+    for (int i = 0; i < s->observers.count; i++) {
+        BST_TRY(resolve_state(ctx, s, "/observers", i, &observers[i].orbit));
+    }
+    for (int i = 0; i < s->world.objects.count; i++) {
+        BST_TRY(resolve_state(ctx, s, "/world/objects", i, &objects[i].orbit));
+    }
+    return BST_OK;
+}
+
+static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
+    const bst_observer_config *observers = s->observers.items;
+    if (!bst_text_is_file_name(s->name)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /name: \"%s\" cannot be the name of a folder (allowed: 1 to 63 bytes "
+                        "without \"/\" and control characters, not beginning with \".\")",
+                        s->file, s->name);
+    }
+    for (int i = 0; i < s->observers.count; i++) {
+        char path[100];
+        snprintf(path, sizeof path, "/observers/%d/name", i);
+        BST_TRY(check_name(ctx, s, path, observers[i].name));
+        for (int k = 0; k < i; k++) {
+            if (strcmp(observers[k].name, observers[i].name) == 0) {
+                return bst_fail(ctx, BST_ERR_CONFIG,
+                                "%s: %s: \"%s\" is the name of /observers/%d too", s->file, path,
+                                observers[i].name, k);
+            }
+        }
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int k = 0; k < observers[i].sensors.count; k++) {
+            snprintf(path, sizeof path, "/observers/%d/sensors/%d/name", i, k);
+            BST_TRY(check_name(ctx, s, path, sensors[k].name));
+            for (int m = 0; m < k; m++) {
+                if (strcmp(sensors[m].name, sensors[k].name) == 0) {
+                    return bst_fail(ctx, BST_ERR_CONFIG,
+                                    "%s: %s: \"%s\" is the name of sensor %d too", s->file, path,
+                                    sensors[k].name, m);
+                }
+            }
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status check_extended(bst_ctx *ctx, const bst_json *json) {
+    const cJSON *root = bst_json_root(json);
+    if (cJSON_GetObjectItemCaseSensitive(root, "extends")) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /extends: the file that it names has not been read (allowed: in a "
+                        "scenario's file; a program reads that by bst_json_load_extended)",
+                        bst_json_name(json));
+    }
+    const cJSON *set = cJSON_GetObjectItemCaseSensitive(root, "set");
+    return !set ? BST_OK
+                : bst_config_fail(ctx, bst_json_name(json), "/set", set,
+                                  "there is nothing that it changes", "only beside \"extends\"");
+}
+
+static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
+                                bst_scenario *out) {
+    memset(out, 0, sizeof *out);
+    BST_TRY(check_extended(ctx, json));
+    BST_TRY(bst_config_read(ctx, json, bst_json_root(json), "", bst_scenario_table, out));
+    snprintf(out->file, sizeof out->file, "%s", bst_json_name(json));
+    bst_scenario_folder(out->file, out->base_dir, sizeof out->base_dir);
+    char address[BST_LINK_ENDPOINT_BYTES];
+    if (*out->link.address && bst_link_endpoint_check(ctx, out->link.address, address) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /link/address", out->file);
+    }
+    if (bst_time_from_utc(ctx, out->epoch_utc, &out->epoch) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /epoch_utc", out->file);
+    }
+    if (bst_seconds_to_ticks(ctx, out->tick_rate_hz, out->duration_s, &out->duration_ticks) !=
+        BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /duration_s", out->file);
+    }
+    if (bst_record_config_check(ctx, &out->record) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
+    }
+    BST_TRY(prepare_cameras(ctx, out));
+    BST_TRY(resolve_states(ctx, out));
+    BST_TRY(check_names(ctx, out));
+    BST_TRY(bst_scenario_paths(ctx, json, out, "", bst_scenario_table, out, false));
+    return bst_scenario_modules(ctx, json, registry, out);
+}
+
+bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
+                             bst_scenario *out) {
+    bst_status status = read_scenario(ctx, json, registry, out);
+    if (status != BST_OK) {
+        bst_json_name_file(ctx, json);
+    }
+    return status;
+}
+
+void bst_scenario_free(bst_scenario *s) {
+    for (int i = 0; s->modules && i < s->module_count; i++) {
+        bst_module_config *module = &s->modules[i];
+        if (module->config && module->desc && module->desc->config) {
+            bst_config_free(module->desc->config, module->config);
+        }
+        free(module->config);
+    }
+    free(s->modules);
+    free(s->plugins);
+    bst_config_free(bst_scenario_table, s);
+    memset(s, 0, sizeof *s);
+}

@@ -1,0 +1,468 @@
+/* Frames as PNG with bounding boxes of the true sources, for training detectors: COCO's
+ * annotations.json (cocodataset.org, "Data format", object detection), and YOLO's text file an
+ * image (docs.ultralytics.com, "Object Detection Datasets"). */
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/cli/progress.h"
+#include "sim/core/folder.h"
+#include "sim/core/json_number.h"
+#include "sim/core/text.h"
+#include "sim/core/version.h"
+#include "sim/export/export.h"
+#include "sim/io/draft_file.h"
+#include "sim/io/fits_reader.h"
+#include "sim/io/frame_picture.h"
+#include "sim/io/grey_png.h"
+#include "sim/io/mask_outline.h"
+
+typedef enum class_kind { SATELLITE, STAR, CLASSES } class_kind;
+
+static const char *const class_names[CLASSES] = {"satellite", "star"};
+
+/* Boxes are clipped to the image; what is left of them has this width and height at least. */
+#define LEAST_PX 1.0
+/* Sources in a frame; truth has room for fewer. */
+enum { MOST_ITEMS = 1 << 24 };
+
+/* Where the pixels of a source lie in the mask: x1 and y1 beyond them; pixels 0: nowhere. */
+typedef struct extent {
+    int x0, y0, x1, y1;
+    int64_t pixels;
+} extent;
+
+typedef struct job {
+    const bst_export *e;
+    const bst_export_sensor *sensor;
+    bst_fits_reader *fits;
+    bst_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
+    bool truth_more;
+    char set[256];
+    bst_fits_reader *masks;  /* NULL: the run has none */
+    bst_fits_read_mask mask; /* of the frame; items NULL: none */
+    extent *extents;         /* of the sources in the mask, by their numbers */
+    int extent_count, extent_room;
+    cJSON *images, *annotations; /* COCO */
+    int64_t written, boxes;
+    int sensors, masked; /* exported, and of them those with masks */
+} job;
+
+/* The delivered frame that a box is in, and its own PNG. */
+typedef struct frame_row {
+    int64_t id, fits_index;
+    double x0_px, y0_px, binning;
+    int width, height; /* of the image */
+    char utc[48], name[300];
+} frame_row;
+
+/* In pixels from the image's upper left corner: that of the centre of the first pixel is 0.5. */
+typedef struct box {
+    class_kind class;
+    double x, y, width, height; /* clipped to the image */
+    double x_centroid, y_centroid;
+} box;
+
+static const char frames_sql[] =
+    "SELECT exposure_id, fits_index, x0_px, y0_px, binning, start_utc FROM frames"
+    " WHERE sensor = ?1 AND fits_index IS NOT NULL ORDER BY exposure_id";
+
+static const char truth_sql[] =
+    "SELECT t.exposure_id, t.kind, t.x_start_px, t.x_mid_px, t.x_end_px, t.y_start_px, t.y_mid_px,"
+    " t.y_end_px, t.v_mag, t.electrons, t.snr, t.x_chief_px, t.y_chief_px, t.x_centroid_px,"
+    " t.y_centroid_px, o.name, t.norad, t.item FROM truth t"
+    " LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
+    " WHERE t.sensor = ?1 ORDER BY t.exposure_id, t.rowid";
+
+/* Extent of the light's way along one axis, grown by `margin`, clipped to 0 ... size. False: less
+ * than LEAST_PX of it is in the image. */
+static bool clip(const double v[3], double margin, double size, double *from, double *length) {
+    double low = fmin(v[0], fmin(v[1], v[2])) - margin,
+           high = fmax(v[0], fmax(v[1], v[2])) + margin;
+    low = fmax(low, 0.0);
+    high = fmin(high, size);
+    *from = low;
+    *length = high - low;
+    return *length >= LEAST_PX;
+}
+
+/* The box of the current row of the truth; false when there is none in the image. */
+static bool box_of(const job *j, const frame_row *f, box *out) {
+    const bst_rows *r = j->truth;
+    double x[3], y[3], margin = fmax(0.5 * j->e->box_px, 0.5 * LEAST_PX);
+    /* boxes hold the light, which the optics put beside the chief ray */
+    double beside_x = bst_rows_real(r, 13) - bst_rows_real(r, 11);
+    double beside_y = bst_rows_real(r, 14) - bst_rows_real(r, 12);
+    bool finite = true;
+    for (int k = 0; k < 3; k++) {
+        x[k] = (bst_rows_real(r, 2 + k) + beside_x - f->x0_px + 0.5) / f->binning;
+        y[k] = (bst_rows_real(r, 5 + k) + beside_y - f->y0_px + 0.5) / f->binning;
+        finite = finite && isfinite(x[k]) && isfinite(y[k]);
+    }
+    out->class = strcmp(bst_rows_text(r, 1), "star") == 0 ? STAR : SATELLITE;
+    out->x_centroid = (bst_rows_real(r, 13) - f->x0_px + 0.5) / f->binning;
+    out->y_centroid = (bst_rows_real(r, 14) - f->y0_px + 0.5) / f->binning;
+    bool bright = bst_rows_real(r, 9) > 0.0 &&
+                  (out->class != STAR || bst_rows_real(r, 8) <= j->e->star_limit);
+    return finite && bright && clip(x, margin, f->width, &out->x, &out->width) &&
+           clip(y, margin, f->height, &out->y, &out->height);
+}
+
+/* ------------------------------------------------------------------ masks */
+
+/* Opens the masks that were recorded beside the sensor's frames, if they were. */
+static bst_status open_masks(bst_ctx *ctx, job *j) {
+    char name[320], path[4096];
+    /* frames.fits -> segmentation.fits, frames_OBSERVER_SENSOR.fits -> ... */
+    if (!j->e->coco || strncmp(j->sensor->file, "frames", 6) != 0) {
+        return BST_OK;
+    }
+    snprintf(name, sizeof name, "segmentation%s", j->sensor->file + 6);
+    BST_TRY(bst_run_reader_file(ctx, j->e->run, name, path, sizeof path));
+    bst_ctx quiet = {0};
+    bst_status status = bst_fits_reader_open_masks(&quiet, path, &j->masks);
+    j->masked += status == BST_OK;
+    return status == BST_OK || status == BST_ERR_NOT_FOUND
+               ? BST_OK
+               : bst_fail(ctx, status, "%s", quiet.message);
+}
+
+static bst_status take_extents(bst_ctx *ctx, job *j) {
+    const bst_fits_read_mask *m = &j->mask;
+    int32_t most = 0;
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    for (size_t i = 0; i < pixels; i++) {
+        most = m->items[i] > most ? m->items[i] : most;
+    }
+    if (most >= MOST_ITEMS) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "the mask of exposure %lld holds source %d",
+                        (long long)m->exposure_id, most);
+    }
+    if (most + 1 > j->extent_room) {
+        extent *grown = realloc(j->extents, 2 * ((size_t)most + 1) * sizeof *grown);
+        if (!grown) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", most);
+        }
+        j->extents = grown;
+        j->extent_room = 2 * (most + 1);
+    }
+    j->extent_count = most + 1;
+    memset(j->extents, 0, (size_t)j->extent_count * sizeof *j->extents);
+    for (size_t i = 0; i < pixels; i++) {
+        if (m->items[i] > 0) {
+            extent *e = &j->extents[m->items[i]];
+            int x = (int)(i % (size_t)m->width), y = (int)(i / (size_t)m->width);
+            bool first = e->pixels++ == 0;
+            e->x0 = first || x < e->x0 ? x : e->x0;
+            e->x1 = first || x >= e->x1 ? x + 1 : e->x1;
+            e->y0 = first ? y : e->y0;
+            e->y1 = y + 1;
+        }
+    }
+    return BST_OK;
+}
+
+/* The mask of a frame and where its sources lie in it. */
+static bst_status read_mask(bst_ctx *ctx, job *j, const frame_row *f, int64_t index) {
+    j->mask.items = NULL;
+    if (!j->masks) {
+        return BST_OK;
+    }
+    BST_TRY(bst_fits_reader_mask(ctx, j->masks, index, &j->mask));
+    if (j->mask.exposure_id != f->id || j->mask.width != f->width || j->mask.height != f->height) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%s: the masks are not those of the frames (mask %lld is of exposure %lld)",
+                        bst_run_reader_folder(j->e->run), (long long)index,
+                        (long long)j->mask.exposure_id);
+    }
+    return take_extents(ctx, j);
+}
+
+/* "segmentation" and "area" of the current row of the truth: of its pixels in the mask; without
+ * any no polygons and the area of the box. */
+static bst_status add_segmentation(bst_ctx *ctx, const job *j, const box *b, cJSON *node) {
+    int64_t item = bst_rows_int(j->truth, 17);
+    bool shown = j->mask.items && item > 0 && item < j->extent_count && j->extents[item].pixels > 0;
+    char *text = NULL;
+    size_t bytes;
+    if (!shown) {
+        bst_json_add_number(node, "area", b->width * b->height);
+        cJSON_AddItemToObject(node, "segmentation", cJSON_CreateArray());
+        return BST_OK;
+    }
+    const extent *e = &j->extents[item];
+    const bst_mask_item outlined = {j->mask.items, j->mask.width, (int32_t)item, e->x0,
+                                    e->y0,         e->x1,         e->y1};
+    bst_json_add_number(node, "area", (double)e->pixels);
+    FILE *stream = open_memstream(&text, &bytes);
+    bst_status status = stream ? bst_mask_outline_write(ctx, &outlined, stream)
+                               : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an outline");
+    if (stream && fclose(stream) != 0 && status == BST_OK) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an outline");
+    }
+    if (status == BST_OK) {
+        cJSON_AddItemToObject(node, "segmentation", cJSON_CreateRaw(text));
+    }
+    free(text);
+    return status;
+}
+
+/* ------------------------------------------------------------------ boxes */
+
+static bst_status add_coco_box(bst_ctx *ctx, job *j, const box *b) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddNumberToObject(node, "id", (double)(j->boxes + 1));
+    cJSON_AddNumberToObject(node, "image_id", (double)(j->written + 1));
+    cJSON_AddNumberToObject(node, "category_id", b->class + 1);
+    cJSON_AddItemToObject(node, "bbox",
+                          cJSON_CreateDoubleArray((double[]){b->x, b->y, b->width, b->height}, 4));
+    cJSON_AddNumberToObject(node, "iscrowd", 0);
+    bst_status status = add_segmentation(ctx, j, b, node);
+    bst_json_add_number(node, "x_centroid", b->x_centroid);
+    bst_json_add_number(node, "y_centroid", b->y_centroid);
+    bst_json_add_number(node, "v_mag", bst_rows_real(j->truth, 8));
+    bst_json_add_number(node, "snr", bst_rows_real(j->truth, 10));
+    cJSON_AddStringToObject(node, "object_name", bst_rows_text(j->truth, 15));
+    cJSON_AddNumberToObject(node, "norad", (double)bst_rows_int(j->truth, 16));
+    cJSON_AddItemToArray(j->annotations, node);
+    return status;
+}
+
+static void add_coco_image(job *j, const frame_row *f) {
+    char file[320];
+    cJSON *node = cJSON_CreateObject();
+    snprintf(file, sizeof file, "%s.png", f->name);
+    cJSON_AddNumberToObject(node, "id", (double)(j->written + 1));
+    cJSON_AddStringToObject(node, "file_name", file);
+    cJSON_AddNumberToObject(node, "width", f->width);
+    cJSON_AddNumberToObject(node, "height", f->height);
+    cJSON_AddStringToObject(node, "date_captured", f->utc);
+    cJSON_AddNumberToObject(node, "exposure_id", (double)f->id);
+    cJSON_AddItemToArray(j->images, node);
+}
+
+/* Boxes of a frame: the rows of its exposure, of which earlier ones are left behind. `yolo` NULL:
+ * none. */
+static bst_status write_boxes(bst_ctx *ctx, job *j, const frame_row *f, FILE *yolo) {
+    for (; j->truth_more && bst_rows_int(j->truth, 0) <= f->id;) {
+        box b;
+        if (bst_rows_int(j->truth, 0) == f->id && box_of(j, f, &b)) {
+            if (yolo) {
+                fprintf(yolo, "%d %.9f %.9f %.9f %.9f\n", b.class, (b.x + 0.5 * b.width) / f->width,
+                        (b.y + 0.5 * b.height) / f->height, b.width / f->width,
+                        b.height / f->height);
+            }
+            if (j->annotations) {
+                BST_TRY(add_coco_box(ctx, j, &b));
+            }
+            j->boxes++;
+        }
+        BST_TRY(bst_rows_next(ctx, j->truth, &j->truth_more));
+    }
+    return BST_OK;
+}
+
+/* The picture below `folder`: the counts, or with 8 bits their grey levels. */
+static bst_status write_image(bst_ctx *ctx, const job *j, const char *folder, const frame_row *f,
+                              const bst_fits_read_frame *image) {
+    char path[4600];
+    snprintf(path, sizeof path, "%.4000s/images/%s.png", folder, f->name);
+    if (j->e->image_bits == 16) {
+        return bst_grey_png_write16(ctx, path, image->pixels, f->width, f->height);
+    }
+    bst_picture *picture;
+    size_t count = (size_t)f->width * (size_t)f->height;
+    uint8_t *bgr = malloc(3 * count);
+    if (!bgr) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
+    }
+    bst_stretch stretch = bst_stretch_of(image->pixels, f->width, f->height);
+    bst_status status = bst_frame_picture(ctx, image->pixels, f->width, f->height, stretch, NULL,
+                                          f->width, f->height, &picture);
+    if (status == BST_OK) {
+        status = bst_picture_copy(ctx, picture, bgr);
+        bst_picture_free(picture);
+    }
+    for (size_t i = 0; status == BST_OK && i < count; i++) {
+        bgr[i] = bgr[3 * i];
+    }
+    status = status == BST_OK ? bst_grey_png_write8(ctx, path, bgr, f->width, f->height) : status;
+    free(bgr);
+    return status;
+}
+
+static bst_status write_frame(bst_ctx *ctx, job *j, frame_row *f) {
+    bst_fits_read_frame image;
+    bool cube = bst_fits_reader_info(j->fits)->cube;
+    BST_TRY(bst_fits_reader_frame(ctx, j->fits, f->fits_index - !cube, &image));
+    f->width = image.width;
+    f->height = image.height;
+    snprintf(f->name, sizeof f->name, "%s.%04" PRId64, j->set, f->id);
+    if (j->e->coco) {
+        BST_TRY(write_image(ctx, j, j->e->coco, f, &image));
+        BST_TRY(read_mask(ctx, j, f, f->fits_index - !cube));
+    }
+    if (!j->e->yolo) {
+        BST_TRY(write_boxes(ctx, j, f, NULL));
+    } else {
+        char path[4600];
+        bst_draft draft;
+        BST_TRY(write_image(ctx, j, j->e->yolo, f, &image));
+        snprintf(path, sizeof path, "%.4000s/labels/%s.txt", j->e->yolo, f->name);
+        BST_TRY(bst_draft_open(ctx, path, &draft));
+        bst_status status = write_boxes(ctx, j, f, draft.stream);
+        BST_TRY(bst_draft_close(ctx, &draft, status));
+    }
+    if (j->images) {
+        add_coco_image(j, f);
+    }
+    j->written++;
+    return BST_OK;
+}
+
+static bst_status write_frames(bst_ctx *ctx, job *j) {
+    bst_rows *rows;
+    bool more;
+    bst_progress progress;
+    bst_status status;
+    BST_TRY(bst_rows_open(ctx, j->e->run, frames_sql, j->sensor->index, 0, &rows));
+    bst_progress_start(
+        &progress, j->set, "frames",
+        bst_run_reader_int(j->e->run, "SELECT count(*) FROM frames WHERE sensor = ?1",
+                           j->sensor->index, 0));
+    for (int64_t n = 0; (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more; n++) {
+        frame_row f = {.id = bst_rows_int(rows, 0),
+                       .fits_index = bst_rows_int(rows, 1),
+                       .x0_px = bst_rows_real(rows, 2),
+                       .y0_px = bst_rows_real(rows, 3),
+                       .binning = fmax(1.0, bst_rows_real(rows, 4))};
+        snprintf(f.utc, sizeof f.utc, "%s", bst_rows_text(rows, 5));
+        if (f.id < j->e->first || f.id > j->e->last || (f.id - j->e->first) % j->e->every != 0) {
+            continue;
+        }
+        status = bst_export_check(ctx);
+        status = status == BST_OK ? write_frame(ctx, j, &f) : status;
+        if (status != BST_OK) {
+            break;
+        }
+        bst_progress_update(&progress, n + 1);
+    }
+    bst_progress_end(&progress);
+    bst_rows_close(rows);
+    return status;
+}
+
+static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
+    char path[4096];
+    bst_export_set_name(j->e->run, several ? j->sensor : NULL, j->set);
+    BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));
+    BST_TRY(bst_rows_open(ctx, j->e->run, truth_sql, j->sensor->index, 0, &j->truth));
+    bst_status status = bst_rows_next(ctx, j->truth, &j->truth_more);
+    j->fits = j->masks = NULL;
+    j->sensors++;
+    if (status == BST_OK) {
+        status = bst_fits_reader_open(ctx, path, &j->fits);
+    }
+    status = status == BST_OK ? open_masks(ctx, j) : status;
+    status = status == BST_OK ? write_frames(ctx, j) : status;
+    bst_fits_reader_close(j->fits);
+    bst_fits_reader_close(j->masks);
+    bst_rows_close(j->truth);
+    return status;
+}
+
+static bst_status write_text(bst_ctx *ctx, const char *folder, const char *name, const char *text) {
+    char path[4200];
+    bst_draft draft;
+    snprintf(path, sizeof path, "%.4000s/%s", folder, name);
+    BST_TRY(bst_draft_open(ctx, path, &draft));
+    fputs(text, draft.stream);
+    return bst_draft_close(ctx, &draft, BST_OK);
+}
+
+static bst_status write_coco(bst_ctx *ctx, const job *j, cJSON *root) {
+    cJSON *info = cJSON_AddObjectToObject(root, "info");
+    cJSON_AddStringToObject(info, "description", "frames of a Boresight run with true sources");
+    cJSON_AddStringToObject(info, "version", bst_version());
+    cJSON *categories = cJSON_AddArrayToObject(root, "categories");
+    for (int k = 0; k < CLASSES; k++) {
+        cJSON *node = cJSON_CreateObject();
+        cJSON_AddNumberToObject(node, "id", k + 1);
+        cJSON_AddStringToObject(node, "name", class_names[k]);
+        cJSON_AddStringToObject(node, "supercategory", "source");
+        cJSON_AddItemToArray(categories, node);
+    }
+    char *text = cJSON_PrintUnformatted(root);
+    bst_status status = text ? write_text(ctx, j->e->coco, "annotations.json", text)
+                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for annotations");
+    cJSON_free(text);
+    return status;
+}
+
+/* Folders below that of the set; the labels' one only for YOLO. */
+static bst_status make_folders(bst_ctx *ctx, const char *folder, bool labels) {
+    char path[4200];
+    snprintf(path, sizeof path, "%.4000s/images", folder);
+    BST_TRY(bst_folder_make(ctx, path));
+    snprintf(path, sizeof path, "%.4000s/labels", folder);
+    return labels ? bst_folder_make(ctx, path) : BST_OK;
+}
+
+static bst_status export_all(bst_ctx *ctx, job *j) {
+    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    int count, kept = 0;
+    bool several = bst_run_reader_int(j->e->run, "SELECT count(*) FROM sensors", 0, 1) > 1;
+    BST_TRY(bst_export_sensors(ctx, j->e->run, j->e->sensor, sensors, &count));
+    BST_TRY(bst_export_need_truth(ctx, j->e->run));
+    for (int i = 0; i < count; i++) {
+        if (sensors[i].file[0]) {
+            kept++;
+            j->sensor = &sensors[i];
+            BST_TRY(export_sensor(ctx, j, several));
+        }
+    }
+    return kept > 0 ? BST_OK
+                    : bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: its frames were not kept",
+                               bst_run_reader_folder(j->e->run));
+}
+
+bst_status bst_export_boxes(bst_ctx *ctx, const bst_export *e) {
+    job j = {.e = e};
+    if (e->coco) {
+        BST_TRY(make_folders(ctx, e->coco, false));
+    }
+    cJSON *root = cJSON_CreateObject();
+    if (e->coco) {
+        j.images = cJSON_AddArrayToObject(root, "images");
+        j.annotations = cJSON_AddArrayToObject(root, "annotations");
+    }
+    bst_status status = e->yolo ? make_folders(ctx, e->yolo, true) : BST_OK;
+    status = status == BST_OK ? export_all(ctx, &j) : status;
+    if (status == BST_OK && e->coco) {
+        status = write_coco(ctx, &j, root);
+    }
+    if (status == BST_OK && e->yolo) {
+        status = write_text(ctx, e->yolo, "data.yaml",
+                            "train: images\nval: images\nnames:\n  0: satellite\n  1: star\n");
+    }
+    cJSON_Delete(root);
+    free(j.extents);
+    const char *const folders[] = {e->coco, e->yolo};
+    for (int k = 0; status == BST_OK && k < 2; k++) {
+        if (folders[k]) {
+            char frames[BST_COUNT_TEXT], boxes[BST_COUNT_TEXT];
+            printf("%s: %s with %s\n", folders[k],
+                   bst_count_text(frames, j.written, "frame", "frames"),
+                   bst_count_text(boxes, j.boxes, "box", "boxes"));
+            if (k == 0 && j.masked < j.sensors) {
+                printf(
+                    "  \"segmentation\" is empty: the run has no masks; record them with "
+                    "--set '/record/planes=[\"segmentation\"]'\n");
+            }
+        }
+    }
+    return status;
+}

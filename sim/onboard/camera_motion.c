@@ -1,0 +1,190 @@
+#include "sim/onboard/camera_motion.h"
+
+static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int64_t n) {
+    return &t->items[n % t->capacity];
+}
+
+/* Sums of a piecewise linear rotation vector r(t), t from the exposure's middle. */
+typedef struct moments {
+    bst_vec3 zeroth, first, second; /* integrals of r, t r and t^2 r */
+} moments;
+
+static void add_segment(moments *m, double t0, double t1, bst_vec3 r0, bst_vec3 r1) {
+    double h = t1 - t0;
+    bst_vec3 mean = bst_vec3_scale(bst_vec3_add(r0, r1), 0.5);
+    bst_vec3 difference = bst_vec3_sub(r1, r0);
+    m->zeroth = bst_vec3_axpy(m->zeroth, h, mean);
+    /* integral of t r over a linear piece: midpoint term plus h^2 (r1 - r0) / 12 */
+    m->first = bst_vec3_axpy(m->first, 0.5 * h * (t0 + t1), mean);
+    m->first = bst_vec3_axpy(m->first, h * h / 12.0, difference);
+    double middle = 0.5 * (t0 + t1);
+    m->second = bst_vec3_axpy(m->second, h * (middle * middle + h * h / 12.0), mean);
+    m->second = bst_vec3_axpy(m->second, h * h * middle / 6.0, difference);
+}
+
+static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double s) {
+    return bst_vec3_axpy(a, s, bst_vec3_sub(b, a));
+}
+
+/* Third differences of rotation vectors at equal steps: 20 times the variance of white noise. */
+typedef struct roughness {
+    bst_vec3 last[3]; /* the newest first */
+    double step;
+    int run, count; /* samples at this step so far; differences */
+    double sum;     /* of squares about x and y */
+} roughness;
+
+static void add_sample(roughness *s, double step, bst_vec3 r) {
+    s->run = s->run > 0 && fabs(step - s->step) > 0.5 ? 1 : s->run;
+    s->step = step;
+    if (s->run >= 3) {
+        double x = r.x - 3.0 * (s->last[0].x - s->last[1].x) - s->last[2].x;
+        double y = r.y - 3.0 * (s->last[0].y - s->last[1].y) - s->last[2].y;
+        s->sum += x * x + y * y;
+        s->count++;
+    }
+    s->last[2] = s->last[1];
+    s->last[1] = s->last[0];
+    s->last[0] = r;
+    s->run++;
+}
+
+/* Fewest third differences that tell the noise. */
+enum { FEWEST_DIFFERENCES = 5 };
+
+static void judge_bend(const roughness *s, double samples, bst_motion *motion) {
+    if (s->count < FEWEST_DIFFERENCES) {
+        return;
+    }
+    /* least-squares coefficient of a Legendre polynomial of degree 2 */
+    double variance = s->sum / (2.0 * s->count * 20.0) * 5.0 / samples;
+    bst_vec3 b = motion->bend_cam_rad;
+    double square = b.x * b.x + b.y * b.y;
+    double share = square > 2.0 * variance ? 1.0 - 2.0 * variance / square : 0.0;
+    motion->bend_cam_rad = (bst_vec3){share * b.x, share * b.y, b.z};
+    motion->bend_sigma_rad = sqrt(share * variance);
+}
+
+bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
+                               int64_t end_tick, bst_motion *out) {
+    if (telemetry->written <= 0 || telemetry->capacity <= 0) {
+        return false;
+    }
+    int64_t newest = telemetry->written - 1;
+    int64_t oldest =
+        telemetry->written > telemetry->capacity ? telemetry->written - telemetry->capacity : 0;
+    /* first: the last sample not after the exposure's start, or the ring's first */
+    int64_t first = newest;
+    while (first > oldest && sample_at(telemetry, first)->tick > start_tick) {
+        first--;
+    }
+    bst_quat reference = sample_at(telemetry, first)->q_cam_from_gcrf;
+    bst_quat inverse = bst_quat_conj(reference);
+    if (first == newest && first > oldest) {
+        first--;
+    }
+    double middle = 0.5 * ((double)(end_tick - start_tick));
+    double half = middle > 0.0 ? middle : 0.0;
+    moments m = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+    bst_vec3 at_middle = {0, 0, 0};
+    roughness noise = {.run = 0};
+    bst_vec3 rb = {0, 0, 0};
+    int64_t known = -1; /* sample that rb is of */
+    for (int64_t n = first; n < newest; n++) {
+        const bst_pointing_sample *a = sample_at(telemetry, n), *b = sample_at(telemetry, n + 1);
+        double ta = (double)(a->tick - start_tick) - middle;
+        double tb = (double)(b->tick - start_tick) - middle;
+        if (!(tb > ta)) {
+            continue;
+        }
+        bst_vec3 ra =
+            n == known ? rb : bst_quat_to_rotvec(bst_quat_mul(a->q_cam_from_gcrf, inverse));
+        rb = bst_quat_to_rotvec(bst_quat_mul(b->q_cam_from_gcrf, inverse));
+        known = n + 1;
+        double lo = n == first || ta < -half ? -half : ta;
+        double hi = n + 1 == newest || tb > half ? half : tb;
+        if ((n == first || ta <= 0.0) && (n + 1 == newest || tb >= 0.0)) {
+            at_middle = lerp(ra, rb, (0.0 - ta) / (tb - ta));
+        }
+        if (noise.run == 0) {
+            add_sample(&noise, tb - ta, ra);
+        }
+        add_sample(&noise, tb - ta, rb);
+        if (hi > lo) {
+            add_segment(&m, lo, hi, lerp(ra, rb, (lo - ta) / (tb - ta)),
+                        lerp(ra, rb, (hi - ta) / (tb - ta)));
+        }
+        if (tb >= half) {
+            break;
+        }
+    }
+    bst_vec3 mean = at_middle, turn = {0, 0, 0}, bend = {0, 0, 0};
+    if (half > 0.0) {
+        double span = 2.0 * half;
+        mean = bst_vec3_scale(m.zeroth, 1.0 / span);
+        /* slope = 12 / T^3 integral of t r; the turn is slope times T */
+        turn = bst_vec3_scale(m.first, 12.0 / (span * span));
+        /* (5 / T) integral of P2(2 t / T) r, P2 the Legendre polynomial */
+        bend = bst_vec3_axpy(bst_vec3_scale(m.zeroth, -2.5 / span), 30.0 / (span * span * span),
+                             m.second);
+    }
+    out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(mean), reference));
+    out->turn_cam_rad = turn;
+    out->bend_cam_rad = bend;
+    out->bend_sigma_rad = 0.0;
+    judge_bend(&noise, 2.0 * half / fmax(noise.step, 1.0), out);
+    return true;
+}
+
+void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, double x_px, double y_px,
+                       double *dx_px, double *dy_px) {
+    bst_vec3 v = bst_camera_unproject(camera, x_px, y_px);
+    bst_quat half = bst_quat_from_rotvec(bst_vec3_scale(motion->turn_cam_rad, 0.5));
+    double x0, y0, x1, y1;
+    *dx_px = *dy_px = 0.0;
+    if (bst_camera_project(camera, bst_quat_rotate(bst_quat_conj(half), v), &x0, &y0) &&
+        bst_camera_project(camera, bst_quat_rotate(half, v), &x1, &y1)) {
+        *dx_px = x1 - x0;
+        *dy_px = y1 - y0;
+    }
+}
+
+void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double *x_px,
+                     double *y_px) {
+    double scale = bst_camera_scale_rad(camera), k[2][2];
+    bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
+    double a = motion->bend_cam_rad.y, b = -motion->bend_cam_rad.x;
+    *x_px = (k[0][0] * a + k[0][1] * b) / scale;
+    *y_px = (k[1][0] * a + k[1][1] * b) / scale;
+}
+
+/* Share of a measured or told bend that may be no bend. */
+static const double BEND_LEFT = 0.05;
+
+static void widen(double x, double y, bst_detection *d) {
+    d->cov_xx += x * x;
+    d->cov_xy += x * y;
+    d->cov_yy += y * y;
+}
+
+void bst_motion_widen(double bend_x_px, double bend_y_px, double followed_x_px,
+                      double followed_y_px, bst_detection *d) {
+    widen(0.5 * (bend_x_px - followed_x_px), 0.5 * (bend_y_px - followed_y_px), d);
+    widen(BEND_LEFT * followed_x_px, BEND_LEFT * followed_y_px, d);
+}
+
+/* The rotation vector that moves the boresight by (x_px, y_px). */
+static bst_vec3 rotation_of(const bst_camera *camera, double x_px, double y_px) {
+    double scale = bst_camera_scale_rad(camera), k[2][2];
+    bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
+    double det = k[0][0] * k[1][1] - k[0][1] * k[1][0];
+    return (bst_vec3){-(k[0][0] * y_px - k[1][0] * x_px) * scale / det,
+                      (k[1][1] * x_px - k[0][1] * y_px) * scale / det, 0.0};
+}
+
+void bst_motion_add(bst_motion *motion, const bst_camera *camera, double dx_px, double dy_px,
+                    double bend_x_px, double bend_y_px) {
+    motion->turn_cam_rad = bst_vec3_add(motion->turn_cam_rad, rotation_of(camera, dx_px, dy_px));
+    motion->bend_cam_rad =
+        bst_vec3_add(motion->bend_cam_rad, rotation_of(camera, bend_x_px, bend_y_px));
+}

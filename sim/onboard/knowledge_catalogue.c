@@ -1,0 +1,115 @@
+/* The onboard catalogue: the scenario's objects on their catalogued orbits, burns left out. */
+#include <string.h>
+
+#include "sim/onboard/knowledge_internal.h"
+#include "sim/world/orbit/ephemeris.h"
+
+int bst_knowledge_object_count(const bst_knowledge *k) {
+    return k->world->object_count;
+}
+
+const bst_object_info *bst_knowledge_object(const bst_knowledge *k, int object) {
+    return &k->world->objects[object].info;
+}
+
+int bst_knowledge_find_object(const bst_knowledge *k, const char *name) {
+    return bst_world_find_object(k->world, name);
+}
+
+bool bst_knowledge_is_itself(const bst_knowledge *k, int object) {
+    const world_observer *own = &k->world->observers[k->observer];
+    return object == own->own_object ||
+           (own->norad != 0 && own->norad == k->world->objects[object].info.norad);
+}
+
+bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee_m,
+                           double *apogee_m) {
+    const bst_world *world = view->knowledge->world;
+    const double mu = BST_EARTH_MU_M3PS2;
+    bst_ctx quiet = {0};
+    bst_state state;
+    if (bst_orbit_state(&quiet, &world->objects[object].orbit, view->clock, world->epoch, 0.0,
+                        false, &state) != BST_OK) {
+        return false;
+    }
+    bst_vec3 h = bst_vec3_cross(state.position_m, state.velocity_mps);
+    double energy = 0.5 * bst_vec3_dot(state.velocity_mps, state.velocity_mps) -
+                    mu / bst_vec3_norm(state.position_m);
+    double p = bst_vec3_dot(h, h) / mu;
+    double e = sqrt(fmax(1.0 + 2.0 * energy * p / mu, 0.0));
+    *perigee_m = p / (1.0 + e);
+    *apogee_m = e < 1.0 ? p / (1.0 - e) : INFINITY;
+    return true;
+}
+
+double bst_knowledge_places(const bst_knowledge *k, double seconds, double *x_m, double *y_m,
+                            double *z_m) {
+    double t = bst_ephemeris_places(k->world->ephemeris, seconds, x_m, y_m, z_m);
+    for (int i = 0; i < k->world->object_count; i++) {
+        if (k->world->objects[i].orbit.burn_count > 0) {
+            x_m[i] = y_m[i] = z_m[i] = NAN;
+        }
+    }
+    return t;
+}
+
+bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_state *eye, bst_bodies *bodies) {
+    double t;
+    bst_sky sky;
+    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, eye));
+    BST_TRY(
+        bst_sky_clock_at(ctx, view->clock, bst_time_add(view->knowledge->world->epoch, t), &sky));
+    *bodies = sky.bodies;
+    return BST_OK;
+}
+
+bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                  double seconds, bst_sight *out) {
+    const bst_world *world = view->knowledge->world;
+    const bst_object_info *info = &world->objects[object].info;
+    double t, emission_s;
+    bst_state eye, target;
+    bst_sky sky;
+    bst_vec3 line;
+    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &eye));
+    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(world->epoch, t), &sky));
+    BST_TRY(bst_orbit_line_of_sight(ctx, &world->objects[object].orbit, &eye, view->clock,
+                                    world->epoch, &sky.bodies, t, false, &line, &target,
+                                    &emission_s));
+    bst_light light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
+    bst_vec3 to_eye = bst_vec3_sub(eye.position_m, target.position_m);
+    bst_vec3 to_sun = bst_vec3_sub(sky.bodies.sun_m, target.position_m);
+    bst_sunlight sunlight;
+    bst_sunlight_at(target.position_m, bst_bodies_sunlight_from(&sky.bodies), sky.bodies.pole,
+                    world->shadow_atmosphere, &sunlight);
+    *out = (bst_sight){.geometric = bst_vec3_unit(line),
+                       .range_m = bst_vec3_norm(to_eye),
+                       .light_time_s = t - emission_s,
+                       .phase_rad = bst_vec3_angle(to_eye, to_sun),
+                       .sunlit_fraction = sunlight.disc};
+    out->apparent = bst_light_aberrate(&light, out->geometric);
+    bst_lighting lighting = {.area_m2 = info->area_m2,
+                             .albedo = info->albedo,
+                             .object_m = target.position_m,
+                             .eye_m = eye.position_m,
+                             .sun_m = sky.bodies.sun_m,
+                             .seconds = emission_s,
+                             .sunlit_fraction = sunlight.disc,
+                             .sunlight = &sunlight};
+    bst_brightness_at(info->brightness, &lighting, &out->glow);
+    out->v_mag = out->glow.v_mag;
+    out->occulted = bst_earth_occults(eye.position_m, target.position_m, sky.bodies.pole);
+    return BST_OK;
+}
+
+bool bst_knowledge_view_task(bst_knowledge_view *view, const bst_task *task) {
+    if (!task || task->id == view->task.id) {
+        return false;
+    }
+    view->task = *task;
+    view->tasked = task->object >= 0 && task->object < view->knowledge->world->object_count;
+    view->any_checked = false;
+    memset(view->knots, 0, sizeof view->knots);
+    return true;
+}

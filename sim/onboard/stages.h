@@ -1,0 +1,81 @@
+/* Stages that a plug-in can take the place of: what their functions are given and give back. A
+ * stage's descriptor (sim/core/stage.h) points to one of these structs. Onboard stages know the
+ * camera as the onboard side does; nobody knows the truth. `config` is the filled struct of the
+ * descriptor's own table and outlives the stage. Errors are told by bst_fail and end the run.
+ * Results are to depend on nothing but what is given, so that a run can be repeated. */
+#ifndef BST_ONBOARD_STAGES_H
+#define BST_ONBOARD_STAGES_H
+
+#include "sim/core/stage.h"
+#include "sim/dynamics/compensator.h"
+#include "sim/onboard/camera_motion.h"
+#include "sim/optics/camera.h"
+
+#define BST_STAGE_DETECTOR "detector" /* of imgproc: bst_detector_stage */
+/* BST_STAGE_COMPENSATOR, of control and of a mount's servo: bst_compensator_stage, in
+ * sim/dynamics/compensator.h */
+#define BST_STAGE_FRAME "frame_stage" /* of scenegen: bst_frame_stage */
+
+extern const char *const bst_stage_kinds[]; /* these, then NULL */
+
+/* ---- detector: what is in a frame. Identification of stars, photometry by them, labels and what
+ * follows stay imgproc's. */
+
+typedef struct bst_detector_env {
+    const bst_camera *camera;  /* as the onboard side knows it; outlives the stage */
+    double electrons_per_s_v0; /* detected of a source of V = 0, e-/s */
+    int capacity;              /* most detections of a frame */
+    /* maps on the full sensor, [height_px][width_px], NULL: none: dark signal's departure from its
+     * mean (e-/s), relative response, and what is not zero is a bad pixel */
+    const float *dark_e_per_s, *flat;
+    const uint8_t *bad;
+} bst_detector_env;
+
+typedef struct bst_detector_frame {
+    int64_t exposure_id;
+    const uint16_t *pixels; /* [window.height / binning][window.width / binning], DN */
+    bst_window window;      /* full-sensor pixels */
+    int binning, bits;
+    double exposure_s;
+    const bst_motion *motion; /* how the camera turned, as telemetry tells it; NULL: not known */
+} bst_detector_frame;
+
+typedef struct bst_detector_stage {
+    bst_status (*create)(bst_ctx *ctx, const void *config, const bst_detector_env *env,
+                         void **self);
+    /* Fills background_e and noise_e (per pixel), threshold_snr, count (at most env->capacity),
+     * lost, and of each item x_px and y_px in full-sensor coordinates, cov_xx, cov_xy, cov_yy,
+     * flux_e, flux_sigma_e, snr, length_px, width_px, angle_rad and flags; label: UNKNOWN, or
+     * ARTEFACT for what is no source. The rest is zero. Frames come in the order of time. */
+    bst_status (*detect)(void *self, bst_ctx *ctx, const bst_detector_frame *frame,
+                         bst_detections *out);
+    void (*destroy)(void *self);
+} bst_detector_stage;
+
+/* ---- frame_stage: changes a rendered frame before anyone sees it, the recorder included. */
+
+typedef struct bst_frame_stage_env {
+    const bst_camera *camera; /* the true one; outlives the stage */
+    const char *instance;     /* "observer/sensor/scenegen" */
+    uint64_t seed, run;       /* for bst_rng_make_key */
+} bst_frame_stage_env;
+
+typedef struct bst_frame_stage_frame {
+    int64_t exposure_id;
+    double start_s, end_s; /* of the exposure, since the scenario's epoch */
+    bst_window window;     /* full-sensor pixels */
+    int width, height;     /* of the frame, binned */
+    int binning, bits;
+} bst_frame_stage_frame;
+
+typedef struct bst_frame_stage {
+    bst_status (*create)(bst_ctx *ctx, const void *config, const bst_frame_stage_env *env,
+                         void **self);
+    /* Changes pixels[height][width], DN, in place; at most 2^bits - 1. Frames come in the order of
+     * time. */
+    bst_status (*apply)(void *self, bst_ctx *ctx, const bst_frame_stage_frame *frame,
+                        uint16_t *pixels);
+    void (*destroy)(void *self);
+} bst_frame_stage;
+
+#endif

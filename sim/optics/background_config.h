@@ -1,0 +1,33 @@
+/* The block `background` of a camera: the light that fills its pixels between the sources. All zero
+ * is a uniform sky of background_mag_arcsec2. */
+#ifndef BST_OPTICS_BACKGROUND_CONFIG_H
+#define BST_OPTICS_BACKGROUND_CONFIG_H
+
+#include <stdbool.h>
+
+#include "sim/core/config.h"
+
+enum { BST_BACKGROUND_UNIFORM, BST_BACKGROUND_SKY };
+
+/* A point of the table of point source transmittance. */
+typedef struct bst_pst_point {
+    double angle_deg, pst;
+} bst_pst_point;
+
+typedef struct bst_background_config {
+    int32_t model; /* BST_BACKGROUND_... */
+    bool zodiacal, starlight;
+    double diffuse_galactic_fraction;
+    bool earth, moon, sun; /* their discs and, in `sky` through the PST, their stray light */
+    double earth_albedo, earth_night_mag_arcsec2, earth_temperature_k, limb_scale_height_m;
+    bst_config_list pst; /* bst_pst_point; empty: no stray light */
+    char pst_file[512];  /* the same from a CSV file; "": none */
+    double pixel_um;     /* pitch, for stray light; 0: that of the optics */
+    /* added in either model: with u, v from -1 to 1 over the sensor's columns and rows,
+     * stray + gradient . (u, v) + curvature . (u^2, u v, v^2) */
+    double stray_e_per_s, gradient_e_per_s[2], curvature_e_per_s[3];
+} bst_background_config;
+
+extern const bst_config_desc bst_background_config_table[];
+
+#endif

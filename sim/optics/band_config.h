@@ -1,0 +1,36 @@
+/* The block `band` of a camera: what wavelengths it sees. All zero is the V band of
+ * photon_flux_v0_per_s_m2. */
+#ifndef BST_OPTICS_BAND_CONFIG_H
+#define BST_OPTICS_BAND_CONFIG_H
+
+#include "sim/core/config.h"
+
+enum {
+    BST_BAND_V,
+    BST_BAND_SILICON,
+    BST_BAND_SWIR,
+    BST_BAND_MWIR,
+    BST_BAND_LWIR,
+    BST_BAND_PRESETS
+};
+
+/* A point of a spectral table, linear between points and zero beyond them. */
+typedef struct bst_response_point {
+    double wavelength_um, value;
+} bst_response_point;
+
+typedef struct bst_band_config {
+    int32_t preset;               /* BST_BAND_... */
+    bst_config_list response;     /* bst_response_point: of the detector, instead of the preset's */
+    char response_file[512];      /* the same from a CSV file; "": none */
+    bst_config_list transmission; /* bst_response_point: of the optics; empty: 1 */
+    char transmission_file[512];
+    double optics_temperature_k;
+    double optics_emissivity;
+    double optics_beam_factor; /* solid angle from which a pixel receives the optics' emission, over
+                                  that of the beam that makes the image */
+} bst_band_config;
+
+extern const bst_config_desc bst_band_config_table[];
+
+#endif

@@ -1,0 +1,36 @@
+/* A curve from a CSV file of two columns, for spectral responses and light curves; inside of
+ * sim/world. */
+#ifndef BST_OPTICS_CURVE_FILE_H
+#define BST_OPTICS_CURVE_FILE_H
+
+#include "sim/core/status.h"
+
+enum { BST_CURVE_POINTS_MAX = 100000 };
+
+/* What a file may hold. The first line that is neither empty nor a comment (#) names the columns.
+ */
+typedef struct bst_curve_format {
+    const char *what;           /* "a table of spectral response", for messages */
+    const char *const *x_names; /* of the first column, NULL-terminated */
+    const char *const *y_names; /* of the second */
+    double x_min, x_max, y_min, y_max;
+} bst_curve_format;
+
+/* x ascends strictly. */
+typedef struct bst_curve {
+    double *x, *y; /* [count] */
+    int count;
+    int x_column, y_column; /* index into the format's names */
+} bst_curve;
+
+/* Reads a file of 1 to BST_CURVE_POINTS_MAX rows. BST_ERR_NOT_FOUND, BST_ERR_IO, or BST_ERR_FORMAT
+ * with file, line, what is wrong and what is expected. The caller frees with bst_curve_free, also
+ * after an error. */
+bst_status bst_curve_load(bst_ctx *ctx, const char *path, const bst_curve_format *format,
+                          bst_curve *out) BST_MUST_CHECK;
+void bst_curve_free(bst_curve *curve);
+
+/* Linear between the points, the first and last value beyond them. */
+double bst_curve_at(const bst_curve *curve, double x);
+
+#endif

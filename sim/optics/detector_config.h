@@ -1,0 +1,69 @@
+/* What the detector does beyond the camera's plain numbers: block `camera.detector`. Every effect
+ * is off by default. */
+#ifndef BST_OPTICS_DETECTOR_CONFIG_H
+#define BST_OPTICS_DETECTOR_CONFIG_H
+
+#include "sim/core/config.h"
+
+/* What happens to charge above the full well. */
+enum { BST_WELL_CLIP, BST_WELL_BLOOM };
+/* From the converter's numbers to the frame's. */
+enum { BST_QUANTISE_UNIFORM, BST_QUANTISE_SQUARE_ROOT, BST_QUANTISE_TABLE };
+
+/* Energetic particles. */
+typedef struct bst_hits_config {
+    double rate_per_cm2_s;           /* through the detector's surface, both sides together */
+    double pixel_pitch_um, depth_um; /* of a pixel: its side, and the sensitive layer's thickness */
+    double e_per_um;                 /* most probable charge per path */
+    double straggling; /* width of the Landau-like spread over the most probable value */
+    double frame_s; /* time in which the detector collects hits besides the exposure: transfer and
+                       read-out */
+} bst_hits_config;
+
+typedef struct bst_quantisation_config {
+    int32_t model;   /* BST_QUANTISE_... */
+    int64_t bits;    /* of the codes, square root */
+    char table[512]; /* file: the converter's number at which each code begins */
+    bool expand;     /* the frame holds the middle of each code's numbers, not the code */
+} bst_quantisation_config;
+
+typedef struct bst_detector_config {
+    double temperature_c, reference_temperature_c, dark_doubling_k;
+    double prnu_rms;
+    char prnu_map[512];
+    double dsnu_rms;
+    char dark_map[512];
+    double hot_fraction, hot_median_e_per_s, hot_spread_dex;
+    double dead_fraction;
+    int64_t bad_columns;
+    uint64_t pattern_seed;
+    double column_offset_rms_e, row_offset_rms_e, row_noise_e;
+    double read_tail_fraction, read_tail_rms_e;
+    double nonlinearity[3];
+    int32_t full_well; /* BST_WELL_... */
+    double frame_transfer_s;
+    double row_time_s; /* rolling shutter */
+    bst_hits_config hits;
+    bst_quantisation_config quantisation;
+} bst_detector_config;
+
+extern const bst_config_desc bst_detector_table[];
+
+/* Factor of the dark current at `temperature_c` over that at the reference temperature: it doubles
+ * with every dark_doubling_k; 1 for a block of zeros. */
+double bst_detector_dark_factor(const bst_detector_config *d);
+
+/* Whether frames need whole columns (blooming, frame transfer), and so the light of them all. */
+bool bst_detector_config_whole_columns(const bst_detector_config *d);
+
+/* BST_ERR_CONFIG, with the key, for effects that exclude each other. */
+bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
+
+/* Rolling shutter: time from the middle row of a window of `rows` rows to its first or last one.
+ * Row n of the window (0, 1, ...) is exposed (n - (rows - 1) / 2) row_time_s later than the
+ * exposure's ticks say. */
+double bst_detector_lead_s(const bst_detector_config *d, int rows);
+/* The same in ticks, rounded up. */
+int64_t bst_detector_lead_ticks(const bst_detector_config *d, int rows, double tick_rate_hz);
+
+#endif

@@ -1,0 +1,76 @@
+#include "sim/optics/psf_image.h"
+
+#include <fftw3.h>
+#include <math.h>
+#include <string.h>
+
+#include "sim/core/vec.h"
+
+enum { LEAST_PERIOD_PX = 64, MOST_FREQUENCIES = 1024 };
+
+/* exp(-2 pi^2 (sigma f)^2) is below 1e-9 beyond this sigma f */
+static const double GAUSSIAN_CUTOFF = 1.03;
+
+static int period_of(int reach_px) {
+    int period = 4 * reach_px < 2 * reach_px + LEAST_PERIOD_PX ? 4 * reach_px
+                                                               : 2 * reach_px + LEAST_PERIOD_PX;
+    return period > LEAST_PERIOD_PX ? period : LEAST_PERIOD_PX;
+}
+
+/* The OTF at multiples of 1 / period on a grid of `side` frequencies each way: those beyond it come
+ * to lie where samples cannot tell them apart from others. */
+static void fill_spectrum(const bst_psf *psf, int node, double blur_px, int period, int side,
+                          fftw_complex *out) {
+    double cutoff = bst_psf_cutoff(psf), scale = 1.0 / ((double)period * period);
+    cutoff = blur_px > 0.0 ? fmin(cutoff, GAUSSIAN_CUTOFF / blur_px) : cutoff;
+    int most = (int)fmin(ceil(cutoff * period), MOST_FREQUENCIES);
+    memset(out, 0, (size_t)side * (size_t)side * sizeof *out);
+    for (int ky = -most; ky <= most; ky++) {
+        for (int kx = 0; kx <= most; kx++) {
+            double fx = (double)kx / period, fy = (double)ky / period, value[2];
+            double f2 = fx * fx + fy * fy;
+            if (f2 > cutoff * cutoff) {
+                continue;
+            }
+            double by = scale * exp(-2.0 * BST_PI * BST_PI * blur_px * blur_px * f2);
+            bst_psf_otf(psf, node, fx, fy, value);
+            size_t row = (size_t)(((ky % side) + side) % side), column = (size_t)(kx % side);
+            double *at = out[row * (size_t)side + column];
+            at[0] += by * value[0];
+            at[1] += by * value[1];
+            if (kx > 0) {
+                /* the image is real */
+                row = ((size_t)side - row) % (size_t)side;
+                column = ((size_t)side - column) % (size_t)side;
+                at = out[row * (size_t)side + column];
+                at[0] += by * value[0];
+                at[1] -= by * value[1];
+            }
+        }
+    }
+}
+
+bst_status bst_psf_image(bst_ctx *ctx, const bst_psf *psf, int node, double blur_px, int per_px,
+                         int reach_px, double *out) {
+    int period = period_of(reach_px), grid = period * per_px;
+    int side = bst_psf_image_side(per_px, reach_px), half = per_px * reach_px;
+    fftw_make_planner_thread_safe();
+    fftw_complex *work = fftw_alloc_complex((size_t)grid * (size_t)grid);
+    fftw_plan plan =
+        work ? fftw_plan_dft_2d(grid, grid, work, work, FFTW_BACKWARD, FFTW_ESTIMATE) : NULL;
+    if (!plan) {
+        fftw_free(work);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the image of a point");
+    }
+    fill_spectrum(psf, node, blur_px, period, grid, work);
+    fftw_execute(plan);
+    for (int j = 0; j < side; j++) {
+        size_t row = (size_t)((j - half + grid) % grid) * (size_t)grid;
+        for (int i = 0; i < side; i++) {
+            out[j * side + i] = work[row + (size_t)((i - half + grid) % grid)][0];
+        }
+    }
+    fftw_destroy_plan(plan);
+    fftw_free(work);
+    return BST_OK;
+}

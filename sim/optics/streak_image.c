@@ -1,0 +1,14 @@
+#include "sim/optics/streak_image.h"
+
+#include <math.h>
+
+#include "sim/core/vec.h"
+
+double bst_image_squared(double along, double across, double length) {
+    const double root_pi = sqrt(BST_PI);
+    double a = length / (2.0 * along);
+    double line = a < 1e-3 ? 1.0 / (2.0 * root_pi * along) * (1.0 - a * a / 6.0)
+                           : erf(a) / length -
+                                 (2.0 * along / (length * length * root_pi)) * (1.0 - exp(-a * a));
+    return line / (2.0 * root_pi * across);
+}

@@ -1,0 +1,36 @@
+#include "sim/registry/registry.h"
+
+#include "control/modules.h"
+#include "gimbal/modules.h"
+#include "imgproc/imgproc.h"
+#include "obsgen/obsgen.h"
+#include "scenegen/module.h"
+#include "sim/link/external.h"
+#include "tracker/module.h"
+
+static const bst_module_desc *const modules[] = {
+    &bst_gimbal_second_order_module,
+    &bst_gimbal_azimuth_elevation_module,
+    &bst_gimbal_cross_elevation_module,
+    &bst_gimbal_ideal_module,
+    &bst_gimbal_scripted_module,
+    &bst_gimbal_external_module,
+    &bst_scenegen_module,
+    &bst_imgproc_module,
+    &bst_tracker_module,
+    &bst_control_standard_module,
+    &bst_tracker_ukf_module,
+    &bst_tracker_imm_module,
+    &bst_obsgen_module,
+    &bst_external_imgproc_module,
+    &bst_external_tracker_module,
+    &bst_external_control_module,
+    &bst_tasking_priority_module,
+};
+
+static const bst_registry registry = {.modules = modules,
+                                      .count = sizeof modules / sizeof *modules};
+
+const bst_registry *bst_app_registry(void) {
+    return &registry;
+}

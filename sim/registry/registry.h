@@ -1,0 +1,10 @@
+/* Every module that comes with Boresight. */
+#ifndef BST_REGISTRY_REGISTRY_H
+#define BST_REGISTRY_REGISTRY_H
+
+#include "sim/engine/scenario/scenario.h"
+
+/* Every module that a scenario can name. Static: lives for ever. */
+const bst_registry *bst_app_registry(void);
+
+#endif

@@ -1,0 +1,391 @@
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/core/text.h"
+#include "sim/core/version.h"
+#include "sim/export/export.h"
+#include "sim/report/report.h"
+
+enum { MOST_EVENTS = 400 };
+
+typedef struct page {
+    FILE *out;
+    bst_run_reader *run;
+    bst_run_scene scene;
+    bool has_scene;
+    bst_export_sensor list[BST_EXPORT_SENSORS];
+    bst_report_sensor sensors[BST_EXPORT_SENSORS];
+    int count;
+    double span_s; /* simulated, as far as the run goes */
+    bst_warnings warnings;
+} page;
+
+static const cJSON *get(const cJSON *node, const char *key) {
+    return cJSON_GetObjectItemCaseSensitive(node, key);
+}
+
+static const char *text_of(const cJSON *node, const char *key, const char *fallback) {
+    const cJSON *item = get(node, key);
+    return cJSON_IsString(item) ? item->valuestring : fallback;
+}
+
+static double number_of(const cJSON *node, const char *key) {
+    const cJSON *item = get(node, key);
+    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
+}
+
+/* The summary of a sensor; NULL when the run has none. */
+static const cJSON *summary_of(const page *p, int i) {
+    const cJSON *manifest = bst_run_reader_manifest(p->run);
+    const cJSON *own = get(get(manifest, "sensors"), p->sensors[i].name);
+    return own ? own : i == 0 ? get(manifest, "summary") : NULL;
+}
+
+/* ------------------------------------------------------------------ reading */
+
+static double span_of(const bst_run_reader *run) {
+    const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
+    double rate = number_of(scenario, "tick_rate_hz"), whole = number_of(scenario, "duration_s");
+    if (bst_run_reader_state(run) == BST_RUN_COMPLETE) {
+        return whole;
+    }
+    double last = number_of(manifest, "last_tick");
+    if (isnan(last)) {
+        static const char *const sources[] = {"SELECT max(end_tick) FROM frames",
+                                              "SELECT max(end_tick) FROM exposures",
+                                              "SELECT max(tick) FROM control"};
+        for (int k = 0; k < 3; k++) {
+            last = fmax(last, (double)bst_run_reader_int(run, sources[k], 0, -1));
+        }
+    }
+    return rate > 0.0 ? (last + 1.0) / rate : whole;
+}
+
+static bst_status read_sensors(bst_ctx *ctx, page *p) {
+    int count = 0;
+    bst_ctx unheard = {0};
+    if (!bst_run_reader_has_tables(p->run) ||
+        bst_export_sensors(&unheard, p->run, NULL, p->list, &count) != BST_OK) {
+        count = 0;
+    }
+    for (int i = 0; i < count; i++) {
+        bst_report_sensor *s = &p->sensors[i];
+        /* the summary's key needs the name, which the reading makes */
+        snprintf(s->name, sizeof s->name, "%s/%s", p->list[i].observer, p->list[i].name);
+        BST_TRY(bst_report_read(ctx, p->run, p->has_scene ? &p->scene : NULL, &p->list[i],
+                                summary_of(p, i), s));
+        p->count = i + 1;
+        if (s->damaged) {
+            bst_run_reader_note_problem(p->run, "run.sqlite is damaged: of %s not all can be shown",
+                                        s->name);
+        }
+    }
+    return BST_OK;
+}
+
+/* ------------------------------------------------------------------ the head */
+
+static void put_head(const page *p) {
+    static const char *const classes[] = {[BST_RUN_COMPLETE] = "good",
+                                          [BST_RUN_INTERRUPTED] = "bad",
+                                          [BST_RUN_RUNNING] = "fair",
+                                          [BST_RUN_KILLED] = "bad"};
+    const cJSON *scenario = bst_run_reader_scenario(p->run);
+    char name[256];
+    bst_run_state state = bst_run_reader_state(p->run);
+    fprintf(p->out, "<p class=\"sub\"><span class=\"badge %s\">%s</span> Folder ", classes[state],
+            bst_run_state_name(state));
+    bst_html_text(p->out, bst_report_folder(p->run, name));
+    fputs("</p>\n", p->out);
+    const char *description = text_of(scenario, "description", "");
+    if (description[0]) {
+        fputs("<p>", p->out);
+        bst_html_text(p->out, description);
+        fputs("</p>\n", p->out);
+    }
+}
+
+static void put_times(const page *p) {
+    const cJSON *scenario = bst_run_reader_scenario(p->run);
+    bst_time epoch;
+    char from[40] = "-", to[40] = "-";
+    if (bst_run_reader_epoch(p->run, &epoch)) {
+        bst_time_to_utc(epoch, 3, from, sizeof from);
+        if (isfinite(p->span_s)) {
+            bst_time_to_utc(bst_time_add(epoch, p->span_s), 3, to, sizeof to);
+        }
+    }
+    bst_page_row(p->out, "from (UTC)", "%s", from);
+    bst_page_row(p->out, "to (UTC)", "%s", to);
+    double whole = number_of(scenario, "duration_s");
+    if (bst_run_reader_state(p->run) == BST_RUN_COMPLETE) {
+        bst_page_row(p->out, "duration", "%.9g s", p->span_s);
+    } else {
+        bst_page_row(p->out, "duration", "%.9g s of %.9g s", p->span_s, whole);
+    }
+}
+
+static void put_objects(const page *p) {
+    const cJSON *world = get(bst_run_reader_scenario(p->run), "world"),
+                *objects = get(world, "objects"), *object;
+    int count = cJSON_GetArraySize(objects), shown = 0;
+    char names[600] = "";
+    cJSON_ArrayForEach(object, objects) {
+        size_t n = strlen(names);
+        if (shown++ < 8) {
+            snprintf(names + n, sizeof names - n, "%s%.60s", n ? ", " : "",
+                     text_of(object, "name", "?"));
+        }
+    }
+    const cJSON *catalogues = get(world, "catalogues"), *catalogue;
+    if (count > 0 || cJSON_GetArraySize(catalogues) == 0) {
+        bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
+                     count > 8 ? " ..." : "");
+    }
+    cJSON_ArrayForEach(catalogue, catalogues) {
+        const char *file = text_of(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
+        bst_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
+                     slash ? slash + 1 : file);
+    }
+}
+
+static void put_identity(const page *p) {
+    const cJSON *manifest = bst_run_reader_manifest(p->run),
+                *scenario = bst_run_reader_scenario(p->run);
+    bst_page_section(p->out, 2, "What was run");
+    fputs("<div class=\"scroll\"><table class=\"two\">\n", p->out);
+    bst_page_row(p->out, "scenario", "%s",
+                 text_of(scenario, "name", text_of(manifest, "scenario", "-")));
+    bst_page_row(p->out, "scenario file", "%s", text_of(manifest, "scenario_file", "-"));
+    put_times(p);
+    bst_page_row(p->out, "program", "Boresight %s",
+                 text_of(manifest, "version", "(version unknown)"));
+    bst_page_row(p->out, "git revision", "%s", text_of(manifest, "git_revision", "-"));
+    const cJSON *identity = manifest ? manifest : scenario;
+    bst_page_row(p->out, "seed", "%s, run %.0f", text_of(identity, "seed", "-"),
+                 isfinite(number_of(identity, "run")) ? number_of(identity, "run") : 0.0);
+    const char *device = text_of(manifest, "device", "");
+    bst_page_row(p->out, "device", "%s", device[0] || !manifest ? device : "none: no images");
+    if (isfinite(number_of(manifest, "stars"))) {
+        bst_page_row(p->out, "star catalogue", "%s, %.0f stars",
+                     text_of(manifest, "star_catalogue", ""), number_of(manifest, "stars"));
+    }
+    put_objects(p);
+    for (int i = 0; i < p->count; i++) {
+        const bst_report_sensor *s = &p->sensors[i];
+        bst_page_row(p->out, i == 0 ? "sensors" : "",
+                     "%s: %" PRId64 " × %" PRId64 " px of %.4g arcsec%s%s", s->name, s->width_px,
+                     s->height_px, s->pixel_scale_arcsec, s->sensor.target[0] ? ", target " : "",
+                     s->sensor.target);
+    }
+    if (isfinite(number_of(manifest, "wall_time_s"))) {
+        bst_page_row(p->out, "wall time", "%.3g s", number_of(manifest, "wall_time_s"));
+    }
+    fputs("</table></div>\n", p->out);
+    bst_page_section_end(p->out);
+}
+
+/* ------------------------------------------------------------------ headline figures */
+
+static int64_t count_of(const page *p, const char *sql, int sensor) {
+    return bst_run_reader_int(p->run, sql, p->sensors[sensor].sensor.index, 0);
+}
+
+static void put_cards(const page *p, int i) {
+    const bst_report_sensor *s = &p->sensors[i];
+    const bst_loop_figures *f = &s->loop;
+    char text[32], note[160], words[2][32];
+    fputs("<div class=\"cards\">\n", p->out);
+    if (s->sensor.target[0] && s->has_tracks) {
+        snprintf(note, sizeof note, "of the visible frames in track; %s %% from acquisition on",
+                 bst_page_number(words[0], 100.0 * f->track_fraction, 4));
+        bst_page_card(p->out, bst_page_number(text, 100.0 * f->custody, 4), "%", "custody", note);
+        snprintf(note, sizeof note, "confirmed after %s s, settled after %s s",
+                 bst_page_number(words[0], f->time_to_confirm_s, 4),
+                 bst_page_number(words[1], f->time_to_settle_s, 4));
+        bst_page_card(p->out, bst_page_number(text, f->time_to_acquire_s, 4), "s",
+                      "time to acquire", note);
+        snprintf(note, sizeof note, "99 %% below %s px, bias %s px",
+                 bst_page_number(words[0], f->pointing_p99_px, 3),
+                 bst_page_number(words[1], f->pointing_bias_px, 2));
+        bst_page_card(p->out, bst_page_number(text, f->pointing_rms_px, 3), "px", "pointing RMS",
+                      note);
+        bst_page_card(p->out, f->final_mode >= 0 ? bst_mode_name(f->final_mode) : "-", "",
+                      "mode at the end", "");
+    }
+    snprintf(text, sizeof text, "%" PRId64, f->frames);
+    bst_page_card(p->out, text, "", "exposures", "");
+    int64_t frames = count_of(p, "SELECT count(*) FROM detection_frames WHERE sensor = ?1", i);
+    if (frames > 0) {
+        int64_t all =
+            count_of(p, "SELECT sum(detections) FROM detection_frames WHERE sensor = ?1", i);
+        snprintf(text, sizeof text, "%" PRId64, all);
+        snprintf(note, sizeof note, "%s a frame",
+                 bst_page_number(words[0], (double)all / (double)frames, 3));
+        bst_page_card(p->out, text, "", "detections", note);
+    }
+    if (isfinite(s->real_time_factor)) {
+        bst_page_card(p->out, bst_page_number(text, s->real_time_factor, 3), "×", "speed",
+                      "simulated time over wall time");
+    }
+    fputs("</div>\n", p->out);
+}
+
+/* ------------------------------------------------------------------ events */
+
+static void put_event(FILE *out, const bst_rows *rows) {
+    fprintf(out, "<tr><td class=\"n\">%.3f</td><td>", bst_rows_real(rows, 0));
+    for (int k = 1; k < 5; k++) {
+        char utc[32];
+        snprintf(utc, sizeof utc, "%.19s", bst_rows_text(rows, 1));
+        bst_html_text(out, k == 1 ? utc : bst_rows_text(rows, k));
+        fputs(k < 4 ? "</td><td>" : "</td></tr>\n", out);
+    }
+}
+
+static bst_status put_events(bst_ctx *ctx, const page *p) {
+    bst_ctx unheard = {0};
+    bst_rows *rows;
+    bool more;
+    int64_t total = bst_run_reader_int(p->run, "SELECT count(*) FROM events", 0, 0), shown = 0;
+    bst_page_section(p->out, 2, "Events");
+    if (total == 0 || bst_rows_open(&unheard, p->run,
+                                    "SELECT time_s, utc(time_s), source, kind, text FROM events"
+                                    " ORDER BY tick, rowid",
+                                    0, 0, &rows) != BST_OK) {
+        fputs("<p class=\"note\">No events are recorded.</p>\n", p->out);
+        bst_page_section_end(p->out);
+        return BST_OK;
+    }
+    fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
+            bst_count_text((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
+    fputs(
+        "<div class=\"scroll\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
+        "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
+        p->out);
+    bst_status status;
+    while ((status = bst_rows_next(&unheard, rows, &more)) == BST_OK && more) {
+        /* of very many the first and the last ones */
+        bool middle =
+            total > MOST_EVENTS && shown >= MOST_EVENTS / 2 && shown < total - MOST_EVENTS / 2;
+        if (!middle) {
+            put_event(p->out, rows);
+        } else if (shown == MOST_EVENTS / 2) {
+            fprintf(p->out, "<tr><td colspan=\"5\">%" PRId64 " events more</td></tr>\n",
+                    total - MOST_EVENTS);
+        }
+        shown++;
+    }
+    bst_rows_close(rows);
+    fputs("</tbody></table></div>\n</details>\n", p->out);
+    if (status == BST_ERR_FORMAT) {
+        fputs("<p class=\"bad\">The table is damaged beyond here.</p>\n", p->out);
+        bst_run_reader_note_problem(p->run, "%s", unheard.message);
+        status = BST_OK;
+    }
+    bst_page_section_end(p->out);
+    return status == BST_OK ? BST_OK : bst_fail(ctx, status, "%s", unheard.message);
+}
+
+/* ------------------------------------------------------------------ all of it */
+
+static bst_status put_sensor(bst_ctx *ctx, const page *p, int i) {
+    const bst_report_sensor *s = &p->sensors[i];
+    char heading[200];
+    snprintf(heading, sizeof heading, "Sensor %s", s->name);
+    bst_page_section(p->out, 2, heading);
+    put_cards(p, i);
+    BST_TRY(bst_report_plots(ctx, p->out, s, p->span_s));
+    bst_page_section(p->out, 3, "Frames");
+    BST_TRY(bst_report_frames(ctx, p->out, p->run, s));
+    bst_page_section_end(p->out);
+    bst_page_section_end(p->out);
+    return BST_OK;
+}
+
+/* The summary alone, of a run without tables. */
+static void put_summary(const page *p) {
+    const cJSON *summary = get(bst_run_reader_manifest(p->run), "summary"), *item;
+    bst_page_section(p->out, 2, "Summary");
+    fputs("<table class=\"two\">\n", p->out);
+    cJSON_ArrayForEach(item, summary) {
+        char text[32];
+        bst_page_row(
+            p->out, item->string, "%s",
+            cJSON_IsString(item)
+                ? item->valuestring
+                : bst_page_number(text, cJSON_IsNumber(item) ? item->valuedouble : NAN, 6));
+    }
+    fputs("</table>\n", p->out);
+    bst_page_section_end(p->out);
+}
+
+static bst_status put_page(bst_ctx *ctx, page *p) {
+    char title[200];
+    const cJSON *scenario = bst_run_reader_scenario(p->run),
+                *manifest = bst_run_reader_manifest(p->run);
+    snprintf(title, sizeof title, "Run of %.150s",
+             text_of(scenario, "name", text_of(manifest, "scenario", "an unknown scenario")));
+    bst_page_begin(p->out, title);
+    put_head(p);
+    bst_warnings_write(p->out, &p->warnings);
+    put_identity(p);
+    bst_status status = bst_report_sightings(ctx, p->out, p->run, p->span_s);
+    if (status != BST_OK && status != BST_ERR_FORMAT) {
+        return status;
+    }
+    if (status == BST_ERR_FORMAT) {
+        bst_run_reader_note_problem(p->run, "%s", ctx->message);
+    }
+    for (int i = 0; i < p->count; i++) {
+        BST_TRY(bst_export_check(ctx));
+        BST_TRY(put_sensor(ctx, p, i));
+    }
+    if (p->count == 0) {
+        put_summary(p);
+    }
+    BST_TRY(put_events(ctx, p));
+    fprintf(p->out,
+            "<p class=\"note\">Made by Boresight %s. boresight info lists the folder's tables and "
+            "files, boresight export takes them out.</p>\n",
+            bst_version());
+    bst_page_end(p->out);
+    return BST_OK;
+}
+
+bst_status bst_report_run(bst_ctx *ctx, bst_run_reader *run, FILE *out) {
+    page *p = calloc(1, sizeof *p);
+    if (!p) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the report");
+    }
+    p->out = out;
+    p->run = run;
+    p->span_s = span_of(run);
+    bst_ctx unheard = {0};
+    p->has_scene =
+        bst_run_reader_scenario(run) && bst_run_scene_open(&unheard, run, &p->scene) == BST_OK;
+    if (!p->has_scene) {
+        bst_warnings_add(
+            &p->warnings, BST_SEVERITY_NOTE,
+            "The run's world cannot be made again (%s): what lies outside the field is "
+            "not shown.",
+            bst_run_reader_scenario(run) ? bst_report_local(run, unheard.message)
+                                         : "no scenario.json");
+    }
+    bst_status status = read_sensors(ctx, p);
+    if (status == BST_OK) {
+        bst_report_run_warnings(run, p->sensors, p->count, p->has_scene ? &p->scene.scenario : NULL,
+                                &p->warnings);
+        status = put_page(ctx, p);
+    }
+    for (int i = 0; i < p->count; i++) {
+        bst_report_sensor_free(&p->sensors[i]);
+    }
+    bst_run_scene_close(&p->scene);
+    free(p);
+    return status;
+}

@@ -1,0 +1,53 @@
+#include "sim/run/run_link.h"
+
+#include <stdio.h>
+
+#include "sim/cli/stop_signals.h"
+
+static bool stop(void *user) {
+    (void)user;
+    return bst_stop_requested();
+}
+
+bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) {
+    bst_link *link = bst_simulation_link(simulation);
+    if (!link) {
+        return BST_OK;
+    }
+    bst_link_on_wait(link, stop, NULL);
+    return bst_link_open(ctx, link);
+}
+
+static const char tape[] = "link.packets";
+
+bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {
+    bst_link *link = bst_simulation_link(simulation);
+    char path[600];
+    if (!link) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "--replay: no module of the scenario is of type \"external\"; what has no "
+                        "peer is repeated by running it");
+    }
+    snprintf(path, sizeof path, "%.500s/%s", folder, tape);
+    return bst_link_replay(ctx, link, path);
+}
+
+bst_status bst_run_link_record(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {
+    bst_link *link = bst_simulation_link(simulation);
+    char path[600];
+    snprintf(path, sizeof path, "%.500s/%s", folder, tape);
+    return link && !bst_link_replays(link) ? bst_link_record(ctx, link, path) : BST_OK;
+}
+
+bst_status bst_run_link_recorded(bst_ctx *ctx, bst_simulation *simulation) {
+    bst_link *link = bst_simulation_link(simulation);
+    return link ? bst_link_record_end(ctx, link) : BST_OK;
+}
+
+void bst_run_link_end(bst_simulation *simulation, bst_status status, const char *message) {
+    bst_link *link = bst_simulation_link(simulation);
+    if (link) {
+        int reason = status == BST_OK ? 0 : status == BST_ERR_INTERRUPTED ? 1 : 2;
+        bst_link_set_end(link, reason, status == BST_OK ? "complete" : message);
+    }
+}

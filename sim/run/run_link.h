@@ -1,0 +1,20 @@
+/* The link of a run. */
+#ifndef BST_RUN_RUN_LINK_H
+#define BST_RUN_RUN_LINK_H
+
+#include "sim/engine/simulation.h"
+
+/* Binds the address where modules are outside, and lets the signals that end a run end its waiting.
+ */
+bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) BST_MUST_CHECK;
+/* What peers are told when the simulation is freed; NULL allowed. */
+/* Has a linked simulation answered as in the run of this folder. BST_ERR_CONFIG: it has no link. */
+bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation,
+                               const char *folder) BST_MUST_CHECK;
+/* Records what peers answer into a run's folder; nothing without a link, or while replaying. */
+bst_status bst_run_link_record(bst_ctx *ctx, bst_simulation *simulation,
+                               const char *folder) BST_MUST_CHECK;
+bst_status bst_run_link_recorded(bst_ctx *ctx, bst_simulation *simulation) BST_MUST_CHECK;
+void bst_run_link_end(bst_simulation *simulation, bst_status status, const char *message);
+
+#endif

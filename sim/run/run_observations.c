@@ -1,0 +1,259 @@
+#include "sim/run/run_observations.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "sim/astro/bodies.h"
+#include "sim/cli/plugins.h"
+#include "sim/onboard/knowledge.h"
+#include "tracker/mtt/tangent.h"
+
+void bst_creation_date(char text[32]) {
+    time_t now = time(NULL);
+    struct tm utc = {0};
+    gmtime_r(&now, &utc);
+    strftime(text, 32, "%Y-%m-%dT%H:%M:%S", &utc);
+}
+
+bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *out) {
+    char path[4096];
+    *out = (bst_run_scene){.run = run};
+    BST_TRY(bst_run_reader_file(ctx, run, "scenario.json", path, sizeof path));
+    BST_TRY(bst_json_load(ctx, path, &out->json));
+    BST_TRY(bst_plugins_recorded_read(ctx, out->json, &out->scenario));
+    /* directions need no stars */
+    bst_world_config config = out->scenario.world;
+    config.faint_stars = BST_FAINT_NONE;
+    snprintf(config.star_catalogue, sizeof config.star_catalogue, "embedded");
+    out->tick_rate_hz = out->scenario.tick_rate_hz;
+    BST_TRY(bst_world_create(ctx, out->scenario.file, &config, &out->scenario.observers,
+                             out->scenario.base_dir, out->scenario.epoch, &out->world));
+    return bst_view_create(ctx, out->world, &out->view);
+}
+
+void bst_run_scene_close(bst_run_scene *scene) {
+    bst_view_free(scene->view);
+    bst_world_free(scene->world);
+    if (scene->json) {
+        bst_scenario_free(&scene->scenario);
+        bst_json_free(scene->json);
+    }
+}
+
+bst_status bst_run_scene_find(bst_ctx *ctx, const bst_run_scene *scene,
+                              const bst_export_sensor *sensor, int *observer_index,
+                              int *sensor_index) {
+    const bst_observer_config *observers = scene->scenario.observers.items;
+    for (int i = 0; i < scene->scenario.observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int k = 0; k < observers[i].sensors.count; k++) {
+            if (strcmp(observers[i].name, sensor->observer) == 0 &&
+                strcmp(sensors[k].name, sensor->name) == 0) {
+                *observer_index = i;
+                *sensor_index = k;
+                return BST_OK;
+            }
+        }
+    }
+    return bst_fail(ctx, BST_ERR_FORMAT, "%s: scenario.json has no sensor %s/%s",
+                    bst_run_reader_folder(scene->run), sensor->observer, sensor->name);
+}
+
+static const char query[] =
+    "SELECT t.track_id, t.tick, t.target_of_interest, t.ra_deg, t.dec_deg, t.v_mag, t.snr,"
+    " t.cov_d1_d1_rad2, t.cov_d1_d2_rad2, t.cov_d2_d2_rad2, f.attitude_valid,"
+    " f.attitude_q_cam_from_gcrf_x, f.attitude_q_cam_from_gcrf_y, f.attitude_q_cam_from_gcrf_z,"
+    " f.attitude_q_cam_from_gcrf_w, f.attitude_sigma_x_arcsec, f.attitude_sigma_y_arcsec,"
+    " f.attitude_sigma_z_arcsec, f.attitude_shared, t.x_px, t.y_px, d.cov_xx_px2, d.cov_xy_px2, "
+    "d.cov_yy_px2,"
+    " g.end_tick - g.start_tick"
+    " FROM tracks t JOIN track_frames f ON f.sensor = t.sensor AND f.exposure_id = t.exposure_id"
+    " LEFT JOIN detections d ON d.sensor = t.sensor AND d.exposure_id = t.exposure_id"
+    " AND d.x_px = t.x_px AND d.y_px = t.y_px"
+    " LEFT JOIN detection_frames g ON g.sensor = t.sensor AND g.exposure_id = t.exposure_id"
+    " WHERE t.sensor = ?1 AND t.misses_in_row = 0 AND (?2 = 0 OR t.track_id = ?2)"
+    " AND t.track_id IN (SELECT track_id FROM tracks WHERE sensor = ?1"
+    " AND (status = 'confirmed' OR target_of_interest = 1))"
+    " ORDER BY t.track_id, t.tick";
+
+enum {
+    ID,
+    TICK,
+    TARGET,
+    RA,
+    DEC,
+    V_MAG,
+    SNR,
+    COV_D,
+    VALID = COV_D + 3,
+    ATTITUDE,
+    SIGMA = ATTITUDE + 4,
+    SHARED = SIGMA + 3,
+    X_PX,
+    Y_PX,
+    COV_PX,
+    EXPOSURE = COV_PX + 3
+};
+
+typedef struct gathering {
+    bst_run_scene *scene;
+    const bst_camera *camera;
+    int observer, sensor_index;
+    bool filtered;
+    bst_run_track track;
+    bst_run_observation *items;
+    int64_t capacity;
+    bst_vec3 boresight; /* of the latest item */
+    double share;       /* of the attitude's variance that frames share, latest */
+} gathering;
+
+/* The detection's place on the sky, and what its errors and the attitude's make of it. */
+static void measure(const gathering *g, const bst_rows *rows, const bst_light *light,
+                    bst_od_observation *out) {
+    double x = bst_rows_real(rows, X_PX), y = bst_rows_real(rows, Y_PX);
+    bst_quat back = bst_quat_conj(bst_quat_unit(
+        (bst_quat){bst_rows_real(rows, ATTITUDE), bst_rows_real(rows, ATTITUDE + 1),
+                   bst_rows_real(rows, ATTITUDE + 2), bst_rows_real(rows, ATTITUDE + 3)}));
+    bst_vec3 v = bst_camera_unproject(g->camera, x, y), columns[5];
+    const bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    columns[0] = bst_vec3_sub(bst_camera_unproject(g->camera, x + 0.5, y),
+                              bst_camera_unproject(g->camera, x - 0.5, y));
+    columns[1] = bst_vec3_sub(bst_camera_unproject(g->camera, x, y + 0.5),
+                              bst_camera_unproject(g->camera, x, y - 0.5));
+    double c[5][5] = {{bst_rows_real(rows, COV_PX), bst_rows_real(rows, COV_PX + 1)},
+                      {bst_rows_real(rows, COV_PX + 1), bst_rows_real(rows, COV_PX + 2)}};
+    for (int i = 0; i < 3; i++) {
+        columns[2 + i] = bst_vec3_cross(unit[i], v);
+        double sigma = bst_rows_real(rows, SIGMA + i) * BST_ARCSEC_RAD;
+        c[2 + i][2 + i] = sigma * sigma;
+    }
+    out->direction = bst_light_unaberrate(light, bst_quat_rotate(back, v));
+    bst_tangent axes = bst_tangent_at(out->direction);
+    double j[2][5];
+    for (int i = 0; i < 5; i++) {
+        bst_vec3 column = bst_quat_rotate(back, columns[i]);
+        j[0][i] = bst_vec3_dot(column, axes.e1);
+        j[1][i] = bst_vec3_dot(column, axes.e2);
+    }
+    for (int axis = 0; axis < 2; axis++) { /* about camera x and y; all of it: see set_shared */
+        double sigma = bst_rows_real(rows, SIGMA + axis) * BST_ARCSEC_RAD;
+        out->shared_rad[0][axis] = j[0][2 + axis] * sigma;
+        out->shared_rad[1][axis] = j[1][2 + axis] * sigma;
+    }
+    for (int i = 0; i < 5; i++) {
+        for (int k = 0; k < 5; k++) {
+            out->cov_11 += j[0][i] * c[i][k] * j[0][k];
+            out->cov_12 += j[0][i] * c[i][k] * j[1][k];
+            out->cov_22 += j[1][i] * c[i][k] * j[1][k];
+        }
+    }
+}
+
+/* Stars leave the field as the camera turns: of two fields that are d apart along a side s they
+ * have the part 1 - d / s in common, of which the exponential has the same integral. */
+static double change_of_stars(gathering *g, const bst_rows *rows) {
+    const bst_camera *c = g->camera;
+    bst_vec3 before = g->boresight;
+    bst_quat q = {bst_rows_real(rows, ATTITUDE), bst_rows_real(rows, ATTITUDE + 1),
+                  bst_rows_real(rows, ATTITUDE + 2), bst_rows_real(rows, ATTITUDE + 3)};
+    g->boresight = bst_quat_rotate(bst_quat_conj(bst_quat_unit(q)), (bst_vec3){0.0, 0.0, 1.0});
+    double side = 0.5 * (double)(c->width_px + c->height_px) * bst_camera_scale_rad(c);
+    return g->track.count > 1 ? 2.0 * bst_vec3_angle(before, g->boresight) / side : 0.0;
+}
+
+/* The shared part of the attitude's errors: its share as the last frame has it, which has seen the
+ * most. */
+static void set_shared(gathering *g) {
+    for (int64_t i = 0; i < g->track.count && !g->filtered; i++) {
+        for (int k = 0; k < 4; k++) {
+            g->items[i].od.shared_rad[k / 2][k % 2] *= sqrt(g->share);
+        }
+    }
+}
+
+static bst_status add(bst_ctx *ctx, gathering *g, const bst_rows *rows) {
+    if (!g->filtered && (bst_rows_int(rows, VALID) == 0 || bst_rows_is_null(rows, COV_PX))) {
+        g->track.skipped++;
+        return BST_OK;
+    }
+    if (g->track.count == g->capacity) {
+        int64_t capacity = g->capacity ? 2 * g->capacity : 1024;
+        bst_run_observation *items = realloc(g->items, (size_t)capacity * sizeof *items);
+        if (!items) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a track's observations");
+        }
+        g->items = items;
+        g->capacity = capacity;
+    }
+    int64_t tick = bst_rows_int(rows, TICK);
+    double seconds = (double)tick / (double)g->scene->tick_rate_hz;
+    bst_state eye;
+    bst_bodies bodies;
+    BST_TRY(bst_view_believed(ctx, g->scene->view, g->observer, g->sensor_index, seconds, &eye,
+                              &bodies));
+    bst_run_observation *o = &g->items[g->track.count++];
+    *o = (bst_run_observation){
+        .time = bst_time_at_tick(g->scene->scenario.epoch, tick, g->scene->tick_rate_hz),
+        .v_mag = bst_rows_is_null(rows, V_MAG) ? NAN : bst_rows_real(rows, V_MAG),
+        .snr = bst_rows_is_null(rows, SNR) ? NAN : bst_rows_real(rows, SNR),
+        .od.observer = {.time_s = seconds,
+                        .position_m = eye.position_m,
+                        .velocity_mps = eye.velocity_mps,
+                        .earth_bary_mps = bodies.earth_bary_mps}};
+    if (g->filtered) {
+        o->od.direction = bst_vec3_from_radec(bst_rows_real(rows, RA) * BST_DEG_RAD,
+                                              bst_rows_real(rows, DEC) * BST_DEG_RAD);
+        o->od.cov_11 = bst_rows_real(rows, COV_D);
+        o->od.cov_12 = bst_rows_real(rows, COV_D + 1);
+        o->od.cov_22 = bst_rows_real(rows, COV_D + 2);
+    } else {
+        bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+        measure(g, rows, &light, &o->od);
+        o->od.shared_change = change_of_stars(g, rows);
+        g->share = bst_rows_real(rows, SHARED);
+    }
+    g->track.target = g->track.target || bst_rows_int(rows, TARGET) != 0;
+    if (g->track.count == 1) {
+        g->track.exposure_s = bst_rows_is_null(rows, EXPOSURE)
+                                  ? NAN
+                                  : bst_rows_real(rows, EXPOSURE) / (double)g->scene->tick_rate_hz;
+    }
+    return BST_OK;
+}
+
+static bst_status hand_over(bst_ctx *ctx, gathering *g, bst_run_track_fn take, void *user) {
+    g->track.items = g->items;
+    set_shared(g);
+    bst_status status = g->track.count > 0 ? take(user, ctx, &g->track) : BST_OK;
+    g->track = (bst_run_track){.sensor = g->track.sensor};
+    return status;
+}
+
+bst_status bst_run_observations(bst_ctx *ctx, bst_run_scene *scene, const bst_export_sensor *sensor,
+                                int64_t id, bool filtered, bst_run_track_fn take, void *user) {
+    gathering g = {.scene = scene, .filtered = filtered, .track.sensor = sensor};
+    bst_knowledge *knowledge = NULL;
+    bst_rows *rows;
+    bool more;
+    BST_TRY(bst_run_scene_find(ctx, scene, sensor, &g.observer, &g.sensor_index));
+    BST_TRY(bst_rows_open(ctx, scene->run, query, sensor->index, id, &rows));
+    bst_status status =
+        bst_knowledge_create(ctx, scene->world, g.observer, g.sensor_index, &knowledge);
+    g.camera = status == BST_OK ? bst_knowledge_camera(knowledge) : NULL;
+    while (status == BST_OK && (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        int64_t now = bst_rows_int(rows, ID);
+        if (now != g.track.id) {
+            status = hand_over(ctx, &g, take, user);
+            g.track.id = now;
+        }
+        status = status == BST_OK ? add(ctx, &g, rows) : status;
+    }
+    bst_rows_close(rows);
+    status = status == BST_OK ? hand_over(ctx, &g, take, user) : status;
+    free(g.items);
+    bst_knowledge_free(knowledge);
+    return status;
+}

@@ -1,0 +1,34 @@
+/* Who saw what: the tables passes and sightings of a run, and its summary. */
+#ifndef BST_RUN_RUN_SIGHTINGS_H
+#define BST_RUN_RUN_SIGHTINGS_H
+
+#include "sim/engine/recorder/recorder.h"
+#include "sim/eval/sightings.h"
+#include "sim/io/run_store.h"
+
+struct cJSON;
+
+typedef struct bst_run_sightings bst_run_sightings;
+
+/* Makes the tables in `store`, which outlives it; NULL: the figures only. *out NULL when the record
+ * is not to have them, or there are no objects. */
+bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
+                                    const bst_record_config *record, int64_t tick_rate_hz,
+                                    bst_run *store, bst_run_sightings **out) BST_MUST_CHECK;
+void bst_run_sightings_free(bst_run_sightings *sightings); /* NULL allowed */
+
+/* A message; `sensor` counts from 0 over all observers. NULL sightings: nothing. */
+bst_status bst_run_sightings_message(bst_ctx *ctx, bst_run_sightings *sightings, int sensor,
+                                     const char *channel, const void *payload) BST_MUST_CHECK;
+/* The last rows, at the end of the simulated time. */
+bst_status bst_run_sightings_finish(bst_ctx *ctx, bst_run_sightings *sightings,
+                                    double end_s) BST_MUST_CHECK;
+
+/* After that: the summary; false and all zero when there is none. */
+bool bst_run_sightings_figures(const bst_run_sightings *sightings, bst_sightings_figures *out);
+
+/* Adds "sightings" to a manifest; prints the same as rows. */
+void bst_run_sightings_add(const bst_run_sightings *sightings, struct cJSON *manifest);
+void bst_run_sightings_print(const bst_run_sightings *sightings);
+
+#endif

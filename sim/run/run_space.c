@@ -1,0 +1,61 @@
+#include "sim/run/run_space.h"
+
+#include <math.h>
+
+#include "sim/io/run_store.h"
+
+/* Less is written without a word. */
+#define WORTH_SAYING_BYTES 1e8
+
+/* Bytes of all frames and planes, before the tables. */
+static double frame_bytes(const bst_scenario *scenario) {
+    const bst_observer_config *observers = scenario->observers.items;
+    const bst_record_config *record = &scenario->record;
+    /* Rice takes noise of some DN to about half */
+    double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
+                                    : bst_record_compresses(record)        ? 1.0
+                                                                           : 2.0;
+    for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
+        per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;
+    }
+    for (int i = 0; i < scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            const bst_exposure_config *e = &sensors[s].exposure;
+            double frames = floor((scenario->duration_s - e->first_s) / e->period_s);
+            bytes += fmax(frames, 0.0) * per_pixel * (double)sensors[s].camera.width_px *
+                     (double)sensors[s].camera.height_px;
+        }
+    }
+    return bytes;
+}
+
+bst_status bst_run_check_space(bst_ctx *ctx, const bst_scenario *scenario, const char *out,
+                               bool force) {
+    double bytes = frame_bytes(scenario), free_bytes = (double)bst_run_free_bytes(out);
+    if (!(bytes > WORTH_SAYING_BYTES)) {
+        return BST_OK;
+    }
+    if (free_bytes < 0.0) { /* not known */
+        bst_log(ctx, BST_LOG_INFO, "%s: the frames will take about %.1f GB", out, bytes * 1e-9);
+        return BST_OK;
+    }
+    if (bytes <= free_bytes) {
+        bst_log(ctx, BST_LOG_INFO, "%s: the frames will take about %.1f GB of %.1f GB free", out,
+                bytes * 1e-9, free_bytes * 1e-9);
+        return BST_OK;
+    }
+    static const char advice[] =
+        "shorten the run (--duration), set /record/frames=none, or "
+        "choose another output folder";
+    if (!force) {
+        return bst_fail(ctx, BST_ERR_IO,
+                        "%s: the frames will take about %.1f GB and %.1f GB are free there; %s; "
+                        "--force starts all the same",
+                        out, bytes * 1e-9, free_bytes * 1e-9, advice);
+    }
+    bst_log(ctx, BST_LOG_WARNING,
+            "%s: the frames will take about %.1f GB and %.1f GB are free there; %s", out,
+            bytes * 1e-9, free_bytes * 1e-9, advice);
+    return BST_OK;
+}

@@ -1,0 +1,29 @@
+/* A track's measured directions in the formats that others read. */
+#ifndef BST_RUN_TRACK_FILES_H
+#define BST_RUN_TRACK_FILES_H
+
+#include <stdio.h>
+
+#include "sim/run/run_observations.h"
+
+/* Name of the object that a track is taken for: what the sensor looks for, or TRACK-7. */
+void bst_track_object(const bst_run_track *track, char *name, size_t bytes);
+
+/* A segment of a TDM whose head is written. `ephemeris` names the OEM with the observer's states
+ * (NULL: none); `what` says what the angles are. */
+bst_status bst_track_write_tdm(bst_ctx *ctx, FILE *stream, const bst_run_track *track,
+                               const char *ephemeris, const char *what) BST_MUST_CHECK;
+
+/* The observations as objects of a JSON array, as the community exchanges them: obTime, ra,
+ * declination (deg), raUnc, declinationUnc, mag, snrEst, expDuration, senx ... senvelz (km, km/s,
+ * GCRF). `first`: nothing stands before them in the array. norad 0: not known. */
+bst_status bst_track_write_json(bst_ctx *ctx, FILE *stream, const bst_run_track *track, int norad,
+                                bool first) BST_MUST_CHECK;
+
+/* The header row of a CSV of observations, and a row each: utc, track, object, sensor, ra_deg,
+ * dec_deg, sigmas and correlation, v_mag, snr, the observer's state (m, m/s). */
+void bst_track_csv_head(FILE *stream);
+bst_status bst_track_write_csv(bst_ctx *ctx, FILE *stream,
+                               const bst_run_track *track) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,26 @@
+/* Labels of a sequence of frames, object by object as in SatNet, in one file a sequence. */
+#ifndef BST_STUDY_KINDS_STUDY_LABELS_H
+#define BST_STUDY_KINDS_STUDY_LABELS_H
+
+#include <stdio.h>
+
+#include "sim/messages/messages.h"
+#include "sim/world/world.h"
+
+typedef struct bst_labels {
+    FILE *stream;
+    const bst_world *world;
+    double box_px, star_limit_v_mag;
+    bool mask;                         /* seg_id is the number in the segmentation mask */
+    int64_t frames, satellites, stars; /* labels so far */
+    double snr_sum;                    /* of the satellites */
+    double longest_px;                 /* way of a satellite through a frame */
+} bst_labels;
+
+/* The frame's part of the list "frames": its time and the objects whose light is in it, as
+ * boresight export --satnet has them. Coordinates are fractions of the image between pixel edges.
+ */
+void bst_labels_frame(bst_labels *labels, const bst_frame_message *frame, const char *start_utc,
+                      double exposure_s, const bst_truth *truth);
+
+#endif

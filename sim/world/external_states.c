@@ -1,0 +1,83 @@
+#include "sim/world/external_states.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+
+#include "sim/astro/kepler.h"
+#include "sim/world/world_internal.h"
+
+enum { KEPT = 4096 };
+
+typedef struct kept_state {
+    double seconds;
+    bst_state state;
+} kept_state;
+
+struct bst_steering {
+    pthread_mutex_t lock;
+    kept_state states[KEPT]; /* a ring: number n is states[n % KEPT] */
+    int64_t count;
+};
+
+bst_status bst_steering_create(bst_ctx *ctx, bst_steering **out) {
+    *out = calloc(1, sizeof **out);
+    if (!*out) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for states that come by message");
+    }
+    pthread_mutex_init(&(*out)->lock, NULL);
+    return BST_OK;
+}
+
+void bst_steering_free(bst_steering *s) {
+    if (s) {
+        pthread_mutex_destroy(&s->lock);
+        free(s);
+    }
+}
+
+bst_status bst_steering_add(bst_ctx *ctx, bst_steering *s, double seconds, const bst_state *state) {
+    pthread_mutex_lock(&s->lock);
+    double last = s->count > 0 ? s->states[(s->count - 1) % KEPT].seconds : -INFINITY;
+    bool later = seconds > last;
+    if (later) {
+        s->states[s->count++ % KEPT] = (kept_state){seconds, *state};
+    }
+    pthread_mutex_unlock(&s->lock);
+    return later ? BST_OK
+                 : bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "a state at %.9g s after one at %.9g s: they come in the order of time",
+                            seconds, last);
+}
+
+bst_status bst_steering_state(bst_ctx *ctx, bst_steering *s, double seconds, bool *steered,
+                              bst_state *out) {
+    pthread_mutex_lock(&s->lock);
+    int64_t low = s->count > KEPT ? s->count - KEPT : 0, high = s->count;
+    /* the last one that is not later, or of those that are still known the first */
+    *steered = s->count > 0 && (low > 0 || s->states[0].seconds <= seconds);
+    while (high - low > 1) {
+        int64_t middle = low + (high - low) / 2;
+        if (s->states[middle % KEPT].seconds <= seconds) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    kept_state from = s->states[low % KEPT];
+    pthread_mutex_unlock(&s->lock);
+    return *steered ? bst_kepler_propagate(ctx, BST_EARTH_MU_M3PS2, from.state.position_m,
+                                           from.state.velocity_mps, seconds - from.seconds,
+                                           &out->position_m, &out->velocity_mps)
+                    : BST_OK;
+}
+
+bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
+                           const bst_state *state) {
+    int object = bst_world_find_object(world, name);
+    bst_steering *steering = object >= 0 ? world->objects[object].orbit.steering : NULL;
+    if (!steering) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND, "no object \"%.64s\" whose key \"steered\" is true",
+                        name);
+    }
+    return bst_steering_add(ctx, steering, seconds, state);
+}

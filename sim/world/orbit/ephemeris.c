@@ -1,0 +1,567 @@
+#include "sim/world/orbit/ephemeris.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/parallel.h"
+#include "sim/core/simd.h"
+
+/* Knots of the polynomial, and those that its error is estimated from: its own and one more on
+ * either side. */
+enum { POINTS = 10, CHECKED = POINTS + 2, BEFORE = CHECKED / 2 - 1 };
+/* Each of so many shares of the bodies makes its next knot at another time in the interval. */
+enum { SHARES = 16 };
+/* Knots kept per body; a power of two. More than CHECKED, so that the next ones can be made one by
+ * one and looking back a little costs nothing. */
+enum { RING = 16, ROTATIONS = 32 };
+enum { STEP_CLASSES = 5, SHORTEST_STEP_S = 16 };
+
+/* Largest product |(u - o_0) ... (u - o_9)| / 10! between the two middle knots, in steps: times the
+ * tenth difference it is the error of the polynomial. */
+#define ERROR_OF_DIFFERENCE 2.4033e-4
+/* The estimate is kept below the tolerance by this: a jump that a tenth difference shows a
+ * thirtieth of would still be seen. */
+#define SAFETY 16.0
+#define ROUNDING_M 20e-6
+/* What comes nearer to the Earth's centre than SGP4's radius has decayed; which is decided by SGP4
+ * itself. */
+#define DECAYED_M 6378136.0
+
+/* Table of all objects at one instant of this grid. */
+enum { TABLE_STEP_S = 8, TABLES = 4 };
+/* An object of a table is within this of where it is said to be. */
+#define TABLE_ERROR_M 1000.0
+#define TABLE_SPAN_S 60.0 /* for which its bound of the speed holds */
+#define HIGHEST_SPEED_MPS 11500.0
+/* Aberration and light time shift directions by less than 3 v / c, v < 45 km/s. */
+#define SHIFT_RAD 5e-4
+/* From so many bodies on a pool of threads is worth having, and so many make a part of its work. */
+enum { BODIES_FOR_THREADS = 1024, GRAIN = 256 };
+
+typedef struct body {
+    const bst_orbit *orbit; /* NULL: not interpolated */
+    int step_class;
+    int64_t first, last; /* the knots that the slots hold; last < first: none */
+    double place_m[3][RING];
+} body;
+
+/* TEME to GCRF at the knots of a class of steps. */
+typedef struct rotations {
+    int64_t knot[ROTATIONS];
+    bst_mat3 gcrf_from_teme[ROTATIONS]; /* NAN: outside the Earth orientation's data */
+} rotations;
+
+typedef struct table {
+    int64_t index; /* time / TABLE_STEP_S */
+    bool valid;
+    int users; /* threads that read it without the lock */
+    /* NAN: unknown, may be anywhere */
+    double *x_m, *y_m, *z_m;
+    double *speed_mps; /* bound of the speed; -INFINITY: has no orbit around that time */
+} table;
+
+struct bst_ephemeris {
+    const bst_world *world;
+    pthread_mutex_t lock;                      /* over all that follows */
+    bst_parallel *pool;                        /* NULL: none */
+    bst_sky_clock *clock_knots, *clock_tables; /* two: each knows the time around its last one */
+    double limit_m;                            /* of the estimated error */
+    body *bodies;
+    int body_count, object_count;
+    rotations rotations[STEP_CLASSES];
+    table tables[TABLES];
+    double *table_memory;
+};
+
+static double step_of(int step_class) {
+    return (double)(SHORTEST_STEP_S << step_class);
+}
+
+/* ---- the polynomial ---- */
+
+/* Weights of the ten knots at u steps after the fifth of them, 0 <= u <= 1, and their derivatives
+ * by u. */
+static void lagrange(double u, double weight[POINTS], double slope[POINTS]) {
+    /* products of the factors before and after each, with their derivatives */
+    static const double divisor[POINTS] = {-362880, 40320, -10080, 4320,   -2880,
+                                           2880,    -4320, 10080,  -40320, 362880};
+    double left = 1.0, left_slope = 0.0, right[POINTS], right_slope[POINTS];
+    right[POINTS - 1] = 1.0;
+    right_slope[POINTS - 1] = 0.0;
+    for (int j = POINTS - 1; j > 0; j--) {
+        double x = u + (POINTS / 2 - 1) - j;
+        right[j - 1] = right[j] * x;
+        right_slope[j - 1] = right_slope[j] * x + right[j];
+    }
+    for (int j = 0; j < POINTS; j++) {
+        double x = u + (POINTS / 2 - 1) - j;
+        weight[j] = left * right[j] / divisor[j];
+        slope[j] = (left_slope * right[j] + left * right_slope[j]) / divisor[j];
+        left_slope = left_slope * x + left;
+        left *= x;
+    }
+}
+
+/* Tenth difference of p[0..10]. */
+static double tenth_difference(const double *p) {
+    return (p[0] + p[10]) - 10.0 * (p[1] + p[9]) + 45.0 * (p[2] + p[8]) - 120.0 * (p[3] + p[7]) +
+           210.0 * (p[4] + p[6]) - 252.0 * p[5];
+}
+
+/* Whether the polynomial through the inner ten of twelve knots is good enough. False for NAN. */
+static bool smooth(double p[3][CHECKED], double limit_m) {
+    double a = 0.0, b = 0.0;
+    for (int i = 0; i < 3; i++) {
+        double first = tenth_difference(p[i]), second = tenth_difference(p[i] + 1);
+        a += first * first;
+        b += second * second;
+    }
+    return ERROR_OF_DIFFERENCE * sqrt(a) <= limit_m && ERROR_OF_DIFFERENCE * sqrt(b) <= limit_m;
+}
+
+/* Whether the polynomial from knot `first` + 1 on would run over a place where the model jumps. */
+static bool jumps(const bst_orbit *orbit, double step, int64_t first) {
+    double period = 60.0 * bst_sgp4_step_minutes(orbit->sgp4);
+    if (!(period > 0.0)) {
+        return false;
+    }
+    double from = orbit->epoch_offset_s + (double)(first + 1) * step;
+    double jump = ceil(from / period) * period;
+    jump = jump == 0.0 ? period : jump; /* none at the epoch itself */
+    return jump <= from + (POINTS - 1) * step;
+}
+
+/* ---- knots ---- */
+
+static int slot_of(int64_t knot, int slots) {
+    return (int)((uint64_t)knot & (uint64_t)(slots - 1));
+}
+
+static const bst_mat3 *rotation_at(bst_ephemeris *e, int step_class, int64_t knot) {
+    rotations *r = &e->rotations[step_class];
+    int slot = slot_of(knot, ROTATIONS);
+    if (r->knot[slot] != knot) {
+        bst_sky sky;
+        bst_time t = bst_time_add(e->world->epoch, (double)knot * step_of(step_class));
+        if (bst_sky_clock_at(NULL, e->clock_knots, t, &sky) != BST_OK) {
+            sky.frames.gcrf_from_teme = (bst_mat3){{{NAN, NAN, NAN}}};
+        }
+        r->gcrf_from_teme[slot] = sky.frames.gcrf_from_teme;
+        r->knot[slot] = knot;
+    }
+    return &r->gcrf_from_teme[slot];
+}
+
+static bst_vec3 place_at(const bst_orbit *orbit, const bst_mat3 *gcrf_from_teme, double seconds) {
+    double r_km[3], v_kmps[3];
+    if (bst_sgp4_propagate(orbit->sgp4, (orbit->epoch_offset_s + seconds) / 60.0, r_km, v_kmps) !=
+        BST_SGP4_OK) {
+        return (bst_vec3){NAN, NAN, NAN};
+    }
+    return bst_vec3_scale(bst_mat3_mul_vec(gcrf_from_teme, (bst_vec3){r_km[0], r_km[1], r_km[2]}),
+                          1000.0);
+}
+
+static void make_missing_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
+    for (int64_t k = first; k <= last; k++) {
+        if (k < b->first || k > b->last) {
+            int slot = slot_of(k, RING);
+            bst_vec3 p = place_at(b->orbit, rotation_at(e, b->step_class, k),
+                                  (double)k * step_of(b->step_class));
+            b->place_m[0][slot] = p.x;
+            b->place_m[1][slot] = p.y;
+            b->place_m[2][slot] = p.z;
+        }
+    }
+    if (first > b->last + 1 || last < b->first - 1) {
+        b->first = first;
+        b->last = last;
+    } else if (last > b->last) {
+        b->last = last;
+        int64_t oldest = last - (RING - 1);
+        b->first = oldest > b->first ? oldest : first < b->first ? first : b->first;
+    } else {
+        b->first = first;
+        int64_t newest = first + (RING - 1);
+        b->last = newest < b->last ? newest : b->last;
+    }
+}
+
+static inline void make_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
+    if (first < b->first || last > b->last) {
+        make_missing_knots(e, b, first, last);
+    }
+}
+
+bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *position_m,
+                      bst_vec3 *velocity_mps) {
+    body *b = &e->bodies[index];
+    if (!b->orbit || !(fabs(seconds) <= 1e9)) {
+        return false;
+    }
+    double step = step_of(b->step_class), whole = floor(seconds / step);
+    int64_t first = (int64_t)whole - BEFORE;
+    if (jumps(b->orbit, step, first)) {
+        return false;
+    }
+    double p[3][CHECKED];
+    pthread_mutex_lock(&e->lock);
+    make_knots(e, b, first, first + CHECKED - 1);
+    for (int j = 0; j < CHECKED; j++) {
+        int slot = slot_of(first + j, RING);
+        for (int i = 0; i < 3; i++) {
+            p[i][j] = b->place_m[i][slot];
+        }
+    }
+    pthread_mutex_unlock(&e->lock);
+    if (!smooth(p, e->limit_m)) {
+        return false;
+    }
+    double weight[POINTS], slope[POINTS], r[3] = {0}, v[3] = {0};
+    lagrange(seconds / step - whole, weight, slope);
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < POINTS; j++) {
+            r[i] += weight[j] * p[i][j + 1];
+            v[i] += slope[j] * p[i][j + 1];
+        }
+    }
+    if (!(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > DECAYED_M * DECAYED_M)) {
+        return false;
+    }
+    *position_m = (bst_vec3){r[0], r[1], r[2]};
+    *velocity_mps = (bst_vec3){v[0] / step, v[1] / step, v[2] / step};
+    return true;
+}
+
+/* ---- tables ---- */
+
+/* What the bodies of one class have in common at the instant of a table. */
+typedef struct table_class {
+    int64_t first;       /* of the CHECKED knots */
+    double late;         /* of the interval between knots, how much has gone by */
+    double weight[RING]; /* by slot; 0 for those that do not take part */
+} table_class;
+
+typedef struct table_job {
+    bst_ephemeris *e;
+    table *table;
+    table_class classes[STEP_CLASSES];
+    bst_mat3 gcrf_from_teme[3]; /* a grid step before, at and after the table's instant */
+} table_job;
+
+/* The row of an orbit that is no polynomial then; false when there is no orbit. */
+static bool table_row_directly(const table_job *job, const bst_orbit *orbit, int i) {
+    double seconds = (double)job->table->index * TABLE_STEP_S;
+    bst_vec3 p = place_at(orbit, &job->gcrf_from_teme[1], seconds);
+    bool none = isnan(p.x) &&
+                isnan(place_at(orbit, &job->gcrf_from_teme[0], seconds - TABLE_STEP_S).x) &&
+                isnan(place_at(orbit, &job->gcrf_from_teme[2], seconds + TABLE_STEP_S).x);
+    job->table->x_m[i] = none ? 0.0 : p.x;
+    job->table->y_m[i] = none ? 0.0 : p.y;
+    job->table->z_m[i] = none ? 0.0 : p.z;
+    job->table->speed_mps[i] = -INFINITY;
+    return !none;
+}
+
+static void table_rows(void *user, int begin, int end) {
+    const table_job *job = user;
+    table *t = job->table;
+    for (int i = begin; i < end; i++) {
+        body *b = &job->e->bodies[i];
+        if (!b->orbit) {
+            t->x_m[i] = t->y_m[i] = t->z_m[i] = NAN;
+            continue;
+        }
+        const table_class *c = &job->classes[b->step_class];
+        int ahead = c->late + (double)(i % SHARES) / SHARES >= 1.0;
+        make_knots(job->e, b, c->first, c->first + CHECKED - 1 + ahead);
+        double p[3] = {0};
+        for (int slot = 0; slot < RING; slot++) {
+            for (int j = 0; j < 3; j++) {
+                p[j] += c->weight[slot] * b->place_m[j][slot];
+            }
+        }
+        t->x_m[i] = p[0];
+        t->y_m[i] = p[1];
+        t->z_m[i] = p[2];
+        if (isnan(p[0]) && !table_row_directly(job, b->orbit, i)) {
+            continue;
+        }
+        /* no faster than it would escape from the lowest place that it may come to */
+        double low = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) -
+                     (TABLE_SPAN_S * HIGHEST_SPEED_MPS + TABLE_ERROR_M);
+        double speed = 1.02 * sqrt(2.0 * BST_EARTH_MU_M3PS2 / fmax(low, 6.2e6));
+        t->speed_mps[i] = fmin(speed, HIGHEST_SPEED_MPS);
+    }
+}
+
+static void make_table(bst_ephemeris *e, table *t, int64_t index) {
+    table_job job = {.e = e, .table = t};
+    double seconds = (double)index * TABLE_STEP_S;
+    for (int c = 0; c < STEP_CLASSES; c++) {
+        double step = step_of(c), whole = floor(seconds / step), weight[POINTS], slope[POINTS];
+        table_class *out = &job.classes[c];
+        out->first = (int64_t)whole - BEFORE;
+        lagrange(seconds / step - whole, weight, slope);
+        for (int j = 0; j < POINTS; j++) {
+            out->weight[slot_of(out->first + 1 + j, RING)] = weight[j];
+        }
+        out->late = seconds / step - whole;
+        int ahead = out->late + (double)(SHARES - 1) / SHARES >= 1.0;
+        for (int j = 0; j < CHECKED + ahead; j++) {
+            (void)rotation_at(e, c, out->first + j); /* the threads only read */
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        bst_sky sky;
+        bst_time time = bst_time_add(e->world->epoch, seconds + (i - 1) * TABLE_STEP_S);
+        if (bst_sky_clock_at(NULL, e->clock_tables, time, &sky) != BST_OK) {
+            sky.frames.gcrf_from_teme = (bst_mat3){{{NAN, NAN, NAN}}};
+        }
+        job.gcrf_from_teme[i] = sky.frames.gcrf_from_teme;
+    }
+    /* the next table in turn makes few knots: not worth waking anybody, who may come late */
+    const table *before = &e->tables[slot_of(index - 1, TABLES)];
+    bool in_turn = before->valid && before->index == index - 1;
+    t->index = index;
+    bst_parallel_for(in_turn ? NULL : e->pool, e->object_count, GRAIN, table_rows, &job);
+    t->valid = true;
+}
+
+/* The table of an instant, made where it is missing; with the lock held. */
+static table *table_at(bst_ephemeris *e, int64_t index) {
+    table *t = &e->tables[slot_of(index, TABLES)];
+    while (t->users > 0 && t->index != index) { /* somebody looks far back, and is soon done */
+        pthread_mutex_unlock(&e->lock);
+        sched_yield();
+        pthread_mutex_lock(&e->lock);
+    }
+    if (!t->valid || t->index != index) {
+        make_table(e, t, index);
+    }
+    return t;
+}
+
+/* The cone of a search, and how far objects may be from where a table has them. */
+typedef struct search {
+    bst_vec3 apex_m, axis;
+    double sin_half, cos_half, span_s, sure_m;
+    double least_mps; /* bound of the speed where the table's does not hold, else 0 */
+} search;
+
+/* Distances of n objects from `begin` on from the cone's surface, less how far they may be off;
+ * behind the apex the distance is longer than this. NAN: unknown. */
+BST_CLONES_256 static void distances(const table *t, int begin, int n, const search *c,
+                                     double *outside_m) {
+    const double *px = t->x_m + begin, *py = t->y_m + begin, *pz = t->z_m + begin,
+                 *speed = t->speed_mps + begin;
+    const bst_vec3 o = c->apex_m, axis = c->axis;
+    for (int i = 0; i < n; i++) {
+        double x = px[i] - o.x, y = py[i] - o.y, z = pz[i] - o.z;
+        double along = x * axis.x + y * axis.y + z * axis.z;
+        double square = x * x + y * y + z * z - along * along;
+        double across = sqrt(square > 0.0 ? square : 0.0);
+        double least = speed[i] < 0.0 ? speed[i] : c->least_mps;
+        double fastest = speed[i] > least ? speed[i] : least;
+        outside_m[i] = across * c->cos_half - along * c->sin_half - fastest * c->span_s - c->sure_m;
+    }
+}
+
+int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_cone *cone,
+                       int *indices) {
+    int count = 0;
+    if (!(fabs(seconds) <= 1e9)) {
+        for (int i = 0; i < e->object_count; i++) {
+            indices[count++] = i;
+        }
+        return count;
+    }
+    int64_t index = llround(seconds / TABLE_STEP_S);
+    double span = fabs(seconds - (double)index * TABLE_STEP_S) + cone->half_span_s + 1e-3;
+    const search c = {.apex_m = cone->apex_m,
+                      .axis = cone->axis,
+                      .sin_half = sin(cone->half_angle_rad + SHIFT_RAD),
+                      .cos_half = cos(cone->half_angle_rad + SHIFT_RAD),
+                      .span_s = span,
+                      .sure_m = TABLE_ERROR_M + cone->apex_span_m,
+                      .least_mps = span < TABLE_SPAN_S ? 0.0 : HIGHEST_SPEED_MPS};
+    pthread_mutex_lock(&e->lock);
+    table *t = table_at(e, index);
+    t->users++;
+    pthread_mutex_unlock(&e->lock);
+    enum { BLOCK = 256 };
+    double outside[BLOCK];
+    for (int begin = 0; begin < e->object_count; begin += BLOCK) {
+        int n = e->object_count - begin < BLOCK ? e->object_count - begin : BLOCK;
+        distances(t, begin, n, &c, outside);
+        for (int i = 0; i < n; i++) {
+            if (!(outside[i] > 0.0)) {
+                indices[count++] = begin + i;
+            }
+        }
+    }
+    pthread_mutex_lock(&e->lock);
+    t->users--;
+    pthread_mutex_unlock(&e->lock);
+    return count;
+}
+
+double bst_ephemeris_places(bst_ephemeris *e, double seconds, double *x_m, double *y_m,
+                            double *z_m) {
+    int64_t index = llround(fmax(fmin(seconds, 1e9), -1e9) / TABLE_STEP_S);
+    size_t bytes = (size_t)e->object_count * sizeof *x_m;
+    pthread_mutex_lock(&e->lock);
+    const table *t = table_at(e, index);
+    memcpy(x_m, t->x_m, bytes);
+    memcpy(y_m, t->y_m, bytes);
+    memcpy(z_m, t->z_m, bytes);
+    pthread_mutex_unlock(&e->lock);
+    return (double)index * TABLE_STEP_S;
+}
+
+/* ---- making it ---- */
+
+/* Eccentric anomaly, e < 1. */
+static double kepler(double m, double e) {
+    double x = m + e; /* not below the root: the steps descend to it */
+    for (int i = 0; i < 20; i++) {
+        double step = (x - e * sin(x) - m) / (1.0 - e * cos(x));
+        x -= step;
+        if (fabs(step) < 1e-14) {
+            break;
+        }
+    }
+    return x;
+}
+
+/* Estimated error of the polynomial around the perigee of a two-body orbit, per semi-major axis. */
+static double perigee_error(double e, double radians_per_step) {
+    double p[3][POINTS + 1] = {{0}};
+    for (int j = 0; j <= POINTS / 2; j++) {
+        double x = kepler(j * radians_per_step, e);
+        p[0][POINTS / 2 + j] = p[0][POINTS / 2 - j] = cos(x);
+        p[1][POINTS / 2 + j] = sqrt(1.0 - e * e) * sin(x);
+    }
+    return ERROR_OF_DIFFERENCE * fabs(tenth_difference(p[0]));
+}
+
+/* The longest step that is good enough at perigee, where the path bends most. */
+static int choose_class(const bst_ephemeris *e, const bst_orbit *orbit) {
+    double r_km[3], v_kmps[3];
+    if (bst_sgp4_propagate(orbit->sgp4, orbit->epoch_offset_s / 60.0, r_km, v_kmps) !=
+        BST_SGP4_OK) {
+        return 0;
+    }
+    bst_vec3 r = {1e3 * r_km[0], 1e3 * r_km[1], 1e3 * r_km[2]};
+    bst_vec3 v = {1e3 * v_kmps[0], 1e3 * v_kmps[1], 1e3 * v_kmps[2]};
+    const double mu = BST_EARTH_MU_M3PS2;
+    double a = 1.0 / (2.0 / bst_vec3_norm(r) - bst_vec3_dot(v, v) / mu);
+    bst_vec3 h = bst_vec3_cross(r, v);
+    double eccentricity = sqrt(fmax(1.0 - bst_vec3_dot(h, h) / (mu * a), 0.0));
+    if (!(a > 0.0 && eccentricity < 1.0)) {
+        return 0;
+    }
+    double rate = sqrt(mu / a) / a;
+    int c = STEP_CLASSES - 1;
+    /* the rest is left to what is no two-body motion: twice and three times the orbital rate */
+    while (c > 0 && !(rate * step_of(c) < 0.5 &&
+                      a * perigee_error(eccentricity, rate * step_of(c)) < 0.05 * e->limit_m)) {
+        c--;
+    }
+    return c;
+}
+
+static double sharpest_pixel(const bst_world *world) {
+    double sharpest = INFINITY;
+    for (int i = 0; i < world->observer_count; i++) {
+        for (int k = 0; k < world->observers[i].sensor_count; k++) {
+            sharpest =
+                fmin(sharpest, bst_camera_scale_rad(&world->observers[i].sensors[k].config.camera));
+        }
+    }
+    return sharpest;
+}
+
+static void set_body(const bst_ephemeris *e, const bst_orbit *orbit, body *b) {
+    if (orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && !orbit->steering) {
+        b->orbit = orbit;
+        b->step_class = choose_class(e, orbit);
+    }
+    b->first = 0;
+    b->last = -1;
+}
+
+bst_status bst_ephemeris_create(bst_ctx *ctx, const bst_world *world, bst_ephemeris **out) {
+    *out = NULL;
+    bst_ephemeris *e = calloc(1, sizeof *e);
+    if (!e) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an ephemeris");
+    }
+    pthread_mutex_init(&e->lock, NULL);
+    e->world = world;
+    e->object_count = world->object_count;
+    e->body_count = world->object_count + world->observer_count;
+    double tolerance = fmin(1e-3 * sharpest_pixel(world) * BST_EPHEMERIS_NEAREST_M, 1.0);
+    e->limit_m = fmax(tolerance, ROUNDING_M) / SAFETY;
+    size_t rows = (size_t)e->object_count + 1;
+    e->bodies = calloc((size_t)e->body_count + 1, sizeof *e->bodies);
+    e->table_memory = calloc(rows * 4 * TABLES, sizeof *e->table_memory);
+    bst_status status =
+        e->bodies && e->table_memory
+            ? bst_sky_clock_create_on(ctx, world->sky_grid, &e->clock_knots)
+            : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an ephemeris of %d", e->body_count);
+    if (status == BST_OK) {
+        status = bst_sky_clock_create_on(ctx, world->sky_grid, &e->clock_tables);
+    }
+    if (status != BST_OK) {
+        bst_ephemeris_free(e);
+        return status;
+    }
+    for (int i = 0; i < TABLES; i++) {
+        double *memory = e->table_memory + rows * 4 * (size_t)i;
+        e->tables[i] = (table){.x_m = memory,
+                               .y_m = memory + rows,
+                               .z_m = memory + 2 * rows,
+                               .speed_mps = memory + 3 * rows};
+    }
+    for (int c = 0; c < STEP_CLASSES; c++) {
+        for (int slot = 0; slot < ROTATIONS; slot++) {
+            e->rotations[c].knot[slot] = INT64_MIN;
+        }
+    }
+    for (int i = 0; i < world->object_count; i++) {
+        set_body(e, &world->objects[i].orbit, &e->bodies[i]);
+    }
+    for (int i = 0; i < world->observer_count; i++) {
+        set_body(e, &world->observers[i].orbit, &e->bodies[world->object_count + i]);
+    }
+    *out = e;
+    return BST_OK;
+}
+
+bst_status bst_ephemeris_prepare(bst_ctx *ctx, bst_ephemeris *e, int threads) {
+    pthread_mutex_lock(&e->lock);
+    bst_status status = BST_OK;
+    if (!e->pool && e->object_count >= BODIES_FOR_THREADS) {
+        status = bst_parallel_create(ctx, threads, &e->pool);
+    }
+    if (status == BST_OK) {
+        make_table(e, &e->tables[0], 0);
+    }
+    pthread_mutex_unlock(&e->lock);
+    return status;
+}
+
+void bst_ephemeris_free(bst_ephemeris *e) {
+    if (e) {
+        bst_parallel_free(e->pool);
+        bst_sky_clock_free(e->clock_knots);
+        bst_sky_clock_free(e->clock_tables);
+        free(e->bodies);
+        free(e->table_memory);
+        pthread_mutex_destroy(&e->lock);
+        free(e);
+    }
+}

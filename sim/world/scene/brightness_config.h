@@ -1,0 +1,25 @@
+/* The block `brightness` of an object: how its light follows from where it is. All zero but
+ * `earth_albedo` is a diffuse sphere of the object's area and albedo that is black and cold. */
+#ifndef BST_WORLD_SCENE_BRIGHTNESS_CONFIG_H
+#define BST_WORLD_SCENE_BRIGHTNESS_CONFIG_H
+
+#include "sim/core/config.h"
+
+enum { BST_BRIGHTNESS_SPHERE, BST_BRIGHTNESS_STANDARD, BST_BRIGHTNESS_LIGHT_CURVE };
+
+typedef struct bst_brightness_config {
+    int32_t model;            /* BST_BRIGHTNESS_... */
+    double specular_fraction; /* of the reflected light, as from a mirror ball; the rest diffuse */
+    double standard_v_mag;    /* at 1000 km, phase 90 degrees, Sun at 1 au */
+    char light_curve_file[512];  /* CSV */
+    double light_curve_period_s; /* 0: the curve is held at its ends */
+    bool earthshine;
+    double earth_albedo;
+    double emissivity;
+    double temperature_k, shadow_temperature_k;
+    bool resolved; /* drawn as a disc when it is large enough */
+} bst_brightness_config;
+
+extern const bst_config_desc bst_brightness_config_table[];
+
+#endif

@@ -1,0 +1,599 @@
+#include "sim/world/scene/field.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/optics/psf.h"
+#include "sim/world/scene/field_image.h"
+#include "sim/world/scene/field_objects.h"
+#include "sim/world/scene/los_track.h"
+#include "sim/world/scene/row_exposure.h"
+#include "sim/world/scene/skylight.h"
+
+/* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
+ * catalogue's. */
+#define APPARENT_SHIFT_RAD (30.0 * BST_ARCSEC_RAD)
+
+/* Statistical stars that a field query keeps for the next one: 40 MiB. */
+#define FAINT_CACHE_STARS 1048576
+
+/* Attitudes and instants at which a position is evaluated to average it over the exposure: the
+ * sigma points of the joint first and second moments of (attitude deviation, time), Julier and
+ * Uhlmann 1997. Exact to second order; the first, the mean itself, has no weight. */
+enum { SIGMA_DIMENSIONS = 4, SIGMA_POINTS = 2 * SIGMA_DIMENSIONS + 1 };
+
+struct bst_field {
+    const bst_world *world;
+    bst_view *view;
+    const bst_camera *camera;
+    int observer;
+    bst_track_store track, middle; /* middle: of a rolling shutter's middle row */
+    bst_star *stars;
+    int star_capacity;
+    bst_faint_stars *faint;      /* NULL: none */
+    bst_skylight *skylight;      /* NULL: always the same all over the sensor */
+    const bst_skylight_map *map; /* of the latest query */
+    bst_source *sources;
+    int source_capacity;
+    bst_object_parts *parts; /* [part_capacity], of the objects among the sources */
+    int part_capacity;
+    int *near; /* objects that may be in the field; room for all */
+    bst_quat q_mid;
+    double exposure_s;
+    bst_quat sigma_q[SIGMA_POINTS];
+    double sigma_time[SIGMA_POINTS]; /* fraction of the exposure */
+};
+
+bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                            bst_field **out) {
+    *out = NULL;
+    bst_field *field = calloc(1, sizeof *field);
+    if (!field) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
+    }
+    field->world = world;
+    field->observer = observer;
+    field->camera = bst_world_camera(world, observer, sensor);
+    field->star_capacity = 4096;
+    field->stars = malloc((size_t)field->star_capacity * sizeof *field->stars);
+    field->near = malloc(((size_t)bst_world_object_count(world) + 1) * sizeof *field->near);
+    bst_status status = field->stars && field->near
+                            ? bst_view_create(ctx, world, &field->view)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
+    if (status == BST_OK && bst_skylight_may_vary(field->camera)) {
+        status = bst_skylight_create(ctx, world, field->camera, &field->skylight);
+    }
+    if (status == BST_OK && world->faint && isfinite(world->faint_limit_v_mag)) {
+        status = bst_faint_stars_create(ctx, world->faint, FAINT_CACHE_STARS, &field->faint);
+    }
+    if (status != BST_OK) {
+        bst_field_free(field);
+        return status;
+    }
+    *out = field;
+    return BST_OK;
+}
+
+void bst_field_free(bst_field *field) {
+    if (field) {
+        bst_view_free(field->view);
+        bst_faint_stars_free(field->faint);
+        bst_skylight_free(field->skylight);
+        bst_track_store_free(&field->track);
+        bst_track_store_free(&field->middle);
+        free(field->stars);
+        free(field->sources);
+        free(field->parts);
+        free(field->near);
+        free(field);
+    }
+}
+
+void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
+    field->camera = camera;
+    if (field->skylight) {
+        bst_skylight_set_camera(field->skylight, camera);
+    }
+}
+
+bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history *history,
+                           int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
+                           bst_los_track *out) {
+    return bst_track_cut(ctx, &field->track, history, start_tick, end_tick, tick_rate_hz, out);
+}
+
+/* Rotation vector from attitude `from` to `to`, camera axes. */
+static bst_vec3 deviation(bst_quat from, bst_quat to) {
+    return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
+}
+
+/* The attitude that shows a star near the boresight at the mean of its places in the exposure. The
+ * mean of the rotation alone is beside it when the camera turns about its axis while it slews: the
+ * track of the star is bent. */
+static bst_quat attitude_of_mean_place(const bst_field *field) {
+    bst_quat mean = field->sigma_q[0];
+    bst_vec3 axis = bst_quat_rotate(bst_quat_conj(mean), (bst_vec3){0, 0, 1});
+    double x = 0.0, y = 0.0;
+    for (int p = 1; p < SIGMA_POINTS; p++) {
+        bst_vec3 seen = bst_quat_rotate(field->sigma_q[p], axis);
+        x += seen.x / seen.z / (SIGMA_POINTS - 1);
+        y += seen.y / seen.z / (SIGMA_POINTS - 1);
+    }
+    if (!isfinite(x) || !isfinite(y)) {
+        return mean; /* turned by a right angle: there is no image of anything */
+    }
+    return bst_quat_mul(bst_quat_from_rotvec((bst_vec3){-y, x, 0.0}), mean);
+}
+
+/* Sigma points of the exposure, the mean attitude, and the largest displacement (px) of any image
+ * point from its place at mid-exposure. */
+static void summarise_track(bst_field *field, const bst_los_track *track, bst_quat *mean,
+                            double *reach_px) {
+    enum { D = SIGMA_DIMENSIONS };
+    double exposure = track->time_s[track->count - 1];
+    field->exposure_s = exposure;
+    field->q_mid = bst_track_attitude(track, 0.5 * exposure);
+    double first[D] = {0}, second[D][D] = {{0}}, total = 0.0, reach = 0.0;
+    double previous[D] = {0};
+    for (int k = 0; k < track->count; k++) {
+        bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
+        double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
+        reach = fmax(reach, bst_track_turned_px(field->camera, d));
+        /* moments of the piecewise linear path between the samples */
+        double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
+        for (int i = 0; i < D; i++) {
+            first[i] += 0.5 * w * (previous[i] + now[i]);
+            for (int j = 0; j < D; j++) {
+                second[i][j] += w / 6.0 *
+                                (2.0 * previous[i] * previous[j] + 2.0 * now[i] * now[j] +
+                                 previous[i] * now[j] + now[i] * previous[j]);
+            }
+        }
+        total += w;
+        memcpy(previous, now, sizeof now);
+    }
+    double chol[D][D] = {{0}};
+    for (int i = 0; i < D; i++) {
+        first[i] /= total;
+    }
+    for (int i = 0; i < D; i++) {
+        for (int j = 0; j <= i; j++) {
+            double c = second[i][j] / total - first[i] * first[j];
+            for (int m = 0; m < j; m++) {
+                c -= chol[i][m] * chol[j][m];
+            }
+            /* a direction without spread gives a zero column */
+            chol[i][j] = i == j ? sqrt(fmax(c, 0.0)) : chol[j][j] > 1e-300 ? c / chol[j][j] : 0.0;
+        }
+    }
+    const double spread = sqrt((double)D); /* centre weight 0 */
+    for (int p = 0; p < SIGMA_POINTS; p++) {
+        double point[D];
+        for (int i = 0; i < D; i++) {
+            double step = p == 0 ? 0.0 : chol[i][(p - 1) / 2] * spread * ((p & 1) ? 1.0 : -1.0);
+            point[i] = first[i] + step;
+        }
+        field->sigma_q[p] = bst_quat_mul(
+            bst_quat_from_rotvec((bst_vec3){point[0], point[1], point[2]}), field->q_mid);
+        field->sigma_time[p] = point[3];
+    }
+    *mean = attitude_of_mean_place(field);
+    *reach_px = reach;
+}
+
+bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
+                       const bst_source *source, double *x_px, double *y_px) {
+    double exposure = track->time_s[track->count - 1];
+    double u = exposure > 0.0 ? track->time_s[k] / exposure : 0.5;
+    return bst_camera_project(
+        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_source_direction(source, u)), x_px,
+        y_px);
+}
+
+static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->star_capacity) {
+        bst_star *more = realloc(field->stars, (size_t)count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d stars", count);
+        }
+        field->stars = more;
+        field->star_capacity = count;
+    }
+    return BST_OK;
+}
+
+/* The catalogue's stars, then the statistical ones down to faint_limit. */
+static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, double radius,
+                              double v_limit, double faint_limit, double julian_year, int *count) {
+    int known, drawn = 0;
+    for (;;) {
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), centre, radius, v_limit,
+                                julian_year, field->stars, field->star_capacity, &known));
+        if (known > field->star_capacity) {
+            BST_TRY(reserve_stars(ctx, field, known));
+            continue;
+        }
+        if (field->faint) {
+            int room = field->star_capacity - known;
+            BST_TRY(bst_faint_stars_query(ctx, field->faint, centre, radius, faint_limit,
+                                          field->stars + known, room, &drawn));
+            if (drawn > room) {
+                BST_TRY(reserve_stars(ctx, field, known + drawn + drawn / 4));
+                continue;
+            }
+        }
+        *count = known + drawn;
+        return BST_OK;
+    }
+}
+
+/* Notes in the truth how much of the window bright bodies cover; whether any is to be drawn. */
+static bool bodies_in_field(const bst_camera *camera, const bst_surroundings *around,
+                            bst_window window, bst_truth *truth) {
+    bst_discs discs;
+    bst_discs_make(camera, around, &discs);
+    truth->earth_fraction = bst_discs_share(&discs, camera, BST_BODY_EARTH, window);
+    truth->moon_fraction = bst_discs_share(&discs, camera, BST_BODY_MOON, window);
+    truth->sun_fraction = bst_discs_share(&discs, camera, BST_BODY_SUN, window);
+    return bst_discs_any(&discs);
+}
+
+static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->source_capacity) {
+        bst_source *more = realloc(field->sources, (size_t)count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", count);
+        }
+        field->sources = more;
+        field->source_capacity = count;
+    }
+    return BST_OK;
+}
+
+static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->part_capacity) {
+        free(field->parts);
+        field->parts = malloc((size_t)count * sizeof *field->parts);
+        field->part_capacity = field->parts ? count : 0;
+        if (!field->parts) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);
+        }
+    }
+    return BST_OK;
+}
+
+static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
+                        double margin_px) {
+    double x, y;
+    bst_vec3 v = bst_quat_rotate(q, direction);
+    if (field->camera->geometry.general && bst_camera_beyond_fold(field->camera, v, margin_px)) {
+        return true; /* no image now, but it may come within the exposure */
+    }
+    return bst_camera_project(field->camera, v, &x, &y) && x >= window.x0 - margin_px &&
+           y >= window.y0 - margin_px && x <= window.x0 + window.width - 1 + margin_px &&
+           y <= window.y0 + window.height - 1 + margin_px;
+}
+
+/* Whether the object is the observer's own satellite as a catalogue has it: its orbit there need
+ * not be the observer's to the metre. */
+static bool is_self(const bst_field *field, int index) {
+    const world_object *object = &field->world->objects[index];
+    if (index == field->world->observers[field->observer].own_object) {
+        return true;
+    }
+    return object->catalogued && object->info.norad != 0 &&
+           object->info.norad == field->world->observers[field->observer].norad;
+}
+
+bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
+                           int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
+                           bst_window window, const bst_field_options *options, bst_truth *truth,
+                           const bst_source **sources, int *count) {
+    const bst_camera *camera = field->camera;
+    double start_s = (double)start_tick / (double)tick_rate_hz,
+           end_s = (double)end_tick / (double)tick_rate_hz;
+    double mid_s = 0.5 * (start_s + end_s), exposure = end_s - start_s;
+    double reach_px;
+    bst_quat mean;
+    bst_los_track own = *track; /* of the exposure itself */
+    if (options->lead_s > 0.0) {
+        BST_TRY(bst_track_part(ctx, &field->middle, track, options->lead_s,
+                               options->lead_s + exposure, &own));
+    }
+    summarise_track(field, &own, &mean, &reach_px);
+    for (int k = 0; options->lead_s > 0.0 && k < track->count; k++) {
+        reach_px =
+            fmax(reach_px, bst_track_moved_px(camera, field->q_mid, track->q_cam_from_gcrf[k]));
+    }
+    start_s -= options->lead_s;
+    end_s += options->lead_s;
+
+    bst_state eye;
+    bst_bodies bodies;
+    BST_TRY(bst_view_observer_state(ctx, field->view, field->observer, mid_s, &eye));
+    BST_TRY(bst_view_bodies(ctx, field->view, mid_s, &bodies));
+    bst_earth_frames frames;
+    BST_TRY(bst_view_earth_frames(ctx, field->view, mid_s, &frames));
+    bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+    bst_light geocentric = bst_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
+
+    truth->start_tick = start_tick;
+    truth->end_tick = end_tick;
+    truth->q_cam_from_gcrf_mid = field->q_mid;
+    truth->q_cam_from_gcrf_mean = mean;
+    truth->observer_gcrf_m = eye.position_m;
+    truth->observer_gcrf_mps = eye.velocity_mps;
+    truth->velocity_bary_mps = light.velocity_mps;
+    truth->sun_m = light.sun_m;
+    truth->pixel_scale_arcsec = camera->pixel_scale_arcsec;
+    truth->boresight_x_px = bst_camera_centre_x(camera);
+    truth->boresight_y_px = bst_camera_centre_y(camera);
+    truth->background_e = bst_camera_background_e_per_s(camera) * exposure;
+    truth->dark_e = bst_camera_dark_e_per_s(camera) * exposure;
+
+    double margin_px = options->margin_px + reach_px;
+    bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
+                                               window.y0 + 0.5 * (window.height - 1));
+    bst_vec3 centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
+    double radius = APPARENT_SHIFT_RAD;
+    if (camera->geometry.general) {
+        radius += bst_camera_reach_rad(camera, centre_cam, window.x0 - margin_px,
+                                       window.y0 - margin_px, window.x0 + window.width + margin_px,
+                                       window.y0 + window.height + margin_px, margin_px);
+    } else {
+        radius += atan(bst_camera_scale_rad(camera) *
+                       (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px));
+    }
+    double tt1, tt2;
+    bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
+    int star_count;
+    field->map = NULL;
+    double faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag);
+    bst_surroundings around = {.eye_m = eye.position_m,
+                               .eye_mps = eye.velocity_mps,
+                               .bodies = bodies,
+                               .itrf_from_gcrf = frames.itrf_from_gcrf,
+                               .light = light,
+                               .exposure_s = exposure,
+                               .v_limit = options->v_limit,
+                               .faint_limit = faint_limit};
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        around.q[k] = bst_track_attitude(&own, exposure * k / BST_DISC_PARTS);
+    }
+    if (bodies_in_field(camera, &around, window, truth) || bst_skylight_varies(camera)) {
+        bst_window lit = window;
+        if (bst_detector_config_whole_columns(&camera->detector)) {
+            lit.y0 = 0;
+            lit.height = (int)camera->height_px;
+        }
+        BST_TRY(bst_skylight_make(ctx, field->skylight, &around, lit, &field->map));
+        truth->background_e = bst_skylight_at(field->map, window.x0 + 0.5 * (window.width - 1),
+                                              window.y0 + 0.5 * (window.height - 1));
+    } else if (field->faint) {
+        double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
+        truth->background_e +=
+            bst_faint_sky_undrawn(field->world->faint, centre, options->v_limit, faint_limit) *
+            pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * exposure;
+    }
+    BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit, faint_limit,
+                        2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
+    int near_count;
+    BST_TRY(bst_view_near(ctx, field->view, field->observer, start_s, end_s, centre, radius,
+                          field->near, &near_count));
+    BST_TRY(reserve_sources(ctx, field, star_count + near_count));
+    int n = 0;
+    bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
+    for (int i = 0; i < star_count; i++) {
+        const bst_star *star = &field->stars[i];
+        bst_vec3 apparent = bst_light_apparent_star(&light, star->icrs);
+        if (!near_window(field, field->q_mid, apparent, window, margin_px)) {
+            continue;
+        }
+        bst_source *s = &field->sources[n++];
+        *s = (bst_source){.kind = BST_SOURCE_STAR,
+                          .id = star->id,
+                          .apparent_mid = apparent,
+                          .electrons_per_s = bst_camera_star_electrons_per_s(
+                              camera, (double)star->v_mag, (double)star->b_minus_v),
+                          .v_mag = (double)star->v_mag,
+                          .sunlit_fraction = NAN,
+                          .phase_rad = NAN,
+                          .range_m = INFINITY};
+        if (coloured && !isnan(star->b_minus_v)) {
+            bst_psf_colour(camera->psf, bst_star_spectrum_k((double)star->b_minus_v), s->colour);
+        }
+        /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
+         * move with the Earth, stands for the star */
+        bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
+        s->occulted = bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray),
+                                        bodies.pole);
+        if (s->occulted) {
+            s->electrons_per_s = 0.0;
+        }
+        bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
+    }
+    BST_TRY(reserve_parts(ctx, field, near_count));
+    const bst_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
+                                      field->q_mid, window, margin_px,       centre,  radius};
+    for (int i = 0, used = 0; i < near_count; i++) {
+        bool there;
+        if (is_self(field, field->near[i])) {
+            continue;
+        }
+        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->parts[used],
+                                 &field->sources[n], &there));
+        n += there;
+        used += there;
+    }
+    *sources = field->sources;
+    *count = n;
+    return BST_OK;
+}
+
+/* Of the image of a point; NAN when it is behind the camera. */
+static bst_image_moments smear_of(const bst_field *field, const bst_source *source) {
+    bst_image_moments m = {0};
+    double x[SIGMA_POINTS], y[SIGMA_POINTS];
+    for (int p = 0; p < SIGMA_POINTS; p++) {
+        bst_vec3 d = bst_source_direction(source, field->sigma_time[p]);
+        x[p] = y[p] = NAN;
+        (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
+                                 &y[p]);
+    }
+    for (int p = 1; p < SIGMA_POINTS; p++) {
+        m.x_mean += x[p] / (SIGMA_POINTS - 1);
+        m.y_mean += y[p] / (SIGMA_POINTS - 1);
+    }
+    for (int p = 1; p < SIGMA_POINTS; p++) {
+        double dx = x[p] - m.x_mean, dy = y[p] - m.y_mean;
+        m.xx += dx * dx / (SIGMA_POINTS - 1);
+        m.xy += dx * dy / (SIGMA_POINTS - 1);
+        m.yy += dy * dy / (SIGMA_POINTS - 1);
+    }
+    return m;
+}
+
+/* Variance that a path has beyond a straight one, over the PSF's, from which on it is followed:
+ * what a bend across is taken for a Gaussian's then makes 3 % of a long streak's signal-to-noise
+ * ratio. */
+static const double BENT = 0.12;
+
+/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
+ * pixel's own width, widened along and across the way from the first to the last
+ * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
+ * Returns the variance before that widening. */
+static double blur(const bst_camera *camera, const bst_source *source, const bst_image_moments *m,
+                   double dx, double dy, double *along, double *across) {
+    double psf = bst_camera_psf_sigma_px(camera), sigma;
+    if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
+        psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
+              2.3548200450309493;
+    }
+    double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
+    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
+    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
+    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
+    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
+    return variance;
+}
+
+const bst_skylight_map *bst_field_background(const bst_field *field) {
+    return field->map;
+}
+
+double bst_field_background_e(const bst_field *field, const bst_truth *header, double x_px,
+                              double y_px) {
+    return field->map && isfinite(x_px) && isfinite(y_px) ? bst_skylight_at(field->map, x_px, y_px)
+                                                          : header->background_e;
+}
+
+/* What a rolling shutter sees of a source: it is exposed while the row where it is. */
+static bst_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
+                                       const bst_source *source, bst_window window, double u[2],
+                                       bst_quat *q_mid, bst_truth_item *out) {
+    const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
+    double duration = track->time_s[track->count - 1];
+    bst_row_source_times(field->camera, &rows, track, source, u);
+    double middle = 0.5 * (u[0] + u[1]);
+    const double when[3] = {u[0], middle, u[1]};
+    double *const x[3] = {&out->x_start_px, &out->x_mid_px, &out->x_end_px};
+    double *const y[3] = {&out->y_start_px, &out->y_mid_px, &out->y_end_px};
+    *q_mid = bst_track_attitude(track, middle * duration);
+    for (int k = 0; k < 3; k++) {
+        bst_quat q = bst_track_attitude(track, when[k] * duration);
+        (void)bst_camera_project(
+            field->camera, bst_quat_rotate(q, bst_source_direction(source, when[k])), x[k], y[k]);
+    }
+    out->delay_s = (middle - 0.5) * duration;
+    out->electrons = source->electrons_per_s * duration *
+                     (bst_source_light(source, u[1]) - bst_source_light(source, u[0]));
+    return bst_image_by_light(field->camera, track, source, u[0], u[1]);
+}
+
+void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
+                          const bst_source *source, bst_window window, int binning,
+                          const bst_truth *header, bst_truth_item *out) {
+    const bst_camera *camera = field->camera;
+    *out = (bst_truth_item){.kind = source->kind,
+                            .id = source->id,
+                            .norad = source->kind == BST_SOURCE_OBJECT
+                                         ? bst_world_object(field->world, (int)source->id)->norad
+                                         : 0,
+                            .ra_rad = source->ra_rad,
+                            .dec_rad = source->dec_rad,
+                            .v_mag = source->v_mag,
+                            .electrons = source->electrons_per_s * field->exposure_s,
+                            .sunlit_fraction = source->sunlit_fraction,
+                            .phase_rad = source->phase_rad,
+                            .range_m = source->range_m,
+                            .x_start_px = NAN,
+                            .y_start_px = NAN,
+                            .x_mid_px = NAN,
+                            .y_mid_px = NAN,
+                            .x_end_px = NAN,
+                            .y_end_px = NAN,
+                            .x_chief_px = NAN,
+                            .y_chief_px = NAN,
+                            .x_centroid_px = NAN,
+                            .y_centroid_px = NAN};
+    bst_image_moments image, path;
+    bst_quat q_mid = field->q_mid;
+    double u[2] = {0.0, 1.0}; /* of the track, while the source is exposed */
+    if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
+        image = place_in_rows(field, track, source, window, u, &q_mid, out);
+    } else {
+        (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
+        (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
+                                &out->y_end_px);
+        (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
+                                 &out->x_mid_px, &out->y_mid_px);
+        image = source->rate ? bst_image_by_light(field->camera, track, source, 0.0, 1.0)
+                             : smear_of(field, source);
+    }
+    path = image;
+    out->x_chief_px = image.x_mean;
+    out->y_chief_px = image.y_mean;
+    if (source->shape) {
+        bst_image_add_disc(field->camera, q_mid, source, &image);
+    }
+    bst_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
+    if (isfinite(image.x_mean)) {
+        out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
+    }
+    double dark =
+        bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
+    /* pixels that are added are read once; their sum is the image blurred by a wider box */
+    double added = (double)binning * binning, widened = (added - 1.0) / 12.0;
+    double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
+    double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
+    double along, across;
+    double sharp = blur(camera, source, &image, out->x_end_px - out->x_start_px,
+                        out->y_end_px - out->y_start_px, &along, &across);
+    if (isfinite(length) && variance > 0.0) {
+        double square = bst_image_squared(sqrt(along * along + widened),
+                                          sqrt(across * across + widened), length);
+        double excess = along * along + across * across - 2.0 * sharp;
+        if (excess > BENT * (sharp + widened)) {
+            /* a disc's own light widens the path */
+            double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
+            double exact = bst_image_squared_path(camera, track, source, u[0], u[1], &path, excess,
+                                                  sharp + widened + disc);
+            square = isfinite(exact) ? exact : square;
+        }
+        out->snr = out->electrons * sqrt(square / variance);
+    }
+    if (source->occulted) {
+        out->flags |= BST_TRUTH_OCCULTED;
+    }
+    if (image.x_mean >= window.x0 - 0.5 && image.x_mean < window.x0 + window.width - 0.5 &&
+        image.y_mean >= window.y0 - 0.5 && image.y_mean < window.y0 + window.height - 0.5) {
+        out->flags |= BST_TRUTH_IN_FIELD;
+    }
+    /* peak of the image: of a point 1 / (2 pi sigma^2), of a long streak 1 / (sqrt(2 pi) sigma
+     * length) */
+    double peak =
+        out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
+    if (peak + dark > camera->full_well_e) {
+        out->flags |= BST_TRUTH_SATURATED;
+    }
+}

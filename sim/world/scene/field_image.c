@@ -1,0 +1,193 @@
+#include "sim/world/scene/field_image.h"
+
+#include "sim/optics/psf.h"
+#include "sim/world/scene/disc.h"
+#include "sim/world/scene/los_track.h"
+
+bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
+                                     const bst_source *source, double u0, double u1) {
+    bst_image_moments m = {0};
+    double total = bst_source_light(source, u1) - bst_source_light(source, u0);
+    double whole = u0 > 0.0 || u1 < 1.0 ? (total > 0.0 ? total : 1.0) : 1.0;
+    double duration = track->time_s[track->count - 1];
+    int sample = 0;
+    int count = 2 * track->count < 128 ? 128 : 2 * track->count < 2048 ? 2 * track->count : 2048;
+    double xx = 0.0, xy = 0.0, yy = 0.0;
+    for (int n = 0; n < count; n++) {
+        double u = u0 + (u1 - u0) * ((n + 0.5) / count), x = NAN, y = NAN;
+        double weight = (bst_source_light(source, u0 + (u1 - u0) * ((n + 1.0) / count)) -
+                         bst_source_light(source, u0 + (u1 - u0) * ((double)n / count))) /
+                        whole;
+        while (sample + 2 < track->count && track->time_s[sample + 1] < u * duration) {
+            sample++;
+        }
+        double step = track->time_s[sample + 1] - track->time_s[sample];
+        bst_quat q =
+            bst_quat_slerp(track->q_cam_from_gcrf[sample], track->q_cam_from_gcrf[sample + 1],
+                           step > 0.0 ? (u * duration - track->time_s[sample]) / step : 0.0);
+        (void)bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x,
+                                 &y);
+        double dx = x - m.x_mean, dy = y - m.y_mean;
+        if (n == 0) { /* moments about the first place */
+            m.x_mean = x;
+            m.y_mean = y;
+            dx = dy = 0.0;
+        }
+        m.xx += weight * dx;
+        m.xy += weight * dy;
+        xx += weight * dx * dx;
+        xy += weight * dx * dy;
+        yy += weight * dy * dy;
+    }
+    double ex = m.xx, ey = m.xy;
+    return (bst_image_moments){m.x_mean + ex, m.y_mean + ey, xx - ex * ex, xy - ex * ey,
+                               yy - ey * ey};
+}
+
+void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,
+                        bst_image_moments *m) {
+    enum { TIMES = 24, AROUND = 48 };
+    bst_disc disc;
+    bst_disc_begin(source, &disc);
+    double x0, y0, sum = 0.0, ex = 0.0, ey = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
+    bst_vec3 z = bst_vec3_unit(source->apparent_mid), e1, e2;
+    if (!bst_camera_project(camera, bst_quat_rotate(q_mid, z), &x0, &y0)) {
+        return;
+    }
+    e1 = bst_vec3_unit(
+        bst_vec3_cross(fabs(z.z) < 0.9 ? (bst_vec3){0, 0, 1} : (bst_vec3){1, 0, 0}, z));
+    e2 = bst_vec3_cross(z, e1);
+    for (int n = 0; n <= TIMES * AROUND; n++) {
+        /* rings of equal area, and the specular point */
+        double s = source->shape->radius * sqrt((n / AROUND + 0.5) / TIMES);
+        double a = 2.0 * BST_PI * (n % AROUND + 0.5 * (n / AROUND % 2)) / AROUND, x, y;
+        bst_vec3 d = bst_vec3_axpy(bst_vec3_axpy(z, s * cos(a), e1), s * sin(a), e2), ray = d;
+        double share = 0.0;
+        if (n == TIMES * AROUND) {
+            ray = bst_vec3_add(z, bst_disc_specular(source));
+            share = source->shape->specular;
+        } else {
+            share = bst_disc_radiance(&disc, bst_vec3_unit(d)) * BST_PI * source->shape->radius *
+                    source->shape->radius / (TIMES * AROUND);
+        }
+        if (share > 0.0 && bst_camera_project(camera, bst_quat_rotate(q_mid, ray), &x, &y)) {
+            x -= x0;
+            y -= y0;
+            sum += share;
+            ex += share * x;
+            ey += share * y;
+            xx += share * x * x;
+            xy += share * x * y;
+            yy += share * y * y;
+        }
+    }
+    if (sum > 0.0) {
+        m->x_mean += ex / sum;
+        m->y_mean += ey / sum;
+        m->xx += xx / sum - ex * ex / (sum * sum);
+        m->xy += xy / sum - ex * ey / (sum * sum);
+        m->yy += yy / sum - ey * ey / (sum * sum);
+    }
+}
+
+void bst_image_centroid(const bst_camera *camera, const bst_source *source,
+                        const bst_image_moments *m, double *x_px, double *y_px) {
+    double shift[2] = {0.0, 0.0}, sigma = bst_camera_psf_sigma_px(camera);
+    *x_px = m->x_mean;
+    *y_px = m->y_mean;
+    if (!isfinite(m->x_mean) || !isfinite(m->y_mean)) {
+        return;
+    }
+    if (camera->psf) {
+        bst_psf_centroid_px(camera->psf, source->colour, m->x_mean, m->y_mean, shift);
+        sigma = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
+                2.3548200450309493;
+    }
+    /* light of variance v on an illumination of slope s per px: by v s */
+    double here = bst_camera_illumination(camera, m->x_mean, m->y_mean), variance = sigma * sigma;
+    if (here > 0.0) {
+        double sx = 0.5 / here *
+                    (bst_camera_illumination(camera, m->x_mean + 1.0, m->y_mean) -
+                     bst_camera_illumination(camera, m->x_mean - 1.0, m->y_mean));
+        double sy = 0.5 / here *
+                    (bst_camera_illumination(camera, m->x_mean, m->y_mean + 1.0) -
+                     bst_camera_illumination(camera, m->x_mean, m->y_mean - 1.0));
+        shift[0] += (m->xx + variance) * sx + m->xy * sy;
+        shift[1] += m->xy * sx + (m->yy + variance) * sy;
+    }
+    *x_px += shift[0];
+    *y_px += shift[1];
+}
+
+/* Variance of what is independent from place to place, both axes, px^2: of white errors second
+ * differences have 6 times that; smooth paths have hardly any. */
+static double roughness(const double *x, const double *y, int count) {
+    double sum = 0.0;
+    for (int k = 1; k + 1 < count; k++) {
+        double dx = x[k - 1] - 2.0 * x[k] + x[k + 1], dy = y[k - 1] - 2.0 * y[k] + y[k + 1];
+        sum += (dx * dx + dy * dy) / (6.0 * (count - 2));
+    }
+    return sum;
+}
+
+double bst_image_squared_path(const bst_camera *camera, const bst_los_track *track,
+                              const bst_source *source, double u0, double u1,
+                              const bst_image_moments *moments, double excess_px2,
+                              double variance_px2) {
+    enum { COARSE = 9, FEWEST = 20, MOST = 256 };
+    const double step_px = 1.5;
+    double x[MOST], y[MOST], w[MOST], total = 0.0, length = 0.0, line = 0.0;
+    double duration = track->time_s[track->count - 1], before = bst_source_light(source, u0);
+    for (int k = 0; k < COARSE; k++) { /* most jitter shows in a few places */
+        double u = u0 + (u1 - u0) * ((k + 0.5) / COARSE);
+        bst_quat q = bst_track_attitude(track, u * duration);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x[k],
+                                &y[k])) {
+            return NAN;
+        }
+    }
+    if (roughness(x, y, COARSE) > 0.5 * excess_px2) {
+        return NAN;
+    }
+    /* twice the length of a straight path with these moments */
+    double wanted = 2.0 * sqrt(12.0 * (moments->xx + moments->yy)) / step_px;
+    int count = wanted < FEWEST ? FEWEST : wanted < MOST ? (int)wanted : MOST;
+    for (int k = 0; k < count; k++) {
+        double u = u0 + (u1 - u0) * ((k + 0.5) / count);
+        double after = bst_source_light(source, u0 + (u1 - u0) * ((k + 1.0) / count));
+        bst_quat q = bst_track_attitude(track, u * duration);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x[k],
+                                &y[k])) {
+            return NAN;
+        }
+        w[k] = after - before;
+        total += w[k];
+        before = after;
+        double h = k > 0 ? hypot(x[k] - x[k - 1], y[k] - y[k - 1]) : 0.0;
+        length += h;
+        if (h > 0.0) {
+            double part = 0.5 * (w[k] + w[k - 1]);
+            line += part * part / h;
+        }
+    }
+    if (!(total > 0.0)) {
+        return NAN;
+    }
+    if (roughness(x, y, count) > 0.5 * excess_px2) {
+        return NAN;
+    }
+    double norm = 1.0 / (total * total);
+    if (length > step_px * (count - 1)) {
+        return norm * line / (2.0 * sqrt(BST_PI * variance_px2));
+    }
+    double sum = 0.0, far = 36.0 * 2.0 * variance_px2;
+    for (int k = 0; k < count; k++) {
+        double row = 0.5 * w[k];
+        for (int i = k + 1; i < count; i++) {
+            double dx = x[i] - x[k], dy = y[i] - y[k], d2 = dx * dx + dy * dy;
+            row += d2 < far ? w[i] * exp(-0.25 * d2 / variance_px2) : 0.0;
+        }
+        sum += 2.0 * w[k] * row;
+    }
+    return norm * sum / (4.0 * BST_PI * variance_px2);
+}

@@ -1,0 +1,233 @@
+/* The objects of a field query. */
+#include "sim/world/scene/field_objects.h"
+
+#include "sim/optics/psf.h"
+
+/* Instants of the exposure over which what light is made of is averaged. */
+enum { TIMES = 16 };
+
+/* Whether the object's path over the image comes near the window; disc: its angular radius, rad. */
+static bool path_touches(const bst_object_query *q, const bst_source *s, double disc) {
+    enum { PIECES = 8 };
+    double disc_px = tan(disc) / bst_camera_scale_rad(q->camera) * bst_camera_stretch(q->camera);
+    bst_vec3 at[PIECES + 1];
+    double x[PIECES + 1], y[PIECES + 1], bend = 0.0;
+    bool front[PIECES + 1];
+    for (int k = 0; k <= PIECES; k++) {
+        at[k] = bst_source_direction(s, (double)k / PIECES);
+        x[k] = y[k] = 0.0;
+        front[k] = bst_camera_project(q->camera, bst_quat_rotate(q->q_mid, at[k]), &x[k], &y[k]);
+    }
+    for (int k = 1; k < PIECES; k++) {
+        /* an eighth of this is what the path lies off the chord */
+        bend = front[k - 1] && front[k] && front[k + 1]
+                   ? fmax(bend,
+                          hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]))
+                   : INFINITY;
+    }
+    for (int k = 0; k < PIECES; k++) {
+        double arc = bst_vec3_angle(at[k], at[k + 1]);
+        if (bst_vec3_angle(q->centre, at[k]) > q->radius + disc + 1.25 * arc) {
+            continue;
+        }
+        double reach = q->margin_px + disc_px + bend;
+        if (fmax(x[k], x[k + 1]) >= q->window.x0 - reach &&
+            fmin(x[k], x[k + 1]) <= q->window.x0 + q->window.width - 1 + reach &&
+            fmax(y[k], y[k + 1]) >= q->window.y0 - reach &&
+            fmin(y[k], y[k + 1]) <= q->window.y0 + q->window.height - 1 + reach) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_source_rate *out,
+                    double *mean) {
+    enum { FIRST = 16 };
+    double middle[BST_RATE_KNOTS], low = INFINITY, high = 0.0;
+    out->count = FIRST + 1;
+    for (int k = 0; k <= FIRST; k++) {
+        out->u[k] = (double)k / FIRST;
+        out->rate[k] = at(user, out->u[k]);
+        low = fmin(low, out->rate[k]);
+        high = fmax(high, out->rate[k]);
+    }
+    *mean = out->rate[FIRST / 2];
+    if (!(high - low > 1e-3 * high)) {
+        return false;
+    }
+    for (int k = 0; k < FIRST; k++) {
+        middle[k] = at(user, 0.5 * (out->u[k] + out->u[k + 1]));
+    }
+    while (out->count < BST_RATE_KNOTS) {
+        int worst = 0;
+        double most = 0.0;
+        for (int k = 0; k + 1 < out->count; k++) {
+            /* by its area: that is what an image sees of it */
+            double miss = fabs(middle[k] - 0.5 * (out->rate[k] + out->rate[k + 1])) *
+                          (out->u[k + 1] - out->u[k]);
+            if (miss > most) {
+                most = miss;
+                worst = k;
+            }
+        }
+        if (most < 1e-7 * high) {
+            break;
+        }
+        for (int k = out->count; k > worst + 1; k--) {
+            out->u[k] = out->u[k - 1];
+            out->rate[k] = out->rate[k - 1];
+            middle[k] = middle[k - 1];
+        }
+        out->u[worst + 1] = 0.5 * (out->u[worst] + out->u[worst + 2]);
+        out->rate[worst + 1] = middle[worst];
+        out->count++;
+        for (int k = worst; k <= worst + 1; k++) {
+            middle[k] = at(user, 0.5 * (out->u[k] + out->u[k + 1]));
+        }
+    }
+    out->light[0] = 0.0;
+    for (int k = 1; k < out->count; k++) {
+        out->light[k] = out->light[k - 1] +
+                        0.5 * (out->rate[k] + out->rate[k - 1]) * (out->u[k] - out->u[k - 1]);
+    }
+    *mean = out->light[out->count - 1];
+    for (int k = 0; k < out->count; k++) {
+        out->rate[k] /= *mean;
+        out->light[k] /= *mean;
+    }
+    return true;
+}
+
+/* An object's brightness through an exposure, for bst_field_rate. */
+typedef struct course {
+    const bst_object_query *query;
+    int object;
+    const bst_source_path *path;
+    const bst_path_light *light;
+} course;
+
+static double course_at(void *user, double u) {
+    const course *c = user;
+    bst_sight sight;
+    bst_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s, c->query->end_s,
+                   u, &sight);
+    return bst_glow_electrons_per_s(c->query->camera, &sight.glow, NULL);
+}
+
+/* Adds the light of one instant to the parts of a shape, in electrons. */
+static void add_parts(const bst_camera *camera, const bst_glow *glow, double weight,
+                      bst_source_shape *shape) {
+    double reflected, all = bst_glow_electrons_per_s(camera, glow, &reflected);
+    double direct = 1.0 - glow->earth_share - glow->specular_share;
+    shape->diffuse += weight * reflected * direct;
+    shape->specular += weight * reflected * glow->specular_share;
+    shape->earthshine += weight * reflected * glow->earth_share;
+    shape->thermal += weight * (all - reflected);
+}
+
+/* What is seen at instant k of TIMES, or at mid-exposure where brightness is constant. */
+static bst_sight sight_at(const course *c, const bst_sight *mid, const bst_source *source, int k) {
+    bst_sight sight = *mid;
+    if (source->rate) {
+        bst_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
+                       c->query->end_s, (k + 0.5) / TIMES, &sight);
+    }
+    return sight;
+}
+
+/* Sunlight and emission, by their shares of the exposure's light. */
+static void make_colour(const course *c, const bst_sight *mid, bst_source *source) {
+    const bst_camera *camera = c->query->camera;
+    double sum[BST_PSF_COLOURS] = {0}, total = 0.0;
+    for (int k = 0; k < (source->rate ? TIMES : 1); k++) {
+        bst_sight sight = sight_at(c, mid, source, k);
+        double reflected, all = bst_glow_electrons_per_s(camera, &sight.glow, &reflected);
+        float warm[BST_PSF_COLOURS];
+        bst_psf_colour(camera->psf, sight.glow.temperature_k, warm);
+        total += all;
+        for (int s = 0; s < BST_PSF_COLOURS; s++) {
+            sum[s] += (all - reflected) * (double)warm[s];
+        }
+    }
+    for (int s = 0; s < BST_PSF_COLOURS && total > 0.0; s++) {
+        source->colour[s] = (float)(sum[s] / total);
+    }
+}
+
+/* The sphere as a disc, where it spans more than a fifth of a pixel. Its parts are those of the
+ * whole exposure. */
+static bool make_shape(const course *c, const bst_sight *mid, const bst_source *source,
+                       bst_source_shape *shape) {
+    const bst_camera *camera = c->query->camera;
+    const bst_object_info *info = bst_view_object(c->query->view, (int)source->id);
+    double radius = sqrt(info->area_m2 / BST_PI) / mid->range_m;
+    double pixels = 2.0 * radius / bst_camera_scale_rad(camera) * bst_camera_stretch(camera);
+    if (!mid->glow.resolved || !(radius < 1.0) || !(pixels > 0.2)) {
+        return false;
+    }
+    *shape = (bst_source_shape){.radius = radius};
+    for (int k = 0; k < (source->rate ? TIMES : 1); k++) {
+        bst_sight sight = sight_at(c, mid, source, k);
+        add_parts(camera, &sight.glow, 1.0, shape);
+    }
+    double all = shape->diffuse + shape->specular + shape->earthshine + shape->thermal;
+    if (!(all > 0.0)) {
+        return false;
+    }
+    shape->diffuse /= all;
+    shape->specular /= all;
+    shape->earthshine /= all;
+    shape->thermal /= all;
+    bst_vec3 object_m =
+        bst_vec3_axpy(c->light->eye_m[BST_PATH_NODES / 2], mid->range_m, mid->geometric);
+    shape->sun = bst_vec3_unit(bst_vec3_sub(c->light->sun_m[BST_PATH_NODES / 2], object_m));
+    shape->earth = mid->glow.earth_share > 0.0 ? mid->glow.earth : shape->sun;
+    return true;
+}
+
+bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *q, int object,
+                            bst_object_parts *parts, bst_source *out, bool *there) {
+    bst_sight mid;
+    bst_path_light light;
+    *there = false;
+    bst_status status = bst_view_path(ctx, q->view, q->observer, object, q->start_s, q->end_s,
+                                      &parts->path, &light, &mid);
+    if (status == BST_ERR_NUMERIC) {
+        return BST_OK;
+    }
+    BST_TRY(status);
+    if (!(mid.range_m > 0.0)) {
+        return BST_OK;
+    }
+    *out = (bst_source){.kind = BST_SOURCE_OBJECT,
+                        .id = (uint32_t)object,
+                        .apparent_mid = mid.apparent,
+                        .path = &parts->path,
+                        .v_mag = mid.v_mag,
+                        .sunlit_fraction = mid.sunlit_fraction,
+                        .phase_rad = mid.phase_rad,
+                        .range_m = mid.range_m,
+                        .occulted = mid.occulted};
+    bst_vec3_to_radec(mid.geometric, &out->ra_rad, &out->dec_rad);
+    double radius = sqrt(bst_view_object(q->view, object)->area_m2 / BST_PI) / mid.range_m;
+    *there = path_touches(q, out, mid.glow.resolved && radius < 1.0 ? asin(radius) : 0.0);
+    if (!*there) {
+        return BST_OK;
+    }
+    course c = {q, object, &parts->path, &light};
+    if (!mid.occulted && q->end_s > q->start_s &&
+        bst_field_rate(course_at, &c, &parts->rate, &out->electrons_per_s)) {
+        out->rate = &parts->rate;
+    } else {
+        out->electrons_per_s =
+            mid.occulted ? 0.0 : bst_glow_electrons_per_s(q->camera, &mid.glow, NULL);
+    }
+    if (q->camera->psf && bst_psf_spectra(q->camera->psf) > 1) {
+        make_colour(&c, &mid, out);
+    }
+    if (make_shape(&c, &mid, out, &parts->shape)) {
+        out->shape = &parts->shape;
+    }
+    return BST_OK;
+}

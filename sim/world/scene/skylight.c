@@ -1,0 +1,333 @@
+#include "sim/world/scene/skylight.h"
+
+#include <stdlib.h>
+
+#include "sim/world/scene/stray.h"
+#include "sim/world/scene/zodiacal.h"
+#include "sim/world/world_internal.h"
+
+enum { MOST_STEP_PX = 32, STAR_NODES = 8 };
+
+/* Nodes of the sky are not farther apart than this. */
+#define MOST_STEP_RAD (0.3 * BST_DEG_RAD)
+
+#define DEG2_PER_SR (1.0 / (BST_DEG_RAD * BST_DEG_RAD))
+
+/* Values at nodes of the sensor. */
+typedef struct lattice {
+    int step, x0, y0, columns, rows;
+    float *value;
+    size_t capacity;
+} lattice;
+
+struct bst_skylight {
+    const bst_world *world;
+    const bst_camera *camera;
+    int step;
+    lattice stars, sky, nodes, pixels;
+    bst_skylight_map map;
+};
+
+/* One exposure on its way to a map. */
+typedef struct painter {
+    const bst_skylight *b;
+    const bst_surroundings *around;
+    bst_discs discs;
+    bst_mat3 gcrf_from_cam;
+    bst_vec3 sun;
+    double sun_e, star_e; /* of one star of V = 0 per steradian, per pixel and second */
+    double even_e;        /* all over the sensor, per pixel and second, behind the vignetting */
+    double earth_e;       /* the Earth's own emission, per pixel and second */
+} painter;
+
+bool bst_skylight_varies(const bst_camera *camera) {
+    const bst_background_config *c = &camera->background;
+    const bst_vignetting *v = &camera->optics.vignetting;
+    bool added = c->stray_e_per_s != 0.0;
+    for (int i = 0; i < 2; i++) {
+        added = added || c->gradient_e_per_s[i] != 0.0;
+    }
+    for (int i = 0; i < 3; i++) {
+        added = added || c->curvature_e_per_s[i] != 0.0;
+    }
+    return c->model == BST_BACKGROUND_SKY || added || v->model != BST_VIGNETTING_NONE ||
+           v->limit_px > 0.0;
+}
+
+bool bst_skylight_may_vary(const bst_camera *camera) {
+    return bst_skylight_varies(camera) || bst_discs_wanted(camera);
+}
+
+/* Bilinear between the four nodes about a place; with a step of a power of two the weights are
+ * exact, so that neighbouring lattices give the same bits. */
+static float interpolate(const float *value, int columns, int rows, int step, int x0, int y0,
+                         float x, float y) {
+    float u = (x - (float)x0) / (float)step, v = (y - (float)y0) / (float)step;
+    int i = (int)floorf(u), j = (int)floorf(v);
+    i = i < 0 ? 0 : i > columns - 2 ? columns - 2 : i;
+    j = j < 0 ? 0 : j > rows - 2 ? rows - 2 : j;
+    float s = u - (float)i, t = v - (float)j;
+    const float *a = value + (size_t)j * (size_t)columns + (size_t)i, *b = a + columns;
+    float left = a[0] + t * (b[0] - a[0]), right = a[1] + t * (b[1] - a[1]);
+    return left + s * (right - left);
+}
+
+double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
+    double x = fmin(fmax(x_px, map->x0_px), map->x0_px + (map->columns - 1.0) * map->step_px);
+    double y = fmin(fmax(y_px, map->y0_px), map->y0_px + (map->rows - 1.0) * map->step_px);
+    if (map->columns < 2 || map->rows < 2) {
+        size_t i = (size_t)(x - map->x0_px + 0.5), j = (size_t)(y - map->y0_px + 0.5);
+        return (double)map->e[j * (size_t)map->columns + i];
+    }
+    return (double)interpolate(map->e, map->columns, map->rows, map->step_px, map->x0_px,
+                               map->y0_px, (float)x, (float)y);
+}
+
+bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_camera *camera,
+                               bst_skylight **out) {
+    *out = NULL;
+    bst_skylight *b = calloc(1, sizeof *b);
+    if (!b) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the background");
+    }
+    b->world = world;
+    bst_skylight_set_camera(b, camera);
+    *out = b;
+    return BST_OK;
+}
+
+void bst_skylight_set_camera(bst_skylight *b, const bst_camera *camera) {
+    b->camera = camera;
+    b->step = MOST_STEP_PX;
+    while (b->step > 1 && b->step * bst_camera_scale_rad(camera) > MOST_STEP_RAD) {
+        b->step /= 2;
+    }
+}
+
+void bst_skylight_free(bst_skylight *b) {
+    if (b) {
+        free(b->stars.value);
+        free(b->sky.value);
+        free(b->nodes.value);
+        free(b->pixels.value);
+        free(b);
+    }
+}
+
+/* Nodes about a rectangle of pixels, at least 3 each way. */
+static bst_status span(bst_ctx *ctx, lattice *l, int step, bst_window w) {
+    l->step = step;
+    l->x0 = w.x0 / step * step;
+    l->y0 = w.y0 / step * step;
+    l->columns = (w.x0 + w.width - 1 - l->x0) / step + 2;
+    l->rows = (w.y0 + w.height - 1 - l->y0) / step + 2;
+    l->columns = l->columns < 3 ? 3 : l->columns;
+    l->rows = l->rows < 3 ? 3 : l->rows;
+    size_t need = (size_t)l->columns * (size_t)l->rows;
+    if (need > l->capacity) {
+        free(l->value);
+        l->value = malloc(need * sizeof *l->value);
+        l->capacity = l->value ? need : 0;
+        if (!l->value) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a background of %zu nodes", need);
+        }
+    }
+    return BST_OK;
+}
+
+static bst_vec3 to_gcrf(const painter *p, bst_vec3 direction) {
+    return bst_mat3_mul_vec(&p->gcrf_from_cam, direction);
+}
+
+/* Light of the stars that are not drawn, stars of V = 0 per steradian. */
+static double star_light(const painter *p, bst_vec3 icrs) {
+    const bst_background_config *c = &p->b->camera->background;
+    bool sky = c->model == BST_BACKGROUND_SKY;
+    const bst_faint_sky *faint = p->b->world->faint;
+    double sum = 0.0;
+    if (faint && (sky ? c->starlight : isfinite(p->b->world->faint_limit_v_mag))) {
+        sum += bst_faint_sky_undrawn(faint, icrs, p->around->v_limit, p->around->faint_limit);
+    }
+    if (sky && c->diffuse_galactic_fraction > 0.0) {
+        bst_star_counts counts;
+        bst_star_counts_at(icrs, &counts);
+        sum += c->diffuse_galactic_fraction * DEG2_PER_SR *
+               bst_star_counts_light(&counts, BST_COUNT_FIRST_V, INFINITY);
+    }
+    return sum;
+}
+
+/* Sky without bright bodies at the nodes, electrons per pixel and second. */
+static bst_status paint_sky(bst_ctx *ctx, const painter *p, bst_skylight *b, bst_window window) {
+    const bst_camera *camera = b->camera;
+    const bst_background_config *c = &camera->background;
+    bool sky = c->model == BST_BACKGROUND_SKY;
+    double uniform =
+        sky ? 0.0 : bst_camera_background_e_per_s(camera) - bst_camera_optics_e_per_s(camera);
+    BST_TRY(span(ctx, &b->sky, b->step, window));
+    lattice *s = &b->sky, *l = &b->stars;
+    bst_window nodes = {s->x0, s->y0, (s->columns - 1) * s->step + 1, (s->rows - 1) * s->step + 1};
+    BST_TRY(span(ctx, l, STAR_NODES * b->step, nodes));
+    for (int j = 0; j < l->rows; j++) {
+        for (int i = 0; i < l->columns; i++) {
+            bst_vec3 d = bst_camera_unproject(camera, l->x0 + i * l->step, l->y0 + j * l->step);
+            l->value[j * l->columns + i] = (float)(p->star_e * star_light(p, to_gcrf(p, d)));
+        }
+    }
+    for (int j = 0; j < s->rows; j++) {
+        for (int i = 0; i < s->columns; i++) {
+            int x = s->x0 + i * s->step, y = s->y0 + j * s->step;
+            double e = uniform + (double)interpolate(l->value, l->columns, l->rows, l->step, l->x0,
+                                                     l->y0, (float)x, (float)y);
+            if (sky && c->zodiacal) {
+                bst_vec3 d = to_gcrf(p, bst_camera_unproject(camera, x, y));
+                e += p->sun_e * 1e-4 * DEG2_PER_SR * bst_zodiacal_towards(d, p->sun);
+            }
+            s->value[j * s->columns + i] = (float)e;
+        }
+    }
+    return BST_OK;
+}
+
+/* Everything at one place, electrons per pixel of the exposure; sky_e from paint_sky. */
+static float paint(const painter *p, double x, double y, double sky_e) {
+    const bst_camera *camera = p->b->camera;
+    const bst_background_config *c = &camera->background;
+    double seen = sky_e;
+    if (bst_discs_any(&p->discs)) {
+        bst_disc_light light = bst_discs_light(&p->discs, bst_camera_unproject(camera, x, y));
+        seen = sky_e * (1.0 - light.earth) + p->sun_e * light.sunlight + p->earth_e * light.earth;
+    }
+    double u = (2.0 * x + 1.0) / (double)camera->width_px - 1.0;
+    double v = (2.0 * y + 1.0) / (double)camera->height_px - 1.0;
+    double added = c->stray_e_per_s + c->gradient_e_per_s[0] * u + c->gradient_e_per_s[1] * v +
+                   c->curvature_e_per_s[0] * u * u + c->curvature_e_per_s[1] * u * v +
+                   c->curvature_e_per_s[2] * v * v;
+    double e = seen * bst_camera_illumination(camera, x, y) + p->even_e + added;
+    return (float)(fmax(e, 0.0) * p->around->exposure_s);
+}
+
+/* How far a node is from the nearest edge of anything, px. */
+static double edge_px(const painter *p, double x, double y) {
+    const bst_camera *camera = p->b->camera;
+    double limit = camera->optics.vignetting.limit_px, edge = INFINITY;
+    if (limit > 0.0) {
+        edge =
+            fabs(hypot(x - bst_camera_centre_x(camera), y - bst_camera_centre_y(camera)) - limit);
+    }
+    if (bst_discs_any(&p->discs)) {
+        edge = fmin(edge, bst_discs_edge_px(&p->discs, bst_camera_unproject(camera, x, y)));
+    }
+    return edge;
+}
+
+/* Whether the cell whose first corner is (x, y) may hold an edge: half a cell's diagonal from its
+ * corners, with room for pixels that are larger than at the boresight. */
+static bool cell_has_edge(const painter *p, int x, int y) {
+    int step = p->b->step;
+    double near = INFINITY;
+    bst_vec3 corner[4];
+    for (int k = 0; k < 4; k++) {
+        int cx = x + (k & 1) * step, cy = y + (k >> 1) * step;
+        corner[k] = bst_camera_unproject(p->b->camera, cx, cy);
+        near = fmin(near, edge_px(p, cx, cy));
+    }
+    return bst_discs_terminator(&p->discs, corner) ||
+           near < 1.06 * step / bst_camera_shrink(p->b->camera);
+}
+
+static bool sensor_has_edge(const painter *p) {
+    const bst_camera *camera = p->b->camera;
+    int step = p->b->step;
+    if (step == 1 || (!bst_discs_any(&p->discs) && !(camera->optics.vignetting.limit_px > 0.0))) {
+        return false;
+    }
+    for (int y = 0; y < camera->height_px; y += step) {
+        for (int x = 0; x < camera->width_px; x += step) {
+            if (cell_has_edge(p, x, y)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* The window pixel by pixel: by itself where there is an edge, else between the nodes. */
+static bst_status paint_pixels(bst_ctx *ctx, const painter *p, bst_skylight *b, bst_window window) {
+    lattice *out = &b->pixels;
+    const lattice *n = &b->nodes, *s = &b->sky;
+    BST_TRY(span(ctx, out, 1, window));
+    out->columns = window.width;
+    out->rows = window.height;
+    int x1 = window.x0 + window.width, y1 = window.y0 + window.height;
+    for (int cy = n->y0; cy < y1; cy += n->step) {
+        for (int cx = n->x0; cx < x1; cx += n->step) {
+            bool edge = cell_has_edge(p, cx, cy);
+            for (int y = cy > window.y0 ? cy : window.y0; y < cy + n->step && y < y1; y++) {
+                float *row = out->value + (size_t)(y - window.y0) * (size_t)window.width;
+                for (int x = cx > window.x0 ? cx : window.x0; x < cx + n->step && x < x1; x++) {
+                    const lattice *from = edge ? s : n;
+                    float e = interpolate(from->value, from->columns, from->rows, from->step,
+                                          from->x0, from->y0, (float)x, (float)y);
+                    row[x - window.x0] = edge ? paint(p, x, y, (double)e) : e;
+                }
+            }
+        }
+    }
+    return BST_OK;
+}
+
+static void prepare(painter *p) {
+    const bst_camera *camera = p->b->camera;
+    const bst_background_config *c = &camera->background;
+    const bst_surroundings *a = p->around;
+    double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
+    bst_quat mid = a->q[BST_DISC_PARTS / 2];
+    p->gcrf_from_cam = bst_quat_to_mat3(bst_quat_conj(mid));
+    p->sun = bst_vec3_sub(a->bodies.sun_m, a->eye_m);
+    p->sun_e = bst_camera_electrons_per_s(camera, 0.0) * pixel_sr;
+    p->star_e = bst_camera_star_electrons_per_s(camera, 0.0, NAN) * pixel_sr;
+    p->earth_e = bst_camera_thermal_electrons_per_s(camera, c->earth_temperature_k, pixel_sr);
+    p->even_e = bst_camera_optics_e_per_s(camera);
+    bst_discs_make(camera, a, &p->discs);
+    if (c->model == BST_BACKGROUND_SKY && camera->pst) {
+        /* what a unit of irradiance gives per area of the detector is what it gives in all over the
+         * light-gathering area and transmission of the optics, which the PST holds */
+        double gathered = 0.25 * BST_PI * camera->aperture_m * camera->aperture_m *
+                          (1.0 - camera->obscuration) * camera->throughput;
+        double pitch = bst_pst_pixel_m(camera->pst);
+        double irradiance = bst_stray_irradiance(camera->pst, c, a->eye_m, &a->bodies,
+                                                 to_gcrf(p, (bst_vec3){0, 0, 1}));
+        p->even_e += gathered > 0.0 ? irradiance * pitch * pitch *
+                                          bst_camera_electrons_per_s(camera, 0.0) / gathered
+                                    : 0.0;
+    }
+}
+
+bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_surroundings *around,
+                             bst_window window, const bst_skylight_map **out) {
+    painter p = {.b = b, .around = around};
+    prepare(&p);
+    BST_TRY(paint_sky(ctx, &p, b, window));
+    BST_TRY(span(ctx, &b->nodes, b->step, window));
+    lattice *n = &b->nodes;
+    for (int j = 0; j < n->rows; j++) {
+        for (int i = 0; i < n->columns; i++) {
+            int k = j * n->columns + i;
+            n->value[k] =
+                paint(&p, n->x0 + i * n->step, n->y0 + j * n->step, (double)b->sky.value[k]);
+        }
+    }
+    if (sensor_has_edge(&p)) {
+        BST_TRY(paint_pixels(ctx, &p, b, window));
+        n = &b->pixels;
+        n->x0 = window.x0;
+        n->y0 = window.y0;
+    }
+    b->map = (bst_skylight_map){n->step, n->x0, n->y0, n->columns, n->rows, n->value, INFINITY};
+    for (int i = 0; i < n->columns * n->rows; i++) {
+        b->map.least_e = fmin(b->map.least_e, (double)n->value[i]);
+    }
+    *out = &b->map;
+    return BST_OK;
+}

@@ -1,0 +1,95 @@
+#include "sim/world/scene/truth_list.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* A source that asks for room in the truth. */
+typedef struct bst_truth_pick {
+    double rate;
+    int index;
+    bool object;
+} pick;
+
+void bst_truth_list_free(bst_truth_list *list) {
+    free(list->picks);
+    *list = (bst_truth_list){0};
+}
+
+static int objects_then_brightest(const void *a, const void *b) {
+    const pick *p = a, *q = b;
+    if (p->object != q->object) {
+        return p->object ? -1 : 1;
+    }
+    return p->rate != q->rate ? (p->rate > q->rate ? -1 : 1)
+                              : (p->index > q->index) - (p->index < q->index);
+}
+
+static int by_index(const void *a, const void *b) {
+    int p = ((const pick *)a)->index, q = ((const pick *)b)->index;
+    return (p > q) - (p < q);
+}
+
+static bst_status pick_sources(bst_ctx *ctx, bst_truth_list *list, const bst_source *sources,
+                               int count, int capacity) {
+    if (count > list->capacity) {
+        pick *more = realloc(list->picks, 2 * (size_t)count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the truth of %d sources", count);
+        }
+        list->picks = more;
+        list->capacity = 2 * count;
+    }
+    for (int i = 0; i < count; i++) {
+        list->picks[i] =
+            (pick){sources[i].electrons_per_s, i, sources[i].kind == BST_SOURCE_OBJECT};
+    }
+    qsort(list->picks, (size_t)count, sizeof *list->picks, objects_then_brightest);
+    qsort(list->picks, (size_t)capacity, sizeof *list->picks, by_index);
+    return BST_OK;
+}
+
+/* Light of a source's brightest binned pixel over that of its brightest sensor pixel: of a streak
+ * that is taken for a Gaussian of its own spread. */
+static double binned_share(const bst_camera *camera, int binning, const bst_truth_item *item) {
+    if (binning < 2) {
+        return 1.0;
+    }
+    double psf = bst_camera_psf_sigma_px(camera), share = 1.0;
+    const double way[2] = {item->x_end_px - item->x_start_px, item->y_end_px - item->y_start_px};
+    for (int i = 0; i < 2; i++) {
+        double spread = isfinite(way[i]) ? way[i] * way[i] / 12.0 : 0.0;
+        double half = 0.5 / sqrt(2.0 * (psf * psf + spread));
+        share *= erf(binning * half) / erf(half);
+    }
+    return share;
+}
+
+bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_truth_request *q,
+                               bst_truth *truth, int capacity, int *source_of) {
+    truth->count = q->count < capacity ? q->count : capacity;
+    truth->lost = q->count - truth->count;
+    if (truth->lost > 0) {
+        BST_TRY(pick_sources(ctx, list, q->sources, q->count, capacity));
+    }
+    const bst_camera *camera = q->camera;
+    double top_e = ((double)((1 << camera->bits) - 1) - camera->offset_dn) * camera->gain_e_per_dn;
+    int binning = q->binning > 1 ? q->binning : 1, added = binning * binning;
+    for (int i = 0; i < truth->count; i++) {
+        int k = truth->lost > 0 ? list->picks[i].index : i;
+        bst_truth_item *item = &truth->items[i];
+        bst_field_truth_item(q->field, q->track, &q->sources[k], q->window, binning, truth, item);
+        if (source_of) {
+            source_of[i] = k;
+        }
+        double x = item->x_chief_px, y = item->y_chief_px;
+        double light = isfinite(x) ? bst_camera_illumination(camera, x, y) : 1.0;
+        double dark_e = truth->dark_e + bst_field_background_e(q->field, truth, x, y);
+        double peak_e = light * q->peak_e(q->user, k, item);
+        /* the wells fill before pixels are added, the converter after */
+        if (peak_e >= camera->full_well_e - dark_e ||
+            peak_e * binned_share(camera, binning, item) >= top_e - added * dark_e) {
+            item->flags |= BST_TRUTH_SATURATED;
+        }
+    }
+    return BST_OK;
+}

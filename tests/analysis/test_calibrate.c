@@ -1,0 +1,145 @@
+/* The calibration finds the factors that observations were made with: the generator's own. */
+#include "obsgen/generator.h"
+#include "sim/analysis/calibration/calibrate.h"
+#include "sim/analysis/calibration/pairing.h"
+#include "tests/test_support.h"
+
+enum { SIDE = 1024, SOURCES = 700, FRAMES = 60 };
+
+static const bst_camera camera = {.width_px = SIDE,
+                                  .height_px = SIDE,
+                                  .pixel_scale_arcsec = 3.0,
+                                  .aperture_m = 0.15,
+                                  .throughput = 0.7,
+                                  .quantum_efficiency = 0.7,
+                                  .photon_flux_v0_per_s_m2 = 3.6e10,
+                                  .psf_fwhm_px = 2.0,
+                                  .read_noise_e = 8.0,
+                                  .full_well_e = 1e5,
+                                  .gain_e_per_dn = 1.6,
+                                  .bits = 16};
+
+static const double SIGMA = 2.0 / 2.3548200450309493;
+
+/* Points of SNR 3 to 9, a few brighter, on a grid with random places in the pixel. */
+static void fill(bst_truth *truth, const bst_bound *bound, int64_t exposure) {
+    bst_rng_key key = bst_rng_make_key(5, 0, "sky", "places");
+    double noise = sqrt(truth->background_e + 64.0);
+    truth->exposure_id = exposure;
+    truth->end_tick = 3000;
+    truth->count = SOURCES;
+    for (int i = 0; i < SOURCES; i++) {
+        double u[3];
+        for (int k = 0; k < 3; k++) {
+            u[k] = bst_rng_uniform(key, (uint64_t)exposure, (uint64_t)(3 * i + k));
+        }
+        double x = 25.0 + 36.0 * (i % 27) + u[0], y = 25.0 + 36.0 * (double)(i / 27) + u[1];
+        double snr = i % 10 == 0 ? 30.0 : 3.0 + 6.0 * u[2];
+        truth->items[i] = (bst_truth_item){.kind = BST_SOURCE_STAR,
+                                           .id = (uint32_t)(i + 1),
+                                           .flags = BST_TRUTH_IN_FIELD,
+                                           .x_start_px = x,
+                                           .x_centroid_px = x,
+                                           .x_end_px = x,
+                                           .y_start_px = y,
+                                           .y_centroid_px = y,
+                                           .y_end_px = y,
+                                           .snr = snr,
+                                           .electrons = snr * noise / bst_bound_norm(bound, 0.0)};
+    }
+}
+
+static void known_factors_are_found(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_bound bound;
+    bst_bound_init(&bound, SIGMA);
+    bst_obsgen_calibration made, found;
+    bst_obsgen_calibration_theory(&made);
+    made.gain[0] = 0.95;
+    made.slope = 0.9;
+    made.threshold_offset = 0.1;
+    made.noise_factor = 1.05;
+    made.crowding = made.background_share = 0.0;
+    made.false_alarm_factor = 0.8;
+    made.false_alarm_tail = 0.7;
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        made.across_factor[i] = 1.15;
+    }
+    const bst_generator_settings settings = {.capacity = 2048,
+                                             .false_alarms_per_frame = 8.0,
+                                             .streak_min_px = 1.5,
+                                             .streak_max_px = 64.0};
+    bst_generator *generator;
+    bst_assert_ok(&ctx,
+                  bst_generator_create(&ctx, &camera, &camera, &settings, &made,
+                                       bst_rng_make_key(3, 0, "x", "observations"), &generator));
+    bst_calibrator *calibrator;
+    bst_assert_ok(&ctx, bst_calibrator_create(&ctx, &calibrator));
+    const bst_calibrated_path path = {.camera = &camera,
+                                      .false_alarms_per_frame = 8.0,
+                                      .streak_min_px = 1.5,
+                                      .streak_max_px = 64.0};
+    bst_assert_ok(&ctx, bst_calibrator_begin(&ctx, calibrator, &path));
+    bst_truth *truth = calloc(1, sizeof *truth + SOURCES * sizeof truth->items[0]);
+    bst_detections *detections = calloc(1, sizeof *detections + 2048 * sizeof(bst_detection));
+    assert_true(truth && detections);
+    truth->background_e = 36.0;
+    for (int f = 0; f < FRAMES; f++) {
+        fill(truth, &bound, f);
+        const bst_generator_frame frame = {.truth = truth,
+                                           .window = {0, 0, SIDE, SIDE},
+                                           .binning = 1,
+                                           .exposure_s = 0.5,
+                                           .sigma_px = SIGMA};
+        bst_generator_result r;
+        bst_assert_ok(&ctx, bst_generator_run(&ctx, generator, &frame, &r));
+        detections->exposure_id = f;
+        detections->background_e = r.background_e;
+        detections->noise_e = r.noise_e;
+        detections->threshold_snr = r.threshold_snr;
+        detections->count = r.count;
+        for (int i = 0; i < r.count; i++) {
+            detections->items[i] = r.items[i].detection;
+        }
+        bst_assert_ok(&ctx, bst_calibrator_add(&ctx, calibrator, truth, detections, 0.5));
+    }
+    bst_calibration_counts counts;
+    bst_assert_ok(&ctx, bst_calibrator_fit(&ctx, calibrator, &found, &counts));
+    assert_int_equal(counts.frames, FRAMES);
+    /* exact but for rounding: both are what was told with each frame */
+    bst_assert_close(found.threshold_offset, 0.1, 1e-9);
+    bst_assert_close(found.noise_factor, 1.05, 1e-6);
+    /* about 30,000 trials: a gain to 0.3 %, a slope to 2 %; the fit's steps of 0.02 on top */
+    bst_assert_close(found.gain[0], 0.95, 0.012);
+    bst_assert_close(found.slope, 0.9, 0.06);
+    /* 200 false alarms where nothing is near: four standard deviations */
+    bst_assert_close(found.false_alarm_factor, 0.8, 0.25);
+    bst_assert_close(found.false_alarm_tail, 0.7, 0.25);
+    /* thousands of places in each; at the limit the pairing cuts the tails off */
+    bst_assert_close(found.across_factor[1], 1.15, 0.06);
+    bst_assert_close(found.across_factor[3], 1.15, 0.04);
+    bst_assert_close(found.phase_bias_px, 0.0, 0.005);
+    free(truth);
+    free(detections);
+    bst_calibrator_free(calibrator);
+    bst_generator_free(generator);
+}
+
+static void too_little_is_refused(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_calibrator *calibrator;
+    bst_obsgen_calibration found;
+    bst_calibration_counts counts;
+    bst_assert_ok(&ctx, bst_calibrator_create(&ctx, &calibrator));
+    assert_int_equal(bst_calibrator_fit(&ctx, calibrator, &found, &counts), BST_ERR_STATE);
+    assert_non_null(strstr(ctx.message, "--seeds"));
+    bst_calibrator_free(calibrator);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(known_factors_are_found),
+                                       cmocka_unit_test(too_little_is_refused)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,209 @@
+#include <stdlib.h>
+
+#include "sim/core/rng.h"
+#include "sim/onboard/camera_motion.h"
+#include "tests/test_support.h"
+
+enum { CAPACITY = 64 };
+
+/* Attitude that turns at a constant rate about a fixed camera axis. */
+static bst_quat turning(double seconds, bst_vec3 rate_radps) {
+    bst_quat start = bst_quat_unit((bst_quat){0.3, -0.5, 0.2, 0.7});
+    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(rate_radps, seconds)), start);
+}
+
+static bst_pointing_telemetry *telemetry(int samples, int64_t step_ticks, bst_vec3 rate) {
+    bst_pointing_telemetry *t = calloc(1, sizeof *t + CAPACITY * sizeof(bst_pointing_sample));
+    assert_non_null(t);
+    t->capacity = CAPACITY;
+    t->written = samples;
+    for (int n = 0; n < samples; n++) {
+        bst_quat q = turning((double)(n * step_ticks) / 6000.0, rate);
+        if (n % 3 == 1) {
+            q = (bst_quat){-q.x, -q.y, -q.z, -q.w}; /* the same attitude */
+        }
+        t->items[n % CAPACITY] =
+            (bst_pointing_sample){.tick = n * step_ticks, .q_cam_from_gcrf = q};
+    }
+    return t;
+}
+
+static double difference(bst_quat a, bst_quat b) {
+    return bst_vec3_norm(bst_quat_to_rotvec(bst_quat_mul(a, bst_quat_conj(b))));
+}
+
+/* At a constant rate the mean is the attitude at mid-exposure and the turn is rate times time,
+ * whether samples bracket the exposure, lie inside it, end before it, or were overwritten before
+ * it. 1e-12 rad: rounding. */
+static void constant_rate(void **state) {
+    (void)state;
+    bst_vec3 rate = {1e-3, -2e-3, 5e-4};
+    static const struct {
+        int samples;
+        int64_t start, end;
+    } cases[] = {{40, 600, 3600},  {40, 613, 3571},  {10, 300, 3300},
+                 {200, 100, 3100}, {40, 1000, 1000}, {40, 1050, 1051}};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        bst_pointing_telemetry *t = telemetry(cases[c].samples, 100, rate);
+        bst_motion m;
+        assert_true(bst_motion_from_telemetry(t, cases[c].start, cases[c].end, &m));
+        double span = (double)(cases[c].end - cases[c].start) / 6000.0;
+        double middle = 0.5 * (double)(cases[c].start + cases[c].end) / 6000.0;
+        bst_assert_close(difference(m.q_cam_from_gcrf, turning(middle, rate)), 0.0, 1e-12);
+        bst_assert_close(m.turn_cam_rad.x, rate.x * span, 1e-12);
+        bst_assert_close(m.turn_cam_rad.y, rate.y * span, 1e-12);
+        bst_assert_close(m.turn_cam_rad.z, rate.z * span, 1e-12);
+        bst_assert_close(bst_vec3_norm(m.bend_cam_rad), 0.0, 1e-12);
+        free(t);
+    }
+}
+
+/* Constant acceleration about x: mean r = a T^2 / 6, least-squares turn a T^2 / 2, bend a T^2 / 12,
+ * exposure from rest; 1e-9 rad: chords of 1/60 s under 1e-3 rad/s^2 err by a h^2 / 12. */
+static void accelerated(void **state) {
+    (void)state;
+    bst_pointing_telemetry *t = telemetry(40, 100, (bst_vec3){0, 0, 0});
+    const double a = 1e-3;
+    for (int n = 0; n < 40; n++) {
+        double s = n / 60.0;
+        t->items[n].q_cam_from_gcrf = bst_quat_from_rotvec((bst_vec3){0.5 * a * s * s, 0, 0});
+    }
+    bst_motion m;
+    assert_true(bst_motion_from_telemetry(t, 0, 3000, &m));
+    bst_vec3 mean = bst_quat_to_rotvec(m.q_cam_from_gcrf);
+    double limit = a / (60.0 * 60.0) / 6.0;
+    bst_assert_close(mean.x, a * 0.25 / 6.0, limit);
+    bst_assert_close(m.turn_cam_rad.x, a * 0.25 / 2.0, limit);
+    bst_assert_close(m.bend_cam_rad.x, a * 0.25 / 12.0, limit);
+    free(t);
+}
+
+static void few_samples(void **state) {
+    (void)state;
+    bst_pointing_telemetry *t = telemetry(0, 100, (bst_vec3){0, 0, 0});
+    bst_motion m = {.turn_cam_rad = {9, 9, 9}};
+    assert_false(bst_motion_from_telemetry(t, 0, 100, &m));
+    assert_true(m.turn_cam_rad.x == 9.0);
+    free(t);
+    t = telemetry(1, 100, (bst_vec3){1, 0, 0});
+    assert_true(bst_motion_from_telemetry(t, 50, 150, &m));
+    bst_assert_close(difference(m.q_cam_from_gcrf, t->items[0].q_cam_from_gcrf), 0.0, 1e-15);
+    bst_assert_close(bst_vec3_norm(m.turn_cam_rad), 0.0, 0.0);
+    free(t);
+}
+
+/* The path against projecting a fixed direction at both ends. */
+static void check_streak(bst_camera c) {
+    bst_motion m = {.q_cam_from_gcrf = bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}),
+                    .turn_cam_rad = {1e-4, -5e-5, 2e-3}};
+    bst_quat end =
+        bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)), m.q_cam_from_gcrf);
+    bst_quat start =
+        bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, -0.5)), m.q_cam_from_gcrf);
+    bst_vec3 star =
+        bst_quat_rotate(bst_quat_conj(m.q_cam_from_gcrf), bst_camera_unproject(&c, 900.0, 100.0));
+    double x0 = 0, y0 = 0, x1 = 0, y1 = 0, dx, dy;
+    assert_true(bst_camera_project(&c, bst_quat_rotate(start, star), &x0, &y0));
+    assert_true(bst_camera_project(&c, bst_quat_rotate(end, star), &x1, &y1));
+    bst_motion_streak(&m, &c, 900.0, 100.0, &dx, &dy);
+    /* rounding of rotations at 1e5 px per radian */
+    bst_assert_close(dx, x1 - x0, 1e-8);
+    bst_assert_close(dy, y1 - y0, 1e-8);
+    assert_true(hypot(dx, dy) > 3.0);
+}
+
+static void streak_is_the_stars_path(void **state) {
+    (void)state;
+    bst_camera c = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
+    check_streak(c);
+    bst_ctx ctx = {0};
+    c.rotation_deg = -37;
+    c.distortion.k1 = 300;
+    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &c));
+    check_streak(c);
+    /* the bend at the boresight: tilted by a small rotation vector, the boresight's own direction
+     * moves as projecting it says */
+    bst_motion m = {.q_cam_from_gcrf = BST_QUAT_IDENTITY, .bend_cam_rad = {3e-5, -7e-5, 0}};
+    double bx, by, x = 0, y = 0;
+    bst_motion_bend(&m, &c, &bx, &by);
+    bst_vec3 v = bst_quat_rotate(bst_quat_from_rotvec(m.bend_cam_rad), (bst_vec3){0, 0, 1});
+    assert_true(bst_camera_project(&c, v, &x, &y));
+    bst_assert_close(bx, x - 511.5, 1e-4); /* third order: 300 (7e-5)^2 of 5 px */
+    bst_assert_close(by, y - 511.5, 1e-4);
+    /* what is added in pixels is there in pixels: both are linear but for the same third order */
+    double x0, y0, x1, y1, cx, cy;
+    bst_motion_streak(&m, &c, 511.5, 511.5, &x0, &y0);
+    bst_motion_add(&m, &c, 0.7, -0.4, 0.3, 0.2);
+    bst_motion_streak(&m, &c, 511.5, 511.5, &x1, &y1);
+    bst_motion_bend(&m, &c, &cx, &cy);
+    bst_assert_close(x1 - x0, 0.7, 1e-6);
+    bst_assert_close(y1 - y0, -0.4, 1e-6);
+    bst_assert_close(cx - bx, 0.3, 1e-9);
+    bst_assert_close(cy - by, 0.2, 1e-9);
+}
+
+/* Noise of the telemetry is no bend, and what it does to a true bend is told. 50 samples in the
+ * exposure: the least-squares coefficient of a Legendre polynomial of degree 2 has sigma
+ * sqrt(5 / 50) of a sample's. */
+static void noise_is_no_bend(void **state) {
+    (void)state;
+    enum { TRIALS = 400 };
+    const double sample = 5e-7, sigma = sample * sqrt(5.0 / 50.0);
+    for (int bent = 0; bent < 2; bent++) {
+        double true_bend = bent ? 20.0 * sigma : 0.0, error2 = 0.0, stated2 = 0.0;
+        for (uint64_t trial = 0; trial < TRIALS; trial++) {
+            bst_rng_key key = bst_rng_make_key(trial, 0, "test", "noise_is_no_bend");
+            bst_pointing_telemetry *t = telemetry(60, 60, (bst_vec3){1e-3, -2e-3, 0});
+            for (int n = 0; n < 60; n++) {
+                double e[2], u = ((double)(n * 60) - 1800.0) / 1500.0;
+                bst_rng_normal2(key, 0, (uint64_t)n, e);
+                bst_vec3 off = {sample * e[0] + true_bend * (1.5 * u * u - 0.5), sample * e[1], 0};
+                t->items[n].q_cam_from_gcrf =
+                    bst_quat_mul(bst_quat_from_rotvec(off), t->items[n].q_cam_from_gcrf);
+            }
+            bst_motion m;
+            assert_true(bst_motion_from_telemetry(t, 300, 3300, &m));
+            error2 += pow(m.bend_cam_rad.x - true_bend, 2) + pow(m.bend_cam_rad.y, 2);
+            stated2 += 2.0 * m.bend_sigma_rad * m.bend_sigma_rad;
+            free(t);
+        }
+        error2 /= TRIALS * 2.0 * sigma * sigma;
+        stated2 /= TRIALS * 2.0 * sigma * sigma;
+        if (bent) {
+            /* 800 draws: 5 %, three of them */
+            bst_assert_close(error2, 1.0, 0.15);
+            bst_assert_close(stated2, 1.0, 0.1);
+        } else {
+            /* of the positive-part estimator at the origin, by quadrature over the chi-square of 2
+             * degrees of freedom: E[(1 - 2/s)+^2 s] / 2 = 0.35 */
+            assert_true(error2 < 0.45);
+        }
+    }
+}
+
+/* A place at 8 and -6 px of bend: half of what the fit does not follow, 5 % of what it does. */
+static void places_are_as_wrong_as_the_bend(void **state) {
+    (void)state;
+    bst_detection d = {.cov_xx = 1.0, .cov_yy = 2.0};
+    bst_motion_widen(8.0, -6.0, 0.0, 0.0, &d);
+    bst_assert_close(d.cov_xx, 17.0, 1e-14); /* rounding */
+    bst_assert_close(d.cov_xy, -12.0, 1e-14);
+    bst_assert_close(d.cov_yy, 11.0, 1e-14);
+    d = (bst_detection){.cov_xx = 1.0, .cov_yy = 2.0};
+    bst_motion_widen(8.0, -6.0, 8.0, -6.0, &d);
+    bst_assert_close(d.cov_xx, 1.16, 1e-14);
+    bst_assert_close(d.cov_xy, -0.12, 1e-14);
+    bst_assert_close(d.cov_yy, 2.09, 1e-14);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(noise_is_no_bend),
+        cmocka_unit_test(constant_rate),
+        cmocka_unit_test(accelerated),
+        cmocka_unit_test(few_samples),
+        cmocka_unit_test(streak_is_the_stars_path),
+        cmocka_unit_test(places_are_as_wrong_as_the_bend),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

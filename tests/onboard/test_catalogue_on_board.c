@@ -1,0 +1,242 @@
+/* The scenario's objects as the onboard side knows them: apsides, first places, sights from where
+ * the spacecraft believes to be; and what a world says of their orbits. */
+#include "sim/onboard/knowledge.h"
+#include "tests/world/world_support.h"
+
+#define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
+#define KEPLER(name, at, e, more)                                                      \
+    "{\"name\": \"" name                                                               \
+    "\", \"orbit\": {\"source\": \"numerical\", \"state\": {\"from\": \"keplerian\", " \
+    "\"at_s\": " at ", \"perigee_radius_m\": 7.2e6, \"eccentricity\": " e              \
+    ", \"inclination_deg\": 60, \"raan_deg\": 30, \"arg_perigee_deg\": 40, "           \
+    "\"true_anomaly_deg\": 50}, \"forces\": {\"gravity\": \"two_body\"}}" more "}"
+#define BESIDE                                                                              \
+    "{\"name\": \"beside\", \"orbit\": {\"source\": \"relative\", \"reference\": \"GX5\", " \
+    "\"offset_rtn_m\": [0, 5000, 0]}}"
+
+enum { OBJECT_GX5, ELLIPSE, HYPERBOLA, BURNING, BESIDE_GX5, SELF, OBJECTS };
+
+typedef struct scene {
+    bst_ctx ctx;
+    bst_world *world;
+    bst_view *view;
+    bst_knowledge *knowledge;
+    bst_knowledge_view *onboard;
+} scene;
+
+static scene make(const char *sensor) {
+    scene s = {.world = test_world_with(
+                   GX5 ", " KEPLER("ellipse", "0", "0.25", "") ", " KEPLER(
+                       "hyperbola", "0", "1.5",
+                       "") ", " KEPLER("burning", "0", "0.1",
+                                       ", \"burns\": [{\"time_s\": 30, \"dv_rtn_mps\": [0, 50, "
+                                       "0]}]") ", " BESIDE ", {\"name\": \"self\", " TEST_NEOSSAT
+                                               "}",
+                   sensor)};
+    bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &s.view));
+    bst_assert_ok(&s.ctx, bst_knowledge_create(&s.ctx, s.world, 0, 0, &s.knowledge));
+    bst_assert_ok(&s.ctx, bst_knowledge_view_create(&s.ctx, s.knowledge, &s.onboard));
+    return s;
+}
+
+static void drop(scene *s) {
+    bst_knowledge_view_free(s->onboard);
+    bst_knowledge_free(s->knowledge);
+    bst_view_free(s->view);
+    bst_world_free(s->world);
+}
+
+static void orbits_by_their_apsides(void **state) {
+    (void)state;
+    scene s = make("");
+    double perigee, apogee;
+    assert_int_equal(bst_knowledge_object_count(s.knowledge), OBJECTS);
+    assert_string_equal(bst_knowledge_object(s.knowledge, ELLIPSE)->name, "ellipse");
+    assert_int_equal(bst_knowledge_find_object(s.knowledge, "burning"), BURNING);
+    assert_int_equal(bst_knowledge_find_object(s.knowledge, "nobody"), -1);
+    assert_true(bst_knowledge_apsides(s.onboard, ELLIPSE, &perigee, &apogee));
+    bst_assert_close(perigee, 7.2e6, 0.01);
+    bst_assert_close(apogee, 7.2e6 * 1.25 / 0.75, 0.01);
+    assert_true(bst_knowledge_apsides(s.onboard, HYPERBOLA, &perigee, &apogee));
+    bst_assert_close(perigee, 7.2e6, 0.01);
+    assert_true(isinf(apogee));
+    /* a geostationary satellite, to its eccentricity of 3e-4 */
+    assert_true(bst_knowledge_apsides(s.onboard, OBJECT_GX5, &perigee, &apogee));
+    bst_assert_close(perigee, 42.164e6, 4e4);
+    bst_assert_close(apogee, 42.164e6, 4e4);
+    for (int i = 0; i < OBJECTS; i++) {
+        assert_true(bst_knowledge_is_itself(s.knowledge, i) == (i == SELF));
+    }
+    drop(&s);
+}
+
+static void first_places_of_all(void **state) {
+    (void)state;
+    scene s = make("");
+    double x[OBJECTS], y[OBJECTS], z[OBJECTS];
+    bst_assert_ok(&s.ctx, bst_world_prepare(&s.ctx, s.world, 1));
+    for (double t = 10; t < 400; t += 130) {
+        double at = bst_knowledge_places(s.knowledge, t, x, y, z);
+        bst_assert_close(at, 8 * round(t / 8), 0);
+        for (int i = 0; i < OBJECTS; i++) {
+            bst_state true_state;
+            bst_assert_ok(&s.ctx, bst_view_object_state(&s.ctx, s.view, i, at, &true_state));
+            if (i == BURNING) { /* its burn is not to be known */
+                assert_true(isnan(x[i]) && isnan(y[i]) && isnan(z[i]));
+            } else if (!isnan(x[i])) {
+                bst_vec3 place = {x[i], y[i], z[i]};
+                bst_assert_close(test_distance(place, true_state.position_m), 0, 1000);
+            }
+        }
+        assert_false(isnan(x[OBJECT_GX5]) || isnan(x[SELF]));
+    }
+    drop(&s);
+}
+
+static void expect_same(const bst_sight *a, const bst_sight *b) {
+    /* the truth's ephemeris is right to millimetres, of thousands of kilometres */
+    bst_assert_close(test_distance(a->geometric, b->geometric), 0, 2e-9);
+    bst_assert_close(test_distance(a->apparent, b->apparent), 0, 2e-9);
+    bst_assert_close(a->range_m, b->range_m, 0.05);
+    bst_assert_close(a->light_time_s, b->light_time_s, 1e-9);
+    bst_assert_close(a->phase_rad, b->phase_rad, 1e-8);
+    bst_assert_close(a->sunlit_fraction, b->sunlit_fraction, 1e-6);
+    assert_true(a->occulted == b->occulted);
+    if (isfinite(b->v_mag)) {
+        bst_assert_close(a->v_mag, b->v_mag, 1e-6);
+    } else {
+        assert_true(isinf(a->v_mag));
+    }
+}
+
+/* With a clock that is 50 s fast everything is as it will truly be 50 s later. */
+static void sights_by_a_fast_clock(void **state) {
+    (void)state;
+    scene s = make(", \"knowledge\": {\"clock_offset_s\": 50}");
+    int hidden = 0, seen = 0;
+    for (double t = 0; t < 9000; t += 300) {
+        for (int i = OBJECT_GX5; i <= ELLIPSE; i++) {
+            bst_sight truth, believed;
+            bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, s.view, 0, i, t + 50, &truth));
+            bst_assert_ok(&s.ctx, bst_knowledge_sight_at(&s.ctx, s.onboard, i, t, &believed));
+            expect_same(&believed, &truth);
+            hidden += believed.occulted;
+            seen += !believed.occulted;
+        }
+        bst_state eye, own;
+        bst_bodies bodies, now;
+        bst_assert_ok(&s.ctx, bst_knowledge_eye_at(&s.ctx, s.onboard, t, &eye, &bodies));
+        bst_assert_ok(&s.ctx, bst_view_observer_state(&s.ctx, s.view, 0, t + 50, &own));
+        bst_assert_ok(&s.ctx, bst_view_bodies(&s.ctx, s.view, t + 50, &now));
+        bst_assert_close(test_distance(eye.position_m, own.position_m), 0, 0.01);
+        bst_assert_close(test_distance(eye.velocity_mps, own.velocity_mps), 0, 1e-5);
+        bst_assert_close(test_distance(bodies.sun_m, now.sun_m), 0, 1);
+        bst_assert_close(test_distance(bodies.moon_m, now.moon_m), 0, 1e-3);
+    }
+    assert_true(hidden > 3 && seen > 3);
+    drop(&s);
+}
+
+/* From a place that is believed: the direction changes by the error across it over the range. */
+static void sights_from_where_it_believes_to_be(void **state) {
+    (void)state;
+    scene right = make(""),
+          wrong = make(
+              ", \"knowledge\": {\"orbit\": {\"position_rtn_m\": [300, -200, 500], "
+              "\"velocity_rtn_mps\": [0.5, 0.2, -0.4], \"along_track_mps\": 2}}");
+    const double t = 40;
+    bst_state truth, eye;
+    bst_bodies bodies;
+    bst_assert_ok(&right.ctx, bst_view_observer_state(&right.ctx, right.view, 0, t, &truth));
+    bst_assert_ok(&wrong.ctx, bst_knowledge_eye_at(&wrong.ctx, wrong.onboard, t, &eye, &bodies));
+    bst_vec3 r = bst_vec3_unit(truth.position_m);
+    bst_vec3 n = bst_vec3_unit(bst_vec3_cross(truth.position_m, truth.velocity_mps));
+    bst_vec3 along = bst_vec3_cross(n, r);
+    bst_vec3 off = bst_vec3_sub(eye.position_m, truth.position_m),
+             drift = bst_vec3_sub(eye.velocity_mps, truth.velocity_mps);
+    bst_assert_close(bst_vec3_dot(off, r), 300, 0.01);
+    bst_assert_close(bst_vec3_dot(off, along), -200 + 2 * t, 0.01);
+    bst_assert_close(bst_vec3_dot(off, n), 500, 0.01);
+    bst_assert_close(bst_vec3_dot(drift, r), 0.5, 1e-5);
+    bst_assert_close(bst_vec3_dot(drift, along), 0.2, 1e-5);
+    bst_assert_close(bst_vec3_dot(drift, n), -0.4, 1e-5);
+    bst_sight a, b;
+    bst_assert_ok(&right.ctx, bst_view_sight(&right.ctx, right.view, 0, ELLIPSE, t, &a));
+    bst_assert_ok(&wrong.ctx, bst_knowledge_sight_at(&wrong.ctx, wrong.onboard, ELLIPSE, t, &b));
+    bst_vec3 line = bst_vec3_axpy(bst_vec3_scale(off, -1), a.range_m, a.geometric);
+    /* light time of 600 m, and the Earth's motion in it: 1e-4 of them */
+    bst_assert_close(test_distance(b.geometric, bst_vec3_unit(line)), 0, 0.2 / a.range_m);
+    bst_assert_close(b.range_m, bst_vec3_norm(line), 0.3);
+    drop(&right);
+    drop(&wrong);
+}
+
+/* Ages of the element sets (2022, days 166.78481540 and 167.00079919) at 2022-06-16T22:10, day
+ * 167 + 79800 / 86400; the laws that objects move by. */
+static void what_a_world_says_of_orbits(void **state) {
+    (void)state;
+    scene s = make("");
+    double age;
+    assert_true(bst_world_element_age(s.world, OBJECT_GX5, &age));
+    bst_assert_close(age, (167 - 167.00079919) * 86400 + 79800, 0.01); /* 1e-8 of a day */
+    assert_true(bst_world_element_age(s.world, OBJECTS, &age));        /* the observer */
+    bst_assert_close(age, (167 - 166.78481540) * 86400 + 79800, 0.01);
+    assert_false(bst_world_element_age(s.world, ELLIPSE, &age));
+    bst_object_motion m = bst_world_object_motion(s.world, SELF);
+    assert_true(m.sgp4 && !m.forces);
+    bst_assert_close(m.bstar, 6.8433e-5, 1e-12);
+    m = bst_world_object_motion(s.world, ELLIPSE);
+    assert_true(!m.sgp4 && m.forces);
+    m = bst_world_object_motion(s.world, BESIDE_GX5); /* by the law of its reference */
+    assert_true(m.sgp4 && !m.forces);
+    assert_int_equal(bst_world_observer_count(s.world), 1);
+    assert_int_equal(bst_world_sensor_count(s.world, 0), 1);
+    assert_string_equal(bst_world_observer_name(s.world, 0), "neossat");
+    char text[40];
+    bst_time_to_utc(bst_world_time(s.world, 3601.5), 1, text, sizeof text);
+    assert_string_equal(text, "2022-06-16T23:10:01.5Z");
+    drop(&s);
+}
+
+/* Of several observers each believes to be where it is itself. */
+static void each_observer_is_itself(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world(
+        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+        "]}, \"observers\": [{\"name\": \"a\", " TEST_NEOSSAT ", \"sensors\": [{" TEST_CAMERA
+        "}]}, {\"name\": \"b\", \"orbit\": {\"elements_file\": "
+        "\"scenarios/catalogue_2022-06.tle\", \"norad\": 25544}, \"sensors\": [{\"knowledge\": "
+        "{\"clock_offset_s\": 7}, " TEST_CAMERA "}]}]}");
+    bst_view *view;
+    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    for (int o = 0; o < 2; o++) {
+        for (double t = 100.2; t < 101; t += 0.1) { /* often within a second */
+            bst_state own, believed;
+            bst_bodies bodies;
+            bst_assert_ok(&ctx, bst_view_observer_state(&ctx, view, o, t + 7 * o, &own));
+            bst_assert_ok(&ctx, bst_view_believed(&ctx, view, o, 0, t, &believed, &bodies));
+            bst_assert_close(test_distance(believed.position_m, own.position_m), 0, 1e-3);
+            bst_assert_close(test_distance(believed.velocity_mps, own.velocity_mps), 0, 1e-6);
+        }
+    }
+    double ages[2];
+    assert_true(bst_world_element_age(world, 1, &ages[0]));
+    assert_true(bst_world_element_age(world, 2, &ages[1]));
+    assert_true(fabs(ages[0] - ages[1]) > 1);
+    assert_string_equal(bst_world_observer_name(world, 1), "b");
+    bst_view_free(view);
+    bst_world_free(world);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(orbits_by_their_apsides),
+        cmocka_unit_test(first_places_of_all),
+        cmocka_unit_test(sights_by_a_fast_clock),
+        cmocka_unit_test(sights_from_where_it_believes_to_be),
+        cmocka_unit_test(what_a_world_says_of_orbits),
+        cmocka_unit_test(each_observer_is_itself),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

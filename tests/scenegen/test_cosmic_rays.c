@@ -1,0 +1,185 @@
+/* Radiation hits against their closed forms, and frames with every effect at once. */
+#include "scenegen/detector/cosmic_rays.h"
+#include "tests/scenegen/scene_support.h"
+#include "tests/test_support.h"
+
+enum { SIDE = 512 };
+
+static const bst_hits_config example = {.rate_per_cm2_s = 5.0,
+                                        .pixel_pitch_um = 13.0,
+                                        .depth_um = 15.0,
+                                        .e_per_um = 75.0,
+                                        .straggling = 0.15};
+
+/* Number: Poisson of rate, area and time. Charge: e_per_um times the mean path 2 depth (the density
+ * 2 mu of the cosine and the length depth / mu) times the mean 1 + straggling (gamma + ln 2) of a
+ * Moyal law. */
+static void hits_have_their_rate_and_charge(void **state) {
+    (void)state;
+    enum { EXPOSURES = 4000 };
+    bst_ctx ctx = {0};
+    bst_hits *hits;
+    bst_hits_config c = example;
+    c.straggling = 0.02; /* so that nothing is cut at 0 */
+    bst_assert_ok(&ctx, bst_hits_create(&ctx, &c, SIDE, SIDE, SIDE, &hits));
+    double tracks = 0.0, tracks2 = 0.0, sum = 0.0;
+    for (int k = 0; k < EXPOSURES; k++) {
+        const bst_hit_pixel *pixels;
+        bst_hits_summary s;
+        bst_assert_ok(&ctx, bst_hits_draw(&ctx, hits, (bst_rng_key){{1, 2}}, k, 2.0, &pixels, &s));
+        double total = 0.0;
+        for (int i = 0; i < s.pixels; i++) {
+            assert_in_range(pixels[i].index, 0, SIDE * SIDE - 1);
+            assert_true(i == 0 || pixels[i].index > pixels[i - 1].index);
+            assert_true(pixels[i].electrons > 0.0f);
+            total += (double)pixels[i].electrons;
+        }
+        bst_assert_close(total, s.electrons, 1e-5 * (s.electrons + 1.0)); /* float sums */
+        tracks += s.tracks;
+        tracks2 += (double)s.tracks * s.tracks;
+        sum += s.electrons;
+    }
+    double area = SIDE * SIDE * 13.0e-4 * 13.0e-4, entered = EXPOSURES * 5.0 * 2.0 * area;
+    /* what comes in beside the sensor replaces what leaves it: mean charge per track that enters.
+     * The path's mean square diverges logarithmically and is cut by the sensor: at most 40 depths^2
+     */
+    double mean = 75.0 * 2.0 * 15.0 * (1.0 + 0.02 * (0.5772 + log(2.0)));
+    bst_assert_close(sum / entered, mean, 4.0 * 75.0 * 15.0 * sqrt(40.0 / entered) + 0.005 * mean);
+    /* tracks that touch the sensor: those that enter, and a rim about as wide as a mean track */
+    assert_true(tracks > entered - 4.0 * sqrt(entered));
+    assert_true(tracks < entered * (1.0 + 4.0 * 4.0 / SIDE) + 4.0 * sqrt(entered));
+    /* variance over mean of a Poisson number, of n exposures: standard deviation sqrt(2 / n) */
+    double m = tracks / EXPOSURES, var = tracks2 / EXPOSURES - m * m;
+    bst_assert_close(var / m, 1.0, 4.0 * sqrt(2.0 / EXPOSURES) + 4.0 / sqrt(tracks));
+    bst_hits_free(hits);
+}
+
+static void too_many_hits_are_refused(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_hits *hits;
+    const bst_hit_pixel *pixels;
+    bst_hits_summary s;
+    bst_assert_ok(&ctx, bst_hits_create(&ctx, &example, SIDE, SIDE, SIDE, &hits));
+    assert_int_equal(bst_hits_draw(&ctx, hits, (bst_rng_key){{1, 2}}, 0, 1e7, &pixels, &s),
+                     BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "rate_per_cm2_s"));
+    bst_hits_free(hits);
+}
+
+static void take(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, uint16_t *out) {
+    bst_frame *frame;
+    const uint16_t *pixels;
+    bst_assert_ok(ctx, bst_renderer_render(ctx, r, q, &frame));
+    bst_assert_ok(ctx, bst_frame_map(frame, ctx, &pixels));
+    memcpy(out, pixels, (size_t)(frame->width * frame->height) * sizeof *out);
+    bst_frame_unmap(frame);
+    bst_frame_release(frame);
+}
+
+/* The charge of the hits is in the frame, and gone from the next one. */
+static void frames_hold_the_hits_of_their_exposure(void **state) {
+    (void)state;
+    enum { W = 200, H = 300 };
+    static uint16_t dn[W * H];
+    bst_ctx ctx = {0};
+    bst_device *device;
+    bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
+    bst_camera camera = scene_camera(W, H);
+    camera.detector.hits = example;
+    camera.detector.hits.rate_per_cm2_s = 2000.0;
+    bst_renderer *r;
+    bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
+    double time_s[2] = {0.0, 1.0};
+    bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
+    bst_los_track track = {2, time_s, q};
+    for (int k = 0; k < 6; k++) {
+        bst_render_request request = {
+            .window = {0, 0, W, H}, .track = &track, .key = {{5, 6}}, .exposure_id = k};
+        take(&ctx, r, &request, dn);
+        double sum = 0.0;
+        for (int i = 0; i < W * H; i++) {
+            sum += dn[i] - 100.0;
+        }
+        bst_render_stats stats;
+        bst_renderer_get_stats(r, &stats);
+        assert_in_range(stats.hits, 100, 500); /* 203 expected */
+        bst_assert_close(sum, stats.hits_e, 4.0 * sqrt(W * H * (64.0 + 1.0 / 12.0)));
+    }
+    bst_renderer_free(r);
+    bst_device_close(device);
+}
+
+/* With every effect on, a window has the bytes that the whole frame has there. */
+static void windows_agree_with_every_effect(void **state) {
+    (void)state;
+    enum { W = 300, H = 200 };
+    static uint16_t full[W * H], other[W * H];
+    bst_ctx ctx = {0};
+    bst_device *device;
+    bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
+    bst_source *stars = NULL;
+    double time_s[2] = {0.0, 0.5};
+    bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
+    bst_los_track track = {2, time_s, q};
+    for (int stage = 0; stage < 2; stage++) { /* in the tile, and in stages */
+        bst_camera camera = scene_camera(W, H);
+        camera.dark_current_e_per_s = 20.0;
+        camera.detector = (bst_detector_config){.prnu_rms = 0.02,
+                                                .dsnu_rms = 0.2,
+                                                .dark_doubling_k = 6.5,
+                                                .hot_fraction = 0.01,
+                                                .hot_median_e_per_s = 5000.0,
+                                                .hot_spread_dex = 0.5,
+                                                .dead_fraction = 0.001,
+                                                .bad_columns = 2,
+                                                .column_offset_rms_e = 3.0,
+                                                .row_offset_rms_e = 3.0,
+                                                .row_noise_e = 2.0,
+                                                .read_tail_fraction = 0.02,
+                                                .read_tail_rms_e = 20.0,
+                                                .nonlinearity = {-0.02, 0.0, 0.0},
+                                                .hits = example};
+        camera.detector.hits.rate_per_cm2_s = 50.0;
+        if (stage == 1) {
+            camera.full_well_e = 20000.0;
+            camera.detector.full_well = BST_WELL_BLOOM;
+            camera.detector.frame_transfer_s = 0.01;
+        }
+        stars = scene_stars(&camera, 100, 2e6, 6.0, 4);
+        bst_render_request request = {.window = {0, 0, W, H},
+                                      .track = &track,
+                                      .sources = stars,
+                                      .count = 100,
+                                      .background_e = 25.0,
+                                      .dark_e = 10.0,
+                                      .key = {{17, 23}},
+                                      .exposure_id = 9};
+        bst_renderer *r;
+        bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
+        take(&ctx, r, &request, full);
+        const bst_window windows[] = {{37, 51, 101, 67}, {13, 0, 16, 200}, {299, 199, 1, 1}};
+        for (size_t i = 0; i < sizeof windows / sizeof *windows; i++) {
+            bst_window w = windows[i];
+            request.window = w;
+            take(&ctx, r, &request, other);
+            for (int y = 0; y < w.height; y++) {
+                assert_memory_equal(&other[y * w.width], &full[(y + w.y0) * W + w.x0],
+                                    (size_t)w.width * sizeof *full);
+            }
+        }
+        bst_renderer_free(r);
+        free(stars);
+    }
+    bst_device_close(device);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(hits_have_their_rate_and_charge),
+        cmocka_unit_test(too_many_hits_are_refused),
+        cmocka_unit_test(frames_hold_the_hits_of_their_exposure),
+        cmocka_unit_test(windows_agree_with_every_effect),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

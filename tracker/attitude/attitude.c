@@ -1,0 +1,276 @@
+#include "tracker/attitude/attitude.h"
+
+#include "sim/core/symmetric.h"
+
+/* Residual of a star (measured - predicted) and its derivative by the camera rotation vector. */
+typedef struct star_residual {
+    double r[2];
+    double j[2][3];
+    double w[3]; /* inverse covariance: xx, xy, yy */
+    double chi2;
+} star_residual;
+
+static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
+                     const bst_attitude_star *star, star_residual *out) {
+    bst_vec3 v = bst_quat_rotate(q, star->apparent_gcrf);
+    double x, y;
+    if (!bst_camera_project(camera, v, &x, &y)) {
+        return false;
+    }
+    double cxx = star->cov_xx + extra_px2, cyy = star->cov_yy + extra_px2, cxy = star->cov_xy,
+           det = cxx * cyy - cxy * cxy;
+    if (!(det > 0.0) || !(cxx > 0.0)) {
+        return false;
+    }
+    out->r[0] = star->x_px - x;
+    out->r[1] = star->y_px - y;
+    out->w[0] = cyy / det;
+    out->w[1] = -cxy / det;
+    out->w[2] = cxx / det;
+    out->chi2 = out->w[0] * out->r[0] * out->r[0] + 2 * out->w[1] * out->r[0] * out->r[1] +
+                out->w[2] * out->r[1] * out->r[1];
+    /* v turns by e x v; the pixel follows from a = vx / vz and b = vy / vz */
+    double f = 1.0 / bst_camera_scale_rad(camera), a = v.x / v.z, b = v.y / v.z;
+    const double ja[3] = {-a * b, 1 + a * a, -b}, jb[3] = {-(1 + b * b), a * b, a};
+    double by_tangent[2][2];
+    bst_camera_jacobian(camera, v, by_tangent);
+    for (int k = 0; k < 3; k++) {
+        out->j[0][k] = (by_tangent[0][0] * ja[k] + by_tangent[0][1] * jb[k]) * f;
+        out->j[1][k] = (by_tangent[1][0] * ja[k] + by_tangent[1][1] * jb[k]) * f;
+    }
+    return isfinite(out->chi2);
+}
+
+typedef enum weighting { WEIGHT_CAUCHY, WEIGHT_GIVEN } weighting;
+
+/* One Gauss-Newton step; false when the normal matrix cannot be inverted. */
+static bool step(const bst_camera *camera, double extra_px2, const bst_attitude_star *stars,
+                 int count, weighting how, double scale2, bst_quat *q, double covariance[3][3],
+                 double *moved_rad) {
+    double n[3][3] = {{0}}, g[3] = {0};
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (!evaluate(camera, extra_px2, *q, &stars[i], &s)) {
+            continue;
+        }
+        double weight = how == WEIGHT_GIVEN ? stars[i].weight : 1.0 / (1.0 + s.chi2 / scale2);
+        for (int k = 0; k < 3; k++) {
+            double a = weight * (s.w[0] * s.j[0][k] + s.w[1] * s.j[1][k]);
+            double b = weight * (s.w[1] * s.j[0][k] + s.w[2] * s.j[1][k]);
+            g[k] += a * s.r[0] + b * s.r[1];
+            for (int m = 0; m < 3; m++) {
+                n[k][m] += a * s.j[0][m] + b * s.j[1][m];
+            }
+        }
+    }
+    if (!bst_symmetric_invert(3, n[0], covariance[0])) {
+        return false;
+    }
+    bst_vec3 e = {covariance[0][0] * g[0] + covariance[0][1] * g[1] + covariance[0][2] * g[2],
+                  covariance[1][0] * g[0] + covariance[1][1] * g[1] + covariance[1][2] * g[2],
+                  covariance[2][0] * g[0] + covariance[2][1] * g[1] + covariance[2][2] * g[2]};
+    *moved_rad = bst_vec3_norm(e);
+    if (!(*moved_rad < 0.5)) {
+        return false;
+    }
+    *q = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(e), *q));
+    return true;
+}
+
+/* Gives weight 1 to the stars within `limit`, 0 to the others; how many changed. */
+static int select_stars(const bst_camera *camera, double extra_px2, double limit, bst_quat q,
+                        bst_attitude_star *stars, int count, int *used) {
+    int changed = 0;
+    *used = 0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        double weight =
+            evaluate(camera, extra_px2, q, &stars[i], &s) && s.chi2 <= limit ? 1.0 : 0.0;
+        changed += weight != stars[i].weight;
+        stars[i].weight = weight;
+        *used += weight > 0.0;
+    }
+    return changed;
+}
+
+static double mean_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
+                        const bst_attitude_star *stars, int count) {
+    double sum = 0.0;
+    int n = 0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (evaluate(camera, extra_px2, q, &stars[i], &s)) {
+            sum += s.chi2;
+            n++;
+        }
+    }
+    return n > 0 ? sum / n : 0.0;
+}
+
+/* The variance per axis that is missing from what all stars state. */
+enum { FEWEST_FOR_EXCESS = 6, BISECTIONS = 40 };
+static const double LARGEST_EXCESS_PX2 = 4.0;
+
+/* Median chi-square of the stars, by bisection: no memory, any order. */
+static double median_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
+                          bst_attitude_star *stars, int count) {
+    double low = 0.0, high = 1e6;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        stars[i].weight = evaluate(camera, extra_px2, q, &stars[i], &s) ? s.chi2 : INFINITY;
+    }
+    for (int k = 0; k < 60; k++) {
+        double middle = 0.5 * (low + high);
+        int below = 0;
+        for (int i = 0; i < count; i++) {
+            below += stars[i].weight <= middle;
+        }
+        *(2 * below >= count ? &high : &low) = middle;
+    }
+    return high;
+}
+
+/* From the median, which misidentified stars hardly move: 0 when it lies within three standard
+ * errors of what it should be, ln 4. */
+static double excess_of_median(const bst_camera *camera, double floor_px2, bst_quat q,
+                               bst_attitude_star *stars, int count) {
+    const double right = log(4.0), error = 2.0 / sqrt((double)count);
+    if (count < FEWEST_FOR_EXCESS ||
+        median_chi2(camera, floor_px2, q, stars, count) <= right + error) {
+        return 0.0;
+    }
+    double low = 0.0, high = LARGEST_EXCESS_PX2;
+    for (int k = 0; k < BISECTIONS; k++) {
+        double middle = 0.5 * (low + high);
+        *(median_chi2(camera, floor_px2 + middle, q, stars, count) > right ? &low : &high) = middle;
+    }
+    return high;
+}
+
+static double total_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
+                         const bst_attitude_star *stars, int count) {
+    double sum = 0.0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (stars[i].weight > 0.0 && evaluate(camera, extra_px2, q, &stars[i], &s)) {
+            sum += s.chi2;
+        }
+    }
+    return sum;
+}
+
+/* From the sum over the stars that are used (Paule and Mandel, J. Res. NBS 87, 1982): 0 when it is
+ * below its 99.9 % quantile (Wilson and Hilferty 1931). */
+static double excess_of_sum(const bst_camera *camera, double floor_px2, bst_quat q,
+                            const bst_attitude_star *stars, int count, int dof) {
+    double spread = 2.0 / (9.0 * dof), root = 1.0 - spread + 3.09 * sqrt(spread);
+    if (dof < 2 * FEWEST_FOR_EXCESS - 3 ||
+        total_chi2(camera, floor_px2, q, stars, count) <= dof * root * root * root) {
+        return 0.0;
+    }
+    double low = 0.0, high = LARGEST_EXCESS_PX2;
+    for (int k = 0; k < BISECTIONS; k++) {
+        double middle = 0.5 * (low + high);
+        *(total_chi2(camera, floor_px2 + middle, q, stars, count) > dof ? &low : &high) = middle;
+    }
+    return high;
+}
+
+/* Iterations are bounded by what the scales need: each halves, from at most 1e6 sigma. */
+enum { MAX_ANNEAL = 24, MAX_RESELECT = 8, MAX_NEWTON = 6 };
+
+static bool solve(const bst_camera *camera, const bst_attitude_params *params,
+                  bst_attitude_star *stars, int count, bst_quat *q, double covariance[3][3],
+                  int *used, double *extra_px2) {
+    const double floor_px2 = params->floor_px * params->floor_px;
+    double moved, scale2 = fmax(mean_chi2(camera, floor_px2, *q, stars, count), 4.0);
+    for (int i = 0; i < MAX_ANNEAL; i++) {
+        if (!step(camera, floor_px2, stars, count, WEIGHT_CAUCHY, scale2, q, covariance, &moved)) {
+            return false;
+        }
+        if (scale2 <= 4.0 && moved < 1e-9) {
+            break;
+        }
+        /* a common shift of all stars leaves at the first step: follow what remains */
+        double now = mean_chi2(camera, floor_px2, *q, stars, count);
+        scale2 = fmax(fmin(0.25 * scale2, now), 4.0);
+    }
+    *extra_px2 = floor_px2 + excess_of_median(camera, floor_px2, *q, stars, count);
+    for (int i = 0; i < count; i++) {
+        stars[i].weight = -1.0;
+    }
+    for (int i = 0; i < MAX_RESELECT; i++) {
+        if (select_stars(camera, *extra_px2, params->reject_chi2, *q, stars, count, used) == 0) {
+            break;
+        }
+        if (*used < 2) {
+            return false;
+        }
+        for (int k = 0; k < MAX_NEWTON; k++) {
+            if (!step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved)) {
+                return false;
+            }
+            if (moved < 1e-12) {
+                break;
+            }
+        }
+        *extra_px2 = floor_px2 + excess_of_sum(camera, floor_px2, *q, stars, count, 2 * *used - 3);
+    }
+    return *used >= 2 &&
+           step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved);
+}
+
+/* What a star does to the attitude. */
+static void measure_pull(const star_residual *s, const double covariance[3][3],
+                         bst_attitude_star *star) {
+    double g[3], gain[3] = {0.0}, info[3][3];
+    for (int k = 0; k < 3; k++) {
+        double a = s->w[0] * s->j[0][k] + s->w[1] * s->j[1][k];
+        double b = s->w[1] * s->j[0][k] + s->w[2] * s->j[1][k];
+        g[k] = a * s->r[0] + b * s->r[1];
+        for (int m = 0; m < 3; m++) {
+            info[k][m] = a * s->j[0][m] + b * s->j[1][m];
+        }
+    }
+    star->leverage = 0.0;
+    for (int k = 0; k < 3; k++) {
+        for (int m = 0; m < 3; m++) {
+            gain[k] += covariance[k][m] * g[m];
+            star->leverage += k < 2 ? 0.5 * covariance[k][m] * info[m][k] : 0.0;
+        }
+    }
+    star->pull_rad = (bst_vec3){gain[0], gain[1], gain[2]};
+}
+
+void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *params,
+                        bst_quat q_start, bst_attitude_star *stars, int count,
+                        bst_attitude_solution *out) {
+    *out = (bst_attitude_solution){.q_cam_from_gcrf = q_start};
+    if (count < 2) {
+        return;
+    }
+    bst_quat q = bst_quat_unit(q_start);
+    int used = 0;
+    double extra_px2 = 0.0;
+    if (!solve(camera, params, stars, count, &q, out->covariance, &used, &extra_px2)) {
+        return;
+    }
+    double square = 0.0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (stars[i].weight > 0.0 && evaluate(camera, extra_px2, q, &stars[i], &s)) {
+            out->chi2 += s.chi2;
+            square += s.r[0] * s.r[0] + s.r[1] * s.r[1];
+            measure_pull(&s, (const double(*)[3])out->covariance, &stars[i]);
+        }
+    }
+    out->q_cam_from_gcrf = q;
+    out->stars_used = used;
+    out->dof = 2 * used - 3;
+    out->excess_px = sqrt(fmax(extra_px2 - params->floor_px * params->floor_px, 0.0));
+    out->rms_px = sqrt(square / (2.0 * used));
+    bool agree = used >= (used < count ? 3 : 2) && used * 10 >= count * 6;
+    out->valid = agree && sqrt(out->covariance[0][0]) <= params->max_cross_rad &&
+                 sqrt(out->covariance[1][1]) <= params->max_cross_rad &&
+                 sqrt(out->covariance[2][2]) <= params->max_roll_rad;
+}

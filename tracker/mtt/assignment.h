@@ -1,0 +1,24 @@
+/* Optimal assignment of rows (tracks) to columns (detections) over sparse candidates, where every
+ * row may also stay unassigned at a price of its own. */
+#ifndef BST_TRACKER_MTT_ASSIGNMENT_H
+#define BST_TRACKER_MTT_ASSIGNMENT_H
+
+#include "sim/core/status.h"
+
+typedef struct bst_assignment bst_assignment; /* work space */
+
+/* Work space for at most `rows` rows and `columns` columns. The caller frees it. */
+bst_status bst_assignment_create(bst_ctx *ctx, int rows, int columns,
+                                 bst_assignment **out) BST_MUST_CHECK;
+void bst_assignment_free(bst_assignment *work);
+
+/* Minimises the sum of costs. Row i has candidates first[i] .. first[i + 1] - 1 with columns[] and
+ * costs[] (any finite numbers; a column at most once per row); staying unassigned costs miss[i].
+ * Writes the column of each row, or -1, to column_of_row. Within the work space's size; no
+ * allocation.
+ * Successive shortest augmenting paths with dual variables (Jonker and Volgenant 1987). */
+void bst_assignment_solve(bst_assignment *work, int rows, int column_count, const int *first,
+                          const int *columns, const double *costs, const double *miss,
+                          int *column_of_row);
+
+#endif

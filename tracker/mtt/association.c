@@ -1,0 +1,253 @@
+/* Which detection belongs to which track. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "tracker/mtt/multitarget_internal.h"
+
+/* Share of a frame in the smoothed number of false alarms, once there are enough frames. */
+#define ALARM_GAIN 0.1
+
+static double component(bst_vec3 v, int axis) {
+    return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
+
+static void sift(double *key, int *order, int root, int count) {
+    for (;;) {
+        int child = 2 * root + 1;
+        if (child >= count) {
+            return;
+        }
+        if (child + 1 < count && key[child + 1] > key[child]) {
+            child++;
+        }
+        if (!(key[child] > key[root])) {
+            return;
+        }
+        double k = key[root];
+        int o = order[root];
+        key[root] = key[child];
+        order[root] = order[child];
+        key[child] = k;
+        order[child] = o;
+        root = child;
+    }
+}
+
+void bst_mtt_sort(double *key, int *order, int count) {
+    for (int i = count / 2 - 1; i >= 0; i--) {
+        sift(key, order, i, count);
+    }
+    for (int end = count - 1; end > 0; end--) {
+        double k = key[0];
+        int o = order[0];
+        key[0] = key[end];
+        order[0] = order[end];
+        key[end] = k;
+        order[end] = o;
+        sift(key, order, 0, end);
+    }
+}
+
+void bst_mtt_pool_index(bst_mtt_pool *pool) {
+    double low[3] = {2, 2, 2}, high[3] = {-2, -2, -2};
+    for (int i = 0; i < pool->count; i++) {
+        for (int a = 0; a < 3; a++) {
+            double v = component(pool->items[i].sky.direction, a);
+            low[a] = fmin(low[a], v);
+            high[a] = fmax(high[a], v);
+        }
+    }
+    pool->axis = 0;
+    for (int a = 1; a < 3; a++) {
+        if (high[a] - low[a] > high[pool->axis] - low[pool->axis]) {
+            pool->axis = a;
+        }
+    }
+    for (int i = 0; i < pool->count; i++) {
+        pool->key[i] = component(pool->items[i].sky.direction, pool->axis);
+        pool->order[i] = i;
+    }
+    bst_mtt_sort(pool->key, pool->order, pool->count);
+}
+
+static int lower_bound(const bst_mtt_pool *pool, double key) {
+    int low = 0, high = pool->count;
+    while (low < high) {
+        int mid = low + (high - low) / 2;
+        if (pool->key[mid] < key) {
+            low = mid + 1;
+        } else {
+            high = mid;
+        }
+    }
+    return low;
+}
+
+void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double chord, int *begin,
+                        int *end) {
+    double centre = component(direction, pool->axis);
+    *begin = lower_bound(pool, centre - chord);
+    *end = *begin;
+    while (*end < pool->count && pool->key[*end] <= centre + chord) {
+        ++*end;
+    }
+}
+
+/* Brightness counts, but a flare or an eclipse must not cost a track its detection. */
+double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection) {
+    double variance =
+        track->v_mag_variance + 0.09 + detection->v_mag_sigma * detection->v_mag_sigma;
+    double difference = track->v_mag - detection->v_mag;
+    double chi2 = difference * difference / variance;
+    return isfinite(chi2) ? 0.5 * fmin(chi2, 9.0) : 0.0;
+}
+
+/* Largest standard deviation of a measurement among the frame's detections. */
+static double largest_sigma(const bst_mtt_pool *pool) {
+    double variance = 0.0;
+    for (int i = 0; i < pool->count; i++) {
+        variance = fmax(variance, pool->items[i].sky.cov_11 + pool->items[i].sky.cov_22);
+    }
+    return sqrt(variance);
+}
+
+static double largest_spread(const bst_mtt_track *track) {
+    double sigma2 = track->state.covariance[0][0] + track->state.covariance[1][1];
+    for (int m = 0; m < track->models.count; m++) {
+        const bst_sky_state *model = &track->models.state[m];
+        bst_vec3 off = bst_vec3_sub(model->direction, track->state.direction);
+        sigma2 = fmax(sigma2,
+                      model->covariance[0][0] + model->covariance[1][1] + bst_vec3_dot(off, off));
+    }
+    return sqrt(sigma2);
+}
+
+/* Candidates of track t, the BST_MTT_CANDIDATES cheapest: detections in its gate that are free or
+ * its own. */
+static int collect(const bst_mtt *mtt, int t, double detection_sigma, int *columns, double *costs) {
+    const bst_mtt_params *params = &mtt->params;
+    const bst_mtt_track *track = &mtt->tracks[t];
+    double sigma = largest_spread(track);
+    double radius = sqrt(params->gate_chi2) * hypot(sigma, detection_sigma);
+    int begin, end, count = 0;
+    bst_mtt_pool_range(&mtt->now, track->state.direction, radius, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        int column = mtt->now.order[i];
+        const bst_mtt_detection *detection = &mtt->now.items[column];
+        bst_filter_candidate candidate = {.measurement = &detection->sky};
+        bst_filter_fit fit;
+        if ((mtt->owner[column] != BST_MTT_NOBODY && mtt->owner[column] != t) ||
+            bst_vec3_norm(bst_vec3_sub(detection->sky.direction, track->state.direction)) >
+                radius ||
+            !bst_filter_evaluate(&mtt->filter, &track->state, &track->models, &candidate, &fit) ||
+            fit.chi2 > params->gate_chi2) {
+            continue;
+        }
+        double cost = -fit.log_likelihood + log(mtt->clutter_density) -
+                      log(params->detection_probability) +
+                      bst_mtt_brightness_cost(track, detection);
+        int at = count;
+        if (count == BST_MTT_CANDIDATES) {
+            at = 0;
+            for (int k = 1; k < count; k++) {
+                if (costs[k] > costs[at]) {
+                    at = k;
+                }
+            }
+            if (costs[at] <= cost) {
+                continue;
+            }
+        } else {
+            count++;
+        }
+        columns[at] = column;
+        costs[at] = cost;
+    }
+    return count;
+}
+
+int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns) {
+    double costs[BST_MTT_CANDIDATES];
+    return collect(mtt, t, mtt->largest_sigma, columns, costs);
+}
+
+/* The cheapest pair first. */
+static void take_nearest(bst_mtt *mtt, int rows) {
+    int edges = mtt->first[rows];
+    for (int r = 0; r < rows; r++) {
+        mtt->column_of_row[r] = -1;
+        for (int e = mtt->first[r]; e < mtt->first[r + 1]; e++) {
+            mtt->edge_row[e] = r;
+            mtt->edge_order[e] = e;
+            mtt->edge_key[e] = mtt->edge_costs[e];
+        }
+    }
+    bst_mtt_sort(mtt->edge_key, mtt->edge_order, edges);
+    for (int i = 0; i < edges; i++) {
+        int e = mtt->edge_order[i], row = mtt->edge_row[e], column = mtt->edge_columns[e];
+        if (mtt->column_of_row[row] < 0 && !mtt->now.used[column] &&
+            mtt->edge_costs[e] < mtt->miss_costs[row]) {
+            mtt->column_of_row[row] = column;
+            mtt->now.used[column] = true;
+        }
+    }
+}
+
+static void assign_group(bst_mtt *mtt, bool tentative) {
+    int rows = 0, edges = 0;
+    for (int t = 0; t < mtt->track_count; t++) {
+        if ((mtt->tracks[t].status == BST_TRACK_TENTATIVE) != tentative || !mtt->observable[t]) {
+            continue;
+        }
+        mtt->rows[rows] = t;
+        mtt->first[rows] = edges;
+        mtt->miss_costs[rows] = -log(1.0 - mtt->params.detection_probability);
+        int found =
+            collect(mtt, t, mtt->largest_sigma, mtt->edge_columns + edges, mtt->edge_costs + edges);
+        edges += found;
+        rows += found > 0;
+    }
+    mtt->first[rows] = edges;
+    if (mtt->params.association == BST_MTT_NEAREST) {
+        take_nearest(mtt, rows);
+    } else {
+        bst_assignment_solve(mtt->assignment, rows, mtt->now.count, mtt->first, mtt->edge_columns,
+                             mtt->edge_costs, mtt->miss_costs, mtt->column_of_row);
+    }
+    for (int r = 0; r < rows; r++) {
+        int column = mtt->column_of_row[r];
+        mtt->detection_of_track[mtt->rows[r]] = column;
+        if (column >= 0) {
+            mtt->now.used[column] = true;
+            /* tentative tracks own nothing: theirs may be a confirmed track's too */
+            mtt->owner[column] = tentative ? BST_MTT_NOBODY : mtt->rows[r];
+        }
+    }
+}
+
+void bst_mtt_associate(bst_mtt *mtt, bool partial) {
+    mtt->largest_sigma = largest_sigma(&mtt->now);
+    for (int t = 0; t < mtt->track_count; t++) {
+        mtt->detection_of_track[t] = -1;
+        mtt->shared[t] = BST_MTT_ALONE;
+    }
+    for (int i = 0; i < mtt->now.count; i++) {
+        mtt->owner[i] = BST_MTT_NOBODY;
+    }
+    /* confirmed tracks choose first: a false start must not take their detections */
+    assign_group(mtt, false);
+    bst_mtt_share(mtt);
+    bst_mtt_gate_manoeuvres(mtt);
+    int unused = 0;
+    for (int i = 0; i < mtt->now.count; i++) {
+        unused += !mtt->now.used[i];
+    }
+    if (!partial) {
+        mtt->alarm_frames++;
+        mtt->alarms += fmax(ALARM_GAIN, 1.0 / mtt->alarm_frames) * (unused - mtt->alarms);
+        mtt->clutter_density =
+            fmax(fmax(mtt->clutter, unused), mtt->params.false_alarms_per_frame) /
+            mtt->params.field_sr;
+    }
+    assign_group(mtt, true);
+}

@@ -1,0 +1,271 @@
+#include "tracker/mtt/filter.h"
+
+#include <string.h>
+
+/* Models of an IMM. */
+#define MODELS 2
+
+/* Lower Cholesky factor; columns without variance of their own are zero. */
+static void factor(const double p[4][4], double l[4][4]) {
+    memset(l, 0, 16 * sizeof(double));
+    for (int j = 0; j < 4; j++) {
+        double v = p[j][j];
+        for (int k = 0; k < j; k++) {
+            v -= l[j][k] * l[j][k];
+        }
+        if (!(v > 1e-14 * p[j][j])) {
+            continue;
+        }
+        l[j][j] = sqrt(v);
+        for (int i = j + 1; i < 4; i++) {
+            double u = p[i][j];
+            for (int k = 0; k < j; k++) {
+                u -= l[i][k] * l[j][k];
+            }
+            l[i][j] = u / l[j][j];
+        }
+    }
+}
+
+void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
+    double l[4][4], weights[8];
+    bst_sky_state points[8], start = *state;
+    factor(state->covariance, l);
+    memset(start.covariance, 0, sizeof start.covariance);
+    for (int k = 0; k < 8; k++) {
+        double x[4], sign = k < 4 ? 2.0 : -2.0; /* sqrt(n + kappa), n = 4 */
+        for (int i = 0; i < 4; i++) {
+            x[i] = sign * l[i][k % 4];
+        }
+        points[k] = start;
+        bst_sky_shift_by(&points[k], x);
+        bst_sky_predict(&points[k], dt_s, 0.0);
+        weights[k] = 0.125;
+    }
+    bst_sky_state moved;
+    bst_sky_mix(points, weights, 8, &moved);
+    double dt = fabs(dt_s);
+    double(*p)[4] = moved.covariance;
+    for (int i = 0; i < 2; i++) {
+        p[i][i] += noise_rad2ps3 * dt * dt * dt / 3.0;
+        p[i][i + 2] += noise_rad2ps3 * dt * dt_s / 2.0;
+        p[i + 2][i] = p[i][i + 2];
+        p[i + 2][i + 2] += noise_rad2ps3 * dt;
+    }
+    *state = moved;
+}
+
+void bst_filter_start(const bst_filter_params *params, const bst_sky_state *state,
+                      bst_filter_models *models) {
+    models->count = 0;
+    if (params->kind != BST_FILTER_IMM) {
+        return;
+    }
+    models->count = MODELS;
+    for (int m = 0; m < MODELS; m++) {
+        models->state[m] = *state;
+    }
+    models->probability[1] = params->manoeuvre_s / (params->quiet_s + params->manoeuvre_s);
+    models->probability[0] = 1.0 - models->probability[1];
+}
+
+static void combine(const bst_filter_models *models, bst_sky_state *state) {
+    bst_sky_mix(models->state, models->probability, models->count, state);
+}
+
+static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_models *models) {
+    double start = 1.0 / params->quiet_s, end = 1.0 / params->manoeuvre_s, both = start + end;
+    double settled = -expm1(-both * dt_s) / both;
+    double change[2] = {start * settled, end * settled}; /* away from model 0, from model 1 */
+    bst_filter_models before = *models;
+    for (int to = 0; to < MODELS; to++) {
+        double weights[MODELS];
+        for (int from = 0; from < MODELS; from++) {
+            weights[from] =
+                before.probability[from] * (from == to ? 1.0 - change[from] : change[from]);
+        }
+        models->probability[to] = weights[0] + weights[1];
+        if (models->probability[to] > 0.0) {
+            bst_sky_mix(before.state, weights, MODELS, &models->state[to]);
+        }
+    }
+}
+
+static void predict_one(const bst_filter_params *params, double dt_s, bst_sky_state *state) {
+    if (params->kind == BST_FILTER_UKF) {
+        bst_sky_predict_unscented(state, dt_s, params->noise_rad2ps3);
+    } else {
+        bst_sky_predict(state, dt_s, params->noise_rad2ps3);
+    }
+}
+
+void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_state *state,
+                        bst_filter_models *models) {
+    if (models->count == 0) {
+        predict_one(params, dt_s, state);
+        return;
+    }
+    if (params->kind == BST_FILTER_IMM) {
+        mix_models(params, dt_s, models);
+        bst_sky_predict(&models->state[0], dt_s, params->noise_rad2ps3);
+        bst_sky_predict(&models->state[1], dt_s, params->manoeuvre_noise_rad2ps3);
+    } else {
+        for (int m = 0; m < models->count; m++) {
+            predict_one(params, dt_s, &models->state[m]);
+        }
+    }
+    combine(models, state);
+}
+
+void bst_filter_shift(bst_sky_state *state, bst_filter_models *models, bst_vec3 direction_rad,
+                      bst_vec3 rate_radps) {
+    bst_vec3 at = state->direction;
+    for (int m = 0; m < models->count; m++) {
+        bst_vec3 own = models->state[m].direction;
+        bst_sky_shift(&models->state[m], bst_tangent_carry(at, own, direction_rad),
+                      bst_tangent_carry(at, own, rate_radps));
+    }
+    bst_sky_shift(state, direction_rad, rate_radps);
+}
+
+static double log_density(const bst_sky_innovation *innovation) {
+    return -0.5 * innovation->chi2 - 0.5 * innovation->log_det_s - log(2.0 * BST_PI);
+}
+
+bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *state,
+                         const bst_filter_models *models, const bst_filter_candidate *candidate,
+                         bst_filter_fit *out) {
+    bool imm = params->kind == BST_FILTER_IMM && models->count > 0;
+    if (!bst_sky_innovate(imm ? &models->state[0] : state, candidate->measurement, candidate->extra,
+                          &out->innovation)) {
+        return false;
+    }
+    out->chi2 = out->innovation.chi2;
+    out->log_likelihood = log_density(&out->innovation);
+    if (models->count == 0) {
+        return true;
+    }
+    double sum = 0.0, high = -INFINITY, logs[BST_FILTER_COMPONENTS];
+    out->chi2 = INFINITY;
+    for (int m = 0; m < models->count; m++) {
+        bst_sky_innovation own;
+        if (!bst_sky_innovate(&models->state[m], candidate->measurement, candidate->extra, &own)) {
+            return false;
+        }
+        logs[m] = log(models->probability[m]) + log_density(&own);
+        high = fmax(high, logs[m]);
+        out->chi2 = fmin(out->chi2, own.chi2);
+    }
+    for (int m = 0; m < models->count; m++) {
+        sum += exp(logs[m] - high);
+    }
+    out->log_likelihood = high > -INFINITY ? high + log(sum) : high;
+    return true;
+}
+
+/* Appends the hypotheses of one Gaussian of weight exp(log_weight); returns the new count. */
+static int spread(const bst_sky_state *state, double log_weight,
+                  const bst_filter_candidate *candidates, int count, double miss_weight,
+                  double hit_weight, bst_sky_state *hypotheses, double *logs, int n) {
+    if (miss_weight > 0.0) {
+        hypotheses[n] = *state;
+        logs[n++] = log_weight + log(miss_weight);
+    }
+    for (int i = 0; i < count; i++) {
+        bst_sky_innovation innovation;
+        if (bst_sky_innovate(state, candidates[i].measurement, candidates[i].extra, &innovation)) {
+            hypotheses[n] = *state;
+            bst_sky_update(&hypotheses[n], &innovation);
+            logs[n++] = log_weight + log(hit_weight) + log_density(&innovation);
+        }
+    }
+    return n;
+}
+
+/* Logarithms to weights whose largest is 1; returns ln of their total before that. */
+static double to_weights(double *logs, int n) {
+    double high = -INFINITY, sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        high = fmax(high, logs[i]);
+    }
+    for (int i = 0; i < n; i++) {
+        logs[i] = exp(logs[i] - high);
+        sum += logs[i];
+    }
+    return high + log(sum);
+}
+
+/* Updates one Gaussian; returns ln of its hypotheses' total weight. */
+static double update_one(bst_sky_state *state, const bst_filter_candidate *candidates, int count,
+                         double miss_weight, double hit_weight) {
+    bst_sky_state hypotheses[BST_FILTER_CANDIDATES + 1];
+    double weights[BST_FILTER_CANDIDATES + 1];
+    int n = spread(state, 0.0, candidates, count, miss_weight, hit_weight, hypotheses, weights, 0);
+    if (n == 0) {
+        return 0.0;
+    }
+    double total = to_weights(weights, n);
+    if (n == 1) {
+        *state = hypotheses[0];
+    } else {
+        bst_sky_mix(hypotheses, weights, n, state);
+    }
+    return total;
+}
+
+static void update_models(bst_filter_models *models, const bst_filter_candidate *candidates,
+                          int count, double miss_weight, double hit_weight) {
+    double sum = 0.0;
+    for (int m = 0; m < models->count; m++) {
+        models->probability[m] =
+            log(models->probability[m]) +
+            update_one(&models->state[m], candidates, count, miss_weight, hit_weight);
+    }
+    (void)to_weights(models->probability, models->count);
+    for (int m = 0; m < models->count; m++) {
+        sum += models->probability[m];
+    }
+    for (int m = 0; m < models->count; m++) {
+        models->probability[m] /= sum;
+    }
+}
+
+static void update_mixture(const bst_sky_state *state, bst_filter_models *models,
+                           const bst_filter_candidate *candidates, int count, double miss_weight,
+                           double hit_weight, int components) {
+    enum { MOST = BST_FILTER_COMPONENTS * (BST_FILTER_CANDIDATES + 1) };
+    bst_sky_state hypotheses[MOST];
+    double weights[MOST];
+    int n = 0;
+    for (int m = 0; m < models->count; m++) {
+        n = spread(&models->state[m], log(models->probability[m]), candidates, count, miss_weight,
+                   hit_weight, hypotheses, weights, n);
+    }
+    if (models->count == 0) {
+        n = spread(state, 0.0, candidates, count, miss_weight, hit_weight, hypotheses, weights, 0);
+    }
+    if (n == 0) {
+        return;
+    }
+    (void)to_weights(weights, n);
+    n = bst_sky_reduce(hypotheses, weights, n, components);
+    models->count = n;
+    memcpy(models->state, hypotheses, (size_t)n * sizeof *hypotheses);
+    memcpy(models->probability, weights, (size_t)n * sizeof *weights);
+}
+
+void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
+                       bst_filter_models *models, const bst_filter_candidate *candidates, int count,
+                       double miss_weight, double hit_weight, int components) {
+    if (params->kind == BST_FILTER_IMM && models->count > 0) {
+        update_models(models, candidates, count, miss_weight, hit_weight);
+        combine(models, state);
+    } else if (models->count > 0 || components > 1) {
+        update_mixture(state, models, candidates, count, miss_weight, hit_weight, components);
+        if (models->count > 0) {
+            combine(models, state);
+        }
+    } else {
+        (void)update_one(state, candidates, count, miss_weight, hit_weight);
+    }
+}

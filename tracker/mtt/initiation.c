@@ -1,0 +1,158 @@
+/* New tracks from pairs of detections. */
+#include <string.h>
+
+#include "tracker/mtt/multitarget_internal.h"
+
+/* Detections of a frame, beside those of confirmed tracks, up to which `confirm_score` alone keeps
+ * false tracks rare: 100 exp(-12) a frame. With more, a track's odds before its first detection are
+ * less in their proportion, so that the rate of false tracks is no higher. */
+static const double FEW_ALARMS = 100.0;
+
+/* What a pair must fulfil: its rate lies within `gate_radps` of `rate`. */
+typedef struct rate_gate {
+    bst_vec3 rate_radps; /* in the tangent plane at the new detection */
+    double gate_radps;
+    int reserve; /* places of the table that such tracks leave free */
+    int history; /* number of earlier frames to look at */
+    bool rest;   /* such tracks are at rest */
+} rate_gate;
+
+static double spread(const bst_mtt_detection *d) {
+    return d->sky.cov_11 + d->sky.cov_22;
+}
+
+/* The unused earlier detection whose pairing with `detection` lies nearest to the gate's centre,
+ * newest frame first; NULL when there is none. */
+static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detection,
+                                  const rate_gate *gate, int *partner) {
+    for (int h = 0; h < mtt->history_count && h < gate->history; h++) {
+        bst_mtt_pool *pool = &mtt->history[h];
+        double dt = mtt->now.seconds - pool->seconds;
+        if (!(dt > 0.0) || dt > mtt->params.initiation_gap_s) {
+            continue;
+        }
+        bst_vec3 d = detection->sky.direction;
+        bst_vec3 back = bst_tangent_exp(d, bst_vec3_scale(gate->rate_radps, -dt));
+        /* sums of two variances are the largest that the error's ellipse can be across */
+        double reach = gate->gate_radps * dt + 3.0 * sqrt(2.0 * spread(detection));
+        int begin, end;
+        double best = INFINITY;
+        bst_mtt_pool_range(pool, back, reach, &begin, &end);
+        for (int i = begin; i < end; i++) {
+            int k = pool->order[i];
+            const bst_mtt_detection *earlier = &pool->items[k];
+            double off = bst_vec3_norm(bst_vec3_sub(earlier->sky.direction, back));
+            double noise = 3.0 * sqrt(spread(detection) + spread(earlier));
+            double dim = fabs(earlier->v_mag - detection->v_mag);
+            double dim_limit = 1.0 + 3.0 * hypot(earlier->v_mag_sigma, detection->v_mag_sigma);
+            if (pool->used[k] || off > gate->gate_radps * dt + noise || dim > dim_limit ||
+                off >= best) {
+                continue;
+            }
+            best = off;
+            *partner = k;
+        }
+        if (best < INFINITY) {
+            return pool;
+        }
+    }
+    return NULL;
+}
+
+static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bst_mtt_pool *pool,
+                        const bst_mtt_detection *later, const rate_gate *gate,
+                        const bst_mtt_frame *frame) {
+    double dt = mtt->now.seconds - pool->seconds;
+    double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
+    double floor = mtt->params.brightness_floor_mag;
+    double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
+    /* of what was taken for charge the like may have been taken for light */
+    double alarms = mtt->clutter_density * mtt->params.field_sr + (double)mtt->charged;
+    bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
+    *track = (bst_mtt_track){
+        .id = mtt->next_id++,
+        .status = BST_TRACK_TENTATIVE,
+        .v_mag = 0.5 * (earlier->v_mag + later->v_mag),
+        .v_mag_variance = isfinite(variance) ? 0.5 * variance : 25.0,
+        .snr = later->snr,
+        .x_px = later->x_px,
+        .y_px = later->y_px,
+        .hits = 2,
+        .frames = 2,
+        .score = fmax(0.0, log(mtt->params.detection_probability /
+                               (mtt->clutter_density * BST_PI * reach * reach))) -
+                 log(fmax(1.0, alarms / FEW_ALARMS)),
+        .last_chi2 = -1.0,
+        .first_tick = pool->tick,
+        .last_update_tick = mtt->now.tick,
+        .last_update_s = mtt->now.seconds,
+        .first_direction = earlier->sky.direction,
+        .first_length_rad = earlier->length_rad,
+        .at_rest = gate->rest,
+    };
+    bst_mtt_note_place(track, later);
+    bst_mtt_start_fixed(mtt, earlier, track);
+    bst_mtt_note_fixed(mtt, later, -log(BST_PI * reach * reach), track);
+    mtt->rest_count += gate->rest;
+    bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
+    if (mtt->cue_lag_valid && bst_mtt_shares_acceleration(mtt, track, frame)) {
+        /* the pair tells the mean rate between its detections, not that of the later one */
+        bst_vec3 lag = bst_vec3_scale(mtt->cue_lag_radps2, dt);
+        track->state.rate_radps =
+            bst_vec3_add(track->state.rate_radps,
+                         bst_tangent_carry(frame->cue_direction, track->state.direction, lag));
+    }
+    bst_filter_start(&mtt->filter, &track->state, &track->models);
+    bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));
+}
+
+static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
+    for (int i = 0; i < mtt->now.count; i++) {
+        if (mtt->now.used[i]) {
+            continue;
+        }
+        bst_mtt_detection *detection = &mtt->now.items[i];
+        if (from_cue && frame->expected_rate) {
+            if (!frame->expected_rate(frame->user, detection->sky.direction, &gate.rate_radps)) {
+                continue;
+            }
+        } else if (from_cue) {
+            gate.rate_radps =
+                bst_tangent_carry(frame->cue_direction, detection->sky.direction,
+                                  bst_tangent_project(frame->cue_direction, frame->cue_rate_radps));
+        }
+        int partner = -1;
+        bst_mtt_pool *pool = find_partner(mtt, detection, &gate, &partner);
+        if (!pool) {
+            continue;
+        }
+        if (!bst_mtt_has_room(mtt, gate.rest, gate.reserve)) {
+            mtt->lost++;
+            continue;
+        }
+        start_track(mtt, &pool->items[partner], pool, detection, &gate, frame);
+        pool->used[partner] = true;
+        mtt->now.used[i] = true;
+    }
+}
+
+void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
+    const bst_mtt_params *params = &mtt->params;
+    /* in a field of many unknown stars two detections at one place are one star, and two at the
+     * cue's rate may be two */
+    if (params->star_rate_radps > 0.0) {
+        rate_gate rest = {.history = BST_MTT_HISTORY, .rest = true};
+        start_all(mtt, rest, frame, false);
+    }
+    if (frame->cue_valid) {
+        rate_gate gate = {
+            .gate_radps = 4.0 * frame->cue_rate_sigma_radps + params->cue_rate_margin_radps,
+            .history = BST_MTT_HISTORY};
+        start_all(mtt, gate, frame, true);
+    }
+    /* without the cue the gate is wide: only the newest frame, and a quarter of the table stays
+     * free for what looks like the target */
+    rate_gate gate = {
+        .gate_radps = params->max_rate_radps, .reserve = params->max_tracks / 4, .history = 1};
+    start_all(mtt, gate, frame, false);
+}

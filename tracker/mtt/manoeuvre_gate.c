@@ -1,0 +1,100 @@
+/* A second, wider gate for tracks that have no detection in their own: the object may have begun to
+ * manoeuvre (two-level gating: Blackman and Popoli, Design and Analysis of Modern Tracking Systems,
+ * 1999, section 6.4). Type imm needs none: its second model has such a gate at all times. */
+#include "tracker/mtt/multitarget_internal.h"
+
+/* A track as it is when the object has manoeuvred since its latest detection. */
+typedef struct hypothesis {
+    bst_sky_state state;
+    bst_filter_models models;
+    double log_prior; /* ln of the chance that a manoeuvre began since then */
+} hypothesis;
+
+typedef struct choice {
+    int column;        /* of the detection; -1: none */
+    double cost;       /* -ln of its likelihood ratio against clutter */
+    double quiet_chi2; /* its misfit to steady motion */
+    double alarms;     /* clutter to be expected at least as near */
+} choice;
+
+static bool may_manoeuvre(const bst_mtt *m, int t) {
+    const bst_mtt_track *track = &m->tracks[t];
+    return m->detection_of_track[t] < 0 && m->shared[t] == BST_MTT_ALONE && m->observable[t] &&
+           track->status != BST_TRACK_TENTATIVE && !track->star && !track->asleep &&
+           track->may_miss && m->seconds >= track->manoeuvre_end_s;
+}
+
+static void widen(const bst_mtt *m, const bst_mtt_track *track, hypothesis *h) {
+    double dt = m->now.seconds - track->last_update_s;
+    double more = m->params.manoeuvre_noise_rad2ps3 - m->params.noise_rad2ps3;
+    h->state = track->state;
+    h->models = track->models;
+    h->log_prior = log(-expm1(-dt / m->params.quiet_s));
+    bst_sky_add_noise(&h->state, dt, more);
+    for (int i = 0; i < h->models.count; i++) {
+        bst_sky_add_noise(&h->models.state[i], dt, more);
+    }
+}
+
+/* The likeliest unused detection that a manoeuvre explains better than steady motion does. */
+static choice choose(const bst_mtt *m, int t, const hypothesis *h) {
+    const bst_mtt_params *p = &m->params;
+    const bst_mtt_track *track = &m->tracks[t];
+    choice best = {.column = -1, .cost = -log(1.0 - p->detection_probability)};
+    double spread = h->state.covariance[0][0] + h->state.covariance[1][1];
+    double radius = sqrt(p->gate_chi2 * (spread + m->largest_sigma * m->largest_sigma));
+    int begin, end;
+    bst_mtt_pool_range(&m->now, h->state.direction, radius, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        int column = m->now.order[i];
+        bst_filter_candidate candidate = {.measurement = &m->now.items[column].sky};
+        bst_filter_fit quiet, fit;
+        if (m->now.used[column] ||
+            bst_vec3_norm(bst_vec3_sub(candidate.measurement->direction, h->state.direction)) >
+                radius ||
+            !bst_filter_evaluate(&m->filter, &track->state, &track->models, &candidate, &quiet) ||
+            !bst_filter_evaluate(&m->filter, &h->state, &h->models, &candidate, &fit) ||
+            quiet.log_likelihood > h->log_prior + fit.log_likelihood || fit.chi2 > p->gate_chi2) {
+            continue;
+        }
+        double cost = -h->log_prior - fit.log_likelihood + log(m->clutter_density) -
+                      log(p->detection_probability) +
+                      bst_mtt_brightness_cost(track, &m->now.items[column]);
+        if (cost < best.cost) {
+            double area = BST_PI * fit.innovation.chi2 * exp(0.5 * fit.innovation.log_det_s);
+            best = (choice){column, cost, quiet.chi2, area * m->clutter_density};
+        }
+    }
+    return best;
+}
+
+void bst_mtt_gate_manoeuvres(bst_mtt *m) {
+    const bst_mtt_params *p = &m->params;
+    double before = m->history_count > 0 ? m->history[0].seconds : m->now.seconds;
+    double allowed = bst_mtt_event_probability(p, m->now.seconds - before);
+    bool asked = p->filter != BST_FILTER_IMM && allowed > 0.0 && p->quiet_s > 0.0 &&
+                 p->manoeuvre_noise_rad2ps3 > p->noise_rad2ps3;
+    for (int t = 0; t < m->track_count; t++) {
+        bst_mtt_track *track = &m->tracks[t];
+        m->departed_chi2[t] = 0.0;
+        if (!asked || !may_manoeuvre(m, t)) {
+            continue;
+        }
+        hypothesis h;
+        widen(m, track, &h);
+        choice best = choose(m, t, &h);
+        if (best.column < 0) {
+            continue;
+        }
+        track->state = h.state;
+        track->models = h.models;
+        track->manoeuvre_end_s = m->now.seconds + p->manoeuvre_s;
+        m->detection_of_track[t] = best.column;
+        m->now.used[best.column] = true;
+        m->owner[best.column] = t;
+        if (exp(-0.5 * best.quiet_chi2) < allowed &&
+            (1.0 - p->detection_probability) * best.alarms < allowed) {
+            m->departed_chi2[t] = best.quiet_chi2;
+        }
+    }
+}

@@ -1,0 +1,190 @@
+/* Mixtures of states: moments, and reduction to fewer components. */
+#include "tracker/mtt/mixture.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Components lighter than this share of the whole are dropped. */
+#define LEAST_WEIGHT 1e-4
+/* Components that the search for the best pair looks at: the heaviest. */
+#define MOST 40
+
+/* A component in the tangent axes of a common state. */
+typedef struct component {
+    double weight, log_det;
+    double x[4], p[4][4];
+} component;
+
+/* Components of state b's mean in the tangent axes at a: direction, then rate. */
+static void difference(const bst_sky_state *a, const bst_sky_state *b, double out[4]) {
+    bst_tangent axes = bst_tangent_at(a->direction);
+    bst_vec3 step = bst_tangent_log(a->direction, b->direction);
+    bst_vec3 rate =
+        bst_vec3_sub(bst_tangent_carry(b->direction, a->direction, b->rate_radps), a->rate_radps);
+    out[0] = bst_vec3_dot(step, axes.e1);
+    out[1] = bst_vec3_dot(step, axes.e2);
+    out[2] = bst_vec3_dot(rate, axes.e1);
+    out[3] = bst_vec3_dot(rate, axes.e2);
+}
+
+void bst_sky_shift_by(bst_sky_state *state, const double x[4]) {
+    bst_tangent axes = bst_tangent_at(state->direction);
+    bst_sky_shift(state, bst_tangent_vector(&axes, x[0], x[1]),
+                  bst_tangent_vector(&axes, x[2], x[3]));
+}
+
+static void express(const bst_sky_state *base, const bst_sky_state *state, double weight,
+                    component *out) {
+    out->weight = weight;
+    difference(base, state, out->x);
+    bst_sky_turn_covariance(state, base->direction, out->p);
+}
+
+static void add(component *sum, const component *c, double share) {
+    for (int a = 0; a < 4; a++) {
+        sum->x[a] += share * c->x[a];
+        for (int b = 0; b < 4; b++) {
+            sum->p[a][b] += share * (c->p[a][b] + c->x[a] * c->x[b]);
+        }
+    }
+}
+
+static void centre(component *sum) {
+    for (int a = 0; a < 4; a++) {
+        for (int b = 0; b < 4; b++) {
+            sum->p[a][b] -= sum->x[a] * sum->x[b];
+        }
+    }
+}
+
+static bst_sky_state state_of(const bst_sky_state *base, const component *c) {
+    bst_sky_state out = *base;
+    memcpy(out.covariance, c->p, sizeof out.covariance);
+    bst_sky_shift_by(&out, c->x);
+    return out;
+}
+
+void bst_sky_mix(const bst_sky_state *states, const double *weights, int count,
+                 bst_sky_state *out) {
+    int heaviest = 0;
+    double total = 0.0;
+    for (int i = 0; i < count; i++) {
+        total += weights[i];
+        heaviest = weights[i] > weights[heaviest] ? i : heaviest;
+    }
+    bst_sky_state base = states[heaviest];
+    component sum = {.weight = total};
+    for (int i = 0; i < count; i++) {
+        if (weights[i] > 0.0) {
+            component c;
+            express(&base, &states[i], weights[i], &c);
+            add(&sum, &c, weights[i] / total);
+        }
+    }
+    centre(&sum);
+    *out = state_of(&base, &sum);
+}
+
+double bst_log_det4(const double p[4][4]) {
+    double a[4][4], sum = 0.0;
+    memcpy(a, p, sizeof a);
+    for (int k = 0; k < 4; k++) {
+        if (!(a[k][k] > 0.0)) {
+            return INFINITY;
+        }
+        sum += log(a[k][k]);
+        for (int i = k + 1; i < 4; i++) {
+            double f = a[i][k] / a[k][k];
+            for (int j = k; j < 4; j++) {
+                a[i][j] -= f * a[k][j];
+            }
+        }
+    }
+    return sum;
+}
+
+static component merge(const component *a, const component *b) {
+    component sum = {.weight = a->weight + b->weight};
+    add(&sum, a, a->weight / sum.weight);
+    add(&sum, b, b->weight / sum.weight);
+    centre(&sum);
+    sum.log_det = bst_log_det4(sum.p);
+    return sum;
+}
+
+/* Bound on the growth of the Kullback-Leibler divergence by merging (Runnalls 2007, eq. 21). */
+static double price(const component *a, const component *b) {
+    component both = merge(a, b);
+    return both.weight * both.log_det - a->weight * a->log_det - b->weight * b->log_det;
+}
+
+int bst_sky_reduce(bst_sky_state *states, double *weights, int count, int keep) {
+    component list[MOST];
+    int heaviest = 0, n = 0;
+    double total = 0.0;
+    for (int i = 0; i < count; i++) {
+        total += weights[i];
+        heaviest = weights[i] > weights[heaviest] ? i : heaviest;
+    }
+    bst_sky_state base = states[heaviest];
+    for (int i = 0; i < count; i++) {
+        if (!(weights[i] > LEAST_WEIGHT * total)) {
+            continue;
+        }
+        int at = n;
+        if (n == MOST) {
+            at = 0;
+            for (int k = 1; k < n; k++) {
+                at = list[k].weight < list[at].weight ? k : at;
+            }
+            if (list[at].weight >= weights[i]) {
+                continue;
+            }
+        } else {
+            n++;
+        }
+        express(&base, &states[i], weights[i], &list[at]);
+        list[at].log_det = bst_log_det4(list[at].p);
+    }
+    double prices[MOST][MOST];
+    for (int i = 0; n > keep && i < n; i++) {
+        for (int j = 0; j < i; j++) {
+            prices[i][j] = price(&list[i], &list[j]);
+        }
+    }
+    while (n > keep) {
+        int a = 1, b = 0;
+        for (int i = 1; i < n; i++) {
+            for (int j = 0; j < i; j++) {
+                if (prices[i][j] < prices[a][b]) {
+                    a = i;
+                    b = j;
+                }
+            }
+        }
+        list[b] = merge(&list[a], &list[b]);
+        n--;
+        if (a < n) {
+            list[a] = list[n];
+            for (int j = 0; j < n; j++) {
+                if (j != a) {
+                    prices[a > j ? a : j][a > j ? j : a] = prices[n][j];
+                }
+            }
+        }
+        for (int j = 0; j < n; j++) {
+            if (j != b) {
+                prices[b > j ? b : j][b > j ? j : b] = price(&list[b], &list[j]);
+            }
+        }
+    }
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        sum += list[i].weight;
+    }
+    for (int i = 0; i < n; i++) {
+        states[i] = state_of(&base, &list[i]);
+        weights[i] = list[i].weight / sum;
+    }
+    return n;
+}

@@ -1,0 +1,557 @@
+#include "tracker/mtt/multitarget.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "tracker/mtt/multitarget_internal.h"
+
+#define JUMP_FLOOR_RAD 1e-6
+
+static bool pool_create(bst_mtt_pool *pool, int capacity) {
+    size_t n = (size_t)capacity + 1;
+    pool->order = calloc(n, sizeof *pool->order);
+    pool->key = calloc(n, sizeof *pool->key);
+    pool->items = calloc(n, sizeof *pool->items);
+    pool->used = calloc(n, sizeof *pool->used);
+    return pool->order && pool->key && pool->items && pool->used;
+}
+
+static void pool_free(bst_mtt_pool *pool) {
+    free(pool->order);
+    free(pool->key);
+    free(pool->items);
+    free(pool->used);
+}
+
+static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
+    if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
+        p->confirm_frames < p->confirm_hits || p->max_stars < 0 || !(p->field_sr > 0.0) ||
+        !(p->detection_probability > 0.0 && p->detection_probability < 1.0) ||
+        !(p->false_alarms_per_frame > 0.0) || !(p->gate_chi2 > 0.0) || !(p->noise_rad2ps3 >= 0.0) ||
+        p->max_memory < 0 || p->event_window < 0 || p->event_window > BST_MTT_EVENT_WINDOW) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "tracker: parameters out of range (need at least one track and detection, "
+                        "2 <= confirm_hits <= confirm_frames, detection_probability in (0, 1), "
+                        "positive field, false alarms and gate, event_window 0 to %d)",
+                        BST_MTT_EVENT_WINDOW);
+    }
+    if (p->filter == BST_FILTER_IMM && p->orbits) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "tracker: motion \"orbit\" does not go with type \"imm\"; use \"ekf\"");
+    }
+    if (p->filter == BST_FILTER_IMM &&
+        !(p->manoeuvre_noise_rad2ps3 >= 0.0 && p->quiet_s > 0.0 && p->manoeuvre_s > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "tracker: imm needs manoeuvre noise >= 0, quiet_s > 0 and manoeuvre_s > 0");
+    }
+    return BST_OK;
+}
+
+bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) {
+    *out = NULL;
+    BST_TRY(check(ctx, params));
+    bst_mtt *m = calloc(1, sizeof *m);
+    if (!m) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    }
+    m->params = *params;
+    m->filter = (bst_filter_params){.kind = params->filter,
+                                    .noise_rad2ps3 = params->noise_rad2ps3,
+                                    .manoeuvre_noise_rad2ps3 = params->manoeuvre_noise_rad2ps3,
+                                    .quiet_s = params->quiet_s,
+                                    .manoeuvre_s = params->manoeuvre_s};
+    m->next_id = 1;
+    m->clutter = params->false_alarms_per_frame;
+    m->clutter_density = params->false_alarms_per_frame / params->field_sr;
+    size_t nt = (size_t)params->max_tracks + (size_t)params->max_stars + 1,
+           ne = nt * BST_MTT_CANDIDATES;
+    m->tracks = calloc(nt, sizeof *m->tracks);
+    m->memory = calloc((size_t)params->max_memory + 1, sizeof *m->memory);
+    m->events = calloc(4 * nt, sizeof *m->events);
+    m->edge_order = calloc(ne, sizeof *m->edge_order);
+    m->edge_row = calloc(ne, sizeof *m->edge_row);
+    m->edge_key = calloc(ne, sizeof *m->edge_key);
+    m->owner = calloc((size_t)params->max_detections, sizeof *m->owner);
+    m->rows = calloc(nt, sizeof *m->rows);
+    m->first = calloc(nt, sizeof *m->first);
+    m->column_of_row = calloc(nt, sizeof *m->column_of_row);
+    m->miss_costs = calloc(nt, sizeof *m->miss_costs);
+    m->edge_columns = calloc(ne, sizeof *m->edge_columns);
+    m->edge_costs = calloc(ne, sizeof *m->edge_costs);
+    m->detection_of_track = calloc(nt, sizeof *m->detection_of_track);
+    m->extra = calloc(nt, sizeof *m->extra);
+    m->shared = calloc(nt, sizeof *m->shared);
+    m->observable = calloc(nt, sizeof *m->observable);
+    m->departed_chi2 = calloc(nt, sizeof *m->departed_chi2);
+    bool ok = m->tracks && m->memory && m->events && m->edge_order && m->edge_row && m->edge_key &&
+              m->owner && m->rows && m->first && m->column_of_row && m->miss_costs &&
+              m->edge_columns && m->edge_costs && m->detection_of_track && m->extra && m->shared &&
+              m->observable && m->departed_chi2 && pool_create(&m->now, params->max_detections);
+    for (int h = 0; ok && h < BST_MTT_HISTORY; h++) {
+        ok = pool_create(&m->history[h], params->max_detections);
+    }
+    bst_status status =
+        ok ? bst_assignment_create(ctx, params->max_tracks + params->max_stars,
+                                   params->max_detections, &m->assignment)
+           : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory for %d tracks, %d detections",
+                      params->max_tracks, params->max_detections);
+    if (status != BST_OK) {
+        bst_mtt_free(m);
+        return status;
+    }
+    *out = m;
+    return BST_OK;
+}
+
+void bst_mtt_free(bst_mtt *m) {
+    if (!m) {
+        return;
+    }
+    free(m->tracks);
+    free(m->memory);
+    free(m->events);
+    free(m->edge_order);
+    free(m->edge_row);
+    free(m->edge_key);
+    free(m->owner);
+    free(m->rows);
+    free(m->first);
+    free(m->column_of_row);
+    free(m->miss_costs);
+    free(m->edge_columns);
+    free(m->edge_costs);
+    free(m->detection_of_track);
+    free(m->extra);
+    free(m->shared);
+    free(m->observable);
+    free(m->departed_chi2);
+    pool_free(&m->now);
+    for (int h = 0; h < BST_MTT_HISTORY; h++) {
+        pool_free(&m->history[h]);
+    }
+    bst_assignment_free(m->assignment);
+    free(m);
+}
+
+static void record(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *track,
+                   double statistic) {
+    m->events[m->event_count++] =
+        (bst_mtt_event){.kind = kind, .statistic = statistic, .track = *track};
+}
+
+/* What the cue's motion has that a constant rate has not, as tangent vectors at the cue's present
+ * direction. */
+static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *step,
+                             bst_vec3 *rate) {
+    if (!frame->cue_valid || !frame->cue_before_valid) {
+        return false;
+    }
+    bst_sky_state cue = {.direction = frame->cue_before_direction,
+                         .rate_radps = bst_tangent_project(frame->cue_before_direction,
+                                                           frame->cue_before_rate_radps)};
+    bst_sky_predict(&cue, dt_s, 0.0);
+    bst_vec3 now = frame->cue_direction;
+    if (!(bst_vec3_dot(cue.direction, now) > 0.9)) {
+        return false;
+    }
+    *step = bst_vec3_scale(bst_tangent_log(now, cue.direction), -1.0);
+    /* what accelerates evenly is off by half the change of its rate; a cue that is off by more than
+     * its rate has jumped */
+    if (bst_vec3_norm(*step) > 2.0 * bst_vec3_norm(frame->cue_rate_radps) * dt_s + JUMP_FLOOR_RAD) {
+        return false;
+    }
+    *rate = bst_vec3_sub(bst_tangent_project(now, frame->cue_rate_radps),
+                         bst_tangent_carry(cue.direction, now, cue.rate_radps));
+    return true;
+}
+
+bool bst_mtt_shares_acceleration(const bst_mtt *m, const bst_mtt_track *track,
+                                 const bst_mtt_frame *frame) {
+    return !track->at_rest &&
+           bst_vec3_dot(track->state.direction, frame->cue_direction) >
+               cos(m->params.feed_forward_rad) &&
+           bst_vec3_norm(track->state.rate_radps) > 0.1 * bst_vec3_norm(frame->cue_rate_radps);
+}
+
+static void shift(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 step, bst_vec3 rate) {
+    bst_vec3 d = track->state.direction;
+    bst_filter_shift(&track->state, &track->models,
+                     bst_tangent_carry(frame->cue_direction, d, step),
+                     bst_tangent_carry(frame->cue_direction, d, rate));
+}
+
+/* The filter for a track: one that is no IMM has the noise of its manoeuvring model while the
+ * innovations show a manoeuvre (adjustable process noise: Bar-Shalom, Li and Kirubarajan,
+ * Estimation with Applications to Tracking and Navigation, 2001, section 11.2). */
+static bst_filter_params filter_of(const bst_mtt *m, const bst_mtt_track *track) {
+    bst_filter_params filter = m->filter;
+    if (filter.kind != BST_FILTER_IMM && m->seconds < track->manoeuvre_end_s) {
+        filter.noise_rad2ps3 = fmax(filter.noise_rad2ps3, filter.manoeuvre_noise_rad2ps3);
+    }
+    return filter;
+}
+
+static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
+    double dt = frame->seconds - m->seconds;
+    bst_vec3 step = {0}, rate = {0};
+    m->sleepers = 0;
+    bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
+    m->cue_lag_valid = forward && dt > 0.0;
+    if (m->cue_lag_valid) {
+        bst_vec3 behind = bst_vec3_sub(rate, bst_vec3_scale(step, 1.0 / dt));
+        m->cue_lag_radps2 = bst_vec3_scale(behind, 1.0 / dt);
+    }
+    for (int t = 0; t < m->track_count; t++) {
+        bst_mtt_track *track = &m->tracks[t];
+        if (track->star) {
+            bst_mtt_predict_star(m, dt, track);
+            m->observable[t] = true;
+            continue;
+        }
+        if (!bst_mtt_predict_orbit(m, track, frame)) {
+            const bst_filter_params filter = filter_of(m, track);
+            bst_filter_predict(&filter, dt, &track->state, &track->models);
+            if (forward && bst_mtt_shares_acceleration(m, track, frame)) {
+                shift(track, frame, step, rate);
+            }
+        }
+        m->observable[t] =
+            !(frame->partial && track->status == BST_TRACK_TENTATIVE) &&
+            (!frame->in_field || frame->in_field(frame->user, track->state.direction));
+        bst_mtt_look(m, t, frame);
+    }
+    bst_mtt_predict_memory(m, frame);
+    for (int i = 0; forward && i < m->memory_count; i++) {
+        if (!m->memory[i].orbit.valid && bst_mtt_shares_acceleration(m, &m->memory[i], frame)) {
+            shift(&m->memory[i], frame, step, rate);
+        }
+    }
+    m->seconds = frame->seconds;
+    m->started = true;
+    m->event_count = 0;
+    m->lost = 0;
+}
+
+static void load_detections(bst_mtt *m, const bst_mtt_frame *frame) {
+    bst_mtt_pool *now = &m->now;
+    now->seconds = frame->seconds;
+    now->tick = frame->tick;
+    now->count = frame->count < m->params.max_detections ? frame->count : m->params.max_detections;
+    m->lost += frame->count - now->count;
+    if (now->count > 0) {
+        memcpy(now->items, frame->detections, (size_t)now->count * sizeof *now->items);
+    }
+    memset(now->used, 0, (size_t)now->count * sizeof *now->used);
+    bst_mtt_pool_index(now);
+}
+
+static void take_brightness(bst_mtt *m, bst_mtt_track *track, const bst_mtt_detection *detection,
+                            double dt_s) {
+    double floor = m->params.brightness_floor_mag, walk = m->params.brightness_walk_mag;
+    double r = floor * floor + detection->v_mag_sigma * detection->v_mag_sigma;
+    if (!isfinite(r) || !isfinite(detection->v_mag)) {
+        return;
+    }
+    double p = track->v_mag_variance + walk * walk;
+    double off = detection->v_mag - track->v_mag, gain = p / (p + r), statistic;
+    track->v_mag += gain * off;
+    track->v_mag_variance = (1.0 - gain) * p;
+    if (track->status != BST_TRACK_TENTATIVE && !track->star &&
+        bst_mtt_note_brightness(&m->params, track, off / sqrt(p + r), dt_s, &statistic)) {
+        record(m, BST_MTT_BRIGHTNESS, track, statistic);
+    }
+}
+
+/* The filter's update by what may be the object's: the detection that it was given, or with
+ * probabilistic data association all in its gate. */
+static void update_filter(bst_mtt *m, int t) {
+    bst_mtt_track *track = &m->tracks[t];
+    int given = m->detection_of_track[t];
+    bool weighs = m->params.association == BST_MTT_PDA || m->params.association == BST_MTT_MIXTURE;
+    bool apart = m->params.association == BST_MTT_MIXTURE && m->params.filter != BST_FILTER_IMM;
+    int components = apart ? BST_FILTER_COMPONENTS : 1;
+    bst_filter_candidate candidates[BST_MTT_CANDIDATES];
+    if (!weighs || track->status == BST_TRACK_TENTATIVE || track->star || m->shared[t]) {
+        if (given >= 0) {
+            candidates[0] = (bst_filter_candidate){.measurement = &m->now.items[given].sky,
+                                                   .extra = m->shared[t] ? m->extra[t] : NULL};
+            bst_filter_update(&m->filter, &track->state, &track->models, candidates, 1, 0.0, 1.0,
+                              components);
+        }
+        return;
+    }
+    int columns[BST_MTT_CANDIDATES];
+    int count = m->observable[t] ? bst_mtt_gated(m, t, columns) : 0;
+    for (int i = 0; i < count; i++) {
+        candidates[i] = (bst_filter_candidate){.measurement = &m->now.items[columns[i]].sky};
+    }
+    if (count > 0) {
+        double pd = m->params.detection_probability, pg = -expm1(-0.5 * m->params.gate_chi2);
+        bst_filter_update(&m->filter, &track->state, &track->models, candidates, count,
+                          1.0 - pd * pg, pd / m->alarm_density, components);
+    }
+}
+
+static void hit(bst_mtt *m, int t) {
+    bst_mtt_track *track = &m->tracks[t];
+    int given = m->detection_of_track[t];
+    const bst_mtt_detection *detection = given >= 0 ? &m->now.items[given] : NULL;
+    bst_mtt_sharing shared = m->shared[t];
+    bool hidden = shared == BST_MTT_HIDDEN, outshines = shared == BST_MTT_OUTSHINING;
+    bst_filter_candidate candidate = {.extra = shared ? m->extra[t] : NULL};
+    bst_filter_fit fit;
+    if (detection) {
+        candidate.measurement = &detection->sky;
+    }
+    bool taken = hidden || (detection && bst_filter_evaluate(&m->filter, &track->state,
+                                                             &track->models, &candidate, &fit));
+    if (!hidden && (taken || !detection)) {
+        update_filter(m, t);
+    }
+    if (!taken) {
+        return;
+    }
+    track->x_px = detection->x_px;
+    track->y_px = detection->y_px;
+    track->snr = detection->snr;
+    if (shared && !outshines) {
+        track->merged_in_row++;
+        return;
+    }
+    double dt = m->now.seconds - track->last_update_s, statistic;
+    track->merged_in_row = 0;
+    track->misses_in_row = 0;
+    track->hits++;
+    track->chi2 += fit.chi2;
+    track->last_chi2 = fit.chi2;
+    track->score += log(m->params.detection_probability / m->clutter_density) + fit.log_likelihood;
+    bst_mtt_note_place(track, detection);
+    bst_mtt_note_fixed(m, detection, fit.log_likelihood, track);
+    track->last_update_tick = m->now.tick;
+    track->last_update_s = m->now.seconds;
+    if (m->departed_chi2[t] > 0.0) {
+        record(m, BST_MTT_MANOEUVRE, track, m->departed_chi2[t]);
+        track->innovation_count = 0;
+    } else if (track->status != BST_TRACK_TENTATIVE && !track->star &&
+               bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
+        record(m, BST_MTT_MANOEUVRE, track, statistic);
+        track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_s;
+    }
+    if (!outshines) { /* the other one's light is in it */
+        take_brightness(m, track, detection, dt);
+        bst_mtt_note_light(track);
+    }
+}
+
+/* 99.9 % quantile of chi-square (Wilson and Hilferty 1931). */
+static double chi2_limit(int dof) {
+    double v = 2.0 / (9.0 * dof), c = 1.0 - v + 3.0902 * sqrt(v);
+    return dof * c * c * c;
+}
+
+static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
+    int dof = 2 * (track->hits - 2);
+    if (track->at_rest || track->hits < m->params.confirm_hits ||
+        track->score < m->params.confirm_score || (dof > 0 && track->chi2 > chi2_limit(dof)) ||
+        bst_mtt_may_be_fixed(m, track)) {
+        return false;
+    }
+    /* a second copy of what is tracked already is no new object */
+    for (int u = 0; u < m->track_count; u++) {
+        const bst_mtt_track *other = &m->tracks[u];
+        if (other != track && !other->asleep && other->status != BST_TRACK_TENTATIVE &&
+            bst_vec3_dot(other->state.direction, track->state.direction) > 0.99999 &&
+            bst_sky_distance2(&other->state, &track->state) < 13.3) { /* 99 %, 4 dof */
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Should this track go? */
+static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
+    const bst_mtt_params *p = &m->params;
+    double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
+    if (track->asleep) {
+        return m->seconds - track->last_update_s > p->memory_s ||
+               !(variance < p->memory_sigma_rad * p->memory_sigma_rad) ||
+               track->misses_in_row > p->max_misses;
+    }
+    /* nothing is known of a tentative track that would be worth waiting for */
+    double patience_s =
+        track->status == BST_TRACK_TENTATIVE
+            ? fmin(p->max_coast_s, p->initiation_gap_s * (p->confirm_frames - p->confirm_hits + 1))
+            : p->max_coast_s;
+    if (track->at_rest && track->hits >= p->confirm_hits) {
+        return m->seconds - track->last_update_s > p->max_coast_s ||
+               !(variance < p->max_sigma_rad * p->max_sigma_rad) ||
+               (!track->star && track->misses_in_row > p->max_misses);
+    }
+    if (!(variance < p->max_sigma_rad * p->max_sigma_rad) ||
+        m->seconds - track->last_update_s > patience_s) {
+        return true;
+    }
+    if (track->status != BST_TRACK_TENTATIVE) {
+        return track->misses_in_row > p->max_misses;
+    }
+    int allowed = p->confirm_frames - p->confirm_hits;
+    return (observed && track->misses_in_row > allowed) ||
+           (track->frames >= p->confirm_frames && track->hits < p->confirm_hits) ||
+           track->frames >= 3 * p->confirm_frames;
+}
+
+static void become_star(bst_mtt *m, bst_mtt_track *track) {
+    bst_mtt_set_rest(m, track, true);
+    if (track->at_rest) {
+        if (track->status != BST_TRACK_TENTATIVE) {
+            record(m, BST_MTT_LOST, track, 0.0);
+        }
+        bst_mtt_make_star(track);
+    }
+}
+
+static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
+    for (int t = 0; t < m->track_count; t++) {
+        bst_mtt_track *track = &m->tracks[t];
+        if (track->star) {
+            continue;
+        }
+        /* what is known to be hidden by its neighbour's light is not missed */
+        bool taken =
+            m->detection_of_track[t] >= 0 &&
+            (track->merged_in_row <= m->params.max_merged || m->shared[t] == BST_MTT_HIDDEN);
+        track->frames += m->observable[t];
+        if (track->may_miss && !taken) {
+            track->misses_in_row++;
+            track->score += log(1.0 - m->params.detection_probability);
+        }
+        bool at_rest = taken && bst_mtt_is_at_rest(m, frame, track);
+        if (at_rest && bst_mtt_is_star(m, frame, track)) {
+            become_star(m, track);
+        } else if (taken && track->status == BST_TRACK_TENTATIVE) {
+            bst_mtt_set_rest(m, track, at_rest);
+        }
+        if (track->star) {
+            continue;
+        }
+        if (track->status != BST_TRACK_TENTATIVE) {
+            track->status = taken ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING;
+            if (taken && m->sleepers > 0 && bst_mtt_resume(m, track, false)) {
+                record(m, BST_MTT_RESUMED, track, 0.0);
+            }
+        } else if (taken && may_confirm(m, track)) {
+            track->status = BST_TRACK_CONFIRMED;
+            bool resumed = bst_mtt_resume(m, track, true);
+            record(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
+        }
+    }
+    int kept = 0;
+    m->rest_count = 0;
+    for (int t = 0; t < m->track_count; t++) {
+        const bst_mtt_track *track = &m->tracks[t];
+        if (track->replaced) {
+            continue;
+        }
+        if (!is_finished(m, track, m->observable[t])) {
+            m->rest_count += track->at_rest;
+            if (kept != t) {
+                m->tracks[kept] = *track;
+            }
+            kept++;
+        } else if (track->status != BST_TRACK_TENTATIVE && !track->star) {
+            record(m, BST_MTT_LOST, track, 0.0);
+            bst_mtt_remember(m, track);
+        }
+    }
+    m->track_count = kept;
+}
+
+/* The frame's unused detections wait for partners. */
+static void remember(bst_mtt *m) {
+    bst_mtt_pool oldest = m->history[BST_MTT_HISTORY - 1];
+    for (int h = BST_MTT_HISTORY - 1; h > 0; h--) {
+        m->history[h] = m->history[h - 1];
+    }
+    bst_mtt_pool *now = &m->now;
+    int kept = 0;
+    for (int i = 0; i < now->count; i++) {
+        if (!now->used[i]) {
+            now->items[kept] = now->items[i];
+            now->used[kept++] = false;
+        }
+    }
+    now->count = kept;
+    bst_mtt_pool_index(now);
+    m->history[0] = *now;
+    m->now = oldest;
+    if (m->history_count < BST_MTT_HISTORY) {
+        m->history_count++;
+    }
+}
+
+void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
+    predict(m, frame);
+    load_detections(m, frame);
+    double floor = m->params.false_alarms_per_frame;
+    m->bad_pixels = frame->bad_pixels;
+    m->charged = frame->charged;
+    m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
+    m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
+    bst_mtt_associate(m, frame->partial);
+    int unused = 0;
+    for (int t = 0; t < m->track_count; t++) {
+        m->tracks[t].last_chi2 = -1.0;
+        hit(m, t);
+    }
+    for (int i = 0; i < m->now.count; i++) {
+        unused += !m->now.used[i];
+    }
+    m->clutter += frame->partial ? 0.0 : 0.1 * (unused - m->clutter);
+    bst_mtt_update_orbits(m, frame);
+    judge(m, frame);
+    bst_mtt_initiate(m, frame);
+    remember(m);
+}
+
+void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
+    predict(m, frame);
+    m->now.count = 0;
+    for (int t = 0; t < m->track_count; t++) {
+        m->observable[t] = m->tracks[t].may_miss = false;
+        m->detection_of_track[t] = -1;
+        m->tracks[t].last_chi2 = -1.0;
+    }
+    judge(m, frame);
+}
+
+const bst_mtt_track *bst_mtt_tracks(const bst_mtt *m, int *count) {
+    *count = m->track_count;
+    return m->tracks;
+}
+
+const bst_mtt_track *bst_mtt_find(const bst_mtt *m, int64_t id) {
+    for (int t = 0; t < m->track_count; t++) {
+        if (m->tracks[t].id == id) {
+            return &m->tracks[t];
+        }
+    }
+    return NULL;
+}
+
+const bst_mtt_event *bst_mtt_events(const bst_mtt *m, int *count) {
+    *count = m->event_count;
+    return m->events;
+}
+
+const bst_mtt_track *bst_mtt_memory(const bst_mtt *m, int *count) {
+    *count = m->memory_count;
+    return m->memory;
+}
+
+double bst_mtt_clutter_density(const bst_mtt *m) {
+    return m->alarm_density;
+}
+
+int bst_mtt_lost(const bst_mtt *m) {
+    return m->lost;
+}

@@ -1,0 +1,246 @@
+#include "tracker/mtt/sky_filter.h"
+
+#include <string.h>
+
+/* Both 2-blocks of the covariance in axes turned by (c, s). */
+static void turn_blocks(double p[4][4], double c, double s) {
+    for (int j = 0; j < 4; j++) {
+        for (int b = 0; b < 4; b += 2) {
+            double x = p[b][j], y = p[b + 1][j];
+            p[b][j] = c * x + s * y;
+            p[b + 1][j] = -s * x + c * y;
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int b = 0; b < 4; b += 2) {
+            double x = p[i][b], y = p[i][b + 1];
+            p[i][b] = c * x + s * y;
+            p[i][b + 1] = -s * x + c * y;
+        }
+    }
+}
+
+static void symmetrise(double p[4][4]) {
+    for (int i = 0; i < 4; i++) {
+        for (int j = i + 1; j < 4; j++) {
+            p[i][j] = p[j][i] = 0.5 * (p[i][j] + p[j][i]);
+        }
+    }
+}
+
+/* out = a p a^T */
+static void sandwich(const double a[4][4], double p[4][4]) {
+    double t[4][4];
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            t[i][j] = a[i][0] * p[0][j] + a[i][1] * p[1][j] + a[i][2] * p[2][j] + a[i][3] * p[3][j];
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            p[i][j] = t[i][0] * a[j][0] + t[i][1] * a[j][1] + t[i][2] * a[j][2] + t[i][3] * a[j][3];
+        }
+    }
+}
+
+void bst_sky_add_noise(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
+    double(*p)[4] = state->covariance;
+    double dt = fabs(dt_s);
+    double q_pp = noise_rad2ps3 * dt * dt * dt / 3.0, q_pr = noise_rad2ps3 * dt * dt_s / 2.0,
+           q_rr = noise_rad2ps3 * dt;
+    for (int i = 0; i < 2; i++) {
+        p[i][i] += q_pp;
+        p[i][i + 2] += q_pr;
+        p[i + 2][i] += q_pr;
+        p[i + 2][i + 2] += q_rr;
+    }
+}
+
+void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
+    bst_vec3 d0 = state->direction, r0 = state->rate_radps;
+    double speed = bst_vec3_norm(r0);
+    double angle = speed * dt_s;
+    double sinc = fabs(angle) > 1e-4 ? sin(angle) / angle : 1.0 - angle * angle / 6.0;
+    double(*p)[4] = state->covariance;
+    double f[4][4] = {{1, 0, dt_s, 0},
+                      {0, cos(angle), 0, dt_s * sinc},
+                      {0, 0, 1, 0},
+                      {0, -speed * sin(angle), 0, cos(angle)}};
+    bst_tangent axes0 = bst_tangent_at(d0);
+    /* axes along and across the track */
+    double c = 1.0, s = 0.0;
+    if (speed > 0.0) {
+        c = bst_vec3_dot(r0, axes0.e1) / speed;
+        s = bst_vec3_dot(r0, axes0.e2) / speed;
+    }
+    turn_blocks(p, c, s);
+    sandwich(f, p);
+    bst_sky_add_noise(state, dt_s, noise_rad2ps3);
+    if (speed > 0.0) {
+        bst_vec3 along = bst_vec3_scale(r0, 1.0 / speed);
+        bst_vec3 d1 =
+            bst_vec3_unit(bst_vec3_axpy(bst_vec3_scale(d0, cos(angle)), sin(angle), along));
+        bst_vec3 along1 = bst_tangent_project(
+            d1, bst_vec3_axpy(bst_vec3_scale(along, cos(angle)), -sin(angle), d0));
+        along1 = bst_vec3_unit(along1);
+        bst_tangent axes1 = bst_tangent_at(d1);
+        state->direction = d1;
+        state->rate_radps = bst_vec3_scale(along1, speed);
+        turn_blocks(p, bst_vec3_dot(along1, axes1.e1), -bst_vec3_dot(along1, axes1.e2));
+    }
+    symmetrise(p);
+}
+
+/* New mean at direction d1 with the rate vector `rate` given at the old direction. */
+static void move_to(bst_sky_state *state, bst_vec3 d1, bst_vec3 rate) {
+    bst_vec3 d0 = state->direction;
+    bst_tangent axes0 = bst_tangent_at(d0), axes1 = bst_tangent_at(d1);
+    double c, s;
+    bst_tangent_turn(d0, &axes0, d1, &axes1, &c, &s);
+    turn_blocks(state->covariance, c, s);
+    state->direction = d1;
+    state->rate_radps = bst_tangent_carry(d0, d1, rate);
+}
+
+void bst_sky_shift(bst_sky_state *state, bst_vec3 direction_rad, bst_vec3 rate_radps) {
+    bst_vec3 d = state->direction;
+    bst_vec3 step = bst_tangent_project(d, direction_rad);
+    bst_vec3 rate = bst_vec3_add(state->rate_radps, bst_tangent_project(d, rate_radps));
+    move_to(state, bst_tangent_exp(d, step), rate);
+    symmetrise(state->covariance);
+}
+
+bool bst_sky_innovate(const bst_sky_state *state, const bst_sky_measurement *measurement,
+                      const double extra[3], bst_sky_innovation *out) {
+    bst_vec3 d = state->direction;
+    bst_tangent axes = bst_tangent_at(d), own = bst_tangent_at(measurement->direction);
+    bst_vec3 step = bst_tangent_log(d, measurement->direction);
+    out->nu[0] = bst_vec3_dot(step, axes.e1);
+    out->nu[1] = bst_vec3_dot(step, axes.e2);
+    double c, s;
+    bst_tangent_turn(measurement->direction, &own, d, &axes, &c, &s);
+    double a = measurement->cov_11, b = measurement->cov_12, e = measurement->cov_22;
+    out->r[0] = c * c * a + 2 * c * s * b + s * s * e;
+    out->r[1] = -c * s * a + (c * c - s * s) * b + c * s * e;
+    out->r[2] = s * s * a - 2 * c * s * b + c * c * e;
+    for (int i = 0; extra && i < 3; i++) {
+        out->r[i] += extra[i];
+    }
+    const double(*p)[4] = state->covariance;
+    out->s[0] = p[0][0] + out->r[0];
+    out->s[1] = p[0][1] + out->r[1];
+    out->s[2] = p[1][1] + out->r[2];
+    double det = out->s[0] * out->s[2] - out->s[1] * out->s[1];
+    if (!(det > 0.0) || !(out->s[0] > 0.0) || !isfinite(det)) {
+        return false;
+    }
+    out->chi2 = (out->s[2] * out->nu[0] * out->nu[0] - 2 * out->s[1] * out->nu[0] * out->nu[1] +
+                 out->s[0] * out->nu[1] * out->nu[1]) /
+                det;
+    out->log_det_s = log(det);
+    return isfinite(out->chi2);
+}
+
+void bst_sky_update(bst_sky_state *state, const bst_sky_innovation *innovation) {
+    double(*p)[4] = state->covariance;
+    const double *s = innovation->s, *r = innovation->r;
+    double det = s[0] * s[2] - s[1] * s[1];
+    double k[4][2], delta[4], a[4][4] = {{0}};
+    for (int i = 0; i < 4; i++) {
+        k[i][0] = (p[i][0] * s[2] - p[i][1] * s[1]) / det;
+        k[i][1] = (p[i][1] * s[0] - p[i][0] * s[1]) / det;
+        delta[i] = k[i][0] * innovation->nu[0] + k[i][1] * innovation->nu[1];
+        a[i][i] = 1.0;
+        a[i][0] -= k[i][0];
+        a[i][1] -= k[i][1];
+    }
+    sandwich(a, p);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            p[i][j] += k[i][0] * (r[0] * k[j][0] + r[1] * k[j][1]) +
+                       k[i][1] * (r[1] * k[j][0] + r[2] * k[j][1]);
+        }
+    }
+    bst_vec3 d = state->direction;
+    bst_tangent axes = bst_tangent_at(d);
+    bst_vec3 rate = bst_vec3_add(state->rate_radps, bst_tangent_vector(&axes, delta[2], delta[3]));
+    move_to(state, bst_tangent_exp(d, bst_tangent_vector(&axes, delta[0], delta[1])), rate);
+    symmetrise(p);
+}
+
+void bst_sky_from_pair(const bst_sky_measurement *first, const bst_sky_measurement *second,
+                       double dt_s, double noise_rad2ps3, bst_sky_state *out) {
+    bst_vec3 back = bst_tangent_log(second->direction, first->direction);
+    out->direction = second->direction;
+    out->rate_radps = bst_vec3_scale(back, -1.0 / dt_s);
+    bst_sky_state at_second = {.direction = second->direction};
+    bst_sky_innovation turned;
+    /* the first covariance in the second's axes; whether S could be inverted does not matter */
+    (void)bst_sky_innovate(&at_second, first, NULL, &turned);
+    double r2[3] = {second->cov_11, second->cov_12, second->cov_22};
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            double b = r2[i + j], a = turned.r[i + j];
+            out->covariance[i][j] = b;
+            out->covariance[i][j + 2] = out->covariance[i + 2][j] = b / dt_s;
+            out->covariance[i + 2][j + 2] =
+                (a + b) / (dt_s * dt_s) + (i == j ? noise_rad2ps3 * dt_s / 3.0 : 0.0);
+        }
+    }
+}
+
+void bst_sky_turn_covariance(const bst_sky_state *state, bst_vec3 direction, double out[4][4]) {
+    bst_tangent from = bst_tangent_at(state->direction), to = bst_tangent_at(direction);
+    double c, s;
+    bst_tangent_turn(state->direction, &from, direction, &to, &c, &s);
+    memcpy(out, state->covariance, sizeof state->covariance);
+    turn_blocks(out, c, s);
+}
+
+/* x^T P^-1 x by Cholesky; INFINITY when P is not positive definite. */
+static double quadratic_inverse(double p[4][4], const double x[4]) {
+    double y[4], sum = 0.0;
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j <= i; j++) {
+            double v = p[i][j];
+            for (int k = 0; k < j; k++) {
+                v -= p[i][k] * p[j][k];
+            }
+            if (i == j) {
+                if (!(v > 0.0)) {
+                    return INFINITY;
+                }
+                p[i][i] = sqrt(v);
+            } else {
+                p[i][j] = v / p[j][j];
+            }
+        }
+        double v = x[i];
+        for (int k = 0; k < i; k++) {
+            v -= p[i][k] * y[k];
+        }
+        y[i] = v / p[i][i];
+        sum += y[i] * y[i];
+    }
+    return sum;
+}
+
+double bst_sky_distance2(const bst_sky_state *a, const bst_sky_state *b) {
+    if (!(bst_vec3_dot(a->direction, b->direction) > 0.98)) {
+        return INFINITY;
+    }
+    double p[4][4];
+    bst_sky_turn_covariance(b, a->direction, p);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            p[i][j] += a->covariance[i][j];
+        }
+    }
+    bst_tangent axes = bst_tangent_at(a->direction);
+    bst_vec3 dd = bst_tangent_log(a->direction, b->direction);
+    bst_vec3 dr =
+        bst_vec3_sub(bst_tangent_carry(b->direction, a->direction, b->rate_radps), a->rate_radps);
+    double x[4] = {bst_vec3_dot(dd, axes.e1), bst_vec3_dot(dd, axes.e2), bst_vec3_dot(dr, axes.e1),
+                   bst_vec3_dot(dr, axes.e2)};
+    return quadratic_inverse(p, x);
+}

@@ -1,0 +1,115 @@
+/* What there is to see of tracks: the Earth's shadow and the Earth itself hide objects. */
+#include "tracker/mtt/visibility.h"
+
+#include "tracker/mtt/multitarget_internal.h"
+
+/* The Earth is taken to be larger by this share for what may be hidden: its atmosphere, and errors
+ * of the orbit. */
+#define LIMB_SHARE 0.02
+/* The pole's distance from the Earth's centre, over the equator's: what passes below that is behind
+ * the Earth for sure. */
+#define POLE (1.0 - BST_EARTH_FLATTENING)
+/* Of the detection threshold: dimmer than this hardly anything is seen, and what is has a centroid
+ * that noise has drawn to itself; and above it by so much, nearly everything is. */
+#define DARK_SHARE 0.6
+#define BRIGHT_ABOVE 3.0
+/* Variance of a track that falls asleep over what its filter says: blends with stars and the last
+ * dim detections have left errors that the filter takes for smaller. */
+#define DOUBT 4.0
+#define LIGHT_GAIN 0.1
+/* Of the time that a track is kept without a detection. */
+#define FADED_SHARE 0.5
+#define FULL_LIGHT 0.99
+
+/* Least distance of the segment between two geocentric points from the Earth's centre. */
+static double least_distance(bst_vec3 a, bst_vec3 b) {
+    bst_vec3 along = bst_vec3_sub(b, a);
+    double length2 = bst_vec3_dot(along, along);
+    double s = length2 > 0.0 ? -bst_vec3_dot(a, along) / length2 : 0.0;
+    return bst_vec3_norm(bst_vec3_axpy(a, fmin(fmax(s, 0.0), 1.0), along));
+}
+
+bst_mtt_sight bst_sight_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3 sun_m,
+                           const bst_sight_seen *seen, double threshold_snr, bst_mtt_light *light) {
+    bst_vec3 to_eye = bst_vec3_sub(observer_m, object_m);
+    double phase = bst_vec3_angle(to_eye, bst_vec3_sub(sun_m, object_m));
+    light->sunlight = bst_sun_fraction(object_m, sun_m, BST_EARTH_POLE_J2000);
+    light->glow = bst_sphere_phase(0.0, phase) / bst_vec3_dot(to_eye, to_eye);
+    double kept = seen->glow > 0.0 ? light->glow / seen->glow : 1.0;
+    light->snr = seen->snr * light->sunlight * kept;
+    light->bright = light->snr > threshold_snr + BRIGHT_ABOVE;
+    double distance = least_distance(object_m, observer_m) / BST_EARTH_RADIUS_M;
+    if (distance < POLE) {
+        return BST_MTT_EARTH;
+    }
+    bst_vec3 farther = bst_vec3_scale(object_m, 1.0 + LIMB_SHARE);
+    if (bst_sun_fraction(farther, sun_m, BST_EARTH_POLE_J2000) == 0.0) {
+        return BST_MTT_DARK;
+    }
+    if (seen->snr > 0.0 ? light->snr < DARK_SHARE * threshold_snr : light->sunlight == 0.0) {
+        return BST_MTT_SHADOW;
+    }
+    bst_vec3 nearer = bst_vec3_scale(object_m, 1.0 / (1.0 + LIMB_SHARE));
+    bool in_full_light =
+        bst_sun_fraction(nearer, sun_m, BST_EARTH_POLE_J2000) == 1.0 && !seen->was_bright;
+    bool dim = !in_full_light && !light->bright;
+    return dim || distance < 1.0 + LIMB_SHARE ? BST_MTT_FAINT : BST_MTT_CLEAR;
+}
+
+static void doubt(bst_mtt_track *track) {
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j < 6; j++) {
+            track->orbit.covariance[i][j] *= DOUBT;
+        }
+        for (int j = 0; j < 4; j++) {
+            track->orbit.cross[i][j] *= DOUBT;
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            track->orbit.sky.covariance[i][j] *= DOUBT;
+        }
+    }
+    track->state = track->orbit.sky;
+}
+
+/* Hardly seen any more, before it is dark: it would not be kept for longer. */
+static bool has_faded(const bst_mtt *m, const bst_mtt_track *track) {
+    return track->sight == BST_MTT_FAINT &&
+           m->now.seconds - track->last_update_s > FADED_SHARE * m->params.max_coast_s;
+}
+
+void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
+    bst_mtt_track *track = &m->tracks[t];
+    track->sight = BST_MTT_CLEAR;
+    track->light = (bst_mtt_light){.sunlight = 1.0};
+    if (m->params.orbits && frame->sight && track->orbit.valid &&
+        track->status != BST_TRACK_TENTATIVE) {
+        track->sight = frame->sight(frame->user, track, &track->light);
+        track->was_bright = track->was_bright || track->light.bright;
+        track->lit = track->lit || track->sight < BST_MTT_SHADOW;
+        if (!track->lit) {
+            track->sight = BST_MTT_CLEAR; /* what is first seen in the dark is not where it seems */
+        } else if (!track->asleep && (track->sight >= BST_MTT_SHADOW || has_faded(m, track))) {
+            track->asleep = true;
+            doubt(track);
+        }
+    }
+    m->sleepers += track->asleep;
+    track->may_miss = m->observable[t] && track->sight == BST_MTT_CLEAR;
+    m->observable[t] = m->observable[t] && !track->asleep;
+}
+
+void bst_mtt_note_light(bst_mtt_track *track) {
+    const bst_mtt_light *light = &track->light;
+    bool seen = track->full_snr > 0.0;
+    /* of what is dim, the threshold picks the detections that noise has made brighter */
+    bool picked = seen && track->sight != BST_MTT_CLEAR && track->snr < light->snr + BRIGHT_ABOVE;
+    if (track->orbit.valid && (light->sunlight < FULL_LIGHT || picked)) {
+        return;
+    }
+    track->full_snr += (seen ? LIGHT_GAIN : 1.0) * (track->snr - track->full_snr);
+    track->full_glow +=
+        (track->full_glow > 0.0 ? LIGHT_GAIN : 1.0) * (light->glow - track->full_glow);
+    track->full_v_mag = track->v_mag;
+}

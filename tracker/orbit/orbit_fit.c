@@ -1,0 +1,551 @@
+#include "tracker/orbit/orbit_fit.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/cholesky.h"
+#include "tracker/mtt/tangent.h"
+
+enum { PARAMETERS = 6, MAX_ITERATIONS = 60, MAX_ROUNDS = 6 };
+
+/* Of the range's logarithm: beyond that the range is not known. */
+static const double MOST_LOG_SIGMA = 0.5;
+
+/* The state as the observer in the middle of the arc has it: r = R + range q, v = V + range (u q +
+ * w), with R and V the observer's state. Steps in it are (direction along two axes, rate times span
+ * along the same axes, ln range, u times span): all of them angles. */
+typedef struct chart {
+    const bst_od_observer *observer;
+    double span_s;
+    bst_vec3 q, w; /* unit direction; its rate, perpendicular */
+    double range_m, u_ps;
+} chart;
+
+typedef struct work {
+    bst_ctx *ctx;
+    const bst_od_observation *items;
+    int count, middle;
+    const bst_od_options *options;
+    bool *used;
+    double (*white)[3];             /* inverse Cholesky factor of each covariance: 11, 21, 22 */
+    double (*residual)[2];          /* whitened, of the present state */
+    double (*side[2])[2];           /* whitened, of displaced ones */
+    double (*slope)[PARAMETERS][2]; /* d(residual)/d(step) */
+} work;
+
+static chart chart_of(const bst_od_observer *observer, double span_s, const bst_od_state *s) {
+    chart c = {.observer = observer, .span_s = span_s};
+    bst_vec3 line = bst_vec3_sub(s->position_m, observer->position_m);
+    bst_vec3 rate = bst_vec3_sub(s->velocity_mps, observer->velocity_mps);
+    c.range_m = bst_vec3_norm(line);
+    c.q = bst_vec3_unit(line);
+    c.u_ps = bst_vec3_dot(c.q, rate) / c.range_m;
+    c.w = bst_vec3_scale(bst_tangent_project(c.q, rate), 1.0 / c.range_m);
+    return c;
+}
+
+static bst_od_state state_of(const chart *c) {
+    bst_vec3 rate = bst_vec3_axpy(c->w, c->u_ps, c->q);
+    return (bst_od_state){
+        .time_s = c->observer->time_s,
+        .position_m = bst_vec3_axpy(c->observer->position_m, c->range_m, c->q),
+        .velocity_mps = bst_vec3_axpy(c->observer->velocity_mps, c->range_m, rate)};
+}
+
+static chart moved(const chart *c, const double step[PARAMETERS]) {
+    bst_tangent axes = bst_tangent_at(c->q);
+    chart out = *c;
+    out.q = bst_tangent_exp(c->q, bst_tangent_vector(&axes, step[0], step[1]));
+    bst_vec3 w =
+        bst_vec3_add(c->w, bst_tangent_vector(&axes, step[2] / c->span_s, step[3] / c->span_s));
+    out.w = bst_tangent_carry(c->q, out.q, w);
+    out.range_m = c->range_m * exp(step[4]);
+    out.u_ps = c->u_ps + step[5] / c->span_s;
+    return out;
+}
+
+/* The derivative of (r, v) by the chart's steps. */
+static void chart_slope(const chart *c, double out[6][PARAMETERS]) {
+    bst_tangent axes = bst_tangent_at(c->q);
+    const bst_vec3 e[2] = {axes.e1, axes.e2};
+    bst_vec3 rate = bst_vec3_axpy(c->w, c->u_ps, c->q);
+    bst_vec3 r[PARAMETERS] = {{0}}, v[PARAMETERS] = {{0}};
+    for (int k = 0; k < 2; k++) {
+        r[k] = bst_vec3_scale(e[k], c->range_m);
+        v[k] = bst_vec3_scale(
+            bst_vec3_axpy(bst_vec3_scale(e[k], c->u_ps), -bst_vec3_dot(c->w, e[k]), c->q),
+            c->range_m);
+        v[2 + k] = bst_vec3_scale(e[k], c->range_m / c->span_s);
+    }
+    r[4] = bst_vec3_scale(c->q, c->range_m);
+    v[4] = bst_vec3_scale(rate, c->range_m);
+    v[5] = bst_vec3_scale(c->q, c->range_m / c->span_s);
+    for (int k = 0; k < PARAMETERS; k++) {
+        const double column[6] = {r[k].x, r[k].y, r[k].z, v[k].x, v[k].y, v[k].z};
+        for (int i = 0; i < 6; i++) {
+            out[i][k] = column[i];
+        }
+    }
+}
+
+/* ------------------------------------------------------------------ residuals */
+
+static bst_status residual_at(work *w, const bst_od_path *path, int i, double out[2]) {
+    const bst_od_observation *o = &w->items[i];
+    bst_od_state then;
+    bst_od_sight sight;
+    BST_TRY(bst_od_path_state(w->ctx, path, o->observer.time_s, &then));
+    bst_od_see(&then, &o->observer, &sight);
+    bst_tangent axes = bst_tangent_at(o->direction);
+    bst_vec3 off = bst_tangent_log(o->direction, sight.direction);
+    double a = bst_vec3_dot(axes.e1, off), b = bst_vec3_dot(axes.e2, off);
+    out[0] = w->white[i][0] * a;
+    out[1] = w->white[i][1] * a + w->white[i][2] * b;
+    return BST_OK;
+}
+
+/* Whitened residuals, predicted less measured, of all observations. */
+static bst_status residuals(work *w, const bst_od_state *state, double (*out)[2]) {
+    bst_od_path *path;
+    BST_TRY(bst_od_path_create(w->ctx, &w->options->motion, state, &path));
+    bst_status status = BST_OK;
+    /* away from the middle on both sides, so that an integration never starts anew */
+    for (int i = w->middle; i < w->count && status == BST_OK; i++) {
+        status = residual_at(w, path, i, out[i]);
+    }
+    for (int i = w->middle - 1; i >= 0 && status == BST_OK; i--) {
+        status = residual_at(w, path, i, out[i]);
+    }
+    bst_od_path_free(path);
+    return status;
+}
+
+static double chi2_of(const double r[2]) {
+    return r[0] * r[0] + r[1] * r[1];
+}
+
+static double total(const work *w, double (*r)[2]) {
+    double sum = 0.0;
+    for (int i = 0; i < w->count; i++) {
+        sum += w->used[i] ? chi2_of(r[i]) : 0.0;
+    }
+    return sum;
+}
+
+static bst_status slopes(work *w, const chart *c) {
+    /* what a displacement of the range does grows with the arc: it is kept within the linear */
+    double fine = 1e-4 / (1.0 + c->span_s / 600.0);
+    const double step[PARAMETERS] = {1e-5, 1e-5, 1e-5, 1e-5, fine, fine};
+    for (int k = 0; k < PARAMETERS; k++) {
+        for (int s = 0; s < 2; s++) {
+            double x[PARAMETERS] = {0.0};
+            x[k] = s ? -step[k] : step[k];
+            chart near = moved(c, x);
+            bst_od_state state = state_of(&near);
+            BST_TRY(residuals(w, &state, w->side[s]));
+        }
+        for (int i = 0; i < w->count; i++) {
+            for (int j = 0; j < 2; j++) {
+                w->slope[i][k][j] = (w->side[0][i][j] - w->side[1][i][j]) / (2.0 * step[k]);
+            }
+        }
+    }
+    return BST_OK;
+}
+
+static void normal_equations(const work *w, double n[PARAMETERS][PARAMETERS],
+                             double b[PARAMETERS]) {
+    memset(n, 0, sizeof(double[PARAMETERS][PARAMETERS]));
+    memset(b, 0, sizeof(double[PARAMETERS]));
+    for (int i = 0; i < w->count; i++) {
+        for (int j = 0; j < 2 && w->used[i]; j++) {
+            for (int k = 0; k < PARAMETERS; k++) {
+                double s = w->slope[i][k][j];
+                b[k] -= s * w->residual[i][j];
+                for (int l = 0; l <= k; l++) {
+                    n[k][l] += s * w->slope[i][l][j];
+                }
+            }
+        }
+    }
+    for (int k = 0; k < PARAMETERS; k++) {
+        for (int l = 0; l < k; l++) {
+            n[l][k] = n[k][l];
+        }
+    }
+}
+
+/* Cholesky factor of n with its diagonal times 1 + damping, scaled to a unit diagonal first; the
+ * scale goes to `size`. False when a pivot is below `least`. */
+static bool factor(const double n[PARAMETERS][PARAMETERS], double damping, double least,
+                   double l[PARAMETERS][PARAMETERS], double size[PARAMETERS]) {
+    for (int i = 0; i < PARAMETERS; i++) {
+        size[i] = sqrt(n[i][i]);
+        if (!(size[i] > 0.0) || !isfinite(size[i])) {
+            return false;
+        }
+    }
+    for (int i = 0; i < PARAMETERS; i++) {
+        for (int j = 0; j <= i; j++) {
+            l[i][j] = i == j ? 1.0 + damping : n[i][j] / (size[i] * size[j]);
+        }
+    }
+    return bst_cholesky_factor(l[0], PARAMETERS, PARAMETERS, least / (1.0 + damping));
+}
+
+static void solve(const double l[PARAMETERS][PARAMETERS], const double size[PARAMETERS],
+                  const double b[PARAMETERS], double x[PARAMETERS]) {
+    for (int i = 0; i < PARAMETERS; i++) {
+        x[i] = b[i] / size[i];
+    }
+    bst_cholesky_solve(l[0], PARAMETERS, PARAMETERS, x);
+    for (int i = 0; i < PARAMETERS; i++) {
+        x[i] /= size[i];
+    }
+}
+
+/* Keeps a step where the linear picture can hold at all. */
+static void limit(double x[PARAMETERS]) {
+    static const double most[PARAMETERS] = {0.2, 0.2, 0.5, 0.5, 0.7, 0.7};
+    double shrink = 1.0;
+    for (int i = 0; i < PARAMETERS; i++) {
+        shrink = fmin(shrink, most[i] / fmax(fabs(x[i]), most[i]));
+    }
+    for (int i = 0; i < PARAMETERS; i++) {
+        x[i] *= shrink;
+    }
+}
+
+static bst_status fail_range(const work *w) {
+    return bst_fail(
+        w->ctx, BST_ERR_NUMERIC,
+        "the %d observations over %.6g s do not determine the range: the arc is too short for "
+        "their errors, or the observer moves in the object's orbital plane beside it; observe for "
+        "longer, or from another orbit",
+        w->count, w->items[w->count - 1].observer.time_s - w->items[0].observer.time_s);
+}
+
+/* The reason why an iteration did not end: where the range is not determined there is no minimum to
+ * find. */
+static bst_status fail_minimise(const work *w, const double n[PARAMETERS][PARAMETERS]) {
+    double l[PARAMETERS][PARAMETERS], size[PARAMETERS], x[PARAMETERS];
+    const double range[PARAMETERS] = {[4] = 1.0};
+    if (!factor(n, 0.0, 1e-15, l, size)) {
+        return fail_range(w);
+    }
+    solve(l, size, range, x);
+    if (!(x[4] < MOST_LOG_SIGMA * MOST_LOG_SIGMA)) {
+        return fail_range(w);
+    }
+    return bst_fail(w->ctx, BST_ERR_NUMERIC,
+                    "the fit of an orbit does not converge in %d iterations: the arc is too short "
+                    "for its errors, the object moves beside the observer, or observations are of "
+                    "another object; use a longer arc or leave out wrong observations",
+                    MAX_ITERATIONS);
+}
+
+/* Iterates to the least sum of squares of the observations in use. */
+static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], int *iterations) {
+    bst_od_state state = state_of(c);
+    BST_TRY(residuals(w, &state, w->residual));
+    double cost = total(w, w->residual), damping = 1e-3;
+    for (*iterations = 1; *iterations <= MAX_ITERATIONS; ++*iterations) {
+        double b[PARAMETERS], l[PARAMETERS][PARAMETERS], size[PARAMETERS], x[PARAMETERS];
+        BST_TRY(slopes(w, c));
+        normal_equations(w, n, b);
+        bool better = false;
+        double foreseen = INFINITY;
+        for (int attempt = 0; attempt < 12 && !better; attempt++) {
+            if (!factor(n, damping, 1e-16, l, size)) {
+                damping = fmax(10.0 * damping, 1e-12);
+                continue;
+            }
+            solve(l, size, b, x);
+            foreseen = 0.0; /* decrease of the sum of squares along the step */
+            for (int i = 0; i < PARAMETERS; i++) {
+                foreseen += b[i] * x[i];
+            }
+            limit(x);
+            chart next = moved(c, x);
+            state = state_of(&next);
+            bst_status status = residuals(w, &state, w->side[0]);
+            double then = status == BST_OK ? total(w, w->side[0]) : INFINITY;
+            if (then <= cost) {
+                better = true;
+                *c = next;
+                memcpy(w->residual, w->side[0], (size_t)w->count * sizeof *w->residual);
+                foreseen = fmax(foreseen, cost - then);
+                cost = then;
+                damping = fmax(0.1 * damping, 1e-14);
+            } else {
+                if (foreseen < 1e-6 + 1e-9 * cost) {
+                    break; /* nothing left to gain */
+                }
+                damping = fmax(10.0 * damping, 1e-12);
+            }
+        }
+        if (foreseen < 1e-6 + 1e-9 * cost) {
+            return BST_OK;
+        }
+        if (!better) {
+            return fail_minimise(w, (const double(*)[PARAMETERS])n);
+        }
+        if (!(c->range_m > 1.0 && c->range_m < 1e10)) {
+            return fail_range(w);
+        }
+    }
+    return fail_minimise(w, (const double(*)[PARAMETERS])n);
+}
+
+/* ------------------------------------------------------------------ the whole fit */
+
+static int compare(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Leaves out what does not fit; true when that changed anything. */
+static bool reject(work *w, bool *changed, double *scratch) {
+    int count = 0;
+    for (int i = 0; i < w->count; i++) {
+        scratch[i] = chi2_of(w->residual[i]);
+    }
+    qsort(scratch, (size_t)w->count, sizeof *scratch, compare);
+    double limit_chi2 = fmax(w->options->reject_chi2, 10.0 * scratch[w->count / 2]);
+    *changed = false;
+    for (int i = 0; i < w->count; i++) {
+        bool use = !(chi2_of(w->residual[i]) > limit_chi2);
+        *changed = *changed || use != w->used[i];
+        w->used[i] = use;
+        count += use;
+    }
+    return count >= BST_OD_LEAST;
+}
+
+static bst_status check(work *w) {
+    for (int i = 0; i < w->count; i++) {
+        const bst_od_observation *o = &w->items[i];
+        /* what it does not share with others */
+        const double(*s)[2] = o->shared_rad;
+        double c11 = o->cov_11 - s[0][0] * s[0][0] - s[0][1] * s[0][1];
+        double c12 = o->cov_12 - s[0][0] * s[1][0] - s[0][1] * s[1][1];
+        double c22 = o->cov_22 - s[1][0] * s[1][0] - s[1][1] * s[1][1];
+        double low = c12 / c11, rest = c22 - low * c12;
+        if (!(c11 > 0.0) || !(rest > 0.0) || !isfinite(c11 + rest)) {
+            return bst_fail(w->ctx, BST_ERR_ARGUMENT,
+                            "observation %d: its covariance is not positive definite", i);
+        }
+        if (!isfinite(o->observer.time_s) || fabs(bst_vec3_norm(o->direction) - 1.0) > 1e-6 ||
+            (i > 0 && !(o->observer.time_s >= o[-1].observer.time_s))) {
+            return bst_fail(w->ctx, BST_ERR_ARGUMENT,
+                            "observation %d: its direction is no unit vector, or it is earlier "
+                            "than the one before",
+                            i);
+        }
+        w->white[i][0] = 1.0 / sqrt(c11);
+        w->white[i][2] = 1.0 / sqrt(rest);
+        w->white[i][1] = -low * w->white[i][2];
+        w->used[i] = true;
+    }
+    return BST_OK;
+}
+
+/* What shared errors make of the solution's covariance, as consider parameters (Tapley, Schutz and
+ * Born, Statistical Orbit Determination, 2004, section 6.3): the sum over all pairs of observations
+ * of g_i g_j^T exp(-|change between them|), with g_i what the error of one moves the solution by.
+ * The exponential makes it one pass: a = exp(-change) a + g, sum += g a^T + a g^T - g g^T. */
+static void add_shared(const work *w, const double l[PARAMETERS][PARAMETERS],
+                       const double size[PARAMETERS], double p[PARAMETERS][PARAMETERS]) {
+    double past[2][PARAMETERS] = {{0.0}};
+    for (int i = 0; i < w->count; i++) {
+        const double *white = w->white[i];
+        const double(*s)[2] = w->items[i].shared_rad;
+        double kept = exp(-w->items[i].shared_change);
+        for (int c = 0; c < 2; c++) {
+            double *a = past[c], b[PARAMETERS] = {0.0}, g[PARAMETERS];
+            const double r[2] = {white[0] * s[0][c], white[1] * s[0][c] + white[2] * s[1][c]};
+            for (int k = 0; k < PARAMETERS && w->used[i]; k++) {
+                b[k] = w->slope[i][k][0] * r[0] + w->slope[i][k][1] * r[1];
+            }
+            solve(l, size, b, g);
+            for (int k = 0; k < PARAMETERS; k++) {
+                a[k] = kept * a[k] + g[k];
+            }
+            for (int k = 0; k < PARAMETERS; k++) {
+                for (int m = 0; m < PARAMETERS; m++) {
+                    p[k][m] += g[k] * a[m] + a[k] * g[m] - g[k] * g[m];
+                }
+            }
+        }
+    }
+}
+
+/* Covariance of the chart's steps: that of the observations' independent errors times the variance
+ * factor, and that of their shared errors. */
+static void covariance_of_steps(const work *w, const double l[PARAMETERS][PARAMETERS],
+                                const double size[PARAMETERS], double variance_factor,
+                                double p[PARAMETERS][PARAMETERS]) {
+    for (int k = 0; k < PARAMETERS; k++) {
+        double unit[PARAMETERS] = {0.0}, x[PARAMETERS];
+        unit[k] = 1.0;
+        solve(l, size, unit, x);
+        for (int i = 0; i < PARAMETERS; i++) {
+            p[i][k] = variance_factor * x[i];
+        }
+    }
+    add_shared(w, l, size, p);
+}
+
+/* Observations and residuals of the solution in numbers. */
+static void count_residuals(work *w, bst_od_solution *out) {
+    double squares = 0.0;
+    out->chi2 = total(w, w->residual);
+    out->used = 0;
+    for (int i = 0; i < w->count; i++) {
+        if (w->used[i]) {
+            const double *white = w->white[i], *r = w->residual[i];
+            double a = r[0] / white[0], b = (r[1] - white[1] * a) / white[2];
+            squares += a * a + b * b;
+            out->used++;
+        }
+    }
+    out->rejected = w->count - out->used;
+    out->dof = 2 * out->used - PARAMETERS;
+    out->rms_rad = sqrt(0.5 * squares / out->used);
+    out->variance_factor = w->options->scale_variance
+                               ? (BST_OD_PRIOR_DOF + out->chi2) / (BST_OD_PRIOR_DOF + out->dof)
+                               : 1.0;
+}
+
+static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
+                         bst_od_solution *out) {
+    double l[PARAMETERS][PARAMETERS], size[PARAMETERS], p[PARAMETERS][PARAMETERS];
+    double map[6][PARAMETERS];
+    if (!factor(n, 0.0, 1e-15, l, size)) {
+        return fail_range(w);
+    }
+    count_residuals(w, out);
+    covariance_of_steps(w, (const double(*)[PARAMETERS])l, size, out->variance_factor, p);
+    chart_slope(c, map);
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = 0.0;
+            for (int a = 0; a < PARAMETERS; a++) {
+                for (int b = 0; b < PARAMETERS; b++) {
+                    sum += map[i][a] * 0.5 * (p[a][b] + p[b][a]) * map[j][b];
+                }
+            }
+            out->covariance[i][j] = out->covariance[j][i] = sum;
+        }
+    }
+    out->state = state_of(c);
+    out->range_m = c->range_m;
+    double log_sigma = sqrt(p[4][4]);
+    out->range_sigma_m = c->range_m * log_sigma;
+    double u = c->u_ps, t = c->span_s;
+    /* range rate = range * u */
+    out->range_rate_sigma_mps =
+        c->range_m * sqrt(fmax(0.0, u * u * p[4][4] + 2.0 * u / t * p[4][5] + p[5][5] / (t * t)));
+    return isfinite(log_sigma) && log_sigma < MOST_LOG_SIGMA ? BST_OK : fail_range(w);
+}
+
+/* How far the sum of squares is from what the covariance foresees, two standard deviations of the
+ * range away along the valley: 0 where the problem is linear. */
+static double bend_of(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
+                      const bst_od_solution *s) {
+    double l[PARAMETERS][PARAMETERS], size[PARAMETERS], column[PARAMETERS], worst = 0.0;
+    const double range[PARAMETERS] = {[4] = 1.0};
+    if (!factor(n, 0.0, 1e-15, l, size)) {
+        return INFINITY;
+    }
+    solve(l, size, range, column);
+    for (int side = -2; side <= 2; side += 4) {
+        double x[PARAMETERS];
+        for (int i = 0; i < PARAMETERS; i++) {
+            x[i] = side * column[i] / sqrt(column[4]);
+        }
+        chart there = moved(c, x);
+        bst_od_state state = state_of(&there);
+        bst_ctx *ctx = w->ctx;
+        bst_ctx quiet = {0};
+        w->ctx = &quiet;
+        bst_status status = residuals(w, &state, w->side[0]);
+        w->ctx = ctx;
+        double excess = status == BST_OK ? (total(w, w->side[0]) - s->chi2) / 4.0 - 1.0 : INFINITY;
+        worst = fmax(worst, fabs(excess));
+    }
+    return worst;
+}
+
+static bst_status fit(work *w, const bst_od_state *first, double *scratch, bst_od_solution *out) {
+    const bst_od_observer *middle = &w->items[w->middle].observer;
+    double start = w->items[0].observer.time_s, end = w->items[w->count - 1].observer.time_s;
+    bst_od_path *path;
+    bst_od_state there;
+    BST_TRY(bst_od_path_create(w->ctx, &w->options->motion, first, &path));
+    bst_status status = bst_od_path_state(w->ctx, path, middle->time_s, &there);
+    bst_od_path_free(path);
+    BST_TRY(status);
+    chart c = chart_of(middle, fmax(0.5 * (end - start), 1.0), &there);
+    double n[PARAMETERS][PARAMETERS];
+    out->iterations = 0;
+    bool changed = true;
+    for (int round = 0; round < MAX_ROUNDS && changed; round++) {
+        int iterations;
+        BST_TRY(minimise(w, &c, n, &iterations));
+        out->iterations += iterations;
+        changed = false;
+        if (w->options->reject_chi2 > 0.0 && !reject(w, &changed, scratch)) {
+            return bst_fail(w->ctx, BST_ERR_NUMERIC,
+                            "no orbit fits %d of the observations; they are of several objects, or "
+                            "their errors are underestimated",
+                            BST_OD_LEAST);
+        }
+    }
+    BST_TRY(finish(w, &c, (const double(*)[PARAMETERS])n, out));
+    out->bend = bend_of(w, &c, (const double(*)[PARAMETERS])n, out);
+    return BST_OK;
+}
+
+bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int count,
+                      const bst_od_options *options, const bst_od_state *first,
+                      double *residual_chi2, bst_od_solution *out) {
+    *out = (bst_od_solution){0};
+    if (count < BST_OD_LEAST) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%d observations are too few: an orbit needs %d",
+                        count, BST_OD_LEAST);
+    }
+    size_t n = (size_t)count;
+    work w = {.ctx = ctx,
+              .items = observations,
+              .count = count,
+              .options = options,
+              .used = malloc(n * sizeof *w.used),
+              .white = malloc(n * sizeof *w.white),
+              .residual = malloc(n * sizeof *w.residual),
+              .side = {malloc(n * sizeof *w.residual), malloc(n * sizeof *w.residual)},
+              .slope = malloc(n * sizeof *w.slope)};
+    double *scratch = malloc(n * sizeof *scratch);
+    double middle = 0.5 * (observations[0].observer.time_s + observations[n - 1].observer.time_s);
+    for (int i = 1; i < count; i++) {
+        double now = fabs(observations[i].observer.time_s - middle);
+        w.middle = now < fabs(observations[w.middle].observer.time_s - middle) ? i : w.middle;
+    }
+    bst_status status = BST_OK;
+    if (!w.used || !w.white || !w.residual || !w.side[0] || !w.side[1] || !w.slope || !scratch) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d observations", count);
+    }
+    status = status == BST_OK ? check(&w) : status;
+    status = status == BST_OK ? fit(&w, first, scratch, out) : status;
+    for (int i = 0; i < count && status == BST_OK && residual_chi2; i++) {
+        residual_chi2[i] = chi2_of(w.residual[i]);
+    }
+    free(w.used);
+    free(w.white);
+    free(w.residual);
+    free(w.side[0]);
+    free(w.side[1]);
+    free(w.slope);
+    free(scratch);
+    return status;
+}

@@ -1,0 +1,183 @@
+#include "tracker/orbit/orbit_track.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sim/astro/bodies.h"
+#include "sim/core/symmetric.h"
+#include "tracker/mtt/mixture.h"
+
+/* Sets sky and cross from state and covariance. */
+static void look(bst_orbit_track *t, const bst_od_observer *observer) {
+    bst_od_sight sight;
+    double slope[4][6];
+    bst_od_project(&t->state, t->covariance, observer, &sight, slope, t->sky.covariance);
+    t->sky.direction = sight.direction;
+    t->sky.rate_radps = sight.rate_radps;
+    for (int i = 0; i < 6; i++) {
+        for (int k = 0; k < 4; k++) {
+            t->cross[i][k] = 0.0;
+            for (int j = 0; j < 6; j++) {
+                t->cross[i][k] += t->covariance[i][j] * slope[k][j];
+            }
+        }
+    }
+}
+
+void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *observer,
+                           const bst_orbit_range *range, bst_orbit_track *out) {
+    *out = (bst_orbit_track){.valid = true};
+    bst_od_from_track(observer, sky->direction, sky->rate_radps, sky->covariance, range->range_m,
+                      range->range_sigma_m, range->range_rate_mps, range->range_rate_sigma_mps,
+                      &out->state, out->covariance);
+    look(out, observer);
+}
+
+/* Acceleration by the Earth's oblateness (Montenbruck and Gill 2000, 3.2.5, with J2 alone), m/s^2.
+ * Its axis is taken along z of GCRF: 0.1 degree of precession change it by less than 1 %. */
+static bst_vec3 oblateness(bst_vec3 r) {
+    const double j2 = 1.08263e-3;
+    double n2 = bst_vec3_dot(r, r), n = sqrt(n2);
+    double k =
+        -1.5 * j2 * BST_EARTH_MU_M3PS2 * BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M / (n2 * n2 * n);
+    double z2 = 5.0 * r.z * r.z / n2;
+    return (bst_vec3){k * r.x * (1.0 - z2), k * r.y * (1.0 - z2), k * r.z * (3.0 - z2)};
+}
+
+/* Greatest step between two pushes by the oblateness: they miss a ten-thousandth of it. */
+#define PUSH_S 30.0
+
+/* Two-body motion between half pushes (Strang splitting). */
+static bst_status move(bst_ctx *ctx, bst_orbit_track *t, double to_s) {
+    const bst_od_motion motion = {.forces = NULL};
+    double span = to_s - t->state.time_s;
+    int steps = (int)ceil(fabs(span) / PUSH_S);
+    double h = steps > 0 ? span / steps : 0.0, from_s = t->state.time_s;
+    for (int k = 1; k <= steps; k++) {
+        bst_od_state state;
+        double moved[6][6];
+        bst_vec3 *v = &t->state.velocity_mps;
+        *v = bst_vec3_axpy(*v, 0.5 * h, oblateness(t->state.position_m));
+        BST_TRY(bst_od_propagate(ctx, &motion, &t->state, t->covariance,
+                                 k < steps ? from_s + k * h : to_s, &state, moved));
+        t->state = state;
+        *v = bst_vec3_axpy(*v, 0.5 * h, oblateness(t->state.position_m));
+        memcpy(t->covariance, moved, sizeof moved);
+    }
+    return BST_OK;
+}
+
+bool bst_orbit_track_predict(bst_orbit_track *t, double noise_m2ps3,
+                             const bst_od_observer *observer) {
+    bst_ctx quiet = {0}; /* an orbit that ends is no failure of the run */
+    double dt = fabs(observer->time_s - t->state.time_s);
+    t->valid = t->valid && move(&quiet, t, observer->time_s) == BST_OK;
+    if (!t->valid) {
+        return false;
+    }
+    for (int i = 0; i < 3; i++) {
+        t->covariance[i][i] += noise_m2ps3 * dt * dt * dt / 3.0;
+        t->covariance[i][i + 3] += noise_m2ps3 * dt * dt / 2.0;
+        t->covariance[i + 3][i] += noise_m2ps3 * dt * dt / 2.0;
+        t->covariance[i + 3][i + 3] += noise_m2ps3 * dt;
+    }
+    look(t, observer);
+    for (int i = 0; i < 4; i++) {
+        t->valid = t->valid && t->sky.covariance[i][i] > 0.0 && isfinite(t->sky.covariance[i][i]);
+    }
+    return t->valid;
+}
+
+/* b - a in the tangent axes at a, and b's covariance there. */
+static void compare(const bst_sky_state *a, const bst_sky_state *b, double difference[4],
+                    double covariance[4][4]) {
+    bst_tangent axes = bst_tangent_at(a->direction);
+    bst_vec3 step = bst_tangent_log(a->direction, b->direction);
+    bst_vec3 rate =
+        bst_vec3_sub(bst_tangent_carry(b->direction, a->direction, b->rate_radps), a->rate_radps);
+    difference[0] = bst_vec3_dot(step, axes.e1);
+    difference[1] = bst_vec3_dot(step, axes.e2);
+    difference[2] = bst_vec3_dot(rate, axes.e1);
+    difference[3] = bst_vec3_dot(rate, axes.e2);
+    bst_sky_turn_covariance(b, a->direction, covariance);
+}
+
+bool bst_orbit_track_update(bst_orbit_track *t, const bst_sky_state *posterior) {
+    double d[4], after[4][4], inverse[4][4], gain[6][4], half[6][4];
+    t->valid = t->valid && bst_symmetric_invert(4, t->sky.covariance[0], inverse[0]);
+    if (!t->valid) {
+        return false;
+    }
+    compare(&t->sky, posterior, d, after);
+    double x[6];
+    for (int i = 0; i < 6; i++) {
+        x[i] = 0.0;
+        for (int k = 0; k < 4; k++) {
+            gain[i][k] = 0.0;
+            for (int j = 0; j < 4; j++) {
+                gain[i][k] += t->cross[i][j] * inverse[j][k];
+            }
+            x[i] += gain[i][k] * d[k];
+        }
+    }
+    for (int i = 0; i < 6; i++) {
+        for (int k = 0; k < 4; k++) {
+            half[i][k] = 0.0;
+            for (int j = 0; j < 4; j++) {
+                half[i][k] += gain[i][j] * (after[j][k] - t->sky.covariance[j][k]);
+            }
+        }
+    }
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < 4; k++) {
+                sum += half[i][k] * gain[j][k];
+            }
+            t->covariance[i][j] += sum;
+            t->covariance[j][i] = t->covariance[i][j];
+        }
+        t->valid = t->valid && t->covariance[i][i] > 0.0 && isfinite(x[i]);
+    }
+    t->state.position_m = bst_vec3_add(t->state.position_m, (bst_vec3){x[0], x[1], x[2]});
+    t->state.velocity_mps = bst_vec3_add(t->state.velocity_mps, (bst_vec3){x[3], x[4], x[5]});
+    return t->valid;
+}
+
+bool bst_sky_fuse(bst_sky_state *a, const bst_sky_state *b) {
+    double d[4], pb[4][4], sum[4][4], inverse[4][4], gain[4][4], after[4][4], x[4];
+    compare(a, b, d, pb);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            sum[i][j] = a->covariance[i][j] + pb[i][j];
+        }
+    }
+    if (!bst_symmetric_invert(4, sum[0], inverse[0])) {
+        return false;
+    }
+    for (int i = 0; i < 4; i++) {
+        x[i] = 0.0;
+        for (int j = 0; j < 4; j++) {
+            gain[i][j] = 0.0;
+            for (int k = 0; k < 4; k++) {
+                gain[i][j] += a->covariance[i][k] * inverse[k][j];
+            }
+            x[i] += gain[i][j] * d[j];
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            after[i][j] = a->covariance[i][j];
+            for (int k = 0; k < 4; k++) {
+                after[i][j] -= gain[i][k] * a->covariance[k][j];
+            }
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            a->covariance[i][j] = 0.5 * (after[i][j] + after[j][i]);
+        }
+    }
+    bst_sky_shift_by(a, x);
+    return true;
+}

@@ -1,0 +1,45 @@
+/* Orbital motion of a track whose range is known or assumed: the six elements of its orbit stand
+ * behind the direction and rate that association and filters work on. */
+#ifndef BST_TRACKER_ORBIT_ORBIT_TRACK_H
+#define BST_TRACKER_ORBIT_ORBIT_TRACK_H
+
+#include "tracker/mtt/sky_filter.h"
+#include "tracker/orbit/orbit_motion.h"
+
+/* What is believed of a range, m and m/s, with standard deviations. */
+typedef struct bst_orbit_range {
+    double range_m, range_sigma_m, range_rate_mps, range_rate_sigma_mps;
+} bst_orbit_range;
+
+typedef struct bst_orbit_track {
+    bool valid;
+    bst_od_state state;      /* geocentric, GCRF */
+    double covariance[6][6]; /* r, v */
+    /* of the latest prediction: direction and rate, and their covariance with r, v */
+    bst_sky_state sky;
+    double cross[6][4];
+} bst_orbit_track;
+
+/* An orbit from a track (bst_od_from_track); predicted to the same time. */
+void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *observer,
+                           const bst_orbit_range *range, bst_orbit_track *out);
+
+/* Moves the orbit to observer->time_s (either way) with white acceleration of power spectral
+ * density noise_m2ps3 along each axis for what two-body motion and J2 leave out, and sets
+ * track->sky to what the observer then sees, to first order in the covariance. False, and the orbit
+ * no longer valid, when there is no such orbit. */
+bool bst_orbit_track_predict(bst_orbit_track *track, double noise_m2ps3,
+                             const bst_od_observer *observer);
+
+/* Takes what detections made of track->sky: with G = cov(orbit, sky) cov(sky)^-1 the orbit becomes
+ * x + G (sky' - sky) and its covariance P + G (S' - S) G^T (the sky state being all that detections
+ * tell of, this is the Kalman update; Anderson and Moore 1979, ch. 5). Any filter or association
+ * may have made `posterior`. False, and the orbit no longer valid, when the covariances do not
+ * allow it. */
+bool bst_orbit_track_update(bst_orbit_track *track, const bst_sky_state *posterior);
+
+/* The mean of two independent estimates of the same sky state, in place of the first; false when
+ * their covariances do not allow it. */
+bool bst_sky_fuse(bst_sky_state *a, const bst_sky_state *b);
+
+#endif
