@@ -18,7 +18,7 @@ static inline bst_quat bst_control_correction_at(const bst_control *c, int64_t t
                                       c->env.tick_rate_hz);
 }
 
-/* ---- aim.c ---- */
+/* ---- pointing_reference.c ---- */
 
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,
                               bst_cue *out) BST_MUST_CHECK;
@@ -42,7 +42,7 @@ bst_status bst_control_expected_rate(bst_ctx *ctx, const bst_control *c, int64_t
 /* Whether the boresight dwells on places of the region as they move. */
 bool bst_control_moves_with_region(const bst_control *c);
 
-/* ---- searching.c ---- */
+/* ---- search_mode.c ---- */
 
 void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reason);
 

@@ -3,7 +3,7 @@
  * Every source has its own track through the exposure. Its light is a sum of weighted nodes, as
  * many as the source's brightness needs. A node is the product of two pixel-integrated Gaussian
  * profiles (kernels/splat.cl) or, for any other PSF, a point on a grid that is convolved with it
- * (fft_light.h). Then background, shot noise, full well, read noise, gain, offset and quantisation
+ * (fourier_render.h). Then background, shot noise, full well, read noise, gain, offset and quantisation
  * (detector.h). Noise is keyed by (key, exposure, pixel of the full sensor). The same bytes come
  * from any number of threads and work-group size and, with a Gaussian PSF, window. */
 #ifndef BST_SCENEGEN_RENDERER_H
@@ -68,7 +68,7 @@ typedef struct bst_render_stats {
     int sources;            /* drawn */
     long long nodes;        /* all sources, filled blocks included */
     double predicted_sigma; /* largest error of the image that is expected in any pixel, in its
-                               sigma (crowd.h); NAN with temporal_oversample, spatial_oversample or
+                               sigma (error_budget.h); NAN with temporal_oversample, spatial_oversample or
                                four fft_taps */
     bool tolerance_missed;  /* that is above the tolerance: the Fourier path's grid, or as many
                                nodes as may be, are too coarse */

@@ -131,7 +131,7 @@ static void a_known_gaussian_has_a_gaussians_images(void **state) {
                     peak = fmax(peak, fabs(e));
                     worst = fmax(worst, fabs(g - e));
                 }
-                /* as test_image.c allows the Gaussian's own code */
+                /* as test_source_profile.c allows the Gaussian's own code */
                 double allowed = part == 0 ? 2e-4 : part < 3 ? 1e-3 : 4e-3;
                 if (!(worst <= allowed * peak)) {
                     fail_msg("binning %d, shape %d, part %d: %g of the peak", binning, k, part,
