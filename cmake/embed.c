@@ -1,5 +1,5 @@
 /* Build tool: writes text files as C strings. Usage: embed OUT.c OUT.h FILE...
- * For each FILE "a/b_c.cl" it defines `const bst_kernel_source bst_kernel_b_c` (see
+ * For each FILE "a/b_c.cl" it defines `const bst_device_kernel_source bst_kernel_b_c` (see
  * sim/device/device.h) with the file's name, text and 64-bit FNV-1a hash. */
 #include <ctype.h>
 #include <stdint.h>
@@ -26,8 +26,8 @@ static int embed(FILE *source, FILE *header, const char *path) {
     }
     symbol[n] = '\0';
     uint64_t hash = 0xCBF29CE484222325u;
-    fprintf(source, "\nconst bst_kernel_source bst_kernel_%s = {\n    \"%s\",\n    \"", symbol,
-            name);
+    fprintf(source, "\nconst bst_device_kernel_source bst_kernel_%s = {\n    \"%s\",\n    \"",
+            symbol, name);
     for (int c; (c = fgetc(in)) != EOF;) {
         hash = (hash ^ (unsigned char)c) * 0x100000001B3u;
         if (c == '\n') {
@@ -42,7 +42,7 @@ static int embed(FILE *source, FILE *header, const char *path) {
     }
     fclose(in);
     fprintf(source, "\",\n    0x%08xu,\n    0x%08xu};\n", (unsigned)(hash >> 32), (unsigned)hash);
-    fprintf(header, "extern const bst_kernel_source bst_kernel_%s;\n", symbol);
+    fprintf(header, "extern const bst_device_kernel_source bst_kernel_%s;\n", symbol);
     return 0;
 }
 

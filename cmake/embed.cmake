@@ -5,7 +5,7 @@ add_executable(bst_embed_tool ${CMAKE_CURRENT_LIST_DIR}/embed.c)
 
 # bst_embed_kernels(target file...)
 # Embeds text files in `target` as C strings: for each b_c.cl the symbol bst_kernel_b_c of type
-# bst_kernel_source, declared in the generated header "<target>_kernels.h" (on target's include path).
+# bst_device_kernel_source, declared in the generated header "<target>_kernels.h" (on target's include path).
 function(bst_embed_kernels target)
   set(files ${ARGN})
   list(TRANSFORM files PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/ REGEX "^[^/]")

@@ -11,7 +11,7 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   set(BST_VISIBLE ${PROJECT_SOURCE_DIR}/cmake/libboresight.map)
   set(parts bst_core bst_messages bst_dynamics bst_astro bst_device bst_catalogue bst_optics bst_world
     bst_onboard bst_io bst_link bst_engine bst_eval bst_scenegen bst_gimbal
-    bst_imgproc bst_tracker bst_control bst_obsgen bst_registry)
+    bst_imgproc bst_tracker bst_control bst_obsgen bst_scenario_registry)
   # all objects of each part, not only what others call; the archives then add nothing but what the
   # parts themselves link
   list(TRANSFORM parts REPLACE ".+" "$<TARGET_OBJECTS:\\0>" OUTPUT_VARIABLE objects)

@@ -63,7 +63,8 @@ typedef struct bst_control_config {
 extern const bst_config_desc bst_control_config_table[];
 
 /* The cue `seconds` after the epoch. */
-typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double seconds, bst_cue *out);
+typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double seconds,
+                                         bst_onboard_cue *out);
 /* Its direction alone. */
 typedef bst_status (*bst_control_cue_direction_fn)(void *user, bst_ctx *ctx, double seconds,
                                                    bool *valid, bst_vec3 *direction);
@@ -105,7 +106,7 @@ typedef struct bst_control_transition {
 typedef struct bst_control_held {
     int64_t id, tick;
     bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
-    bst_cue cue;                              /* at that time */
+    bst_onboard_cue cue;                      /* at that time */
 } bst_control_held;
 
 /* The cue as it was when it was looked at last. */
@@ -153,7 +154,7 @@ typedef struct bst_control {
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;
-    bst_aberration aberration; /* by nav, once that is valid */
+    bst_astro_aberration aberration; /* by nav, once that is valid */
     bool nav_valid;
     bst_control_held held; /* the track that the aim is on */
     bst_control_held lost; /* the target that BST_MODE_REACQUIRE looks for */

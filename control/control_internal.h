@@ -21,7 +21,7 @@ static inline bst_quat bst_control_correction_at(const bst_control *c, int64_t t
 /* ---- pointing_reference.c ---- */
 
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,
-                              bst_cue *out) BST_MUST_CHECK;
+                              bst_onboard_cue *out) BST_MUST_CHECK;
 
 /* Geometric to apparent with what navigation knows. */
 bst_vec3 bst_control_apparent(const bst_control *c, bst_vec3 geometric);

@@ -38,7 +38,7 @@ typedef struct module {
     bool sensor_told;
 } module;
 
-static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out) {
+static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_onboard_cue *out) {
     return bst_knowledge_cue_at(ctx, user, seconds, out);
 }
 

@@ -179,7 +179,7 @@ static void take_pointing(module *m, struct bst_step *s, const bst_link_pointing
 static void take_states(module *m, struct bst_step *s, const bst_link_target_states *states) {
     for (int i = 0; i < states->count; i++) {
         const bst_link_target_state *item = &states->items[i];
-        bst_state state = {item->position_gcrf_m, item->velocity_gcrf_mps};
+        bst_world_state state = {item->position_gcrf_m, item->velocity_gcrf_mps};
         bst_ctx why = {0};
         bool past = item->tick < bst_step_tick(s);
         if (past || bst_world_steer(&why, m->world, item->object,

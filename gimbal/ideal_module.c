@@ -35,19 +35,19 @@ typedef struct module {
 /* Apparent direction of the target at a grid node. */
 static bst_status apparent(void *user, bst_ctx *ctx, double seconds, bst_vec3 *direction) {
     module *m = user;
-    bst_view *view = m->base.view;
+    bst_world_view *view = m->base.view;
     if (m->target == BST_IDEAL_OBJECT) {
-        bst_sight sight;
-        BST_TRY(bst_view_sight(ctx, view, m->base.observer, m->object, seconds, &sight));
+        bst_world_sight sight;
+        BST_TRY(bst_world_view_sight(ctx, view, m->base.observer, m->object, seconds, &sight));
         *direction = sight.apparent;
         return BST_OK;
     }
-    bst_state state;
+    bst_world_state state;
     bst_bodies bodies;
-    BST_TRY(bst_view_observer_state(ctx, view, m->base.observer, seconds, &state));
-    BST_TRY(bst_view_bodies(ctx, view, seconds, &bodies));
-    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
-    *direction = bst_light_apparent_star(&light, m->icrs);
+    BST_TRY(bst_world_view_observer_state(ctx, view, m->base.observer, seconds, &state));
+    BST_TRY(bst_world_view_bodies(ctx, view, seconds, &bodies));
+    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
+    *direction = bst_astro_light_apparent_star(&light, m->icrs);
     return BST_OK;
 }
 

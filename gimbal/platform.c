@@ -31,7 +31,7 @@ const bst_config_desc bst_platform_config_table[] = {
              "than this, it covers their latency."),
     BST_REAL(P, nav_rate_hz, "Hz", 0.001, 10000, "10",
              "Rate of navigation telemetry; divides the plant's rate."),
-    BST_OBJECT(P, spacecraft, bst_craft_config_table, "{}",
+    BST_OBJECT(P, spacecraft, bst_spacecraft_config_table, "{}",
                "The body: held, or with dynamics, wheels, sensors and a pointing law."),
     BST_CONFIG_END};
 #undef P
@@ -126,8 +126,8 @@ bst_status bst_platform_advance(bst_ctx *ctx, bst_platform *platform, int64_t n,
         platform->body.q_body_from_gcrf = drifted(platform, seconds);
         return BST_OK;
     }
-    BST_TRY(bst_craft_step(ctx, platform->spacecraft, n, seconds, reaction_nm));
-    const bst_craft_now *now = bst_craft_at(platform->spacecraft);
+    BST_TRY(bst_spacecraft_step(ctx, platform->spacecraft, n, seconds, reaction_nm));
+    const bst_spacecraft_now *now = bst_spacecraft_at(platform->spacecraft);
     platform->body = now->body;
     platform->q_believed_from_gcrf = now->q_believed_from_gcrf;
     platform->rate_believed_radps = now->rate_believed_radps;
@@ -215,6 +215,6 @@ void bst_platform_add_status(const bst_platform *platform, bst_quat q_body_seen_
     out->rate_body_radps = platform->rate_believed_radps;
     out->q_body_from_gcrf = q_body_seen_from_gcrf;
     if (platform->spacecraft) {
-        out->roll = bst_craft_at(platform->spacecraft)->roll;
+        out->roll = bst_spacecraft_at(platform->spacecraft)->roll;
     }
 }

@@ -20,7 +20,7 @@ typedef struct bst_platform_config {
     double history_s;
     double telemetry_rate_hz, telemetry_history_s;
     double nav_rate_hz;
-    bst_craft_config spacecraft;
+    bst_spacecraft_config spacecraft;
 } bst_platform_config;
 
 extern const bst_config_desc bst_platform_config_table[];
@@ -37,7 +37,7 @@ typedef struct bst_platform {
     double unresolved_rad2; /* variance of the jitter per axis that is not between the samples, and
                                of the wheels' imbalance */
     double jitter_unresolved_rad2; /* the former alone */
-    bst_craft *spacecraft;         /* owned; NULL: inertial */
+    bst_spacecraft *spacecraft;    /* owned; NULL: inertial */
     struct bst_platform_sky *sky;  /* owned, with it */
     bool wheels_saturated;         /* at their greatest speed or torque */
     bool trackers_blind;           /* no star tracker saw stars when last asked */
@@ -57,13 +57,13 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
                              bst_rng_key attitude_key) BST_MUST_CHECK;
 
 /* Gives a platform whose configuration has a `rigid_body` its spacecraft, which sees the world of
- * the module's sensor; nothing for an inertial one. Errors as bst_craft_create; freed by
+ * the module's sensor; nothing for an inertial one. Errors as bst_spacecraft_create; freed by
  * bst_platform_free. */
 bst_status bst_platform_equip(const bst_module_env *env, bst_platform *platform,
                               const bst_platform_config *config, double dt_s) BST_MUST_CHECK;
-/* BST_ERR_CONFIG when a mount of that inertia (kg m^2, in the order of bst_craft_spec) is too heavy
- * for its spacecraft: its reaction comes a step late, which is stable while the mount's inertia is
- * less than the rest's, here required to be below half of it. */
+/* BST_ERR_CONFIG when a mount of that inertia (kg m^2, in the order of bst_spacecraft_spec) is too
+ * heavy for its spacecraft: its reaction comes a step late, which is stable while the mount's
+ * inertia is less than the rest's, here required to be below half of it. */
 bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
                                     const double mount_kgm2[6]) BST_MUST_CHECK;
 /* What init and equip made; a zeroed platform is allowed. */
@@ -72,7 +72,7 @@ void bst_platform_free(bst_platform *platform);
 /* Brings the body to plant step n = 0, 1, 2, ... in turn, `seconds` after the epoch: members body,
  * q_believed_from_gcrf, rate_believed_radps, unresolved_rad2 and the flags. reaction_nm: torque of
  * the mount on the body over the step before (N m, body axes; of no effect on an inertial one). An
- * inertial platform needs it only where `body` is read. Passes on errors of bst_craft_step. */
+ * inertial platform needs it only where `body` is read. Passes on errors of bst_spacecraft_step. */
 bst_status bst_platform_advance(bst_ctx *ctx, bst_platform *platform, int64_t n, double seconds,
                                 bst_vec3 reaction_nm) BST_MUST_CHECK;
 /* True camera attitude at plant step n (seconds = n * dt_s), given the camera's attitude in the

@@ -6,33 +6,33 @@
 
 /* What a spacecraft sees of the world, and knows of it. */
 typedef struct bst_platform_sky {
-    bst_view *view;
+    bst_world_view *view;
     bst_knowledge_view *knowledge; /* NULL: the law needs no target */
     int observer, sensor;
 } bst_platform_sky;
 
-static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_craft_sky *out) {
+static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_spacecraft_sky *out) {
     bst_platform_sky *sky = user;
-    bst_state state;
+    bst_world_state state;
     bst_bodies bodies;
-    BST_TRY(bst_view_observer_state(ctx, sky->view, sky->observer, seconds, &state));
-    BST_TRY(bst_view_bodies(ctx, sky->view, seconds, &bodies));
+    BST_TRY(bst_world_view_observer_state(ctx, sky->view, sky->observer, seconds, &state));
+    BST_TRY(bst_world_view_bodies(ctx, sky->view, seconds, &bodies));
     out->position_m = state.position_m;
     out->sun_m = bst_vec3_sub(bodies.sun_m, state.position_m);
     out->sunlit =
-        bst_sun_fraction(state.position_m, bst_bodies_sunlight_from(&bodies), bodies.pole);
+        bst_astro_sun_fraction(state.position_m, bst_bodies_sunlight_from(&bodies), bodies.pole);
 
     BST_TRY(
-        bst_view_believed(ctx, sky->view, sky->observer, sky->sensor, seconds, &state, &bodies));
-    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
-    out->known = (bst_law_inputs){
+        bst_world_view_nav(ctx, sky->view, sky->observer, sky->sensor, seconds, &state, &bodies));
+    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
+    out->known = (bst_spacecraft_law_inputs){
         .position_m = state.position_m, .velocity_mps = state.velocity_mps, .sun_m = light.sun_m};
     if (sky->knowledge) {
         bool valid;
         bst_vec3 direction;
         BST_TRY(bst_knowledge_cue_direction_at(ctx, sky->knowledge, seconds, &valid, &direction));
         if (valid) {
-            out->known.target = bst_light_aberrate(&light, direction);
+            out->known.target = bst_astro_light_aberrate(&light, direction);
         }
     }
     return BST_OK;
@@ -41,7 +41,7 @@ static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_craft_sky
 static void free_sky(bst_platform_sky *sky) {
     if (sky) {
         bst_knowledge_view_free(sky->knowledge);
-        bst_view_free(sky->view);
+        bst_world_view_free(sky->view);
         free(sky);
     }
 }
@@ -58,18 +58,18 @@ bst_status bst_platform_equip(const bst_module_env *env, bst_platform *platform,
     platform->sky = sky;
     sky->observer = env->observer;
     sky->sensor = env->sensor;
-    BST_TRY(bst_view_create(env->ctx, env->world, &sky->view));
+    BST_TRY(bst_world_view_create(env->ctx, env->world, &sky->view));
     if (config->spacecraft.attitude.law == BST_LAW_TARGET) {
         BST_TRY(bst_knowledge_view_create(env->ctx, env->knowledge, &sky->knowledge));
     }
-    bst_craft_setup setup = {.dt_s = dt_s,
-                             .q_nominal = platform->q_nominal_from_gcrf,
-                             .sky_at = sky_at,
-                             .user = sky,
-                             .seed = env->seed,
-                             .run = env->run,
-                             .instance = env->instance};
-    return bst_craft_create(env->ctx, &config->spacecraft, &setup, &platform->spacecraft);
+    bst_spacecraft_setup setup = {.dt_s = dt_s,
+                                  .q_nominal = platform->q_nominal_from_gcrf,
+                                  .sky_at = sky_at,
+                                  .user = sky,
+                                  .seed = env->seed,
+                                  .run = env->run,
+                                  .instance = env->instance};
+    return bst_spacecraft_create(env->ctx, &config->spacecraft, &setup, &platform->spacecraft);
 }
 
 bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
@@ -77,10 +77,10 @@ bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
     if (!platform->spacecraft) {
         return BST_OK;
     }
-    bst_mat3 mount = bst_inertia_matrix(mount_kgm2);
-    const bst_craft_body *body = bst_craft_dynamics(platform->spacecraft);
+    bst_mat3 mount = bst_spacecraft_inertia_matrix(mount_kgm2);
+    const bst_spacecraft_body *body = bst_spacecraft_dynamics(platform->spacecraft);
     double heaviest[3], lightest = INFINITY;
-    bst_symmetric_eigen(3, &mount.m[0][0], heaviest, NULL);
+    bst_dynamics_symmetric_eigen(3, &mount.m[0][0], heaviest, NULL);
     for (int i = 0; i < 3; i++) {
         lightest = fmin(lightest, 1.0 / body->per_moment[i]);
     }
@@ -96,7 +96,7 @@ bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
 }
 
 void bst_platform_free(bst_platform *platform) {
-    bst_craft_free(platform->spacecraft);
+    bst_spacecraft_free(platform->spacecraft);
     free_sky(platform->sky);
     bst_jitter_free(&platform->jitter);
     platform->spacecraft = NULL;

@@ -53,7 +53,7 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
                                  &base->telemetry_steps));
     BST_TRY(bst_platform_divider(env->ctx, "nav_rate_hz", rate_hz, config->nav_rate_hz,
                                  &base->nav_steps));
-    BST_TRY(bst_view_create(env->ctx, env->world, &base->view));
+    BST_TRY(bst_world_view_create(env->ctx, env->world, &base->view));
     bst_env_set_capacity(env, BST_GIMBAL_HISTORY, ring(config->history_s, rate_hz) + history_more);
     /* the tracker asks for the attitude in the middle of a frame that comes late */
     double late_s = exposure_s + env->frame_latency_s + 2.0 / config->telemetry_rate_hz;
@@ -64,14 +64,14 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
 }
 
 void bst_gimbal_base_free(bst_gimbal_base *base) {
-    bst_view_free(base->view);
+    bst_world_view_free(base->view);
     base->view = NULL;
 }
 
 bst_status bst_platform_step(struct bst_step *step, bst_platform *platform, int64_t n,
                              bst_vec3 reaction_nm, const bst_los_command *command) {
     if (command && command->roll_given) {
-        bst_craft_command_roll(platform->spacecraft, command->roll_rad);
+        bst_spacecraft_command_roll(platform->spacecraft, command->roll_rad);
     }
     bool saturated = platform->wheels_saturated, blind = platform->trackers_blind;
     BST_TRY(
@@ -143,11 +143,11 @@ bst_status bst_gimbal_publish_nav(struct bst_step *step, const bst_gimbal_base *
     }
     bst_nav_telemetry *out = bst_step_write(step, BST_GIMBAL_NAV, NULL);
     bst_ctx *ctx = bst_step_ctx(step);
-    bst_state state;
+    bst_world_state state;
     bst_bodies bodies;
-    BST_TRY(bst_view_believed(ctx, base->view, base->observer, base->sensor, bst_step_seconds(step),
-                              &state, &bodies));
-    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
+    BST_TRY(bst_world_view_nav(ctx, base->view, base->observer, base->sensor,
+                               bst_step_seconds(step), &state, &bodies));
+    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
     *out = (bst_nav_telemetry){.tick = bst_step_tick(step),
                                .position_gcrf_m = state.position_m,
                                .velocity_gcrf_mps = state.velocity_mps,

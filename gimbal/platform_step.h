@@ -30,7 +30,7 @@ enum {
 
 /* The first member of a gimbal module's instance. */
 typedef struct bst_gimbal_base {
-    bst_view *view; /* owned */
+    bst_world_view *view; /* owned */
     int observer, sensor;
     double tick_rate_hz, dt_s; /* plant step */
     int64_t telemetry_steps, nav_steps;
@@ -57,7 +57,7 @@ bst_status bst_gimbal_platform_init(const bst_module_env *env, const bst_platfor
 
 /* The rest of the base: dividers, view, and the capacities of the rings. exposure_s: longest of the
  * sensor, which the history must cover; history_more: room in it besides the plant's steps. Errors
- * as bst_platform_check_history, bst_platform_divider and bst_view_create. */
+ * as bst_platform_check_history, bst_platform_divider and bst_world_view_create. */
 bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_config *config,
                                 double exposure_s, int history_more,
                                 bst_gimbal_base *base) BST_MUST_CHECK;

@@ -81,7 +81,7 @@ static bst_status fill(bst_ctx *ctx, const bst_frame_updates *updates, bst_frame
             BST_TRY(add(ctx, s, ended, s->nodes[s->count - 1].q, where));
         }
         for (int k = 0; has && k < c.update->node_count; k++) {
-            const bst_pointing_node *n = &c.update->nodes[k];
+            const bst_world_pointing_node *n = &c.update->nodes[k];
             bool end = k == c.update->node_count - 1;
             double tick = (double)c.start_tick +
                           (end ? (double)c.exposure_ticks : n->time_s * c.tick_rate_hz);

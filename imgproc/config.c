@@ -3,8 +3,8 @@
 #include "sim/optics/column_level.h"
 
 static const bst_config_desc bad_pixel_table[] = {
-    BST_INT(bst_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),
-    BST_INT(bst_bad_pixel, y, "px", 0, 32767, NULL, "Row, 0 the first."),
+    BST_INT(bst_imgproc_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),
+    BST_INT(bst_imgproc_bad_pixel, y, "px", 0, 32767, NULL, "Row, 0 the first."),
     BST_CONFIG_END,
 };
 
@@ -62,8 +62,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
         bst_imgproc_config, threads, "", 0, 32, "0",
         "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
         "not depend on it."),
-    BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
-             "Sensor pixels to leave out."),
+    BST_LIST(bst_imgproc_config, bad_pixels, bst_imgproc_bad_pixel, bad_pixel_table, 0, 1000000,
+             "[]", "Sensor pixels to leave out."),
     BST_PATH(
         bst_imgproc_config, dark_file, "\"\"",
         "FITS image of the sensor's size: each pixel's dark signal less the mean, e-/s; empty: "
@@ -72,7 +72,7 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "FITS image of the sensor's size: each pixel's relative response; empty: uniform."),
     BST_PATH(bst_imgproc_config, bad_pixel_file, "\"\"",
              "FITS image of the sensor's size: what is not zero is left out; empty: none."),
-    BST_OBJECT(bst_imgproc_config, detector, bst_plugged_table, "{}",
+    BST_OBJECT(bst_imgproc_config, detector, bst_plugin_detector_table, "{}",
                "A detector of one's own: what finds and measures sources in a frame."),
     BST_CONFIG_END,
 };

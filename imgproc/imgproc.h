@@ -15,9 +15,9 @@
 #include "sim/optics/camera.h"
 #include "sim/optics/photometry.h"
 
-typedef struct bst_bad_pixel {
+typedef struct bst_imgproc_bad_pixel {
     int64_t x, y; /* full-sensor coordinates */
-} bst_bad_pixel;
+} bst_imgproc_bad_pixel;
 
 typedef struct bst_imgproc_config {
     int64_t capacity;              /* detections per frame */
@@ -34,7 +34,7 @@ typedef struct bst_imgproc_config {
     bst_pixel_learner_config bad_pixel_learning;
     int column_level;           /* see sim/optics/column_level.h */
     int64_t threads;            /* 0: one per processor */
-    bst_config_list bad_pixels; /* of bst_bad_pixel */
+    bst_config_list bad_pixels; /* of bst_imgproc_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
     char dark_file[512], flat_file[512], bad_pixel_file[512];
     bst_stage_use detector; /* a plug-in's in place of bst_imgproc_detect; left to the caller too */
@@ -108,7 +108,7 @@ void bst_imgproc_free(bst_imgproc *ip);
  * source's second moments. No output is NaN. BST_ERR_ARGUMENT for a window or binning that does not
  * fit the sensor. */
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
-                              const bst_motion *motion, bst_detections *out,
+                              const bst_camera_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
 
 /* The same in windows of the frame only, `count` of them, apart from each other, inside the frame's
@@ -118,7 +118,7 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
  * time that it takes follows the windows' area. */
 bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                                       const bst_window *windows, int count,
-                                      const bst_motion *motion, bst_detections *out,
+                                      const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) BST_MUST_CHECK;
 
 /* Has the following frames collect evidence of defective pixels, up to `capacity` pixels of a
@@ -134,7 +134,7 @@ const struct bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip);
  * zero_point. In windows all are fitted.
  */
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
-                        const bst_zero_point *zero_point);
+                        const bst_optics_zero_point *zero_point);
 
 /* V magnitude of the faintest star that the latest frame could show at `snr`, with the shape
  * (point or streak) that stars had in it. */

@@ -49,15 +49,15 @@ typedef struct imgproc_module {
     bst_imgproc_maps maps;
     lane lanes[BST_STEP_LANES];
     bst_starid *starid;
-    bst_discriminator *discriminator;
-    bst_sky sky;
-    bst_windows windows; /* of the present frame; none: all of it */
-    bst_stack *stack;    /* NULL: no stacks */
-    bst_photometer photometer;
-    bst_pixel_learner *pixels; /* NULL: no bad pixels are learned */
-    int64_t steps;             /* that were made */
-    bst_wings *wings;          /* NULL: the PSF has none */
-    bst_plugged *plugged;      /* NULL: detection is this module's own */
+    bst_imgproc_discriminator *discriminator;
+    bst_predicted_stars sky;
+    bst_region_of_interest windows; /* of the present frame; none: all of it */
+    bst_stack *stack;               /* NULL: no stacks */
+    bst_optics_photometer photometer;
+    bst_pixel_learner *pixels;    /* NULL: no bad pixels are learned */
+    int64_t steps;                /* that were made */
+    bst_psf_wings *wings;         /* NULL: the PSF has none */
+    bst_plugin_detector *plugged; /* NULL: detection is this module's own */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -71,13 +71,13 @@ static void destroy(void *self) {
     }
     bst_calibration_free(&m->maps);
     bst_starid_free(m->starid);
-    bst_discriminator_free(m->discriminator);
-    bst_sky_free(&m->sky);
+    bst_imgproc_discriminator_free(m->discriminator);
+    bst_predicted_stars_free(&m->sky);
     bst_stack_free(m->stack);
-    bst_photometer_free(&m->photometer);
+    bst_optics_photometer_free(&m->photometer);
     bst_pixel_learner_free(m->pixels);
-    bst_wings_free(m->wings);
-    bst_plugged_free(m->plugged);
+    bst_psf_wings_free(m->wings);
+    bst_plugin_detector_free(m->plugged);
     free(m);
 }
 
@@ -103,8 +103,8 @@ static bst_status open_plugged(const bst_module_env *env, imgproc_module *m) {
             "frames by itself; turn track_windows and stack off",
             env->observer, env->sensor);
     }
-    return bst_plugged_create(env->ctx, &m->config->detector, &m->camera, &m->maps,
-                              (int)m->config->capacity, &m->plugged);
+    return bst_plugin_detector_create(env->ctx, &m->config->detector, &m->camera, &m->maps,
+                                      (int)m->config->capacity, &m->plugged);
 }
 
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
@@ -123,12 +123,13 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                                          &m->pixels));
     }
     BST_TRY(open_lane(env->ctx, m, &m->lanes[0]));
-    BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
-                           bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
+    BST_TRY(bst_predicted_stars_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
+                                       bst_knowledge_julian_year(env->knowledge),
+                                       CATALOGUE_CAPACITY, &m->sky));
     BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
                               m->config->search_radius_px, &m->starid));
-    BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
-                                     &m->discriminator));
+    BST_TRY(bst_imgproc_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
+                                             &m->discriminator));
     if (m->config->stack.frames > 0 && m->config->track_windows) {
         return bst_fail(env->ctx, BST_ERR_CONFIG,
                         "imgproc: track_windows and stack do not go together: stacks are made of "
@@ -138,10 +139,10 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
         BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
                                  &m->stack));
     }
-    BST_TRY(bst_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
+    BST_TRY(bst_optics_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
     if (m->maps.psf) {
-        BST_TRY(bst_wings_create(env->ctx, m->maps.psf, (double)m->camera.width_px,
-                                 (double)m->camera.height_px, m->config->jitter_px, &m->wings));
+        BST_TRY(bst_psf_wings_create(env->ctx, m->maps.psf, (double)m->camera.width_px,
+                                     (double)m->camera.height_px, m->config->jitter_px, &m->wings));
     }
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
@@ -192,12 +193,12 @@ static const double WINDOW_STAR_SNR = 12.0;
 
 /* Windows for the brightest stars: *count of those expected, which are put in front, brightest
  * first. */
-static void add_stars(imgproc_module *m, const bst_frame_message *message, const bst_motion *motion,
-                      int count) {
+static void add_stars(imgproc_module *m, const bst_frame_message *message,
+                      const bst_camera_motion *motion, int count) {
     double half = 0.5 * (double)m->config->window_px;
     int chosen = 0;
     for (; chosen < count && chosen < m->config->window_stars; chosen++) {
-        bst_expected_star *e = m->sky.expected;
+        bst_imgproc_expected_star *e = m->sky.expected;
         int best = chosen;
         for (int i = chosen + 1; i < count; i++) {
             best =
@@ -205,21 +206,21 @@ static void add_stars(imgproc_module *m, const bst_frame_message *message, const
                     ? i
                     : best;
         }
-        bst_expected_star star = e[best];
+        bst_imgproc_expected_star star = e[best];
         e[best] = e[chosen];
         e[chosen] = star;
         double dx, dy;
-        bst_motion_streak(motion, &m->camera, star.x_px, star.y_px, &dx, &dy);
-        (void)bst_windows_add(&m->windows, &message->window, star.x_px, star.y_px,
-                              half + 0.5 * fabs(dx), half + 0.5 * fabs(dy));
+        bst_camera_motion_streak(motion, &m->camera, star.x_px, star.y_px, &dx, &dy);
+        (void)bst_region_of_interest_add(&m->windows, &message->window, star.x_px, star.y_px,
+                                         half + 0.5 * fabs(dx), half + 0.5 * fabs(dy));
     }
 }
 
 /* Where to look in a frame while a target is followed: round what the tracker predicts, and round
  * bright stars. False: everywhere. */
 static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
-                               const bst_frame_message *message, const bst_motion *motion,
-                               const bst_light *light, const bst_predictions *predictions,
+                               const bst_frame_message *message, const bst_camera_motion *motion,
+                               const bst_astro_light *light, const bst_predictions *predictions,
                                const bst_quat *q_cam_from_gcrf, bool *use) {
     *use = false;
     m->windows.count = 0;
@@ -233,20 +234,21 @@ static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
     for (int i = 0; i < predictions->count; i++) {
         const bst_prediction *p = &predictions->items[i];
         bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(p->direction_gcrf, age_s, p->rate_gcrf_radps));
-        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_light_aberrate(light, d));
+        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_astro_light_aberrate(light, d));
         double x, y, reach = half + 5.0 * p->sigma_rad / scale;
         bool added = bst_camera_project(&m->camera, v, &x, &y) &&
-                     bst_windows_add(&m->windows, &message->window, x, y, reach, reach);
+                     bst_region_of_interest_add(&m->windows, &message->window, x, y, reach, reach);
         target = target || (added && p->target_of_interest);
     }
     if (!target || m->windows.count == BST_WINDOWS_MAX) {
         return BST_OK;
     }
     int expected = 0;
-    BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, light, message->window, 0.0,
-                           bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR), &expected));
+    BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, *q_cam_from_gcrf, light, message->window, 0.0,
+                                       bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR), &expected));
     add_stars(m, message, motion, expected);
-    *use = bst_windows_settle(&m->windows, &message->window, message->binning, WINDOWS_SHARE);
+    *use = bst_region_of_interest_settle(&m->windows, &message->window, message->binning,
+                                         WINDOWS_SHARE);
     return BST_OK;
 }
 
@@ -254,8 +256,8 @@ static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
 static int in_windows(imgproc_module *m, int expected) {
     int kept = 0;
     for (int i = 0; i < expected; i++) {
-        const bst_expected_star *e = &m->sky.expected[i];
-        if (bst_windows_hold(&m->windows, e->x_px, e->y_px, LOCKED_RADIUS_PX)) {
+        const bst_imgproc_expected_star *e = &m->sky.expected[i];
+        if (bst_region_of_interest_hold(&m->windows, e->x_px, e->y_px, LOCKED_RADIUS_PX)) {
             m->sky.expected[kept++] = *e;
         }
     }
@@ -264,15 +266,15 @@ static int in_windows(imgproc_module *m, int expected) {
 
 /* *q_cam_from_gcrf: in, the attitude that is believed; out, that of the stars, when any are
  * identified. */
-static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const bst_light *light,
-                           bst_window window, bool locked, bst_detections *out,
-                           bst_quat *q_cam_from_gcrf) {
+static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
+                           const bst_astro_light *light, bst_window window, bool locked,
+                           bst_detections *out, bst_quat *q_cam_from_gcrf) {
     double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
     double v_limit =
-        m->plugged ? bst_plugged_v_limit(m->plugged, snr) : bst_imgproc_v_limit(l->ip, snr);
+        m->plugged ? bst_plugin_detector_v_limit(m->plugged, snr) : bst_imgproc_v_limit(l->ip, snr);
     int expected = 0;
-    BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, light, window,
-                           m->config->search_radius_px, v_limit, &expected));
+    BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, out->q_cam_from_gcrf, light, window,
+                                       m->config->search_radius_px, v_limit, &expected));
     expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
     bst_starid_options options = {m->config->search_radius_px,
                                   m->config->match_tolerance_px,
@@ -301,8 +303,8 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const
                 out->items[i].star_id = 0;
             }
         }
-        BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, light, window,
-                               m->config->search_radius_px, v_limit, &expected));
+        BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, *q_cam_from_gcrf, light, window,
+                                           m->config->search_radius_px, v_limit, &expected));
         expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
         options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
@@ -315,65 +317,66 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const
     for (int i = 0; i < out->count; i++) {
         int star = bst_starid_star_of(m->starid, i);
         if (star >= 0) {
-            bst_photometer_add(&m->photometer, &out->items[i], m->sky.expected[star].v_mag);
+            bst_optics_photometer_add(&m->photometer, &out->items[i], m->sky.expected[star].v_mag);
         }
     }
     return BST_OK;
 }
 
-static void ground_at(const void *user, double x_px, double y_px, bst_wings_ground *out) {
+static void ground_at(const void *user, double x_px, double y_px, bst_psf_wings_ground *out) {
     bst_imgproc_ground(user, x_px, y_px, &out->level_e, &out->noise_e);
 }
 
 /* Labels what the wings of bright stars pretend to be: catalogued ones, also beside the frame,
  * where the attitude is that of stars, and what saturates. */
 static bst_status label_wings(imgproc_module *m, bst_ctx *ctx, const lane *l,
-                              const bst_frame_message *message, const bst_motion *motion,
-                              const bst_frame_knowledge *known, bst_detections *out) {
+                              const bst_frame_message *message, const bst_camera_motion *motion,
+                              const bst_imgproc_frame_knowledge *known, bst_detections *out) {
     double dx = 0.0, dy = 0.0,
            exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz;
     double bright_e =
-        bst_wings_bright_e(m->wings, out->noise_e / message->binning, out->threshold_snr);
+        bst_psf_wings_bright_e(m->wings, out->noise_e / message->binning, out->threshold_snr);
     if (motion) {
-        bst_motion_streak(motion, &m->camera, bst_camera_centre_x(&m->camera),
-                          bst_camera_centre_y(&m->camera), &dx, &dy);
+        bst_camera_motion_streak(motion, &m->camera, bst_camera_centre_x(&m->camera),
+                                 bst_camera_centre_y(&m->camera), &dx, &dy);
     }
-    bst_wings_begin(m->wings, dx, dy);
+    bst_psf_wings_begin(m->wings, dx, dy);
     if (known->oriented) {
         int expected = 0;
-        BST_TRY(bst_sky_expect(ctx, &m->sky, known->q_cam_from_gcrf, &known->light, message->window,
-                               BST_WINGS_REACH_PX,
-                               bst_camera_v_mag(&m->camera, bright_e / exposure_s), &expected));
+        BST_TRY(bst_predicted_stars_expect(
+            ctx, &m->sky, known->q_cam_from_gcrf, &known->light, message->window,
+            BST_WINGS_REACH_PX, bst_camera_v_mag(&m->camera, bright_e / exposure_s), &expected));
         for (int i = 0; i < expected; i++) {
-            const bst_expected_star *e = &m->sky.expected[i];
-            bst_wings_add(m->wings, e->x_px, e->y_px,
-                          exposure_s * bst_camera_electrons_per_s(&m->camera, e->v_mag));
+            const bst_imgproc_expected_star *e = &m->sky.expected[i];
+            bst_psf_wings_add(m->wings, e->x_px, e->y_px,
+                              exposure_s * bst_camera_electrons_per_s(&m->camera, e->v_mag));
         }
     }
     for (int i = 0; i < out->count; i++) {
         const bst_detection *d = &out->items[i];
         if ((d->flags & BST_DETECTION_SATURATED) && d->flux_e > bright_e &&
-            !bst_wings_holds(m->wings, d->x_px, d->y_px, 5.0)) {
-            bst_wings_add(m->wings, d->x_px, d->y_px, d->flux_e);
+            !bst_psf_wings_holds(m->wings, d->x_px, d->y_px, 5.0)) {
+            bst_psf_wings_add(m->wings, d->x_px, d->y_px, d->flux_e);
         }
     }
-    bst_wings_label(m->wings, m->plugged ? bst_plugged_ground : ground_at,
-                    m->plugged ? (const void *)m->plugged : l->ip, message->binning, out);
+    bst_psf_wings_label(m->wings, m->plugged ? bst_plugin_detector_ground : ground_at,
+                        m->plugged ? (const void *)m->plugged : l->ip, message->binning, out);
     return BST_OK;
 }
 
 /* The camera's motion as telemetry tells it; false: not known. */
-static bool motion_of(struct bst_step *step, const bst_frame_message *message, bst_motion *motion) {
+static bool motion_of(struct bst_step *step, const bst_frame_message *message,
+                      bst_camera_motion *motion) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
-    *motion = (bst_motion){.q_cam_from_gcrf = BST_QUAT_IDENTITY};
+    *motion = (bst_camera_motion){.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     return pointing.payload && !pointing.stale &&
-           bst_motion_from_telemetry(pointing.payload, message->start_tick, message->end_tick,
-                                     motion);
+           bst_camera_motion_from_telemetry(pointing.payload, message->start_tick,
+                                            message->end_tick, motion);
 }
 
 /* What is in a frame. It depends on how the camera turned, not on where it looked. */
 static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
-                         const bst_frame_message *message, const bst_motion *motion,
+                         const bst_frame_message *message, const bst_camera_motion *motion,
                          bool beside_another, bst_detections *out, int capacity) {
     const uint16_t *pixels;
     if (m->pixels) {
@@ -387,12 +390,12 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
         .bits = message->bits,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
         .beside_another = beside_another};
-    bst_status status = m->plugged ? bst_plugged_detect(ctx, m->plugged, &frame,
-                                                        message->exposure_id, motion, out, capacity)
-                        : m->windows.count > 0
-                            ? bst_imgproc_detect_windows(ctx, l->ip, &frame, m->windows.items,
-                                                         m->windows.count, motion, out, capacity)
-                            : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
+    bst_status status =
+        m->plugged ? bst_plugin_detector_detect(ctx, m->plugged, &frame, message->exposure_id,
+                                                motion, out, capacity)
+        : m->windows.count > 0 ? bst_imgproc_detect_windows(ctx, l->ip, &frame, m->windows.items,
+                                                            m->windows.count, motion, out, capacity)
+                               : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
     bst_frame_unmap(message->frame);
     return status;
 }
@@ -417,7 +420,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
         }
     }
     const bst_frame_message *message = sample.payload;
-    bst_motion motion;
+    bst_camera_motion motion;
     bool oriented = motion_of(step, message, &motion);
     BST_TRY(detect(ctx, m, l, message, oriented ? &motion : NULL, true, l->made, capacity));
     l->exposure_id = message->exposure_id;
@@ -427,7 +430,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
 
 /* What was made ahead for this frame, or else made now. */
 static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
-                                const bst_frame_message *message, const bst_motion *motion,
+                                const bst_frame_message *message, const bst_camera_motion *motion,
                                 bst_detections *out, int capacity) {
     bool made = l->ready && l->exposure_id == message->exposure_id;
     l->ready = false;
@@ -447,7 +450,7 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
 
 /* Each full stack adds what it shows to the detections of its last frame. */
 static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
-                         bst_quat q_cam_from_gcrf, const bst_zero_point *zero_point,
+                         bst_quat q_cam_from_gcrf, const bst_optics_zero_point *zero_point,
                          bst_detections *out, int capacity) {
     bst_stack_frame frame =
         bst_imgproc_stack_frame(l->ip, middle_tick / (double)m->tick_rate_hz, q_cam_from_gcrf);
@@ -462,7 +465,7 @@ static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
 }
 
 static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l,
-                         const bst_frame_message *message, const bst_frame_knowledge *known,
+                         const bst_frame_message *message, const bst_imgproc_frame_knowledge *known,
                          bst_detections *out) {
     int64_t lost = bst_pixel_learner_lost(m->pixels);
     double middle_s =
@@ -478,8 +481,8 @@ static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l
 }
 
 /* Of the middle of an exposure: navigation may be later by the read-out. */
-static bst_light light_at(const imgproc_module *m, const bst_nav_telemetry *nav,
-                          double middle_tick) {
+static bst_astro_light light_at(const imgproc_module *m, const bst_nav_telemetry *nav,
+                                double middle_tick) {
     return bst_nav_light_after(nav, (middle_tick - (double)nav->tick) / (double)m->tick_rate_hz);
 }
 
@@ -487,7 +490,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
                           const bst_frame_message *message) {
     bst_ctx *ctx = bst_step_ctx(step);
     lane *l = &m->lanes[bst_step_lane(step)];
-    bst_motion motion;
+    bst_camera_motion motion;
     bool oriented = motion_of(step, message, &motion);
     bst_sample nav = bst_step_latest(step, PORT_NAV);
     bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
@@ -508,7 +511,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     m->windows.count = 0;
     out->windows = 0;
     bool navigated = nav.payload && !nav.stale;
-    bst_light light = navigated ? light_at(m, nav.payload, middle) : (bst_light){0};
+    bst_astro_light light = navigated ? light_at(m, nav.payload, middle) : (bst_astro_light){0};
     if (m->config->track_windows && locked && navigated) {
         bool use;
         BST_TRY(plan_windows(m, ctx, l, message, &motion, &light, predictions,
@@ -518,18 +521,19 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     }
     BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
     bool smeared = !m->plugged && bst_imgproc_smeared(l->ip);
-    bst_photometer_begin(&m->photometer);
-    bst_frame_knowledge known = {
+    bst_optics_photometer_begin(&m->photometer);
+    bst_imgproc_frame_knowledge known = {
         .q_cam_from_gcrf = out->q_cam_from_gcrf,
         .window = message->window,
-        .streak_px = m->plugged ? bst_plugged_streak_px(m->plugged) : bst_imgproc_streak_px(l->ip),
+        .streak_px =
+            m->plugged ? bst_plugin_detector_streak_px(m->plugged) : bst_imgproc_streak_px(l->ip),
         .predictions = predictions};
     if (oriented && navigated && !smeared) {
         BST_TRY(identify(m, l, ctx, &light, message->window, locked, out, &known.q_cam_from_gcrf));
         known.light = light;
         known.oriented = out->stars_identified > 0;
     }
-    bst_zero_point zero_point = bst_photometer_zero_point(&m->photometer);
+    bst_optics_zero_point zero_point = bst_optics_photometer_zero_point(&m->photometer);
     bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (predictions) {
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
@@ -544,7 +548,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         BST_TRY(label_wings(m, ctx, l, message, oriented ? &motion : NULL, &known, out));
     }
     if (!smeared) {
-        bst_discriminator_label(m->discriminator, &known, out);
+        bst_imgproc_discriminator_label(m->discriminator, &known, out);
         for (int i = 0; i < out->count && !m->plugged; i++) {
             if (out->items[i].label == BST_LABEL_OBJECT) {
                 bst_imgproc_refine(l->ip, out, i, &zero_point);

@@ -104,7 +104,7 @@ bst_status bst_obsgen_calibration_write(bst_ctx *ctx, const char *path,
                                         const bst_obsgen_calibration *calibration) {
     cJSON *root = bst_config_echo(bst_obsgen_calibration_table, calibration);
     char *text = root ? cJSON_Print(root) : NULL;
-    bst_status status = text ? bst_write_file_atomic(ctx, path, text, strlen(text))
+    bst_status status = text ? bst_io_write_file_atomic(ctx, path, text, strlen(text))
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %s", path);
     free(text);
     cJSON_Delete(root);

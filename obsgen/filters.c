@@ -26,7 +26,7 @@ static double straighten(bst_generator *g) {
         x += weight * u * g->path_x[k];
         y += weight * u * g->path_y[k];
     }
-    g->straight_path = (bst_path_px){x / moment, y / moment};
+    g->straight_path = (bst_obsgen_path_px){x / moment, y / moment};
     double length = hypot(g->star_path.dx, g->star_path.dy);
     double c = length > 0.0 ? g->star_path.dx / length : 1.0;
     double s = length > 0.0 ? g->star_path.dy / length : 0.0;
@@ -39,7 +39,7 @@ static double straighten(bst_generator *g) {
     return sum / last;
 }
 
-static double mean_width(const bst_image_width *w) {
+static double mean_width(const bst_obsgen_image_width *w) {
     return sqrt(w->across_px * w->along_px);
 }
 
@@ -63,7 +63,7 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     g->image_bound = f->image_bound;
     g->onboard_bound = f->onboard_bound;
     g->place_ratio2 = g->image_bound && g->onboard_bound ? 1.0 : ratio * ratio;
-    const bst_path_px rest = {0.0, 0.0}, paths[2] = {rest, g->star_path};
+    const bst_obsgen_path_px rest = {0.0, 0.0}, paths[2] = {rest, g->star_path};
     for (int k = 0; k < (g->streak > 0.0 ? 2 : 1); k++) {
         g->filters[k] = (bst_generator_filter){
             .efficiency = bst_response_efficiency(&g->response,
@@ -96,7 +96,7 @@ static void set_threshold(bst_generator *g) {
 /* Sum over an axis of the squares of the sums across it of a filter of unit norm, drawn along a
  * path that moves by `moved` on that axis: what offsets of its rows or columns become. */
 static double summed_up(const bst_generator *g, double moved, double square) {
-    const bst_path_px shadow = {moved, 0.0};
+    const bst_obsgen_path_px shadow = {moved, 0.0};
     double width = g->filter_sigma;
     /* of a Gaussian the integral across is the product's over 1 / (2 sqrt(pi) width) */
     return bst_matched_product(shadow, shadow, width) * 2.0 * sqrt(BST_PI) * width / square;
@@ -104,8 +104,8 @@ static double summed_up(const bst_generator *g, double moved, double square) {
 
 /* Variance of a filter's output over that of white noise of the frame's variance, of which the
  * offsets of columns and rows are these shares. */
-static double output_variance(const bst_generator *g, const bst_path_px *path, double columns,
-                              double rows) {
+static double output_variance(const bst_generator *g, const bst_obsgen_path_px *path,
+                              double columns, double rows) {
     if (columns == 0.0 && rows == 0.0) {
         return 1.0;
     }
@@ -160,7 +160,7 @@ void bst_generator_set_filters(bst_generator *g) {
     /* a Gaussian's top over its sqrt(sum p^2) */
     g->fit_light = 1.0 / (sqrt(BST_PI) * g->cross_sigma * g->noise_e * g->noise_e);
     set_threshold(g);
-    const bst_path_px paths[2] = {{0.0, 0.0}, g->star_path};
+    const bst_obsgen_path_px paths[2] = {{0.0, 0.0}, g->star_path};
     const double lengths[2] = {0.0, g->streak};
     const bst_threshold_noise law = noise_law(g);
     const bst_detector_config *d = &g->camera->detector;
@@ -179,7 +179,7 @@ void bst_generator_set_filters(bst_generator *g) {
                        : fmax(bst_threshold_quantile(g->threshold, &weights, &law), g->threshold);
         filter->variance = output_variance(g, &paths[k], columns, rows);
         double share = lengths[k] > g->filter_sigma ? LINE_SHOT : POINT_SHOT;
-        filter->shot = share * bst_bound_norm(&g->bound, lengths[k]) / g->noise_e;
+        filter->shot = share * bst_crlb_table_norm(&g->bound, lengths[k]) / g->noise_e;
         if (!(g->streak > 0.0)) {
             g->filters[1] = g->filters[0];
             break;

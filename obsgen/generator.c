@@ -56,7 +56,7 @@ void bst_generator_free(bst_generator *g) {
         free(g->ranks);
         free(g->route);
         free(g->way);
-        bst_generator_free_streaks(g->streaks);
+        bst_streak_breakup_free(g->streaks);
         free(g->path_x);
         free(g->path_y);
         free(g->object_x);
@@ -109,7 +109,7 @@ static double sharpness(const bst_generator *g, const bst_generator_frame *f,
                         const bst_truth_item *item, double length) {
     double v = (double)g->binning * g->binning * (f->truth->background_e + f->truth->dark_e) +
                g->camera->read_noise_e * g->camera->read_noise_e;
-    double plain = item->electrons * bst_bound_norm(&g->bound, length) / sqrt(fmax(v, 1e-6));
+    double plain = item->electrons * bst_crlb_table_norm(&g->bound, length) / sqrt(fmax(v, 1e-6));
     bool known = item->snr > 0.0 && plain > 0.0;
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
@@ -188,15 +188,15 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
 
 /* Amplitude of a source at the filter's output without noise, and which filter gives it. */
 static void respond(const bst_generator *g, generator_source *s) {
-    const bst_path_px point = {0.0, 0.0};
+    const bst_obsgen_path_px point = {0.0, 0.0};
     double gain = bst_obsgen_between(bst_obsgen_lengths_px, g->calibration.gain, BST_OBSGEN_LENGTHS,
                                      s->length);
-    double ideal =
-        s->sharp * s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e * sqrt(s->visible);
+    double ideal = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e *
+                   sqrt(s->visible);
     double efficiency = g->filters[0].efficiency;
     s->as_streak = false;
     if (s->broken) { /* at rest */
-        s->amplitude = efficiency * s->flux_e * bst_bound_norm(&g->bound, 0.0) / g->noise_e;
+        s->amplitude = efficiency * s->flux_e * bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
         return;
     }
     s->as_streak = s->star && g->streak > 0.0;
@@ -211,7 +211,8 @@ static void respond(const bst_generator *g, generator_source *s) {
         }
     }
     if (g->image_bound) {
-        ideal *= bst_bound_norm(g->image_bound, s->length) / bst_bound_norm(&g->bound, s->length);
+        ideal *= bst_crlb_table_norm(g->image_bound, s->length) /
+                 bst_crlb_table_norm(&g->bound, s->length);
     } else if (g->response.source.across_px != g->response.source.along_px) {
         ideal *= bst_response_norm_ratio(&g->response, s->length);
     }
@@ -299,7 +300,8 @@ static void add_crowding(bst_generator *g) {
         if (!s->broken) { /* the filter's sum over its norm times what is too much */
             s->amplitude *= before / g->noise_e;
             double length = s->as_streak ? g->streak : 0.0;
-            s->amplitude -= g->background_bias_e / (bst_bound_norm(&g->bound, length) * g->noise_e);
+            s->amplitude -=
+                g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
         }
     }
 }
@@ -330,9 +332,9 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
         g->path_x[k] = known ? f->path_x_px[k] / b : (k - 0.5) * f->streak_dx_px / b;
         g->path_y[k] = known ? f->path_y_px[k] / b : (k - 0.5) * f->streak_dy_px / b;
     }
-    g->path = (bst_route_path){g->path_x, g->path_y, count};
-    g->whole_path =
-        (bst_path_px){g->path_x[count - 1] - g->path_x[0], g->path_y[count - 1] - g->path_y[0]};
+    g->path = (bst_star_trail_path){g->path_x, g->path_y, count};
+    g->whole_path = (bst_obsgen_path_px){g->path_x[count - 1] - g->path_x[0],
+                                         g->path_y[count - 1] - g->path_y[0]};
     memset(g->star_bias, 0, sizeof g->star_bias);
     memset(g->streak_bias, 0, sizeof g->streak_bias);
     g->route_count = 0;
@@ -347,12 +349,12 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the way of stars");
         }
     }
-    g->route_count = bst_route_lay(&g->path, g->cross_sigma, g->route);
+    g->route_count = bst_star_trail_lay(&g->path, g->cross_sigma, g->route);
     double *box = g->route_box;
     box[0] = box[2] = INFINITY;
     box[1] = box[3] = -INFINITY;
     for (int i = 0; i < g->route_count; i++) {
-        const bst_route_node *n = &g->route[i];
+        const bst_star_trail_node *n = &g->route[i];
         g->route_top = fmax(g->route_top, n->light);
         box[0] = fmin(box[0], n->x);
         box[1] = fmax(box[1], n->x);
@@ -368,15 +370,16 @@ static void set_star_bias(bst_generator *g) {
         return;
     }
     if (g->streak > 0.0) {
-        bst_route_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
-                       g->total_sigma, g->streak_bias);
+        bst_star_trail_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                            g->total_sigma, g->streak_bias);
     }
     double light = GENERATOR_FIRST_LIGHT;
     for (int i = 0; i < GENERATOR_BIASES; i++, light *= 10.0) {
         if (i > 0) {
             memcpy(g->star_bias[i], g->star_bias[i - 1], sizeof g->star_bias[0]);
         }
-        bst_route_point_bias(&g->path, &g->blend_weights, light, g->bias_sigma, g->star_bias[i]);
+        bst_star_trail_point_bias(&g->path, &g->blend_weights, light, g->bias_sigma,
+                                  g->star_bias[i]);
     }
 }
 
@@ -389,7 +392,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     if (sigma != g->sigma) {
         g->sigma = sigma;
         g->total_sigma = sqrt(sigma * sigma + 1.0 / 12.0);
-        bst_bound_init(&g->bound, sigma);
+        bst_crlb_table_init(&g->bound, sigma);
     }
     g->fitted_sigma = fmax(g->onboard_sigma_px / g->binning, 0.2);
     double length = hypot(f->streak_dx_px, f->streak_dy_px) / g->binning;
@@ -397,9 +400,9 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     g->bend_y = f->bend_y_px / g->binning;
     bool filtered = length >= g->settings.streak_min_px && length <= g->settings.streak_max_px;
     g->smeared = length + 2.0 * hypot(g->bend_x, g->bend_y) > g->settings.streak_max_px;
-    g->star_path = filtered
-                       ? (bst_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
-                       : (bst_path_px){0.0, 0.0};
+    g->star_path =
+        filtered ? (bst_obsgen_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
+                 : (bst_obsgen_path_px){0.0, 0.0};
     g->streak = filtered ? length : 0.0;
     g->path.count = 0;
     bst_generator_set_response(g, f);
@@ -434,7 +437,7 @@ double bst_generator_draw(const bst_generator *g, const generator_source *s, int
                           s->name * GENERATOR_DRAWS + (uint64_t)which);
 }
 
-void bst_generator_keep(bst_generator *g, const bst_generated *item) {
+void bst_generator_keep(bst_generator *g, const bst_obsgen_generated *item) {
     if (g->count < g->settings.capacity) {
         g->items[g->count++] = *item;
         return;
@@ -451,8 +454,8 @@ void bst_generator_keep(bst_generator *g, const bst_generated *item) {
 }
 
 void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, int item) {
-    double b = g->binning, norm = bst_bound_norm(&g->bound, 0.0), sigma = g->noise_e / norm;
-    bst_generated out = {.item = item};
+    double b = g->binning, norm = bst_crlb_table_norm(&g->bound, 0.0), sigma = g->noise_e / norm;
+    bst_obsgen_generated out = {.item = item};
     bst_detection *d = &out.detection;
     d->x_px = g->origin_x + b * x;
     d->y_px = g->origin_y + b * y;
@@ -486,8 +489,8 @@ static void keep_whole_rough(bst_generator *g, int i) {
 }
 
 static int generated_by_row(const void *a, const void *b) {
-    const bst_detection *p = &((const bst_generated *)a)->detection,
-                        *q = &((const bst_generated *)b)->detection;
+    const bst_detection *p = &((const bst_obsgen_generated *)a)->detection,
+                        *q = &((const bst_obsgen_generated *)b)->detection;
     if (p->y_px != q->y_px) {
         return p->y_px < q->y_px ? -1 : 1;
     }
@@ -518,22 +521,22 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
             b.point = b.point || bst_generator_fits_point(g, s, &b);
-            bst_generated item = {.detection = bst_generator_measure(g, s, &b),
-                                  .item = s->item,
-                                  .drawn = s->as_streak && !b.point};
+            bst_obsgen_generated item = {.detection = bst_generator_measure(g, s, &b),
+                                         .item = s->item,
+                                         .drawn = s->as_streak && !b.point};
             bst_generator_keep(g, &item);
         }
     }
     if (g->smeared) {
-        BST_TRY(bst_generator_fragments(ctx, g));
+        BST_TRY(bst_streak_breakup_fragments(ctx, g));
     }
-    bst_generator_false_alarms(g);
-    bst_generator_hits(g);
+    bst_false_alarms_draw(g);
+    bst_false_alarms_cosmic_rays(g);
     for (int i = 0; i < g->count; i++) {
         bst_detection *d = &g->items[i].detection;
         bool drawn = g->items[i].drawn;
-        bst_motion_widen(f->bend_x_px, f->bend_y_px, drawn ? f->bend_x_px : 0.0,
-                         drawn ? f->bend_y_px : 0.0, d);
+        bst_camera_motion_widen(f->bend_x_px, f->bend_y_px, drawn ? f->bend_x_px : 0.0,
+                                drawn ? f->bend_y_px : 0.0, d);
     }
     qsort(g->items, (size_t)g->count, sizeof *g->items, generated_by_row);
     *out = (bst_generator_result){.items = g->items,
@@ -551,6 +554,6 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
 }
 
 double bst_generator_v_limit(const bst_generator *g, double snr) {
-    double electrons = snr * g->noise_e / bst_bound_norm(&g->bound, g->streak);
+    double electrons = snr * g->noise_e / bst_crlb_table_norm(&g->bound, g->streak);
     return -2.5 * log10(electrons / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
 }

@@ -21,12 +21,12 @@ typedef struct bst_generator_settings {
 } bst_generator_settings;
 
 /* A detection with where it comes from. */
-typedef struct bst_generated {
+typedef struct bst_obsgen_generated {
     bst_detection detection;
     int32_t item; /* of the truth, the brightest that is in it; -1: none */
     bool hit;     /* a radiation hit */
     bool drawn;   /* fitted with the stars' path, its bend too */
-} bst_generated;
+} bst_obsgen_generated;
 
 typedef struct bst_generator bst_generator;
 
@@ -53,8 +53,8 @@ typedef struct bst_generator_frame {
     const bst_response *response; /* of the filter to that PSF; NULL: both are Gaussians */
     /* of images at rest with that PSF, and with the onboard one with its jitter, where `response`
      * is given; NULL: of Gaussians with the width of its gradient */
-    const bst_bound *image_bound, *onboard_bound;
-    /* path of the stars in the middle of the window and its bend (bst_motion_bend) as image
+    const bst_crlb_table *image_bound, *onboard_bound;
+    /* path of the stars in the middle of the window and its bend (bst_camera_motion_bend) as image
      * processing takes them from telemetry, sensor px */
     double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;
     /* the true path of a star there at path_count equal steps of the exposure, less its mean,
@@ -74,7 +74,7 @@ typedef struct bst_generator_filter {
 } bst_generator_filter;
 
 typedef struct bst_generator_result {
-    const bst_generated *items; /* by row, then column; held until the next call */
+    const bst_obsgen_generated *items; /* by row, then column; held until the next call */
     int count, lost;
     double background_e, noise_e, threshold_snr;
     bst_generator_filter filter; /* of the stars */

@@ -10,7 +10,7 @@
 /* A source of the truth on the frame, in pixels that are read. */
 typedef struct generator_source {
     double x, y; /* mean of its path */
-    bst_path_px path;
+    bst_obsgen_path_px path;
     double length, flux_e;
     double visible;        /* share of the squares of its image that is on the frame */
     double ends;           /* share of both ends that is */
@@ -71,22 +71,22 @@ struct bst_generator {
     double white_share;              /* of the noise's variance that pixels have each for itself */
     double
         fit_light; /* brightest pixel over the noise's variance, per sqrt(sum p^2) and electron */
-    bst_path_px straight_path; /* nearest to the true one */
-    double widening;           /* width of the images over the PSF's: the path is not straight */
-    double known_width;        /* width of the filters' images over the PSF's */
-    double place_ratio2;       /* variance of a place over that of a Gaussian of the PSF's
-                                              noise-equivalent             area */
-    double norm_ratio[2];      /* sqrt(sum p^2) of the filters' images over the bound's */
-    bst_bound bound;
-    const bst_bound *image_bound, *onboard_bound; /* of the frame; NULL: from `bound` */
+    bst_obsgen_path_px straight_path; /* nearest to the true one */
+    double widening;      /* width of the images over the PSF's: the path is not straight */
+    double known_width;   /* width of the filters' images over the PSF's */
+    double place_ratio2;  /* variance of a place over that of a Gaussian of the PSF's
+                                         noise-equivalent             area */
+    double norm_ratio[2]; /* sqrt(sum p^2) of the filters' images over the bound's */
+    bst_crlb_table bound;
+    const bst_crlb_table *image_bound, *onboard_bound; /* of the frame; NULL: from `bound` */
     bst_blend_weights blend_weights;
-    bst_path_px star_path;
+    bst_obsgen_path_px star_path;
     double bend_x, bend_y;
-    bst_route_path path; /* the true one; count 0: not known */
+    bst_star_trail_path path; /* the true one; count 0: not known */
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;
-    double streak;      /* 0: not filtered for */
-    bst_wander *wander; /* for `streak`, once it was asked for */
+    double streak;                     /* 0: not filtered for */
+    bst_streak_centroid_error *wander; /* for `streak`, once it was asked for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
     double dark_noise_e; /* the noise without the light that is part of it */
@@ -101,16 +101,16 @@ struct bst_generator {
     int source_count, source_capacity;
     double reach; /* of any source's light */
     /* the stars' way, in frames that are smeared, and a source's */
-    bst_route_node *route, *way;
+    bst_star_trail_node *route, *way;
     int route_count;
-    double route_top;       /* greatest light */
-    double route_box[4];    /* least and greatest x, least and greatest y */
-    bst_path_px whole_path; /* from its start to its end */
+    double route_top;              /* greatest light */
+    double route_box[4];           /* least and greatest x, least and greatest y */
+    bst_obsgen_path_px whole_path; /* from its start to its end */
     struct generator_streaks *streaks;
     /* of fits, by how the camera really moved, and by their light */
     double star_bias[GENERATOR_BIASES][2], streak_bias[2];
-    double bias_sigma; /* bst_route_point_bias */
-    bst_generated *items;
+    double bias_sigma; /* bst_star_trail_point_bias */
+    bst_obsgen_generated *items;
     int count, lost;
 };
 
@@ -153,6 +153,6 @@ enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_SHAPE, GENERAT
 void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, int item);
 
 /* Takes a detection, in place of the faintest where there is no room. */
-void bst_generator_keep(bst_generator *g, const bst_generated *item);
+void bst_generator_keep(bst_generator *g, const bst_obsgen_generated *item);
 
 #endif

@@ -75,7 +75,7 @@ static bool enough(const bst_identify_options *o, const bst_generator_frame *f, 
 
 /* Something else that lies on a star of its brightness. */
 static bst_status mistake(bst_ctx *ctx, const bst_identify_options *o, const bst_generator_frame *f,
-                          const bst_generated *generated, int count, bst_detection *d) {
+                          const bst_obsgen_generated *generated, int count, bst_detection *d) {
     double tolerance = fmin(o->match_tolerance_px, 4.0 * sqrt(d->cov_xx + d->cov_yy + 0.0625)),
            nearest = tolerance;
     const bst_truth *t = f->truth;
@@ -100,7 +100,7 @@ static bst_status mistake(bst_ctx *ctx, const bst_identify_options *o, const bst
 }
 
 bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
-                               const bst_generator_frame *f, const bst_generated *generated,
+                               const bst_generator_frame *f, const bst_obsgen_generated *generated,
                                bst_detection *items, int count, int *identified) {
     const bst_truth *t = f->truth;
     int found = 0;

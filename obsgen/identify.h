@@ -22,8 +22,9 @@ typedef struct bst_identify_options {
  * consistent pairs). A detection of something else next to an undetected star of its brightness is
  * taken for that star. Returns how many in *identified. */
 bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *options,
-                               const bst_generator_frame *frame, const bst_generated *generated,
-                               bst_detection *items, int count, int *identified) BST_MUST_CHECK;
+                               const bst_generator_frame *frame,
+                               const bst_obsgen_generated *generated, bst_detection *items,
+                               int count, int *identified) BST_MUST_CHECK;
 
 /* Labels the rest: cut by the frame's edge: artefact; what is no star, where stars were found or
  * streak, object, unless it moved as stars do. Every label is told as certain. */

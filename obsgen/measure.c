@@ -27,20 +27,20 @@ static void shared_bias(const bst_generator *g, const generator_source *s, bool 
         }
         return;
     }
-    const bst_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
+    const bst_obsgen_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
     double dx = s->path.dx - stars->dx, dy = s->path.dy - stars->dy;
     for (int k = 0; k < g->path.count; k++) {
         double u = (double)k / (g->path.count - 1) - 0.5;
         g->object_x[k] = g->path_x[k] + u * dx;
         g->object_y[k] = g->path_y[k] + u * dy;
     }
-    const bst_route_path path = {g->object_x, g->object_y, g->path.count};
+    const bst_star_trail_path path = {g->object_x, g->object_y, g->path.count};
     bias[0] = bias[1] = 0.0;
     if (as_streak) {
-        bst_route_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
-                       g->total_sigma, bias);
+        bst_star_trail_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                            g->total_sigma, bias);
     } else {
-        bst_route_point_bias(&path, &g->blend_weights, light, g->bias_sigma, bias);
+        bst_star_trail_point_bias(&path, &g->blend_weights, light, g->bias_sigma, bias);
     }
 }
 
@@ -56,21 +56,21 @@ static double misfit(const double image[2], const double model[2]) {
 
 /* Bound of an image at rest that the camera's path widens, or of a streak: what a path of the
  * stars' own length bends widens it across, not along. */
-static bst_bound_at bound_of_image(const bst_generator *g, double flux_e, double length) {
-    const bst_bound *bound = g->image_bound ? g->image_bound : &g->bound;
+static bst_crlb_table_at bound_of_image(const bst_generator *g, double flux_e, double length) {
+    const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
     if (length > 1.0) {
-        bst_bound_at b = bst_bound_of(bound, flux_e, g->noise_e, length);
+        bst_crlb_table_at b = bst_crlb_table_of(bound, flux_e, g->noise_e, length);
         b.var_across_px2 *= g->widening * g->widening;
         return b;
     }
-    return bst_bound_wider(bound, flux_e, g->noise_e, length, g->widening);
+    return bst_crlb_table_wider(bound, flux_e, g->noise_e, length, g->widening);
 }
 
 /* Bound of the image that is fitted. */
-static bst_bound_at bound_of_model(const bst_generator *g, double flux_e, double length) {
+static bst_crlb_table_at bound_of_model(const bst_generator *g, double flux_e, double length) {
     return g->onboard_bound
-               ? bst_bound_of(g->onboard_bound, flux_e, g->noise_e, length)
-               : bst_bound_wider(&g->bound, flux_e, g->noise_e, length, g->known_width);
+               ? bst_crlb_table_of(g->onboard_bound, flux_e, g->noise_e, length)
+               : bst_crlb_table_wider(&g->bound, flux_e, g->noise_e, length, g->known_width);
 }
 
 bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
@@ -78,8 +78,8 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
     if (!s->as_streak || b->drawn) {
         return false;
     }
-    const bst_image_width *w = &g->response.filter;
-    const bst_path_px rest = {0.0, 0.0};
+    const bst_obsgen_image_width *w = &g->response.filter;
+    const bst_obsgen_path_px rest = {0.0, 0.0};
     double common = bst_response_product(w, g->star_path, rest) /
                     sqrt(bst_response_product(w, rest, rest) *
                          bst_response_product(w, g->star_path, g->star_path));
@@ -92,8 +92,9 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
 
 /* Place with error and covariance, along and across the path. */
 static void measure_place(const bst_generator *g, const generator_source *s,
-                          const generator_blend *b, const bst_bound_at *truth,
-                          const bst_bound_at *told, double snr, double length, bst_detection *d) {
+                          const generator_blend *b, const bst_crlb_table_at *truth,
+                          const bst_crlb_table_at *told, double snr, double length,
+                          bst_detection *d) {
     const bst_obsgen_calibration *cal = &g->calibration;
     double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr);
     double along =
@@ -107,7 +108,7 @@ static void measure_place(const bst_generator *g, const generator_source *s,
         b->widen * g->place_ratio2 / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen * g->place_ratio2 / fmax(s->visible, LEAST_SEEN);
     /* what of `sharp` is not the wider image, which `truth` is for: the background's place */
-    double sharp = s->sharp * bst_bound_norm(&g->bound, s->length) / truth->norm;
+    double sharp = s->sharp * bst_crlb_table_norm(&g->bound, s->length) / truth->norm;
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
     double open = b->drawn ? 0.0 : worse;
     /* a point that is fitted to a short streak */
@@ -183,14 +184,14 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     /* a point filter's flux of a streak too faint to be fitted as one is what it caught */
     bool own = !b->point && (s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5);
     double length = own && (s->as_streak || is_drawn_out(g, s)) ? s->length : 0.0;
-    double caught =
-        own ? 1.0
-            : bst_matched_product(s->path, (bst_path_px){0, 0}, g->total_sigma) /
-                  bst_matched_product((bst_path_px){0, 0}, (bst_path_px){0, 0}, g->total_sigma);
+    double caught = own ? 1.0
+                        : bst_matched_product(s->path, (bst_obsgen_path_px){0, 0}, g->total_sigma) /
+                              bst_matched_product((bst_obsgen_path_px){0, 0},
+                                                  (bst_obsgen_path_px){0, 0}, g->total_sigma);
     double flux = b->flux_e * caught;
     /* errors are those of the image; what is said of them, those of the PSF that is known */
-    bst_bound_at truth = bound_of_image(g, b->flux_e, s->length);
-    bst_bound_at fitted = bound_of_model(g, flux, length);
+    bst_crlb_table_at truth = bound_of_image(g, b->flux_e, s->length);
+    bst_crlb_table_at fitted = bound_of_model(g, flux, length);
     /* flux goes with the peak that was detected: nearly the same filter on the same noise */
     const double together = 0.95;
     double noise = together * s->noise +
@@ -200,10 +201,10 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     if (b->drawn) {
         d.flux_e = b->snr * g->noise_e / fitted.norm;
     }
-    bst_bound_at told = bound_of_model(g, d.flux_e, length);
+    bst_crlb_table_at told = bound_of_model(g, d.flux_e, length);
     d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
-    double norm = bst_bound_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
-    d.snr = d.flux_e * (g->onboard_bound ? bst_bound_norm(g->onboard_bound, length) : norm) /
+    double norm = bst_crlb_table_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
+    d.snr = d.flux_e * (g->onboard_bound ? bst_crlb_table_norm(g->onboard_bound, length) : norm) /
             g->noise_e;
     measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));

@@ -92,7 +92,7 @@ typedef struct pending {
     int room;
     double sigma_px;
     bst_response response; /* where `own_response` */
-    bst_bound image_bound, onboard_bound;
+    bst_crlb_table image_bound, onboard_bound;
     bool own_response;             /* one of the PSFs is no Gaussian */
     double *path_x_px, *path_y_px; /* of a star in the middle, less its mean */
     int path_count, path_room;
@@ -118,10 +118,10 @@ typedef struct obsgen {
     bst_psf *psf;                 /* of it, if it is wider than the world's */
     double jitter_rad2, sigma_px; /* sigma: of the Gaussian that the PSF is or stands for */
     bst_response response; /* of the onboard filter to it, at response_binning (0: not made) */
-    bst_bound image_bound, onboard_bound; /* at bound_binning (0: not made) */
+    bst_crlb_table image_bound, onboard_bound; /* at bound_binning (0: not made) */
     int bound_binning;
     int response_binning;
-    bst_photometer photometer;
+    bst_optics_photometer photometer;
     pending waiting[PENDING];
 } obsgen;
 
@@ -134,7 +134,7 @@ static void destroy(void *self) {
     bst_truth_list_free(&o->list);
     bst_generator_free(o->generator);
     bst_psf_free(o->psf);
-    bst_photometer_free(&o->photometer);
+    bst_optics_photometer_free(&o->photometer);
     for (int i = 0; i < PENDING; i++) {
         free(o->waiting[i].truth);
         free(o->waiting[i].path_x_px);
@@ -174,7 +174,7 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
     BST_TRY(bst_generator_reserve_streaks(env->ctx, o->generator, (int)o->world_camera->width_px,
                                           (int)o->world_camera->height_px));
     BST_TRY(bst_field_create(env->ctx, env->world, env->observer, env->sensor, &o->field));
-    BST_TRY(bst_photometer_create(env->ctx, (int)c->capacity, &o->photometer));
+    BST_TRY(bst_optics_photometer_create(env->ctx, (int)c->capacity, &o->photometer));
     bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)c->capacity);
     return BST_OK;
@@ -216,7 +216,8 @@ static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, doubl
     }
     bst_camera camera;
     bst_psf *psf;
-    BST_TRY(bst_camera_trembling(ctx, o->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
+    BST_TRY(
+        bst_psf_camera_trembling(ctx, o->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
     bst_psf_free(o->psf);
     o->psf = psf;
     o->camera = camera;
@@ -228,7 +229,7 @@ static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, doubl
 }
 
 /* Of the Gaussian with an image's noise-equivalent area, without the pixel's own width, px. */
-static double own_sigma(const bst_image_width *w) {
+static double own_sigma(const bst_obsgen_image_width *w) {
     return sqrt(fmax(w->across_px * w->along_px - 1.0 / 12.0, 0.04));
 }
 
@@ -307,7 +308,7 @@ static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *
     p->path_count = count;
     for (int k = 0; k < count; k++) {
         bst_quat q =
-            even ? track->q_cam_from_gcrf[k] : bst_track_attitude(track, lead_s + k * step_s);
+            even ? track->q_cam_from_gcrf[k] : bst_los_track_attitude(track, lead_s + k * step_s);
         double weight = (k == 0 || k == count - 1 ? 0.5 : 1.0) / (count - 1);
         if (!bst_camera_project(&o->camera, bst_quat_rotate(q, star), &x, &y)) {
             p->path_count = 0;
@@ -354,7 +355,7 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
         .margin_px = fmax(o->config->margin_px, ceil(6.0 * o->sigma_px)),
         .lead_s = (double)lead / (double)o->tick_rate_hz};
     int capacity, count;
-    const bst_source *sources;
+    const bst_scene_source *sources;
     bst_truth *truth = bst_step_write(step, PORT_TRUTH, &capacity);
     truth->exposure_id = e->id;
     truth->dropped = e->dropped;
@@ -396,12 +397,14 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
 }
 
 static void set_attitude(const obsgen *o, struct bst_step *step, const bst_exposure *e,
-                         bool *oriented, bool *locked, bst_motion *known, bst_detections *out) {
+                         bool *oriented, bool *locked, bst_camera_motion *known,
+                         bst_detections *out) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
     bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
-    bst_motion motion = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
-    *oriented = pointing.payload && !pointing.stale &&
-                bst_motion_from_telemetry(pointing.payload, e->start_tick, e->end_tick, &motion);
+    bst_camera_motion motion = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
+    *oriented =
+        pointing.payload && !pointing.stale &&
+        bst_camera_motion_from_telemetry(pointing.payload, e->start_tick, e->end_tick, &motion);
     out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
     *known = motion;
     const bst_predictions *p = predicted.stale ? NULL : predicted.payload;
@@ -423,14 +426,15 @@ static double shift_px(const obsgen *o, const bst_truth *t, bst_quat q_onboard) 
 }
 
 /* The stars that were identified rightly, for the zero point. */
-static void add_stars(obsgen *o, const bst_generator_frame *frame, const bst_generated *generated,
-                      const bst_detections *detections) {
+static void add_stars(obsgen *o, const bst_generator_frame *frame,
+                      const bst_obsgen_generated *generated, const bst_detections *detections) {
     for (int i = 0; i < detections->count; i++) {
         const bst_detection *d = &detections->items[i];
         if (d->star_id != 0 && generated[i].item >= 0) {
             double electrons = frame->truth->items[generated[i].item].electrons;
-            bst_photometer_add(&o->photometer, d,
-                               bst_camera_v_mag(o->world_camera, electrons / frame->exposure_s));
+            bst_optics_photometer_add(
+                &o->photometer, d,
+                bst_camera_v_mag(o->world_camera, electrons / frame->exposure_s));
         }
     }
 }
@@ -448,7 +452,7 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
     out->start_tick = e->start_tick;
     out->end_tick = e->end_tick;
     bool oriented, locked;
-    bst_motion motion;
+    bst_camera_motion motion;
     set_attitude(o, step, e, &oriented, &locked, &motion, out);
     bst_generator_frame frame = {
         .truth = p->truth,
@@ -464,10 +468,10 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
         .path_count = p->path_count};
     if (oriented) {
         const bst_camera *camera = bst_knowledge_camera(o->knowledge);
-        bst_motion_streak(&motion, camera, e->window.x0 + 0.5 * (e->window.width - 1),
-                          e->window.y0 + 0.5 * (e->window.height - 1), &frame.streak_dx_px,
-                          &frame.streak_dy_px);
-        bst_motion_bend(&motion, camera, &frame.bend_x_px, &frame.bend_y_px);
+        bst_camera_motion_streak(&motion, camera, e->window.x0 + 0.5 * (e->window.width - 1),
+                                 e->window.y0 + 0.5 * (e->window.height - 1), &frame.streak_dx_px,
+                                 &frame.streak_dy_px);
+        bst_camera_motion_bend(&motion, camera, &frame.bend_x_px, &frame.bend_y_px);
     }
     bst_generator_result made;
     BST_TRY(bst_generator_run(ctx, o->generator, &frame, &made));
@@ -480,7 +484,7 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
     for (int i = 0; i < out->count; i++) {
         out->items[i] = made.items[i].detection;
     }
-    bst_photometer_begin(&o->photometer);
+    bst_optics_photometer_begin(&o->photometer);
     bst_sample nav = bst_step_latest(step, PORT_NAV);
     if (oriented && nav.payload && !nav.stale && !made.smeared) {
         const bst_identify_options options = {
@@ -498,7 +502,7 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
                                     &out->stars_identified));
         add_stars(o, &frame, made.items, out);
     }
-    bst_zero_point zero_point = bst_photometer_zero_point(&o->photometer);
+    bst_optics_zero_point zero_point = bst_optics_photometer_zero_point(&o->photometer);
     bst_photometry_apply(&zero_point, bst_camera_v_mag(bst_knowledge_camera(o->knowledge), 1.0),
                          out);
     if (!made.smeared) {

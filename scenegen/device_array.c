@@ -1,7 +1,7 @@
 #include "scenegen/device_array.h"
 
-bst_status bst_growing_reserve(bst_ctx *ctx, cl_context context, uint64_t most_bytes,
-                               bst_growing *g, size_t bytes) {
+bst_status bst_device_array_reserve(bst_ctx *ctx, cl_context context, uint64_t most_bytes,
+                                    bst_device_array *g, size_t bytes) {
     if (g->bytes >= bytes && g->buffer) {
         return BST_OK;
     }

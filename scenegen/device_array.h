@@ -9,14 +9,14 @@
 #include "sim/device/device.h"
 
 /* All zero: empty. Its owner releases the buffer. */
-typedef struct bst_growing {
+typedef struct bst_device_array {
     cl_mem buffer;
     size_t bytes;
-} bst_growing;
+} bst_device_array;
 
 /* Makes room for `bytes`; the content is lost when the buffer grows. most_bytes: of one buffer, by
  * the device. BST_ERR_DEVICE. */
-bst_status bst_growing_reserve(bst_ctx *ctx, cl_context context, uint64_t most_bytes,
-                               bst_growing *growing, size_t bytes) BST_MUST_CHECK;
+bst_status bst_device_array_reserve(bst_ctx *ctx, cl_context context, uint64_t most_bytes,
+                                    bst_device_array *growing, size_t bytes) BST_MUST_CHECK;
 
 #endif

@@ -184,7 +184,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     s->key = bst_env_rng(env, "detector");
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
-    options.motion = (bst_star_motion)c->renderer;
+    options.motion = (bst_smear_star_motion)c->renderer;
     options.temporal_oversample = (int)c->fidelity.temporal_oversample;
     options.spatial_oversample = (int)c->fidelity.spatial_oversample;
     options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
@@ -252,7 +252,8 @@ static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
     bst_camera camera;
     bst_psf *psf;
     long long pixels;
-    BST_TRY(bst_camera_trembling(ctx, s->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
+    BST_TRY(
+        bst_psf_camera_trembling(ctx, s->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
     bst_renderer *renderer;
     bst_status status =
         bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer);
@@ -295,7 +296,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                            "one (the detector's row_time_s)");
     }
     int capacity, count;
-    const bst_source *sources;
+    const bst_scene_source *sources;
     bst_truth *truth = bst_step_write(step, PORT_TRUTH, &capacity);
     truth->exposure_id = e->id;
     truth->dropped = e->dropped;

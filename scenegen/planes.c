@@ -37,8 +37,8 @@ struct bst_plane_maker {
     uint64_t *cells;
     int cells_x;
     shape *shapes;
-    bst_source *sources; /* of one layer */
-    int capacity;        /* of both */
+    bst_scene_source *sources; /* of one layer */
+    int capacity;              /* of both */
 };
 
 static bool wants(const bst_plane_maker *m, bst_plane plane) {
@@ -124,7 +124,7 @@ static bst_status render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *rendere
 
 /* Expected electrons of some sources alone. */
 static bst_status render_sources(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
-                                 const bst_render_request *request, const bst_source *sources,
+                                 const bst_render_request *request, const bst_scene_source *sources,
                                  int count, float *out) {
     bst_render_request part = *request;
     part.sources = sources;

@@ -52,22 +52,23 @@ static void add_psf(bst_window w, double sigma, double x, double y, double elect
     }
 }
 
-bool bst_reference_place(const bst_camera *camera, const bst_los_track *track, const bst_source *s,
-                         int k, double u, double *x, double *y, double *light) {
+bool bst_reference_place(const bst_camera *camera, const bst_los_track *track,
+                         const bst_scene_source *s, int k, double u, double *x, double *y,
+                         double *light) {
     double from_s = track->time_s[k], dt = track->time_s[k + 1] - from_s;
     bst_quat q = bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-    bst_vec3 v = bst_source_direction(s, (from_s + u * dt) / track->time_s[track->count - 1]);
+    bst_vec3 v = bst_scene_source_direction(s, (from_s + u * dt) / track->time_s[track->count - 1]);
     if (!bst_camera_project(camera, bst_quat_rotate(q, v), x, y)) {
         return false;
     }
-    *light = bst_source_rate_at(s, (from_s + u * dt) / track->time_s[track->count - 1]);
+    *light = bst_scene_source_rate_at(s, (from_s + u * dt) / track->time_s[track->count - 1]);
     return true;
 }
 
 /* One source with every stretch between LOS samples in `parts` parts. */
 static void render_source(const bst_camera *camera, double sigma, bst_window w,
-                          const bst_los_track *track, const bst_source *s, int parts, double *line,
-                          double *image) {
+                          const bst_los_track *track, const bst_scene_source *s, int parts,
+                          double *line, double *image) {
     for (int k = 0; k + 1 < track->count; k++) {
         double dt = track->time_s[k + 1] - track->time_s[k];
         for (int n = 0; n < 4 * parts && dt > 0.0; n++) {
@@ -83,7 +84,7 @@ static void render_source(const bst_camera *camera, double sigma, bst_window w,
 
 static bst_status render_gaussian(bst_ctx *ctx, const bst_camera *camera, double sigma,
                                   bst_window window, const bst_los_track *track,
-                                  const bst_source *sources, int count, double tolerance,
+                                  const bst_scene_source *sources, int count, double tolerance,
                                   double *image) {
     size_t pixels = (size_t)window.width * (size_t)window.height;
     double *coarse = malloc(pixels * sizeof *coarse), *fine = malloc(pixels * sizeof *fine);
@@ -133,8 +134,9 @@ exit:
 
 /* Makes a point source of every point of the discs among the sources. *out and *paths are the
  * caller's to free. */
-static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera, const bst_source *sources,
-                              int count, bst_source **out, bst_source_path **paths, int *made) {
+static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera,
+                              const bst_scene_source *sources, int count, bst_scene_source **out,
+                              bst_scene_source_path **paths, int *made) {
     bst_disc_points points = {0};
     bst_status status = BST_OK;
     double panel = fmin(bst_camera_psf_sigma_px(camera), 1.0) * bst_camera_scale_rad(camera);
@@ -142,7 +144,7 @@ static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera, const bst_
     for (int pass = 0; pass < 2; pass++) {
         int n = 0, moving = 0;
         for (int i = 0; i < count && status == BST_OK; i++) {
-            const bst_source *s = &sources[i];
+            const bst_scene_source *s = &sources[i];
             points.count = 0;
             if (s->shape && 2.0 * asin(s->shape->radius) > 400.0 * panel) {
                 status = bst_fail(ctx, BST_ERR_NUMERIC,
@@ -154,7 +156,7 @@ static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera, const bst_
                 if (pass == 0) {
                     continue;
                 }
-                bst_source *part = &(*out)[n];
+                bst_scene_source *part = &(*out)[n];
                 *part = *s;
                 if (!s->shape) {
                     continue;
@@ -165,7 +167,7 @@ static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera, const bst_
                 part->apparent_mid =
                     bst_vec3_unit(bst_vec3_add(bst_vec3_unit(s->apparent_mid), offset));
                 if (s->path) {
-                    bst_source_path *path = &(*paths)[moving++];
+                    bst_scene_source_path *path = &(*paths)[moving++];
                     double range = bst_vec3_norm(s->path->place[BST_PATH_NODES / 2]);
                     *path = *s->path;
                     for (int k = 0; k < BST_PATH_NODES; k++) {
@@ -190,7 +192,7 @@ static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera, const bst_
 
 bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, const bst_psf *psf,
                                     bst_window window, const bst_los_track *track,
-                                    const bst_source *sources, int count, double tolerance,
+                                    const bst_scene_source *sources, int count, double tolerance,
                                     double *image) {
     size_t width = (size_t)window.width, height = (size_t)window.height;
     double sigma, *light = calloc(width * height, sizeof *light);
@@ -198,8 +200,8 @@ bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, cons
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a reference image of %d x %d pixels",
                         window.width, window.height);
     }
-    bst_source *parts = NULL;
-    bst_source_path *paths = NULL;
+    bst_scene_source *parts = NULL;
+    bst_scene_source_path *paths = NULL;
     int made = 0;
     bst_status status = split_discs(ctx, camera, sources, count, &parts, &paths, &made);
     if (status == BST_OK) {
@@ -220,8 +222,8 @@ bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, cons
 }
 
 bst_status bst_reference_render(bst_ctx *ctx, const bst_camera *camera, bst_window window,
-                                const bst_los_track *track, const bst_source *sources, int count,
-                                double tolerance, double *image) {
+                                const bst_los_track *track, const bst_scene_source *sources,
+                                int count, double tolerance, double *image) {
     bst_psf *psf;
     BST_TRY(bst_psf_create(ctx, camera, &psf));
     bst_status status =

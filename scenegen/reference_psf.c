@@ -169,8 +169,8 @@ static void spread_point(spectrum *s, const instant *p, double light) {
     }
 }
 
-static void place_rule(const spectrum *s, const time_rule *rule, const bst_source *source, int k,
-                       double u0, double u1, instant p[POINTS]) {
+static void place_rule(const spectrum *s, const time_rule *rule, const bst_scene_source *source,
+                       int k, double u0, double u1, instant p[POINTS]) {
     for (int i = 0; i < rule->count; i++) {
         double u = u0 + rule->place[i] * (u1 - u0);
         p[i] = (instant){0};
@@ -209,8 +209,8 @@ static void try_rule(const spectrum *s, const instant *p, int count, int trial, 
 /* Adds the part [u0, u1] of a stretch with `light` electrons at mean brightness. It is halved until
  * two halves change nothing, or no more than a thousandth of that of the stretch: brightness may
  * have kinks. */
-static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_source *source, int k, double u0,
-                           double u1, double light, int depth) {
+static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_scene_source *source, int k,
+                           double u0, double u1, double light, int depth) {
     const time_rule *rule = &rules[depth > 0];
     instant whole[POINTS] = {{0}}, half[2][POINTS] = {{{0}}};
     double middle = 0.5 * (u0 + u1), all = 0.0, worst = 0.0;
@@ -247,7 +247,8 @@ static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_source *source, 
     return add_part(ctx, s, source, k, middle, u1, light, depth + 1);
 }
 
-static bst_status add_sources(bst_ctx *ctx, spectrum *s, const bst_source *sources, int count) {
+static bst_status add_sources(bst_ctx *ctx, spectrum *s, const bst_scene_source *sources,
+                              int count) {
     const bst_los_track *t = s->track;
     int spectra = bst_psf_spectra(s->psf), of = s->node * spectra / bst_psf_nodes(s->psf);
     for (int i = 0; i < count; i++) {
@@ -284,7 +285,7 @@ static void add_spectrum(spectrum *s, double times) {
     }
 }
 
-static bst_status add_all(bst_ctx *ctx, spectrum *s, const bst_source *sources, int count) {
+static bst_status add_all(bst_ctx *ctx, spectrum *s, const bst_scene_source *sources, int count) {
     int most = (int)ceil(s->cutoff - 0.5);
     for (s->node = 0; s->node < bst_psf_nodes(s->psf); s->node++) {
         /* half of the whole shifts; the others are the mirror image of these */
@@ -308,7 +309,7 @@ static bst_status add_all(bst_ctx *ctx, spectrum *s, const bst_source *sources, 
 
 bst_status bst_reference_spectrum(bst_ctx *ctx, const bst_camera *camera, const bst_psf *psf,
                                   bst_window window, const bst_los_track *track,
-                                  const bst_source *sources, int count, double tolerance,
+                                  const bst_scene_source *sources, int count, double tolerance,
                                   double *image) {
     spectrum s = {.camera = camera,
                   .psf = psf,

@@ -91,12 +91,12 @@ double bst_render_exposure_s(const bst_render_request *q) {
     return q->row_time_s != 0.0 ? q->exposure_s : q->track->time_s[q->track->count - 1];
 }
 
-bst_scene_params bst_render_params(const bst_camera *c, const bst_renderer_options *options,
-                                   const bst_render_request *q, int sources) {
+bst_kernel_frame_params bst_render_params(const bst_camera *c, const bst_renderer_options *options,
+                                          const bst_render_request *q, int sources) {
     const bst_skylight_map *map = bst_render_background(q);
     bst_window w = q->window;
     int x0 = w.x0 / 64 * 64;
-    return (bst_scene_params){
+    return (bst_kernel_frame_params){
         .window_x0 = w.x0,
         .window_y0 = w.y0,
         .window_width = w.width,

@@ -20,7 +20,8 @@ double bst_render_exposure_s(const bst_render_request *request);
 /* The request's map of the background, or one that adds nothing. */
 const bst_skylight_map *bst_render_background(const bst_render_request *request);
 /* sources: that are drawn. */
-bst_scene_params bst_render_params(const bst_camera *camera, const bst_renderer_options *options,
-                                   const bst_render_request *request, int sources);
+bst_kernel_frame_params bst_render_params(const bst_camera *camera,
+                                          const bst_renderer_options *options,
+                                          const bst_render_request *request, int sources);
 
 #endif

@@ -25,7 +25,7 @@
 #include "sim/world/scene/skylight.h"
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
-typedef bst_growing growing;
+typedef bst_device_array growing;
 
 struct bst_renderer {
     bst_camera camera;
@@ -36,15 +36,15 @@ struct bst_renderer {
     cl_program program;
     cl_kernel nodes_kernel, frame_kernel, expected_kernel;
     bst_psf *psf;
-    bst_fft_light *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
+    bst_fourier_render *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
-    bst_crowd *crowd;
+    bst_error_budget *crowd;
     bst_detector *detector;
     bst_readout *readout;
     bst_rolling *rolling; /* NULL: all rows are exposed at once */
     bst_frame_pool *pool;
     cl_mem law; /* of the stamps' profiles */
-    bst_stage *stage;
+    bst_upload_ring *stage;
     cl_mem sources, shares, table; /* of the present frame; borrowed */
     growing block_box, source_box, group_box, expected;
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
@@ -70,7 +70,7 @@ static int taps_for(double sigma_px) {
 }
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device, double law_widest) {
-    const bst_kernel_source *sources[] = {
+    const bst_device_kernel_source *sources[] = {
         &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_random,
         &bst_kernel_splat,        &bst_kernel_chunk,      &bst_kernel_noise_law,
         &bst_kernel_read_tail,    &bst_kernel_detector,   &bst_kernel_light,
@@ -94,7 +94,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device, doubl
 }
 
 static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) {
-    return bst_growing_reserve(ctx, r->context, r->most_bytes, g, bytes);
+    return bst_device_array_reserve(ctx, r->context, r->most_bytes, g, bytes);
 }
 
 /* The PSF, and the Fourier path where it is no Gaussian. */
@@ -106,18 +106,18 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
         return BST_OK;
     }
     /* a point that fills the well, next to dark pixels */
-    bst_fft_light_options light = bst_fft_light_default_options();
+    bst_fourier_render_options light = bst_fourier_render_default_options();
     double dark = fmax(r->camera.read_noise_e, 3.0);
     light.tolerance = 10.0 * r->options.tolerance_sigma * dark / fmax(r->camera.full_well_e, 1.0);
     light.tolerance = fmin(fmax(light.tolerance, 2e-6), 1e-3);
     light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
     light.spatial_oversample = r->options.spatial_oversample;
-    BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
-    smear->widest = bst_fft_light_widest(r->fft_light);
-    smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
-    smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
-    smear->grid_per_px = bst_fft_light_density(r->fft_light);
-    memcpy(smear->pixel_part, bst_fft_light_band(r->fft_light)->pixel_part,
+    BST_TRY(bst_fourier_render_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
+    smear->widest = bst_fourier_render_widest(r->fft_light);
+    smear->node_sigma_px = bst_fourier_render_band(r->fft_light)->node_sigma_px;
+    smear->share_sigma_px = bst_fourier_render_band(r->fft_light)->share_sigma_px;
+    smear->grid_per_px = bst_fourier_render_density(r->fft_light);
+    memcpy(smear->pixel_part, bst_fourier_render_band(r->fft_light)->pixel_part,
            sizeof smear->pixel_part);
     return BST_OK;
 }
@@ -177,13 +177,14 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
     }
     if (status == BST_OK) {
-        status = bst_crowd_create(ctx, &r->crowd);
+        status = bst_error_budget_create(ctx, &r->crowd);
     }
     if (status == BST_OK) {
-        status = bst_stage_create(ctx, device, &r->stage);
+        status = bst_upload_ring_create(ctx, device, &r->stage);
     }
     if (status == BST_OK && rolling) {
-        double peak_px = r->fft_light ? bst_fft_light_band(r->fft_light)->share_sigma_px : sigma_px;
+        double peak_px =
+            r->fft_light ? bst_fourier_render_band(r->fft_light)->share_sigma_px : sigma_px;
         status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fft_light,
                                     &r->rolling);
     }
@@ -220,11 +221,11 @@ void bst_renderer_free(bst_renderer *r) {
     if (r->program) {
         clReleaseProgram(r->program);
     }
-    bst_stage_free(r->stage);
+    bst_upload_ring_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
-    bst_crowd_free(r->crowd);
-    bst_fft_light_free(r->fft_light);
+    bst_error_budget_free(r->crowd);
+    bst_fourier_render_free(r->fft_light);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
     bst_rolling_free(r->rolling);
@@ -267,19 +268,19 @@ static bst_status set_args(bst_ctx *ctx, cl_kernel kernel, const void *const *va
 }
 
 /* Uploads sources and tables and enqueues the nodes kernel. */
-static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_params *p) {
+static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_kernel_frame_params *p) {
     const bst_scene_plan *plan = &r->plan;
     int table_blocks, count = plan->count;
     const float *table = bst_smear_table(r->smear, &table_blocks);
     size_t groups = (size_t)p->source_groups, more = (groups + BST_BLOCK - 1) / BST_BLOCK;
     size_t block_bytes = BST_BLOCK * sizeof(float);
-    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_TABLE, table,
-                          (size_t)table_blocks * BST_TABLE_ROWS * block_bytes, &r->table));
-    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
-                          (size_t)count * sizeof *plan->sources, &r->sources));
+    BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_TABLE, table,
+                                (size_t)table_blocks * BST_TABLE_ROWS * block_bytes, &r->table));
+    BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
+                                (size_t)count * sizeof *plan->sources, &r->sources));
     if (plan->shares) {
-        BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_SHARES, plan->shares,
-                              (size_t)count * sizeof *plan->shares, &r->shares));
+        BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_SHARES, plan->shares,
+                                    (size_t)count * sizeof *plan->shares, &r->shares));
     }
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)plan->boxes * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BST_BOX_BYTES));
@@ -308,7 +309,7 @@ static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
     }
     r->tiles[set] = 0;
     r->saturated_pixels = 0;
-    BST_TRY(bst_stage_result(ctx, r->stage, set, BST_STAGE_SATURATED, &counts));
+    BST_TRY(bst_upload_ring_result(ctx, r->stage, set, BST_STAGE_SATURATED, &counts));
     for (int i = 0; i < tiles; i++) {
         r->saturated_pixels += ((const cl_int *)counts)[i];
     }
@@ -318,23 +319,23 @@ static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
 
 /* Room for the frame's counts. */
 static bst_status saturated_room(bst_ctx *ctx, bst_renderer *r, size_t tiles, cl_mem *out) {
-    return bst_stage_room(ctx, r->stage, BST_STAGE_SATURATED, tiles * sizeof(cl_int), out);
+    return bst_upload_ring_room(ctx, r->stage, BST_STAGE_SATURATED, tiles * sizeof(cl_int), out);
 }
 
 /* Takes the next set of what goes with a frame; another frame may be under way. */
 static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
-    r->set = bst_stage_begin(r->stage);
+    r->set = bst_upload_ring_begin(r->stage);
     return count_saturated(ctx, r, r->set);
 }
 
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
-                             bst_scene_params *p, cl_mem *light) {
-    bst_fft_light_nodes nodes = {r->sources,           r->table,  r->block_box.buffer,
-                                 r->source_box.buffer, r->shares, p->source_groups,
-                                 r->plan.fine};
-    bst_fft_light_image image;
-    BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
+                             bst_kernel_frame_params *p, cl_mem *light) {
+    bst_fourier_render_nodes nodes = {r->sources,           r->table,  r->block_box.buffer,
+                                      r->source_box.buffer, r->shares, p->source_groups,
+                                      r->plan.fine};
+    bst_fourier_render_image image;
+    BST_TRY(bst_fourier_render_frame(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;
     p->light_pitch = image.pitch;
     *light = image.buffer;
@@ -357,7 +358,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     if (!to->kernel) {
         return BST_OK;
     }
-    bst_scene_params p = bst_render_params(&r->camera, &r->options, q, r->plan.count);
+    bst_kernel_frame_params p = bst_render_params(&r->camera, &r->options, q, r->plan.count);
     BST_TRY(enqueue_nodes(ctx, r, &p));
     p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
     p.background_e = to->light_only ? 0.0f : p.background_e;
@@ -396,7 +397,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
         const bst_skylight_map *map = bst_render_background(q);
         size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
         cl_mem nodes;
-        BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_BACKGROUND, map->e, size, &nodes));
+        BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_BACKGROUND, map->e, size, &nodes));
         BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, (cl_uint)count, m, &nodes),
                                  "setting a kernel argument"));
     }
@@ -442,7 +443,7 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
         BST_TRY(enqueue_tiles(ctx, r, &band, &to));
         to.first_tile = to.saturated ? r->tiles[r->set] : 0;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
-        all.predicted_sigma = fmax(all.predicted_sigma, bst_crowd_error_sigma(r->crowd) +
+        all.predicted_sigma = fmax(all.predicted_sigma, bst_error_budget_error_sigma(r->crowd) +
                                                             bst_rolling_error_sigma(r->rolling));
         for (int i = 0; i < band.count; i++) {
             double *peak_e = &r->rolled_peak_e[bst_rolling_source(r->rolling, i)];
@@ -475,7 +476,7 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
     cl_mem saturated;
     BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
     r->tiles[r->set] = rows;
-    bst_scene_params p = bst_render_params(&r->camera, &r->options, q, 0);
+    bst_kernel_frame_params p = bst_render_params(&r->camera, &r->options, q, 0);
     return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame, saturated);
 }
 
@@ -507,7 +508,7 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
         status = bst_detector_end(ctx, r->detector);
     }
     if (status == BST_OK) {
-        status = bst_stage_end(ctx, r->stage);
+        status = bst_upload_ring_end(ctx, r->stage);
     }
     if (status == BST_OK) {
         status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
@@ -517,7 +518,7 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
         bst_frame_release(frame);
         return status;
     }
-    bst_hits_summary hits = bst_detector_hits(r->detector);
+    bst_cosmic_rays_summary hits = bst_detector_hits(r->detector);
     r->stats.hits = hits.tracks;
     r->stats.hits_e = hits.electrons;
     *out = frame;
@@ -532,7 +533,7 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
     BST_TRY(begin_set(ctx, r));
     BST_TRY(enqueue_image(ctx, r, request,
                           (target){.kernel = r->expected_kernel, .out = r->expected.buffer}));
-    BST_TRY(bst_stage_end(ctx, r->stage));
+    BST_TRY(bst_upload_ring_end(ctx, r->stage));
     return bst_device_check(
         ctx,
         clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),
@@ -558,7 +559,7 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
     *out = r->stats;
     if (!r->rolled) {
-        out->predicted_sigma = bst_crowd_error_sigma(r->crowd);
+        out->predicted_sigma = bst_error_budget_error_sigma(r->crowd);
     }
     out->predicted_sigma = foreseen(r) ? out->predicted_sigma : NAN;
     out->tolerance_missed = out->predicted_sigma > r->options.tolerance_sigma;
@@ -569,5 +570,5 @@ double bst_renderer_peak_e(const bst_renderer *r, int index) {
 }
 
 int bst_renderer_margin_px(const bst_renderer *r) {
-    return r->fft_light ? bst_fft_light_margin_px(r->fft_light) : r->taps / 2 + 1;
+    return r->fft_light ? bst_fourier_render_margin_px(r->fft_light) : r->taps / 2 + 1;
 }

@@ -3,9 +3,9 @@
  * Every source has its own track through the exposure. Its light is a sum of weighted nodes, as
  * many as the source's brightness needs. A node is the product of two pixel-integrated Gaussian
  * profiles (kernels/splat.cl) or, for any other PSF, a point on a grid that is convolved with it
- * (fourier_render.h). Then background, shot noise, full well, read noise, gain, offset and quantisation
- * (detector.h). Noise is keyed by (key, exposure, pixel of the full sensor). The same bytes come
- * from any number of threads and work-group size and, with a Gaussian PSF, window. */
+ * (fourier_render.h). Then background, shot noise, full well, read noise, gain, offset and
+ * quantisation (detector.h). Noise is keyed by (key, exposure, pixel of the full sensor). The same
+ * bytes come from any number of threads and work-group size and, with a Gaussian PSF, window. */
 #ifndef BST_SCENEGEN_RENDERER_H
 #define BST_SCENEGEN_RENDERER_H
 
@@ -17,10 +17,10 @@
 typedef struct bst_renderer bst_renderer;
 
 typedef struct bst_renderer_options {
-    double tolerance_sigma; /* error of the image in any pixel that is allowed, in sigma
-                               of that pixel (0.05) */
-    bst_rng_key pattern;    /* of the detector's fixed patterns */
-    bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
+    double tolerance_sigma;       /* error of the image in any pixel that is allowed, in sigma
+                                     of that pixel (0.05) */
+    bst_rng_key pattern;          /* of the detector's fixed patterns */
+    bst_smear_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
     /* Knobs that the tolerance chooses when they are 0. Equal parts of the exposure per star; parts
      * of a pixel per axis to whose centres nodes are moved; px that stamps reach beyond a node's
      * two nearest pixels; odd degree of the PSF's profile (scenegen/stamp/profile_law.h); taps of
@@ -49,7 +49,7 @@ typedef struct bst_render_request {
     double row_time_s; /* rolling shutter, where not 0: each row is exposed so much later than the
                           row before, for exposure_s, the middle row in the middle of the track */
     double exposure_s; /* with row_time_s */
-    const bst_source *sources;
+    const bst_scene_source *sources;
     int count;
     double background_e; /* expected electrons per sensor pixel: sky and dark current */
     double dark_e;       /* of them, dark current (a map of it, if there is one, takes its place) */
@@ -68,8 +68,8 @@ typedef struct bst_render_stats {
     int sources;            /* drawn */
     long long nodes;        /* all sources, filled blocks included */
     double predicted_sigma; /* largest error of the image that is expected in any pixel, in its
-                               sigma (error_budget.h); NAN with temporal_oversample, spatial_oversample or
-                               four fft_taps */
+                               sigma (error_budget.h); NAN with temporal_oversample,
+                               spatial_oversample or four fft_taps */
     bool tolerance_missed;  /* that is above the tolerance: the Fourier path's grid, or as many
                                nodes as may be, are too coarse */
     bool single_kernel;     /* the stars followed one track */

@@ -30,12 +30,12 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
 
 void bst_scene_node_options(const bst_camera *camera, int spatial_oversample, char *text,
                             size_t bytes) {
-    int length = snprintf(text, bytes, " -DPLACE_BITS=%d", bst_place_bits(camera));
+    int length = snprintf(text, bytes, " -DPLACE_BITS=%d", bst_fixed_point_px_bits(camera));
     if (spatial_oversample > 0) {
         length += snprintf(text + length, bytes - (size_t)length, " -DSPATIAL_OVERSAMPLE=%d",
                            spatial_oversample);
     }
-    const bst_distortion *d = &camera->distortion;
+    const bst_camera_distortion *d = &camera->distortion;
     if (bst_camera_distorted(camera)) {
         double a = bst_camera_scale_rad(camera), a2 = a * a, out = camera->geometry.domain / a;
         snprintf(

@@ -35,11 +35,11 @@ static bst_status reserve(bst_ctx *ctx, bst_scene_plan *p, int count, bool colou
 
 /* Puts the drawn sources in order and counts up their blocks and boxes. Until here, first_box is
  * the source's index in the request. */
-static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_source *all) {
+static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_scene_source *all) {
     bst_source_order(camera, p->list, p->count, p->sources);
     p->blocks = p->boxes = 0;
     for (int i = 0; i < p->count; i++) {
-        bst_scene_source *s = &p->sources[i];
+        bst_kernel_source_record *s = &p->sources[i];
         for (int k = 0; p->shares && k < BST_SPECTRA; k++) {
             p->shares[i][k] = (float)bst_psf_share(all[s->first_box].colour, k);
         }
@@ -52,8 +52,8 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_
 /* What one planning of the sources is given. */
 typedef struct planning {
     bst_smear *smear;
-    bst_crowd *crowd;
-    const bst_fft_light *fft_light;
+    bst_error_budget *crowd;
+    const bst_fourier_render *fft_light;
     const bst_render_request *request;
     double dark_e2;
     double beyond;     /* light that a pixel gets of a source beyond the margin, s */
@@ -63,40 +63,41 @@ typedef struct planning {
 } planning;
 
 /* Adds a drawn source's error to those of the frame. */
-static bst_status add_error(bst_ctx *ctx, planning *m, const bst_source *source) {
-    bst_crowd_source error = *bst_smear_last_error(m->smear);
+static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *source) {
+    bst_error_budget_source error = *bst_smear_last_error(m->smear);
     if (m->fft_light) { /* of its grid, on dark pixels too */
         double peak_e = bst_smear_last_read_e(m->smear),
                presence = bst_smear_last_presence(m->smear);
-        double grid = bst_fft_light_error_sigma(m->fft_light, m->fine, presence < 1.0,
-                                                m->request->window, peak_e, m->dark_e2);
+        double grid = bst_fourier_render_error_sigma(m->fft_light, m->fine, presence < 1.0,
+                                                     m->request->window, peak_e, m->dark_e2);
         m->grid_sigma = fmax(m->grid_sigma, grid);
         /* of either sign, as those of nodes */
         error.nodes_e += (float)(grid * sqrt((double)error.peak_e + m->dark_e2));
         const float *colour = source->colour;
         if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
-            error.excess_e += (float)(presence * bst_fft_light_mixing_error(m->fft_light) * peak_e);
+            error.excess_e +=
+                (float)(presence * bst_fourier_render_mixing_error(m->fft_light) * peak_e);
         }
     }
-    return bst_crowd_add(ctx, m->crowd, &error);
+    return bst_error_budget_add(ctx, m->crowd, &error);
 }
 
 /* Chooses nodes and stamps of all sources. *fits: false when they need more blocks than there may
  * be; the plan is then good for nothing. */
 static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, bool *fits) {
     const bst_render_request *q = m->request;
-    bst_crowd_motion motion = bst_smear_motion(m->smear);
-    bst_crowd_begin(m->crowd, &motion);
+    bst_error_budget_motion motion = bst_smear_motion(m->smear);
+    bst_error_budget_begin(m->crowd, &motion);
     p->count = p->blocks = 0;
     m->grid_sigma = 0.0;
     *fits = true;
     for (int i = 0; i < q->count && *fits; i++) {
-        bst_scene_source *s = &p->list[p->count];
+        bst_kernel_source_record *s = &p->list[p->count];
         bool visible;
         BST_TRY(bst_smear_source(ctx, m->smear, &q->sources[i], s, &visible));
         p->peak_e[i] = bst_smear_last_peak_e(m->smear);
         if (m->fft_light && !q->sources[i].occulted && bst_smear_last_leaves(m->smear)) {
-            bst_crowd_miss(m->crowd, m->beyond * q->sources[i].electrons_per_s);
+            bst_error_budget_miss(m->crowd, m->beyond * q->sources[i].electrons_per_s);
         }
         if (!visible) {
             continue;
@@ -106,7 +107,7 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
         s->first_box = i;
         p->count++;
         if (m->fft_light) {
-            bst_fft_light_stamp(m->fft_light, s);
+            bst_fourier_render_stamp(m->fft_light, s);
         }
         BST_TRY(add_error(ctx, m, &q->sources[i]));
     }
@@ -158,7 +159,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
      * prediction, made when it is asked for, says what came of it */
     coarse = coarse || m->request->count > TOO_MANY;
     for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
-        double error = bst_crowd_error_sigma(m->crowd), last = aim;
+        double error = bst_error_budget_error_sigma(m->crowd), last = aim;
         if (error <= tolerance) {
             break;
         }
@@ -180,10 +181,11 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
 }
 
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
-                               bst_smear *smear, bst_crowd *crowd, const bst_fft_light *fft_light,
+                               bst_smear *smear, bst_error_budget *crowd,
+                               const bst_fourier_render *fft_light,
                                const bst_scene_plan_limits *limits, const bst_render_request *q) {
     double read = camera->read_noise_e, brightest = 0.0;
-    BST_TRY(reserve(ctx, p, q->count, fft_light && bst_fft_light_spectra(fft_light) > 1));
+    BST_TRY(reserve(ctx, p, q->count, fft_light && bst_fourier_render_spectra(fft_light) > 1));
     for (int i = 0; i < q->count; i++) {
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
     }
@@ -203,8 +205,8 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                   .fft_light = fft_light,
                   .request = q,
                   .dark_e2 = dark_e2,
-                  .beyond = fft_light ? bst_fft_light_band(fft_light)->beyond * binning * binning *
-                                            q->track->time_s[q->track->count - 1]
+                  .beyond = fft_light ? bst_fourier_render_band(fft_light)->beyond * binning *
+                                            binning * q->track->time_s[q->track->count - 1]
                                       : 0.0};
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
     uint64_t most = limits->bytes < counted ? limits->bytes : counted;

@@ -8,14 +8,15 @@
 #include "scenegen/smear/smear.h"
 
 typedef struct bst_scene_plan {
-    bst_scene_source *sources;    /* [count] that are drawn, in the order of bst_source_order */
+    bst_kernel_source_record
+        *sources;                 /* [count] that are drawn, in the order of bst_source_order */
     float (*shares)[BST_SPECTRA]; /* [count] of the PSF's spectra; NULL: there is one */
     int count;
     int blocks;     /* of their nodes */
     int boxes;      /* of the blocks, by groups of BST_BLOCK */
     bool fine;      /* on the finer grid of the Fourier path */
     double *peak_e; /* of all sources of the request: most expected electrons on one pixel */
-    bst_scene_source *list; /* scratch */
+    bst_kernel_source_record *list; /* scratch */
     int capacity;
 } bst_scene_plan;
 
@@ -35,7 +36,8 @@ typedef struct bst_scene_plan_limits {
  * the Fourier path, or NULL where stamps are drawn. BST_ERR_RANGE when the coarsest nodes need more
  * than a buffer. */
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_camera *camera,
-                               bst_smear *smear, bst_crowd *crowd, const bst_fft_light *fft_light,
+                               bst_smear *smear, bst_error_budget *crowd,
+                               const bst_fourier_render *fft_light,
                                const bst_scene_plan_limits *limits,
                                const bst_render_request *request) BST_MUST_CHECK;
 

@@ -9,7 +9,7 @@
  * cell as they come, so that what a tile draws lies together in memory. The order of two sources
  * depends on nothing but their places and their order in `list`: each pixel sums its light in the
  * same order for every window. */
-void bst_source_order(const bst_camera *camera, const bst_scene_source *list, int count,
-                      bst_scene_source *sorted);
+void bst_source_order(const bst_camera *camera, const bst_kernel_source_record *list, int count,
+                      bst_kernel_source_record *sorted);
 
 #endif

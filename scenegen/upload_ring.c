@@ -12,7 +12,7 @@ typedef struct staged {
     cl_event ready; /* of the mapping; NULL: it is there */
 } staged;
 
-struct bst_stage {
+struct bst_upload_ring {
     cl_context context;
     cl_command_queue queue;
     cl_ulong most_bytes; /* of one buffer */
@@ -20,8 +20,8 @@ struct bst_stage {
     staged parts[BST_STAGE_SETS][BST_STAGE_PARTS];
 };
 
-bst_status bst_stage_create(bst_ctx *ctx, bst_device *device, bst_stage **out) {
-    bst_stage *s = calloc(1, sizeof *s);
+bst_status bst_upload_ring_create(bst_ctx *ctx, bst_device *device, bst_upload_ring **out) {
+    bst_upload_ring *s = calloc(1, sizeof *s);
     *out = s;
     if (!s) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for what goes to the device");
@@ -47,7 +47,7 @@ static bst_status await(bst_ctx *ctx, staged *p) {
 }
 
 /* Gives the part to the device. */
-static bst_status hand_over(bst_ctx *ctx, bst_stage *s, staged *p) {
+static bst_status hand_over(bst_ctx *ctx, bst_upload_ring *s, staged *p) {
     if (!p->mapped) {
         return BST_OK;
     }
@@ -57,7 +57,7 @@ static bst_status hand_over(bst_ctx *ctx, bst_stage *s, staged *p) {
     return bst_device_check(ctx, code, "unmapping scene memory");
 }
 
-static bst_status map(bst_ctx *ctx, bst_stage *s, staged *p) {
+static bst_status map(bst_ctx *ctx, bst_upload_ring *s, staged *p) {
     cl_int code;
     cl_map_flags flags = p->result ? CL_MAP_READ : CL_MAP_WRITE_INVALIDATE_REGION;
     p->mapped = clEnqueueMapBuffer(s->queue, p->buffer, CL_FALSE, flags, 0, p->bytes, 0, NULL,
@@ -65,7 +65,7 @@ static bst_status map(bst_ctx *ctx, bst_stage *s, staged *p) {
     return bst_device_check(ctx, code, "mapping scene memory");
 }
 
-void bst_stage_free(bst_stage *s) {
+void bst_upload_ring_free(bst_upload_ring *s) {
     if (!s) {
         return;
     }
@@ -89,13 +89,13 @@ void bst_stage_free(bst_stage *s) {
     free(s);
 }
 
-int bst_stage_begin(bst_stage *s) {
+int bst_upload_ring_begin(bst_upload_ring *s) {
     s->present = (s->present + 1) % BST_STAGE_SETS;
     return s->present;
 }
 
 /* Makes room for `bytes`; the content is lost when the buffer grows. */
-static bst_status grow(bst_ctx *ctx, bst_stage *s, staged *p, size_t bytes) {
+static bst_status grow(bst_ctx *ctx, bst_upload_ring *s, staged *p, size_t bytes) {
     if (p->buffer && p->bytes >= bytes) {
         return BST_OK;
     }
@@ -110,8 +110,8 @@ static bst_status grow(bst_ctx *ctx, bst_stage *s, staged *p, size_t bytes) {
                              &p->buffer);
 }
 
-bst_status bst_stage_put(bst_ctx *ctx, bst_stage *s, bst_stage_part part, const void *data,
-                         size_t bytes, cl_mem *buffer) {
+bst_status bst_upload_ring_put(bst_ctx *ctx, bst_upload_ring *s, bst_upload_ring_part part,
+                               const void *data, size_t bytes, cl_mem *buffer) {
     staged *p = &s->parts[s->present][part];
     BST_TRY(grow(ctx, s, p, bytes));
     if (!p->mapped) {
@@ -125,8 +125,8 @@ bst_status bst_stage_put(bst_ctx *ctx, bst_stage *s, bst_stage_part part, const 
     return hand_over(ctx, s, p);
 }
 
-bst_status bst_stage_room(bst_ctx *ctx, bst_stage *s, bst_stage_part part, size_t bytes,
-                          cl_mem *buffer) {
+bst_status bst_upload_ring_room(bst_ctx *ctx, bst_upload_ring *s, bst_upload_ring_part part,
+                                size_t bytes, cl_mem *buffer) {
     staged *p = &s->parts[s->present][part];
     p->result = true;
     BST_TRY(grow(ctx, s, p, bytes));
@@ -134,8 +134,8 @@ bst_status bst_stage_room(bst_ctx *ctx, bst_stage *s, bst_stage_part part, size_
     return hand_over(ctx, s, p);
 }
 
-bst_status bst_stage_result(bst_ctx *ctx, bst_stage *s, int set, bst_stage_part part,
-                            const void **data) {
+bst_status bst_upload_ring_result(bst_ctx *ctx, bst_upload_ring *s, int set,
+                                  bst_upload_ring_part part, const void **data) {
     staged *p = &s->parts[set][part];
     *data = NULL;
     BST_TRY(await(ctx, p));
@@ -144,7 +144,7 @@ bst_status bst_stage_result(bst_ctx *ctx, bst_stage *s, int set, bst_stage_part 
                      : bst_fail(ctx, BST_ERR_STATE, "the device has not left anything there");
 }
 
-bst_status bst_stage_end(bst_ctx *ctx, bst_stage *s) {
+bst_status bst_upload_ring_end(bst_ctx *ctx, bst_upload_ring *s) {
     for (int n = 0; n < BST_STAGE_PARTS; n++) {
         staged *p = &s->parts[s->present][n];
         if (p->buffer && !p->mapped) {

@@ -168,7 +168,7 @@ static bst_status take(tracker_module *m, struct bst_step *step, const bst_detec
     if (bst_knowledge_view_task(m->view, bst_step_latest(step, PORT_TASK).payload)) {
         bst_tracker_retarget(m->tracker);
     }
-    bst_cue cue;
+    bst_onboard_cue cue;
     BST_TRY(bst_knowledge_cue_at(bst_step_ctx(step), m->view, seconds, &cue));
     input.cue = (bst_tracker_cue){.valid = cue.valid,
                                   .direction_gcrf = cue.direction_gcrf,

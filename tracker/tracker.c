@@ -177,7 +177,7 @@ typedef struct frame_attitude {
 } frame_attitude;
 
 /* Returns the number of t->stars that were looked at. */
-static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
+static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_astro_light *light,
                           bst_attitude_solution *out) {
     int count = 0;
     for (int i = 0; i < d->count && count < MAX_STARS; i++) {
@@ -190,7 +190,7 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         }
         t->stars[count++] =
             (bst_attitude_star){.id = item->star_id,
-                                .apparent_gcrf = bst_light_apparent_star(light, icrs),
+                                .apparent_gcrf = bst_astro_light_apparent_star(light, icrs),
                                 .x_px = item->x_px,
                                 .y_px = item->y_px,
                                 .cov_xx = item->cov_xx,
@@ -205,7 +205,7 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     return count;
 }
 
-static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
+static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_astro_light *light,
                           int64_t tick, double dt_s, frame_attitude *out) {
     memset(out, 0, sizeof *out);
     bst_quat q_telemetry = bst_quat_unit(d->q_telemetry_from_gcrf);
@@ -250,7 +250,7 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
 }
 
 static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *item,
-                                  const frame_attitude *attitude, const bst_light *light) {
+                                  const frame_attitude *attitude, const bst_astro_light *light) {
     double extra = t->floor_variance_px2;
     if (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) {
         extra += t->blend_variance_px2;
@@ -260,7 +260,7 @@ static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *ite
 }
 
 static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
-                           const bst_light *light, int *lost) {
+                           const bst_astro_light *light, int *lost) {
     double scale = bst_camera_scale_rad(&t->camera);
     int count = 0;
     *lost = 0;
@@ -461,37 +461,37 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     }
     double seconds = (double)tick / t->tick_rate_hz;
     double dt = t->started ? (double)(tick - t->last_tick) / t->tick_rate_hz : 0.0;
-    bst_light light =
+    bst_astro_light light =
         bst_nav_light_after(input->nav, seconds - (double)input->nav->tick / t->tick_rate_hz);
     frame_attitude attitude;
     find_attitude(t, d, &light, tick, dt, &attitude);
     t->event_count = 0;
     const bst_tracker_cue *cue = &input->cue;
-    bst_frame_view view = {.tracker = t,
-                           .q_cam_from_gcrf = attitude.q_cam_from_gcrf,
-                           .light = light,
-                           .range_m = cue->range_m,
-                           .range_rate_mps = cue->range_rate_mps,
-                           .cue = {.valid = cue->valid,
-                                   .direction = cue->direction_gcrf,
-                                   .rate_radps = cue->rate_gcrf_radps,
-                                   .sigma_rad = cue->sigma_rad,
-                                   .rate_sigma_radps = cue->rate_sigma_radps,
-                                   .v_mag = cue->v_mag,
-                                   .v_mag_sigma = cue->v_mag_sigma,
-                                   .in_region = cue->in_region,
-                                   .belt_eye = cue->belt_eye}};
+    bst_tracker_frame_view view = {.tracker = t,
+                                   .q_cam_from_gcrf = attitude.q_cam_from_gcrf,
+                                   .light = light,
+                                   .range_m = cue->range_m,
+                                   .range_rate_mps = cue->range_rate_mps,
+                                   .cue = {.valid = cue->valid,
+                                           .direction = cue->direction_gcrf,
+                                           .rate_radps = cue->rate_gcrf_radps,
+                                           .sigma_rad = cue->sigma_rad,
+                                           .rate_sigma_radps = cue->rate_sigma_radps,
+                                           .v_mag = cue->v_mag,
+                                           .v_mag_sigma = cue->v_mag_sigma,
+                                           .in_region = cue->in_region,
+                                           .belt_eye = cue->belt_eye}};
     bst_mtt_frame frame = {.tick = tick,
                            .seconds = seconds,
                            .detections = t->detections,
                            .partial = d->windows > 0,
                            .bad_pixels = d->bad_pixels,
                            .charged = charged_of(d),
-                           .in_field = bst_frame_in_field,
-                           .expected = bst_frame_is_expected,
-                           .range = bst_frame_range_of,
+                           .in_field = bst_tracker_frame_in_field,
+                           .expected = bst_tracker_frame_is_expected,
+                           .range = bst_tracker_frame_range_of,
                            .user = &view,
-                           .expected_rate = cue->in_region ? bst_frame_expected_rate : NULL,
+                           .expected_rate = cue->in_region ? bst_tracker_frame_expected_rate : NULL,
                            .cue_valid = cue->valid,
                            .cue_before_valid = t->cue_before.valid,
                            .cue_direction = cue->direction_gcrf,
@@ -500,9 +500,9 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                            .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
                            .cue_rate_sigma_radps = cue->rate_sigma_radps,
                            .common_rate_sigma_radps = attitude.rate_sigma_radps};
-    if (t->orbits && bst_frame_observer(t, input->nav, seconds, &view.observer)) {
+    if (t->orbits && bst_tracker_frame_observer(t, input->nav, seconds, &view.observer)) {
         frame.observer = &view.observer;
-        frame.sight = bst_frame_sight_of;
+        frame.sight = bst_tracker_frame_sight_of;
         view.threshold_snr = d->threshold_snr > 0.0 ? d->threshold_snr : USUAL_THRESHOLD_SNR;
     }
     int detections_lost = 0;

@@ -47,7 +47,7 @@ extern const bst_config_desc bst_tracker_config_table[];
 /* Looks up a catalogue star: unit direction, ICRS, proper motion applied. False when unknown. */
 typedef bool (*bst_tracker_star_fn)(void *user, uint32_t star_id, bst_vec3 *icrs);
 
-/* The cue at one time, as bst_cue of sim/world has it. */
+/* The cue at one time, as bst_onboard_cue of sim/world has it. */
 typedef struct bst_tracker_cue {
     bool valid;
     bst_vec3 direction_gcrf, rate_gcrf_radps;

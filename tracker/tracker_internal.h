@@ -50,27 +50,27 @@ struct bst_tracker {
 };
 
 /* What is asked of one frame. */
-typedef struct bst_frame_view {
+typedef struct bst_tracker_frame_view {
     const bst_tracker *tracker;
     bst_quat q_cam_from_gcrf;
-    bst_light light;
+    bst_astro_light light;
     bst_target_cue cue;
     double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
     bst_od_observer observer;
     double threshold_snr;
-} bst_frame_view;
+} bst_tracker_frame_view;
 
-/* Hooks of bst_mtt_frame; user is a bst_frame_view. */
-bool bst_frame_in_field(const void *user, bst_vec3 direction);
-bool bst_frame_is_expected(const void *user, const bst_mtt_track *track);
-bool bst_frame_expected_rate(const void *user, bst_vec3 direction, bst_vec3 *rate_radps);
-bool bst_frame_range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
-bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track,
-                                 bst_mtt_light *light);
+/* Hooks of bst_mtt_frame; user is a bst_tracker_frame_view. */
+bool bst_tracker_frame_in_field(const void *user, bst_vec3 direction);
+bool bst_tracker_frame_is_expected(const void *user, const bst_mtt_track *track);
+bool bst_tracker_frame_expected_rate(const void *user, bst_vec3 direction, bst_vec3 *rate_radps);
+bool bst_tracker_frame_range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
+bst_mtt_sight bst_tracker_frame_sight_of(const void *user, const bst_mtt_track *track,
+                                         bst_mtt_light *light);
 
 /* The observer in mid-exposure, from navigation telemetry of about that time; false when that is
  * not there. One that is on no orbit is carried on in a straight line. */
-bool bst_frame_observer(const bst_tracker *tracker, const bst_nav_telemetry *nav, double seconds,
-                        bst_od_observer *out);
+bool bst_tracker_frame_observer(const bst_tracker *tracker, const bst_nav_telemetry *nav,
+                                double seconds, bst_od_observer *out);
 
 #endif

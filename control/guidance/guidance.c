@@ -28,14 +28,14 @@ void bst_guidance_telemetry(bst_guidance *g, const bst_mount_status *mount) {
 }
 
 int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,
-                       bst_zone zones[BST_ZONE_KINDS]) {
+                       bst_keep_out_zone zones[BST_ZONE_KINDS]) {
     const bst_guidance_config *c = &g->config;
-    const bst_exclusion exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
-                                     .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,
-                                     .earth = c->earth_keep_out,
-                                     .earth_limb_rad = c->earth_limb_keep_out_deg * BST_DEG_RAD,
-                                     .limb_altitude_m = 1e3 * c->earth_limb_altitude_km};
-    return bst_exclusion_zones(&exclusion, nav->position_gcrf_m, nav->sun_m, nav->moon_m, zones);
+    const bst_keep_out exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
+                                    .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,
+                                    .earth = c->earth_keep_out,
+                                    .earth_limb_rad = c->earth_limb_keep_out_deg * BST_DEG_RAD,
+                                    .limb_altitude_m = 1e3 * c->earth_limb_altitude_km};
+    return bst_keep_out_zones(&exclusion, nav->position_gcrf_m, nav->sun_m, nav->moon_m, zones);
 }
 
 bst_quat bst_guidance_body(const bst_guidance *g, int64_t tick) {
@@ -73,7 +73,7 @@ static bst_vec3 slew_at(const bst_guidance *g, double seconds, double near_rad[B
     bst_vec3 tangent, bend;
     if (slew->along_path) {
         bst_slew_path_at(&slew->speed, seconds, &s, &rate, &accel);
-        return bst_path_at(&slew->path, s, &tangent, &bend);
+        return bst_keep_out_route_at(&slew->path, s, &tangent, &bend);
     }
     for (int i = 0; i < g->mount.axes; i++) {
         bst_slew_axis_at(&slew->axis[i], seconds, &angle[i], &rate, &accel);
@@ -106,8 +106,8 @@ static bst_status target_angles(bst_ctx *ctx, const bst_guidance *g, int64_t tic
     for (int i = 0; i < mount.axes; i++) {
         mount.axis[i].angle_rad = present[i];
     }
-    bst_wrap_choice choice;
-    *found = bst_wrap_choose(&mount, coming, count, &choice);
+    bst_mount_turn_choice choice;
+    *found = bst_mount_choose_turn(&mount, coming, count, &choice);
     for (int i = 0; *found && i < BST_MOUNT_AXES; i++) {
         angle[i] = choice.angle_rad[i];
     }
@@ -115,9 +115,9 @@ static bst_status target_angles(bst_ctx *ctx, const bst_guidance *g, int64_t tic
 }
 
 /* Where the aim will be at a tick, out of the cones, and how fast it moves there. */
-static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick, const bst_zone *zones,
-                         int zone_count, bst_vec3 towards, bool *valid, bst_vec3 *d,
-                         bst_vec3 *rate) {
+static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick,
+                         const bst_keep_out_zone *zones, int zone_count, bst_vec3 towards,
+                         bool *valid, bst_vec3 *d, bst_vec3 *rate) {
     int64_t half = (int64_t)llround(0.1 * g->env.tick_rate_hz);
     half = half > 0 ? half : 1;
     bst_vec3 ahead, behind, free;
@@ -131,7 +131,7 @@ static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick, cons
     *rate = both[0] && both[1] ? bst_vec3_scale(bst_vec3_sub(ahead, behind),
                                                 0.5 * g->env.tick_rate_hz / (double)half)
                                : (bst_vec3){0.0, 0.0, 0.0};
-    if (!bst_exclusion_nearest(zones, zone_count, *d, towards, &free)) {
+    if (!bst_keep_out_nearest(zones, zone_count, *d, towards, &free)) {
         *valid = false;
     } else if (bst_vec3_angle(free, *d) > 0.0) {
         *d = free;
@@ -157,8 +157,9 @@ static void present_axes(const bst_guidance *g, int64_t tick, double angle[], do
 
 /* The fastest motion of the axes onto the moving aim; *made false when it cannot be or would cross
  * a cone. */
-static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, const bst_zone *zones,
-                            int zone_count, bst_vec3 from, bool *made) {
+static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick,
+                            const bst_keep_out_zone *zones, int zone_count, bst_vec3 from,
+                            bool *made) {
     *made = false;
     if (!g->mount_known || !bst_mount_steers(&g->mount)) {
         return BST_OK;
@@ -202,7 +203,7 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, const b
     for (int k = 0; k <= SAMPLES && zone_count > 0; k++) {
         double depth;
         bst_vec3 d = slew_at(g, slew.duration_s * k / SAMPLES, NULL);
-        if (bst_exclusion_inside(zones, zone_count, d, &depth) >= 0) {
+        if (bst_keep_out_inside(zones, zone_count, d, &depth) >= 0) {
             g->slew = before;
             return BST_OK;
         }
@@ -212,7 +213,7 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, const b
 }
 
 /* The axis angles along a path; for a mount whose axes are not known, the way itself. */
-static void path_nodes(const bst_guidance *g, const bst_path *path, int64_t tick,
+static void path_nodes(const bst_guidance *g, const bst_keep_out_route *path, int64_t tick,
                        bst_slew_nodes *nodes, bst_slew_limits *limits) {
     bool steers = g->mount_known && bst_mount_steers(&g->mount);
     double near[BST_MOUNT_AXES], rate[BST_MOUNT_AXES], ways[2][BST_MOUNT_AXES];
@@ -229,7 +230,7 @@ static void path_nodes(const bst_guidance *g, const bst_path *path, int64_t tick
         limits->accel_radps2[i] = hard > 0.0 ? hard : 1.0;
     }
     for (int j = 0; j < PATH_NODES; j++) {
-        bst_vec3 d = bst_path_at(path, j * nodes->step, &tangent, &bend);
+        bst_vec3 d = bst_keep_out_route_at(path, j * nodes->step, &tangent, &bend);
         /* within a step an arc turns by no more than its own curvature makes it; beside an end,
          * which is passed slowly anyway, the angles' second differences are enough */
         nodes->corner[j] = j > 2 && j < PATH_NODES - 3 && !nodes->corner[j - 1] &&
@@ -248,8 +249,9 @@ static void path_nodes(const bst_guidance *g, const bst_path *path, int64_t tick
 }
 
 /* The shortest way round the cones, as fast as the axes allow. */
-static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick, const bst_zone *zones,
-                            int zone_count, bst_vec3 from, bst_vec3 from_rate, bool *made) {
+static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick,
+                            const bst_keep_out_zone *zones, int zone_count, bst_vec3 from,
+                            bst_vec3 from_rate, bool *made) {
     bst_guidance_slew *slew = &g->slew;
     bst_guidance_slew before = *slew;
     double duration = 0.0;
@@ -261,7 +263,7 @@ static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick, const b
         bool valid;
         *slew = before;
         BST_TRY(aim_at(ctx, g, arrival, zones, zone_count, from, &valid, &d, &r));
-        if (!valid || !bst_exclusion_path(zones, zone_count, from, d, &slew->path)) {
+        if (!valid || !bst_keep_out_path(zones, zone_count, from, d, &slew->path)) {
             *slew = before;
             return BST_OK;
         }
@@ -269,8 +271,8 @@ static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick, const b
             *slew = before;
             return BST_OK;
         }
-        (void)bst_path_at(&slew->path, 0.0, &tangent, &bend);
-        (void)bst_path_at(&slew->path, slew->path.length_rad, &end, &bend);
+        (void)bst_keep_out_route_at(&slew->path, 0.0, &tangent, &bend);
+        (void)bst_keep_out_route_at(&slew->path, slew->path.length_rad, &end, &bend);
         path_nodes(g, &slew->path, tick, &g->nodes, &limits);
         if (!bst_slew_path_plan(&g->nodes, &limits, fmax(bst_vec3_dot(from_rate, tangent), 0.0),
                                 fmax(bst_vec3_dot(r, end), 0.0), &slew->speed)) {
@@ -334,7 +336,7 @@ static void keep_turn(bst_guidance *g, bst_los_command *command) {
 }
 
 /* Whether the slew under way still ends on the aim. */
-static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, const bst_zone *zones,
+static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, const bst_keep_out_zone *zones,
                                int zone_count, bst_vec3 from, bool *out) {
     int64_t arrival =
         g->slew.start_tick + (int64_t)llround(g->slew.duration_s * g->env.tick_rate_hz);
@@ -356,7 +358,7 @@ static bool turns_matter(const bst_guidance *g) {
 
 static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
                         bst_los_command *command, bool *give) {
-    const bst_zone *zones = g->zones;
+    const bst_keep_out_zone *zones = g->zones;
     int zone_count = g->zone_count;
     if (zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
         return BST_OK;
@@ -392,8 +394,8 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight
         }
     }
     double depth;
-    bool inside = bst_exclusion_inside(zones, zone_count, target, &depth) >= 0;
-    bool blocked = inside && !bst_exclusion_nearest(zones, zone_count, target, from, &target);
+    bool inside = bst_keep_out_inside(zones, zone_count, target, &depth) >= 0;
+    bool blocked = inside && !bst_keep_out_nearest(zones, zone_count, target, from, &target);
     bool made = false;
     if (!blocked && is_beyond(from, target, g->config.slew_above_deg * BST_DEG_RAD)) {
         BST_TRY(plan_axes(ctx, g, tick, zones, zone_count, from, &made));

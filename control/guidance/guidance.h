@@ -52,7 +52,7 @@ typedef enum bst_guidance_event_kind {
 
 typedef struct bst_guidance_event {
     int kind;
-    int reason;             /* bst_reach */
+    int reason;             /* bst_pointing_feasibility */
     double from_s, until_s; /* seconds since the epoch; INFINITY: not within look_ahead_s */
     double length_rad;      /* of a detour, a roll */
 } bst_guidance_event;
@@ -66,7 +66,7 @@ typedef struct bst_guidance_slew {
     double duration_s;
     bst_vec3 arrival; /* where it ends */
     bst_slew_axis axis[BST_MOUNT_AXES];
-    bst_path path;
+    bst_keep_out_route path;
     bst_slew_path speed;
 } bst_guidance_slew;
 
@@ -75,8 +75,8 @@ typedef struct bst_guidance {
     bst_guidance_env env;
     bst_mount_status mount;
     bool mount_known;
-    bst_nav_telemetry nav;          /* as the attitude telemetry sees it */
-    bst_zone zones[BST_ZONE_KINDS]; /* of nav, WIDER_RAD wider */
+    bst_nav_telemetry nav;                   /* as the attitude telemetry sees it */
+    bst_keep_out_zone zones[BST_ZONE_KINDS]; /* of nav, WIDER_RAD wider */
     int zone_count;
     bool nav_known;
     bool commanded;
@@ -87,7 +87,7 @@ typedef struct bst_guidance {
     bool near_known;
     double near_rad[BST_MOUNT_AXES];
     bst_vec3 near_body; /* direction in body axes that near_rad was worked out for; zero: none */
-    int reach;          /* bst_reach, as last told */
+    int reach;          /* bst_pointing_feasibility, as last told */
     bool no_way;        /* told */
     int64_t ahead_tick; /* of the next look ahead */
     bool roll_given;    /* the body has been asked for */
@@ -118,7 +118,7 @@ bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_
 
 /* The cones of keep-out at present. */
 int bst_guidance_zones(const bst_guidance *guidance, const bst_nav_telemetry *nav,
-                       bst_zone zones[BST_ZONE_KINDS]);
+                       bst_keep_out_zone zones[BST_ZONE_KINDS]);
 
 /* Body attitude by the mount's status carried to a tick: at its rate, the roll that it was asked
  * for within its limits. */
@@ -129,8 +129,8 @@ bst_quat bst_guidance_rolled(const bst_guidance *guidance, double seconds, doubl
 /* Chooses the least roll of the body by which what `problem` expects (seconds from now) can be
  * followed up to horizon_s without loss; *found false: there is none. */
 bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *guidance,
-                                    const bst_reach_problem *problem, double horizon_s,
-                                    bool *found) BST_MUST_CHECK;
+                                    const bst_pointing_feasibility_problem *problem,
+                                    double horizon_s, bool *found) BST_MUST_CHECK;
 
 /* guidance_ahead.c: looks look_ahead_s ahead of `tick` and notes what changes as events. */
 bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *guidance,

@@ -18,11 +18,12 @@ typedef struct looking {
     int64_t tick; /* of now: seconds count from it */
 } looking;
 
-static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+static bst_status look(void *user, bst_ctx *ctx, double seconds,
+                       bst_pointing_feasibility_look *out) {
     const looking *l = user;
     bst_guidance *g = l->g;
     int64_t tick = l->tick + (int64_t)llround(seconds * g->env.tick_rate_hz);
-    *out = (bst_reach_look){.valid = false};
+    *out = (bst_pointing_feasibility_look){.valid = false};
     BST_TRY(g->env.aim(g->env.user, ctx, tick, &out->valid, &out->direction_gcrf));
     if (!out->valid) {
         return BST_OK;
@@ -68,19 +69,20 @@ static void tell_ahead(bst_guidance *g, double now_s, int kind, int reason, doub
 
 bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) {
     looking user = {g, tick};
-    const bst_reach_problem problem = {.look = look,
-                                       .user = &user,
-                                       .mount = g->mount_known ? &g->mount : NULL,
-                                       .limits_share = g->config.limits_share};
+    const bst_pointing_feasibility_problem problem = {.look = look,
+                                                      .user = &user,
+                                                      .mount = g->mount_known ? &g->mount : NULL,
+                                                      .limits_share = g->config.limits_share};
     double horizon = g->config.look_ahead_s, now_s = (double)tick / g->env.tick_rate_hz;
     double step = fmin(fmax(1e-3 * horizon, LEAST_STEP_S), MOST_STEP_S);
     double when = 0.0, until = INFINITY;
-    bst_reach reach, why;
+    bst_pointing_feasibility reach, why;
     bool found;
-    BST_TRY(bst_reach_at(ctx, &problem, 0.0, &reach));
+    BST_TRY(bst_pointing_feasibility_at(ctx, &problem, 0.0, &reach));
     if (reach != BST_REACH_OK) {
         if ((int)reach != g->reach) {
-            BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, step, true, &found, &when, NULL));
+            BST_TRY(bst_pointing_feasibility_next(ctx, &problem, 0.0, horizon, step, true, &found,
+                                                  &when, NULL));
             tell(g, BST_GUIDANCE_UNREACHABLE, reach, now_s, found ? now_s + when : INFINITY);
         }
         g->reach = reach;
@@ -90,16 +92,18 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         tell(g, BST_GUIDANCE_REACHABLE, g->reach, now_s, now_s);
     }
     g->reach = BST_REACH_OK;
-    BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, step, false, &found, &when, &why));
+    BST_TRY(bst_pointing_feasibility_next(ctx, &problem, 0.0, horizon, step, false, &found, &when,
+                                          &why));
     if (!found) {
         return BST_OK;
     }
     if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
-        bst_reach_loss loss;
+        bst_pointing_feasibility_loss loss;
         int losses;
         double from = fmax(when - RUN_UP_S, 0.0);
-        BST_TRY(bst_reach_chase(ctx, &problem, from, horizon,
-                                g->config.loss_tolerance_px * g->env.pixel_rad, &loss, 1, &losses));
+        BST_TRY(bst_pointing_feasibility_chase(ctx, &problem, from, horizon,
+                                               g->config.loss_tolerance_px * g->env.pixel_rad,
+                                               &loss, 1, &losses));
         bool rolls = false;
         double before = g->roll_rad;
         if (losses > 0 && g->config.body_roll) {
@@ -113,14 +117,15 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         }
         return BST_OK;
     }
-    BST_TRY(bst_reach_next(ctx, &problem, when, horizon, step, true, &found, &until, NULL));
+    BST_TRY(bst_pointing_feasibility_next(ctx, &problem, when, horizon, step, true, &found, &until,
+                                          NULL));
     tell_ahead(g, now_s, BST_GUIDANCE_AHEAD, why, when, found ? until : INFINITY);
     return BST_OK;
 }
 
 void bst_guidance_describe(const bst_guidance_event *event, char *text, size_t bytes) {
     char until[48] = "for as long as is looked ahead";
-    const char *why = bst_reach_reason(event->reason);
+    const char *why = bst_pointing_feasibility_reason(event->reason);
     if (isfinite(event->until_s)) {
         snprintf(until, sizeof until, "until %.1f s", event->until_s);
     }

@@ -25,7 +25,8 @@ bst_quat bst_guidance_rolled(const bst_guidance *g, double seconds, double roll_
     return bst_quat_mul(bst_quat_from_rotvec(turn), q);
 }
 
-bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *g, const bst_reach_problem *problem,
+bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *g,
+                                    const bst_pointing_feasibility_problem *problem,
                                     double horizon_s, bool *found) {
     const bst_body_roll *roll = &g->mount.roll;
     *found = false;
@@ -34,23 +35,24 @@ bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *g, const bst_rea
     }
     bool given = g->roll_given;
     double before = g->roll_rad, from = given ? before : roll->angle_rad;
-    bst_reach_problem careful = *problem;
+    bst_pointing_feasibility_problem careful = *problem;
     careful.limits_share *= SHARE;
     g->roll_given = true;
     for (int i = 1; i <= MOST_STEPS && !*found; i++) {
         for (int side = -1; side <= 1 && !*found; side += 2) {
-            bst_reach_loss loss;
+            bst_pointing_feasibility_loss loss;
             bool out;
             double when;
             int losses;
             g->roll_rad = from + side * i * STEP_RAD;
-            BST_TRY(bst_reach_next(ctx, &careful, 0.0, horizon_s, 0.5, false, &out, &when, NULL));
+            BST_TRY(bst_pointing_feasibility_next(ctx, &careful, 0.0, horizon_s, 0.5, false, &out,
+                                                  &when, NULL));
             if (out) {
                 continue;
             }
-            BST_TRY(bst_reach_chase(ctx, &careful, 0.0, horizon_s,
-                                    g->config.loss_tolerance_px * g->env.pixel_rad, &loss, 1,
-                                    &losses));
+            BST_TRY(bst_pointing_feasibility_chase(ctx, &careful, 0.0, horizon_s,
+                                                   g->config.loss_tolerance_px * g->env.pixel_rad,
+                                                   &loss, 1, &losses));
             *found = losses == 0;
         }
     }

@@ -5,28 +5,31 @@
 /* Directions this far inside a cone's edge count as outside: paths run along edges. */
 #define EDGE_RAD 1e-9
 
-int bst_exclusion_zones(const bst_exclusion *exclusion, bst_vec3 position_m, bst_vec3 to_sun,
-                        bst_vec3 to_moon, bst_zone zones[BST_ZONE_KINDS]) {
+int bst_keep_out_zones(const bst_keep_out *exclusion, bst_vec3 position_m, bst_vec3 to_sun,
+                       bst_vec3 to_moon, bst_keep_out_zone zones[BST_ZONE_KINDS]) {
     int count = 0;
     if (exclusion->sun_rad > 0.0 && bst_vec3_norm(to_sun) > 0.0) {
-        zones[count++] = (bst_zone){BST_ZONE_SUN, bst_vec3_unit(to_sun), exclusion->sun_rad};
+        zones[count++] =
+            (bst_keep_out_zone){BST_ZONE_SUN, bst_vec3_unit(to_sun), exclusion->sun_rad};
     }
     if (exclusion->moon_rad > 0.0 && bst_vec3_norm(to_moon) > 0.0) {
-        zones[count++] = (bst_zone){BST_ZONE_MOON, bst_vec3_unit(to_moon), exclusion->moon_rad};
+        zones[count++] =
+            (bst_keep_out_zone){BST_ZONE_MOON, bst_vec3_unit(to_moon), exclusion->moon_rad};
     }
     double r = bst_vec3_norm(position_m);
     if (exclusion->earth && r > 0.0) {
         double limb = (BST_EARTH_RADIUS_M + exclusion->limb_altitude_m) / r;
         double half = asin(fmin(limb, 1.0)) + exclusion->earth_limb_rad;
         if (half > 0.0) {
-            zones[count++] = (bst_zone){BST_ZONE_EARTH, bst_vec3_scale(position_m, -1.0 / r),
-                                        fmin(half, BST_PI - 1e-6)};
+            zones[count++] = (bst_keep_out_zone){
+                BST_ZONE_EARTH, bst_vec3_scale(position_m, -1.0 / r), fmin(half, BST_PI - 1e-6)};
         }
     }
     return count;
 }
 
-int bst_exclusion_inside(const bst_zone *zones, int count, bst_vec3 direction, double *depth_rad) {
+int bst_keep_out_inside(const bst_keep_out_zone *zones, int count, bst_vec3 direction,
+                        double *depth_rad) {
     int deepest = -1;
     *depth_rad = EDGE_RAD;
     for (int i = 0; i < count; i++) {
@@ -45,9 +48,9 @@ int bst_exclusion_inside(const bst_zone *zones, int count, bst_vec3 direction, d
     return deepest;
 }
 
-static bool outside(const bst_zone *zones, int count, bst_vec3 direction) {
+static bool outside(const bst_keep_out_zone *zones, int count, bst_vec3 direction) {
     double depth;
-    return bst_exclusion_inside(zones, count, direction, &depth) < 0;
+    return bst_keep_out_inside(zones, count, direction, &depth) < 0;
 }
 
 /* v turned by angle about the unit axis, both unit (Rodrigues). */
@@ -59,7 +62,7 @@ static bst_vec3 turned(bst_vec3 axis, double angle, bst_vec3 v) {
 }
 
 /* The point of a cone's edge on the side of `towards`. */
-static bst_vec3 edge_point(const bst_zone *zone, bst_vec3 towards) {
+static bst_vec3 edge_point(const bst_keep_out_zone *zone, bst_vec3 towards) {
     bst_vec3 side = bst_vec3_axpy(towards, -bst_vec3_dot(towards, zone->axis), zone->axis);
     side = bst_vec3_norm(side) > 1e-12 ? bst_vec3_unit(side) : bst_vec3_perpendicular(zone->axis);
     return bst_vec3_unit(bst_vec3_axpy(bst_vec3_scale(zone->axis, cos(zone->half_angle_rad)),
@@ -86,8 +89,8 @@ static int with_products(bst_vec3 a, double p, bst_vec3 b, double q, bst_vec3 ou
     return 2;
 }
 
-bool bst_exclusion_nearest(const bst_zone *zones, int count, bst_vec3 direction, bst_vec3 towards,
-                           bst_vec3 *out) {
+bool bst_keep_out_nearest(const bst_keep_out_zone *zones, int count, bst_vec3 direction,
+                          bst_vec3 towards, bst_vec3 *out) {
     *out = direction;
     if (outside(zones, count, direction)) {
         return true;
@@ -131,20 +134,20 @@ typedef struct node {
     int partner;  /* node that a tangent leads to, -1: none */
     double angle; /* along the edge */
     double cost;
-    int before;  /* -1: none */
-    bst_arc arc; /* from there */
+    int before;           /* -1: none */
+    bst_keep_out_arc arc; /* from there */
     bool done;
 } node;
 
 typedef struct graph {
-    const bst_zone *zones;
+    const bst_keep_out_zone *zones;
     int zone_count, count;
     node nodes[NODES];
     bst_vec3 x[BST_ZONES], y[BST_ZONES]; /* axes that angles along an edge are counted from */
 } graph;
 
 /* Greatest closeness of an arc to a zone's axis: p . axis over the arc. */
-static double closest(const bst_arc *arc, bst_vec3 axis) {
+static double closest(const bst_keep_out_arc *arc, bst_vec3 axis) {
     bst_vec3 across = bst_vec3_axpy(arc->from, -bst_vec3_dot(arc->from, arc->axis), arc->axis);
     double level = bst_vec3_dot(arc->axis, arc->from) * bst_vec3_dot(arc->axis, axis);
     double a = bst_vec3_dot(across, axis);
@@ -160,7 +163,7 @@ static double closest(const bst_arc *arc, bst_vec3 axis) {
     return level + fmax(a, end);
 }
 
-static bool is_free(const graph *g, const bst_arc *arc, int except) {
+static bool is_free(const graph *g, const bst_keep_out_arc *arc, int except) {
     for (int i = 0; i < g->zone_count; i++) {
         double half = g->zones[i].half_angle_rad;
         /* from the cosine: d cos = sin d angle */
@@ -172,9 +175,9 @@ static bool is_free(const graph *g, const bst_arc *arc, int except) {
     return true;
 }
 
-static bst_arc straight(bst_vec3 a, bst_vec3 b) {
+static bst_keep_out_arc straight(bst_vec3 a, bst_vec3 b) {
     bst_vec3 n = bst_vec3_cross(a, b);
-    bst_arc arc = {.from = a, .turn_rad = bst_vec3_angle(a, b)};
+    bst_keep_out_arc arc = {.from = a, .turn_rad = bst_vec3_angle(a, b)};
     arc.axis = bst_vec3_norm(n) > 0.0 ? bst_vec3_unit(n) : bst_vec3_perpendicular(a);
     /* rounding of nearly parallel vectors */
     arc.axis = bst_vec3_unit(bst_vec3_axpy(arc.axis, -bst_vec3_dot(arc.axis, a), a));
@@ -192,14 +195,14 @@ static int add_node(graph *g, bst_vec3 place, int zone, int partner) {
 }
 
 /* Where the great circle with normal n is nearest to a zone's axis. */
-static bst_vec3 foot(const bst_zone *zone, bst_vec3 n) {
+static bst_vec3 foot(const bst_keep_out_zone *zone, bst_vec3 n) {
     return bst_vec3_unit(bst_vec3_axpy(zone->axis, -bst_vec3_dot(zone->axis, n), n));
 }
 
 static void add_tangents(graph *g) {
     bst_vec3 n[2];
     for (int i = 0; i < g->zone_count; i++) {
-        const bst_zone *zone = &g->zones[i];
+        const bst_keep_out_zone *zone = &g->zones[i];
         double s = sin(zone->half_angle_rad);
         for (int end = 0; end < 2; end++) {
             int count = with_products(g->nodes[end].place, 0.0, zone->axis, s, n);
@@ -220,7 +223,7 @@ static void add_tangents(graph *g) {
     }
 }
 
-static void relax(graph *g, int from, int to, const bst_arc *arc) {
+static void relax(graph *g, int from, int to, const bst_keep_out_arc *arc) {
     double cost = g->nodes[from].cost + arc->length_rad;
     if (cost < g->nodes[to].cost) {
         g->nodes[to].cost = cost;
@@ -232,7 +235,7 @@ static void relax(graph *g, int from, int to, const bst_arc *arc) {
 /* Both ways along a zone's edge. */
 static void relax_edges(graph *g, int from) {
     const node *a = &g->nodes[from];
-    const bst_zone *zone = &g->zones[a->zone];
+    const bst_keep_out_zone *zone = &g->zones[a->zone];
     for (int to = 0; to < g->count; to++) {
         if (to == from || g->nodes[to].zone != a->zone || g->nodes[to].done) {
             continue;
@@ -240,9 +243,9 @@ static void relax_edges(graph *g, int from) {
         double turn = g->nodes[to].angle - a->angle;
         turn -= 2.0 * BST_PI * floor(turn / (2.0 * BST_PI));
         for (int way = 0; way < 2; way++) {
-            bst_arc arc = {.axis = bst_vec3_scale(zone->axis, way ? -1.0 : 1.0),
-                           .from = a->place,
-                           .turn_rad = way ? 2.0 * BST_PI - turn : turn};
+            bst_keep_out_arc arc = {.axis = bst_vec3_scale(zone->axis, way ? -1.0 : 1.0),
+                                    .from = a->place,
+                                    .turn_rad = way ? 2.0 * BST_PI - turn : turn};
             arc.length_rad = arc.turn_rad * sin(zone->half_angle_rad);
             if (is_free(g, &arc, a->zone)) {
                 relax(g, from, to, &arc);
@@ -252,7 +255,7 @@ static void relax_edges(graph *g, int from) {
 }
 
 static void relax_straight(graph *g, int from, int to) {
-    bst_arc arc = straight(g->nodes[from].place, g->nodes[to].place);
+    bst_keep_out_arc arc = straight(g->nodes[from].place, g->nodes[to].place);
     if (is_free(g, &arc, -1)) {
         relax(g, from, to, &arc);
     }
@@ -297,7 +300,7 @@ static void add_halves(graph *g) {
     }
 }
 
-static bool append(bst_path *path, const bst_arc *arc) {
+static bool append(bst_keep_out_route *path, const bst_keep_out_arc *arc) {
     if (arc->length_rad <= 1e-15) {
         return true;
     }
@@ -309,22 +312,22 @@ static bool append(bst_path *path, const bst_arc *arc) {
     return true;
 }
 
-bool bst_exclusion_path(const bst_zone *zones, int count, bst_vec3 from, bst_vec3 to,
-                        bst_path *out) {
-    *out = (bst_path){.left_zone = -1, .target_zone = -1, .arcs = {{.from = from}}};
+bool bst_keep_out_path(const bst_keep_out_zone *zones, int count, bst_vec3 from, bst_vec3 to,
+                       bst_keep_out_route *out) {
+    *out = (bst_keep_out_route){.left_zone = -1, .target_zone = -1, .arcs = {{.from = from}}};
     if (count < 0 || count > BST_ZONES) {
         return false;
     }
     double depth;
     bst_vec3 start, end;
-    out->left_zone = bst_exclusion_inside(zones, count, from, &depth);
-    out->target_zone = bst_exclusion_inside(zones, count, to, &depth);
-    if (!bst_exclusion_nearest(zones, count, from, to, &start) ||
-        !bst_exclusion_nearest(zones, count, to, start, &end)) {
+    out->left_zone = bst_keep_out_inside(zones, count, from, &depth);
+    out->target_zone = bst_keep_out_inside(zones, count, to, &depth);
+    if (!bst_keep_out_nearest(zones, count, from, to, &start) ||
+        !bst_keep_out_nearest(zones, count, to, start, &end)) {
         return false;
     }
     if (out->left_zone >= 0) {
-        bst_arc leave = straight(from, start);
+        bst_keep_out_arc leave = straight(from, start);
         (void)append(out, &leave);
     }
     graph g = {.zones = zones, .zone_count = count};
@@ -337,7 +340,7 @@ bool bst_exclusion_path(const bst_zone *zones, int count, bst_vec3 from, bst_vec
     if (bst_vec3_angle(start, end) > BST_PI - 1e-9) {
         add_halves(&g);
     } else {
-        bst_arc direct = straight(start, end);
+        bst_keep_out_arc direct = straight(start, end);
         if (is_free(&g, &direct, -1)) {
             return append(out, &direct);
         }
@@ -353,7 +356,7 @@ bool bst_exclusion_path(const bst_zone *zones, int count, bst_vec3 from, bst_vec
         }
     }
     if (!search(&g)) {
-        *out = (bst_path){
+        *out = (bst_keep_out_route){
             .left_zone = out->left_zone, .target_zone = out->target_zone, .arcs = {{.from = from}}};
         return false;
     }
@@ -368,7 +371,8 @@ bool bst_exclusion_path(const bst_zone *zones, int count, bst_vec3 from, bst_vec
     return fits;
 }
 
-bst_vec3 bst_path_at(const bst_path *path, double s_rad, bst_vec3 *tangent, bst_vec3 *bend) {
+bst_vec3 bst_keep_out_route_at(const bst_keep_out_route *path, double s_rad, bst_vec3 *tangent,
+                               bst_vec3 *bend) {
     *tangent = *bend = (bst_vec3){0.0, 0.0, 0.0};
     if (path->count == 0) {
         return path->arcs[0].from;
@@ -378,7 +382,7 @@ bst_vec3 bst_path_at(const bst_path *path, double s_rad, bst_vec3 *tangent, bst_
     while (i < path->count - 1 && s > path->arcs[i].length_rad) {
         s -= path->arcs[i++].length_rad;
     }
-    const bst_arc *arc = &path->arcs[i];
+    const bst_keep_out_arc *arc = &path->arcs[i];
     s = fmin(s, arc->length_rad);
     double rate = arc->turn_rad / arc->length_rad;
     bst_vec3 d = turned(arc->axis, s * rate, arc->from);

@@ -176,8 +176,8 @@ static int served(const bst_mount_status *mount, const bst_vec3 *directions, int
     return count;
 }
 
-bool bst_wrap_choose(const bst_mount_status *mount, const bst_vec3 *directions_body, int count,
-                     bst_wrap_choice *out) {
+bool bst_mount_choose_turn(const bst_mount_status *mount, const bst_vec3 *directions_body,
+                           int count, bst_mount_turn_choice *out) {
     double present[BST_MOUNT_AXES] = {0.0}, ways[2][BST_MOUNT_AXES];
     for (int i = 0; i < mount->axes; i++) {
         present[i] = mount->axis[i].angle_rad;
@@ -201,7 +201,7 @@ bool bst_wrap_choose(const bst_mount_status *mount, const bst_vec3 *directions_b
         for (int n = 0; n < turns[0] * turns[1] * turns[2]; n++) {
             const int which[BST_MOUNT_AXES] = {n % turns[0], n / turns[0] % turns[1],
                                                n / turns[0] / turns[1]};
-            bst_wrap_choice choice = {.slew_s = 0.0};
+            bst_mount_turn_choice choice = {.slew_s = 0.0};
             for (int i = 0; i < mount->axes; i++) {
                 const bst_mount_axis *axis = &mount->axis[i];
                 choice.angle_rad[i] = lowest[i] + turn_rad * which[i];

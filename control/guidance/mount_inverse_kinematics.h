@@ -27,17 +27,17 @@ bool bst_mount_within(const bst_mount_axis *axis, double angle_rad);
 bool bst_mount_nearest(const bst_mount_status *mount, bst_vec3 direction_body,
                        const double near_rad[BST_MOUNT_AXES], double angle_rad[BST_MOUNT_AXES]);
 
-typedef struct bst_wrap_choice {
+typedef struct bst_mount_turn_choice {
     double angle_rad[BST_MOUNT_AXES]; /* at the first direction */
     int serves;                       /* of the directions, in a row from the first */
     double slew_s; /* of the axis that takes longest to get there at its rate limit */
-} bst_wrap_choice;
+} bst_mount_turn_choice;
 
 /* Among all turns and both ways within travel at the first of `count` directions to come (unit,
  * body axes, close enough together that an axis moves by less than half a turn between two), the
  * one that can follow the most of them without leaving travel; of equals the one that is reached
  * soonest from the present angles. False when there is none. */
-bool bst_wrap_choose(const bst_mount_status *mount, const bst_vec3 *directions_body, int count,
-                     bst_wrap_choice *out);
+bool bst_mount_choose_turn(const bst_mount_status *mount, const bst_vec3 *directions_body,
+                           int count, bst_mount_turn_choice *out);
 
 #endif

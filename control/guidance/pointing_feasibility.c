@@ -6,7 +6,7 @@
 #define HALF_S 0.05
 #define FOUND_TO_S 0.01
 
-const char *bst_reach_reason(int reach) {
+const char *bst_pointing_feasibility_reason(int reach) {
     static const char *const reasons[BST_REACH_COUNT] = {
         [BST_REACH_OK] = "within reach",
         [BST_REACH_NO_CUE] = "not cued",
@@ -21,7 +21,7 @@ const char *bst_reach_reason(int reach) {
     return reach >= 0 && reach < BST_REACH_COUNT ? reasons[reach] : "unknown";
 }
 
-static bool behind_earth(const bst_reach_look *look) {
+static bool behind_earth(const bst_pointing_feasibility_look *look) {
     double r2 = bst_vec3_dot(look->position_m, look->position_m);
     double towards = -bst_vec3_dot(look->position_m, look->direction_gcrf);
     double miss2 = r2 - towards * towards;
@@ -29,13 +29,13 @@ static bool behind_earth(const bst_reach_look *look) {
            miss2 < BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M;
 }
 
-static bst_reach of_zone(int kind) {
+static bst_pointing_feasibility of_zone(int kind) {
     return kind == BST_ZONE_SUN    ? BST_REACH_SUN
            : kind == BST_ZONE_MOON ? BST_REACH_MOON
                                    : BST_REACH_EARTH;
 }
 
-static bst_vec3 in_body(const bst_reach_look *look) {
+static bst_vec3 in_body(const bst_pointing_feasibility_look *look) {
     return bst_quat_rotate(look->q_body_from_gcrf, look->direction_gcrf);
 }
 
@@ -48,7 +48,8 @@ static bool has_redundant(const bst_mount_status *mount) {
 }
 
 /* Whether the axes can follow three directions HALF_S apart. */
-static bst_reach follows(const bst_reach_problem *problem, const bst_vec3 body[3]) {
+static bst_pointing_feasibility follows(const bst_pointing_feasibility_problem *problem,
+                                        const bst_vec3 body[3]) {
     const bst_mount_status *mount = problem->mount;
     double present[BST_MOUNT_AXES], angle[3][BST_MOUNT_AXES], ways[2][BST_MOUNT_AXES];
     for (int i = 0; i < BST_MOUNT_AXES; i++) {
@@ -66,7 +67,7 @@ static bst_reach follows(const bst_reach_problem *problem, const bst_vec3 body[3
         }
     }
     double sky = bst_vec3_norm(bst_vec3_sub(body[2], body[0])) / (2.0 * HALF_S);
-    bst_reach worst = BST_REACH_OK;
+    bst_pointing_feasibility worst = BST_REACH_OK;
     for (int i = 0; i < mount->axes; i++) {
         double share = problem->limits_share, limit = share * mount->axis[i].rate_limit_radps;
         double hard = share * mount->axis[i].accel_limit_radps2;
@@ -91,9 +92,10 @@ static bst_reach follows(const bst_reach_problem *problem, const bst_vec3 body[3
     return worst;
 }
 
-bst_status bst_reach_at(bst_ctx *ctx, const bst_reach_problem *problem, double seconds,
-                        bst_reach *out) {
-    bst_reach_look look, beside;
+bst_status bst_pointing_feasibility_at(bst_ctx *ctx,
+                                       const bst_pointing_feasibility_problem *problem,
+                                       double seconds, bst_pointing_feasibility *out) {
+    bst_pointing_feasibility_look look, beside;
     BST_TRY(problem->look(problem->user, ctx, seconds, &look));
     double depth;
     *out = BST_REACH_OK;
@@ -105,7 +107,7 @@ bst_status bst_reach_at(bst_ctx *ctx, const bst_reach_problem *problem, double s
         *out = BST_REACH_BEHIND_EARTH;
         return BST_OK;
     }
-    int zone = bst_exclusion_inside(look.zones, look.zone_count, look.direction_gcrf, &depth);
+    int zone = bst_keep_out_inside(look.zones, look.zone_count, look.direction_gcrf, &depth);
     if (zone >= 0) {
         *out = of_zone(look.zones[zone].kind);
         return BST_OK;
@@ -122,14 +124,16 @@ bst_status bst_reach_at(bst_ctx *ctx, const bst_reach_problem *problem, double s
     return BST_OK;
 }
 
-bst_status bst_reach_next(bst_ctx *ctx, const bst_reach_problem *problem, double seconds,
-                          double horizon_s, double step_s, bool wanted, bool *found, double *when_s,
-                          bst_reach *why) {
+bst_status bst_pointing_feasibility_next(bst_ctx *ctx,
+                                         const bst_pointing_feasibility_problem *problem,
+                                         double seconds, double horizon_s, double step_s,
+                                         bool wanted, bool *found, double *when_s,
+                                         bst_pointing_feasibility *why) {
     *found = false;
     double before = seconds;
     for (double at = seconds;; at = fmin(at + step_s, seconds + horizon_s)) {
-        bst_reach reach;
-        BST_TRY(bst_reach_at(ctx, problem, at, &reach));
+        bst_pointing_feasibility reach;
+        BST_TRY(bst_pointing_feasibility_at(ctx, problem, at, &reach));
         if ((reach == BST_REACH_OK) != wanted) {
             if (at >= seconds + horizon_s) {
                 return BST_OK;
@@ -139,8 +143,8 @@ bst_status bst_reach_next(bst_ctx *ctx, const bst_reach_problem *problem, double
         }
         while (at - before > FOUND_TO_S) {
             double middle = 0.5 * (before + at);
-            bst_reach there;
-            BST_TRY(bst_reach_at(ctx, problem, middle, &there));
+            bst_pointing_feasibility there;
+            BST_TRY(bst_pointing_feasibility_at(ctx, problem, middle, &there));
             if ((there == BST_REACH_OK) == wanted) {
                 at = middle;
                 reach = there;
@@ -191,9 +195,10 @@ static void follow(follower *f, const bst_mount_axis *axis, double share, double
 }
 
 /* Angles and rates that the axes head for at a time. */
-static bst_status heading(bst_ctx *ctx, const bst_reach_problem *problem, double seconds,
-                          const follower *now, double to[], bst_vec3 *body, bool *valid) {
-    bst_reach_look look;
+static bst_status heading(bst_ctx *ctx, const bst_pointing_feasibility_problem *problem,
+                          double seconds, const follower *now, double to[], bst_vec3 *body,
+                          bool *valid) {
+    bst_pointing_feasibility_look look;
     double near[BST_MOUNT_AXES];
     BST_TRY(problem->look(problem->user, ctx, seconds, &look));
     for (int i = 0; i < BST_MOUNT_AXES; i++) {
@@ -204,9 +209,11 @@ static bst_status heading(bst_ctx *ctx, const bst_reach_problem *problem, double
     return BST_OK;
 }
 
-bst_status bst_reach_chase(bst_ctx *ctx, const bst_reach_problem *problem, double from_s,
-                           double until_s, double tolerance_rad, bst_reach_loss *losses, int most,
-                           int *count) {
+bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
+                                          const bst_pointing_feasibility_problem *problem,
+                                          double from_s, double until_s, double tolerance_rad,
+                                          bst_pointing_feasibility_loss *losses, int most,
+                                          int *count) {
     const bst_mount_status *mount = problem->mount;
     *count = 0;
     if (!mount || !bst_mount_steers(mount) || has_redundant(mount) || most < 1) {
@@ -246,7 +253,7 @@ bst_status bst_reach_chase(bst_ctx *ctx, const bst_reach_problem *problem, doubl
             double off = bst_vec3_angle(bst_mount_boresight(mount, angle), wanted);
             double t = at + k * CHASE_STEP_S;
             if (off > tolerance_rad && !lost && *count < most) {
-                losses[(*count)++] = (bst_reach_loss){t, INFINITY, off};
+                losses[(*count)++] = (bst_pointing_feasibility_loss){t, INFINITY, off};
                 lost = true;
             } else if (off <= tolerance_rad && lost) {
                 losses[*count - 1].until_s = t;

@@ -6,7 +6,7 @@
 #include "control/guidance/mount_inverse_kinematics.h"
 #include "sim/core/status.h"
 
-typedef enum bst_reach {
+typedef enum bst_pointing_feasibility {
     BST_REACH_OK = 0,
     BST_REACH_NO_CUE,
     BST_REACH_BEHIND_EARTH,
@@ -18,57 +18,65 @@ typedef enum bst_reach {
     BST_REACH_ACCEL,   /* speeding up faster than an axis does */
     BST_REACH_KEYHOLE, /* the same, but only because the pole is near */
     BST_REACH_COUNT
-} bst_reach;
+} bst_pointing_feasibility;
 
 /* "in the keep-out cone of the Sun" for BST_REACH_SUN, and so on. */
-const char *bst_reach_reason(int reach);
+const char *bst_pointing_feasibility_reason(int reach);
 
 /* What is expected at one time. */
-typedef struct bst_reach_look {
+typedef struct bst_pointing_feasibility_look {
     bool valid; /* false: there is no cue then */
     bst_vec3 direction_gcrf;
     double range_m;      /* 0: not known, then nothing is behind the Earth */
     bst_vec3 position_m; /* of the observer, geocentric */
     bst_quat q_body_from_gcrf;
     int zone_count;
-    bst_zone zones[BST_ZONE_KINDS];
-} bst_reach_look;
+    bst_keep_out_zone zones[BST_ZONE_KINDS];
+} bst_pointing_feasibility_look;
 
-typedef bst_status (*bst_reach_fn)(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out);
+typedef bst_status (*bst_pointing_feasibility_fn)(void *user, bst_ctx *ctx, double seconds,
+                                                  bst_pointing_feasibility_look *out);
 
-typedef struct bst_reach_problem {
-    bst_reach_fn look;
+typedef struct bst_pointing_feasibility_problem {
+    bst_pointing_feasibility_fn look;
     void *user;
     const bst_mount_status *mount; /* NULL: one that follows at once */
     double limits_share;           /* of the rate and acceleration limits that may be used */
-} bst_reach_problem;
+} bst_pointing_feasibility_problem;
 
 /* Whether what is expected at a time can be followed there, or the first reason in the order of
- * bst_reach why not. Rates and accelerations of the axes are those of the differences over 0.1 s.
+ * bst_pointing_feasibility why not. Rates and accelerations of the axes are those of the
+ * differences over 0.1 s.
  */
-bst_status bst_reach_at(bst_ctx *ctx, const bst_reach_problem *problem, double seconds,
-                        bst_reach *out) BST_MUST_CHECK;
+bst_status bst_pointing_feasibility_at(bst_ctx *ctx,
+                                       const bst_pointing_feasibility_problem *problem,
+                                       double seconds,
+                                       bst_pointing_feasibility *out) BST_MUST_CHECK;
 
-/* The first time after `seconds` at which bst_reach_at says OK (wanted) or something else (not
- * wanted), to 0.01 s, within horizon_s in steps of step_s: shorter changes may be missed. *found
- * false: none. *why (may be NULL): the reason beyond, when not wanted. */
-bst_status bst_reach_next(bst_ctx *ctx, const bst_reach_problem *problem, double seconds,
-                          double horizon_s, double step_s, bool wanted, bool *found, double *when_s,
-                          bst_reach *why) BST_MUST_CHECK;
+/* The first time after `seconds` at which bst_pointing_feasibility_at says OK (wanted) or something
+ * else (not wanted), to 0.01 s, within horizon_s in steps of step_s: shorter changes may be missed.
+ * *found false: none. *why (may be NULL): the reason beyond, when not wanted. */
+bst_status bst_pointing_feasibility_next(bst_ctx *ctx,
+                                         const bst_pointing_feasibility_problem *problem,
+                                         double seconds, double horizon_s, double step_s,
+                                         bool wanted, bool *found, double *when_s,
+                                         bst_pointing_feasibility *why) BST_MUST_CHECK;
 
 /* A time in which the boresight is off by more than the tolerance. */
-typedef struct bst_reach_loss {
+typedef struct bst_pointing_feasibility_loss {
     double from_s, until_s; /* INFINITY: not by the end */
     double worst_rad;
-} bst_reach_loss;
+} bst_pointing_feasibility_loss;
 
 /* Follows what is expected from from_s to until_s with axes that keep their limits, from perfectly
  * on it: each axis heads for the nearest angle within travel, at full rate, braking at the last
  * moment that 0.8 of the acceleration allow, as the mounts do. What is lost by a keyhole or by
  * limits is lost from, and back at, those times. Ends after `most` losses; finds none for a mount
  * with a redundant axis, which is taken to pass its pole. */
-bst_status bst_reach_chase(bst_ctx *ctx, const bst_reach_problem *problem, double from_s,
-                           double until_s, double tolerance_rad, bst_reach_loss *losses, int most,
-                           int *count) BST_MUST_CHECK;
+bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
+                                          const bst_pointing_feasibility_problem *problem,
+                                          double from_s, double until_s, double tolerance_rad,
+                                          bst_pointing_feasibility_loss *losses, int most,
+                                          int *count) BST_MUST_CHECK;
 
 #endif

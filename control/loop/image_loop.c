@@ -32,7 +32,7 @@ bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
                                   .arrival_s = arrival,
                                   .effect_s = arrival + env->command_latency_s,
                                   .switch_s = arrival + env->command_latency_s};
-    bst_servo_response servo = {.delay_s = env->servo_lag_s};
+    bst_control_servo_response servo = {.delay_s = env->servo_lag_s};
     const bst_tracking_observer none = {.motion_gain = 1.0};
     bst_tracking_loop *plant;
     BST_TRY(bst_tracking_loop_create(ctx, &timing, &servo, NULL, &none, &plant));

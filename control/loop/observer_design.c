@@ -15,7 +15,7 @@ enum { DECADES = 40, HALVINGS = 7 };
 
 static bst_status is_robust(bst_ctx *ctx, const bst_observer_request *r, double density,
                             bool *out) {
-    const bst_servo_response servo = {.delay_s = r->servo_lag_s};
+    const bst_control_servo_response servo = {.delay_s = r->servo_lag_s};
     bst_tracking_observer observer = {.motion_gain = 1.0};
     bst_tracking_observer_gains(density, r->sigma, r->timing.period_s, &observer.alpha,
                                 &observer.beta);

@@ -6,12 +6,12 @@
 #include "sim/dynamics/compensator.h"
 
 /* Response at omega rad/s of a loop with later_s of delay more. */
-typedef double complex (*bst_later_response_fn)(const void *user, double omega_radps,
-                                                double later_s);
+typedef double complex (*bst_stability_delayed_response_fn)(const void *user, double omega_radps,
+                                                            double later_s);
 
 /* An open loop L, negative feedback: closed loop L / (1 + L), sensitivity 1 / (1 + L). */
 typedef struct bst_loop {
-    bst_response_fn open; /* L(exp(j omega dt_s)) at omega rad/s, up to half the rate */
+    bst_dynamics_response_fn open; /* L(exp(j omega dt_s)) at omega rad/s, up to half the rate */
     const void *user;
     double dt_s;    /* sampling interval; for a continuous loop one far shorter than its dynamics */
     double delay_s; /* in L, so that the walk is fine enough for its phase; 0: short */
@@ -21,9 +21,9 @@ typedef struct bst_loop {
     /* Of a loop L = N / D whose unstable poles are not known beforehand: D, where N and D have no
      * poles outside the unit circle and tend to 0 and 1 at infinity. The zeros of D there are then
      * counted, and unstable_poles is not read. NULL: unstable_poles holds. */
-    bst_response_fn denominator;
+    bst_dynamics_response_fn denominator;
     /* L when the plant answers later_s later; NULL: L exp(-j omega later_s). */
-    bst_later_response_fn open_later;
+    bst_stability_delayed_response_fn open_later;
 } bst_loop;
 
 typedef struct bst_loop_margins {
@@ -60,14 +60,14 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop,
  * given on the circle at omega rad/s, with a delay of up to delay_s in it; zeros at z = 1 do not
  * count. By the argument principle, so never negative. BST_ERR_NUMERIC: the function is not finite,
  * is zero on the circle, or has poles outside. */
-bst_status bst_loop_zeros_outside(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
-                                  double delay_s, int *out) BST_MUST_CHECK;
+bst_status bst_loop_zeros_outside(bst_ctx *ctx, bst_dynamics_response_fn of, const void *user,
+                                  double dt_s, double delay_s, int *out) BST_MUST_CHECK;
 
 /* ---- what stability.c and winding.c share ---- */
 
 /* Turns about zero of a function on the unit circle, zeros and poles at z = 1 passed by on the
  * outside: zeros less poles inside. Errors as above. */
-bst_status bst_loop_turns(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
+bst_status bst_loop_turns(bst_ctx *ctx, bst_dynamics_response_fn of, const void *user, double dt_s,
                           double delay_s, int *out) BST_MUST_CHECK;
 
 /* Greatest change of the phase of a delay between two points of a walk, rad: what is more could be

@@ -39,7 +39,7 @@ static bst_status fill(bst_ctx *ctx, deficit *d, const double *source, double si
 }
 
 bst_status bst_tracking_loop_create(bst_ctx *ctx, const bst_tracking_timing *timing,
-                                    const bst_servo_response *servo,
+                                    const bst_control_servo_response *servo,
                                     const bst_compensator *compensator,
                                     const bst_tracking_observer *observer,
                                     bst_tracking_loop **out) {

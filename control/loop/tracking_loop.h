@@ -10,11 +10,11 @@
  * on, to a unit step of the commanded angle, and its lag behind a command that begins to move at a
  * unit rate then (angle asked for minus angle). Both end at rest: step at 1, lag at 0. With count 0
  * the mount does what is asked, delay_s late, and follows rates at once. */
-typedef struct bst_servo_response {
+typedef struct bst_control_servo_response {
     double dt_s, delay_s;
     int count;
     const double *step, *ramp_lag;
-} bst_servo_response;
+} bst_control_servo_response;
 
 typedef struct bst_tracking_timing {
     double period_s, exposure_s;
@@ -37,7 +37,7 @@ typedef struct bst_tracking_loop bst_tracking_loop;
  * correction, or the observer's estimate of d carried along with its rate. Copies the servo's
  * response and the compensator or, where that is NULL, the observer. BST_ERR_MEMORY. */
 bst_status bst_tracking_loop_create(bst_ctx *ctx, const bst_tracking_timing *timing,
-                                    const bst_servo_response *servo,
+                                    const bst_control_servo_response *servo,
                                     const bst_compensator *compensator,
                                     const bst_tracking_observer *observer,
                                     bst_tracking_loop **out) BST_MUST_CHECK;

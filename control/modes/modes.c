@@ -152,7 +152,7 @@ bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
 
 /* Open-loop strategies begin as soon as there is something to aim at. */
 static bst_status start_open_loop(bst_ctx *ctx, bst_control *c, int64_t tick) {
-    bst_cue cue;
+    bst_onboard_cue cue;
     switch (c->config.strategy) {
         case BST_CONTROL_STARE:
             BST_TRY(c->env.cue_at(c->env.cue_user, ctx, c->config.stare_time_s, &cue));
@@ -192,7 +192,7 @@ bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) {
         return bst_control_start_search(ctx, c, BST_MODE_SEARCH, tick,
                                         "there is a region to search");
     }
-    bst_cue cue;
+    bst_onboard_cue cue;
     BST_TRY(bst_control_cue_at(ctx, c, tick, &cue));
     if (cue.valid) {
         c->search_since_tick = tick;

@@ -9,7 +9,8 @@
  * times less, and aims worked out with different telemetry differ by 1e-10. */
 #define SMOOTH_RAD 1e-9
 
-bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_cue *out) {
+bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,
+                              bst_onboard_cue *out) {
     return c->env.cue_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), out);
 }
 
@@ -23,7 +24,7 @@ static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_
                           int64_t tick, bst_vec3 *direction) {
     double dt = (double)(tick - held->tick) / c->env.tick_rate_hz;
     bst_vec3 d = bst_vec3_axpy(held->direction_gcrf, dt, held->rate_gcrf_radps);
-    const bst_cue *then = &held->cue;
+    const bst_onboard_cue *then = &held->cue;
     bool valid;
     bst_vec3 now;
     BST_TRY(cue_direction_at(ctx, c, tick, &valid, &now));
@@ -51,7 +52,7 @@ bool bst_control_moves_with_region(const bst_control *c) {
 bst_status bst_control_expected_rate(bst_ctx *ctx, const bst_control *c, int64_t tick,
                                      bst_vec3 direction, bool *known, bst_vec3 *rate_radps) {
     if (c->env.region.kind == BST_REGION_NONE) {
-        bst_cue cue;
+        bst_onboard_cue cue;
         BST_TRY(bst_control_cue_at(ctx, c, tick, &cue));
         *known = cue.valid;
         *rate_radps = cue.rate_gcrf_radps;
@@ -145,7 +146,7 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
 }
 
 bst_vec3 bst_control_apparent(const bst_control *c, bst_vec3 geometric) {
-    return bst_aberrate(&c->aberration, geometric);
+    return bst_astro_aberrate(&c->aberration, geometric);
 }
 
 void bst_control_forget_aims(bst_control *c) {
@@ -167,12 +168,12 @@ static bool held_in_body(const bst_control *c) {
 
 /* What aberrates a direction at a tick that navigation's telemetry is not of: the observer falls.
  */
-static bst_aberration aberration_at(const bst_control *c, int64_t tick) {
+static bst_astro_aberration aberration_at(const bst_control *c, int64_t tick) {
     const bst_nav_telemetry *nav = &c->nav;
     double dt = fmax(fmin(bst_control_seconds(c, tick - nav->tick), FALL_S), -FALL_S);
     double r = bst_vec3_norm(nav->position_gcrf_m);
     double fall = r > 0.0 ? -BST_EARTH_MU_M3PS2 / (r * r * r) : 0.0;
-    return bst_aberration_of(&(bst_light){
+    return bst_astro_aberration_of(&(bst_astro_light){
         .velocity_mps = bst_vec3_axpy(nav->velocity_bary_mps, dt * fall, nav->position_gcrf_m),
         .sun_m = nav->sun_m});
 }
@@ -202,9 +203,9 @@ static bst_status work_out(bst_ctx *ctx, const bst_control *c, int64_t tick,
     bst_vec3 d = {0.0, 0.0, 0.0};
     BST_TRY(bst_control_aim(ctx, c, tick, &valid, &d));
     if (valid && !held_in_body(c)) { /* else, where the stars are does not matter */
-        bst_aberration aberration = aberration_at(c, tick);
+        bst_astro_aberration aberration = aberration_at(c, tick);
         bst_quat error = bst_control_correction_at(c, tick);
-        d = bst_quat_rotate(error, bst_aberrate(&aberration, d));
+        d = bst_quat_rotate(error, bst_astro_aberrate(&aberration, d));
     }
     keep(c, aimed, tick, valid, d);
     return BST_OK;

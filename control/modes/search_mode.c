@@ -130,7 +130,7 @@ bst_status bst_control_start_search(bst_ctx *ctx, bst_control *c, int mode, int6
     } else {
         double extent = c->config.reacquire_extent_deg * BST_DEG_RAD;
         if (mode == BST_MODE_SEARCH) {
-            bst_cue cue;
+            bst_onboard_cue cue;
             BST_TRY(bst_control_cue_at(ctx, c, tick, &cue));
             extent = fmin(c->config.search_sigmas * (cue.valid ? cue.sigma_rad : 0.0),
                           c->config.search_max_deg * BST_DEG_RAD);
@@ -171,14 +171,14 @@ bst_status bst_control_next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) {
 }
 
 /* Whether a track's brightness may be the cue's. */
-static bool is_bright_enough(const bst_cue *cue, const bst_track *track) {
+static bool is_bright_enough(const bst_onboard_cue *cue, const bst_track *track) {
     return !isfinite(cue->v_mag_sigma) ||
            fabs(track->v_mag - cue->v_mag) <= 4.0 * hypot(cue->v_mag_sigma, 0.3);
 }
 
 bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const bst_tracks *tracks,
                                       const bst_track **out) {
-    bst_cue cue;
+    bst_onboard_cue cue;
     BST_TRY(bst_control_cue_at(ctx, c, tracks->tick, &cue));
     *out = NULL;
     bst_vec3 rate = c->mode == BST_MODE_REACQUIRE ? c->lost.rate_gcrf_radps : cue.rate_gcrf_radps;

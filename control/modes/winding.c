@@ -12,7 +12,7 @@ static const double two_pi = 2.0 * BST_PI;
 #define DEEPEST 30   /* halvings between two points of the grid */
 
 typedef struct curve {
-    bst_response_fn of;
+    bst_dynamics_response_fn of;
     const void *user;
 } curve;
 
@@ -33,7 +33,7 @@ static double turned(const curve *c, double low, double complex a, double high, 
     return turned(c, low, a, middle, m, depth + 1) + turned(c, middle, m, high, b, depth + 1);
 }
 
-bst_status bst_loop_turns(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
+bst_status bst_loop_turns(bst_ctx *ctx, bst_dynamics_response_fn of, const void *user, double dt_s,
                           double delay_s, int *out) {
     const curve c = {of, user};
     double end = BST_PI / dt_s, omega = LOWEST_SHARE * end;
@@ -61,8 +61,8 @@ bst_status bst_loop_turns(bst_ctx *ctx, bst_response_fn of, const void *user, do
     return BST_OK;
 }
 
-bst_status bst_loop_zeros_outside(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
-                                  double delay_s, int *out) {
+bst_status bst_loop_zeros_outside(bst_ctx *ctx, bst_dynamics_response_fn of, const void *user,
+                                  double dt_s, double delay_s, int *out) {
     int turns = 0;
     BST_TRY(bst_loop_turns(ctx, of, user, dt_s, delay_s, &turns));
     *out = -turns;

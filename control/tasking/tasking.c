@@ -195,7 +195,7 @@ static int list_choices(bst_tasking *t, int sensor, double now_s) {
 /* Whether the sensor sees an object from its arrival to the last frame wanted. */
 static bst_status sees(bst_ctx *ctx, const bst_tasking *t, int sensor,
                        const bst_tasking_choice *choice, double now_s, bst_tasking_why *why,
-                       bst_sight *first, double *snr) {
+                       bst_world_sight *first, double *snr) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     double from_s = now_s + choice->slew_s + t->config.settle_s;
     double until_s = from_s + (double)line_of(t, choice->object)->frames * s->period_s, worst;
@@ -208,7 +208,7 @@ static bst_status sees(bst_ctx *ctx, const bst_tasking *t, int sensor,
 }
 
 static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
-                 const bst_tasking_choice *choice, const bst_sight *sight, double snr) {
+                 const bst_tasking_choice *choice, const bst_world_sight *sight, double snr) {
     const bst_tasking_config *c = &t->config;
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick);
@@ -233,7 +233,7 @@ static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
 
 /* The best that the sensor can see, -1: none. */
 static bst_status choose(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s, int *chosen,
-                         bst_sight *sight, double *snr) {
+                         bst_world_sight *sight, double *snr) {
     int count = list_choices(t, sensor, now_s);
     *chosen = -1;
     for (int i = 0; i < count && i < TRIES && *chosen < 0; i++) {
@@ -271,7 +271,7 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick), snr = 0.0;
     bst_task_end before = BST_TASK_NONE;
-    bst_sight sight;
+    bst_world_sight sight;
     int chosen;
     if (s->task.object >= 0) {
         before = ending(t, s, now_s);

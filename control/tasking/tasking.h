@@ -64,7 +64,7 @@ typedef struct bst_tasking_sensor {
     bool nav_known, mount_known;
     bst_nav_telemetry nav;
     bst_mount_status mount;
-    bst_zone zones[BST_ZONE_KINDS]; /* at the last nav */
+    bst_keep_out_zone zones[BST_ZONE_KINDS]; /* at the last nav */
     double zone_cosines[BST_ZONE_KINDS];
     int zone_count;
     /* the task */
@@ -126,7 +126,7 @@ int64_t bst_tasking_quiet_until(const bst_tasking *tasking, int sensor);
 /* Whether an object can be seen by a sensor at a time, by what is known; *sight (may be NULL) and
  * *snr of a frame as far as they were worked out. */
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *tasking, int sensor, int object,
-                            double seconds, bst_tasking_why *why, bst_sight *sight,
+                            double seconds, bst_tasking_why *why, bst_world_sight *sight,
                             double *snr) BST_MUST_CHECK;
 
 /* Looks from all sensors at all targets of the list. */

@@ -19,16 +19,16 @@ const char *bst_tasking_reason(int why) {
 }
 
 static int zones_at(const bst_tasking_config *c, bst_vec3 position_m, bst_vec3 to_sun,
-                    bst_vec3 to_moon, bst_zone zones[BST_ZONE_KINDS]) {
-    bst_exclusion exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
-                               .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,
-                               .earth = true,
-                               .earth_limb_rad = c->earth_limb_keep_out_deg * BST_DEG_RAD,
-                               .limb_altitude_m = 1e3 * c->earth_limb_altitude_km};
-    return bst_exclusion_zones(&exclusion, position_m, to_sun, to_moon, zones);
+                    bst_vec3 to_moon, bst_keep_out_zone zones[BST_ZONE_KINDS]) {
+    bst_keep_out exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
+                              .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,
+                              .earth = true,
+                              .earth_limb_rad = c->earth_limb_keep_out_deg * BST_DEG_RAD,
+                              .limb_altitude_m = 1e3 * c->earth_limb_altitude_km};
+    return bst_keep_out_zones(&exclusion, position_m, to_sun, to_moon, zones);
 }
 
-static void cosines_of(const bst_zone *zones, int count, double cosines[BST_ZONE_KINDS]) {
+static void cosines_of(const bst_keep_out_zone *zones, int count, double cosines[BST_ZONE_KINDS]) {
     for (int i = 0; i < count; i++) {
         cosines[i] = cos(zones[i].half_angle_rad);
     }
@@ -50,7 +50,7 @@ void bst_tasking_telemetry(bst_tasking *t, int sensor, const bst_nav_telemetry *
     }
 }
 
-static bst_tasking_why zone_reason(const bst_zone *zones, const double *cosines, int count,
+static bst_tasking_why zone_reason(const bst_keep_out_zone *zones, const double *cosines, int count,
                                    bst_vec3 direction) {
     static const bst_tasking_why reasons[BST_ZONE_KINDS] = {[BST_ZONE_SUN] = BST_WHY_SUN,
                                                             [BST_ZONE_MOON] = BST_WHY_MOON,
@@ -72,29 +72,30 @@ bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *s, bst_vec3 place_m
     bst_tasking_why why = zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
     if (why == BST_WHY_NOT) {
         bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
-        why = bst_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5 ? BST_WHY_NOT
-                                                                           : BST_WHY_SHADOW;
+        why = bst_astro_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5 ? BST_WHY_NOT
+                                                                                 : BST_WHY_SHADOW;
     }
     return why;
 }
 
-/* For bst_reach_at. */
+/* For bst_pointing_feasibility_at. */
 typedef struct reach_user {
     const bst_tasking *tasking;
     const bst_tasking_sensor *sensor;
     int object;
 } reach_user;
 
-static bst_status reach_look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+static bst_status reach_look(void *user, bst_ctx *ctx, double seconds,
+                             bst_pointing_feasibility_look *out) {
     const reach_user *r = user;
-    bst_state eye;
+    bst_world_state eye;
     bst_bodies bodies;
-    bst_sight sight;
+    bst_world_sight sight;
     BST_TRY(bst_knowledge_eye_at(ctx, r->sensor->view, seconds, &eye, &bodies));
     BST_TRY(bst_knowledge_sight_at(ctx, r->sensor->view, r->object, seconds, &sight));
     double dt = seconds - (double)r->sensor->mount.tick / r->tasking->tick_rate_hz;
     bst_quat turn = bst_quat_from_rotvec(bst_vec3_scale(r->sensor->mount.rate_body_radps, -dt));
-    *out = (bst_reach_look){
+    *out = (bst_pointing_feasibility_look){
         .valid = true,
         .direction_gcrf = sight.apparent,
         .position_m = eye.position_m,
@@ -109,21 +110,22 @@ static bst_status mount_reaches(bst_ctx *ctx, const bst_tasking *t, const bst_ta
         return BST_OK;
     }
     reach_user user = {t, s, object};
-    bst_reach_problem problem = {
+    bst_pointing_feasibility_problem problem = {
         .look = reach_look, .user = &user, .mount = &s->mount, .limits_share = 0.9};
-    bst_reach reach;
-    BST_TRY(bst_reach_at(ctx, &problem, seconds, &reach));
+    bst_pointing_feasibility reach;
+    BST_TRY(bst_pointing_feasibility_at(ctx, &problem, seconds, &reach));
     *reached = reach == BST_REACH_OK;
     return BST_OK;
 }
 
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
-                            double seconds, bst_tasking_why *why, bst_sight *sight, double *snr) {
+                            double seconds, bst_tasking_why *why, bst_world_sight *sight,
+                            double *snr) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const double step_s = 1.0; /* over which the rate is taken */
     bst_ctx quiet = {0};       /* an orbit that has ended is no error here */
-    bst_sight now, later;
-    bst_state eye;
+    bst_world_sight now, later;
+    bst_world_state eye;
     bst_bodies bodies;
     *snr = 0.0;
     if (bst_knowledge_is_itself(s->knowledge, object)) {
@@ -139,7 +141,7 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     if (sight) {
         *sight = now;
     }
-    bst_zone zones[BST_ZONE_KINDS];
+    bst_keep_out_zone zones[BST_ZONE_KINDS];
     int count = zones_at(&t->config, eye.position_m, bst_vec3_sub(bodies.sun_m, eye.position_m),
                          bst_vec3_sub(bodies.moon_m, eye.position_m), zones);
     double cosines[BST_ZONE_KINDS];
@@ -151,7 +153,7 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
         return BST_OK;
     }
     const bst_camera *camera = bst_knowledge_camera(s->knowledge);
-    double electrons = bst_glow_electrons_per_s(camera, &now.glow, NULL) * s->exposure_s;
+    double electrons = bst_scene_glow_electrons_per_s(camera, &now.glow, NULL) * s->exposure_s;
     *snr = electrons / (s->noise_e * sqrt(s->pixels));
     bool reached = true;
     if (*snr < t->config.min_snr) {
@@ -171,7 +173,7 @@ void bst_tasking_noise(bst_tasking_sensor *s) {
     double sigma2 = bst_camera_psf_sigma_px(camera) * bst_camera_psf_sigma_px(camera) + 1.0 / 12.0;
     double light = bst_camera_background_e_per_s(camera) + bst_camera_dark_e_per_s(camera);
     s->noise_e = sqrt(light * s->exposure_s + camera->read_noise_e * camera->read_noise_e);
-    s->pixels = 1.0 / bst_image_squared(sqrt(sigma2), sqrt(sigma2), 0.0);
+    s->pixels = 1.0 / bst_optics_image_squared(sqrt(sigma2), sqrt(sigma2), 0.0);
 }
 
 bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,

@@ -7,7 +7,7 @@
 
 typedef struct bst_jitter_more {
     bool has_noise[2];
-    bst_noise noise[2]; /* low, high */
+    bst_jitter_noise noise[2]; /* low, high */
     double y_factor;
     int lines;
     int64_t index; /* of the step that the phasors stand at; -1: none */

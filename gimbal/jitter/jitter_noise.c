@@ -9,13 +9,13 @@ enum { N = BST_NOISE_POINTS, HALF = N / 2 };
 
 #define NODES_PER_PERIOD 20.0
 
-void bst_noise_init(bst_noise *noise, const bst_density *density, double top_hz, double dt_s,
-                    bst_rng_key key) {
+void bst_jitter_noise_init(bst_jitter_noise *noise, const bst_jitter_density *density,
+                           double top_hz, double dt_s, bst_rng_key key) {
     memset(noise, 0, sizeof *noise);
     noise->key = key;
     noise->dt_s = dt_s;
     noise->stride = 1;
-    double top = fmin(top_hz, bst_density_top_hz(density));
+    double top = fmin(top_hz, bst_jitter_density_top_hz(density));
     while (top > 0.0 && NODES_PER_PERIOD * top * dt_s * 2.0 * (double)noise->stride <= 1.0 &&
            noise->stride < ((int64_t)1 << 40)) {
         noise->stride *= 2;
@@ -23,7 +23,7 @@ void bst_noise_init(bst_noise *noise, const bst_density *density, double top_hz,
     double bin_hz = 1.0 / (N * dt_s * (double)noise->stride);
     for (int k = 0; k < HALF; k++) {
         double low = fmax(0.0, (k - 0.5) * bin_hz), high = fmin(top_hz, (k + 0.5) * bin_hz);
-        double share = high > low ? bst_density_integral(density, low, high) : 0.0;
+        double share = high > low ? bst_jitter_density_integral(density, low, high) : 0.0;
         /* bin 0 is one bin of both signs */
         noise->gain[k] = sqrt(k == 0 ? 2.0 * share : share) * sqrt(0.5);
         noise->lines = share > 0.0 ? k : noise->lines;
@@ -48,7 +48,7 @@ static unsigned reversed(unsigned i) {
 }
 
 /* Sum of x[k] exp(2 pi i j k / N), input in bit-reversed order (Cooley and Tukey, radix 2). */
-static void transform(const bst_noise *noise, double *re, double *im) {
+static void transform(const bst_jitter_noise *noise, double *re, double *im) {
     for (int span = 1; span < N; span *= 2) {
         int skip = HALF / span;
         for (int from = 0; from < N; from += 2 * span) {
@@ -65,7 +65,7 @@ static void transform(const bst_noise *noise, double *re, double *im) {
     }
 }
 
-static void make_block(bst_noise *noise, int64_t block) {
+static void make_block(bst_jitter_noise *noise, int64_t block) {
     int slot = (int)(block & 1);
     double *re = noise->x[slot], *im = noise->y[slot];
     memset(re, 0, sizeof noise->x[slot]);
@@ -86,8 +86,8 @@ static void make_block(bst_noise *noise, int64_t block) {
 }
 
 /* The sequence at a node; block b begins at node b * HALF. Nodes before the first are in block 0
- * alone; they are never asked for at its beginning (bst_noise_at). */
-static void node(bst_noise *noise, int64_t at, double out[2]) {
+ * alone; they are never asked for at its beginning (bst_jitter_noise_at). */
+static void node(bst_jitter_noise *noise, int64_t at, double out[2]) {
     int64_t block = at / HALF;
     int i = (int)(at % HALF);
     out[0] = out[1] = 0.0;
@@ -103,7 +103,7 @@ static void node(bst_noise *noise, int64_t at, double out[2]) {
     }
 }
 
-void bst_noise_at(bst_noise *noise, int64_t n, double out[2]) {
+void bst_jitter_noise_at(bst_jitter_noise *noise, int64_t n, double out[2]) {
     /* from the second block on, so that each node lies in two, and nodes before it exist */
     int64_t first = HALF + 2;
     if (noise->stride == 1) {

@@ -17,7 +17,7 @@ enum { BST_NOISE_POINTS = 2048 };
  * the steps' rate has a node only every `stride` steps (a power of two, at least 20 nodes in the
  * fastest period) and a cubic through four of them between; block and node are functions of the
  * step's number and the key alone. */
-typedef struct bst_noise {
+typedef struct bst_jitter_noise {
     bst_rng_key key;
     double dt_s;
     int64_t stride;
@@ -28,13 +28,13 @@ typedef struct bst_noise {
     double x[2][BST_NOISE_POINTS], y[2][BST_NOISE_POINTS];
     int64_t interval; /* between which nodes the cubic goes; -1: none */
     double cubic[2][4];
-} bst_noise;
+} bst_jitter_noise;
 
 /* density: of each axis, in squares of the output's unit. What lies above top_hz is left out. */
-void bst_noise_init(bst_noise *noise, const bst_density *density, double top_hz, double dt_s,
-                    bst_rng_key key);
+void bst_jitter_noise_init(bst_jitter_noise *noise, const bst_jitter_density *density,
+                           double top_hz, double dt_s, bst_rng_key key);
 
 /* Values at step n >= 0, in any order; in turn is fast. */
-void bst_noise_at(bst_noise *noise, int64_t n, double out[2]);
+void bst_jitter_noise_at(bst_jitter_noise *noise, int64_t n, double out[2]);
 
 #endif

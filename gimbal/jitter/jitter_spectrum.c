@@ -10,9 +10,9 @@
 
 /* One band's table: inline or of a file, scaled; owned by *out. */
 static bst_status take_table(bst_ctx *ctx, const char *key, const bst_config_list *list,
-                             const char *file, double scale, bst_density *out) {
-    *out = (bst_density){NULL, 0};
-    bst_density_point *points = NULL;
+                             const char *file, double scale, bst_jitter_density *out) {
+    *out = (bst_jitter_density){NULL, 0};
+    bst_jitter_density_point *points = NULL;
     int count = list->count;
     if (*file && list->count > 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -20,7 +20,7 @@ static bst_status take_table(bst_ctx *ctx, const char *key, const bst_config_lis
                         key, key);
     }
     if (*file) {
-        BST_TRY(bst_density_load(ctx, file, &points, &count));
+        BST_TRY(bst_jitter_density_load(ctx, file, &points, &count));
     } else if (count > 0) {
         points = malloc((size_t)count * sizeof *points);
         if (!points) {
@@ -32,8 +32,8 @@ static bst_status take_table(bst_ctx *ctx, const char *key, const bst_config_lis
     }
     char what[600];
     snprintf(what, sizeof what, "%s%s", *file ? "" : "platform/jitter_psd/", *file ? file : key);
-    bst_density density = {points, count};
-    bst_status status = bst_density_check(ctx, what, &density);
+    bst_jitter_density density = {points, count};
+    bst_status status = bst_jitter_density_check(ctx, what, &density);
     if (status != BST_OK) {
         free(points);
         return status;
@@ -79,7 +79,7 @@ bst_status bst_jitter_spectrum_create(bst_ctx *ctx, const bst_jitter_spec *flat,
 void bst_jitter_spectrum_free(bst_jitter_spectrum *s) {
     free((void *)(uintptr_t)s->low.points);
     free((void *)(uintptr_t)s->high.points);
-    s->low = s->high = (bst_density){NULL, 0};
+    s->low = s->high = (bst_jitter_density){NULL, 0};
 }
 
 bool bst_jitter_spectrum_is_more(const bst_jitter_spectrum *s) {
@@ -94,8 +94,8 @@ static double flat_integral(double rms, double min_hz, double max_hz, double low
 
 double bst_jitter_spectrum_at(const bst_jitter_spectrum *s, int axis, double f) {
     const bst_jitter_spec *flat = &s->flat;
-    double sum =
-        (axis == 1 ? s->y_scale : 1.0) * (bst_density_at(&s->low, f) + bst_density_at(&s->high, f));
+    double sum = (axis == 1 ? s->y_scale : 1.0) *
+                 (bst_jitter_density_at(&s->low, f) + bst_jitter_density_at(&s->high, f));
     if (f <= flat->low_cutoff_hz && flat->low_cutoff_hz > 0.0) {
         sum += 0.5 * flat->low_rms_rad * flat->low_rms_rad / flat->low_cutoff_hz;
     }
@@ -112,8 +112,9 @@ double bst_jitter_spectrum_variance(const bst_jitter_spectrum *s, int axis, doub
     double sum =
         flat_integral(flat->low_rms_rad, 0.0, flat->low_cutoff_hz, low_hz, high_hz) +
         flat_integral(flat->high_rms_rad, flat->high_min_hz, flat->high_max_hz, low_hz, high_hz);
-    sum += (axis == 1 ? s->y_scale : 1.0) * (bst_density_integral(&s->low, low_hz, high_hz) +
-                                             bst_density_integral(&s->high, low_hz, high_hz));
+    sum +=
+        (axis == 1 ? s->y_scale : 1.0) * (bst_jitter_density_integral(&s->low, low_hz, high_hz) +
+                                          bst_jitter_density_integral(&s->high, low_hz, high_hz));
     for (int i = 0; i < s->line_count; i++) {
         const bst_jitter_line *l = &s->line[i];
         if (l->axis == axis && l->frequency_hz >= low_hz && l->frequency_hz <= high_hz) {
@@ -125,15 +126,15 @@ double bst_jitter_spectrum_variance(const bst_jitter_spectrum *s, int axis, doub
 
 /* Of a table about x: share (1 - cos(2 pi f dt)) / 3 up to the highest resolved frequency, all
  * beyond; in narrow strips, a density's integral times the share at the middle. */
-static double lacking(const bst_density *density, double dt_s) {
+static double lacking(const bst_jitter_density *density, double dt_s) {
     enum { STRIPS = 4096 };
-    double top = fmin(BST_JITTER_RESOLVED / dt_s, bst_density_top_hz(density)), sum = 0.0;
+    double top = fmin(BST_JITTER_RESOLVED / dt_s, bst_jitter_density_top_hz(density)), sum = 0.0;
     for (int i = 0; i < STRIPS; i++) {
         double low = top * i / STRIPS, high = top * (i + 1) / STRIPS;
         double share = (1.0 - cos(BST_PI * (low + high) * dt_s)) / 3.0;
-        sum += share * bst_density_integral(density, low, high);
+        sum += share * bst_jitter_density_integral(density, low, high);
     }
-    return sum + bst_density_integral(density, top, INFINITY);
+    return sum + bst_jitter_density_integral(density, top, INFINITY);
 }
 
 double bst_jitter_spectrum_unresolved_rad2(const bst_jitter_spectrum *s, double dt_s) {
@@ -157,12 +158,12 @@ bst_status bst_jitter_add(bst_ctx *ctx, bst_jitter *jitter, const bst_jitter_spe
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for jitter");
     }
     double dt_s = jitter->dt_s, top = BST_JITTER_RESOLVED / dt_s;
-    const bst_density *tables[2] = {&spectrum->low, &spectrum->high};
+    const bst_jitter_density *tables[2] = {&spectrum->low, &spectrum->high};
     for (int t = 0; t < 2; t++) {
         more->has_noise[t] = tables[t]->count > 0;
         /* two streams from one key: words of the same counter under another key */
         bst_rng_key own = {{key.k[0] ^ (0x9E3779B9u * (uint32_t)(t + 1)), key.k[1]}};
-        bst_noise_init(&more->noise[t], tables[t], top, dt_s, own);
+        bst_jitter_noise_init(&more->noise[t], tables[t], top, dt_s, own);
     }
     more->y_factor = sqrt(spectrum->y_scale);
     more->index = -1;
@@ -218,7 +219,7 @@ void bst_jitter_more_at(bst_jitter_more *m, int64_t n, double dt_s, double out[2
     for (int t = 0; t < 2; t++) {
         if (m->has_noise[t]) {
             double v[2];
-            bst_noise_at(&m->noise[t], n, v);
+            bst_jitter_noise_at(&m->noise[t], n, v);
             out[0] += v[0];
             out[1] += m->y_factor * v[1];
         }

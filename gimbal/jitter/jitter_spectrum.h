@@ -15,16 +15,16 @@ typedef struct bst_jitter_line {
 } bst_jitter_line;
 
 typedef struct bst_jitter_spectrum {
-    bst_jitter_spec flat;  /* the flat bands */
-    bst_density low, high; /* about x, rad^2/Hz; their points are owned */
-    double y_scale;        /* density of the tables about y over that about x */
+    bst_jitter_spec flat;         /* the flat bands */
+    bst_jitter_density low, high; /* about x, rad^2/Hz; their points are owned */
+    double y_scale;               /* density of the tables about y over that about x */
     int line_count;
     bst_jitter_line line[BST_JITTER_SPECTRUM_LINES];
 } bst_jitter_spectrum;
 
 /* From the flat bands and a "jitter_psd" block; pixel_rad: angle of a pixel. BST_ERR_CONFIG with
- * the key for tables that are none, or given twice; errors of bst_density_load. On failure nothing
- * is owned. */
+ * the key for tables that are none, or given twice; errors of bst_jitter_density_load. On failure
+ * nothing is owned. */
 bst_status bst_jitter_spectrum_create(bst_ctx *ctx, const bst_jitter_spec *flat,
                                       const bst_jitter_psd_config *config, double pixel_rad,
                                       bst_jitter_spectrum *out) BST_MUST_CHECK;

@@ -8,7 +8,7 @@
 
 #define MOST_POINTS 100000
 
-#define D bst_density_point
+#define D bst_jitter_density_point
 static const bst_config_desc point_table[] = {
     BST_REAL(D, frequency_hz, "Hz", 0, 1e6, NULL, "Frequency of this point."),
     BST_REAL(D, psd, "", 0, 1e12, NULL, "One-sided density there, unit^2/Hz, per axis."),
@@ -30,10 +30,11 @@ static const char *const unit_names[] = {"px", "arcsec", NULL};
 #define P bst_jitter_psd_config
 const bst_config_desc bst_jitter_psd_config_table[] = {
     BST_ENUM(P, unit, unit_names, "\"px\"", "Unit of the tables (squared, per Hz) and lines."),
-    BST_LIST(P, low, bst_density_point, point_table, 0, 10000, "[]",
+    BST_LIST(P, low, bst_jitter_density_point, point_table, 0, 10000, "[]",
              "Table of the low band: points by rising frequency, straight in the logarithms "
              "between; both bands add up."),
-    BST_LIST(P, high, bst_density_point, point_table, 0, 10000, "[]", "Table of the high band."),
+    BST_LIST(P, high, bst_jitter_density_point, point_table, 0, 10000, "[]",
+             "Table of the high band."),
     BST_PATH(P, low_file, "\"\"",
              "File with the low band's table instead: frequency in Hz and density a line."),
     BST_PATH(P, high_file, "\"\"", "File with the high band's table instead."),
@@ -43,7 +44,7 @@ const bst_config_desc bst_jitter_psd_config_table[] = {
 #undef P
 
 /* The segment from point i to the next at a frequency in it. */
-static double segment_at(const bst_density_point *p, double f) {
+static double segment_at(const bst_jitter_density_point *p, double f) {
     double f1 = p[0].frequency_hz, f2 = p[1].frequency_hz, s1 = p[0].psd, s2 = p[1].psd;
     if (s1 > 0.0 && s2 > 0.0 && f1 > 0.0) {
         return s1 * pow(f / f1, log(s2 / s1) / log(f2 / f1));
@@ -51,7 +52,7 @@ static double segment_at(const bst_density_point *p, double f) {
     return s1 + (s2 - s1) * (f - f1) / (f2 - f1);
 }
 
-static double segment_integral(const bst_density_point *p, double low, double high) {
+static double segment_integral(const bst_jitter_density_point *p, double low, double high) {
     double f1 = p[0].frequency_hz, f2 = p[1].frequency_hz, s1 = p[0].psd, s2 = p[1].psd;
     double at_low = segment_at(p, low);
     if (s1 > 0.0 && s2 > 0.0 && f1 > 0.0) {
@@ -63,7 +64,7 @@ static double segment_integral(const bst_density_point *p, double low, double hi
     return 0.5 * (at_low + segment_at(p, high)) * (high - low);
 }
 
-double bst_density_at(const bst_density *d, double f) {
+double bst_jitter_density_at(const bst_jitter_density *d, double f) {
     for (int i = 0; i + 1 < d->count; i++) {
         if (f >= d->points[i].frequency_hz && f <= d->points[i + 1].frequency_hz) {
             return segment_at(&d->points[i], f);
@@ -72,7 +73,7 @@ double bst_density_at(const bst_density *d, double f) {
     return 0.0;
 }
 
-double bst_density_integral(const bst_density *d, double low_hz, double high_hz) {
+double bst_jitter_density_integral(const bst_jitter_density *d, double low_hz, double high_hz) {
     double sum = 0.0;
     for (int i = 0; i + 1 < d->count; i++) {
         double low = fmax(low_hz, d->points[i].frequency_hz);
@@ -84,17 +85,17 @@ double bst_density_integral(const bst_density *d, double low_hz, double high_hz)
     return sum;
 }
 
-double bst_density_top_hz(const bst_density *d) {
+double bst_jitter_density_top_hz(const bst_jitter_density *d) {
     return d->count > 0 ? d->points[d->count - 1].frequency_hz : 0.0;
 }
 
-bst_status bst_density_check(bst_ctx *ctx, const char *what, const bst_density *d) {
+bst_status bst_jitter_density_check(bst_ctx *ctx, const char *what, const bst_jitter_density *d) {
     if (d->count < 2) {
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: %d points make no density; give at least two",
                         what, d->count);
     }
     for (int i = 0; i < d->count; i++) {
-        const bst_density_point *p = &d->points[i];
+        const bst_jitter_density_point *p = &d->points[i];
         if (!(p->frequency_hz >= 0.0) || !(p->psd >= 0.0) || !isfinite(p->frequency_hz) ||
             !isfinite(p->psd)) {
             return bst_fail(ctx, BST_ERR_CONFIG,
@@ -130,8 +131,8 @@ static int parse_line(char *line, double out[2]) {
     return at[strspn(at, " \t")] == '\0' ? 2 : -1;
 }
 
-bst_status bst_density_load(bst_ctx *ctx, const char *path, bst_density_point **points,
-                            int *count) {
+bst_status bst_jitter_density_load(bst_ctx *ctx, const char *path,
+                                   bst_jitter_density_point **points, int *count) {
     char *text;
     size_t bytes;
     *points = NULL;
@@ -143,7 +144,7 @@ bst_status bst_density_load(bst_ctx *ctx, const char *path, bst_density_point **
     for (size_t i = 0; i < bytes; i++) {
         lines += text[i] == '\n';
     }
-    bst_density_point *list = NULL;
+    bst_jitter_density_point *list = NULL;
     if (status == BST_OK && lines > MOST_POINTS) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%s: more than %d lines", path, MOST_POINTS);
     }
@@ -164,7 +165,7 @@ bst_status bst_density_load(bst_ctx *ctx, const char *path, bst_density_point **
                 bst_fail(ctx, BST_ERR_FORMAT,
                          "%s: line %d: \"%.40s\" is not a frequency and a density", path, n, line);
         } else if (numbers == 2) {
-            list[found++] = (bst_density_point){pair[0], pair[1]};
+            list[found++] = (bst_jitter_density_point){pair[0], pair[1]};
         }
         line = next;
     }

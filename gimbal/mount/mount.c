@@ -229,12 +229,12 @@ static void integrate(bst_mount *m, const double torque_nm[M], bst_vec3 rate_bod
     if (m->steps > 0) {
         bst_vec3 momentum = {0, 0, 0};
         if (m->want_reaction) {
-            momentum = bst_chain_momentum(&m->joints.chain, &m->joints.state, before);
+            momentum = bst_mount_chain_momentum(&m->joints.chain, &m->joints.state, before);
         }
-        bst_joints_step(&m->joints, m->dt_s, torque_nm, before, rate);
+        bst_mount_joints_step(&m->joints, m->dt_s, torque_nm, before, rate);
         if (m->want_reaction) {
             /* the mount gains what the body loses: dH/dt in inertial space */
-            bst_vec3 after = bst_chain_momentum(&m->joints.chain, &m->joints.state, rate);
+            bst_vec3 after = bst_mount_chain_momentum(&m->joints.chain, &m->joints.state, rate);
             bst_vec3 gain = bst_vec3_scale(bst_vec3_sub(after, momentum), 1.0 / m->dt_s);
             gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(before, momentum));
             gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(rate, after));
@@ -298,7 +298,7 @@ static void watch(bst_mount *m, bst_mount_servo *servo, double error_rad) {
  * from the encoders. */
 static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_body, int64_t n) {
     double asked[M] = {0.0}, s[M], c[M];
-    bst_chain_state at = {{0.0}, {0.0}, {0.0}, {0.0}};
+    bst_mount_chain_state at = {{0.0}, {0.0}, {0.0}, {0.0}};
     int64_t newest = n + m->delay_steps + 1;
     m->limited = wanted->out_of_travel;
     double accel[M];
@@ -318,9 +318,9 @@ static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_
         m->servo[k].ring_radps[slot] = shaper->reference_radps;
         m->limited = m->limited || shaper->limited;
     }
-    bst_chain_base base = {bst_mount_swap(m->type, believed_rate_body), {0, 0, 0}};
-    bst_chain_equations eq;
-    bst_chain_equations_at(&m->model, &at, s, c, &base, &eq);
+    bst_mount_chain_base base = {bst_mount_swap(m->type, believed_rate_body), {0, 0, 0}};
+    bst_mount_chain_equations eq;
+    bst_mount_chain_equations_at(&m->model, &at, s, c, &base, &eq);
     for (int k = 0; k < m->axes; k++) {
         bst_mount_servo *servo = &m->servo[k];
         double error = servo->ring_rad[n % (BST_MOUNT_DELAYS + 1)] - servo->unwrapped_rad;
@@ -331,7 +331,7 @@ static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_
     }
     for (int k = 0; k < m->axes; k++) {
         bst_mount_servo *servo = &m->servo[k];
-        const bst_joint *joint = &m->joints.joint[k];
+        const bst_mount_joint *joint = &m->joints.joint[k];
         double rate = at.rate_radps[k];
         double torque =
             m->feed_model * (eq.bias_nm[k] + joint->viscous_nms * rate +

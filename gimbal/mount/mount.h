@@ -37,8 +37,8 @@ typedef struct bst_mount_body {
 typedef struct bst_mount {
     int type; /* bst_mount_type */
     int axes;
-    bst_joints joints;
-    bst_chain model; /* as the servo knows it: rigid */
+    bst_mount_joints joints;
+    bst_mount_chain model; /* as the servo knows it: rigid */
     bst_mount_servo servo[BST_MOUNT_MOST];
     double sight_share[BST_MOUNT_MOST]; /* of the flex angles */
     double encoder_step_rad, encoder_noise_rad, settle_tolerance_rad;

@@ -48,9 +48,11 @@ static inline void add_outward(int k, double to[6], const double j[6], double s,
     }
 }
 
-void bst_chain_equations_at(const bst_chain *chain, const bst_chain_state *state,
-                            const double sine[BST_CHAIN_MOST], const double cosine[BST_CHAIN_MOST],
-                            const bst_chain_base *base, bst_chain_equations *out) {
+void bst_mount_chain_equations_at(const bst_mount_chain *chain, const bst_mount_chain_state *state,
+                                  const double sine[BST_CHAIN_MOST],
+                                  const double cosine[BST_CHAIN_MOST],
+                                  const bst_mount_chain_base *base,
+                                  bst_mount_chain_equations *out) {
     int n = chain->stages;
     bst_vec3 rate = base->rate_radps, accel = base->accel_radps2, force[BST_CHAIN_MOST];
     double stiff[BST_CHAIN_MOST][6]; /* composite, without what hangs on the springs */
@@ -92,8 +94,8 @@ void bst_chain_equations_at(const bst_chain *chain, const bst_chain_state *state
     }
 }
 
-bst_vec3 bst_chain_momentum(const bst_chain *chain, const bst_chain_state *state,
-                            bst_vec3 base_rate_radps) {
+bst_vec3 bst_mount_chain_momentum(const bst_mount_chain *chain, const bst_mount_chain_state *state,
+                                  bst_vec3 base_rate_radps) {
     bst_vec3 rate = base_rate_radps, momentum[BST_CHAIN_MOST];
     double s[BST_CHAIN_MOST], c[BST_CHAIN_MOST];
     for (int k = 0; k < chain->stages; k++) {
@@ -109,8 +111,8 @@ bst_vec3 bst_chain_momentum(const bst_chain *chain, const bst_chain_state *state
     return outward(0, momentum[0], s[0], c[0]);
 }
 
-double bst_chain_energy(const bst_chain *chain, const bst_chain_state *state,
-                        bst_vec3 base_rate_radps) {
+double bst_mount_chain_energy(const bst_mount_chain *chain, const bst_mount_chain_state *state,
+                              bst_vec3 base_rate_radps) {
     bst_vec3 rate = base_rate_radps;
     double energy = 0.0;
     for (int k = 0; k < chain->stages; k++) {
@@ -124,8 +126,8 @@ double bst_chain_energy(const bst_chain *chain, const bst_chain_state *state,
     return energy;
 }
 
-void bst_chain_locked_inertia(const bst_chain *chain, const double angle_rad[BST_CHAIN_MOST],
-                              double out[6]) {
+void bst_mount_chain_locked_inertia(const bst_mount_chain *chain,
+                                    const double angle_rad[BST_CHAIN_MOST], double out[6]) {
     double sum[6] = {0.0};
     for (int k = chain->stages - 1; k >= 0; k--) {
         double here[6], turned[6] = {0.0};

@@ -141,12 +141,12 @@ static bool is_inertia(const double j[6]) {
 }
 
 static bst_status put_flexible(bst_ctx *ctx, const bst_mount_flexible_config *f, double dt_s,
-                               bst_chain *chain) {
+                               bst_mount_chain *chain) {
     static const double zero[BST_CHAIN_MOST] = {0.0}, one[BST_CHAIN_MOST] = {1.0, 1.0, 1.0};
-    bst_chain_state still = {{0.0}, {0.0}, {0.0}, {0.0}};
-    bst_chain_base base = {{0, 0, 0}, {0, 0, 0}};
-    bst_chain_equations eq;
-    bst_chain_equations_at(chain, &still, zero, one, &base, &eq);
+    bst_mount_chain_state still = {{0.0}, {0.0}, {0.0}, {0.0}};
+    bst_mount_chain_base base = {{0, 0, 0}, {0, 0, 0}};
+    bst_mount_chain_equations eq;
+    bst_mount_chain_equations_at(chain, &still, zero, one, &base, &eq);
     for (int k = 0; k < chain->stages; k++) {
         if (f->frequency_hz[k] <= 0.0) {
             continue;
@@ -179,9 +179,9 @@ static bst_status put_flexible(bst_ctx *ctx, const bst_mount_flexible_config *f,
 }
 
 /* What else makes the axes faster than the step: viscous friction and cables. */
-static bst_status check_step(bst_ctx *ctx, const bst_joints *joints, double dt_s) {
+static bst_status check_step(bst_ctx *ctx, const bst_mount_joints *joints, double dt_s) {
     for (int k = 0; k < joints->chain.stages; k++) {
-        const bst_joint *joint = &joints->joint[k];
+        const bst_mount_joint *joint = &joints->joint[k];
         /* the least inertia that the axis can have to itself */
         double inertia = joints->chain.inertia[k][k == 1 ? 1 : 0] - joints->chain.flex_inertia[k];
         double longest_s = joint->viscous_nms > 0.0 ? 0.5 * inertia / joint->viscous_nms : INFINITY;
@@ -209,9 +209,9 @@ static bst_status check_step(bst_ctx *ctx, const bst_joints *joints, double dt_s
 }
 
 bst_status bst_mount_config_joints(bst_ctx *ctx, int type, const bst_mount_config *c, double dt_s,
-                                   bst_joints *joints) {
-    *joints = (bst_joints){.method = c->integrator};
-    bst_chain *chain = &joints->chain;
+                                   bst_mount_joints *joints) {
+    *joints = (bst_mount_joints){.method = c->integrator};
+    bst_mount_chain *chain = &joints->chain;
     chain->stages = c->third_axis ? 3 : 2;
     const double *inertia[BST_CHAIN_MOST] = {c->inertia_outer_kgm2, c->inertia_inner_kgm2,
                                              c->inertia_third_kgm2};
@@ -241,18 +241,18 @@ bst_status bst_mount_config_joints(bst_ctx *ctx, int type, const bst_mount_confi
                             c->travel_max_deg[k]);
         }
         joints->joint[k] =
-            (bst_joint){.coulomb_nm = f->coulomb_nm[k],
-                        .breakaway_nm = f->breakaway_nm[k],
-                        .stribeck_radps = f->stribeck_degps[k] * BST_DEG_RAD,
-                        .viscous_nms = f->viscous_nms_per_rad[k],
-                        .spring_nm = c->cable.stiffness_nm_per_rad[k],
-                        .spring_zero_rad = c->cable.zero_deg[k] * BST_DEG_RAD,
-                        .min_rad = endless ? -INFINITY : c->travel_min_deg[k] * BST_DEG_RAD,
-                        .max_rad = endless ? INFINITY : c->travel_max_deg[k] * BST_DEG_RAD,
-                        .restitution = c->stop_restitution};
+            (bst_mount_joint){.coulomb_nm = f->coulomb_nm[k],
+                              .breakaway_nm = f->breakaway_nm[k],
+                              .stribeck_radps = f->stribeck_degps[k] * BST_DEG_RAD,
+                              .viscous_nms = f->viscous_nms_per_rad[k],
+                              .spring_nm = c->cable.stiffness_nm_per_rad[k],
+                              .spring_zero_rad = c->cable.zero_deg[k] * BST_DEG_RAD,
+                              .min_rad = endless ? -INFINITY : c->travel_min_deg[k] * BST_DEG_RAD,
+                              .max_rad = endless ? INFINITY : c->travel_max_deg[k] * BST_DEG_RAD,
+                              .restitution = c->stop_restitution};
     }
     BST_TRY(put_flexible(ctx, &c->flexible, dt_s, chain));
     BST_TRY(check_step(ctx, joints, dt_s));
-    bst_joints_init(joints, start);
+    bst_mount_joints_init(joints, start);
     return BST_OK;
 }

@@ -48,7 +48,7 @@ typedef struct bst_mount_config {
     bst_mount_flexible_config flexible;
     bst_mount_servo_config servo;
     bst_mount_fault_config fault;
-    int32_t integrator; /* bst_joint_method */
+    int32_t integrator; /* bst_mount_joint_method */
     bst_platform_config platform;
 } bst_mount_config;
 
@@ -59,6 +59,6 @@ extern const bst_config_desc bst_mount_config_table[];
  * whose share leaves no inertia, and for a step of dt_s in which a mode's free oscillation has less
  * than a tenth of its period: the message says the largest step allowed. */
 bst_status bst_mount_config_joints(bst_ctx *ctx, int type, const bst_mount_config *config,
-                                   double dt_s, bst_joints *joints) BST_MUST_CHECK;
+                                   double dt_s, bst_mount_joints *joints) BST_MUST_CHECK;
 
 #endif

@@ -27,8 +27,8 @@ typedef enum bst_mount_type {
     BST_MOUNT_CROSS_ELEVATION,
 } bst_mount_type;
 
-/* The mount's base frame (bst_chain): first axis along the outer axis, second along the inner one
- * at zero angles. The same function leads there and back. */
+/* The mount's base frame (bst_mount_chain): first axis along the outer axis, second along the inner
+ * one at zero angles. The same function leads there and back. */
 static inline bst_vec3 bst_mount_swap(int type, bst_vec3 v) {
     return type == BST_MOUNT_AZIMUTH_ELEVATION ? v : (bst_vec3){v.y, v.x, -v.z};
 }

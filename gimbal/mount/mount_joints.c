@@ -7,7 +7,7 @@
 enum { N = BST_CHAIN_MOST };
 
 /* So told, the compiler knows that there are two or three. */
-static inline int stages_of(const bst_joints *j) {
+static inline int stages_of(const bst_mount_joints *j) {
     return j->chain.stages == 2 ? 2 : N;
 }
 
@@ -25,14 +25,14 @@ static inline void turn_on(double s, double c, double more, double *s_out, doubl
     *c_out = c * dc - s * ds;
 }
 
-static void refresh(bst_joints *j) {
+static void refresh(bst_mount_joints *j) {
     for (int k = 0; k < stages_of(j); k++) {
         j->sine[k] = sin(j->state.angle_rad[k]);
         j->cosine[k] = cos(j->state.angle_rad[k]);
     }
 }
 
-void bst_joints_init(bst_joints *j, const double angle_rad[N]) {
+void bst_mount_joints_init(bst_mount_joints *j, const double angle_rad[N]) {
     memset(&j->state, 0, sizeof j->state);
     for (int k = 0; k < stages_of(j); k++) {
         j->state.angle_rad[k] = angle_rad[k];
@@ -44,7 +44,7 @@ void bst_joints_init(bst_joints *j, const double angle_rad[N]) {
 }
 
 /* Friction without its viscous part, at a rate against its direction. */
-static inline double sliding_nm(const bst_joint *joint, double rate) {
+static inline double sliding_nm(const bst_mount_joint *joint, double rate) {
     double x = rate / joint->stribeck_radps;
     return joint->coulomb_nm + (joint->breakaway_nm - joint->coulomb_nm) / (1.0 + x * x);
 }
@@ -92,19 +92,20 @@ static inline void solve_free(int n, double mass[N][N], const bool held[N], doub
 }
 
 /* Torques about the axes besides the motor's, but for friction of joints at rest. */
-static inline double passive_nm(const bst_joint *joint, double angle, double rate, int slide) {
+static inline double passive_nm(const bst_mount_joint *joint, double angle, double rate,
+                                int slide) {
     double friction = slide ? -(double)slide * sliding_nm(joint, rate) : 0.0;
     return friction - joint->viscous_nms * rate -
            joint->spring_nm * (angle - joint->spring_zero_rad);
 }
 
-static inline void evaluate(const bst_joints *j, const bst_chain_state *state, const double s[N],
-                            const double c[N], const motion *m, double after_s,
-                            bst_chain_equations *eq, slopes *out) {
-    const bst_chain *chain = &j->chain;
+static inline void evaluate(const bst_mount_joints *j, const bst_mount_chain_state *state,
+                            const double s[N], const double c[N], const motion *m, double after_s,
+                            bst_mount_chain_equations *eq, slopes *out) {
+    const bst_mount_chain *chain = &j->chain;
     int n = stages_of(j);
-    bst_chain_base base = {bst_vec3_axpy(m->rate, after_s, m->slope), m->slope};
-    bst_chain_equations_at(chain, state, s, c, &base, eq);
+    bst_mount_chain_base base = {bst_vec3_axpy(m->rate, after_s, m->slope), m->slope};
+    bst_mount_chain_equations_at(chain, state, s, c, &base, eq);
     double right[N], mass[N][N];
     for (int k = 0; k < n; k++) {
         right[k] = m->torque_nm[k] - eq->bias_nm[k] +
@@ -129,8 +130,9 @@ static inline void evaluate(const bst_joints *j, const bst_chain_state *state, c
 }
 
 /* from + h * (rates of `at`, slopes) */
-static inline void displace(int n, const bst_chain_state *from, double h, const bst_chain_state *at,
-                            const slopes *slope, bst_chain_state *out) {
+static inline void displace(int n, const bst_mount_chain_state *from, double h,
+                            const bst_mount_chain_state *at, const slopes *slope,
+                            bst_mount_chain_state *out) {
     for (int k = 0; k < n; k++) {
         out->angle_rad[k] = from->angle_rad[k] + h * at->rate_radps[k];
         out->rate_radps[k] = from->rate_radps[k] + h * slope->accel[k];
@@ -139,22 +141,22 @@ static inline void displace(int n, const bst_chain_state *from, double h, const 
     }
 }
 
-static inline void turned(const bst_joints *j, const bst_chain_state *state, double s[N],
-                          double c[N]) {
+static inline void turned(const bst_mount_joints *j, const bst_mount_chain_state *state,
+                          double s[N], double c[N]) {
     for (int k = 0; k < stages_of(j); k++) {
         turn_on(j->sine[k], j->cosine[k], state->angle_rad[k] - j->state.angle_rad[k], &s[k],
                 &c[k]);
     }
 }
 
-static void runge_kutta(const bst_joints *j, const motion *m, double h, bst_chain_state *out,
-                        double accel[N]) {
+static void runge_kutta(const bst_mount_joints *j, const motion *m, double h,
+                        bst_mount_chain_state *out, double accel[N]) {
     int n = stages_of(j);
-    bst_chain_equations eq;
+    bst_mount_chain_equations eq;
     slopes a, b, c, d;
-    bst_chain_state at2, at3, at4;
+    bst_mount_chain_state at2, at3, at4;
     double sine[N], cosine[N];
-    const bst_chain_state *from = &j->state;
+    const bst_mount_chain_state *from = &j->state;
     evaluate(j, from, j->sine, j->cosine, m, 0.0, &eq, &a);
     displace(n, from, 0.5 * h, from, &a, &at2);
     turned(j, &at2, sine, cosine);
@@ -184,14 +186,14 @@ static void runge_kutta(const bst_joints *j, const motion *m, double h, bst_chai
 
 /* Drift, kick, drift; forces that depend on rates are those at the mean of the rates before and
  * after the kick, which a first kick foretells. */
-static void leapfrog(const bst_joints *j, const motion *m, double h, bst_chain_state *out,
-                     double accel[N]) {
+static void leapfrog(const bst_mount_joints *j, const motion *m, double h,
+                     bst_mount_chain_state *out, double accel[N]) {
     int n = stages_of(j);
     static const slopes none = {{0.0}, {0.0}};
-    bst_chain_equations eq;
+    bst_mount_chain_equations eq;
     slopes kick;
     double sine[N], cosine[N];
-    bst_chain_state half, middle;
+    bst_mount_chain_state half, middle;
     displace(n, &j->state, 0.5 * h, &j->state, &none, &half);
     turned(j, &half, sine, cosine);
     evaluate(j, &half, sine, cosine, m, 0.5 * h, &eq, &kick);
@@ -211,8 +213,8 @@ static void leapfrog(const bst_joints *j, const motion *m, double h, bst_chain_s
 }
 
 /* Torque that friction and stop can give a joint at rest. */
-static void holding(const bst_joints *j, int k, double *least, double *most) {
-    const bst_joint *joint = &j->joint[k];
+static void holding(const bst_mount_joints *j, int k, double *least, double *most) {
+    const bst_mount_joint *joint = &j->joint[k];
     *most =
         joint->stuck || j->state.angle_rad[k] <= joint->min_rad ? INFINITY : joint->breakaway_nm;
     *least =
@@ -221,7 +223,7 @@ static void holding(const bst_joints *j, int k, double *least, double *most) {
 
 /* Which joints at rest stay so: all are held; of those that hold more than they can, the one that
  * is most beyond starts to slide, until none is. */
-static void settle(bst_joints *j, motion *m) {
+static void settle(bst_mount_joints *j, motion *m) {
     int n = stages_of(j);
     bool rest = false;
     for (int k = 0; k < n; k++) {
@@ -235,7 +237,7 @@ static void settle(bst_joints *j, motion *m) {
         j->at_stop[k] = false;
     }
     while (rest) {
-        bst_chain_equations eq;
+        bst_mount_chain_equations eq;
         slopes slope;
         evaluate(j, &j->state, j->sine, j->cosine, m, 0.0, &eq, &slope);
         int worst = -1;
@@ -287,13 +289,14 @@ static double time_of_passing(double x, double v, double end, double h) {
 enum event_kind { EVENT_NONE, EVENT_REST, EVENT_STOP };
 
 /* The first event on the way from the present state to `end`; its time and joint. */
-static enum event_kind first_event(const bst_joints *j, const motion *m, const bst_chain_state *end,
-                                   double h, double *time, int *which) {
+static enum event_kind first_event(const bst_mount_joints *j, const motion *m,
+                                   const bst_mount_chain_state *end, double h, double *time,
+                                   int *which) {
     enum event_kind kind = EVENT_NONE;
     *time = h;
     *which = 0;
     for (int k = 0; k < stages_of(j); k++) {
-        const bst_joint *joint = &j->joint[k];
+        const bst_mount_joint *joint = &j->joint[k];
         if (m->held[k]) {
             continue;
         }
@@ -322,8 +325,8 @@ static enum event_kind first_event(const bst_joints *j, const motion *m, const b
 }
 
 /* Joint k meets its stop: an impulse about its axis turns its rate back; held joints stay. */
-static void bounce(bst_joints *j, const motion *m, int k) {
-    const bst_joint *joint = &j->joint[k];
+static void bounce(bst_mount_joints *j, const motion *m, int k) {
+    const bst_mount_joint *joint = &j->joint[k];
     int n = stages_of(j);
     double v = j->state.rate_radps[k], back = -joint->restitution * v;
     double over = j->state.angle_rad[k] - joint->max_rad;
@@ -333,9 +336,9 @@ static void bounce(bst_joints *j, const motion *m, int k) {
     if (top ? v <= 0.0 : v >= 0.0) {
         return;
     }
-    bst_chain_equations eq;
-    bst_chain_base still = {{0, 0, 0}, {0, 0, 0}};
-    bst_chain_equations_at(&j->chain, &j->state, j->sine, j->cosine, &still, &eq);
+    bst_mount_chain_equations eq;
+    bst_mount_chain_base still = {{0, 0, 0}, {0, 0, 0}};
+    bst_mount_chain_equations_at(&j->chain, &j->state, j->sine, j->cosine, &still, &eq);
     /* unit impulse on k, what hangs on springs not yet moved */
     double right[N] = {0.0}, jump[N];
     right[k] = 1.0;
@@ -364,7 +367,8 @@ static void bounce(bst_joints *j, const motion *m, int k) {
 
 /* The state after h; returns how soon a sliding joint would come to rest by its deceleration at the
  * start, h at the latest. */
-static double advance(const bst_joints *j, const motion *m, double h, bst_chain_state *end) {
+static double advance(const bst_mount_joints *j, const motion *m, double h,
+                      bst_mount_chain_state *end) {
     double accel[N], soonest = h;
     if (j->method == BST_JOINT_LEAPFROG) {
         leapfrog(j, m, h, end, accel);
@@ -381,7 +385,7 @@ static double advance(const bst_joints *j, const motion *m, double h, bst_chain_
     return soonest;
 }
 
-static bool nothing_moves(const bst_joints *j, const motion *m) {
+static bool nothing_moves(const bst_mount_joints *j, const motion *m) {
     for (int k = 0; k < stages_of(j); k++) {
         if (!m->held[k] || j->chain.flex_inertia[k] > 0.0) {
             return false;
@@ -390,7 +394,7 @@ static bool nothing_moves(const bst_joints *j, const motion *m) {
     return true;
 }
 
-static void accept(bst_joints *j, const bst_chain_state *end) {
+static void accept(bst_mount_joints *j, const bst_mount_chain_state *end) {
     double s[N], c[N];
     turned(j, end, s, c);
     int n = stages_of(j);
@@ -401,13 +405,13 @@ static void accept(bst_joints *j, const bst_chain_state *end) {
     j->state = *end;
 }
 
-void bst_joints_step(bst_joints *j, double dt_s, const double torque_nm[N], bst_vec3 rate_before,
-                     bst_vec3 rate_after) {
+void bst_mount_joints_step(bst_mount_joints *j, double dt_s, const double torque_nm[N],
+                           bst_vec3 rate_before, bst_vec3 rate_after) {
     motion m = {.torque_nm = torque_nm,
                 .rate = rate_before,
                 .slope = bst_vec3_scale(bst_vec3_sub(rate_after, rate_before), 1.0 / dt_s)};
     double left = dt_s;
-    bst_chain_state end = {{0.0}, {0.0}, {0.0}, {0.0}};
+    bst_mount_chain_state end = {{0.0}, {0.0}, {0.0}, {0.0}};
     settle(j, &m);
     for (int part = 0; left > 0.0; part++) {
         if (nothing_moves(j, &m)) {
@@ -454,8 +458,8 @@ void bst_joints_step(bst_joints *j, double dt_s, const double torque_nm[N], bst_
     refresh(j);
 }
 
-double bst_joints_energy(const bst_joints *j, bst_vec3 base_rate_radps) {
-    double energy = bst_chain_energy(&j->chain, &j->state, base_rate_radps);
+double bst_mount_joints_energy(const bst_mount_joints *j, bst_vec3 base_rate_radps) {
+    double energy = bst_mount_chain_energy(&j->chain, &j->state, base_rate_radps);
     for (int k = 0; k < stages_of(j); k++) {
         double bend = j->state.angle_rad[k] - j->joint[k].spring_zero_rad;
         energy += 0.5 * j->joint[k].spring_nm * bend * bend;

@@ -36,7 +36,7 @@ static bst_status prepare(const bst_module_env *env, int type, const bst_mount_c
     BST_TRY(bst_mount_init(env->ctx, &m->mount, type, c, dt, bst_env_rng(env, "encoder")));
     BST_TRY(bst_platform_equip(env, &m->platform, &c->platform, dt));
     m->mount.want_reaction = m->platform.spacecraft != NULL;
-    bst_chain_locked_inertia(&m->mount.joints.chain, zero, inertia);
+    bst_mount_chain_locked_inertia(&m->mount.joints.chain, zero, inertia);
     BST_TRY(bst_platform_check_mount(env->ctx, &m->platform, inertia));
     return bst_gimbal_base_init(env, &c->platform, env->exposure_s, 0, &m->base);
 }

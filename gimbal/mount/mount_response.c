@@ -47,20 +47,20 @@ static void exponential(double a[5][5], double out[5][5]) {
     }
 }
 
-void bst_mount_linearise(const bst_joints *joints, int axis, const double angle_rad[BST_CHAIN_MOST],
-                         double dt_s, int delay_steps, double line_of_sight_share,
-                         bst_mount_linear *out) {
-    const bst_chain *chain = &joints->chain;
-    const bst_joint *joint = &joints->joint[axis];
+void bst_mount_linearise(const bst_mount_joints *joints, int axis,
+                         const double angle_rad[BST_CHAIN_MOST], double dt_s, int delay_steps,
+                         double line_of_sight_share, bst_mount_linear *out) {
+    const bst_mount_chain *chain = &joints->chain;
+    const bst_mount_joint *joint = &joints->joint[axis];
     double s[BST_CHAIN_MOST], c[BST_CHAIN_MOST];
     for (int k = 0; k < BST_CHAIN_MOST; k++) {
         s[k] = sin(angle_rad[k]);
         c[k] = cos(angle_rad[k]);
     }
-    bst_chain_state still = {{0.0}, {0.0}, {0.0}, {0.0}};
-    bst_chain_base base = {{0, 0, 0}, {0, 0, 0}};
-    bst_chain_equations eq;
-    bst_chain_equations_at(chain, &still, s, c, &base, &eq);
+    bst_mount_chain_state still = {{0.0}, {0.0}, {0.0}, {0.0}};
+    bst_mount_chain_base base = {{0, 0, 0}, {0, 0, 0}};
+    bst_mount_chain_equations eq;
+    bst_mount_chain_equations_at(chain, &still, s, c, &base, &eq);
     double flex = chain->flex_inertia[axis];
     double own = eq.mass[axis][axis]; /* without what swings on its springs */
     double all = own + flex;
@@ -167,7 +167,7 @@ bst_status bst_mount_servo_compensator(bst_ctx *ctx, const bst_mount_servo_confi
 bst_status bst_mount_axis_model_init(bst_ctx *ctx, int type, const bst_mount_config *config,
                                      const double angle_rad[BST_CHAIN_MOST], double dt_s, int axis,
                                      bst_mount_axis_model *out) {
-    bst_joints joints;
+    bst_mount_joints joints;
     BST_TRY(bst_mount_config_joints(ctx, type, config, dt_s, &joints));
     if (axis < 0 || axis >= joints.chain.stages) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "a mount of %d axes has no axis %d",

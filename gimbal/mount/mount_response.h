@@ -20,9 +20,9 @@ typedef struct bst_mount_linear {
 } bst_mount_linear;
 
 /* Linearises axis k of the joints at angles; exact for the step dt_s (matrix exponential). */
-void bst_mount_linearise(const bst_joints *joints, int axis, const double angle_rad[BST_CHAIN_MOST],
-                         double dt_s, int delay_steps, double line_of_sight_share,
-                         bst_mount_linear *out);
+void bst_mount_linearise(const bst_mount_joints *joints, int axis,
+                         const double angle_rad[BST_CHAIN_MOST], double dt_s, int delay_steps,
+                         double line_of_sight_share, bst_mount_linear *out);
 
 /* Sampled responses of the axis at omega rad/s, from the acceleration asked for. */
 double complex bst_mount_linear_encoder(const bst_mount_linear *linear, double omega_radps);

@@ -9,7 +9,7 @@ static const double two_pi = 2.0 * BST_PI;
 /* Below this distance from the pole (rad) the outer angle is not defined well enough to follow. */
 #define POLE_RAD 1e-9
 
-#define C bst_two_axis_config
+#define C bst_mount_two_axis_config
 const bst_config_desc bst_two_axis_config_table[] = {
     BST_REAL(C, rate_limit_degps, "deg/s", 1e-6, 1000, "2", "Greatest rate of either axis."),
     BST_REAL(C, accel_limit_degps2, "deg/s^2", 1e-6, 10000, "4",
@@ -26,16 +26,17 @@ const bst_config_desc bst_two_axis_config_table[] = {
     BST_CONFIG_END};
 #undef C
 
-bst_status bst_two_axis_init(bst_ctx *ctx, bst_two_axis *plant, const bst_two_axis_config *config,
-                             bst_quat q_nominal_from_gcrf, double pixel_rad, double dt_s,
-                             const bst_two_axis_keys *keys) {
-    *plant =
-        (bst_two_axis){.encoder_noise_rad = config->encoder_noise_arcsec * BST_ARCSEC_RAD,
-                       .inner_travel_rad = config->inner_travel_deg * BST_DEG_RAD,
-                       .settle_tolerance_rad = config->settle_tolerance_arcsec * BST_ARCSEC_RAD,
-                       .encoder_key = keys->encoder,
-                       .dt_s = dt_s,
-                       .near = {{0.0, 0.0, 1.0}, {0.0, 0.0, 1.0}}};
+bst_status bst_mount_two_axis_init(bst_ctx *ctx, bst_mount_two_axis *plant,
+                                   const bst_mount_two_axis_config *config,
+                                   bst_quat q_nominal_from_gcrf, double pixel_rad, double dt_s,
+                                   const bst_mount_two_axis_keys *keys) {
+    *plant = (bst_mount_two_axis){
+        .encoder_noise_rad = config->encoder_noise_arcsec * BST_ARCSEC_RAD,
+        .inner_travel_rad = config->inner_travel_deg * BST_DEG_RAD,
+        .settle_tolerance_rad = config->settle_tolerance_arcsec * BST_ARCSEC_RAD,
+        .encoder_key = keys->encoder,
+        .dt_s = dt_s,
+        .near = {{0.0, 0.0, 1.0}, {0.0, 0.0, 1.0}}};
     bst_axis_spec spec = {.rate_limit_radps = config->rate_limit_degps * BST_DEG_RAD,
                           .accel_limit_radps2 = config->accel_limit_degps2 * BST_DEG_RAD,
                           .natural_frequency_radps = two_pi * config->natural_frequency_hz,
@@ -47,8 +48,8 @@ bst_status bst_two_axis_init(bst_ctx *ctx, bst_two_axis *plant, const bst_two_ax
                              pixel_rad, dt_s, keys->jitter, keys->attitude);
 }
 
-void bst_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_rad, double angle_rad[2],
-                        double rate_radps[2]) {
+void bst_mount_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_rad,
+                              double angle_rad[2], double rate_radps[2]) {
     double h2 = b.x * b.x + b.z * b.z;
     double h = sqrt(h2);
     angle_rad[1] = atan2(-b.y, h);
@@ -98,13 +99,13 @@ static halves halves_beside(const halves *h, const double more_rad[2]) {
 }
 
 /* Of the axes' present angles. */
-static halves halves_now(bst_two_axis *plant) {
+static halves halves_now(bst_mount_two_axis *plant) {
     halves out;
     for (int a = 0; a < 2; a++) {
-        bst_two_axis_half *near = &plant->near[a];
+        bst_mount_two_axis_half *near = &plant->near[a];
         double angle = plant->axis[a].angle_rad;
         if (!(fabs(angle - near->angle_rad) < NEAR_RAD)) {
-            *near = (bst_two_axis_half){angle, sin(0.5 * angle), cos(0.5 * angle)};
+            *near = (bst_mount_two_axis_half){angle, sin(0.5 * angle), cos(0.5 * angle)};
         }
         beside(near->sin, near->cos, angle - near->angle_rad, &out.sin[a], &out.cos[a]);
     }
@@ -123,7 +124,7 @@ static bst_quat attitude_of(const halves *h) {
                       h->cos[1] * h->cos[0]};
 }
 
-bst_quat bst_two_axis_attitude(const double angle_rad[2]) {
+bst_quat bst_mount_two_axis_attitude(const double angle_rad[2]) {
     halves h = halves_of(angle_rad);
     return attitude_of(&h);
 }
@@ -134,7 +135,7 @@ static double wrap(double angle) {
 
 /* The angle of (x, y) where that is no further from a known one than the arc tangent's series
  * reaches. */
-static bool angle_near(const bst_two_axis_half *near, double x, double y, double *angle_rad) {
+static bool angle_near(const bst_mount_two_axis_half *near, double x, double y, double *angle_rad) {
     double c = near->cos * near->cos - near->sin * near->sin, s = 2.0 * near->sin * near->cos;
     double along = x * c + y * s, across = y * c - x * s;
     if (!(fabs(across) < 0.01 * along)) {
@@ -144,8 +145,8 @@ static bool angle_near(const bst_two_axis_half *near, double x, double y, double
     return true;
 }
 
-/* bst_two_axis_solve for the way round that is nearer to the present angle. */
-static void solve(const bst_two_axis *plant, bst_vec3 b, bst_vec3 rate, double angle_rad[2],
+/* bst_mount_two_axis_solve for the way round that is nearer to the present angle. */
+static void solve(const bst_mount_two_axis *plant, bst_vec3 b, bst_vec3 rate, double angle_rad[2],
                   double rate_radps[2]) {
     double h2 = b.x * b.x + b.z * b.z, h = sqrt(h2), now = plant->axis[0].reference_rad;
     if (h > POLE_RAD && angle_near(&plant->near[0], b.z, b.x, &angle_rad[0]) &&
@@ -154,12 +155,12 @@ static void solve(const bst_two_axis *plant, bst_vec3 b, bst_vec3 rate, double a
         rate_radps[1] = -rate.y / h;
         return;
     }
-    bst_two_axis_solve(b, rate, now, angle_rad, rate_radps);
+    bst_mount_two_axis_solve(b, rate, now, angle_rad, rate_radps);
     angle_rad[0] = now + wrap(angle_rad[0] - now);
 }
 
 /* Where the axes shall be at this step. */
-static void target(const bst_two_axis *plant, const bst_los_command *command, double age_s,
+static void target(const bst_mount_two_axis *plant, const bst_los_command *command, double age_s,
                    double angle_rad[2], double rate_radps[2], bool *at_stop) {
     bst_vec3 rate = bst_vec3_axpy(command->rate_gcrf_radps, age_s, command->accel_gcrf_radps2);
     bst_vec3 v = bst_vec3_axpy(command->direction_gcrf, age_s, command->rate_gcrf_radps);
@@ -182,7 +183,8 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
     }
 }
 
-void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out) {
+void bst_mount_two_axis_status(const bst_mount_two_axis *plant, int64_t tick,
+                               bst_mount_status *out) {
     if (out->axes == 0) {
         *out = (bst_mount_status){.axes = 2, .q_body_from_cam_at_zero = BST_QUAT_IDENTITY};
         for (int i = 0; i < 2; i++) {
@@ -206,8 +208,8 @@ void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_stat
     out->axis[1].flags |= plant->at_stop ? BST_AXIS_AT_STOP : 0u;
 }
 
-void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, double command_age_s,
-                       bool measure) {
+void bst_mount_two_axis_step(bst_mount_two_axis *plant, const bst_los_command *command,
+                             double command_age_s, bool measure) {
     int64_t n = plant->steps++;
     double noise[2] = {0.0, 0.0};
     if (plant->encoder_noise_rad > 0.0) {
@@ -247,8 +249,8 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
     if (fabs(outer->reference_rad) > BST_PI) {
         double turns = outer->reference_rad > 0.0 ? -1.0 : 1.0;
         bst_axis_unwind(outer, turns);
-        bst_two_axis_half *near = &plant->near[0];
-        *near = (bst_two_axis_half){near->angle_rad + turns * two_pi, -near->sin, -near->cos};
+        bst_mount_two_axis_half *near = &plant->near[0];
+        *near = (bst_mount_two_axis_half){near->angle_rad + turns * two_pi, -near->sin, -near->cos};
         turn_half(&half);
     }
     plant->q_cam_from_gcrf =

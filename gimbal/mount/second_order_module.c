@@ -15,7 +15,7 @@ static const bst_port ports[PORT_COUNT] = {
 
 typedef struct module {
     bst_gimbal_base base;
-    bst_two_axis plant;
+    bst_mount_two_axis plant;
 } module;
 
 static void destroy(void *self) {
@@ -28,12 +28,12 @@ static void destroy(void *self) {
 }
 
 static bst_status prepare(const bst_module_env *env, const void *config, void *self) {
-    const bst_two_axis_config *c = config;
+    const bst_mount_two_axis_config *c = config;
     module *m = self;
-    const bst_two_axis_keys keys = {bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude"),
-                                    bst_env_rng(env, "encoder")};
-    BST_TRY(bst_two_axis_init(env->ctx, &m->plant, c, bst_gimbal_nominal(env),
-                              bst_gimbal_pixel_rad(env), m->base.dt_s, &keys));
+    const bst_mount_two_axis_keys keys = {bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude"),
+                                          bst_env_rng(env, "encoder")};
+    BST_TRY(bst_mount_two_axis_init(env->ctx, &m->plant, c, bst_gimbal_nominal(env),
+                                    bst_gimbal_pixel_rad(env), m->base.dt_s, &keys));
     BST_TRY(bst_platform_equip(env, &m->plant.platform, &c->platform, m->base.dt_s));
     return bst_gimbal_base_init(env, &c->platform, env->exposure_s, 0, &m->base);
 }
@@ -44,7 +44,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
 
 static bst_status step(void *self, struct bst_step *s) {
     module *m = self;
-    bst_two_axis *plant = &m->plant;
+    bst_mount_two_axis *plant = &m->plant;
     int64_t n = plant->steps;
     double age;
     const bst_los_command *command = bst_gimbal_command(s, PORT_COMMAND, &m->base, &age);
@@ -52,7 +52,7 @@ static bst_status step(void *self, struct bst_step *s) {
     if (plant->platform.spacecraft) { /* without reaction: a mount of this type has no inertia */
         BST_TRY(bst_platform_step(s, &plant->platform, n, (bst_vec3){0, 0, 0}, command));
     }
-    bst_two_axis_step(plant, command, age, measure);
+    bst_mount_two_axis_step(plant, command, age, measure);
     bst_gimbal_publish_sight(s, &plant->platform, plant->q_cam_from_gcrf);
     if (measure) {
         const bst_gimbal_reading reading = {
@@ -62,7 +62,7 @@ static bst_status step(void *self, struct bst_step *s) {
             .settled = plant->settled,
             .limited = plant->limited};
         bst_mount_status *status = bst_step_write(s, BST_GIMBAL_MOUNT, NULL);
-        bst_two_axis_status(plant, bst_step_tick(s), status);
+        bst_mount_two_axis_status(plant, bst_step_tick(s), status);
         bst_gimbal_publish_reading(s, &plant->platform, &reading, NULL);
     }
     return bst_gimbal_publish_nav(s, &m->base, n);
@@ -78,7 +78,7 @@ const bst_module_desc bst_gimbal_second_order_module = {
         "drifting, jittering spacecraft.",
     .flags = BST_MODULE_READS_TRUTH,
     .config = bst_two_axis_config_table,
-    .config_bytes = sizeof(bst_two_axis_config),
+    .config_bytes = sizeof(bst_mount_two_axis_config),
     .default_rate_hz = 1000.0,
     .ports = ports,
     .port_count = PORT_COUNT,

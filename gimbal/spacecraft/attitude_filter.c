@@ -15,7 +15,7 @@ void bst_attitude_filter_init(bst_attitude_filter *filter, bst_quat q_body_from_
     }
 }
 
-bst_vec3 bst_attitude_error(bst_quat q, bst_quat estimate) {
+bst_vec3 bst_attitude_filter_error(bst_quat q, bst_quat estimate) {
     return bst_vec3_scale(bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(estimate))), -1.0);
 }
 

@@ -13,7 +13,7 @@ typedef struct bst_attitude_filter {
     bst_quat q_body_from_gcrf;
     bst_vec3 bias_radps;
     double covariance[6][6];      /* of (e, b) */
-    double angle_walk, rate_walk; /* of the gyro, as bst_gyro */
+    double angle_walk, rate_walk; /* of the gyro, as bst_spacecraft_gyro */
 } bst_attitude_filter;
 
 /* Starts with an attitude of standard deviation sigma_rad and a bias of zero with
@@ -26,17 +26,17 @@ void bst_attitude_filter_init(bst_attitude_filter *filter, bst_quat q_body_from_
  * dt_s. */
 void bst_attitude_filter_propagate(bst_attitude_filter *filter, bst_vec3 sample_rad, double dt_s);
 
-/* Takes in an attitude measured age_s ago. error: bst_attitude_error of the measurement against the
- * estimate of then; q_now_from_then: the body's turn since, as estimated; noise: the measurement's
- * covariance, rad^2, body axes of then. The covariance follows in Joseph's form and is made
- * symmetric. correction (may be NULL): the changes of e and b. The gyro's noise since then is left
- * out of account: within a second it is far below a tracker's. */
+/* Takes in an attitude measured age_s ago. error: bst_attitude_filter_error of the measurement
+ * against the estimate of then; q_now_from_then: the body's turn since, as estimated; noise: the
+ * measurement's covariance, rad^2, body axes of then. The covariance follows in Joseph's form and
+ * is made symmetric. correction (may be NULL): the changes of e and b. The gyro's noise since then
+ * is left out of account: within a second it is far below a tracker's. */
 void bst_attitude_filter_update(bst_attitude_filter *filter, bst_vec3 error, double age_s,
                                 bst_quat q_now_from_then, const bst_mat3 *noise,
                                 bst_vec3 correction[2]);
 
 /* The error e that takes `estimate` to `q`, the short way round. */
-bst_vec3 bst_attitude_error(bst_quat q, bst_quat estimate);
+bst_vec3 bst_attitude_filter_error(bst_quat q, bst_quat estimate);
 
 /* Standard deviations (rad, about one axis) that the filter comes to on a resting body with one
  * tracker of equal noise about all axes every dt_s: just before and just after a measurement, and

@@ -2,7 +2,7 @@
 
 #include "sim/astro/bodies.h"
 
-#define C bst_star_tracker_config
+#define C bst_spacecraft_star_tracker_config
 const bst_config_desc bst_star_tracker_config_table[] = {
     BST_REALS(C, axis, "", -1e6, 1e6, NULL, "Boresight in body axes, any length."),
     BST_REAL(C, noise_arcsec, "arcsec", 1e-6, 36000, "3", "White noise across the boresight."),
@@ -22,7 +22,7 @@ const bst_config_desc bst_star_tracker_config_table[] = {
     BST_CONFIG_END};
 #undef C
 
-#define C bst_gyro_config
+#define C bst_spacecraft_gyro_config
 const bst_config_desc bst_gyro_config_table[] = {
     BST_REAL(C, rate_hz, "Hz", 0.1, 10000, "100", "Samples a second; divides the plant's rate."),
     BST_REAL(C, angle_random_walk_deg_rth, "deg/sqrt(h)", 1e-9, 10, "0.005", "Angle random walk."),
@@ -43,10 +43,11 @@ static bst_vec3 arcsec(const double v[3]) {
     return bst_vec3_scale((bst_vec3){v[0], v[1], v[2]}, BST_ARCSEC_RAD);
 }
 
-void bst_star_tracker_init(bst_star_tracker *tracker, const bst_star_tracker_config *c,
-                           bst_rng_key key) {
+void bst_spacecraft_star_tracker_init(bst_spacecraft_star_tracker *tracker,
+                                      const bst_spacecraft_star_tracker_config *c,
+                                      bst_rng_key key) {
     bst_vec3 axis = bst_vec3_unit((bst_vec3){c->axis[0], c->axis[1], c->axis[2]});
-    *tracker = (bst_star_tracker){
+    *tracker = (bst_spacecraft_star_tracker){
         .axis = axis,
         .across = bst_vec3_perpendicular(axis),
         .sigma_rad = {c->noise_arcsec * BST_ARCSEC_RAD,
@@ -59,9 +60,9 @@ void bst_star_tracker_init(bst_star_tracker *tracker, const bst_star_tracker_con
         .key = key};
 }
 
-bool bst_star_tracker_sees(const bst_star_tracker *tracker, double seconds,
-                           bst_quat q_body_from_gcrf, bst_vec3 rate_radps, bst_vec3 position_m,
-                           bst_vec3 sun_m) {
+bool bst_spacecraft_star_tracker_sees(const bst_spacecraft_star_tracker *tracker, double seconds,
+                                      bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
+                                      bst_vec3 position_m, bst_vec3 sun_m) {
     if ((seconds >= tracker->outage_s[0] && seconds < tracker->outage_s[1]) ||
         bst_vec3_norm(rate_radps) > tracker->rate_limit_radps) {
         return false;
@@ -74,8 +75,8 @@ bool bst_star_tracker_sees(const bst_star_tracker *tracker, double seconds,
            bst_vec3_angle(axis, down) >= limb + tracker->earth_exclusion_rad;
 }
 
-bst_quat bst_star_tracker_measure(const bst_star_tracker *tracker, int64_t sample,
-                                  bst_quat q_body_from_gcrf) {
+bst_quat bst_spacecraft_star_tracker_measure(const bst_spacecraft_star_tracker *tracker,
+                                             int64_t sample, bst_quat q_body_from_gcrf) {
     double a[2], b[2];
     bst_rng_normal2(tracker->key, (uint64_t)sample, 0, a);
     bst_rng_normal2(tracker->key, (uint64_t)sample, 1, b);
@@ -87,7 +88,7 @@ bst_quat bst_star_tracker_measure(const bst_star_tracker *tracker, int64_t sampl
                                       q_body_from_gcrf));
 }
 
-bst_mat3 bst_star_tracker_covariance(const bst_star_tracker *tracker) {
+bst_mat3 bst_spacecraft_star_tracker_covariance(const bst_spacecraft_star_tracker *tracker) {
     double across = tracker->sigma_rad[0] * tracker->sigma_rad[0];
     double more = tracker->sigma_rad[1] * tracker->sigma_rad[1] - across;
     double a[3] = {tracker->axis.x, tracker->axis.y, tracker->axis.z};
@@ -107,7 +108,8 @@ static bst_vec3 normal3(bst_rng_key key, uint64_t sample, uint64_t draw) {
     return (bst_vec3){a[0], a[1], b[0]};
 }
 
-void bst_gyro_init(bst_gyro *gyro, const bst_gyro_config *c, double dt_s, bst_rng_key key) {
+void bst_spacecraft_gyro_init(bst_spacecraft_gyro *gyro, const bst_spacecraft_gyro_config *c,
+                              double dt_s, bst_rng_key key) {
     bst_mat3 turned =
         bst_quat_to_mat3(bst_quat_from_rotvec(bst_vec3_scale(arcsec(c->alignment_arcsec), -1.0)));
     for (int i = 0; i < 3; i++) {
@@ -117,15 +119,16 @@ void bst_gyro_init(bst_gyro *gyro, const bst_gyro_config *c, double dt_s, bst_rn
     }
     bst_vec3 bias = bst_vec3_axpy((bst_vec3){c->bias_degph[0], c->bias_degph[1], c->bias_degph[2]},
                                   c->bias_sigma_degph, normal3(key, 0, 0));
-    *gyro = (bst_gyro){.angle_walk = c->angle_random_walk_deg_rth * BST_DEG_RAD / 60.0,
-                       .rate_walk = c->rate_random_walk_deg_rth3 * BST_DEG_RAD / 216000.0,
-                       .response = turned,
-                       .bias_radps = bst_vec3_scale(bias, BST_DEG_RAD / 3600.0),
-                       .dt_s = dt_s,
-                       .key = key};
+    *gyro =
+        (bst_spacecraft_gyro){.angle_walk = c->angle_random_walk_deg_rth * BST_DEG_RAD / 60.0,
+                              .rate_walk = c->rate_random_walk_deg_rth3 * BST_DEG_RAD / 216000.0,
+                              .response = turned,
+                              .bias_radps = bst_vec3_scale(bias, BST_DEG_RAD / 3600.0),
+                              .dt_s = dt_s,
+                              .key = key};
 }
 
-bst_vec3 bst_gyro_measure(bst_gyro *gyro, bst_vec3 turn_rad) {
+bst_vec3 bst_spacecraft_gyro_measure(bst_spacecraft_gyro *gyro, bst_vec3 turn_rad) {
     uint64_t sample = (uint64_t)++gyro->samples;
     double dt = gyro->dt_s, v = gyro->angle_walk, u = gyro->rate_walk;
     double a[2], b[2], c[2];

@@ -11,7 +11,7 @@
 
 #define BST_TRACKERS_MOST 4
 
-typedef struct bst_star_tracker_config {
+typedef struct bst_spacecraft_star_tracker_config {
     double axis[3];
     double noise_arcsec, noise_about_axis_arcsec;
     double alignment_arcsec[3];
@@ -19,21 +19,21 @@ typedef struct bst_star_tracker_config {
     double sun_exclusion_deg, earth_exclusion_deg;
     double rate_limit_degps;
     double outage_s[2];
-} bst_star_tracker_config;
+} bst_spacecraft_star_tracker_config;
 
-typedef struct bst_gyro_config {
+typedef struct bst_spacecraft_gyro_config {
     double rate_hz;
     double angle_random_walk_deg_rth;
     double rate_random_walk_deg_rth3;
     double bias_degph[3], bias_sigma_degph;
     double scale_factor_ppm[3];
     double alignment_arcsec[3];
-} bst_gyro_config;
+} bst_spacecraft_gyro_config;
 
 extern const bst_config_desc bst_star_tracker_config_table[];
 extern const bst_config_desc bst_gyro_config_table[];
 
-typedef struct bst_star_tracker {
+typedef struct bst_spacecraft_star_tracker {
     bst_vec3 axis;       /* unit, body axes: its boresight */
     bst_vec3 across;     /* unit, perpendicular to it */
     double sigma_rad[2]; /* across the axis, about it */
@@ -41,29 +41,30 @@ typedef struct bst_star_tracker {
     double sun_exclusion_rad, earth_exclusion_rad, rate_limit_radps;
     double outage_s[2];
     bst_rng_key key;
-} bst_star_tracker;
+} bst_spacecraft_star_tracker;
 
-void bst_star_tracker_init(bst_star_tracker *tracker, const bst_star_tracker_config *config,
-                           bst_rng_key key);
+void bst_spacecraft_star_tracker_init(bst_spacecraft_star_tracker *tracker,
+                                      const bst_spacecraft_star_tracker_config *config,
+                                      bst_rng_key key);
 
 /* Whether it sees stars: not turning faster than its limit, its axis away from the Sun and from the
  * Earth's limb (a sphere of the equatorial radius) by the exclusion angles, and not within its
  * outage. position_m geocentric, sun_m from the spacecraft, both GCRF. */
-bool bst_star_tracker_sees(const bst_star_tracker *tracker, double seconds,
-                           bst_quat q_body_from_gcrf, bst_vec3 rate_radps, bst_vec3 position_m,
-                           bst_vec3 sun_m);
+bool bst_spacecraft_star_tracker_sees(const bst_spacecraft_star_tracker *tracker, double seconds,
+                                      bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
+                                      bst_vec3 position_m, bst_vec3 sun_m);
 
 /* Measurement number `sample`: the true attitude turned by noise and alignment error. */
-bst_quat bst_star_tracker_measure(const bst_star_tracker *tracker, int64_t sample,
-                                  bst_quat q_body_from_gcrf);
+bst_quat bst_spacecraft_star_tracker_measure(const bst_spacecraft_star_tracker *tracker,
+                                             int64_t sample, bst_quat q_body_from_gcrf);
 
 /* Covariance (rad^2, body axes) of the noise. */
-bst_mat3 bst_star_tracker_covariance(const bst_star_tracker *tracker);
+bst_mat3 bst_spacecraft_star_tracker_covariance(const bst_spacecraft_star_tracker *tracker);
 
 /* A rate-integrating gyro: each sample is the angle turned since the one before. Farrenkopf, J.
  * Guidance and Control 1 (1978) 282; discrete form after Crassidis and Junkins, Optimal Estimation
  * of Dynamic Systems (2nd edition), section 7.2.2. */
-typedef struct bst_gyro {
+typedef struct bst_spacecraft_gyro {
     double angle_walk;   /* rad / sqrt(s) */
     double rate_walk;    /* rad / s^1.5 */
     bst_mat3 response;   /* scale factor and alignment: sensed angle from body angle */
@@ -71,14 +72,15 @@ typedef struct bst_gyro {
     double dt_s;
     bst_rng_key key;
     int64_t samples;
-} bst_gyro;
+} bst_spacecraft_gyro;
 
 /* dt_s: time between samples. The first bias: bias_degph plus a draw of bias_sigma_degph about each
  * axis. */
-void bst_gyro_init(bst_gyro *gyro, const bst_gyro_config *config, double dt_s, bst_rng_key key);
+void bst_spacecraft_gyro_init(bst_spacecraft_gyro *gyro, const bst_spacecraft_gyro_config *config,
+                              double dt_s, bst_rng_key key);
 
 /* The next sample, rad, body axes, of a true turn (rotation vector of the body since the sample
  * before); the bias walks on. */
-bst_vec3 bst_gyro_measure(bst_gyro *gyro, bst_vec3 turn_rad);
+bst_vec3 bst_spacecraft_gyro_measure(bst_spacecraft_gyro *gyro, bst_vec3 turn_rad);
 
 #endif

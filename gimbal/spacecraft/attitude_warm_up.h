@@ -8,10 +8,10 @@
 typedef struct bst_attitude_past {
     double seconds; /* that it has been running */
     bst_quat q_body_from_gcrf;
-    bst_vec3 rate_radps;  /* of the body, body axes, all the time */
-    const bst_gyro *gyro; /* as it is at the epoch */
-    int trackers;         /* those that saw stars */
-    const bst_star_tracker *tracker[BST_TRACKERS_MOST];
+    bst_vec3 rate_radps;             /* of the body, body axes, all the time */
+    const bst_spacecraft_gyro *gyro; /* as it is at the epoch */
+    int trackers;                    /* those that saw stars */
+    const bst_spacecraft_star_tracker *tracker[BST_TRACKERS_MOST];
     double rate_hz[BST_TRACKERS_MOST];
     bst_rng_key key; /* of the past's noise */
 } bst_attitude_past;

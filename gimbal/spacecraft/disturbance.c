@@ -25,16 +25,16 @@ static bst_vec3 vec(const double v[3]) {
     return (bst_vec3){v[0], v[1], v[2]};
 }
 
-bst_vec3 bst_gravity_gradient_torque(const bst_mat3 *inertia_kgm2, bst_quat q_body_from_gcrf,
-                                     bst_vec3 position_m) {
+bst_vec3 bst_spacecraft_gravity_gradient_torque(const bst_mat3 *inertia_kgm2,
+                                                bst_quat q_body_from_gcrf, bst_vec3 position_m) {
     double r2 = bst_vec3_dot(position_m, position_m);
     bst_vec3 r = bst_quat_rotate(q_body_from_gcrf, position_m);
     return bst_vec3_scale(bst_vec3_cross(r, bst_mat3_mul_vec(inertia_kgm2, r)),
                           3.0 * BST_EARTH_MU_M3PS2 / (r2 * r2 * sqrt(r2)));
 }
 
-bst_vec3 bst_solar_torque(const bst_disturbance_config *config, bst_quat q_body_from_gcrf,
-                          bst_vec3 sun_m, double sunlit) {
+bst_vec3 bst_spacecraft_solar_torque(const bst_disturbance_config *config,
+                                     bst_quat q_body_from_gcrf, bst_vec3 sun_m, double sunlit) {
     double d = bst_vec3_norm(sun_m);
     double force = BST_SUNLIGHT_PRESSURE_PA * (BST_AU_M / d) * (BST_AU_M / d) *
                    config->solar_area_m2 * config->solar_coefficient * sunlit;
@@ -42,7 +42,7 @@ bst_vec3 bst_solar_torque(const bst_disturbance_config *config, bst_quat q_body_
     return bst_vec3_cross(vec(config->solar_lever_m), away);
 }
 
-bst_vec3 bst_dipole_field_t(bst_vec3 position_m) {
+bst_vec3 bst_spacecraft_dipole_field_t(bst_vec3 position_m) {
     static const double reference_m = 6371.2e3, equator_t = 29404.8e-9;
     double r = bst_vec3_norm(position_m), ratio = reference_m / r;
     bst_vec3 u = bst_vec3_scale(position_m, 1.0 / r);
@@ -55,7 +55,7 @@ static double clipped(double v, double limit) {
     return fmax(-limit, fmin(limit, v));
 }
 
-bst_vec3 bst_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, double limit_am2) {
+bst_vec3 bst_spacecraft_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, double limit_am2) {
     double b2 = bst_vec3_dot(field_t, field_t);
     bst_vec3 m = bst_vec3_scale(bst_vec3_cross(momentum_nms, field_t), 1.0 / (BST_UNLOAD_S * b2));
     return (bst_vec3){clipped(m.x, limit_am2), clipped(m.y, limit_am2), clipped(m.z, limit_am2)};
@@ -66,17 +66,19 @@ bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_
                                 double sunlit, bst_vec3 wheel_momentum_nms) {
     bst_vec3 sum = vec(config->constant_torque_nm);
     if (config->gravity_gradient) {
-        sum = bst_vec3_add(sum,
-                           bst_gravity_gradient_torque(inertia_kgm2, q_body_from_gcrf, position_m));
+        sum = bst_vec3_add(sum, bst_spacecraft_gravity_gradient_torque(
+                                    inertia_kgm2, q_body_from_gcrf, position_m));
     }
     if (config->solar_area_m2 > 0.0 && sunlit > 0.0) {
-        sum = bst_vec3_add(sum, bst_solar_torque(config, q_body_from_gcrf, sun_m, sunlit));
+        sum =
+            bst_vec3_add(sum, bst_spacecraft_solar_torque(config, q_body_from_gcrf, sun_m, sunlit));
     }
     bst_vec3 dipole = vec(config->residual_dipole_am2);
     if (config->unload_dipole_am2 > 0.0 || bst_vec3_norm(dipole) > 0.0) {
-        bst_vec3 field = bst_quat_rotate(q_body_from_gcrf, bst_dipole_field_t(position_m));
-        dipole = bst_vec3_add(
-            dipole, bst_unload_dipole(wheel_momentum_nms, field, config->unload_dipole_am2));
+        bst_vec3 field =
+            bst_quat_rotate(q_body_from_gcrf, bst_spacecraft_dipole_field_t(position_m));
+        dipole = bst_vec3_add(dipole, bst_spacecraft_unload_dipole(wheel_momentum_nms, field,
+                                                                   config->unload_dipole_am2));
         sum = bst_vec3_add(sum, bst_vec3_cross(dipole, field));
     }
     return sum;

@@ -19,22 +19,22 @@ extern const bst_config_desc bst_disturbance_config_table[];
 
 /* Of a point mass Earth: 3 mu / r^3 (u x I u), u the unit vector to the Earth's centre. Markley and
  * Crassidis, Fundamentals of Spacecraft Attitude Determination and Control (2014), eq. 3.155. */
-bst_vec3 bst_gravity_gradient_torque(const bst_mat3 *inertia_kgm2, bst_quat q_body_from_gcrf,
-                                     bst_vec3 position_m);
+bst_vec3 bst_spacecraft_gravity_gradient_torque(const bst_mat3 *inertia_kgm2,
+                                                bst_quat q_body_from_gcrf, bst_vec3 position_m);
 
 /* Of sunlight: the force P (1 au / d)^2 A C away from the Sun at `lever` from the centre of mass.
  * sun_m: spacecraft to Sun, GCRF; sunlit: fraction of the Sun's disc in sight. */
-bst_vec3 bst_solar_torque(const bst_disturbance_config *config, bst_quat q_body_from_gcrf,
-                          bst_vec3 sun_m, double sunlit);
+bst_vec3 bst_spacecraft_solar_torque(const bst_disturbance_config *config,
+                                     bst_quat q_body_from_gcrf, bst_vec3 sun_m, double sunlit);
 
 /* The Earth's field (T, GCRF) at a geocentric place: the axial dipole alone, along GCRF z (IGRF-13,
  * g(1,0) = -29404.8 nT at 6371.2 km, 2020). */
-bst_vec3 bst_dipole_field_t(bst_vec3 position_m);
+bst_vec3 bst_spacecraft_dipole_field_t(bst_vec3 position_m);
 
 /* The dipole (A m^2, body axes) with which magnetic torquers of at most limit_am2 about each axis
  * take momentum_nms (body axes) off the wheels in about BST_UNLOAD_S: (h x B) / (t |B|^2), each
  * component clipped; the torque m x B = -(h across B) / t. */
-bst_vec3 bst_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, double limit_am2);
+bst_vec3 bst_spacecraft_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, double limit_am2);
 
 #define BST_UNLOAD_S 600.0
 

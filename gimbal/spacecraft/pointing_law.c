@@ -8,7 +8,8 @@ static bst_quat turned(bst_quat q, bst_vec3 r) {
     return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
 }
 
-bst_quat bst_pointing_law_attitude(const bst_pointing_law *law, const bst_law_inputs *inputs) {
+bst_quat bst_pointing_law_attitude(const bst_pointing_law *law,
+                                   const bst_spacecraft_law_inputs *inputs) {
     bst_vec3 towards = {0, 0, 0};
     /* where the nominal attitude has the second axis */
     bst_vec3 second = bst_quat_rotate(bst_quat_conj(law->q_nominal), law->second_axis);
@@ -35,8 +36,9 @@ bst_quat bst_pointing_law_attitude(const bst_pointing_law *law, const bst_law_in
     return bst_quat_unit(turned(q, bst_vec3_scale(law->axis, law->roll_rad)));
 }
 
-bst_attitude_reference bst_attitude_reference_at(const bst_quat node[4], double step_s,
-                                                 double place) {
+bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_at(const bst_quat node[4],
+                                                                       double step_s,
+                                                                       double place) {
     bst_vec3 r[4];
     bool jump = false;
     for (int k = 0; k < 4; k++) {
@@ -47,7 +49,7 @@ bst_attitude_reference bst_attitude_reference_at(const bst_quat node[4], double 
     }
     if (jump) {
         int nearest = (int)fmin(3.0, fmax(0.0, floor(place + 0.5)));
-        return (bst_attitude_reference){.q_body_from_gcrf = node[nearest]};
+        return (bst_spacecraft_attitude_reference){.q_body_from_gcrf = node[nearest]};
     }
     /* Lagrange's polynomials of the nodes 0 to 3, and their first two derivatives */
     double a = place, b = place - 1.0, c = place - 2.0, d = place - 3.0;
@@ -64,16 +66,16 @@ bst_attitude_reference bst_attitude_reference_at(const bst_quat node[4], double 
     /* w = r' - r x r' / 2 + ..., in the turned axes */
     rate = bst_vec3_axpy(rate, -0.5, bst_vec3_cross(turn, rate));
     accel = bst_vec3_axpy(accel, -0.5, bst_vec3_cross(turn, accel));
-    return (bst_attitude_reference){bst_quat_unit(turned(node[1], turn)), rate, accel};
+    return (bst_spacecraft_attitude_reference){bst_quat_unit(turned(node[1], turn)), rate, accel};
 }
 
-bst_attitude_reference bst_attitude_reference_rolled(const bst_attitude_reference *reference,
-                                                     bst_vec3 axis, double roll_rad,
-                                                     double roll_radps) {
+bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_rolled(
+    const bst_spacecraft_attitude_reference *reference, bst_vec3 axis, double roll_rad,
+    double roll_radps) {
     bst_quat step = bst_quat_from_rotvec(bst_vec3_scale(axis, -roll_rad));
     bst_vec3 spin = bst_vec3_scale(axis, roll_radps);
     bst_vec3 carried = bst_quat_rotate(step, reference->rate_radps);
-    bst_attitude_reference out;
+    bst_spacecraft_attitude_reference out;
     out.q_body_from_gcrf = bst_quat_unit(bst_quat_mul(step, reference->q_body_from_gcrf));
     out.rate_radps = bst_vec3_add(carried, spin);
     /* the carried rate turns backwards in axes that roll */

@@ -14,58 +14,58 @@ typedef struct pending {
     bst_quat measured, estimate; /* estimate: of the instant of the measurement, as known now */
 } pending;
 
-struct bst_craft {
+struct bst_spacecraft {
     double dt_s;
-    bst_craft_body body;
+    bst_spacecraft_body body;
     bst_wheels wheels;
     double wheel_phase_rad[BST_WHEELS_MOST], wheel_load_kgm2[BST_WHEELS_MOST];
     double motor_nm[BST_WHEELS_MOST];
     bst_disturbance_config disturbances;
     bst_vec3 disturbance_nm; /* held */
-    bst_gyro gyro;
+    bst_spacecraft_gyro gyro;
     bst_quat q_at_gyro;          /* true, at the latest sample */
     bst_vec3 turn_since_control; /* sum of the gyro's samples since the controller's step */
     int samples_since_control;
     bst_vec3 rate_control_radps; /* their mean rate */
     int64_t gyro_steps, control_steps;
     int trackers;
-    bst_star_tracker tracker[BST_TRACKERS_MOST];
+    bst_spacecraft_star_tracker tracker[BST_TRACKERS_MOST];
     bst_mat3 tracker_noise[BST_TRACKERS_MOST];
     int64_t tracker_steps[BST_TRACKERS_MOST], tracker_latency[BST_TRACKERS_MOST];
     pending *pending;
     int pendings, pending_room;
     bst_attitude_filter filter;
     int64_t filter_step; /* plant step of the filter's estimate */
-    bst_attitude_control control;
+    bst_spacecraft_attitude_control control;
     bst_pointing_law law;
     bst_axis roll; /* its shaper */
     double roll_target_rad;
-    bst_sky_grid grid;
-    bst_craft_sky sky;
-    bst_craft_now now;
+    bst_spacecraft_sky_grid grid;
+    bst_spacecraft_sky sky;
+    bst_spacecraft_now now;
 };
 
-const bst_craft_now *bst_craft_at(const bst_craft *craft) {
+const bst_spacecraft_now *bst_spacecraft_at(const bst_spacecraft *craft) {
     return &craft->now;
 }
 
-const bst_craft_body *bst_craft_dynamics(const bst_craft *craft) {
+const bst_spacecraft_body *bst_spacecraft_dynamics(const bst_spacecraft *craft) {
     return &craft->body;
 }
 
-const bst_attitude_filter *bst_craft_filter(const bst_craft *craft) {
+const bst_attitude_filter *bst_spacecraft_filter(const bst_spacecraft *craft) {
     return &craft->filter;
 }
 
-bst_vec3 bst_craft_gyro_bias(const bst_craft *craft) {
+bst_vec3 bst_spacecraft_gyro_bias(const bst_spacecraft *craft) {
     return craft->gyro.bias_radps;
 }
 
-void bst_craft_command_roll(bst_craft *craft, double roll_rad) {
+void bst_spacecraft_command_roll(bst_spacecraft *craft, double roll_rad) {
     craft->roll_target_rad = roll_rad;
 }
 
-void bst_craft_free(bst_craft *craft) {
+void bst_spacecraft_free(bst_spacecraft *craft) {
     if (craft) {
         free(craft->pending);
         free(craft);
@@ -80,7 +80,7 @@ static bst_quat turned(bst_quat q, bst_vec3 r) {
     return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q));
 }
 
-static bst_rng_key stream(const bst_craft_setup *setup, const char *name) {
+static bst_rng_key stream(const bst_spacecraft_setup *setup, const char *name) {
     return bst_rng_make_key(setup->seed, setup->run, setup->instance, name);
 }
 
@@ -99,8 +99,8 @@ static bst_status whole_steps(bst_ctx *ctx, const char *key, double plant_hz, do
     return BST_OK;
 }
 
-static bst_status set_law(bst_ctx *ctx, bst_craft *craft, const bst_attitude_config *config,
-                          bst_quat q_nominal) {
+static bst_status set_law(bst_ctx *ctx, bst_spacecraft *craft,
+                          const bst_spacecraft_attitude_config *config, bst_quat q_nominal) {
     bst_vec3 axis = bst_vec3_unit(vec(config->axis)),
              second = bst_vec3_unit(vec(config->second_axis));
     if (!(bst_vec3_norm(bst_vec3_cross(axis, second)) > 1e-3)) {
@@ -109,7 +109,7 @@ static bst_status set_law(bst_ctx *ctx, bst_craft *craft, const bst_attitude_con
                         "one of them has no length; give two directions at an angle",
                         second.x, second.y, second.z, axis.x, axis.y, axis.z);
     }
-    craft->law = (bst_pointing_law){.law = (bst_law)config->law,
+    craft->law = (bst_pointing_law){.law = (bst_spacecraft_law)config->law,
                                     .q_nominal = q_nominal,
                                     .axis = axis,
                                     .second_axis = second,
@@ -117,36 +117,36 @@ static bst_status set_law(bst_ctx *ctx, bst_craft *craft, const bst_attitude_con
     return BST_OK;
 }
 
-static bst_status set_body(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
+static bst_status set_body(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecraft_config *config,
                            bst_quat q, bst_vec3 rate) {
-    bst_craft_spec spec = {.wheels = craft->wheels.count,
-                           .modes = config->modes.count,
-                           .integrator = (bst_integrator)config->integrator,
-                           .dt_s = craft->dt_s};
+    bst_spacecraft_spec spec = {.wheels = craft->wheels.count,
+                                .modes = config->modes.count,
+                                .integrator = (bst_integrator)config->integrator,
+                                .dt_s = craft->dt_s};
     for (int i = 0; i < 6; i++) {
         spec.inertia_kgm2[i] = config->inertia_kgm2[i];
     }
     double start[BST_WHEELS_MOST] = {0};
     for (int i = 0; i < spec.wheels; i++) {
         const bst_wheel *wheel = &craft->wheels.wheel[i];
-        spec.wheel[i] = (bst_craft_wheel){wheel->axis, wheel->inertia_kgm2};
+        spec.wheel[i] = (bst_spacecraft_wheel){wheel->axis, wheel->inertia_kgm2};
         start[i] = wheel->start_radps;
         craft->wheel_phase_rad[i] = wheel->phase0_rad;
     }
-    const bst_mode_config *modes = config->modes.items;
+    const bst_spacecraft_mode_config *modes = config->modes.items;
     for (int k = 0; k < spec.modes; k++) {
-        spec.mode[k] = (bst_craft_mode){2.0 * BST_PI * modes[k].frequency_hz, modes[k].damping,
-                                        vec(modes[k].coupling)};
+        spec.mode[k] = (bst_spacecraft_mode){2.0 * BST_PI * modes[k].frequency_hz, modes[k].damping,
+                                             vec(modes[k].coupling)};
     }
-    BST_TRY(bst_craft_body_init(ctx, &craft->body, &spec, q, rate, start));
+    BST_TRY(bst_spacecraft_body_init(ctx, &craft->body, &spec, q, rate, start));
     for (int i = 0; i < spec.wheels; i++) {
-        craft->wheel_load_kgm2[i] = bst_craft_body_wheel_load_kgm2(&craft->body, i);
+        craft->wheel_load_kgm2[i] = bst_spacecraft_body_wheel_load_kgm2(&craft->body, i);
     }
     return BST_OK;
 }
 
 /* Wheels that work must turn the body about every axis, unless nothing is controlled. */
-static bst_status check_wheels(bst_ctx *ctx, const bst_craft *craft) {
+static bst_status check_wheels(bst_ctx *ctx, const bst_spacecraft *craft) {
     double speed[BST_WHEELS_MOST] = {0}, motor[BST_WHEELS_MOST];
     if (craft->law.law != BST_LAW_FREE &&
         (bst_wheels_share(&craft->wheels, speed, (bst_vec3){0, 0, 0}, motor) & BST_WHEELS_SHORT)) {
@@ -159,9 +159,11 @@ static bst_status check_wheels(bst_ctx *ctx, const bst_craft *craft) {
     return BST_OK;
 }
 
-static bst_status set_trackers(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
-                               const bst_craft_setup *setup) {
-    const bst_star_tracker_config *all = bst_craft_trackers(config, &craft->trackers);
+static bst_status set_trackers(bst_ctx *ctx, bst_spacecraft *craft,
+                               const bst_spacecraft_config *config,
+                               const bst_spacecraft_setup *setup) {
+    const bst_spacecraft_star_tracker_config *all =
+        bst_spacecraft_trackers(config, &craft->trackers);
     for (int i = 0; i < craft->trackers; i++) {
         char name[64];
         snprintf(name, sizeof name, "star_trackers/%d/rate_hz", i);
@@ -183,8 +185,8 @@ static bst_status set_trackers(bst_ctx *ctx, bst_craft *craft, const bst_craft_c
         craft->tracker_latency[i] =
             (int64_t)ceil(all[i].latency_s / craft->gyro.dt_s - 1e-9) * craft->gyro_steps;
         snprintf(name, sizeof name, "star_tracker_%d", i);
-        bst_star_tracker_init(&craft->tracker[i], &all[i], stream(setup, name));
-        craft->tracker_noise[i] = bst_star_tracker_covariance(&craft->tracker[i]);
+        bst_spacecraft_star_tracker_init(&craft->tracker[i], &all[i], stream(setup, name));
+        craft->tracker_noise[i] = bst_spacecraft_star_tracker_covariance(&craft->tracker[i]);
         craft->pending_room += (int)(craft->tracker_latency[i] / craft->tracker_steps[i]) + 1;
     }
     craft->pending = calloc((size_t)craft->pending_room + 1, sizeof *craft->pending);
@@ -200,8 +202,8 @@ static bst_vec3 normal3(bst_rng_key key) {
 }
 
 /* The filter as it is at the epoch. */
-static void set_filter(bst_craft *craft, const bst_craft_config *config,
-                       const bst_craft_setup *setup, bst_quat q, bst_vec3 rate) {
+static void set_filter(bst_spacecraft *craft, const bst_spacecraft_config *config,
+                       const bst_spacecraft_setup *setup, bst_quat q, bst_vec3 rate) {
     double sigma = config->initial_knowledge_arcsec * BST_ARCSEC_RAD;
     bst_vec3 error = bst_vec3_scale(normal3(stream(setup, "knowledge")), sigma);
     bst_attitude_filter_init(&craft->filter, turned(q, error), sigma,
@@ -217,9 +219,9 @@ static void set_filter(bst_craft *craft, const bst_craft_config *config,
                               .key = stream(setup, "past")};
     for (int all = 0; all < 2 && past.trackers == 0; all++) {
         for (int i = 0; i < craft->trackers; i++) {
-            const bst_star_tracker *tracker = &craft->tracker[i];
-            if (all || bst_star_tracker_sees(tracker, 0.0, q, rate, craft->sky.position_m,
-                                             craft->sky.sun_m)) {
+            const bst_spacecraft_star_tracker *tracker = &craft->tracker[i];
+            if (all || bst_spacecraft_star_tracker_sees(tracker, 0.0, q, rate,
+                                                        craft->sky.position_m, craft->sky.sun_m)) {
                 past.rate_hz[past.trackers] = 1.0 / ((double)craft->tracker_steps[i] * craft->dt_s);
                 past.tracker[past.trackers++] = tracker;
             }
@@ -228,25 +230,26 @@ static void set_filter(bst_craft *craft, const bst_craft_config *config,
     bst_attitude_warm_up(&past, &craft->filter);
 }
 
-static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
-                          const bst_craft_setup *setup) {
+static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecraft_config *config,
+                          const bst_spacecraft_setup *setup) {
     double plant_hz = 1.0 / setup->dt_s;
     craft->dt_s = setup->dt_s;
     craft->disturbances = config->disturbances;
     BST_TRY(set_law(ctx, craft, &config->attitude, setup->q_nominal));
     int wheels;
-    const bst_wheel_config *wheel = bst_craft_wheels(config, &wheels);
+    const bst_wheel_config *wheel = bst_spacecraft_wheels(config, &wheels);
     BST_TRY(bst_wheels_init(ctx, &craft->wheels, wheel, wheels, stream(setup, "wheels")));
     BST_TRY(check_wheels(ctx, craft));
     BST_TRY(whole_steps(ctx, "gyro/rate_hz", plant_hz, config->gyro.rate_hz, &craft->gyro_steps));
     BST_TRY(whole_steps(ctx, "attitude/rate_hz", plant_hz, config->attitude.rate_hz,
                         &craft->control_steps));
-    bst_gyro_init(&craft->gyro, &config->gyro, (double)craft->gyro_steps * setup->dt_s,
-                  stream(setup, "gyro"));
+    bst_spacecraft_gyro_init(&craft->gyro, &config->gyro, (double)craft->gyro_steps * setup->dt_s,
+                             stream(setup, "gyro"));
     BST_TRY(set_trackers(ctx, craft, config, setup));
 
-    craft->grid = (bst_sky_grid){.sky_at = setup->sky_at, .user = setup->user, .law = &craft->law};
-    BST_TRY(bst_sky_grid_at(&craft->grid, ctx, 0.0, &craft->sky, &craft->now.reference));
+    craft->grid =
+        (bst_spacecraft_sky_grid){.sky_at = setup->sky_at, .user = setup->user, .law = &craft->law};
+    BST_TRY(bst_spacecraft_sky_grid_at(&craft->grid, ctx, 0.0, &craft->sky, &craft->now.reference));
     bst_vec3 turn = bst_vec3_scale(vec(config->initial_turn_deg), BST_DEG_RAD);
     bst_quat q = turned(craft->now.reference.q_body_from_gcrf, turn);
     bst_vec3 rate = bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(turn, -1.0)),
@@ -254,8 +257,8 @@ static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config
     rate = bst_vec3_axpy(rate, BST_DEG_RAD, vec(config->initial_rate_degps));
     BST_TRY(set_body(ctx, craft, config, q, rate));
     set_filter(craft, config, setup, q, rate);
-    bst_attitude_control_spec spec = bst_attitude_control_of(config);
-    bst_attitude_control_init(&craft->control, &spec);
+    bst_spacecraft_attitude_control_spec spec = bst_spacecraft_attitude_control_of(config);
+    bst_spacecraft_attitude_control_init(&craft->control, &spec);
     if (craft->law.law != BST_LAW_FREE) {
         const bst_axis_spec limits = {.rate_limit_radps = spec.rate_limit_radps,
                                       .accel_limit_radps2 = spec.accel_limit_radps2,
@@ -270,15 +273,15 @@ static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config
     return BST_OK;
 }
 
-bst_status bst_craft_create(bst_ctx *ctx, const bst_craft_config *config,
-                            const bst_craft_setup *setup, bst_craft **out) {
-    bst_craft *craft = calloc(1, sizeof *craft);
+bst_status bst_spacecraft_create(bst_ctx *ctx, const bst_spacecraft_config *config,
+                                 const bst_spacecraft_setup *setup, bst_spacecraft **out) {
+    bst_spacecraft *craft = calloc(1, sizeof *craft);
     if (!craft) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a spacecraft");
     }
     bst_status status = prepare(ctx, craft, config, setup);
     if (status != BST_OK) {
-        bst_craft_free(craft);
+        bst_spacecraft_free(craft);
         return bst_fail_prefix(ctx, status, "platform/spacecraft");
     }
     *out = craft;
@@ -286,11 +289,11 @@ bst_status bst_craft_create(bst_ctx *ctx, const bst_craft_config *config,
 }
 
 /* Fastest imbalance that steps follow, rad/s. */
-static double followed_radps(const bst_craft *craft) {
+static double followed_radps(const bst_spacecraft *craft) {
     return 2.0 * BST_PI * BST_JITTER_RESOLVED / craft->dt_s;
 }
 
-static void move(bst_craft *craft, bst_vec3 reaction_nm) {
+static void move(bst_spacecraft *craft, bst_vec3 reaction_nm) {
     int wheels = craft->wheels.count;
     double dt = craft->dt_s, top = followed_radps(craft);
     double torque[BST_WHEELS_MOST];
@@ -307,28 +310,28 @@ static void move(bst_craft *craft, bst_vec3 reaction_nm) {
         craft->wheel_phase_rad[i] =
             fabs(next) > 2.0 * BST_PI ? next - copysign(2.0 * BST_PI, next) : next;
     }
-    bst_craft_body_step(&craft->body, outer, torque);
+    bst_spacecraft_body_step(&craft->body, outer, torque);
 }
 
-static void observe_motion(bst_craft *craft, bool moved) {
+static void observe_motion(bst_spacecraft *craft, bool moved) {
     bst_body_state *body = &craft->now.body;
     bst_vec3 before = body->rate_radps;
-    body->q_body_from_gcrf = bst_craft_body_attitude(&craft->body);
-    body->rate_radps = bst_craft_body_rate(&craft->body);
+    body->q_body_from_gcrf = bst_spacecraft_body_attitude(&craft->body);
+    body->rate_radps = bst_spacecraft_body_rate(&craft->body);
     body->accel_radps2 =
         moved ? bst_vec3_scale(bst_vec3_sub(body->rate_radps, before), 1.0 / craft->dt_s)
               : (bst_vec3){0, 0, 0};
     for (int i = 0; i < craft->wheels.count; i++) {
-        craft->now.wheel_radps[i] = bst_craft_body_wheel_radps(&craft->body, i);
+        craft->now.wheel_radps[i] = bst_spacecraft_body_wheel_radps(&craft->body, i);
     }
 }
 
-static void read_gyro(bst_craft *craft, int64_t n) {
+static void read_gyro(bst_spacecraft *craft, int64_t n) {
     double dt = craft->gyro.dt_s;
     bst_quat q = craft->now.body.q_body_from_gcrf;
     bst_vec3 turn = n == 0 ? bst_vec3_scale(craft->now.body.rate_radps, dt)
-                           : bst_attitude_error(q, craft->q_at_gyro);
-    bst_vec3 sample = bst_gyro_measure(&craft->gyro, turn);
+                           : bst_attitude_filter_error(q, craft->q_at_gyro);
+    bst_vec3 sample = bst_spacecraft_gyro_measure(&craft->gyro, turn);
     if (n > 0) {
         bst_attitude_filter_propagate(&craft->filter, sample, dt);
     }
@@ -340,7 +343,7 @@ static void read_gyro(bst_craft *craft, int64_t n) {
     craft->samples_since_control++;
 }
 
-static void read_trackers(bst_craft *craft, int64_t n, double seconds) {
+static void read_trackers(bst_spacecraft *craft, int64_t n, double seconds) {
     bool asked = false, seen = false;
     for (int i = 0; i < craft->trackers; i++) {
         if (n % craft->tracker_steps[i] != 0) {
@@ -348,8 +351,9 @@ static void read_trackers(bst_craft *craft, int64_t n, double seconds) {
         }
         const bst_body_state *body = &craft->now.body;
         asked = true;
-        if (!bst_star_tracker_sees(&craft->tracker[i], seconds, body->q_body_from_gcrf,
-                                   body->rate_radps, craft->sky.position_m, craft->sky.sun_m)) {
+        if (!bst_spacecraft_star_tracker_sees(&craft->tracker[i], seconds, body->q_body_from_gcrf,
+                                              body->rate_radps, craft->sky.position_m,
+                                              craft->sky.sun_m)) {
             continue;
         }
         seen = true;
@@ -357,7 +361,7 @@ static void read_trackers(bst_craft *craft, int64_t n, double seconds) {
             (pending){.sampled = n,
                       .due = n + craft->tracker_latency[i],
                       .tracker = i,
-                      .measured = bst_star_tracker_measure(
+                      .measured = bst_spacecraft_star_tracker_measure(
                           &craft->tracker[i], n / craft->tracker_steps[i], body->q_body_from_gcrf),
                       .estimate = craft->filter.q_body_from_gcrf};
     }
@@ -373,7 +377,7 @@ static void correct_past(bst_quat *estimate, bst_quat q_now, double age_s,
     *estimate = turned(*estimate, bst_quat_rotate(q_then_from_now, e));
 }
 
-static void take_in(bst_craft *craft, int64_t n) {
+static void take_in(bst_spacecraft *craft, int64_t n) {
     int kept = 0;
     for (int k = 0; k < craft->pendings; k++) {
         pending p = craft->pending[k];
@@ -383,10 +387,10 @@ static void take_in(bst_craft *craft, int64_t n) {
         }
         bst_quat q_now = craft->filter.q_body_from_gcrf;
         bst_vec3 correction[2] = {{0, 0, 0}, {0, 0, 0}};
-        bst_attitude_filter_update(&craft->filter, bst_attitude_error(p.measured, p.estimate),
-                                   (double)(n - p.sampled) * craft->dt_s,
-                                   bst_quat_mul(q_now, bst_quat_conj(p.estimate)),
-                                   &craft->tracker_noise[p.tracker], correction);
+        bst_attitude_filter_update(
+            &craft->filter, bst_attitude_filter_error(p.measured, p.estimate),
+            (double)(n - p.sampled) * craft->dt_s, bst_quat_mul(q_now, bst_quat_conj(p.estimate)),
+            &craft->tracker_noise[p.tracker], correction);
         craft->now.rate_believed_radps =
             bst_vec3_sub(craft->now.rate_believed_radps, correction[1]);
         for (int j = 0; j < craft->pendings; j++) {
@@ -402,7 +406,7 @@ static void take_in(bst_craft *craft, int64_t n) {
 
 /* What the imbalance of wheels adds that the steps do not show: all of the fast ones, and of the
  * others what straight lines between the steps lack. */
-static double unresolved(const bst_craft *craft) {
+static double unresolved(const bst_spacecraft *craft) {
     double sum = 0.0, top = followed_radps(craft);
     const bst_mat3 *inertia = &craft->body.inertia;
     for (int i = 0; i < craft->wheels.count; i++) {
@@ -420,7 +424,7 @@ static double unresolved(const bst_craft *craft) {
 }
 
 /* Brings the commanded roll a step of the controller on. */
-static void roll(bst_craft *craft) {
+static void roll(bst_spacecraft *craft) {
     bst_axis *axis = &craft->roll;
     bst_body_roll *now = &craft->now.roll;
     if (craft->roll_target_rad == 0.0 && axis->reference_rad == 0.0 &&
@@ -430,16 +434,17 @@ static void roll(bst_craft *craft) {
     now->angle_rad = axis->reference_rad;
     now->rate_radps = axis->reference_radps;
     double h = axis->spec.dt_s, accel = bst_axis_shape(axis, craft->roll_target_rad, 0.0);
-    craft->now.reference = bst_attitude_reference_rolled(&craft->now.reference, now->axis_body,
-                                                         now->angle_rad, now->rate_radps);
+    craft->now.reference = bst_spacecraft_attitude_reference_rolled(
+        &craft->now.reference, now->axis_body, now->angle_rad, now->rate_radps);
     craft->now.reference.accel_radps2 =
         bst_vec3_axpy(craft->now.reference.accel_radps2, accel, now->axis_body);
     axis->reference_rad += axis->reference_radps * h + 0.5 * accel * h * h;
     axis->reference_radps += accel * h;
 }
 
-static bst_status control(bst_ctx *ctx, bst_craft *craft, int64_t n, double seconds) {
-    BST_TRY(bst_sky_grid_at(&craft->grid, ctx, seconds, &craft->sky, &craft->now.reference));
+static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double seconds) {
+    BST_TRY(
+        bst_spacecraft_sky_grid_at(&craft->grid, ctx, seconds, &craft->sky, &craft->now.reference));
     const bst_body_state *body = &craft->now.body;
     bst_vec3 momentum = {0, 0, 0};
     for (int i = 0; i < craft->wheels.count; i++) {
@@ -468,16 +473,16 @@ static bst_status control(bst_ctx *ctx, bst_craft *craft, int64_t n, double seco
         craft->turn_since_control = (bst_vec3){0, 0, 0};
         craft->samples_since_control = 0;
     }
-    bst_vec3 torque = bst_attitude_control_step(&craft->control, &craft->now.reference, q,
-                                                craft->rate_control_radps, momentum,
-                                                craft->now.wheel_flags != 0u);
+    bst_vec3 torque = bst_spacecraft_attitude_control_step(&craft->control, &craft->now.reference,
+                                                           q, craft->rate_control_radps, momentum,
+                                                           craft->now.wheel_flags != 0u);
     craft->now.wheel_flags =
         bst_wheels_share(&craft->wheels, craft->now.wheel_radps, torque, craft->motor_nm);
     return BST_OK;
 }
 
-bst_status bst_craft_step(bst_ctx *ctx, bst_craft *craft, int64_t n, double seconds,
-                          bst_vec3 reaction_nm) {
+bst_status bst_spacecraft_step(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double seconds,
+                               bst_vec3 reaction_nm) {
     if (n > 0) {
         move(craft, reaction_nm);
     }

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-bst_mat3 bst_inertia_matrix(const double i[6]) {
+bst_mat3 bst_spacecraft_inertia_matrix(const double i[6]) {
     return (bst_mat3){{{i[0], i[3], i[4]}, {i[3], i[1], i[5]}, {i[4], i[5], i[2]}}};
 }
 
@@ -21,7 +21,7 @@ static void take_away(bst_mat3 *m, double scale, bst_vec3 v) {
 /* Principal moments (ascending) must be those of a body. */
 static bst_status check_inertia(bst_ctx *ctx, const bst_mat3 *inertia) {
     double moment[3];
-    bst_symmetric_eigen(3, &inertia->m[0][0], moment, NULL);
+    bst_dynamics_symmetric_eigen(3, &inertia->m[0][0], moment, NULL);
     if (!(moment[0] > 0.0)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "inertia_kgm2: not positive definite (its principal moments are %g, %g and "
@@ -39,8 +39,8 @@ static bst_status check_inertia(bst_ctx *ctx, const bst_mat3 *inertia) {
 }
 
 /* The principal axes and moments of what remains when wheels and appendages turn freely. */
-static bst_status set_axes(bst_ctx *ctx, bst_craft_body *body) {
-    const bst_craft_spec *spec = &body->spec;
+static bst_status set_axes(bst_ctx *ctx, bst_spacecraft_body *body) {
+    const bst_spacecraft_spec *spec = &body->spec;
     bst_mat3 hub = body->inertia;
     for (int i = 0; i < spec->wheels; i++) {
         take_away(&hub, spec->wheel[i].inertia_kgm2, spec->wheel[i].axis);
@@ -49,8 +49,8 @@ static bst_status set_axes(bst_ctx *ctx, bst_craft_body *body) {
         take_away(&hub, 1.0, spec->mode[k].coupling);
     }
     double moment[3], axes[9], whole[3];
-    bst_symmetric_eigen(3, &hub.m[0][0], moment, axes);
-    bst_symmetric_eigen(3, &body->inertia.m[0][0], whole, NULL);
+    bst_dynamics_symmetric_eigen(3, &hub.m[0][0], moment, axes);
+    bst_dynamics_symmetric_eigen(3, &body->inertia.m[0][0], whole, NULL);
     if (!(moment[0] > 1e-6 * whole[0])) {
         return bst_fail(
             ctx, BST_ERR_CONFIG,
@@ -76,19 +76,19 @@ static bst_status set_axes(bst_ctx *ctx, bst_craft_body *body) {
     return BST_OK;
 }
 
-static bst_vec3 by_moments(const bst_craft_body *body, bst_vec3 v) {
+static bst_vec3 by_moments(const bst_spacecraft_body *body, bst_vec3 v) {
     const double *m = body->per_moment;
     return (bst_vec3){m[0] * v.x, m[1] * v.y, m[2] * v.z};
 }
 
 /* d_j . M d_k + (j == k): how p drives n. */
-static double mobility(const bst_craft_body *body, int j, int k) {
+static double mobility(const bst_spacecraft_body *body, int j, int k) {
     return (j == k ? 1.0 : 0.0) +
            bst_vec3_dot(body->coupling[j], by_moments(body, body->coupling[k]));
 }
 
-static bst_status set_modes(bst_ctx *ctx, bst_craft_body *body) {
-    const bst_craft_spec *spec = &body->spec;
+static bst_status set_modes(bst_ctx *ctx, bst_spacecraft_body *body) {
+    const bst_spacecraft_spec *spec = &body->spec;
     int m = spec->modes;
     if (m == 0) {
         return BST_OK;
@@ -100,7 +100,7 @@ static bst_status set_modes(bst_ctx *ctx, bst_craft_body *body) {
                                 mobility(body, j, k);
         }
     }
-    bst_symmetric_eigen(m, square, squared, NULL);
+    bst_dynamics_symmetric_eigen(m, square, squared, NULL);
     for (int k = 0; k < m; k++) {
         body->free_radps[k] = sqrt(squared[k]);
     }
@@ -128,7 +128,7 @@ static bst_status set_modes(bst_ctx *ctx, bst_craft_body *body) {
             a[(m + j) * n + 2 * m + k] = -c * a[j * n + 2 * m + k];
         }
     }
-    bst_matrix_exp(n, a, e);
+    bst_dynamics_matrix_exp(n, a, e);
     for (int i = 0; i < 2 * m; i++) {
         memcpy(body->keep[i], &e[i * n], (size_t)(2 * m) * sizeof(double));
         memcpy(body->drive[i], &e[i * n + 2 * m], 3 * sizeof(double));
@@ -137,7 +137,7 @@ static bst_status set_modes(bst_ctx *ctx, bst_craft_body *body) {
 }
 
 /* Momentum of the wheels, and that of the modes, in principal axes. */
-static bst_vec3 wheels_momentum(const bst_craft_body *body, const double *wheel_momentum) {
+static bst_vec3 wheels_momentum(const bst_spacecraft_body *body, const double *wheel_momentum) {
     bst_vec3 sum = {0, 0, 0};
     for (int i = 0; i < body->spec.wheels; i++) {
         sum = bst_vec3_axpy(sum, wheel_momentum[i], body->wheel_axis[i]);
@@ -145,7 +145,7 @@ static bst_vec3 wheels_momentum(const bst_craft_body *body, const double *wheel_
     return sum;
 }
 
-static bst_vec3 modes_momentum(const bst_craft_body *body, const double *mode_momentum) {
+static bst_vec3 modes_momentum(const bst_spacecraft_body *body, const double *mode_momentum) {
     bst_vec3 sum = {0, 0, 0};
     for (int k = 0; k < body->spec.modes; k++) {
         sum = bst_vec3_axpy(sum, mode_momentum[k], body->coupling[k]);
@@ -153,17 +153,18 @@ static bst_vec3 modes_momentum(const bst_craft_body *body, const double *mode_mo
     return sum;
 }
 
-static void set_rate(bst_craft_body *body) {
+static void set_rate(bst_spacecraft_body *body) {
     bst_vec3 shift = bst_vec3_add(wheels_momentum(body, body->wheel_momentum),
                                   modes_momentum(body, body->mode_momentum));
     bst_vec3 pi = bst_quat_rotate(body->q, body->momentum_gcrf);
     body->rate_principal = by_moments(body, bst_vec3_sub(pi, shift));
 }
 
-bst_status bst_craft_body_init(bst_ctx *ctx, bst_craft_body *body, const bst_craft_spec *spec,
-                               bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
-                               const double *wheel_radps) {
-    *body = (bst_craft_body){.spec = *spec, .inertia = bst_inertia_matrix(spec->inertia_kgm2)};
+bst_status bst_spacecraft_body_init(bst_ctx *ctx, bst_spacecraft_body *body,
+                                    const bst_spacecraft_spec *spec, bst_quat q_body_from_gcrf,
+                                    bst_vec3 rate_radps, const double *wheel_radps) {
+    *body = (bst_spacecraft_body){.spec = *spec,
+                                  .inertia = bst_spacecraft_inertia_matrix(spec->inertia_kgm2)};
     BST_TRY(check_inertia(ctx, &body->inertia));
     BST_TRY(set_axes(ctx, body));
     BST_TRY(set_modes(ctx, body));
@@ -184,7 +185,7 @@ bst_status bst_craft_body_init(bst_ctx *ctx, bst_craft_body *body, const bst_cra
 }
 
 /* The modes over half a step, the body's momentum held. */
-static void step_modes(bst_craft_body *body, bst_vec3 pi_without_wheels) {
+static void step_modes(bst_spacecraft_body *body, bst_vec3 pi_without_wheels) {
     int m = body->spec.modes;
     if (m == 0) {
         return;
@@ -215,7 +216,7 @@ static bst_quat renormalised(bst_quat q) {
     return (bst_quat){q.x * f, q.y * f, q.z * f, q.w * f};
 }
 
-static void step_split(bst_craft_body *body, bst_vec3 torque, const double *wheel_torque) {
+static void step_split(bst_spacecraft_body *body, bst_vec3 torque, const double *wheel_torque) {
     double dt = body->spec.dt_s, half = 0.5 * dt;
     int wheels = body->spec.wheels;
     bst_vec3 start_torque = bst_quat_rotate(bst_quat_conj(body->q), torque);
@@ -228,13 +229,13 @@ static void step_split(bst_craft_body *body, bst_vec3 torque, const double *whee
     step_modes(body, bst_vec3_sub(pi, wheel_shift));
 
     bst_vec3 shift = bst_vec3_add(wheel_shift, modes_momentum(body, body->mode_momentum));
-    bst_free_body rigid = {{body->per_moment[0], body->per_moment[1], body->per_moment[2]},
-                           {shift.x, shift.y, shift.z}};
+    bst_dynamics_free_body rigid = {{body->per_moment[0], body->per_moment[1], body->per_moment[2]},
+                                    {shift.x, shift.y, shift.z}};
     double turned[3] = {pi.x, pi.y, pi.z};
     if (body->spec.integrator == BST_INTEGRATE_SYMPLECTIC4) {
-        bst_turn_free_body4(&rigid, dt, &body->q, turned);
+        bst_dynamics_turn_free_body4(&rigid, dt, &body->q, turned);
     } else {
-        bst_turn_free_body(&rigid, dt, &body->q, turned);
+        bst_dynamics_turn_free_body(&rigid, dt, &body->q, turned);
     }
     body->q = renormalised(body->q);
 
@@ -249,14 +250,14 @@ static void step_split(bst_craft_body *body, bst_vec3 torque, const double *whee
 
 /* rk4: variables are q, momentum in GCRF, wheels, modes' places, modes' momenta. */
 typedef struct held {
-    const bst_craft_body *body;
+    const bst_spacecraft_body *body;
     bst_vec3 torque;
     const double *wheel_torque;
 } held;
 
 static void slopes(const void *user, const double *y, double *out) {
     const held *h = user;
-    const bst_craft_body *body = h->body;
+    const bst_spacecraft_body *body = h->body;
     int wheels = body->spec.wheels, m = body->spec.modes;
     const double *place = y + 7 + wheels, *momentum = place + m;
     bst_quat q = {y[0], y[1], y[2], y[3]};
@@ -278,7 +279,7 @@ static void slopes(const void *user, const double *y, double *out) {
     }
 }
 
-static void step_rk4(bst_craft_body *body, bst_vec3 torque, const double *wheel_torque) {
+static void step_rk4(bst_spacecraft_body *body, bst_vec3 torque, const double *wheel_torque) {
     int wheels = body->spec.wheels, m = body->spec.modes;
     double y[BST_RK4_MOST] = {body->q.x,
                               body->q.y,
@@ -291,7 +292,7 @@ static void step_rk4(bst_craft_body *body, bst_vec3 torque, const double *wheel_
     memcpy(y + 7 + wheels, body->mode_place, (size_t)m * sizeof *y);
     memcpy(y + 7 + wheels + m, body->mode_momentum, (size_t)m * sizeof *y);
     held h = {body, torque, wheel_torque};
-    bst_rk4_step(slopes, &h, 7 + wheels + 2 * m, body->spec.dt_s, y);
+    bst_dynamics_rk4_step(slopes, &h, 7 + wheels + 2 * m, body->spec.dt_s, y);
     body->q = bst_quat_unit((bst_quat){y[0], y[1], y[2], y[3]});
     body->momentum_gcrf = (bst_vec3){y[4], y[5], y[6]};
     memcpy(body->wheel_momentum, y + 7, (size_t)wheels * sizeof *y);
@@ -299,7 +300,8 @@ static void step_rk4(bst_craft_body *body, bst_vec3 torque, const double *wheel_
     memcpy(body->mode_momentum, y + 7 + wheels + m, (size_t)m * sizeof *y);
 }
 
-void bst_craft_body_step(bst_craft_body *body, bst_vec3 torque_nm, const double *wheel_torque_nm) {
+void bst_spacecraft_body_step(bst_spacecraft_body *body, bst_vec3 torque_nm,
+                              const double *wheel_torque_nm) {
     bst_vec3 torque = bst_quat_rotate(body->q_principal_from_body, torque_nm);
     if (body->spec.integrator == BST_INTEGRATE_RK4) {
         step_rk4(body, torque, wheel_torque_nm);
@@ -309,40 +311,40 @@ void bst_craft_body_step(bst_craft_body *body, bst_vec3 torque_nm, const double 
     set_rate(body);
 }
 
-bst_quat bst_craft_body_attitude(const bst_craft_body *body) {
+bst_quat bst_spacecraft_body_attitude(const bst_spacecraft_body *body) {
     return bst_quat_mul(bst_quat_conj(body->q_principal_from_body), body->q);
 }
 
-bst_vec3 bst_craft_body_rate(const bst_craft_body *body) {
+bst_vec3 bst_spacecraft_body_rate(const bst_spacecraft_body *body) {
     return bst_quat_rotate(bst_quat_conj(body->q_principal_from_body), body->rate_principal);
 }
 
-double bst_craft_body_wheel_radps(const bst_craft_body *body, int wheel) {
+double bst_spacecraft_body_wheel_radps(const bst_spacecraft_body *body, int wheel) {
     return body->wheel_momentum[wheel] / body->spec.wheel[wheel].inertia_kgm2 -
            bst_vec3_dot(body->wheel_axis[wheel], body->rate_principal);
 }
 
-double bst_craft_body_wheel_load_kgm2(const bst_craft_body *body, int wheel) {
+double bst_spacecraft_body_wheel_load_kgm2(const bst_spacecraft_body *body, int wheel) {
     bst_vec3 axis = body->wheel_axis[wheel];
     return 1.0 / (1.0 / body->spec.wheel[wheel].inertia_kgm2 +
                   bst_vec3_dot(axis, by_moments(body, axis)));
 }
 
-bst_vec3 bst_craft_body_momentum(const bst_craft_body *body) {
-    bst_vec3 rate = bst_craft_body_rate(body), pi = bst_mat3_mul_vec(&body->inertia, rate);
+bst_vec3 bst_spacecraft_body_momentum(const bst_spacecraft_body *body) {
+    bst_vec3 rate = bst_spacecraft_body_rate(body), pi = bst_mat3_mul_vec(&body->inertia, rate);
     for (int i = 0; i < body->spec.wheels; i++) {
-        pi = bst_vec3_axpy(pi,
-                           body->spec.wheel[i].inertia_kgm2 * bst_craft_body_wheel_radps(body, i),
-                           body->spec.wheel[i].axis);
+        pi = bst_vec3_axpy(
+            pi, body->spec.wheel[i].inertia_kgm2 * bst_spacecraft_body_wheel_radps(body, i),
+            body->spec.wheel[i].axis);
     }
     for (int k = 0; k < body->spec.modes; k++) {
         bst_vec3 d = body->spec.mode[k].coupling;
         pi = bst_vec3_axpy(pi, body->mode_momentum[k] - bst_vec3_dot(d, rate), d);
     }
-    return bst_quat_rotate(bst_quat_conj(bst_craft_body_attitude(body)), pi);
+    return bst_quat_rotate(bst_quat_conj(bst_spacecraft_body_attitude(body)), pi);
 }
 
-double bst_craft_body_energy(const bst_craft_body *body) {
+double bst_spacecraft_body_energy(const bst_spacecraft_body *body) {
     bst_vec3 w = body->rate_principal;
     double sum = w.x * w.x / body->per_moment[0] + w.y * w.y / body->per_moment[1] +
                  w.z * w.z / body->per_moment[2];

@@ -19,30 +19,30 @@
 #define BST_WHEELS_MOST 8
 #define BST_MODES_MOST 6
 
-typedef struct bst_craft_wheel {
+typedef struct bst_spacecraft_wheel {
     bst_vec3 axis; /* unit, body */
     double inertia_kgm2;
-} bst_craft_wheel;
+} bst_spacecraft_wheel;
 
-typedef struct bst_craft_mode {
+typedef struct bst_spacecraft_mode {
     double frequency_radps; /* of the appendage on a fixed hub */
     double damping;         /* ratio */
     bst_vec3 coupling;      /* sqrt(kg) m, body axes */
-} bst_craft_mode;
+} bst_spacecraft_mode;
 
-typedef struct bst_craft_spec {
+typedef struct bst_spacecraft_spec {
     double inertia_kgm2[6]; /* of all, wheels and appendages at rest: xx, yy, zz, xy, xz, yz; the
                                tensor's elements, so xy is minus the integral of x y dm */
     int wheels, modes;
-    bst_craft_wheel wheel[BST_WHEELS_MOST];
-    bst_craft_mode mode[BST_MODES_MOST];
+    bst_spacecraft_wheel wheel[BST_WHEELS_MOST];
+    bst_spacecraft_mode mode[BST_MODES_MOST];
     bst_integrator integrator;
     double dt_s;
-} bst_craft_spec;
+} bst_spacecraft_spec;
 
 /* All but the members that its functions return are its own. */
-typedef struct bst_craft_body {
-    bst_craft_spec spec;
+typedef struct bst_spacecraft_body {
+    bst_spacecraft_spec spec;
     bst_mat3 inertia;                                               /* body axes */
     bst_quat q_principal_from_body;                                 /* principal axes of M */
     bst_vec3 wheel_axis[BST_WHEELS_MOST], coupling[BST_MODES_MOST]; /* principal axes */
@@ -56,16 +56,16 @@ typedef struct bst_craft_body {
     double wheel_momentum[BST_WHEELS_MOST], mode_place[BST_MODES_MOST],
         mode_momentum[BST_MODES_MOST];
     bst_vec3 rate_principal;
-} bst_craft_body;
+} bst_spacecraft_body;
 
 /* At rest in its modes, turning at rate_radps (body axes), wheels at wheel_radps. BST_ERR_CONFIG
  * with the reason: an inertia that is none (not positive definite, or a principal moment above the
  * sum of the two others), wheels or appendages with more inertia than the whole, and a step in
  * which the fastest mode of the free craft turns by more than BST_MODE_STEP_CYCLES of its cycle:
  * the message has the longest step allowed. */
-bst_status bst_craft_body_init(bst_ctx *ctx, bst_craft_body *body, const bst_craft_spec *spec,
-                               bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
-                               const double *wheel_radps) BST_MUST_CHECK;
+bst_status bst_spacecraft_body_init(bst_ctx *ctx, bst_spacecraft_body *body,
+                                    const bst_spacecraft_spec *spec, bst_quat q_body_from_gcrf,
+                                    bst_vec3 rate_radps, const double *wheel_radps) BST_MUST_CHECK;
 
 #define BST_MODE_STEP_CYCLES 0.1
 
@@ -75,20 +75,21 @@ bst_status bst_craft_body_init(bst_ctx *ctx, bst_craft_body *body, const bst_cra
  * (spec.integrator), the modes step again: second order, symmetric in time, and without torques
  * and damping momentum and energy are kept to the order of the integrator. With rk4 all variables
  * are stepped by it at once. */
-void bst_craft_body_step(bst_craft_body *body, bst_vec3 torque_nm, const double *wheel_torque_nm);
+void bst_spacecraft_body_step(bst_spacecraft_body *body, bst_vec3 torque_nm,
+                              const double *wheel_torque_nm);
 
-bst_quat bst_craft_body_attitude(const bst_craft_body *body); /* q_body_from_gcrf */
-bst_vec3 bst_craft_body_rate(const bst_craft_body *body);     /* body axes */
-double bst_craft_body_wheel_radps(const bst_craft_body *body, int wheel);
+bst_quat bst_spacecraft_body_attitude(const bst_spacecraft_body *body); /* q_body_from_gcrf */
+bst_vec3 bst_spacecraft_body_rate(const bst_spacecraft_body *body);     /* body axes */
+double bst_spacecraft_body_wheel_radps(const bst_spacecraft_body *body, int wheel);
 /* Inertia that a motor torque on a wheel turns: its own against the body that gives way. */
-double bst_craft_body_wheel_load_kgm2(const bst_craft_body *body, int wheel);
+double bst_spacecraft_body_wheel_load_kgm2(const bst_spacecraft_body *body, int wheel);
 
 /* Angular momentum in GCRF, N m s, from attitude, rates and modes; kinetic and elastic energy, J.
  */
-bst_vec3 bst_craft_body_momentum(const bst_craft_body *body);
-double bst_craft_body_energy(const bst_craft_body *body);
+bst_vec3 bst_spacecraft_body_momentum(const bst_spacecraft_body *body);
+double bst_spacecraft_body_energy(const bst_spacecraft_body *body);
 
-/* The symmetric matrix of six elements in the order of bst_craft_spec. */
-bst_mat3 bst_inertia_matrix(const double inertia_kgm2[6]);
+/* The symmetric matrix of six elements in the order of bst_spacecraft_spec. */
+bst_mat3 bst_spacecraft_inertia_matrix(const double inertia_kgm2[6]);
 
 #endif

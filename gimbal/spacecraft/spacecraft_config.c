@@ -2,7 +2,7 @@
 
 static const char *const type_names[] = {"inertial", "rigid_body", NULL};
 
-#define C bst_mode_config
+#define C bst_spacecraft_mode_config
 static const bst_config_desc mode_table[] = {
     BST_REAL(C, frequency_hz, "Hz", 1e-4, 10000, NULL,
              "Of the appendage on a fixed hub; on the free craft it is higher."),
@@ -12,7 +12,7 @@ static const bst_config_desc mode_table[] = {
     BST_CONFIG_END};
 #undef C
 
-#define C bst_attitude_config
+#define C bst_spacecraft_attitude_config
 static const bst_config_desc attitude_table[] = {
     BST_ENUM(C, law, bst_law_names, "\"inertial\"",
              "What the body is kept on: `inertial`, the attitude of the epoch; `nadir`, axis to "
@@ -35,8 +35,8 @@ static const bst_config_desc attitude_table[] = {
     BST_CONFIG_END};
 #undef C
 
-#define C bst_craft_config
-const bst_config_desc bst_craft_config_table[] = {
+#define C bst_spacecraft_config
+const bst_config_desc bst_spacecraft_config_table[] = {
     BST_ENUM(C, type, type_names, "\"inertial\"",
              "`inertial`: held but for drift_arcsec_per_s, known but for attitude_bias_arcsec and "
              "attitude_noise_arcsec. `rigid_body`: dynamics, wheels, sensors and controller of the "
@@ -62,9 +62,9 @@ const bst_config_desc bst_craft_config_table[] = {
     BST_LIST(C, wheels, bst_wheel_config, bst_wheel_config_table, 0, BST_WHEELS_MOST, "[]",
              "Reaction wheels. None given: four like the default one on the edges of a pyramid "
              "about z, at [1, 1, 1] and so on; with the law `free` none."),
-    BST_LIST(C, modes, bst_mode_config, mode_table, 0, BST_MODES_MOST, "[]",
+    BST_LIST(C, modes, bst_spacecraft_mode_config, mode_table, 0, BST_MODES_MOST, "[]",
              "Flexible modes of appendages."),
-    BST_LIST(C, star_trackers, bst_star_tracker_config, bst_star_tracker_config_table, 0,
+    BST_LIST(C, star_trackers, bst_spacecraft_star_tracker_config, bst_star_tracker_config_table, 0,
              BST_TRACKERS_MOST, "[]",
              "Star trackers. None given: two like the default one, along +y and -y, of which one "
              "always looks away from the Earth."),
@@ -74,15 +74,17 @@ const bst_config_desc bst_craft_config_table[] = {
     BST_CONFIG_END};
 #undef C
 
-bst_attitude_control_spec bst_attitude_control_of(const bst_craft_config *config) {
-    const bst_attitude_config *a = &config->attitude;
-    return (bst_attitude_control_spec){.natural_radps = 2.0 * BST_PI * a->bandwidth_hz,
-                                       .damping = a->damping,
-                                       .integral_radps = 2.0 * BST_PI * a->integral_hz,
-                                       .rate_limit_radps = a->rate_limit_degps * BST_DEG_RAD,
-                                       .accel_limit_radps2 = a->accel_limit_degps2 * BST_DEG_RAD,
-                                       .dt_s = 1.0 / a->rate_hz,
-                                       .inertia_kgm2 = bst_inertia_matrix(config->inertia_kgm2)};
+bst_spacecraft_attitude_control_spec bst_spacecraft_attitude_control_of(
+    const bst_spacecraft_config *config) {
+    const bst_spacecraft_attitude_config *a = &config->attitude;
+    return (bst_spacecraft_attitude_control_spec){
+        .natural_radps = 2.0 * BST_PI * a->bandwidth_hz,
+        .damping = a->damping,
+        .integral_radps = 2.0 * BST_PI * a->integral_hz,
+        .rate_limit_radps = a->rate_limit_degps * BST_DEG_RAD,
+        .accel_limit_radps2 = a->accel_limit_degps2 * BST_DEG_RAD,
+        .dt_s = 1.0 / a->rate_hz,
+        .inertia_kgm2 = bst_spacecraft_inertia_matrix(config->inertia_kgm2)};
 }
 
 #define WHEEL(x, y) \
@@ -94,7 +96,7 @@ bst_attitude_control_spec bst_attitude_control_of(const bst_craft_config *config
         .rate_limit_degps = 2                                                              \
     }
 
-const bst_wheel_config *bst_craft_wheels(const bst_craft_config *config, int *count) {
+const bst_wheel_config *bst_spacecraft_wheels(const bst_spacecraft_config *config, int *count) {
     static const bst_wheel_config pyramid[4] = {WHEEL(1, 1), WHEEL(-1, 1), WHEEL(-1, -1),
                                                 WHEEL(1, -1)};
     bool given = config->wheels.count > 0 || config->attitude.law == BST_LAW_FREE;
@@ -102,8 +104,9 @@ const bst_wheel_config *bst_craft_wheels(const bst_craft_config *config, int *co
     return given ? config->wheels.items : pyramid;
 }
 
-const bst_star_tracker_config *bst_craft_trackers(const bst_craft_config *config, int *count) {
-    static const bst_star_tracker_config pair[2] = {TRACKER(1), TRACKER(-1)};
+const bst_spacecraft_star_tracker_config *bst_spacecraft_trackers(
+    const bst_spacecraft_config *config, int *count) {
+    static const bst_spacecraft_star_tracker_config pair[2] = {TRACKER(1), TRACKER(-1)};
     bool given = config->star_trackers.count > 0;
     *count = given ? config->star_trackers.count : 2;
     return given ? config->star_trackers.items : pair;

@@ -8,44 +8,46 @@
 #include "gimbal/spacecraft/spacecraft_control.h"
 #include "gimbal/spacecraft/wheels.h"
 
-typedef enum bst_craft_type {
+typedef enum bst_spacecraft_type {
     BST_CRAFT_INERTIAL,   /* "inertial": the platform's drift, bias and noise */
     BST_CRAFT_RIGID_BODY, /* "rigid_body" */
-} bst_craft_type;
+} bst_spacecraft_type;
 
-typedef struct bst_mode_config {
+typedef struct bst_spacecraft_mode_config {
     double frequency_hz, damping, coupling[3];
-} bst_mode_config;
+} bst_spacecraft_mode_config;
 
-typedef struct bst_attitude_config {
-    int32_t law; /* bst_law */
+typedef struct bst_spacecraft_attitude_config {
+    int32_t law; /* bst_spacecraft_law */
     double axis[3], second_axis[3];
     double roll_deg;
     double rate_hz;
     double bandwidth_hz, damping, integral_hz;
     double rate_limit_degps, accel_limit_degps2;
-} bst_attitude_config;
+} bst_spacecraft_attitude_config;
 
-typedef struct bst_craft_config {
-    int32_t type;       /* bst_craft_type */
+typedef struct bst_spacecraft_config {
+    int32_t type;       /* bst_spacecraft_type */
     int32_t integrator; /* bst_integrator */
     double inertia_kgm2[6];
     double initial_turn_deg[3], initial_rate_degps[3];
     double initial_knowledge_arcsec, running_s;
     bst_config_list wheels, modes, star_trackers;
-    bst_gyro_config gyro;
+    bst_spacecraft_gyro_config gyro;
     bst_disturbance_config disturbances;
-    bst_attitude_config attitude;
-} bst_craft_config;
+    bst_spacecraft_attitude_config attitude;
+} bst_spacecraft_config;
 
-extern const bst_config_desc bst_craft_config_table[];
+extern const bst_config_desc bst_spacecraft_config_table[];
 
 /* Wheels and star trackers of a configuration, those that it has when it lists none included; lent.
  */
-const bst_wheel_config *bst_craft_wheels(const bst_craft_config *config, int *count);
-const bst_star_tracker_config *bst_craft_trackers(const bst_craft_config *config, int *count);
+const bst_wheel_config *bst_spacecraft_wheels(const bst_spacecraft_config *config, int *count);
+const bst_spacecraft_star_tracker_config *bst_spacecraft_trackers(
+    const bst_spacecraft_config *config, int *count);
 
 /* The controller of a configuration. */
-bst_attitude_control_spec bst_attitude_control_of(const bst_craft_config *config);
+bst_spacecraft_attitude_control_spec bst_spacecraft_attitude_control_of(
+    const bst_spacecraft_config *config);
 
 #endif

@@ -9,14 +9,14 @@
  * a slew's end would add to it takes long to go. */
 #define INTEGRAL_SHARE 0.05
 
-void bst_attitude_control_init(bst_attitude_control *control,
-                               const bst_attitude_control_spec *spec) {
-    *control = (bst_attitude_control){.spec = *spec};
+void bst_spacecraft_attitude_control_init(bst_spacecraft_attitude_control *control,
+                                          const bst_spacecraft_attitude_control_spec *spec) {
+    *control = (bst_spacecraft_attitude_control){.spec = *spec};
 }
 
 /* Turn from the wanted attitude, the way round that was taken last where both are about as far. */
-static bst_vec3 error_of(bst_attitude_control *control, bst_quat q, bst_quat wanted) {
-    bst_vec3 e = bst_attitude_error(q, wanted);
+static bst_vec3 error_of(bst_spacecraft_attitude_control *control, bst_quat q, bst_quat wanted) {
+    bst_vec3 e = bst_attitude_filter_error(q, wanted);
     double angle = bst_vec3_norm(e);
     if (angle > 0.9 * BST_PI && bst_vec3_dot(e, control->error_rad) < 0.0) {
         e = bst_vec3_scale(e, 1.0 - 2.0 * BST_PI / angle);
@@ -30,11 +30,11 @@ static bst_vec3 clipped(bst_vec3 v, double limit) {
     return size > limit ? bst_vec3_scale(v, limit / size) : v;
 }
 
-bst_vec3 bst_attitude_control_step(bst_attitude_control *control,
-                                   const bst_attitude_reference *reference,
-                                   bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
-                                   bst_vec3 wheel_momentum_nms, bool saturated) {
-    const bst_attitude_control_spec *spec = &control->spec;
+bst_vec3 bst_spacecraft_attitude_control_step(bst_spacecraft_attitude_control *control,
+                                              const bst_spacecraft_attitude_reference *reference,
+                                              bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
+                                              bst_vec3 wheel_momentum_nms, bool saturated) {
+    const bst_spacecraft_attitude_control_spec *spec = &control->spec;
     bst_quat q_body_from_wanted =
         bst_quat_mul(q_body_from_gcrf, bst_quat_conj(reference->q_body_from_gcrf));
     bst_vec3 wanted_rate = bst_quat_rotate(q_body_from_wanted, reference->rate_radps);

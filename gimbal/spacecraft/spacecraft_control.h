@@ -4,22 +4,22 @@
 
 #include "gimbal/spacecraft/pointing_law.h"
 
-typedef struct bst_attitude_control_spec {
+typedef struct bst_spacecraft_attitude_control_spec {
     double natural_radps, damping;
     double integral_radps; /* below this frequency the integral part is the larger */
     double rate_limit_radps, accel_limit_radps2; /* of a slew, against the wanted motion */
     double dt_s;
     bst_mat3 inertia_kgm2;
-} bst_attitude_control_spec;
+} bst_spacecraft_attitude_control_spec;
 
-typedef struct bst_attitude_control {
-    bst_attitude_control_spec spec;
+typedef struct bst_spacecraft_attitude_control {
+    bst_spacecraft_attitude_control_spec spec;
     bst_vec3 integral_radps2;
     bst_vec3 error_rad; /* of the step before: which way round was taken */
-} bst_attitude_control;
+} bst_spacecraft_attitude_control;
 
-void bst_attitude_control_init(bst_attitude_control *control,
-                               const bst_attitude_control_spec *spec);
+void bst_spacecraft_attitude_control_init(bst_spacecraft_attitude_control *control,
+                                          const bst_spacecraft_attitude_control_spec *spec);
 
 /* Torque (N m, body axes) wanted on the body. With e the rotation vector by which the body is
  * turned from the wanted attitude, |e| <= pi, a slew goes about e at the rate v(|e|) = l |e| near
@@ -33,9 +33,9 @@ void bst_attitude_control_init(bst_attitude_control *control,
  * twentieth of the range in which the law is linear, and with `saturated` false (what was asked
  * last came). Wie, Space Vehicle Dynamics and Control (2nd edition), section 7.3; Mayhew, Sanfelice
  * and Teel, IEEE TAC 56 (2011) 2555. */
-bst_vec3 bst_attitude_control_step(bst_attitude_control *control,
-                                   const bst_attitude_reference *reference,
-                                   bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
-                                   bst_vec3 wheel_momentum_nms, bool saturated);
+bst_vec3 bst_spacecraft_attitude_control_step(bst_spacecraft_attitude_control *control,
+                                              const bst_spacecraft_attitude_reference *reference,
+                                              bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
+                                              bst_vec3 wheel_momentum_nms, bool saturated);
 
 #endif

@@ -10,16 +10,16 @@ static void put(double out[2], cplx z) {
 }
 
 /* Element (axis, axis) of the inverse of s^2 (I - sum J a a' - sum d d' s^2 / (s^2 + c s + k)). */
-static cplx plant_at(const bst_craft_config *config, int axis, double w) {
+static cplx plant_at(const bst_spacecraft_config *config, int axis, double w) {
     cplx s = I * w, m[3][3];
-    bst_mat3 inertia = bst_inertia_matrix(config->inertia_kgm2);
+    bst_mat3 inertia = bst_spacecraft_inertia_matrix(config->inertia_kgm2);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
             m[i][j] = inertia.m[i][j];
         }
     }
     int count;
-    const bst_wheel_config *wheels = bst_craft_wheels(config, &count);
+    const bst_wheel_config *wheels = bst_spacecraft_wheels(config, &count);
     for (int k = 0; k < count; k++) {
         const double *a = wheels[k].axis;
         double share = wheels[k].inertia_kgm2 / (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
@@ -29,7 +29,7 @@ static cplx plant_at(const bst_craft_config *config, int axis, double w) {
             }
         }
     }
-    const bst_mode_config *modes = config->modes.items;
+    const bst_spacecraft_mode_config *modes = config->modes.items;
     for (int k = 0; k < config->modes.count; k++) {
         const double *d = modes[k].coupling;
         double f = 2.0 * BST_PI * modes[k].frequency_hz;
@@ -62,11 +62,11 @@ typedef struct law {
     cplx attitude, rate;
 } law;
 
-static law law_at(const bst_craft_config *config, int axis, double w) {
+static law law_at(const bst_spacecraft_config *config, int axis, double w) {
     if (config->attitude.law == BST_LAW_FREE) {
         return (law){0.0, 0.0};
     }
-    bst_attitude_control_spec spec = bst_attitude_control_of(config);
+    bst_spacecraft_attitude_control_spec spec = bst_spacecraft_attitude_control_of(config);
     cplx s = I * w, z = cexp(s * spec.dt_s);
     double wn = spec.natural_radps;
     cplx integral = spec.integral_radps * spec.dt_s * z / (z - 1.0); /* the newest error counts */
@@ -76,13 +76,13 @@ static law law_at(const bst_craft_config *config, int axis, double w) {
                  held * 2.0 * spec.damping * wn * mean_over(s, rate_s)};
 }
 
-bst_craft_response bst_craft_response_at(const bst_craft_config *config, int axis,
-                                         double frequency_hz) {
+bst_spacecraft_response bst_spacecraft_response_at(const bst_spacecraft_config *config, int axis,
+                                                   double frequency_hz) {
     double w = 2.0 * BST_PI * frequency_hz;
     law l = law_at(config, axis, w);
     cplx plant = plant_at(config, axis, w), controller = l.attitude + I * w * l.rate;
     cplx loop = plant * controller;
-    bst_craft_response out;
+    bst_spacecraft_response out;
     put(out.plant, plant);
     put(out.controller, controller);
     put(out.closed, loop / (1.0 + loop));
@@ -94,15 +94,17 @@ static double square(cplx z) {
     return creal(z) * creal(z) + cimag(z) * cimag(z);
 }
 
-bst_craft_noise bst_craft_noise_at(const bst_craft_config *config, int axis, double frequency_hz) {
+bst_spacecraft_noise bst_spacecraft_noise_at(const bst_spacecraft_config *config, int axis,
+                                             double frequency_hz) {
     double w = 2.0 * BST_PI * frequency_hz;
     int count;
-    const bst_star_tracker_config *first = bst_craft_trackers(config, &count);
-    bst_star_tracker tracker;
-    bst_gyro gyro;
-    bst_star_tracker_init(&tracker, first, (bst_rng_key){{0, 0}});
-    bst_gyro_init(&gyro, &config->gyro, 1.0 / config->gyro.rate_hz, (bst_rng_key){{0, 0}});
-    double r = bst_star_tracker_covariance(&tracker).m[axis][axis] / first->rate_hz;
+    const bst_spacecraft_star_tracker_config *first = bst_spacecraft_trackers(config, &count);
+    bst_spacecraft_star_tracker tracker;
+    bst_spacecraft_gyro gyro;
+    bst_spacecraft_star_tracker_init(&tracker, first, (bst_rng_key){{0, 0}});
+    bst_spacecraft_gyro_init(&gyro, &config->gyro, 1.0 / config->gyro.rate_hz,
+                             (bst_rng_key){{0, 0}});
+    double r = bst_spacecraft_star_tracker_covariance(&tracker).m[axis][axis] / first->rate_hz;
     double v = gyro.angle_walk, u = gyro.rate_walk;
     double k1 = sqrt(v * v / r + 2.0 * u / sqrt(r)), k2 = u / sqrt(r);
     cplx s = I * w, denominator = s * s + k1 * s + k2;
@@ -111,7 +113,7 @@ bst_craft_noise bst_craft_noise_at(const bst_craft_config *config, int axis, dou
     law l = law_at(config, axis, w);
     cplx plant = plant_at(config, axis, w);
     cplx compliance = plant / (1.0 + plant * (l.attitude + s * l.rate));
-    bst_craft_noise out = {0.0, 0.0};
+    bst_spacecraft_noise out = {0.0, 0.0};
     for (int i = 0; i < 3; i++) {
         cplx rate = (s + k1) * error[i] - (i == 0 ? k1 : 0.0);
         out.knowledge += density[i] * square(error[i]);
@@ -120,10 +122,10 @@ bst_craft_noise bst_craft_noise_at(const bst_craft_config *config, int axis, dou
     return out;
 }
 
-void bst_craft_imbalance_line(const bst_craft_config *config, int wheel, int axis,
-                              double *frequency_hz, double *amplitude_rad) {
+void bst_spacecraft_imbalance_line(const bst_spacecraft_config *config, int wheel, int axis,
+                                   double *frequency_hz, double *amplitude_rad) {
     int count;
-    const bst_wheel_config *c = &bst_craft_wheels(config, &count)[wheel];
+    const bst_wheel_config *c = &bst_spacecraft_wheels(config, &count)[wheel];
     bst_vec3 spin = bst_vec3_unit((bst_vec3){c->axis[0], c->axis[1], c->axis[2]});
     bst_vec3 x = bst_vec3_perpendicular(spin);
     bst_wheel w = {.axis = spin,
@@ -137,7 +139,7 @@ void bst_craft_imbalance_line(const bst_craft_config *config, int wheel, int axi
     *frequency_hz = speed / (2.0 * BST_PI);
     *amplitude_rad = 0.0;
     if (speed > 0.0 && about > 0.0) {
-        bst_craft_response response = bst_craft_response_at(config, axis, *frequency_hz);
+        bst_spacecraft_response response = bst_spacecraft_response_at(config, axis, *frequency_hz);
         *amplitude_rad = about * hypot(response.compliance[0], response.compliance[1]);
     }
 }

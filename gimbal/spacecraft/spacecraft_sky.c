@@ -1,6 +1,6 @@
 #include "gimbal/spacecraft/spacecraft_sky.h"
 
-static bst_status fill(bst_sky_grid *grid, bst_ctx *ctx, int64_t first) {
+static bst_status fill(bst_spacecraft_sky_grid *grid, bst_ctx *ctx, int64_t first) {
     for (int i = 0; i < 4; i++) {
         int64_t old = first + i - grid->first;
         if (grid->filled && old >= i && old < 4) {
@@ -21,8 +21,9 @@ static bst_status fill(bst_sky_grid *grid, bst_ctx *ctx, int64_t first) {
     return BST_OK;
 }
 
-bst_status bst_sky_grid_at(bst_sky_grid *grid, bst_ctx *ctx, double seconds, bst_craft_sky *sky,
-                           bst_attitude_reference *reference) {
+bst_status bst_spacecraft_sky_grid_at(bst_spacecraft_sky_grid *grid, bst_ctx *ctx, double seconds,
+                                      bst_spacecraft_sky *sky,
+                                      bst_spacecraft_attitude_reference *reference) {
     double x = seconds * BST_SKY_NODES_PER_S;
     int64_t cell = (int64_t)floor(x);
     int64_t first = cell >= 1 || cell < 0 ? cell - 1 : cell;
@@ -31,13 +32,13 @@ bst_status bst_sky_grid_at(bst_sky_grid *grid, bst_ctx *ctx, double seconds, bst
     }
     double a = x - (double)first, b = a - 1.0, c = a - 2.0, d = a - 3.0;
     const double w[4] = {-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0};
-    *sky = (bst_craft_sky){.sunlit = 0.0};
+    *sky = (bst_spacecraft_sky){.sunlit = 0.0};
     for (int k = 0; k < 4; k++) {
         sky->position_m = bst_vec3_axpy(sky->position_m, w[k], grid->node[k].position_m);
         sky->sun_m = bst_vec3_axpy(sky->sun_m, w[k], grid->node[k].sun_m);
         sky->sunlit += w[k] * grid->node[k].sunlit;
     }
     sky->sunlit = fmin(1.0, fmax(0.0, sky->sunlit));
-    *reference = bst_attitude_reference_at(grid->attitude, 1.0 / BST_SKY_NODES_PER_S, a);
+    *reference = bst_spacecraft_attitude_reference_at(grid->attitude, 1.0 / BST_SKY_NODES_PER_S, a);
     return BST_OK;
 }

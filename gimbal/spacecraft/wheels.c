@@ -79,7 +79,7 @@ static bool solve(const bst_wheels *wheels, const bool *used, bst_vec3 torque, b
         }
     }
     double value[3], vector[9];
-    bst_symmetric_eigen(3, g, value, vector);
+    bst_dynamics_symmetric_eigen(3, g, value, vector);
     bool all = true;
     *x = (bst_vec3){0, 0, 0};
     for (int k = 0; k < 3; k++) {

@@ -63,7 +63,7 @@ unsigned bst_wheels_share(const bst_wheels *wheels, const double *speed_radps, b
 
 /* The torque on a wheel over a step of dt_s: the motor's (none into a speed beyond the greatest)
  * minus friction. Coulomb friction never turns a wheel round: what would, brings it to rest and
- * holds it there. load_kgm2: bst_craft_body_wheel_load_kgm2. */
+ * holds it there. load_kgm2: bst_spacecraft_body_wheel_load_kgm2. */
 double bst_wheel_torque(const bst_wheel *wheel, double speed_radps, double motor_nm,
                         double load_kgm2, double dt_s);
 

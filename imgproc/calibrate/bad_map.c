@@ -6,7 +6,7 @@
 bst_status bst_bad_map_create(bst_ctx *ctx, const bst_camera *camera, const bst_imgproc_maps *maps,
                               const bst_config_list *list, uint8_t **out) {
     *out = NULL;
-    const bst_bad_pixel *pixel = list->items;
+    const bst_imgproc_bad_pixel *pixel = list->items;
     if (!maps->bad && list->count == 0) {
         return BST_OK;
     }

@@ -4,7 +4,7 @@
 
 #include "imgproc/imgproc.h"
 
-/* The bad pixels of a map (maps->bad, may be NULL) and of a list of bst_bad_pixel together:
+/* The bad pixels of a map (maps->bad, may be NULL) and of a list of bst_imgproc_bad_pixel together:
  * [height_px][width_px], the caller's to free; NULL where there are none. BST_ERR_CONFIG for a
  * pixel outside the sensor, BST_ERR_MEMORY. */
 bst_status bst_bad_map_create(bst_ctx *ctx, const bst_camera *camera, const bst_imgproc_maps *maps,

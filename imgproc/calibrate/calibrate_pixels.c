@@ -3,7 +3,7 @@
 #include "imgproc/detect/background.h"
 
 /* Dark, flat and bad pixels of part of a binned row, from the full-sensor maps. */
-static void correct(const bst_electrons *e, int y, int first, int count, float *out) {
+static void correct(const bst_calibrate_pixels *e, int y, int first, int count, float *out) {
     const bst_imgproc_frame *frame = e->frame;
     int b = frame->binning;
     size_t stride = (size_t)e->camera->width_px;
@@ -25,15 +25,15 @@ static void correct(const bst_electrons *e, int y, int first, int count, float *
     }
 }
 
-bool bst_electrons_plain(const bst_electrons *e, bst_row_gain *gain) {
+bool bst_calibrate_pixels_plain(const bst_calibrate_pixels *e, bst_row_gain *gain) {
     *gain = (bst_row_gain){(float)e->camera->offset_dn, (float)e->camera->gain_e_per_dn};
     return !e->maps->dark_e_per_s && !e->maps->flat && !e->bad && !e->columns;
 }
 
-void bst_electrons_read(const void *electrons, int y, int x, int count, float *out) {
-    const bst_electrons *e = electrons;
+void bst_calibrate_pixels_read(const void *electrons, int y, int x, int count, float *out) {
+    const bst_calibrate_pixels *e = electrons;
     bst_row_gain gain;
-    (void)bst_electrons_plain(e, &gain);
+    (void)bst_calibrate_pixels_plain(e, &gain);
     int width = e->frame->window.width / e->frame->binning;
     bst_row_electrons(e->frame->pixels + (size_t)y * (size_t)width + (size_t)x, count, gain.offset,
                       gain.gain, out);

@@ -7,7 +7,7 @@
 #include "imgproc/detect/row_kernels.h"
 #include "imgproc/imgproc.h"
 
-typedef struct bst_electrons {
+typedef struct bst_calibrate_pixels {
     const bst_camera *camera;
     const bst_imgproc_maps *maps;
     const uint8_t *bad; /* [height_px][width_px] of the sensor; NULL: none */
@@ -15,13 +15,13 @@ typedef struct bst_electrons {
     const bst_bad_rows *learned; /* left out too; NULL: none */
     const bst_columns *columns;  /* taken off; NULL: not measured */
     int first_column;            /* of `columns`, that the frame begins with */
-} bst_electrons;
+} bst_calibrate_pixels;
 
-/* A bst_pixel_fn (background.h) for a bst_electrons. */
-void bst_electrons_read(const void *electrons, int y, int x, int count, float *out);
+/* A bst_imgproc_pixel_fn (background.h) for a bst_calibrate_pixels. */
+void bst_calibrate_pixels_read(const void *electrons, int y, int x, int count, float *out);
 
 /* Whether nothing is corrected but learned bad pixels are left out: electrons are digital numbers
  * by their gain. */
-bool bst_electrons_plain(const bst_electrons *electrons, bst_row_gain *gain);
+bool bst_calibrate_pixels_plain(const bst_calibrate_pixels *electrons, bst_row_gain *gain);
 
 #endif

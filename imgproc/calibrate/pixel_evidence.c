@@ -50,7 +50,7 @@ static void find_highest(const bst_sharpness *s, const bst_locate_frame *f, int 
 /* What adding the maxima of a frame needs. */
 typedef struct adder {
     bst_pixel_shows *shows;
-    const bst_locator *l;
+    const bst_imgproc_locator *l;
     const bst_locate_frame *f;
     double noise_e; /* at the maximum */
 } adder;
@@ -92,8 +92,8 @@ static void add_cluster(const adder *a, int x, int y) {
     }
 }
 
-void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_locator *l, const bst_locate_frame *f,
-                         const bst_candidates *candidates) {
+void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_imgproc_locator *l,
+                         const bst_locate_frame *f, const bst_candidates *candidates) {
     adder a = {shows, l, f, 0.0};
     shows->maxima += candidates->count;
     for (int i = 0; i < candidates->count; i++) {

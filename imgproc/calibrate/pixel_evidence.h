@@ -35,7 +35,7 @@ void bst_pixel_shows_free(bst_pixel_shows *shows);
  * stands at the highest of the nine pixels about it; the pixels about one with charge that hold
  * charge too are added. Bright ones that are not sharper than light are only counted. The locator's
  * sharpness is made for the frame. */
-void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_locator *locator,
+void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_imgproc_locator *locator,
                          const bst_locate_frame *frame, const bst_candidates *candidates);
 
 /* Puts the maxima in order of pixel, one of each, and the checks in order of pixel. */

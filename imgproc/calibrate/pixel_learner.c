@@ -480,7 +480,7 @@ void bst_pixel_learner_publish(bst_pixel_learner *l, int slot, int64_t turn) {
 }
 
 void bst_pixel_map_check(const bst_pixel_map *map, const bst_locate_frame *f,
-                         const bst_window *window, bst_pixel_fn read, const void *user,
+                         const bst_window *window, bst_imgproc_pixel_fn read, const void *user,
                          bst_pixel_shows *shows) {
     const bst_bad_rows *rows = &map->rows;
     int b = (int)f->binning;

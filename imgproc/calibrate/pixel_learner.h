@@ -82,7 +82,7 @@ void bst_pixel_learner_publish(bst_pixel_learner *learner, int slot, int64_t tur
 /* Adds to `shows` the signals of a share of the pixels of the map that a frame covers; `read` gives
  * electrons without the map (background.h). */
 void bst_pixel_map_check(const bst_pixel_map *map, const bst_locate_frame *frame,
-                         const bst_window *window, bst_pixel_fn read, const void *user,
+                         const bst_window *window, bst_imgproc_pixel_fn read, const void *user,
                          bst_pixel_shows *shows);
 
 #endif

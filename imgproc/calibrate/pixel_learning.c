@@ -25,7 +25,7 @@ static void note_stars(bst_pixel_learner *learner, const bst_camera *camera,
     }
 }
 
-static int predict(const bst_camera *camera, const bst_frame_knowledge *known,
+static int predict(const bst_camera *camera, const bst_imgproc_frame_knowledge *known,
                    double out[MOST_PREDICTED][3]) {
     int count = 0, given = known->predictions ? known->predictions->count : 0;
     for (int i = 0; i < given && count < MOST_PREDICTED; i++) {
@@ -33,7 +33,7 @@ static int predict(const bst_camera *camera, const bst_frame_knowledge *known,
         bst_vec3 d = bst_vec3_unit(
             bst_vec3_axpy(p->direction_gcrf, known->predictions_age_s, p->rate_gcrf_radps));
         if (known->oriented) {
-            d = bst_light_aberrate(&known->light, d);
+            d = bst_astro_light_aberrate(&known->light, d);
         }
         if (bst_camera_project(camera, bst_quat_rotate(known->q_cam_from_gcrf, d), &out[count][0],
                                &out[count][1])) {
@@ -45,8 +45,9 @@ static int predict(const bst_camera *camera, const bst_frame_knowledge *known,
 }
 
 void bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
-                    const bst_frame_knowledge *known, const bst_windows *windows, int binning,
-                    double time_s, const bst_pixel_shows *shows, const bst_detections *out) {
+                    const bst_imgproc_frame_knowledge *known, const bst_region_of_interest *windows,
+                    int binning, double time_s, const bst_pixel_shows *shows,
+                    const bst_detections *out) {
     if (!shows->usable) {
         return;
     }

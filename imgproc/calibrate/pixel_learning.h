@@ -12,7 +12,8 @@
  * frame's stars, which a frame without any lacks); what is known of it; the windows that were
  * looked at (none: all of it). Nothing is done with maxima of no use (shows->usable). */
 void bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
-                    const bst_frame_knowledge *known, const bst_windows *windows, int binning,
-                    double time_s, const bst_pixel_shows *shows, const bst_detections *detections);
+                    const bst_imgproc_frame_knowledge *known, const bst_region_of_interest *windows,
+                    int binning, double time_s, const bst_pixel_shows *shows,
+                    const bst_detections *detections);
 
 #endif

@@ -55,7 +55,7 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
         bst_background_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu background meshes", meshes);
     }
-    bst_borrow_init(out->lent, threads);
+    bst_scratch_pool_init(out->lent, threads);
     return BST_OK;
 }
 
@@ -146,7 +146,7 @@ static bool first_guess(const mesh_pixels *m, float step_e, float *level, float 
 typedef struct reading {
     bst_background *b;
     double read_variance;
-    bst_pixel_fn pixels;
+    bst_imgproc_pixel_fn pixels;
     const void *user;
     float step_e;
     double origin_e; /* a digital value */
@@ -215,8 +215,9 @@ static bool estimate_mesh(const reading *r, const mesh_pixels *m, float *level, 
             break;
         }
         if (last) {
-            bst_clipped_noise law = {r->read_variance, (double)step_e};
-            bst_clipped_solve(&law, (double)low, (double)high, mean, variance, &centre, &deviation);
+            bst_truncated_moments_noise law = {r->read_variance, (double)step_e};
+            bst_truncated_moments_solve(&law, (double)low, (double)high, mean, variance, &centre,
+                                        &deviation);
             mean = centre;
         } else {
             /* 0.97334 = 1 - 6 phi(3) / (2 Phi(3) - 1): variance of a normal cut at 3 sigma */
@@ -242,7 +243,7 @@ static int count_left(const mesh_pixels *m) {
 static void read_rows(void *user, int begin, int end) {
     const reading *r = user;
     bst_background *b = r->b;
-    int taken = bst_borrow_take(b->lent);
+    int taken = bst_scratch_pool_take(b->lent);
     float *band = b->bands + (size_t)taken * b->band;
     size_t stride = band_stride(b->width);
     for (int j = begin; j < end; j++) {
@@ -272,7 +273,7 @@ static void read_rows(void *user, int begin, int end) {
             }
         }
     }
-    bst_borrow_give(b->lent, taken);
+    bst_scratch_pool_give(b->lent, taken);
 }
 
 /* Mean of `values` with the opposite neighbours that agree; error(k) is the standard error. */
@@ -340,7 +341,7 @@ static void read_meshes(bst_background *b, bst_parallel *pool, const reading *r)
     smooth(b, b->noise, true);
 }
 
-void bst_background_read(bst_background *b, bst_parallel *pool, bst_pixel_fn pixels,
+void bst_background_read(bst_background *b, bst_parallel *pool, bst_imgproc_pixel_fn pixels,
                          const void *user, int width, int height, const bst_background_steps *steps,
                          double read_variance_e2) {
     b->width = width;
@@ -353,7 +354,7 @@ void bst_background_read(bst_background *b, bst_parallel *pool, bst_pixel_fn pix
     read_meshes(b, pool, &r);
 }
 
-double bst_background_read_again(bst_background *b, bst_parallel *pool, bst_pixel_fn pixels,
+double bst_background_read_again(bst_background *b, bst_parallel *pool, bst_imgproc_pixel_fn pixels,
                                  const void *user, const bst_background_steps *steps,
                                  double read_variance_e2) {
     reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e, true};

@@ -23,13 +23,13 @@ typedef struct bst_background {
     float *scratch;   /* all meshes, for medians and smoothing */
     float *bands;     /* one for each thread: the pixels of a row of meshes */
     size_t band;      /* floats of a band */
-    bst_borrow *lent; /* of bands */
+    bst_scratch_pool *lent; /* of bands */
     float median_level, median_noise;
 } bst_background;
 
 /* Writes `count` pixels of row y from column x on, electrons or BST_PIXEL_... values. Called from
  * several threads at a time. */
-typedef void (*bst_pixel_fn)(const void *user, int y, int x, int count, float *out);
+typedef void (*bst_imgproc_pixel_fn)(const void *user, int y, int x, int count, float *out);
 
 /* For loops on up to `threads` threads. */
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
@@ -51,13 +51,13 @@ typedef struct bst_background_steps {
  * to four standard errors: a slope stays what it is, and where the sky is even the error falls to a
  * third.
  */
-void bst_background_read(bst_background *background, bst_parallel *pool, bst_pixel_fn pixels,
-                         const void *user, int width, int height, const bst_background_steps *steps,
-                         double read_variance_e2);
+void bst_background_read(bst_background *background, bst_parallel *pool,
+                         bst_imgproc_pixel_fn pixels, const void *user, int width, int height,
+                         const bst_background_steps *steps, double read_variance_e2);
 /* The same again of the same frame with pixels left out; returns the share of pixels that were not.
  * A mesh of which less than a sixteenth is left stays as it is. */
 double bst_background_read_again(bst_background *background, bst_parallel *pool,
-                                 bst_pixel_fn pixels, const void *user,
+                                 bst_imgproc_pixel_fn pixels, const void *user,
                                  const bst_background_steps *steps, double read_variance_e2);
 /* The same of image [height][width] whose noise is normal. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,

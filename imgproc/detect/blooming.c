@@ -98,7 +98,7 @@ static void gather(const bst_locate_frame *f, int x, int y, bleed_set *out) {
 }
 
 /* Whether a candidate is one of a set's: on it, beside it, or at an end of one of its columns. */
-static bool belongs(const bleed_set *set, const bst_found *found) {
+static bool belongs(const bleed_set *set, const bst_imgproc_found *found) {
     int k = found->peak_x - set->x0;
     if (k < -1 || k > set->columns) {
         return false;
@@ -125,7 +125,7 @@ static double charge_of(const bst_locate_frame *f, const bleed_set *set, int rea
 
 /* Puts a source where its light beside the full columns is the highest. In a row, of a Gaussian's
  * values L and R at places l and r: ln(L / R) = ((r - x)^2 - (l - x)^2) / (2 sigma^2). */
-static void start_beside(const bst_locate_frame *f, const bleed_set *set, bst_found *out) {
+static void start_beside(const bst_locate_frame *f, const bleed_set *set, bst_imgproc_found *out) {
     int best = set->first;
     for (int y = set->first; y <= set->last; y++) {
         best = beside(f, set, y) > beside(f, set, best) ? y : best;
@@ -161,7 +161,7 @@ static void cut_ends(const bst_locate_frame *f, const bleed_set *set) {
 }
 
 /* A full pixel among the nine about a candidate's maximum. */
-static bool find_full(const bst_locate_frame *f, const bst_found *found, int *x, int *y) {
+static bool find_full(const bst_locate_frame *f, const bst_imgproc_found *found, int *x, int *y) {
     for (int k = 0; k < 9; k++) {
         /* the maximum itself first */
         *x = found->peak_x + (k + 1) % 3 - 1;
@@ -173,8 +173,8 @@ static bool find_full(const bst_locate_frame *f, const bst_found *found, int *x,
     return false;
 }
 
-static void begin_source(const bst_locate_frame *f, const bleed_set *set, bst_found *out) {
-    int reach = (int)bst_company_reach(f);
+static void begin_source(const bst_locate_frame *f, const bleed_set *set, bst_imgproc_found *out) {
+    int reach = (int)bst_deblend_reach(f);
     out->bleed_e = charge_of(f, set, reach);
     bool drawn = f->filter->streak && set->columns > 2 * reach + 1;
     if (!drawn) {
@@ -183,12 +183,12 @@ static void begin_source(const bst_locate_frame *f, const bleed_set *set, bst_fo
         out->streak = false;
         start_beside(f, set, out);
         out->source.flux_e = out->bleed_e;
-        out->source.shape =
-            (bst_shape){.x_px = out->top_x_px, .y_px = out->top_y_px, .sigma_px = f->sigma_px};
+        out->source.shape = (bst_imgproc_shape){
+            .x_px = out->top_x_px, .y_px = out->top_y_px, .sigma_px = f->sigma_px};
     }
 }
 
-void bst_bleed_join(bst_locator *l, const bst_locate_frame *f) {
+void bst_blooming_join(bst_imgproc_locator *l, const bst_locate_frame *f) {
     if (f->camera->detector.full_well != BST_WELL_BLOOM) {
         return;
     }
@@ -209,14 +209,15 @@ void bst_bleed_join(bst_locator *l, const bst_locate_frame *f) {
     }
 }
 
-bool bst_bleed_fit(const bst_worker *w, int i, bst_found *found) {
+bool bst_blooming_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_locate_frame *f = w->f;
-    double reach = bst_company_reach(f) + 0.5 * found->bleed_px;
-    bst_stamp stamp = bst_fit_stamp(&found->source, reach, w->l->max_side, f->width, f->height);
-    bst_source start = found->source;
+    double reach = bst_deblend_reach(f) + 0.5 * found->bleed_px;
+    bst_imgproc_stamp stamp =
+        bst_fit_stamp(&found->source, reach, w->l->max_side, f->width, f->height);
+    bst_imgproc_source start = found->source;
     for (int k = 0; k < 2; k++) {
         found->source = start;
-        if (bst_company_fit(w, i, found, &stamp, k == 0) &&
+        if (bst_deblend_fit(w, i, found, &stamp, k == 0) &&
             found->source.chi_square < MOST_MISFIT * found->source.pixels) {
             return true;
         }
@@ -225,8 +226,8 @@ bool bst_bleed_fit(const bst_worker *w, int i, bst_found *found) {
     return false;
 }
 
-void bst_bleed_finish(const bst_locate_frame *f, bst_found *found) {
-    bst_source *s = &found->source;
+void bst_blooming_finish(const bst_locate_frame *f, bst_imgproc_found *found) {
+    bst_imgproc_source *s = &found->source;
     double width = UNFITTED_SHARE * found->bleed_px;
     if (s->fitted) {
         double misfit = s->chi_square / fmax(s->pixels - 4.0, 1.0);

@@ -12,14 +12,14 @@
  * blooming keeps charge. The pixels at both ends of the columns, which overflow fills in part,
  * become BST_PIXEL_BAD. In a frame whose stars are streaks a set that is wider than a point's is
  * only made one source. */
-void bst_bleed_join(bst_locator *locator, const bst_locate_frame *frame);
+void bst_blooming_join(bst_imgproc_locator *locator, const bst_locate_frame *frame);
 
 /* Fits a source with found->bleed to the unsaturated pixels about it, its width free. False: they
  * do not determine it; it stays where it started. */
-bool bst_bleed_fit(const bst_worker *w, int i, bst_found *found);
+bool bst_blooming_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found);
 
 /* Completes such a source after the fits: flux from its charge, a covariance that is not less than
  * the misfit of the PSF to its wings allows, SNR, flags, the extent of the PSF. */
-void bst_bleed_finish(const bst_locate_frame *frame, bst_found *found);
+void bst_blooming_finish(const bst_locate_frame *frame, bst_imgproc_found *found);
 
 #endif

@@ -57,8 +57,8 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_filter_create(ctx, ip->known, width, height, streak, bst_parallel_threads(ip->pool),
                               &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, ip->known, bst_parallel_threads(ip->pool), capacity, width,
-                               height, side, &ip->locator));
+    BST_TRY(bst_imgproc_locator_create(ctx, ip->known, bst_parallel_threads(ip->pool), capacity,
+                                       width, height, side, &ip->locator));
     ip->locator.most_fits = (int)ip->config.most_fits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
@@ -112,7 +112,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_background_free(&ip->background);
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
-    bst_locator_free(&ip->locator);
+    bst_imgproc_locator_free(&ip->locator);
     bst_streak_motion_free(&ip->streak_motion);
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
@@ -123,22 +123,22 @@ void bst_imgproc_free(bst_imgproc *ip) {
 }
 
 typedef struct sparing_reader {
-    bst_electrons read;
+    bst_calibrate_pixels read;
     const bst_filter *filter;
 } sparing_reader;
 
 /* Without the stars that the filter found. */
 static void read_between_stars(const void *user, int y, int x, int count, float *out) {
     const sparing_reader *r = user;
-    bst_electrons_read(&r->read, y, x, count, out);
+    bst_calibrate_pixels_read(&r->read, y, x, count, out);
     bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
 }
 
-/* The noise of a row's columns, and its learned bad pixels where bst_electrons_read did not read
- * it.
+/* The noise of a row's columns, and its learned bad pixels where bst_calibrate_pixels_read did not
+ * read it.
  */
 static void correct_row(const void *user, int y, int width, float *signal, float *normalised) {
-    const bst_electrons *e = user;
+    const bst_calibrate_pixels *e = user;
     for (int x = 0; e->columns && x < width; x++) {
         normalised[x] /= e->columns->noise[e->first_column + x];
     }
@@ -204,18 +204,18 @@ static double saturation_e(const bst_imgproc *ip, int saturated_dn) {
 
 /* The path of stars on the window's middle, on a grid of half a pixel: small changes of the
  * telemetry leave the filter as it is. 0, 0 when too short or too long to filter for. */
-static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
-                        double *dx, double *dy) {
+static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                        const bst_camera_motion *motion, double *dx, double *dy) {
     *dx = *dy = 0.0;
     ip->smeared = false;
     if (!motion) {
         return;
     }
     const bst_window *w = &frame->window;
-    bst_motion_streak(motion, &ip->camera, w->x0 + 0.5 * (w->width - 1),
-                      w->y0 + 0.5 * (w->height - 1), dx, dy);
+    bst_camera_motion_streak(motion, &ip->camera, w->x0 + 0.5 * (w->width - 1),
+                             w->y0 + 0.5 * (w->height - 1), dx, dy);
     double bend_x, bend_y;
-    bst_motion_bend(motion, &ip->camera, &bend_x, &bend_y);
+    bst_camera_motion_bend(motion, &ip->camera, &bend_x, &bend_y);
     double length = hypot(*dx, *dy) / frame->binning;
     double bend = hypot(bend_x, bend_y) / frame->binning;
     ip->smeared = length + 2.0 * bend > ip->config.streak_max_px;
@@ -245,18 +245,19 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f, const bst_shape *shape,
-                          bst_detection *d) {
+static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f,
+                          const bst_imgproc_shape *shape, bst_detection *d) {
     if (f->motion) {
         double x, y;
-        bst_motion_bend(f->motion, &ip->camera, &x, &y);
-        bst_motion_widen(x, y, f->binning * shape->bend_x_px, f->binning * shape->bend_y_px, d);
+        bst_camera_motion_bend(f->motion, &ip->camera, &x, &y);
+        bst_camera_motion_widen(x, y, f->binning * shape->bend_x_px, f->binning * shape->bend_y_px,
+                                d);
     }
 }
 
 static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
-                            const bst_found *found) {
-    const bst_source *s = &found->source;
+                            const bst_imgproc_found *found) {
+    const bst_imgproc_source *s = &found->source;
     double b = f->binning;
     bst_detection d = {0};
     d.x_px = f->origin_x_px + b * s->shape.x_px;
@@ -291,8 +292,9 @@ typedef struct part {
 } part;
 
 /* What the locator and stacks see of a frame that was searched. */
-static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
-                     double sigma, const float *column_noise, bst_parallel *pool) {
+static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                     const bst_camera_motion *motion, double sigma, const float *column_noise,
+                     bst_parallel *pool) {
     if (motion) {
         ip->motion = *motion;
     }
@@ -322,7 +324,7 @@ static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_
 /* Finds the candidates of `frame` and sets ip->view. `whole` is the frame of which it is a window,
  * itself else: the density of false alarms and the filter are the whole frame's. */
 static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
-                 const bst_motion *motion, bst_parallel *pool, part *out) {
+                 const bst_camera_motion *motion, bst_parallel *pool, part *out) {
     int width = frame->window.width / frame->binning;
     int height = frame->window.height / frame->binning;
     double sigma = ip->known ? ip->known->sigma_px
@@ -338,14 +340,14 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
         {&ip->camera, &ip->maps, ip->bad, frame, learned, columns, first_column}, &ip->filter};
     ip->filter.correct_row = learned || columns ? correct_row : NULL;
     ip->filter.correct_user = &sparing.read;
-    const bst_electrons *read = &sparing.read;
+    const bst_calibrate_pixels *read = &sparing.read;
     bst_row_gain by_gain;
-    const bst_row_gain *plain = bst_electrons_plain(read, &by_gain) ? &by_gain : NULL;
+    const bst_row_gain *plain = bst_calibrate_pixels_plain(read, &by_gain) ? &by_gain : NULL;
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
     bst_background_steps steps = {gain, -ip->camera.offset_dn * gain};
-    bst_background_read(&ip->background, pool, bst_electrons_read, read, width, height, &steps,
-                        read_noise * read_noise);
+    bst_background_read(&ip->background, pool, bst_calibrate_pixels_read, read, width, height,
+                        &steps, read_noise * read_noise);
     double dx, dy;
     filter_path(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
@@ -358,8 +360,8 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
     double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
     int saturated_dn = saturation_dn(ip, frame);
-    bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
-                   plain, ip->electrons, width, height, saturated_dn,
+    bst_filter_run(&ip->filter, pool, &ip->background, bst_calibrate_pixels_read, read,
+                   frame->pixels, plain, ip->electrons, width, height, saturated_dn,
                    (float)look_from(ip, threshold));
     if (ip->filter.crowded && !ip->smeared) {
         double share = bst_background_read_again(&ip->background, pool, read_between_stars,
@@ -367,8 +369,8 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
         /* where there are stars noise makes no detections of its own */
         pixels *= fmax(share, LEAST_OPEN);
         threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
-        bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
-                       plain, ip->electrons, width, height, saturated_dn,
+        bst_filter_run(&ip->filter, pool, &ip->background, bst_calibrate_pixels_read, read,
+                       frame->pixels, plain, ip->electrons, width, height, saturated_dn,
                        (float)look_from(ip, threshold));
     }
     double look = look_from(ip, threshold);
@@ -384,7 +386,7 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
 }
 
 /* Corrects a motion by the streaks that were added to ip->streak_motion. */
-static void correct_motion(bst_imgproc *ip, double binning, bst_motion *motion) {
+static void correct_motion(bst_imgproc *ip, double binning, bst_camera_motion *motion) {
     double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
                            motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
     (void)bst_streak_motion_solve(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
@@ -436,7 +438,7 @@ static void empty(bst_detections *out) {
 }
 
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
-                              const bst_motion *motion, bst_detections *out, int capacity) {
+                              const bst_camera_motion *motion, bst_detections *out, int capacity) {
     BST_TRY(check_frame(ctx, ip, frame));
     /* a pool that has to wait for processors is slower than one thread that has one */
     bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
@@ -460,10 +462,11 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
 
 /* Whether the windows' streaks are to tell the motion: looks for them in all windows. */
 static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
-                               const bst_window *windows, int count, const bst_motion *motion) {
+                               const bst_window *windows, int count,
+                               const bst_camera_motion *motion) {
     for (int i = 0; i < count; i++) {
         part p;
-        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        bst_imgproc_frame window = bst_region_of_interest_crop(frame, &windows[i], ip->cropped);
         find(ip, &window, frame, motion, NULL, &p);
         if (i == 0 && (ip->smeared || !bst_streak_motion_begin(&ip->streak_motion, &ip->view))) {
             return false;
@@ -475,10 +478,11 @@ static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
 
 bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                                       const bst_window *windows, int count,
-                                      const bst_motion *motion, bst_detections *out, int capacity) {
+                                      const bst_camera_motion *motion, bst_detections *out,
+                                      int capacity) {
     BST_TRY(check_frame(ctx, ip, frame));
     double pixels = 0.0;
-    bst_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
+    bst_camera_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     empty(out);
     measure_columns(ip, ip->pool, frame);
     ip->windowed = true;
@@ -491,7 +495,7 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
     bst_imgproc_begin_shows(ip);
     for (int i = 0; i < count; i++) {
         part p;
-        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        bst_imgproc_frame window = bst_region_of_interest_crop(frame, &windows[i], ip->cropped);
         find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
         bst_imgproc_add_shows(ip, &window, frame);
         take(ip, &p, out, capacity);
@@ -509,9 +513,9 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
 }
 
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
-                        const bst_zero_point *zero_point) {
+                        const bst_optics_zero_point *zero_point) {
     bst_detection *item = &detections->items[index];
-    const bst_found *found = &ip->locator.found[ip->order[index]];
+    const bst_imgproc_found *found = &ip->locator.found[ip->order[index]];
     if (ip->windowed || !found->rough) {
         return;
     }

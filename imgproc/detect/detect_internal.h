@@ -19,7 +19,7 @@ struct bst_imgproc {
     bst_background background;
     bst_filter filter;
     bst_candidates candidates;
-    bst_locator locator;
+    bst_imgproc_locator locator;
     bst_streak_motion streak_motion;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
@@ -27,7 +27,7 @@ struct bst_imgproc {
     uint16_t *cropped; /* a window's pixels */
     /* of the latest frame */
     bst_locate_frame view;
-    bst_motion motion;
+    bst_camera_motion motion;
     double exposure_s, binning, streak_px;
     bool smeared, windowed;
     bst_stack_frame left;

@@ -25,17 +25,17 @@ void bst_imgproc_add_shows(bst_imgproc *ip, const bst_imgproc_frame *frame,
     if (!ip->shows.usable) {
         return;
     }
-    bst_electrons read = {&ip->camera,
-                          &ip->maps,
-                          ip->bad,
-                          frame,
-                          NULL,
-                          ip->columns.count > 0 ? &ip->columns : NULL,
-                          (frame->window.x0 - whole->window.x0) / frame->binning};
+    bst_calibrate_pixels read = {&ip->camera,
+                                 &ip->maps,
+                                 ip->bad,
+                                 frame,
+                                 NULL,
+                                 ip->columns.count > 0 ? &ip->columns : NULL,
+                                 (frame->window.x0 - whole->window.x0) / frame->binning};
     bst_locate_prepare(&ip->locator, &ip->view);
     bst_pixel_shows_add(&ip->shows, &ip->locator, &ip->view, &ip->candidates);
     if (ip->map) {
-        bst_pixel_map_check(ip->map, &ip->view, &frame->window, bst_electrons_read, &read,
+        bst_pixel_map_check(ip->map, &ip->view, &frame->window, bst_calibrate_pixels_read, &read,
                             &ip->shows);
     }
     ip->shows.pixels += (double)ip->view.width * ip->view.height;

@@ -57,7 +57,7 @@ bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_w
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the filters of a %d x %d frame",
                         max_width, max_height);
     }
-    bst_borrow_init(out->lent, threads);
+    bst_scratch_pool_init(out->lent, threads);
     return BST_OK;
 }
 
@@ -96,7 +96,7 @@ static void edge_factors(const bst_filter *f, const double *square_at, int count
 typedef struct pass {
     bst_filter *f;
     const bst_background *background;
-    bst_pixel_fn read;
+    bst_imgproc_pixel_fn read;
     const void *user;
     const uint16_t *raw;
     const bst_row_gain *gain; /* NULL: electrons as read gives them */
@@ -233,7 +233,7 @@ static void filter_rows(void *user, int begin, int end) {
     bst_filter *f = p->f;
     int r = f->radius, ring_rows = 2 * r + GROUP;
     size_t line = (size_t)f->stride;
-    int taken = bst_borrow_take(f->lent);
+    int taken = bst_scratch_pool_take(f->lent);
     float *lines = f->lines + f->line_floats * (size_t)taken, *ring = lines + 6 * line;
     /* the latest rows of the streak map: maxima are looked for while they are near */
     size_t ring_lines = (size_t)(ring_rows * f->rank);
@@ -269,7 +269,7 @@ static void filter_rows(void *user, int begin, int end) {
             }
         }
     }
-    bst_borrow_give(f->lent, taken);
+    bst_scratch_pool_give(f->lent, taken);
 }
 
 /* Whether a row depends on rows of other parts, `reach` away. */
@@ -309,7 +309,7 @@ static void finish_apart(void *user, int begin, int end) {
     const pass *p = user;
     bst_filter *f = p->f;
     size_t line = (size_t)f->stride;
-    int taken = bst_borrow_take(f->lent), made = -2;
+    int taken = bst_scratch_pool_take(f->lent), made = -2;
     float *ring = f->lines + f->line_floats * (size_t)taken;
     memset(ring, 0, LATEST * line * sizeof(float));
     for (int y = begin; y < end; y++) {
@@ -329,7 +329,7 @@ static void finish_apart(void *user, int begin, int end) {
         }
         note_maxima(f, y, rows[0], rows[1], rows[2], p->threshold);
     }
-    bst_borrow_give(f->lent, taken);
+    bst_scratch_pool_give(f->lent, taken);
 }
 
 /* Whether the greater output will be asked for at so many places that a map of it is quicker. */
@@ -342,7 +342,7 @@ static bool is_crowded(const bst_filter *f) {
 }
 
 void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *background,
-                    bst_pixel_fn read, const void *user, const uint16_t *raw,
+                    bst_imgproc_pixel_fn read, const void *user, const uint16_t *raw,
                     const bst_row_gain *gain, float *signal, int width, int height,
                     int saturated_dn, float threshold) {
     if (f->width != width || f->height != height) {

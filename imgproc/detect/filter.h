@@ -40,9 +40,9 @@ typedef struct bst_filter {
     float *maximum_snr;
     bst_filter_row_fn correct_row; /* of the next bst_filter_run; NULL: none */
     const void *correct_user;
-    float *lines;       /* work space of each thread */
-    size_t line_floats; /* of one */
-    bst_borrow *lent;   /* of lines */
+    float *lines;           /* work space of each thread */
+    size_t line_floats;     /* of one */
+    bst_scratch_pool *lent; /* of lines */
     float *edge_x,
         *edge_y; /* 1 / norm of the kernel's part inside the frame, over the whole norm */
     const bst_known_psf *known; /* NULL: a Gaussian, whose kernel is one even product */
@@ -107,7 +107,7 @@ double bst_filter_threshold(bst_filter *filter, double false_alarms, double pixe
  * where raw >= saturated_dn), then maps and maxima are made. Memory outside the frame counts as
  * noise-free background. */
 void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background *background,
-                    bst_pixel_fn read, const void *user, const uint16_t *raw,
+                    bst_imgproc_pixel_fn read, const void *user, const uint16_t *raw,
                     const bst_row_gain *gain, float *signal, int width, int height,
                     int saturated_dn, float threshold);
 

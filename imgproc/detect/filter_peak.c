@@ -35,7 +35,8 @@ static void known_values(const bst_filter *f, const float *corner, phase_values 
         BST_SIMD_PICK(add_row)(f, row, j, lanes);
     }
     for (int p = 0; p < BST_FILTER_PHASES * BST_FILTER_PHASES; p++) {
-        value[p / BST_FILTER_PHASES][p % BST_FILTER_PHASES] = bst_lane_sum(lanes + p * BST_LANES);
+        value[p / BST_FILTER_PHASES][p % BST_FILTER_PHASES] =
+            bst_simd_layout_sum(lanes + p * BST_LANES);
     }
 }
 

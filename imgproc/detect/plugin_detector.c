@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-struct bst_plugged {
+struct bst_plugin_detector {
     const bst_stage_use *use;
     const bst_detector_stage *stage;
     void *self;
@@ -15,25 +15,26 @@ struct bst_plugged {
 
 static const char *const kinds[] = {BST_STAGE_DETECTOR, NULL};
 
-const bst_config_desc bst_plugged_table[] = {
+const bst_config_desc bst_plugin_detector_table[] = {
     BST_STAGE_ALONE(kinds,
                     "A shared library with a detector, relative to the folder of the file that "
                     "says so; the other keys are then that one's. Left out: imgproc's own."),
     BST_CONFIG_END};
 
-static bst_status told(bst_ctx *ctx, const bst_plugged *p, bst_status status) {
+static bst_status told(bst_ctx *ctx, const bst_plugin_detector *p, bst_status status) {
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "plug-in %s", p->use->plugin);
 }
 
-bst_status bst_plugged_create(bst_ctx *ctx, const bst_stage_use *use, const bst_camera *camera,
-                              const bst_imgproc_maps *maps, int capacity, bst_plugged **out) {
+bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
+                                      const bst_camera *camera, const bst_imgproc_maps *maps,
+                                      int capacity, bst_plugin_detector **out) {
     const bst_detector_stage *stage = use->desc->functions;
-    bst_plugged *p = calloc(1, sizeof *p);
+    bst_plugin_detector *p = calloc(1, sizeof *p);
     *out = p;
     if (!p) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a plug-in");
     }
-    *p = (bst_plugged){.use = use, .stage = stage, .camera = camera};
+    *p = (bst_plugin_detector){.use = use, .stage = stage, .camera = camera};
     if (!stage->create || !stage->detect || !stage->destroy) {
         return told(ctx, p,
                     bst_fail(ctx, BST_ERR_CONFIG,
@@ -49,7 +50,7 @@ bst_status bst_plugged_create(bst_ctx *ctx, const bst_stage_use *use, const bst_
     return told(ctx, p, stage->create(ctx, use->config, &env, &p->self));
 }
 
-void bst_plugged_free(bst_plugged *p) {
+void bst_plugin_detector_free(bst_plugin_detector *p) {
     if (p && p->self) {
         p->stage->destroy(p->self);
     }
@@ -71,7 +72,7 @@ static bool is_sound(const bst_detection *d, const bst_window *w) {
            (d->label == BST_LABEL_UNKNOWN || d->label == BST_LABEL_ARTEFACT);
 }
 
-static bst_status check(bst_ctx *ctx, const bst_plugged *p, const bst_imgproc_frame *frame,
+static bst_status check(bst_ctx *ctx, const bst_plugin_detector *p, const bst_imgproc_frame *frame,
                         bst_detections *out, int capacity) {
     if (out->count < 0 || out->count > capacity || out->lost < 0) {
         return bst_fail(ctx, BST_ERR_STATE,
@@ -105,9 +106,10 @@ static bst_status check(bst_ctx *ctx, const bst_plugged *p, const bst_imgproc_fr
     return BST_OK;
 }
 
-bst_status bst_plugged_detect(bst_ctx *ctx, bst_plugged *p, const bst_imgproc_frame *frame,
-                              int64_t exposure_id, const bst_motion *motion, bst_detections *out,
-                              int capacity) {
+bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *p,
+                                      const bst_imgproc_frame *frame, int64_t exposure_id,
+                                      const bst_camera_motion *motion, bst_detections *out,
+                                      int capacity) {
     double dx = 0.0, dy = 0.0;
     const bst_detector_frame given = {.exposure_id = exposure_id,
                                       .pixels = frame->pixels,
@@ -122,8 +124,8 @@ bst_status bst_plugged_detect(bst_ctx *ctx, bst_plugged *p, const bst_imgproc_fr
     BST_TRY(check(ctx, p, frame, out, capacity));
     qsort(out->items, (size_t)out->count, sizeof out->items[0], by_place);
     if (motion) {
-        bst_motion_streak(motion, p->camera, bst_camera_centre_x(p->camera),
-                          bst_camera_centre_y(p->camera), &dx, &dy);
+        bst_camera_motion_streak(motion, p->camera, bst_camera_centre_x(p->camera),
+                                 bst_camera_centre_y(p->camera), &dx, &dy);
     }
     p->exposure_s = frame->exposure_s;
     p->level_e = out->background_e;
@@ -133,7 +135,7 @@ bst_status bst_plugged_detect(bst_ctx *ctx, bst_plugged *p, const bst_imgproc_fr
     return BST_OK;
 }
 
-double bst_plugged_v_limit(const bst_plugged *p, double snr) {
+double bst_plugin_detector_v_limit(const bst_plugin_detector *p, double snr) {
     /* a Gaussian's SNR is that of its light in 4 pi sigma^2 pixels of the noise; smeared over a
      * length, in 2 sqrt(pi) sigma by that and the length */
     double sigma = p->camera->psf_fwhm_px / 2.3548, wide = 2.0 * sqrt(BST_PI) * sigma;
@@ -141,12 +143,13 @@ double bst_plugged_v_limit(const bst_plugged *p, double snr) {
     return bst_camera_v_mag(p->camera, snr * p->noise_e * sqrt(fmax(pixels, 1.0)) / p->exposure_s);
 }
 
-double bst_plugged_streak_px(const bst_plugged *p) {
+double bst_plugin_detector_streak_px(const bst_plugin_detector *p) {
     return p->streak_px;
 }
 
-void bst_plugged_ground(const void *plugged, double x_px, double y_px, bst_wings_ground *out) {
-    const bst_plugged *p = plugged;
+void bst_plugin_detector_ground(const void *plugged, double x_px, double y_px,
+                                bst_psf_wings_ground *out) {
+    const bst_plugin_detector *p = plugged;
     (void)x_px;
     (void)y_px;
     out->level_e = p->level_e;

@@ -30,7 +30,7 @@ static void legendre_rule(int n, double *node, double *weight) {
     }
 }
 
-void bst_gauss_init(bst_gauss *psf) {
+void bst_imgproc_gauss_init(bst_imgproc_gauss *psf) {
     for (int i = 0; i < BST_PSF_TABLE_SIZE; i++) {
         double t = (double)i / BST_PSF_TABLE_PER_SIGMA - BST_PSF_REACH_SIGMA;
         psf->cdf[i] = 0.5 * erfc(-t / sqrt(2.0));
@@ -47,7 +47,7 @@ typedef struct profile {
 } profile;
 
 /* Normal distribution and density at t (in sigma) by cubic Hermite interpolation. */
-static void normal_at(const bst_gauss *psf, double t, double *cdf, double *pdf) {
+static void normal_at(const bst_imgproc_gauss *psf, double t, double *cdf, double *pdf) {
     double u = (t + BST_PSF_REACH_SIGMA) * BST_PSF_TABLE_PER_SIGMA;
     if (!(u > 0.0)) {
         *cdf = *pdf = 0.0;
@@ -70,7 +70,7 @@ static void normal_at(const bst_gauss *psf, double t, double *cdf, double *pdf) 
 
 /* The 1-D pixel-integrated Gaussian about `centre` over pixels 0..side-1, and its derivatives by
  * the centre, first and second; only the pixels within reach. */
-static void make_profile(const bst_gauss *psf, double centre, double sigma, int side,
+static void make_profile(const bst_imgproc_gauss *psf, double centre, double sigma, int side,
                          profile *out) {
     double reach = BST_PSF_REACH_SIGMA * sigma;
     double lo = floor(centre - reach + 0.5), hi = floor(centre + reach + 0.5);
@@ -96,7 +96,7 @@ static void make_profile(const bst_gauss *psf, double centre, double sigma, int 
     }
 }
 
-static int node_count(const bst_shape *shape) {
+static int node_count(const bst_imgproc_shape *shape) {
     /* path at the greatest speed, which is at an end */
     double length =
         (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
@@ -104,8 +104,8 @@ static int node_count(const bst_shape *shape) {
     return length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
 }
 
-void bst_gauss_profile(const bst_gauss *psf, double centre, double sigma, int side, double *share,
-                       double *slope, double *curvature) {
+void bst_imgproc_gauss_profile(const bst_imgproc_gauss *psf, double centre, double sigma, int side,
+                               double *share, double *slope, double *curvature) {
     profile p;
     make_profile(psf, centre, sigma, side, &p);
     for (int i = 0; i < side; i++) {
@@ -116,8 +116,9 @@ void bst_gauss_profile(const bst_gauss *psf, double centre, double sigma, int si
     }
 }
 
-void bst_gauss_render(const bst_gauss *psf, const bst_shape *shape, const bst_stamp *stamp,
-                      double *share, double *by_x, double *by_y, double *by_variance) {
+void bst_imgproc_gauss_render(const bst_imgproc_gauss *psf, const bst_imgproc_shape *shape,
+                              const bst_imgproc_stamp *stamp, double *share, double *by_x,
+                              double *by_y, double *by_variance) {
     size_t bytes = (size_t)stamp->width * (size_t)stamp->height * sizeof(double);
     memset(share, 0, bytes);
     memset(by_x, 0, bytes);
@@ -148,7 +149,7 @@ void bst_gauss_render(const bst_gauss *psf, const bst_shape *shape, const bst_st
     }
 }
 
-void bst_shape_path_variance(const bst_shape *s, double out[3]) {
+void bst_imgproc_shape_path_variance(const bst_imgproc_shape *s, double out[3]) {
     out[0] = s->dx_px * s->dx_px / 12.0 + s->bend_x_px * s->bend_x_px / 5.0;
     out[1] = s->dx_px * s->dy_px / 12.0 + s->bend_x_px * s->bend_y_px / 5.0;
     out[2] = s->dy_px * s->dy_px / 12.0 + s->bend_y_px * s->bend_y_px / 5.0;

@@ -12,40 +12,41 @@ enum {
 
 /* Tables: the normal distribution by sigma, and Gauss-Legendre rules of 1 to BST_PSF_MAX_NODES
  * nodes. */
-typedef struct bst_gauss {
+typedef struct bst_imgproc_gauss {
     double cdf[BST_PSF_TABLE_SIZE], pdf[BST_PSF_TABLE_SIZE];
     double node[BST_PSF_MAX_NODES * (BST_PSF_MAX_NODES + 1) / 2];   /* in [-1/2, 1/2] */
     double weight[BST_PSF_MAX_NODES * (BST_PSF_MAX_NODES + 1) / 2]; /* sum 1 */
-} bst_gauss;
+} bst_imgproc_gauss;
 
 /* A source of unit flux. */
-typedef struct bst_shape {
+typedef struct bst_imgproc_shape {
     double x_px, y_px;           /* centroid */
     double dx_px, dy_px;         /* path during the exposure; 0, 0: at rest */
     double bend_x_px, bend_y_px; /* of the path: coefficient of (3 u^2 - 1) / 2, u from -1 to 1 */
     double sigma_px;
-} bst_shape;
+} bst_imgproc_shape;
 
 /* Second moments of the path alone: variance along x, covariance, variance along y. */
-void bst_shape_path_variance(const bst_shape *shape, double out[3]);
+void bst_imgproc_shape_path_variance(const bst_imgproc_shape *shape, double out[3]);
 
 /* A rectangle of pixels [height][width] whose first pixel is (x0, y0). */
-typedef struct bst_stamp {
+typedef struct bst_imgproc_stamp {
     int x0, y0, width, height;
-} bst_stamp;
+} bst_imgproc_stamp;
 
-void bst_gauss_init(bst_gauss *psf);
+void bst_imgproc_gauss_init(bst_imgproc_gauss *psf);
 
 /* Writes the share of the source's light in each pixel of the stamp and its derivatives, each
  * [height][width]: by x, by y, and by sigma^2 (half the Laplacian: the heat equation). The streak
  * is quadratic in time; its integral along the path is a Gauss-Legendre sum with an error below
  * 1e-5 of the peak. Light beyond 6 sigma is left out. Sides at most BST_PSF_MAX_SIDE. */
-void bst_gauss_render(const bst_gauss *psf, const bst_shape *shape, const bst_stamp *stamp,
-                      double *share, double *by_x, double *by_y, double *by_variance);
+void bst_imgproc_gauss_render(const bst_imgproc_gauss *psf, const bst_imgproc_shape *shape,
+                              const bst_imgproc_stamp *stamp, double *share, double *by_x,
+                              double *by_y, double *by_variance);
 
 /* Along one axis: the pixel-integrated Gaussian about `centre` on pixels 0 to side - 1 (at most
  * BST_PSF_MAX_SIDE), and its first and second derivative by the centre; 0 beyond 6 sigma. */
-void bst_gauss_profile(const bst_gauss *psf, double centre, double sigma, int side, double *share,
-                       double *slope, double *curvature);
+void bst_imgproc_gauss_profile(const bst_imgproc_gauss *psf, double centre, double sigma, int side,
+                               double *share, double *slope, double *curvature);
 
 #endif

@@ -20,7 +20,7 @@ typedef struct bright {
     double x_px, y_px, flux_e;
 } bright;
 
-struct bst_wings {
+struct bst_psf_wings {
     float *peak;      /* [SIDE][SIDE]: the greatest share of light within a pixel around */
     double near_peak; /* the greatest of it from NEAR_PX on */
     double area_px2;  /* 1 / sum p^2 */
@@ -29,7 +29,7 @@ struct bst_wings {
     int count;
 };
 
-static void take_peaks(const double *image, bst_wings *w) {
+static void take_peaks(const double *image, bst_psf_wings *w) {
     for (int y = 0; y < SIDE; y++) {
         for (int x = 0; x < SIDE; x++) {
             double most = 0.0;
@@ -47,7 +47,7 @@ static void take_peaks(const double *image, bst_wings *w) {
 }
 
 static bst_status fill_in(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
-                          double blur_px, bst_wings *w) {
+                          double blur_px, bst_psf_wings *w) {
     size_t count = (size_t)SIDE * SIDE;
     double *one = malloc(2 * count * sizeof *one), *mean = one ? one + count : NULL, square = 0.0;
     w->peak = malloc(count * sizeof *w->peak);
@@ -79,46 +79,46 @@ static bst_status fill_in(bst_ctx *ctx, const bst_psf *psf, double width_px, dou
     return status;
 }
 
-bst_status bst_wings_create(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
-                            double blur_px, bst_wings **out) {
+bst_status bst_psf_wings_create(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
+                                double blur_px, bst_psf_wings **out) {
     *out = NULL;
-    bst_wings *w = calloc(1, sizeof *w);
+    bst_psf_wings *w = calloc(1, sizeof *w);
     if (!w) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the wings of stars");
     }
     bst_status status = fill_in(ctx, psf, width_px, height_px, blur_px, w);
     if (status != BST_OK) {
-        bst_wings_free(w);
+        bst_psf_wings_free(w);
         return status;
     }
     *out = w;
     return BST_OK;
 }
 
-void bst_wings_free(bst_wings *w) {
+void bst_psf_wings_free(bst_psf_wings *w) {
     if (w) {
         free(w->peak);
         free(w);
     }
 }
 
-double bst_wings_bright_e(const bst_wings *w, double noise_e, double threshold_snr) {
+double bst_psf_wings_bright_e(const bst_psf_wings *w, double noise_e, double threshold_snr) {
     return MATTERS * threshold_snr * noise_e / (w->near_peak * sqrt(w->area_px2));
 }
 
-void bst_wings_begin(bst_wings *w, double dx_px, double dy_px) {
+void bst_psf_wings_begin(bst_psf_wings *w, double dx_px, double dy_px) {
     w->count = 0;
     w->dx_px = dx_px;
     w->dy_px = dy_px;
 }
 
-void bst_wings_add(bst_wings *w, double x_px, double y_px, double flux_e) {
+void bst_psf_wings_add(bst_psf_wings *w, double x_px, double y_px, double flux_e) {
     if (w->count < STARS) {
         w->stars[w->count++] = (bright){x_px, y_px, flux_e};
     }
 }
 
-bool bst_wings_holds(const bst_wings *w, double x_px, double y_px, double radius_px) {
+bool bst_psf_wings_holds(const bst_psf_wings *w, double x_px, double y_px, double radius_px) {
     for (int i = 0; i < w->count; i++) {
         if (hypot(w->stars[i].x_px - x_px, w->stars[i].y_px - y_px) <= radius_px) {
             return true;
@@ -128,7 +128,7 @@ bool bst_wings_holds(const bst_wings *w, double x_px, double y_px, double radius
 }
 
 /* Whether a detection is one of the stars themselves. */
-static bool is_star(const bst_wings *w, const bst_detection *d) {
+static bool is_star(const bst_psf_wings *w, const bst_detection *d) {
     for (int i = 0; i < w->count; i++) {
         const bright *s = &w->stars[i];
         if (hypot(s->x_px - d->x_px, s->y_px - d->y_px) < OWN_PX &&
@@ -140,7 +140,7 @@ static bool is_star(const bst_wings *w, const bst_detection *d) {
 }
 
 /* Light of the stars in a sensor pixel. */
-static double light_at(const bst_wings *w, double x_px, double y_px) {
+static double light_at(const bst_psf_wings *w, double x_px, double y_px) {
     double length = hypot(w->dx_px, w->dy_px), sum = 0.0;
     int nodes = 1 + (int)fmin(length, MOST_NODES - 1);
     for (int i = 0; i < w->count; i++) {
@@ -157,8 +157,8 @@ static double light_at(const bst_wings *w, double x_px, double y_px) {
     return sum;
 }
 
-void bst_wings_label(const bst_wings *w, bst_wings_ground_fn ground, const void *user, int binning,
-                     bst_detections *detections) {
+void bst_psf_wings_label(const bst_psf_wings *w, bst_psf_wings_ground_fn ground, const void *user,
+                         int binning, bst_detections *detections) {
     double noise_e = detections->noise_e, threshold = detections->threshold_snr;
     for (int i = 0; i < detections->count && w->count > 0; i++) {
         bst_detection *d = &detections->items[i];
@@ -168,7 +168,7 @@ void bst_wings_label(const bst_wings *w, bst_wings_ground_fn ground, const void 
         if (!(light > 0.0) || is_star(w, d)) {
             continue;
         }
-        bst_wings_ground here;
+        bst_psf_wings_ground here;
         ground(user, d->x_px, d->y_px, &here);
         double area = pow(d->flux_e / (d->snr * here.noise_e), 2.0);
         double noise2 = fmin(here.noise_e, noise_e) * fmin(here.noise_e, noise_e);

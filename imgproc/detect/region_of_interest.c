@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-bool bst_windows_add(bst_windows *windows, const bst_window *frame, double x_px, double y_px,
-                     double half_x_px, double half_y_px) {
+bool bst_region_of_interest_add(bst_region_of_interest *windows, const bst_window *frame,
+                                double x_px, double y_px, double half_x_px, double half_y_px) {
     double x0 = fmax(floor(x_px - half_x_px), frame->x0);
     double y0 = fmax(floor(y_px - half_y_px), frame->y0);
     double x1 = fmin(ceil(x_px + half_x_px), frame->x0 + frame->width - 1.0);
@@ -39,7 +39,8 @@ static void align(int *start, int *length, int origin, int size, int binning) {
     *length = (end - first) * binning;
 }
 
-bool bst_windows_settle(bst_windows *windows, const bst_window *frame, int binning, double share) {
+bool bst_region_of_interest_settle(bst_region_of_interest *windows, const bst_window *frame,
+                                   int binning, double share) {
     int kept = 0;
     for (int i = 0; i < windows->count; i++) {
         bst_window w = windows->items[i];
@@ -75,7 +76,8 @@ bool bst_windows_settle(bst_windows *windows, const bst_window *frame, int binni
     return windows->count > 0 && area <= share * (double)frame->width * (double)frame->height;
 }
 
-bool bst_windows_hold(const bst_windows *windows, double x_px, double y_px, double margin_px) {
+bool bst_region_of_interest_hold(const bst_region_of_interest *windows, double x_px, double y_px,
+                                 double margin_px) {
     for (int i = 0; i < windows->count; i++) {
         const bst_window *w = &windows->items[i];
         if (x_px > w->x0 - margin_px && x_px < w->x0 + w->width - 1 + margin_px &&
@@ -86,8 +88,8 @@ bool bst_windows_hold(const bst_windows *windows, double x_px, double y_px, doub
     return false;
 }
 
-bst_imgproc_frame bst_windows_crop(const bst_imgproc_frame *frame, const bst_window *w,
-                                   uint16_t *pixels) {
+bst_imgproc_frame bst_region_of_interest_crop(const bst_imgproc_frame *frame, const bst_window *w,
+                                              uint16_t *pixels) {
     int b = frame->binning;
     size_t stride = (size_t)(frame->window.width / b), width = (size_t)(w->width / b);
     size_t x = (size_t)((w->x0 - frame->window.x0) / b);

@@ -260,7 +260,7 @@ void bst_row_streak(float *out, float *copy, int count, const float *const *in, 
     bool streamed = copy && may_stream(copy);
     int x = BST_SIMD_PICK(streak)(out, streamed ? copy : NULL, count, in, weight, taps, floor);
     if (streamed) {
-        bst_end_stream();
+        bst_simd_stream_end();
     }
     int whole = streamed ? x : 0;
     for (; x < count; x++) {

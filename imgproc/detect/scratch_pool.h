@@ -7,12 +7,12 @@
 
 enum { BST_BORROW_MOST = 33 };
 
-typedef struct bst_borrow {
+typedef struct bst_scratch_pool {
     atomic_flag taken[BST_BORROW_MOST];
     int count; /* at least as many as threads */
-} bst_borrow;
+} bst_scratch_pool;
 
-static inline void bst_borrow_init(bst_borrow *b, int count) {
+static inline void bst_scratch_pool_init(bst_scratch_pool *b, int count) {
     b->count = count < BST_BORROW_MOST ? count : BST_BORROW_MOST;
     for (int i = 0; i < b->count; i++) {
         atomic_flag_clear(&b->taken[i]);
@@ -20,7 +20,7 @@ static inline void bst_borrow_init(bst_borrow *b, int count) {
 }
 
 /* Index of a work space that nobody else has. */
-static inline int bst_borrow_take(bst_borrow *b) {
+static inline int bst_scratch_pool_take(bst_scratch_pool *b) {
     for (int i = 0;; i = i + 1 < b->count ? i + 1 : 0) {
         if (!atomic_flag_test_and_set_explicit(&b->taken[i], memory_order_acquire)) {
             return i;
@@ -28,7 +28,7 @@ static inline int bst_borrow_take(bst_borrow *b) {
     }
 }
 
-static inline void bst_borrow_give(bst_borrow *b, int index) {
+static inline void bst_scratch_pool_give(bst_scratch_pool *b, int index) {
     atomic_flag_clear_explicit(&b->taken[index], memory_order_release);
 }
 

@@ -9,12 +9,12 @@
 enum { BST_LANES = 16 };
 
 /* A number of floats rounded up to whole lanes. */
-static inline int bst_lanes_up(int count) {
+static inline int bst_simd_layout_round_up(int count) {
     return (count + BST_LANES - 1) / BST_LANES * BST_LANES;
 }
 
 /* Sum of sixteen floats, always in the same order. */
-static inline double bst_lane_sum(const float *v) {
+static inline double bst_simd_layout_sum(const float *v) {
     float s[4];
     for (int i = 0; i < 4; i++) {
         s[i] = (v[i] + v[i + 8]) + (v[i + 4] + v[i + 12]);

@@ -116,7 +116,7 @@ static void count_moments(double counted, double shift, double read_e, double st
 }
 
 /* Few electrons: no series holds. The law itself is cut and digitised. */
-static bool solve_counted(const bst_clipped_noise *noise, double low, double high,
+static bool solve_counted(const bst_truncated_moments_noise *noise, double low, double high,
                           double inner_mean, double inner_variance, double *mean,
                           double *deviation) {
     double read_e = sqrt(noise->read_variance_e2), step = noise->step_e;
@@ -148,8 +148,9 @@ static bool solve_counted(const bst_clipped_noise *noise, double low, double hig
     return true;
 }
 
-void bst_clipped_solve(const bst_clipped_noise *noise, double low, double high, double inner_mean,
-                       double inner_variance, double *mean, double *deviation) {
+void bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, double low, double high,
+                                 double inner_mean, double inner_variance, double *mean,
+                                 double *deviation) {
     if (solve_counted(noise, low, high, inner_mean, inner_variance, mean, deviation)) {
         return;
     }

@@ -3,10 +3,10 @@
 #define BST_IMGPROC_DETECT_TRUNCATED_MOMENTS_H
 
 /* Noise that is the sum of a normal part and of counted electrons, in digital steps. */
-typedef struct bst_clipped_noise {
+typedef struct bst_truncated_moments_noise {
     double read_variance_e2; /* of the normal part, without that of the steps; INFINITY: all is */
     double step_e;           /* >= 0 */
-} bst_clipped_noise;
+} bst_truncated_moments_noise;
 
 /* Improves *mean and *deviation (of the noise as it is digitised, electrons; on entry a guess) of
  * pixels whose values from `low` to `high` have the mean `inner_mean` and the variance
@@ -19,7 +19,8 @@ typedef struct bst_clipped_noise {
  * Below 12 electrons counted, with a normal part below 0.8 e-^2 and no more than 100 steps between
  * the edges, no such series holds: the Poisson law of whole electrons, the normal part about each,
  * is digitised and cut as it is, and mean and deviation are those of all digital values. */
-void bst_clipped_solve(const bst_clipped_noise *noise, double low, double high, double inner_mean,
-                       double inner_variance, double *mean, double *deviation);
+void bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, double low, double high,
+                                 double inner_mean, double inner_variance, double *mean,
+                                 double *deviation);
 
 #endif

@@ -5,20 +5,21 @@
 
 static const double BRIGHTEST_V = -2.0;
 
-bst_status bst_sky_create(bst_ctx *ctx, const bst_camera *camera, const bst_stars *stars,
-                          double julian_year, int capacity, bst_sky *out) {
-    *out = (bst_sky){
+bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
+                                      const bst_stars *stars, double julian_year, int capacity,
+                                      bst_predicted_stars *out) {
+    *out = (bst_predicted_stars){
         .camera = camera, .stars = stars, .julian_year = julian_year, .capacity = capacity};
     out->found = calloc((size_t)capacity, sizeof *out->found);
     out->expected = calloc((size_t)capacity, sizeof *out->expected);
     if (!out->found || !out->expected) {
-        bst_sky_free(out);
+        bst_predicted_stars_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d catalogue stars", capacity);
     }
     return BST_OK;
 }
 
-void bst_sky_free(bst_sky *sky) {
+void bst_predicted_stars_free(bst_predicted_stars *sky) {
     free(sky->found);
     free(sky->expected);
     sky->found = NULL;
@@ -35,9 +36,10 @@ static double seen_mag(const bst_camera *camera, const bst_star *star) {
         camera, bst_camera_star_electrons_per_s(camera, v_mag, (double)star->b_minus_v));
 }
 
-bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
-                          const bst_light *light, bst_window window, double margin_px,
-                          double v_limit, int *count) {
+bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
+                                      bst_quat q_cam_from_gcrf, const bst_astro_light *light,
+                                      bst_window window, double margin_px, double v_limit,
+                                      int *count) {
     *count = 0;
     double x0 = window.x0 - margin_px, x1 = window.x0 + window.width - 1 + margin_px;
     double y0 = window.y0 - margin_px, y1 = window.y0 + window.height - 1 + margin_px;
@@ -53,7 +55,7 @@ bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
         radius = bst_camera_reach_rad(sky->camera, centre, x0, y0, x1, y1, 0.0);
     }
     bst_vec3 direction = bst_quat_rotate(bst_quat_conj(q_cam_from_gcrf), centre);
-    direction = bst_light_catalogue_star(light, direction);
+    direction = bst_astro_light_catalogue_star(light, direction);
     int total = 0;
     for (; v_limit > BRIGHTEST_V; v_limit -= 0.5) {
         BST_TRY(bst_stars_query(ctx, sky->stars, direction, radius + BST_ARCSEC_RAD, v_limit,
@@ -65,12 +67,12 @@ bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
     total = total < sky->capacity ? total : sky->capacity;
     for (int i = 0; i < total; i++) {
         const bst_star *star = &sky->found[i];
-        bst_vec3 apparent = bst_light_apparent_star(light, star->icrs);
+        bst_vec3 apparent = bst_astro_light_apparent_star(light, star->icrs);
         double x, y;
         if (bst_camera_project(sky->camera, bst_quat_rotate(q_cam_from_gcrf, apparent), &x, &y) &&
             x >= x0 && x <= x1 && y >= y0 && y <= y1) {
             sky->expected[(*count)++] =
-                (bst_expected_star){x, y, seen_mag(sky->camera, star), star->id};
+                (bst_imgproc_expected_star){x, y, seen_mag(sky->camera, star), star->id};
         }
     }
     return BST_OK;

@@ -7,24 +7,26 @@
 #include "sim/catalogue/stars.h"
 #include "sim/optics/camera.h"
 
-typedef struct bst_sky {
+typedef struct bst_predicted_stars {
     const bst_camera *camera;
     const bst_stars *stars;
     double julian_year;
     int capacity;
-    bst_star *found;             /* [capacity] */
-    bst_expected_star *expected; /* [capacity] */
-} bst_sky;
+    bst_star *found;                     /* [capacity] */
+    bst_imgproc_expected_star *expected; /* [capacity] */
+} bst_predicted_stars;
 
-bst_status bst_sky_create(bst_ctx *ctx, const bst_camera *camera, const bst_stars *stars,
-                          double julian_year, int capacity, bst_sky *out) BST_MUST_CHECK;
-void bst_sky_free(bst_sky *sky);
+bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
+                                      const bst_stars *stars, double julian_year, int capacity,
+                                      bst_predicted_stars *out) BST_MUST_CHECK;
+void bst_predicted_stars_free(bst_predicted_stars *sky);
 
 /* Fills sky->expected with the stars to v_limit whose apparent places fall within margin_px of the
  * window, for a camera at q_cam_from_gcrf that sees light as `light` says. Where there are more
  * than fit, the limit is raised by half a magnitude until they do. */
-bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
-                          const bst_light *light, bst_window window, double margin_px,
-                          double v_limit, int *count) BST_MUST_CHECK;
+bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
+                                      bst_quat q_cam_from_gcrf, const bst_astro_light *light,
+                                      bst_window window, double margin_px, double v_limit,
+                                      int *count) BST_MUST_CHECK;
 
 #endif

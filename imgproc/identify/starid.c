@@ -63,11 +63,11 @@ void bst_starid_free(bst_starid *s) {
 }
 
 static bool star_higher(const void *context, int a, int b) {
-    const bst_expected_star *stars = context;
+    const bst_imgproc_expected_star *stars = context;
     return stars[a].y_px != stars[b].y_px ? stars[a].y_px < stars[b].y_px : a < b;
 }
 static bool star_brighter(const void *context, int a, int b) {
-    const bst_expected_star *stars = context;
+    const bst_imgproc_expected_star *stars = context;
     return stars[a].v_mag != stars[b].v_mag ? stars[a].v_mag < stars[b].v_mag : a < b;
 }
 static bool detection_brighter(const void *context, int a, int b) {
@@ -77,7 +77,7 @@ static bool detection_brighter(const void *context, int a, int b) {
 
 /* Whether a detection may be a star: saturated sources may be brighter than they seem, cut ones
  * too. */
-static bool consistent(const bst_detection *d, const bst_expected_star *s) {
+static bool consistent(const bst_detection *d, const bst_imgproc_expected_star *s) {
     if (d->label != BST_LABEL_UNKNOWN && d->label != BST_LABEL_STAR) {
         return false;
     }
@@ -105,7 +105,7 @@ static double poisson_tail(double mu, int k) {
 }
 
 /* The shift that most pairs agree on; false when none stands out from chance. */
-static bool vote(bst_starid *s, const bst_starid_options *o, const bst_expected_star *stars,
+static bool vote(bst_starid *s, const bst_starid_options *o, const bst_imgproc_expected_star *stars,
                  int star_count, const bst_detection *items, int count, double *shift_x,
                  double *shift_y) {
     int *bright_stars = s->bright, *bright_items = s->bright + star_count;
@@ -126,7 +126,7 @@ static bool vote(bst_starid *s, const bst_starid_options *o, const bst_expected_
     memset(s->votes, 0, (size_t)side * (size_t)side * sizeof *s->votes);
     double pairs = 0.0;
     for (int j = 0; j < m; j++) {
-        const bst_expected_star *star = &stars[bright_stars[j]];
+        const bst_imgproc_expected_star *star = &stars[bright_stars[j]];
         for (int i = 0; i < n; i++) {
             const bst_detection *d = &items[bright_items[i]];
             if (!consistent(d, star)) {
@@ -167,14 +167,14 @@ static bool vote(bst_starid *s, const bst_starid_options *o, const bst_expected_
     return trials * poisson_tail(mean, best) < CHANCE;
 }
 
-static void expected_place(const bst_starid_options *o, const bst_expected_star *star,
+static void expected_place(const bst_starid_options *o, const bst_imgproc_expected_star *star,
                            const bst_starid_result *r, double *x, double *y) {
     *x = star->x_px + r->shift_x_px - r->roll_rad * (star->y_px - o->centre_y_px);
     *y = star->y_px + r->shift_y_px + r->roll_rad * (star->x_px - o->centre_x_px);
 }
 
 /* First star, in order of y, that is not below y_px. */
-static int first_not_below(const bst_starid *s, const bst_expected_star *stars, int count,
+static int first_not_below(const bst_starid *s, const bst_imgproc_expected_star *stars, int count,
                            double y_px) {
     int lo = 0, hi = count;
     while (lo < hi) {
@@ -189,8 +189,9 @@ static int first_not_below(const bst_starid *s, const bst_expected_star *stars, 
 }
 
 /* One-to-one nearest partners within the tolerance. Returns how many. */
-static int pair_up(bst_starid *s, const bst_starid_options *o, const bst_expected_star *stars,
-                   int star_count, const bst_detection *items, int count, double floor_px,
+static int pair_up(bst_starid *s, const bst_starid_options *o,
+                   const bst_imgproc_expected_star *stars, int star_count,
+                   const bst_detection *items, int count, double floor_px,
                    const bst_starid_result *r) {
     for (int j = 0; j < star_count; j++) {
         s->detection_of[j] = -1;
@@ -237,14 +238,15 @@ static int pair_up(bst_starid *s, const bst_starid_options *o, const bst_expecte
 }
 
 /* Least squares for shift and turn; residuals as they are after it. */
-static void refine(const bst_starid *s, const bst_starid_options *o, const bst_expected_star *stars,
-                   const bst_detection *items, int count, int matched, bst_starid_result *r) {
+static void refine(const bst_starid *s, const bst_starid_options *o,
+                   const bst_imgproc_expected_star *stars, const bst_detection *items, int count,
+                   int matched, bst_starid_result *r) {
     double a[3][3] = {{0}}, g[3] = {0};
     for (int i = 0; i < count; i++) {
         if (s->star_of[i] < 0) {
             continue;
         }
-        const bst_expected_star *star = &stars[s->star_of[i]];
+        const bst_imgproc_expected_star *star = &stars[s->star_of[i]];
         double wx = 1.0 / (fmax(items[i].cov_xx, 0.0) + 0.0025);
         double wy = 1.0 / (fmax(items[i].cov_yy, 0.0) + 0.0025);
         double dx = items[i].x_px - star->x_px, dy = items[i].y_px - star->y_px;
@@ -277,8 +279,9 @@ static void refine(const bst_starid *s, const bst_starid_options *o, const bst_e
     r->rms_px = sqrt(sum / (2.0 * matched));
 }
 
-void bst_starid_match(bst_starid *s, const bst_starid_options *o, const bst_expected_star *stars,
-                      int star_count, bst_detection *items, int count, bst_starid_result *out) {
+void bst_starid_match(bst_starid *s, const bst_starid_options *o,
+                      const bst_imgproc_expected_star *stars, int star_count, bst_detection *items,
+                      int count, bst_starid_result *out) {
     *out = (bst_starid_result){0};
     s->matched_of = 0;
     star_count = star_count < s->max_stars ? star_count : s->max_stars;

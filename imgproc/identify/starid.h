@@ -5,11 +5,11 @@
 #include "sim/messages/messages.h"
 
 /* A catalogue star where telemetry says that it should be, mean over the exposure. */
-typedef struct bst_expected_star {
+typedef struct bst_imgproc_expected_star {
     double x_px, y_px; /* full-sensor coordinates */
     double v_mag;      /* as the camera sees it: that of a Sun-like star of the same light */
     uint32_t id;
-} bst_expected_star;
+} bst_imgproc_expected_star;
 
 typedef struct bst_starid_options {
     double search_radius_px;                /* greatest shift between expectation and detection */
@@ -42,7 +42,7 @@ void bst_starid_free(bst_starid *starid);
  * matches no star) of the matched ones, leaves the others untouched. Only detections of label
  * UNKNOWN (or STAR) take part. */
 void bst_starid_match(bst_starid *starid, const bst_starid_options *options,
-                      const bst_expected_star *stars, int star_count, bst_detection *items,
+                      const bst_imgproc_expected_star *stars, int star_count, bst_detection *items,
                       int count, bst_starid_result *out);
 
 /* Index of the star that the latest match gave a detection, -1: none. */

@@ -5,8 +5,8 @@
 enum { MAX_CHARGE = 64 };
 
 /* The pixels that are sharper than light about a candidate's maximum, and those that they join. */
-static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bst_found *found,
-                       int at[MAX_CHARGE], double *sharpest) {
+static int find_charge(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                       const bst_imgproc_found *found, int at[MAX_CHARGE], double *sharpest) {
     int reach_px = 1 + (int)f->sigma_px, count = 0;
     *sharpest = 0.0;
     for (int round = -1; round < count; round++) {
@@ -37,7 +37,7 @@ static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bs
 
 /* What a candidate is when its charge is all there is: centroid and extent of the charge. */
 static void describe_charge(const bst_sharpness *s, const bst_locate_frame *f, const int *at,
-                            int count, double sharpest, bst_found *found) {
+                            int count, double sharpest, bst_imgproc_found *found) {
     double sum = 0.0, square = 0.0, mx = 0.0, my = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;
     for (int k = 0; k < count; k++) {
         double v = bst_sharpness_signal(s, f->signal[at[k]]), x = at[k] % f->width - found->peak_x,
@@ -56,7 +56,8 @@ static void describe_charge(const bst_sharpness *s, const bst_locate_frame *f, c
     myy = fmax(myy / sum - my * my, 0.0) + 1.0 / 12.0;
     mxy = mxy / sum - mx * my;
     double mean = 0.5 * (mxx + myy), half = hypot(0.5 * (mxx - myy), mxy);
-    found->charge = (bst_charge){.pixels = count,
+    found->charge =
+        (bst_imgproc_cosmic_ray){.pixels = count,
                                  .sharpness = sharpest,
                                  .x_px = found->peak_x + mx,
                                  .y_px = found->peak_y + my,
@@ -68,7 +69,7 @@ static void describe_charge(const bst_sharpness *s, const bst_locate_frame *f, c
 }
 
 typedef struct search {
-    bst_locator *l;
+    bst_imgproc_locator *l;
     const bst_locate_frame *f;
 } search;
 
@@ -78,13 +79,13 @@ static void count_charge(void *user, int begin, int end) {
     for (int i = begin; i < end; i++) {
         int at[MAX_CHARGE];
         double sharpest;
-        bst_found *found = &s->l->found[i];
+        bst_imgproc_found *found = &s->l->found[i];
         bool light = found->dropped || found->bleed;
         found->charge.pixels = light ? 0 : find_charge(s->l, s->f, found, at, &sharpest);
     }
 }
 
-void bst_charge_remove(bst_locator *l, const bst_locate_frame *f) {
+void bst_cosmic_ray_remove(bst_imgproc_locator *l, const bst_locate_frame *f) {
     enum { A_TIME = 64 };
     search s = {l, f};
     bst_parallel_for(f->pool, l->count, A_TIME, count_charge, &s);
@@ -106,7 +107,7 @@ void bst_charge_remove(bst_locator *l, const bst_locate_frame *f) {
     }
 }
 
-double bst_charge_light(const bst_locate_frame *f, const bst_found *found) {
+double bst_cosmic_ray_light(const bst_locate_frame *f, const bst_imgproc_found *found) {
     int r = 1 + (int)ceil(1.5 * f->sigma_px);
     double sum = 0.0, norm = 0.0, scale = -0.5 / (f->sigma_px * f->sigma_px + 1.0 / 12.0);
     for (int y = found->peak_y - r; y <= found->peak_y + r; y++) {
@@ -126,8 +127,8 @@ double bst_charge_light(const bst_locate_frame *f, const bst_found *found) {
     return norm > 0.0 ? sum / (sqrt(norm) * found->noise_e) : 0.0;
 }
 
-void bst_charge_take(bst_found *found) {
-    const bst_charge *c = &found->charge;
+void bst_cosmic_ray_take(bst_imgproc_found *found) {
+    const bst_imgproc_cosmic_ray *c = &found->charge;
     found->label = c->pixels == 1 ? BST_LABEL_HOT_PIXEL : BST_LABEL_HIT;
     /* chance of light: its tail there, against one candidate in a thousand that is charge */
     double odds = exp(fmin(0.5 * c->sharpness * c->sharpness, 300.0) - 7.0);
@@ -148,15 +149,15 @@ void bst_charge_take(bst_found *found) {
     found->angle_rad = c->angle_rad;
 }
 
-bool bst_charge_alone(const bst_found *found) {
-    const bst_source *s = &found->source;
+bool bst_cosmic_ray_alone(const bst_imgproc_found *found) {
+    const bst_imgproc_source *s = &found->source;
     double snr2 = s->flux_e * s->flux_e / fmax(s->flux_variance, 1e-30);
     double excess = s->chi_square - s->pixels;
     return !s->fitted || snr2 < BST_CHARGE_LIGHT_SNR * BST_CHARGE_LIGHT_SNR ||
            excess > 5.0 * sqrt(2.0 * s->pixels) + 0.1 * snr2;
 }
 
-bool bst_charge_in(const bst_locator *l, int width, const bst_stamp *stamp) {
+bool bst_cosmic_ray_in(const bst_imgproc_locator *l, int width, const bst_imgproc_stamp *stamp) {
     bool in = false;
     for (int k = 0; k < l->charged_count && !in; k++) {
         int x = l->charged[k] % width - stamp->x0, y = l->charged[k] / width - stamp->y0;

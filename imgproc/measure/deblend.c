@@ -4,19 +4,20 @@
 
 #include "imgproc/measure/cosmic_ray.h"
 
-double bst_company_reach(const bst_locate_frame *f) {
+double bst_deblend_reach(const bst_locate_frame *f) {
     return fmax(3.0, ceil(3.6 * f->sigma_px));
 }
 
-double bst_company_fit_limit(const bst_locate_frame *f, double path_px) {
+double bst_deblend_fit_limit(const bst_locate_frame *f, double path_px) {
     return 1.5 + f->sigma_px + 0.4 * path_px;
 }
 
-bst_stamp bst_company_stamp(const bst_locator *l, const bst_locate_frame *f, const bst_source *s) {
-    return bst_fit_stamp(s, bst_company_reach(f), l->max_side, f->width, f->height);
+bst_imgproc_stamp bst_deblend_stamp(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                                    const bst_imgproc_source *s) {
+    return bst_fit_stamp(s, bst_deblend_reach(f), l->max_side, f->width, f->height);
 }
 
-void bst_company_index(bst_locator *l, const bst_locate_frame *f) {
+void bst_deblend_index(bst_imgproc_locator *l, const bst_locate_frame *f) {
     l->columns = f->width / BST_LOCATE_CELL_PX + 1;
     l->rows = f->height / BST_LOCATE_CELL_PX + 1;
     for (int i = 0; i < l->columns * l->rows; i++) {
@@ -38,14 +39,15 @@ static void cell_range(double from, double to, double margin_px, int cells, int 
     *last = hi < 0.0 ? 0 : hi > cells - 1 ? cells - 1 : (int)hi;
 }
 
-void bst_company_gather(const bst_locator *l, const bst_locate_frame *f, int i,
-                        const bst_source *own, const bst_stamp *stamp, bst_company *out) {
+void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f, int i,
+                        const bst_imgproc_source *own, const bst_imgproc_stamp *stamp,
+                        bst_deblend *out) {
     out->free[0] = own;
     out->free_count = 1;
     out->fixed_count = 0;
     /* a fit moves a source from its maximum by its limit at most */
     double margin =
-        bst_company_reach(f) + 1.8 * l->longest_px + bst_company_fit_limit(f, 0.0) + 1.0;
+        bst_deblend_reach(f) + 1.8 * l->longest_px + bst_deblend_fit_limit(f, 0.0) + 1.0;
     int first_column, last_column, first_row, last_row;
     cell_range(stamp->x0, stamp->x0 + stamp->width, margin, l->columns, &first_column,
                &last_column);
@@ -55,11 +57,11 @@ void bst_company_gather(const bst_locator *l, const bst_locate_frame *f, int i,
     for (int c = 0; c < across * (last_row - first_row + 1); c++) {
         int cell = (first_row + c / across) * l->columns + first_column + c % across;
         for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
-            if (k == i || l->found[k].dropped || bst_charge_label(l->found[k].label)) {
+            if (k == i || l->found[k].dropped || bst_cosmic_ray_label(l->found[k].label)) {
                 continue;
             }
-            bst_stamp other = bst_fit_stamp(&l->found[k].source, bst_company_reach(f), l->max_side,
-                                            f->width, f->height);
+            bst_imgproc_stamp other = bst_fit_stamp(&l->found[k].source, bst_deblend_reach(f),
+                                                    l->max_side, f->width, f->height);
             if (other.x0 >= stamp->x0 + stamp->width || stamp->x0 >= other.x0 + other.width ||
                 other.y0 >= stamp->y0 + stamp->height || stamp->y0 >= other.y0 + other.height) {
                 continue;
@@ -80,7 +82,7 @@ void bst_company_gather(const bst_locator *l, const bst_locate_frame *f, int i,
         }
     }
     for (int n = 0; n < count; n++) {
-        const bst_source *s = &l->found[near[n]].source;
+        const bst_imgproc_source *s = &l->found[near[n]].source;
         /* a centre just outside still has half its light inside */
         bool inside = s->shape.x_px >= stamp->x0 - 1.5 && s->shape.y_px >= stamp->y0 - 1.5 &&
                       s->shape.x_px <= stamp->x0 + stamp->width + 0.5 &&
@@ -93,19 +95,19 @@ void bst_company_gather(const bst_locator *l, const bst_locate_frame *f, int i,
     }
 }
 
-bool bst_company_fit(const bst_worker *w, int i, bst_found *found, const bst_stamp *stamp,
-                     bool free_width) {
+bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
+                     const bst_imgproc_stamp *stamp, bool free_width) {
     const bst_locate_frame *f = w->f;
-    bst_company c;
-    bst_company_gather(w->l, f, i, &found->source, stamp, &c);
-    bst_source copies[BST_FIT_MAX_FREE];
-    bst_source *free_sources[BST_FIT_MAX_FREE];
+    bst_deblend c;
+    bst_deblend_gather(w->l, f, i, &found->source, stamp, &c);
+    bst_imgproc_source copies[BST_FIT_MAX_FREE];
+    bst_imgproc_source *free_sources[BST_FIT_MAX_FREE];
     for (int k = 0; k < c.free_count; k++) {
         copies[k] = *c.free[k];
         free_sources[k] = &copies[k];
     }
     bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
-    double limit = bst_company_fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px));
+    double limit = bst_deblend_fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px));
     bool ok = bst_fit_run(w->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
                           free_width && c.free_count == 1, limit);
     if (!ok && c.free_count > 1) {
@@ -127,21 +129,22 @@ bool bst_company_fit(const bst_worker *w, int i, bst_found *found, const bst_sta
     return ok;
 }
 
-void bst_company_drop_doubles(bst_locator *l, const bst_locate_frame *f, int end) {
+void bst_deblend_drop_doubles(bst_imgproc_locator *l, const bst_locate_frame *f, int end) {
     double radius = 0.6 * BST_FWHM_PER_SIGMA * f->sigma_px;
-    double margin = radius + 1.8 * l->longest_px + 2.0 * bst_company_fit_limit(f, 0.0);
+    double margin = radius + 1.8 * l->longest_px + 2.0 * bst_deblend_fit_limit(f, 0.0);
     for (int i = 0; i < end; i++) {
-        const bst_shape *a = &l->found[i].source.shape;
+        const bst_imgproc_shape *a = &l->found[i].source.shape;
         int x0, x1, y0, y1;
         cell_range(a->x_px, a->x_px, margin, l->columns, &x0, &x1);
         cell_range(a->y_px, a->y_px, margin, l->rows, &y0, &y1);
         for (int c = 0; c < (x1 - x0 + 1) * (y1 - y0 + 1); c++) {
             int cell = (y0 + c / (x1 - x0 + 1)) * l->columns + x0 + c % (x1 - x0 + 1);
             for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
-                const bst_shape *b = &l->found[k].source.shape;
+                const bst_imgproc_shape *b = &l->found[k].source.shape;
                 /* numbers are by brightness: the fainter goes */
                 if (k < i && !l->found[k].dropped &&
-                    bst_charge_label(l->found[k].label) == bst_charge_label(l->found[i].label) &&
+                    bst_cosmic_ray_label(l->found[k].label) ==
+                        bst_cosmic_ray_label(l->found[i].label) &&
                     hypot(a->x_px - b->x_px, a->y_px - b->y_px) < radius) {
                     l->found[i].dropped = true;
                 }

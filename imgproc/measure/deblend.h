@@ -7,40 +7,42 @@
 enum { BST_COMPANY_MAX_FIXED = 12 };
 
 /* One thread's part of a loop over the found ones. */
-typedef struct bst_worker {
-    const bst_locator *l;
+typedef struct bst_imgproc_worker {
+    const bst_imgproc_locator *l;
     const bst_locate_frame *f;
     bst_fit *fit;
-} bst_worker;
+} bst_imgproc_worker;
 
-typedef struct bst_company {
-    const bst_source *free[BST_FIT_MAX_FREE]; /* the first is the one asked about */
+typedef struct bst_deblend {
+    const bst_imgproc_source *free[BST_FIT_MAX_FREE]; /* the first is the one asked about */
     int free_count;
-    const bst_source *fixed[BST_COMPANY_MAX_FIXED];
+    const bst_imgproc_source *fixed[BST_COMPANY_MAX_FIXED];
     int fixed_count;
-} bst_company;
+} bst_deblend;
 
 /* Distance around a path inside which a source's light counts, px. */
-double bst_company_reach(const bst_locate_frame *frame);
+double bst_deblend_reach(const bst_locate_frame *frame);
 /* How far a fit may move a source from its maximum, px. */
-double bst_company_fit_limit(const bst_locate_frame *frame, double path_px);
+double bst_deblend_fit_limit(const bst_locate_frame *frame, double path_px);
 /* The pixels that a source is fitted to. */
-bst_stamp bst_company_stamp(const bst_locator *l, const bst_locate_frame *f, const bst_source *s);
+bst_imgproc_stamp bst_deblend_stamp(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                                    const bst_imgproc_source *s);
 
 /* Puts the found ones into squares of the frame, by their maxima. */
-void bst_company_index(bst_locator *locator, const bst_locate_frame *frame);
+void bst_deblend_index(bst_imgproc_locator *locator, const bst_locate_frame *frame);
 
 /* The sources that share light with `own`, number i: those centred on its stamp are free, the
  * brightest first; those that only reach into it are fixed. */
-void bst_company_gather(const bst_locator *l, const bst_locate_frame *f, int i,
-                        const bst_source *own, const bst_stamp *stamp, bst_company *out);
+void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f, int i,
+                        const bst_imgproc_source *own, const bst_imgproc_stamp *stamp,
+                        bst_deblend *out);
 
 /* Fits *found, number i, in the shape that its source has. The neighbours' own entries stay as they
  * are: each gets its values from its own fit. */
-bool bst_company_fit(const bst_worker *w, int i, bst_found *found, const bst_stamp *stamp,
-                     bool free_width);
+bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
+                     const bst_imgproc_stamp *stamp, bool free_width);
 
 /* Of numbers 0 to end - 1, all fitted, those that ended at a brighter one's place are dropped. */
-void bst_company_drop_doubles(bst_locator *l, const bst_locate_frame *f, int end);
+void bst_deblend_drop_doubles(bst_imgproc_locator *l, const bst_locate_frame *f, int end);
 
 #endif

@@ -51,7 +51,7 @@ typedef struct fate {
     double judged, stayed;
 } fate;
 
-struct bst_discriminator {
+struct bst_imgproc_discriminator {
     bst_camera camera;
     int capacity, room;
     remembered *sources; /* [room] */
@@ -70,10 +70,10 @@ struct bst_discriminator {
     bst_window window, charge_window;
 };
 
-bst_status bst_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
-                                    bst_discriminator **out) {
+bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
+                                            bst_imgproc_discriminator **out) {
     *out = NULL;
-    bst_discriminator *d = calloc(1, sizeof *d);
+    bst_imgproc_discriminator *d = calloc(1, sizeof *d);
     if (!d) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for discrimination");
     }
@@ -91,14 +91,14 @@ bst_status bst_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int 
     d->band = calloc((size_t)d->bands, sizeof *d->band);
     if (!d->sources || !d->charge || !d->merged || !d->keys || !d->keys_order || !d->again ||
         !d->band) {
-        bst_discriminator_free(d);
+        bst_imgproc_discriminator_free(d);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory to remember %d detections", capacity);
     }
     *out = d;
     return BST_OK;
 }
 
-void bst_discriminator_free(bst_discriminator *d) {
+void bst_imgproc_discriminator_free(bst_imgproc_discriminator *d) {
     if (!d) {
         return;
     }
@@ -124,7 +124,7 @@ static bool in_window(const bst_window *w, double x, double y, double margin) {
 
 /* ---- charge: the same pixel again, or not ---- */
 
-static int64_t pixel_of(const bst_discriminator *d, const bst_detection *item) {
+static int64_t pixel_of(const bst_imgproc_discriminator *d, const bst_detection *item) {
     return (int64_t)llround(item->y_px) * d->camera.width_px + (int64_t)llround(item->x_px);
 }
 
@@ -134,7 +134,7 @@ static bool key_less(const void *context, int a, int b) {
 }
 
 /* In how many frames a pixel held charge. */
-static int times_charged(const bst_discriminator *d, int64_t pixel) {
+static int times_charged(const bst_imgproc_discriminator *d, int64_t pixel) {
     int lo = 0, hi = d->charge_count;
     while (lo < hi) {
         int mid = lo + (hi - lo) / 2;
@@ -148,14 +148,14 @@ static int times_charged(const bst_discriminator *d, int64_t pixel) {
 }
 
 /* Log-odds that a maximum is that of a pixel that learning suspects. */
-static double suspicion(const bst_discriminator *d, const bst_frame_knowledge *f,
+static double suspicion(const bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
                         const bst_detection *item) {
     return f->learned
                ? bst_pixel_learner_suspicion(f->learned, f->left_out, (int32_t)pixel_of(d, item))
                : 0.0;
 }
 
-static void label_charge(const bst_discriminator *d, const bst_frame_knowledge *f,
+static void label_charge(const bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
                          bst_detection *item) {
     int64_t pixel = pixel_of(d, item);
     bool again = times_charged(d, pixel) > 0 || suspicion(d, f, item) >= SUSPICIOUS;
@@ -180,11 +180,11 @@ static void label_charge(const bst_discriminator *d, const bst_frame_knowledge *
 }
 
 /* Merges the frame's charge into the memory; both are in order of pixel. */
-static void remember_charge(bst_discriminator *d, const bst_window *window,
+static void remember_charge(bst_imgproc_discriminator *d, const bst_window *window,
                             const bst_detections *out) {
     int fresh = 0;
     for (int i = 0; i < out->count && fresh < d->capacity; i++) {
-        if (bst_charge_label(out->items[i].label)) {
+        if (bst_cosmic_ray_label(out->items[i].label)) {
             d->keys_order[fresh] = fresh;
             d->keys[fresh++] = pixel_of(d, &out->items[i]);
         }
@@ -222,13 +222,13 @@ static void remember_charge(bst_discriminator *d, const bst_window *window,
 
 /* ---- sources: the same place of the sky again, or not ---- */
 
-static bool project(const bst_discriminator *d, bst_quat q, bst_vec3 direction, double *x,
+static bool project(const bst_imgproc_discriminator *d, bst_quat q, bst_vec3 direction, double *x,
                     double *y) {
     return bst_camera_project(&d->camera, bst_quat_rotate(q, direction), x, y);
 }
 
 /* Puts what is remembered on this frame. */
-static void place_memory(bst_discriminator *d, const bst_frame_knowledge *f) {
+static void place_memory(bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f) {
     for (int i = 0; i < d->bands; i++) {
         d->band[i] = -1;
     }
@@ -254,7 +254,7 @@ static double mag_sigma(const bst_detection *item) {
 }
 
 /* Number of the nearest remembered source of like brightness; -1: none. */
-static int recall(bst_discriminator *d, const bst_detection *item) {
+static int recall(bst_imgproc_discriminator *d, const bst_detection *item) {
     double scale = bst_camera_scale_rad(&d->camera), closest = 1.0;
     int best = -1;
     int band = (int)(item->y_px / BAND);
@@ -276,17 +276,17 @@ static int recall(bst_discriminator *d, const bst_detection *item) {
     return best;
 }
 
-static fate *fate_of(bst_discriminator *d, double v_mag, bool blend) {
+static fate *fate_of(bst_imgproc_discriminator *d, double v_mag, bool blend) {
     int bin = (int)floor(2.0 * (v_mag + 5.0));
     return &d->fates[blend][bin < 0 ? 0 : bin >= MAG_BINS ? MAG_BINS - 1 : bin];
 }
 
 static bool is_source(const bst_detection *item) {
-    return !bst_charge_label(item->label) && item->label != BST_LABEL_ARTEFACT;
+    return !bst_cosmic_ray_label(item->label) && item->label != BST_LABEL_ARTEFACT;
 }
 
 /* Notes that an earlier source was seen again. */
-static void note_again(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
+static void note_again(bst_imgproc_discriminator *d, const bst_detection *item, bst_vec3 direction,
                        remembered *r) {
     double scale = bst_camera_scale_rad(&d->camera);
     double variance = place_variance(item) * scale * scale;
@@ -299,14 +299,14 @@ static void note_again(bst_discriminator *d, const bst_detection *item, bst_vec3
     r->latest_var = variance;
 }
 
-static bst_vec3 direction_of(const bst_discriminator *d, const bst_frame_knowledge *f,
-                             const bst_detection *item) {
+static bst_vec3 direction_of(const bst_imgproc_discriminator *d,
+                             const bst_imgproc_frame_knowledge *f, const bst_detection *item) {
     return bst_quat_rotate(bst_quat_conj(f->q_cam_from_gcrf),
                            bst_camera_unproject(&d->camera, item->x_px, item->y_px));
 }
 
 /* Finds the sources that were there before, and judges what was new in the frame before. */
-static void look_back(bst_discriminator *d, const bst_frame_knowledge *f,
+static void look_back(bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
                       const bst_detections *out) {
     for (int i = 0; i < out->count && i < d->capacity; i++) {
         d->again[i] = is_source(&out->items[i]) ? recall(d, &out->items[i]) : -1;
@@ -326,7 +326,7 @@ static void look_back(bst_discriminator *d, const bst_frame_knowledge *f,
     }
 }
 
-static void remember(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
+static void remember(bst_imgproc_discriminator *d, const bst_detection *item, bst_vec3 direction,
                      bool fresh) {
     if (d->count >= d->room) {
         return;
@@ -346,7 +346,7 @@ static void remember(bst_discriminator *d, const bst_detection *item, bst_vec3 d
 }
 
 /* Forgets what was not seen for long, or is far from what is looked at. */
-static void forget(bst_discriminator *d) {
+static void forget(bst_imgproc_discriminator *d) {
     int kept = 0;
     for (int i = 0; i < d->count; i++) {
         remembered *r = &d->sources[i];
@@ -359,7 +359,7 @@ static void forget(bst_discriminator *d) {
 }
 
 /* The probability that a source which no earlier frame had there is a star all the same. */
-static double new_star_probability(bst_discriminator *d, const bst_detection *item) {
+static double new_star_probability(bst_imgproc_discriminator *d, const bst_detection *item) {
     const fate *t = fate_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
     /* two that moved are believed in beforehand */
     double stayed = t->stayed / (t->judged + 2.0);
@@ -369,15 +369,16 @@ static double new_star_probability(bst_discriminator *d, const bst_detection *it
 /* ---- the frame ---- */
 
 /* Numbers of the detections that lie where moving tracks are expected get label OBJECT. */
-static void label_predicted(const bst_discriminator *d, const bst_frame_knowledge *f,
-                            bst_detections *out) {
+static void label_predicted(const bst_imgproc_discriminator *d,
+                            const bst_imgproc_frame_knowledge *f, bst_detections *out) {
     double scale = bst_camera_scale_rad(&d->camera);
     for (int p = 0; f->predictions && p < f->predictions->count; p++) {
         const bst_prediction *track = &f->predictions->items[p];
         bst_vec3 direction = bst_vec3_unit(
             bst_vec3_axpy(track->direction_gcrf, f->predictions_age_s, track->rate_gcrf_radps));
         double x, y, closest = fmin(1.0 + 3.0 * track->sigma_rad / scale, 2.0 * MAX_GATE_PX);
-        if (!project(d, f->q_cam_from_gcrf, bst_light_aberrate(&f->light, direction), &x, &y)) {
+        if (!project(d, f->q_cam_from_gcrf, bst_astro_light_aberrate(&f->light, direction), &x,
+                     &y)) {
             continue;
         }
         int best = -1;
@@ -400,8 +401,8 @@ static bool is_long_streak(const bst_detection *item) {
            item->length_px > LONG_SHARE * item->width_px;
 }
 
-static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, double unlisted,
-                         int again, bst_detection *item) {
+static void label_source(bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
+                         double unlisted, int again, bst_detection *item) {
     bool open = item->label == BST_LABEL_UNKNOWN;
     double star = 0.0;
     if (again >= 0) {
@@ -433,13 +434,13 @@ static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, dou
     }
 }
 
-void bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *f,
-                             bst_detections *out) {
+void bst_imgproc_discriminator_label(bst_imgproc_discriminator *d,
+                                     const bst_imgproc_frame_knowledge *f, bst_detections *out) {
     double unlisted = 0.0;
     for (int i = 0; i < out->count; i++) {
         bst_detection *item = &out->items[i];
         double odds = item->label == BST_LABEL_UNKNOWN ? suspicion(d, f, item) : 0.0;
-        if (bst_charge_label(item->label)) {
+        if (bst_cosmic_ray_label(item->label)) {
             label_charge(d, f, item);
         } else if (odds >= SUSPICIOUS) {
             say(item, BST_LABEL_HOT_PIXEL, 1.0 - exp(-odds));

@@ -8,25 +8,25 @@
 #include "sim/optics/camera.h"
 
 /* One frame, as far as it is known. */
-typedef struct bst_frame_knowledge {
+typedef struct bst_imgproc_frame_knowledge {
     bool oriented;            /* stars are identified: attitude is theirs */
     bst_quat q_cam_from_gcrf; /* mid-exposure */
-    bst_light light;
+    bst_astro_light light;
     bst_window window;
     double streak_px;                        /* of the stars; below streak_min_px: 0 */
     const bst_predictions *predictions;      /* moving tracks; NULL: none */
     double predictions_age_s;                /* from their tick to mid-exposure */
     const struct bst_pixel_learner *learned; /* bad pixels; NULL: none */
     const struct bst_pixel_map *left_out;    /* with `learned`: of this frame */
-} bst_frame_knowledge;
+} bst_imgproc_frame_knowledge;
 
 /* Memory of earlier frames. */
-typedef struct bst_discriminator bst_discriminator;
+typedef struct bst_imgproc_discriminator bst_imgproc_discriminator;
 
 /* For frames of up to `capacity` detections; `camera` is copied. BST_ERR_MEMORY. */
-bst_status bst_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
-                                    bst_discriminator **out) BST_MUST_CHECK;
-void bst_discriminator_free(bst_discriminator *discriminator);
+bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
+                                            bst_imgproc_discriminator **out) BST_MUST_CHECK;
+void bst_imgproc_discriminator_free(bst_imgproc_discriminator *discriminator);
 
 /* Sets label and label_probability of a frame's detections; frames come in order of time.
  *
@@ -44,7 +44,8 @@ void bst_discriminator_free(bst_discriminator *discriminator);
  * only) and some did not, and their share is the probability. Without earlier frames ten objects
  * are expected in a frame and the others are stars. Nothing is said without orientation, except of
  * charge. */
-void bst_discriminator_label(bst_discriminator *discriminator, const bst_frame_knowledge *frame,
-                             bst_detections *detections);
+void bst_imgproc_discriminator_label(bst_imgproc_discriminator *discriminator,
+                                     const bst_imgproc_frame_knowledge *frame,
+                                     bst_detections *detections);
 
 #endif

@@ -15,15 +15,15 @@ enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PAR
 static const double LEAST_PIVOT = 1e-11;
 static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
 
-bst_status bst_fit_create(bst_ctx *ctx, const bst_gauss *psf, const bst_profiles *profiles,
-                          int max_side, bst_fit *out) {
-    size_t plane = (size_t)max_side * (size_t)bst_lanes_up(max_side);
+bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
+                          const bst_source_profiles *profiles, int max_side, bst_fit *out) {
+    size_t plane = (size_t)max_side * (size_t)bst_simd_layout_round_up(max_side);
     *out = (bst_fit){.psf = psf, .profiles = profiles, .max_side = max_side};
     out->value = calloc(plane, sizeof(float));
     out->fixed = calloc(plane, sizeof(float));
     out->valid = calloc(plane, sizeof(float));
     out->model = calloc(plane * 4 * BST_FIT_MAX_FREE, sizeof(float));
-    out->scratch = calloc(bst_image_scratch(max_side), sizeof(float));
+    out->scratch = calloc(bst_source_profile_scratch(max_side), sizeof(float));
     if (!out->value || !out->fixed || !out->valid || !out->model || !out->scratch) {
         bst_fit_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a fit on %d x %d pixels", max_side,
@@ -41,9 +41,9 @@ void bst_fit_free(bst_fit *fit) {
     *fit = (bst_fit){0};
 }
 
-bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side, int width,
-                        int height) {
-    const bst_shape *s = &source->shape;
+bst_imgproc_stamp bst_fit_stamp(const bst_imgproc_source *source, double reach_px, int max_side,
+                                int width, int height) {
+    const bst_imgproc_shape *s = &source->shape;
     double limit = 0.5 * (max_side - 2);
     double rx = fmin(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + reach_px, limit);
     double ry = fmin(0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + reach_px, limit);
@@ -51,22 +51,23 @@ bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side,
     int y0 = (int)fmax(floor(s->y_px - ry + 0.5), 0.0);
     int x1 = (int)fmin(floor(s->x_px + rx + 0.5), width - 1.0);
     int y1 = (int)fmin(floor(s->y_px + ry + 0.5), height - 1.0);
-    return (bst_stamp){x0, y0, x1 >= x0 ? x1 - x0 + 1 : 0, y1 >= y0 ? y1 - y0 + 1 : 0};
+    return (bst_imgproc_stamp){x0, y0, x1 >= x0 ? x1 - x0 + 1 : 0, y1 >= y0 ? y1 - y0 + 1 : 0};
 }
 
-static int plane_of(const bst_stamp *stamp) {
-    return bst_lanes_up(stamp->width) * stamp->height;
+static int plane_of(const bst_imgproc_stamp *stamp) {
+    return bst_simd_layout_round_up(stamp->width) * stamp->height;
 }
 
-static bool fits_in(const bst_fit *fit, const bst_stamp *stamp) {
+static bool fits_in(const bst_fit *fit, const bst_imgproc_stamp *stamp) {
     return stamp->width > 0 && stamp->height > 0 && stamp->width <= fit->max_side &&
            stamp->height <= fit->max_side;
 }
 
 /* Renders a source into slot k of the work space. */
-static float *render(const bst_fit *fit, const bst_stamp *stamp, const bst_source *source, int k) {
+static float *render(const bst_fit *fit, const bst_imgproc_stamp *stamp,
+                     const bst_imgproc_source *source, int k) {
     float *m = fit->model + (size_t)k * 4 * (size_t)plane_of(stamp);
-    bst_image_render(fit->profiles, fit->psf, &source->shape, stamp, fit->scratch, m);
+    bst_source_profile_render(fit->profiles, fit->psf, &source->shape, stamp, fit->scratch, m);
     return m;
 }
 
@@ -83,8 +84,8 @@ typedef struct terms {
 #include "sim/core/simd_each.inc"
 
 /* Loads pixels and the fixed sources' light; returns the number of pixels that count. */
-static int load(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                const bst_source *const *fixed, int fixed_count) {
+static int load(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
+                const bst_imgproc_source *const *fixed, int fixed_count) {
     int n = plane_of(stamp);
     memset(fit->fixed, 0, (size_t)n * sizeof(float));
     for (int s = 0; s < fixed_count; s++) {
@@ -97,8 +98,8 @@ static int load(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
 
 /* Normal equations at the current sources. Parameters: x, y, flux of each, then the product of flux
  * and widening of the first (only when it is alone). Returns chi-square. */
-static double accumulate(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                         bst_source *const *free, int count, bool free_width,
+static double accumulate(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
+                         bst_imgproc_source *const *free, int count, bool free_width,
                          double a[][BST_FIT_MAX_PARAMETERS], double *g) {
     terms t = {.value = fit->value,
                .fixed = fit->fixed,
@@ -115,21 +116,22 @@ static double accumulate(bst_fit *fit, const bst_fit_data *data, const bst_stamp
     const float *at = sums;
     for (int p = 0; p < 3 * count + (free_width ? 1 : 0); p++) {
         for (int q = 0; q <= p; q++, at += BST_LANES) {
-            a[p][q] = bst_lane_sum(at);
+            a[p][q] = bst_simd_layout_sum(at);
         }
-        g[p] = bst_lane_sum(at);
+        g[p] = bst_simd_layout_sum(at);
         at += BST_LANES;
     }
-    return bst_lane_sum(at);
+    return bst_simd_layout_sum(at);
 }
 
 static double clamp(double v, double lo, double hi) {
     return v < lo ? lo : v > hi ? hi : v;
 }
 
-bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                 bst_source *const *free, int free_count, const bst_source *const *fixed,
-                 int fixed_count, bool free_width, double limit_px) {
+bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
+                 bst_imgproc_source *const *free, int free_count,
+                 const bst_imgproc_source *const *fixed, int fixed_count, bool free_width,
+                 double limit_px) {
     free_width = free_width && free_count == 1;
     int parameters = 3 * free_count + (free_width ? 1 : 0);
     if (!fits_in(fit, stamp) || free_count < 1 || free_count > BST_FIT_MAX_FREE) {
@@ -140,7 +142,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
         return false;
     }
     double a[BST_FIT_MAX_PARAMETERS][BST_FIT_MAX_PARAMETERS], g[BST_FIT_MAX_PARAMETERS];
-    bst_source start[BST_FIT_MAX_FREE];
+    bst_imgproc_source start[BST_FIT_MAX_FREE];
     for (int s = 0; s < free_count; s++) {
         start[s] = *free[s];
     }
@@ -166,7 +168,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
         settled = iteration > 0;
         for (int s = 0; s < free_count; s++) {
             const double *step = g + 3 * s;
-            bst_source *f = free[s];
+            bst_imgproc_source *f = free[s];
             double x = clamp(f->shape.x_px + clamp(step[0], -0.7, 0.7),
                              start[s].shape.x_px - limit_px, start[s].shape.x_px + limit_px);
             double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7),
@@ -228,9 +230,9 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
     return true;
 }
 
-double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
+double bst_fit_norm(const bst_fit *fit, const bst_imgproc_stamp *stamp) {
     double sum = 0.0;
-    int stride = bst_lanes_up(stamp->width);
+    int stride = bst_simd_layout_round_up(stamp->width);
     for (int j = 0; j < stamp->height; j++) {
         for (int i = 0; i < stamp->width; i++) {
             double m = (double)fit->model[j * stride + i];
@@ -240,17 +242,17 @@ double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
     return sqrt(sum);
 }
 
-bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                     const bst_source *source, const bst_source *const *fixed, int fixed_count,
-                     double out[3]) {
+bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
+                     const bst_imgproc_source *source, const bst_imgproc_source *const *fixed,
+                     int fixed_count, double out[3]) {
     if (!fits_in(fit, stamp) ||
         load(fit, data, stamp, fixed, fixed_count) < stamp->width * stamp->height) {
         return false;
     }
-    const bst_shape *s = &source->shape;
+    const bst_imgproc_shape *s = &source->shape;
     double base = s->sigma_px * s->sigma_px + fmax(source->widening_px2, 0.0) + 1.0 / 12.0;
     double path[3];
-    bst_shape_path_variance(s, path);
+    bst_imgproc_shape_path_variance(s, path);
     double wxx = 2.0 * (base + path[0]), wxy = 2.0 * path[1], wyy = 2.0 * (base + path[2]);
     double det = wxx * wyy - wxy * wxy;
     double ixx = wyy / det, iyy = wxx / det, ixy = -wxy / det;
@@ -258,8 +260,9 @@ bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *st
     BST_SIMD_PICK(sum_moments)
     (fit, stamp, (const double[2]){s->x_px - stamp->x0, s->y_px - stamp->y0},
      (const double[3]){ixx, ixy, iyy}, sums);
-    double sum = bst_lane_sum(sums), mxx = bst_lane_sum(sums + BST_LANES);
-    double mxy = bst_lane_sum(sums + 2 * BST_LANES), myy = bst_lane_sum(sums + 3 * BST_LANES);
+    double sum = bst_simd_layout_sum(sums), mxx = bst_simd_layout_sum(sums + BST_LANES);
+    double mxy = bst_simd_layout_sum(sums + 2 * BST_LANES),
+           myy = bst_simd_layout_sum(sums + 3 * BST_LANES);
     if (!(sum > 0.0)) {
         return false;
     }

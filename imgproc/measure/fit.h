@@ -10,8 +10,8 @@
 enum { BST_FIT_MAX_FREE = 5, BST_FIT_MAX_PARAMETERS = 3 * BST_FIT_MAX_FREE + 1 };
 
 /* A source as the fit sees it; pixels of the frame. */
-typedef struct bst_source {
-    bst_shape shape; /* centroid, path, sigma of the PSF */
+typedef struct bst_imgproc_source {
+    bst_imgproc_shape shape; /* centroid, path, sigma of the PSF */
     double flux_e;
     double widening_px2; /* added to the PSF's variance, to first order */
     /* results */
@@ -19,7 +19,7 @@ typedef struct bst_source {
     double chi_square;
     int pixels; /* that it was fitted to */
     bool fitted;
-} bst_source;
+} bst_imgproc_source;
 
 /* Pixels and noise to fit to. */
 typedef struct bst_fit_data {
@@ -30,22 +30,23 @@ typedef struct bst_fit_data {
 
 /* Work space; the planes are [height][width rounded up to lanes] of a stamp. */
 typedef struct bst_fit {
-    const bst_gauss *psf;
-    const bst_profiles *profiles; /* made for the sources' sigma before a fit */
+    const bst_imgproc_gauss *psf;
+    const bst_source_profiles *profiles; /* made for the sources' sigma before a fit */
     int max_side;
     float *value, *fixed, *valid;
     float *model; /* [BST_FIT_MAX_FREE][4]: share, by x, by y, by variance */
     float *scratch;
 } bst_fit;
 
-bst_status bst_fit_create(bst_ctx *ctx, const bst_gauss *psf, const bst_profiles *profiles,
-                          int max_side, bst_fit *out) BST_MUST_CHECK;
+bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
+                          const bst_source_profiles *profiles, int max_side,
+                          bst_fit *out) BST_MUST_CHECK;
 void bst_fit_free(bst_fit *fit);
 
 /* The stamp that holds a source with `reach_px` around its path, cut to the frame; width or height
  * is 0 when it lies outside. */
-bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side, int width,
-                        int height);
+bst_imgproc_stamp bst_fit_stamp(const bst_imgproc_source *source, double reach_px, int max_side,
+                                int width, int height);
 
 /* Fits x, y and flux of `free` sources (the first is the one wanted, at most BST_FIT_MAX_FREE) with
  * `fixed` sources taken off, on the first one's pixels; free_width: also its widening. Gauss-Newton
@@ -54,19 +55,20 @@ bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side,
  * source's covariance is the inverse of the Fisher matrix, its neighbours' uncertainty included;
  * saturated and bad pixels are left out. False and nothing changed when the pixels do not determine
  * the parameters. */
-bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                 bst_source *const *free, int free_count, const bst_source *const *fixed,
-                 int fixed_count, bool free_width, double limit_px);
+bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
+                 bst_imgproc_source *const *free, int free_count,
+                 const bst_imgproc_source *const *fixed, int fixed_count, bool free_width,
+                 double limit_px);
 
 /* sqrt(sum share^2) of the first source of the latest bst_fit_run on this stamp: its SNR is flux
  * times this over the background's noise. */
-double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp);
+double bst_fit_norm(const bst_fit *fit, const bst_imgproc_stamp *stamp);
 
 /* Second moments (variance along x, covariance, variance along y) of the source in its stamp with
  * the fixed sources taken off, from moments under a Gaussian window of twice the model's
  * covariance. False when they are not those of a peak. */
-bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                     const bst_source *source, const bst_source *const *fixed, int fixed_count,
-                     double out[3]);
+bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
+                     const bst_imgproc_source *source, const bst_imgproc_source *const *fixed,
+                     int fixed_count, double out[3]);
 
 #endif

@@ -5,10 +5,10 @@
 #include <stdbool.h>
 
 /* True when index a comes before index b; a strict total order gives one result only. */
-typedef bool (*bst_index_before)(const void *context, int a, int b);
+typedef bool (*bst_imgproc_index_before)(const void *context, int a, int b);
 
-static inline void bst_heapsort_sift(int *items, int root, int count, bst_index_before before,
-                                     const void *context) {
+static inline void bst_heapsort_sift(int *items, int root, int count,
+                                     bst_imgproc_index_before before, const void *context) {
     int moved = items[root];
     for (int child; (child = 2 * root + 1) < count; root = child) {
         if (child + 1 < count && before(context, items[child], items[child + 1])) {
@@ -22,7 +22,7 @@ static inline void bst_heapsort_sift(int *items, int root, int count, bst_index_
     items[root] = moved;
 }
 
-static inline void bst_heapsort_indices(int *items, int count, bst_index_before before,
+static inline void bst_heapsort_indices(int *items, int count, bst_imgproc_index_before before,
                                         const void *context) {
     for (int i = count / 2 - 1; i >= 0; i--) {
         bst_heapsort_sift(items, i, count, before, context);

@@ -10,16 +10,16 @@
 #include "sim/onboard/camera_motion.h"
 
 /* Charge that is not light, in pixels of the frame. */
-typedef struct bst_charge {
+typedef struct bst_imgproc_cosmic_ray {
     int pixels;       /* 0: none */
     double sharpness; /* greatest of them, see sharpness.h */
     double x_px, y_px, electrons;
     double snr; /* sqrt(sum d^2) over the background's noise */
     double length_px, width_px, angle_rad;
-} bst_charge;
+} bst_imgproc_cosmic_ray;
 
-typedef struct bst_found {
-    bst_source source;
+typedef struct bst_imgproc_found {
+    bst_imgproc_source source;
     double noise_e; /* of the background there */
     double snr;     /* against the background's noise */
     double length_px, width_px, angle_rad;
@@ -32,36 +32,37 @@ typedef struct bst_found {
     int company;              /* neighbours that the latest fit counted with */
     int label; /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
     double label_probability;
-    bst_charge charge;
+    bst_imgproc_cosmic_ray charge;
     float peak_snr;
     int peak_x, peak_y;
     double top_snr, top_x_px, top_y_px; /* of the filter's output between the pixels */
     int next;                           /* in its cell of the frame */
-} bst_found;
+} bst_imgproc_found;
 
 /* The one that a source belongs to. */
-static inline const bst_found *bst_found_of(const bst_source *source) {
-    return (const bst_found *)(const void *)((const char *)source - offsetof(bst_found, source));
+static inline const bst_imgproc_found *bst_imgproc_found_of(const bst_imgproc_source *source) {
+    return (const bst_imgproc_found *)(const void *)((const char *)source -
+                                                     offsetof(bst_imgproc_found, source));
 }
 
 /* How well the filter's top is known: see peak_centroid.h. */
-typedef struct bst_top_law {
+typedef struct bst_imgproc_peak_law {
     double xx, xy, yy, photons, norm2, flux_photons, floor_px2;
-} bst_top_law;
+} bst_imgproc_peak_law;
 
-typedef struct bst_locator {
-    bst_gauss psf;
-    bst_profiles profiles;
+typedef struct bst_imgproc_locator {
+    bst_imgproc_gauss psf;
+    bst_source_profiles profiles;
     bst_fit *fits; /* one for each thread */
     int threads;
-    bst_borrow lent;
+    bst_scratch_pool lent;
     bst_sharpness sharpness;
-    bst_top_law law[2]; /* of a point, and of a star's streak on the middle of the frame */
+    bst_imgproc_peak_law law[2]; /* of a point, and of a star's streak on the middle of the frame */
     int max_side, capacity;
-    int most_fits;           /* so many of the brightest are fitted; 0: all */
-    bst_found *found, *next; /* [capacity]; next: what a loop makes of them */
-    int *from;               /* [capacity]: the candidate of each */
-    uint8_t *chosen;         /* for each candidate that a frame may have */
+    int most_fits;                   /* so many of the brightest are fitted; 0: all */
+    bst_imgproc_found *found, *next; /* [capacity]; next: what a loop makes of them */
+    int *from;                       /* [capacity]: the candidate of each */
+    uint8_t *chosen;                 /* for each candidate that a frame may have */
     int count;
     int *cell; /* first found in each square of the frame, by its maximum */
     int columns, rows;
@@ -69,7 +70,7 @@ typedef struct bst_locator {
     double widening_sum, widening_weight;
     int *charged; /* pixels of the latest frame that hold charge */
     int charged_count, charged_capacity;
-} bst_locator;
+} bst_imgproc_locator;
 
 /* What one frame gives. */
 typedef struct bst_locate_frame {
@@ -81,7 +82,7 @@ typedef struct bst_locate_frame {
     double full_e;             /* least signal of a saturated pixel; 0: of one that may have taken
                                   its neighbours' overflow */
     double sigma_px;           /* of the PSF, in this frame's pixels */
-    const bst_motion *motion;  /* NULL: stars are points */
+    const bst_camera_motion *motion; /* NULL: stars are points */
     const bst_camera *camera;
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
     bst_parallel *pool;                       /* for the loops; NULL: the caller's thread */
@@ -97,10 +98,10 @@ static inline double bst_locate_noise_at(const bst_locate_frame *f, int x, int y
 enum { BST_LOCATE_CELL_PX = 16 };
 
 /* known: lent; NULL: the PSF is a Gaussian. For loops on up to `threads` threads. */
-bst_status bst_locator_create(bst_ctx *ctx, const bst_known_psf *known, int threads, int capacity,
-                              int max_width, int max_height, int max_side,
-                              bst_locator *out) BST_MUST_CHECK;
-void bst_locator_free(bst_locator *locator);
+bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known, int threads,
+                                      int capacity, int max_width, int max_height, int max_side,
+                                      bst_imgproc_locator *out) BST_MUST_CHECK;
+void bst_imgproc_locator_free(bst_imgproc_locator *locator);
 
 /* SNR of a source of one electron in noise of one, as a point or drawn as stars are. */
 static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak) {
@@ -121,18 +122,18 @@ static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak)
  *
  * Pixels that are sharper than light are left out first. What the others then do not show to be a
  * source is a HOT_PIXEL or a HIT, by the number of pixels. */
-void bst_locate(bst_locator *locator, const bst_locate_frame *frame,
+void bst_locate(bst_imgproc_locator *locator, const bst_locate_frame *frame,
                 const bst_candidates *candidates);
 
 /* What bst_locate does first: the PSF's profiles and sharpness for the frame. */
-void bst_locate_prepare(bst_locator *locator, const bst_locate_frame *frame);
+void bst_locate_prepare(bst_imgproc_locator *locator, const bst_locate_frame *frame);
 
 /* Fits number i of the latest frame if the filter placed it. */
-void bst_locate_again(bst_locator *locator, const bst_locate_frame *frame, int i);
+void bst_locate_again(bst_imgproc_locator *locator, const bst_locate_frame *frame, int i);
 
 /* The same without fits: each stands at its maximum, known to a pixel, with the flux that the
  * filter says. For frames in which stars moved further than is modelled. */
-void bst_locate_roughly(bst_locator *locator, const bst_locate_frame *frame,
+void bst_locate_roughly(bst_imgproc_locator *locator, const bst_locate_frame *frame,
                         const bst_candidates *candidates);
 
 #endif

@@ -8,20 +8,21 @@
  * pixel, and what the filter's rounded path adds by its length, px and px per px. */
 static const double FLOOR_PX = 0.012, FLOOR_SLOPE = 0.0013;
 
-bst_top_law bst_top_law_of(const bst_worker *w, const bst_shape *shape) {
+bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
+                                              const bst_imgproc_shape *shape) {
     enum { PLACES = 2 };
-    bst_top_law law = {0};
+    bst_imgproc_peak_law law = {0};
     double s[3] = {0}, k[3] = {0}, square = 0.0, cube = 0.0;
     for (int place = 0; place < PLACES * PLACES; place++) {
-        bst_source source = {.shape = *shape};
+        bst_imgproc_source source = {.shape = *shape};
         /* the mean over the pixel, far from every edge */
         source.shape.x_px = 500.0 + (place % PLACES + 0.5) / PLACES;
         source.shape.y_px = 500.0 + (place / PLACES + 0.5) / PLACES;
-        bst_stamp stamp =
-            bst_fit_stamp(&source, bst_company_reach(w->f), w->l->max_side, 1000, 1000);
-        bst_image_render(w->fit->profiles, w->fit->psf, &source.shape, &stamp, w->fit->scratch,
-                         w->fit->model);
-        int stride = bst_lanes_up(stamp.width), n = stride * stamp.height;
+        bst_imgproc_stamp stamp =
+            bst_fit_stamp(&source, bst_deblend_reach(w->f), w->l->max_side, 1000, 1000);
+        bst_source_profile_render(w->fit->profiles, w->fit->psf, &source.shape, &stamp,
+                                  w->fit->scratch, w->fit->model);
+        int stride = bst_simd_layout_round_up(stamp.width), n = stride * stamp.height;
         for (int at = 0; at < n; at++) {
             if (at % stride >= stamp.width) {
                 continue;
@@ -51,10 +52,10 @@ bst_top_law bst_top_law_of(const bst_worker *w, const bst_shape *shape) {
 }
 
 /* Whether a neighbour lies on the stamp, and whether a brighter one stands at the same place. */
-static void look_round(const bst_worker *w, int i, bst_found *found) {
-    const bst_locator *l = w->l;
-    const bst_shape *s = &found->source.shape;
-    double radius = 0.6 * BST_FWHM_PER_SIGMA * s->sigma_px, reach = bst_company_reach(w->f);
+static void look_round(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
+    const bst_imgproc_locator *l = w->l;
+    const bst_imgproc_shape *s = &found->source.shape;
+    double radius = 0.6 * BST_FWHM_PER_SIGMA * s->sigma_px, reach = bst_deblend_reach(w->f);
     double half_x = 0.5 * fabs(s->dx_px) + reach, half_y = 0.5 * fabs(s->dy_px) + reach;
     int margin_x = (int)half_x + 4, margin_y = (int)half_y + 4;
     int left = found->peak_x > margin_x ? (found->peak_x - margin_x) / BST_LOCATE_CELL_PX : 0;
@@ -66,8 +67,8 @@ static void look_round(const bst_worker *w, int i, bst_found *found) {
     for (int v = top; v <= bottom; v++) {
         for (int u = left; u <= right; u++) {
             for (int k = l->cell[v * l->columns + u]; k >= 0; k = l->found[k].next) {
-                const bst_found *other = &l->found[k];
-                if (k == i || other->dropped || bst_charge_label(other->label)) {
+                const bst_imgproc_found *other = &l->found[k];
+                if (k == i || other->dropped || bst_cosmic_ray_label(other->label)) {
                     continue;
                 }
                 double dx = fabs(other->source.shape.x_px - s->x_px);
@@ -81,9 +82,9 @@ static void look_round(const bst_worker *w, int i, bst_found *found) {
     }
 }
 
-void bst_top_place(const bst_worker *w, int i, bst_found *found) {
-    bst_source *s = &found->source;
-    const bst_top_law *law = &w->l->law[found->streak ? 1 : 0];
+void bst_peak_centroid_place(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
+    bst_imgproc_source *s = &found->source;
+    const bst_imgproc_peak_law *law = &w->l->law[found->streak ? 1 : 0];
     double noise2 = found->noise_e * found->noise_e, flux = fmax(s->flux_e, 1e-3 * found->noise_e);
     double scale = noise2 / (flux * flux) + law->photons / flux;
     s->cov_xx = scale * law->xx + law->floor_px2;

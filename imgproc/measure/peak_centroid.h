@@ -10,10 +10,11 @@
  * the top of the output sum p d of pixels d of variance s^2 + F p has the covariance S^-1 sum (s^2
  * + F p) grad p grad p^T S^-1 / F^2 (first order); its photons' part is given the shape of the
  * other. */
-bst_top_law bst_top_law_of(const bst_worker *w, const bst_shape *shape);
+bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
+                                              const bst_imgproc_shape *shape);
 
 /* Puts *found, number i, which is not fitted, at its top. Its neighbours are not counted with: one
  * on its stamp makes it a BLEND, and it is dropped where a brighter one was fitted at its place. */
-void bst_top_place(const bst_worker *w, int i, bst_found *found);
+void bst_peak_centroid_place(const bst_imgproc_worker *w, int i, bst_imgproc_found *found);
 
 #endif

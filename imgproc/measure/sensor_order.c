@@ -2,20 +2,20 @@
 
 #include <string.h>
 
-static int row_of(const bst_found *found, int height) {
+static int row_of(const bst_imgproc_found *found, int height) {
     double y = found->source.shape.y_px;
     return y > height - 1.0 ? height - 1 : y > 0.0 ? (int)y : 0;
 }
 
-static bool before_on_sensor(const bst_found *found, int a, int b) {
-    const bst_shape *p = &found[a].source.shape, *q = &found[b].source.shape;
+static bool before_on_sensor(const bst_imgproc_found *found, int a, int b) {
+    const bst_imgproc_shape *p = &found[a].source.shape, *q = &found[b].source.shape;
     if (p->y_px != q->y_px) {
         return p->y_px < q->y_px;
     }
     return p->x_px != q->x_px ? p->x_px < q->x_px : a < b;
 }
 
-void bst_sensor_order(const bst_found *found, int count, int height, int *order, int *swap,
+void bst_sensor_order(const bst_imgproc_found *found, int count, int height, int *order, int *swap,
                       int *row) {
     memset(row, 0, ((size_t)height + 1) * sizeof *row);
     for (int i = 0; i < count; i++) {

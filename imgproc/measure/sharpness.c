@@ -27,7 +27,7 @@ static double estimate(const bst_sharpness *s, int group, const double (*at)[3])
 
 /* What the ratios are made from. */
 typedef struct source {
-    const bst_gauss *psf;
+    const bst_imgproc_gauss *psf;
     const bst_known_psf *known;
     int binning;
     double sigma_px;
@@ -37,9 +37,10 @@ typedef struct source {
 static void image_of(const source *from, int node, double x, double y, double image[3][3]) {
     if (!from->known) {
         double unused[3][9];
-        bst_stamp stamp = {-1, -1, 3, 3};
-        bst_shape shape = {.x_px = x, .y_px = y, .sigma_px = from->sigma_px};
-        bst_gauss_render(from->psf, &shape, &stamp, image[0], unused[0], unused[1], unused[2]);
+        bst_imgproc_stamp stamp = {-1, -1, 3, 3};
+        bst_imgproc_shape shape = {.x_px = x, .y_px = y, .sigma_px = from->sigma_px};
+        bst_imgproc_gauss_render(from->psf, &shape, &stamp, image[0], unused[0], unused[1],
+                                 unused[2]);
         return;
     }
     for (int j = 0; j < 3; j++) {
@@ -50,7 +51,7 @@ static void image_of(const source *from, int node, double x, double y, double im
     }
 }
 
-void bst_sharpness_set(bst_sharpness *s, const bst_gauss *psf, const bst_known_psf *known,
+void bst_sharpness_set(bst_sharpness *s, const bst_imgproc_gauss *psf, const bst_known_psf *known,
                        int binning, double sigma_px) {
     if (s->sigma_px == sigma_px) {
         return;

@@ -39,8 +39,8 @@ typedef struct bst_sharpness {
 /* Prepares the ratios for a Gaussian of sigma_px, or, unless `known` is NULL, for the known PSF in
  * pixels of binning x binning, which sigma_px is the like of: at its sharpest in the field. At once
  * when they are already there. */
-void bst_sharpness_set(bst_sharpness *sharpness, const bst_gauss *psf, const bst_known_psf *known,
-                       int binning, double sigma_px);
+void bst_sharpness_set(bst_sharpness *sharpness, const bst_imgproc_gauss *psf,
+                       const bst_known_psf *known, int binning, double sigma_px);
 
 /* What a pixel holds at least: full_e where `signal` is BST_PIXEL_SATURATED, else `signal`. */
 double bst_sharpness_signal(const bst_sharpness *sharpness, float signal);

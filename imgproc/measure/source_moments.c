@@ -4,24 +4,25 @@
 
 #include "imgproc/measure/cosmic_ray.h"
 
-bool bst_extent_measure(const bst_worker *w, int i, bst_found *found, double wider) {
+bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
+                                double wider) {
     const bst_locate_frame *f = w->f;
-    const bst_shape *s = &found->source.shape;
+    const bst_imgproc_shape *s = &found->source.shape;
     double base = s->sigma_px * s->sigma_px + fmax(found->source.widening_px2, 0.0);
     double m[3];
-    bst_shape_path_variance(s, m);
+    bst_imgproc_shape_path_variance(s, m);
     m[0] += base;
     m[2] += base;
     bool measured = false;
     if (found->snr >= BST_EXTENT_SNR && !(found->flags & BST_DETECTION_EDGE)) {
-        bst_stamp stamp = bst_fit_stamp(&found->source, bst_company_reach(f) + wider,
-                                        w->l->max_side, f->width, f->height);
-        bst_company c;
+        bst_imgproc_stamp stamp = bst_fit_stamp(&found->source, bst_deblend_reach(f) + wider,
+                                                w->l->max_side, f->width, f->height);
+        bst_deblend c;
         c.free_count = c.fixed_count = 0;
         if (!found->rough) {
-            bst_company_gather(w->l, f, i, &found->source, &stamp, &c);
+            bst_deblend_gather(w->l, f, i, &found->source, &stamp, &c);
         }
-        const bst_source *others[BST_FIT_MAX_FREE + BST_COMPANY_MAX_FIXED];
+        const bst_imgproc_source *others[BST_FIT_MAX_FREE + BST_COMPANY_MAX_FIXED];
         int count = 0;
         for (int k = 1; k < c.free_count; k++) {
             others[count++] = c.free[k];
@@ -52,30 +53,31 @@ bool bst_extent_measure(const bst_worker *w, int i, bst_found *found, double wid
 }
 
 /* Fits *found with its path set to `path` px along `angle`; chi-square, or infinity. */
-static double try_path(const bst_worker *w, int i, bst_found *found, const bst_stamp *stamp,
-                       const bst_source *start_from, double path, double angle) {
+static double try_path(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
+                       const bst_imgproc_stamp *stamp, const bst_imgproc_source *start_from,
+                       double path, double angle) {
     found->source = *start_from;
     found->source.shape.dx_px = path * cos(angle);
     found->source.shape.dy_px = path * sin(angle);
-    return bst_company_fit(w, i, found, stamp, false) ? found->source.chi_square : INFINITY;
+    return bst_deblend_fit(w, i, found, stamp, false) ? found->source.chi_square : INFINITY;
 }
 
-void bst_extent_own_streak(const bst_worker *w, int i, bst_found *found) {
+void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_locate_frame *f = w->f;
     double psf_fwhm = BST_FWHM_PER_SIGMA * f->sigma_px;
     for (int round = 0; round < 4; round++) {
-        if (!bst_extent_measure(w, i, found, 2.0 * bst_company_reach(f)) ||
+        if (!bst_source_moments_measure(w, i, found, 2.0 * bst_deblend_reach(f)) ||
             found->length_px < 1.5 * psf_fwhm) {
             return;
         }
         double spread = (found->length_px * found->length_px - psf_fwhm * psf_fwhm) /
                         (BST_FWHM_PER_SIGMA * BST_FWHM_PER_SIGMA);
         double path = fmin(sqrt(12.0 * spread), 0.4 * w->l->max_side), angle = found->angle_rad;
-        bst_found before = *found;
-        bst_source longest = before.source;
+        bst_imgproc_found before = *found;
+        bst_imgproc_source longest = before.source;
         longest.shape.dx_px = 1.2 * path * cos(angle);
         longest.shape.dy_px = 1.2 * path * sin(angle);
-        bst_stamp stamp = bst_company_stamp(w->l, f, &longest);
+        bst_imgproc_stamp stamp = bst_deblend_stamp(w->l, f, &longest);
         double old_path = hypot(before.source.shape.dx_px, before.source.shape.dy_px);
         double old_angle = atan2(before.source.shape.dy_px, before.source.shape.dx_px);
         double old_chi = try_path(w, i, found, &stamp, &before.source, old_path, old_angle);

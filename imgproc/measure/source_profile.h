@@ -17,7 +17,7 @@ enum {
 /* The pixel-integrated PSF along one axis at centres of 1/128 px apart: share, slope and half the
  * curvature by centre. A Gaussian has one profile for both axes; a known PSF `terms` of them for
  * each, those of x by node of the field grid. */
-typedef struct bst_profiles {
+typedef struct bst_source_profiles {
     const bst_known_psf *known; /* NULL: a Gaussian */
     double sigma_px;            /* that they were made for */
     int length, half;           /* pixels of a row: a multiple of 16; of them before the centre's */
@@ -28,43 +28,48 @@ typedef struct bst_profiles {
     /* the frame: full-sensor place = origin + binning * its pixel */
     double origin_x_px, origin_y_px;
     int binning, made_binning;
-} bst_profiles;
+} bst_source_profiles;
 
 /* known: lent, NULL for a Gaussian. */
-bst_status bst_profiles_create(bst_ctx *ctx, const bst_known_psf *known,
-                               bst_profiles *out) BST_MUST_CHECK;
-void bst_profiles_free(bst_profiles *profiles);
+bst_status bst_source_profiles_create(bst_ctx *ctx, const bst_known_psf *known,
+                                      bst_source_profiles *out) BST_MUST_CHECK;
+void bst_source_profiles_free(bst_source_profiles *profiles);
 /* Where on the sensor the sources of a frame are. */
-void bst_profiles_on(bst_profiles *profiles, double origin_x_px, double origin_y_px, int binning);
+void bst_source_profiles_on(bst_source_profiles *profiles, double origin_x_px, double origin_y_px,
+                            int binning);
 /* Makes them for a Gaussian of sigma_px, at most 9, or the known PSF, which sigma_px is the like
  * of; at once when they are there. */
-void bst_profiles_set(bst_profiles *profiles, const bst_gauss *psf, double sigma_px);
+void bst_source_profiles_set(bst_source_profiles *profiles, const bst_imgproc_gauss *psf,
+                             double sigma_px);
 
-/* Work space of bst_image_render for stamps of up to max_side, floats. */
-size_t bst_image_scratch(int max_side);
+/* Work space of bst_source_profile_render for stamps of up to max_side, floats. */
+size_t bst_source_profile_scratch(int max_side);
 
-/* As bst_gauss_render, for the PSF of `profiles`: four planes [height][stride] one after the other,
- * share, by x, by y and by variance; stride: the stamp's width rounded up to lanes, what is beyond
- * the stamp is of no meaning. Errors stay below 2e-4 of the peak: half of it the sum along the
- * path, the rest the straight lines between the profiles' centres and, for sigma beyond 1.5 px, the
- * light beyond 4.5 sigma; of a known PSF, what its sums miss. */
-void bst_image_render(const bst_profiles *profiles, const bst_gauss *psf, const bst_shape *shape,
-                      const bst_stamp *stamp, float *scratch, float *planes);
+/* As bst_imgproc_gauss_render, for the PSF of `profiles`: four planes [height][stride] one after
+ * the other, share, by x, by y and by variance; stride: the stamp's width rounded up to lanes, what
+ * is beyond the stamp is of no meaning. Errors stay below 2e-4 of the peak: half of it the sum
+ * along the path, the rest the straight lines between the profiles' centres and, for sigma
+ * beyond 1.5 px, the light beyond 4.5 sigma; of a known PSF, what its sums miss. */
+void bst_source_profile_render(const bst_source_profiles *profiles, const bst_imgproc_gauss *psf,
+                               const bst_imgproc_shape *shape, const bst_imgproc_stamp *stamp,
+                               float *scratch, float *planes);
 
 /* The planes of a path's own changes, after the four: by its length in direction (ex, ey), by its
  * end minus start across that, (-ey, ex), and by its bend in direction (ex, ey). */
 enum { BST_IMAGE_BY_LENGTH = 4, BST_IMAGE_BY_ACROSS, BST_IMAGE_BY_BEND, BST_IMAGE_MOTION_PLANES };
 
-/* As bst_image_render, with the planes of changes that all streaks of a frame share. */
-void bst_image_render_motion(const bst_profiles *profiles, const bst_gauss *psf,
-                             const bst_shape *shape, const bst_stamp *stamp, double ex, double ey,
-                             float *scratch, float *planes);
+/* As bst_source_profile_render, with the planes of changes that all streaks of a frame share. */
+void bst_source_profile_render_motion(const bst_source_profiles *profiles,
+                                      const bst_imgproc_gauss *psf, const bst_imgproc_shape *shape,
+                                      const bst_imgproc_stamp *stamp, double ex, double ey,
+                                      float *scratch, float *planes);
 
 /* The same two for a known PSF; moved: with the planes of changes, else ex and ey are not used. */
-void bst_image_render_known(const bst_profiles *profiles, const bst_gauss *psf,
-                            const bst_shape *shape, const bst_stamp *stamp, bool moved, double ex,
-                            double ey, float *scratch, float *planes);
+void bst_source_profile_render_known(const bst_source_profiles *profiles,
+                                     const bst_imgproc_gauss *psf, const bst_imgproc_shape *shape,
+                                     const bst_imgproc_stamp *stamp, bool moved, double ex,
+                                     double ey, float *scratch, float *planes);
 /* Fills the profiles of a known PSF for the frame's binning. */
-void bst_profiles_set_known(bst_profiles *profiles);
+void bst_source_profiles_set_known(bst_source_profiles *profiles);
 
 #endif

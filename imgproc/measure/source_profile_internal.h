@@ -16,7 +16,7 @@ typedef struct laid {
 } laid;
 
 /* Returns false when none of it lies there. */
-static inline bool lay(const bst_profiles *t, double centre, int side, laid *out) {
+static inline bool lay(const bst_source_profiles *t, double centre, int side, laid *out) {
     if (!(fabs(centre) < 1e6)) {
         return false;
     }

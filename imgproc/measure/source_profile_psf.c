@@ -5,7 +5,8 @@
 #include "imgproc/measure/source_profile_internal.h"
 
 /* One function's profile about a centre that is `phase` of the table's steps past -1/2 px. */
-static void add_profile(const bst_profiles *p, const double *samples, int phase, float *row) {
+static void add_profile(const bst_source_profiles *p, const double *samples, int phase,
+                        float *row) {
     const bst_known_psf *k = p->known;
     int b = p->binning;
     double centre = (double)phase / BST_PROFILE_PHASES - 0.5 + p->half;
@@ -29,7 +30,7 @@ static void add_profile(const bst_profiles *p, const double *samples, int phase,
     }
 }
 
-void bst_profiles_set_known(bst_profiles *p) {
+void bst_source_profiles_set_known(bst_source_profiles *p) {
     const bst_known_psf *k = p->known;
     if (p->made_binning == p->binning) {
         return;
@@ -37,7 +38,7 @@ void bst_profiles_set_known(bst_profiles *p) {
     p->made_binning = p->binning;
     int half = (k->reach_px + p->binning - 1) / p->binning;
     half = half < BST_LANES / 2 - 1 ? BST_LANES / 2 - 1 : half;
-    p->length = bst_lanes_up(2 * half + 1);
+    p->length = bst_simd_layout_round_up(2 * half + 1);
     p->length = p->length < BST_PROFILE_LENGTH ? p->length : BST_PROFILE_LENGTH;
     p->half = (p->length - 1) / 2;
     p->pitch = p->length + BST_LANES;
@@ -65,8 +66,9 @@ typedef struct mix {
 #define BST_SIMD_KERNELS "imgproc/measure/source_profile_psf_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-void bst_image_render_known(const bst_profiles *t, const bst_gauss *psf, const bst_shape *shape,
-                            const bst_stamp *stamp, bool moved, double ex, double ey,
-                            float *scratch, float *planes) {
+void bst_source_profile_render_known(const bst_source_profiles *t, const bst_imgproc_gauss *psf,
+                                     const bst_imgproc_shape *shape, const bst_imgproc_stamp *stamp,
+                                     bool moved, double ex, double ey, float *scratch,
+                                     float *planes) {
     BST_SIMD_PICK(render)(t, psf, shape, stamp, moved, ex, ey, scratch, planes);
 }

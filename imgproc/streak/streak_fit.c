@@ -17,7 +17,7 @@ static const double LEAST_PIVOT = 1e-9;
 
 static const double PATH_STEP_PX = 0.02;
 
-bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_gauss *psf, int max_side,
+bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, int max_side,
                                  bst_streak_fit *out) {
     size_t pixels = (size_t)max_side * (size_t)max_side;
     *out = (bst_streak_fit){.psf = psf, .max_side = max_side};
@@ -52,11 +52,12 @@ static bool solve(double a[PARAMETERS][PARAMETERS], double *b) {
 }
 
 /* Chi-square of the source, whose image stays in fit->image. */
-static double evaluate(bst_streak_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                       const uint8_t *excluded, const bst_source *s) {
+static double evaluate(bst_streak_fit *fit, const bst_fit_data *data,
+                       const bst_imgproc_stamp *stamp, const uint8_t *excluded,
+                       const bst_imgproc_source *s) {
     size_t n = (size_t)stamp->width * (size_t)stamp->height;
     double *share = fit->image, *by_v = share + 3 * n, chi = 0.0;
-    bst_gauss_render(fit->psf, &s->shape, stamp, share, share + n, share + 2 * n, by_v);
+    bst_imgproc_gauss_render(fit->psf, &s->shape, stamp, share, share + n, share + 2 * n, by_v);
     double noise2 = data->noise_e * data->noise_e;
     for (int j = 0; j < stamp->height; j++) {
         const float *row =
@@ -74,17 +75,18 @@ static double evaluate(bst_streak_fit *fit, const bst_fit_data *data, const bst_
 }
 
 /* Normal equations at the source that was evaluated last. */
-static void accumulate(bst_streak_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                       const uint8_t *excluded, const bst_source *s, normal *out) {
+static void accumulate(bst_streak_fit *fit, const bst_fit_data *data,
+                       const bst_imgproc_stamp *stamp, const uint8_t *excluded,
+                       const bst_imgproc_source *s, normal *out) {
     size_t n = (size_t)stamp->width * (size_t)stamp->height;
     double *share = fit->image, *by_x = share + n, *by_y = by_x + n, *by_v = by_y + n;
     double *along_x = by_v + n, *along_y = along_x + n, *spare = fit->spare;
-    bst_shape moved = s->shape;
+    bst_imgproc_shape moved = s->shape;
     moved.dx_px += PATH_STEP_PX;
-    bst_gauss_render(fit->psf, &moved, stamp, along_x, spare, spare + n, spare + 2 * n);
+    bst_imgproc_gauss_render(fit->psf, &moved, stamp, along_x, spare, spare + n, spare + 2 * n);
     moved = s->shape;
     moved.dy_px += PATH_STEP_PX;
-    bst_gauss_render(fit->psf, &moved, stamp, along_y, spare, spare + n, spare + 2 * n);
+    bst_imgproc_gauss_render(fit->psf, &moved, stamp, along_y, spare, spare + n, spare + 2 * n);
     memset(out, 0, sizeof *out);
     double noise2 = data->noise_e * data->noise_e;
     for (int j = 0; j < stamp->height; j++) {
@@ -122,13 +124,14 @@ static double limited(double v, double limit) {
     return v < -limit ? -limit : v > limit ? limit : v;
 }
 
-bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                        const uint8_t *excluded, bst_source *source, double *norm) {
+bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data,
+                        const bst_imgproc_stamp *stamp, const uint8_t *excluded,
+                        bst_imgproc_source *source, double *norm) {
     if (stamp->width <= 0 || stamp->height <= 0 || stamp->width > fit->max_side ||
         stamp->height > fit->max_side) {
         return false;
     }
-    bst_source best = *source;
+    bst_imgproc_source best = *source;
     normal at;
     double chi = evaluate(fit, data, stamp, excluded, &best);
     accumulate(fit, data, stamp, excluded, &best, &at);
@@ -144,7 +147,7 @@ bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data, const bst
         if (!solve(a, step)) {
             return false;
         }
-        bst_source next = best;
+        bst_imgproc_source next = best;
         next.shape.x_px += limited(step[0], 2.0);
         next.shape.y_px += limited(step[1], 2.0);
         next.shape.dx_px += limited(step[2], 4.0);

@@ -7,13 +7,13 @@
 #include "imgproc/measure/fit.h"
 
 typedef struct bst_streak_fit {
-    const bst_gauss *psf;
+    const bst_imgproc_gauss *psf;
     int max_side;
     double *image; /* [6][max_side^2]: share, by x, by y, by variance, share of two other paths */
     double *spare; /* [3][max_side^2] */
 } bst_streak_fit;
 
-bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_gauss *psf, int max_side,
+bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, int max_side,
                                  bst_streak_fit *out) BST_MUST_CHECK;
 void bst_streak_fit_free(bst_streak_fit *fit);
 
@@ -25,7 +25,8 @@ void bst_streak_fit_free(bst_streak_fit *fit);
  * inverse of the Fisher matrix of all five parameters), chi-square and fitted; `norm` is sqrt(sum
  * share^2). False and nothing changed when the pixels do not determine the five: the path is then
  * shorter than the PSF can tell. */
-bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                        const uint8_t *excluded, bst_source *source, double *norm);
+bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data,
+                        const bst_imgproc_stamp *stamp, const uint8_t *excluded,
+                        bst_imgproc_source *source, double *norm);
 
 #endif

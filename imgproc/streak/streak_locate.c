@@ -17,7 +17,7 @@ static const double CROWD_PER_PX = 0.0015;
 static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
 static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
 
-bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_gauss *psf, bst_parallel *pool,
+bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, bst_parallel *pool,
                                      int max_width, int max_height, double fwhm_px, double max_px,
                                      bst_streak_locator *out) {
     *out = (bst_streak_locator){0};
@@ -66,18 +66,18 @@ static double across(const bst_streak_line *line, double x, double y, double *al
 
 /* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance, up to
  * beyond_px past its ends; returns how many, and marks them by `pieces`. */
-static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
+static int drop_pieces(bst_streak_locator *l, bst_imgproc_locator *found, int count,
                        const bst_streak_line *line, double sigma_px, double piece_snr,
                        double beyond_px) {
     double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
     int pieces = 0;
     for (int i = 0; i < count && pieces < MOST_PIECES; i++) {
-        bst_found *f = &found->found[i];
+        bst_imgproc_found *f = &found->found[i];
         double along, distance = across(line, f->source.shape.x_px, f->source.shape.y_px, &along);
         double beyond = fmax(-along, along - 1.0) * length;
         bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < beyond_px;
         bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
-        if (inside && !own && !f->dropped && !bst_charge_label(f->label)) {
+        if (inside && !own && !f->dropped && !bst_cosmic_ray_label(f->label)) {
             f->dropped = true;
             l->pieces[pieces++] = i;
         }
@@ -86,14 +86,14 @@ static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
 }
 
 /* Leaves out pixels with the light of other sources. */
-static void exclude(bst_streak_locator *l, const bst_locate_frame *f, const bst_locator *found,
-                    int count, const bst_stamp *stamp) {
+static void exclude(bst_streak_locator *l, const bst_locate_frame *f,
+                    const bst_imgproc_locator *found, int count, const bst_imgproc_stamp *stamp) {
     memset(l->excluded, 0, (size_t)stamp->width * (size_t)stamp->height);
     for (int i = 0; i < count; i++) {
-        const bst_found *o = &found->found[i];
+        const bst_imgproc_found *o = &found->found[i];
         double x = o->source.shape.x_px - stamp->x0, y = o->source.shape.y_px - stamp->y0;
         double radius = disc_radius(o->snr, f->sigma_px);
-        if (o->dropped || bst_charge_label(o->label) || x < -radius || y < -radius ||
+        if (o->dropped || bst_cosmic_ray_label(o->label) || x < -radius || y < -radius ||
             x > stamp->width + radius || y > stamp->height + radius) {
             continue;
         }
@@ -111,7 +111,7 @@ static void exclude(bst_streak_locator *l, const bst_locate_frame *f, const bst_
     }
 }
 
-static bool at_edge(const bst_locate_frame *f, const bst_shape *s) {
+static bool at_edge(const bst_locate_frame *f, const bst_imgproc_shape *s) {
     double x = 0.5 * fabs(s->dx_px) + 2.0 * f->sigma_px;
     double y = 0.5 * fabs(s->dy_px) + 2.0 * f->sigma_px;
     return s->x_px - x < -0.5 || s->y_px - y < -0.5 || s->x_px + x > f->width - 0.5 ||
@@ -120,8 +120,9 @@ static bool at_edge(const bst_locate_frame *f, const bst_shape *s) {
 
 /* What a line whose fit fails is worth: across it as a point of its SNR, along it a third of its
  * length. */
-static void claim_line(const bst_locate_frame *f, const bst_streak_line *line, bst_found *out) {
-    bst_source *s = &out->source;
+static void claim_line(const bst_locate_frame *f, const bst_streak_line *line,
+                       bst_imgproc_found *out) {
+    bst_imgproc_source *s = &out->source;
     double length = hypot(s->shape.dx_px, s->shape.dy_px);
     double c = s->shape.dx_px / length, d = s->shape.dy_px / length;
     double across2 = 2.0 * f->sigma_px * f->sigma_px / (line->snr * line->snr) + 0.04;
@@ -133,16 +134,16 @@ static void claim_line(const bst_locate_frame *f, const bst_streak_line *line, b
 }
 
 /* The source that a line tells of; false when the fit fails and the line itself is all there is. */
-static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_locator *found,
-                    int count, const bst_streak_line *line, double beyond_px, bst_found *out,
-                    bst_stamp *stamp) {
-    *out = (bst_found){.peak_snr = (float)line->snr, .streak = true};
-    bst_source *s = &out->source;
-    s->shape = (bst_shape){.x_px = 0.5 * (line->x0 + line->x1),
-                           .y_px = 0.5 * (line->y0 + line->y1),
-                           .dx_px = line->x1 - line->x0,
-                           .dy_px = line->y1 - line->y0,
-                           .sigma_px = f->sigma_px};
+static bool measure(bst_streak_locator *l, const bst_locate_frame *f,
+                    const bst_imgproc_locator *found, int count, const bst_streak_line *line,
+                    double beyond_px, bst_imgproc_found *out, bst_imgproc_stamp *stamp) {
+    *out = (bst_imgproc_found){.peak_snr = (float)line->snr, .streak = true};
+    bst_imgproc_source *s = &out->source;
+    s->shape = (bst_imgproc_shape){.x_px = 0.5 * (line->x0 + line->x1),
+                                   .y_px = 0.5 * (line->y0 + line->y1),
+                                   .dx_px = line->x1 - line->x0,
+                                   .dy_px = line->y1 - line->y0,
+                                   .sigma_px = f->sigma_px};
     s->widening_px2 =
         found->widening_weight > 0.0 ? found->widening_sum / found->widening_weight : 0.0;
     out->noise_e = bst_background_noise_at(f->background, s->shape.x_px, s->shape.y_px);
@@ -173,7 +174,7 @@ static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_
     if (at_edge(f, &s->shape)) {
         out->flags |= BST_DETECTION_EDGE;
     }
-    const bst_shape *p = &s->shape;
+    const bst_imgproc_shape *p = &s->shape;
     if (p->x_px < -0.5 || p->y_px < -0.5 || p->x_px > f->width - 0.5 || p->y_px > f->height - 0.5) {
         out->label = BST_LABEL_ARTEFACT;
         out->label_probability = 0.9;
@@ -183,15 +184,15 @@ static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_
 
 /* Chi-square of the dropped pieces as sources of their own, on the stamp of the latest fit. */
 static double chi_of_pieces(bst_streak_locator *l, const bst_locate_frame *f,
-                            const bst_locator *found, int pieces, const bst_stamp *stamp,
-                            double noise) {
+                            const bst_imgproc_locator *found, int pieces,
+                            const bst_imgproc_stamp *stamp, double noise) {
     size_t n = (size_t)stamp->width * (size_t)stamp->height;
     double *total = l->fit.image, *share = total + n, chi = 0.0;
     memset(total, 0, n * sizeof(double));
     for (int i = 0; i < pieces; i++) {
-        const bst_source *s = &found->found[l->pieces[i]].source;
-        bst_gauss_render(l->fit.psf, &s->shape, stamp, share, share + n, share + 2 * n,
-                         share + 3 * n);
+        const bst_imgproc_source *s = &found->found[l->pieces[i]].source;
+        bst_imgproc_gauss_render(l->fit.psf, &s->shape, stamp, share, share + n, share + 2 * n,
+                                 share + 3 * n);
         for (size_t k = 0; k < n; k++) {
             total[k] += s->flux_e * (share[k] + s->widening_px2 * share[k + 3 * n]);
         }
@@ -211,11 +212,11 @@ static double chi_of_pieces(bst_streak_locator *l, const bst_locate_frame *f,
 }
 
 /* SNR of the two brightest points on the line together; in the map they are cut down. */
-static double snr_of_points(const bst_streak_locator *l, const bst_locator *found, int pieces,
-                            const bst_streak_line *line) {
+static double snr_of_points(const bst_streak_locator *l, const bst_imgproc_locator *found,
+                            int pieces, const bst_streak_line *line) {
     double first = line->point_snr[0], second = line->point_snr[1];
     for (int i = 0; i < pieces; i++) {
-        const bst_found *f = &found->found[l->pieces[i]];
+        const bst_imgproc_found *f = &found->found[l->pieces[i]];
         double snr = f->streak ? 0.0 : f->snr;
         if (snr > first) {
             second = i > 0 ? first : second;
@@ -228,15 +229,15 @@ static double snr_of_points(const bst_streak_locator *l, const bst_locator *foun
 }
 
 /* Whether the fit went to a streak that is there already. */
-static bool is_known(const bst_locate_frame *f, const bst_locator *found, int points,
-                     const bst_found *streak) {
+static bool is_known(const bst_locate_frame *f, const bst_imgproc_locator *found, int points,
+                     const bst_imgproc_found *streak) {
     for (int i = points; i < found->count; i++) {
-        const bst_shape *s = &found->found[i].source.shape;
+        const bst_imgproc_shape *s = &found->found[i].source.shape;
         bst_streak_line line = {.x0 = s->x_px - 0.5 * s->dx_px,
                                 .y0 = s->y_px - 0.5 * s->dy_px,
                                 .x1 = s->x_px + 0.5 * s->dx_px,
                                 .y1 = s->y_px + 0.5 * s->dy_px};
-        const bst_shape *n = &streak->source.shape;
+        const bst_imgproc_shape *n = &streak->source.shape;
         double along, distance = across(&line, n->x_px, n->y_px, &along);
         double turn =
             fabs(s->dx_px * n->dy_px - s->dy_px * n->dx_px) / fmax(hypot(s->dx_px, s->dy_px), 1.0);
@@ -251,14 +252,14 @@ static bool is_known(const bst_locate_frame *f, const bst_locator *found, int po
 /* Takes a line for a streak with the points up to beyond_px past its ends as its pieces, unless
  * `bare`, then those that are not too bright for it; false, and all as it was, when they are better
  * explained as points. */
-static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_locator *found,
+static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_imgproc_locator *found,
                      int points, const bst_streak_line *line, double beyond_px, bool bare) {
     double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
     double piece =
         bare ? line->snr * sqrt(3.5 * f->sigma_px / (length + 3.5 * f->sigma_px)) : INFINITY;
     int pieces = drop_pieces(l, found, points, line, f->sigma_px, piece, beyond_px);
-    bst_found streak;
-    bst_stamp stamp;
+    bst_imgproc_found streak;
+    bst_imgproc_stamp stamp;
     bool fitted = measure(l, f, found, points, line, beyond_px, &streak, &stamp);
     /* a line that owes its SNR to light of others keeps little of it without that */
     bool good = fitted ? streak.snr > line->snr - LOST_SNR : bare && pieces == 0;
@@ -282,8 +283,8 @@ static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_locat
     return good;
 }
 
-static void add(bst_streak_locator *l, const bst_locate_frame *f, bst_locator *found, int points,
-                int lines) {
+static void add(bst_streak_locator *l, const bst_locate_frame *f, bst_imgproc_locator *found,
+                int points, int lines) {
     for (int i = 0; i < lines && found->count < found->capacity; i++) {
         const bst_streak_line *line = &l->search.found[i];
         /* a point may be all that shows of the streak there, or a star on it or beside it */
@@ -300,7 +301,7 @@ static void blank_point(bst_streak_locator *l, double x, double y, double snr, d
 }
 
 /* Takes charge out: what is left of its track beside the pixels that were left out. */
-static void blank_charge(bst_streak_locator *l, const bst_found *o) {
+static void blank_charge(bst_streak_locator *l, const bst_imgproc_found *o) {
     /* a track of even charge, by its second moment */
     double half = 0.5 * sqrt(12.0) / FWHM_PER_SIGMA * o->length_px;
     double dx = half * cos(o->angle_rad), dy = half * sin(o->angle_rad);
@@ -356,7 +357,7 @@ static int lit_pixels(const bst_filter *filter, double threshold, int x, int y, 
 
 /* Whether a source is too bright for a piece of a streak of that many pixels: filtered, a point is
  * above a threshold t on 4 pi sigma^2 ln(snr / t) pixels. */
-static bool is_bright_point(const bst_locate_frame *f, const bst_found *o) {
+static bool is_bright_point(const bst_locate_frame *f, const bst_imgproc_found *o) {
     double snr = (double)o->peak_snr, threshold = f->filter->threshold;
     if (o->streak || (o->flags & BST_DETECTION_BLEND) || !(snr > BRIGHT_POINT_SNR)) {
         return false;
@@ -367,13 +368,14 @@ static bool is_bright_point(const bst_locate_frame *f, const bst_found *o) {
 }
 
 void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
-                       const bst_candidates *candidates, double false_alarms, bst_locator *found) {
+                       const bst_candidates *candidates, double false_alarms,
+                       bst_imgproc_locator *found) {
     int points = found->count;
     bst_streak_search_fill(&l->search, f->signal, f->width, f->height, f->background, f->sigma_px);
     for (int i = 0; i < points; i++) {
-        const bst_found *o = &found->found[i];
+        const bst_imgproc_found *o = &found->found[i];
         bool saturated = o->flags & BST_DETECTION_SATURATED;
-        if (bst_charge_label(o->label)) {
+        if (bst_cosmic_ray_label(o->label)) {
             blank_charge(l, o);
         } else if (saturated || is_bright_point(f, o)) {
             blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
@@ -386,8 +388,8 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
     }
     int light = 0;
     for (int i = 0; i < points; i++) {
-        const bst_found *o = &found->found[i];
-        if (!o->dropped && !bst_charge_label(o->label)) {
+        const bst_imgproc_found *o = &found->found[i];
+        if (!o->dropped && !bst_cosmic_ray_label(o->label)) {
             light++;
             blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
         }

@@ -14,7 +14,7 @@ typedef struct bst_streak_locator {
 } bst_streak_locator;
 
 /* psf and pool are kept; pool NULL: the caller's thread alone. */
-bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_gauss *psf, bst_parallel *pool,
+bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, bst_parallel *pool,
                                      int max_width, int max_height, double fwhm_px, double max_px,
                                      bst_streak_locator *out) BST_MUST_CHECK;
 void bst_streak_locator_free(bst_streak_locator *locator);
@@ -24,6 +24,7 @@ void bst_streak_locator_free(bst_streak_locator *locator);
  * that are light of such a streak are dropped from it. Charge that is not light (BST_PIXEL_BAD in
  * the signal) counts for nothing. */
 void bst_streak_locate(bst_streak_locator *locator, const bst_locate_frame *frame,
-                       const bst_candidates *candidates, double false_alarms, bst_locator *found);
+                       const bst_candidates *candidates, double false_alarms,
+                       bst_imgproc_locator *found);
 
 #endif

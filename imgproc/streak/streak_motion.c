@@ -22,8 +22,8 @@ enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, ROUNDS = 4 };
 enum { LOOKED_AT = 16 * BST_STREAK_MOTION_STARS };
 
 typedef struct bst_streak_motion_star {
-    bst_shape shape;
-    bst_stamp stamp;
+    bst_imgproc_shape shape;
+    bst_imgproc_stamp stamp;
     double flux_e, product_e; /* flux; flux times widening */
     double start_x, start_y, noise_e;
     double origin_x_px, origin_y_px; /* of the frame it is in */
@@ -38,9 +38,9 @@ typedef struct bst_streak_motion_star {
 
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motion *out) {
     out->max_side = max_side;
-    size_t plane = (size_t)max_side * (size_t)bst_lanes_up(max_side);
+    size_t plane = (size_t)max_side * (size_t)bst_simd_layout_round_up(max_side);
     out->planes = calloc(plane * (BST_IMAGE_MOTION_PLANES + 2), sizeof *out->planes);
-    out->scratch = calloc(bst_image_scratch(max_side), sizeof *out->scratch);
+    out->scratch = calloc(bst_source_profile_scratch(max_side), sizeof *out->scratch);
     out->pixels = calloc(plane * 2 * BST_STREAK_MOTION_STARS, sizeof *out->pixels);
     out->stars = calloc(BST_STREAK_MOTION_STARS, sizeof *out->stars);
     if (!out->planes || !out->scratch || !out->pixels || !out->stars) {
@@ -61,7 +61,7 @@ void bst_streak_motion_free(bst_streak_motion *work) {
 /* Whether a stamp lies inside the frame, has only pixels that measure, and no other source that
  * matters. */
 static bool is_alone(const bst_locate_frame *f, const bst_candidates *candidates, int rank,
-                     const bst_stamp *s, double margin) {
+                     const bst_imgproc_stamp *s, double margin) {
     if (s->x0 <= 0 || s->y0 <= 0 || s->x0 + s->width >= f->width ||
         s->y0 + s->height >= f->height) {
         return false;
@@ -100,10 +100,10 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
         return false;
     }
     double dx, dy, snr = bst_filter_top(f->filter, false, c->x, c->y, &dx, &dy);
-    bst_shape shape = {.x_px = c->x + dx, .y_px = c->y + dy, .sigma_px = f->sigma_px};
-    bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * c->x,
-                      f->origin_y_px + f->binning * c->y, &shape.dx_px, &shape.dy_px);
-    bst_motion_bend(f->motion, f->camera, &shape.bend_x_px, &shape.bend_y_px);
+    bst_imgproc_shape shape = {.x_px = c->x + dx, .y_px = c->y + dy, .sigma_px = f->sigma_px};
+    bst_camera_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * c->x,
+                             f->origin_y_px + f->binning * c->y, &shape.dx_px, &shape.dy_px);
+    bst_camera_motion_bend(f->motion, f->camera, &shape.bend_x_px, &shape.bend_y_px);
     shape.dx_px /= f->binning;
     shape.dy_px /= f->binning;
     shape.bend_x_px /= f->binning;
@@ -116,7 +116,7 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
                   .origin_y_px = f->origin_y_px};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
     out->flux_e = snr * out->noise_e / f->filter->streak_norm;
-    bst_source source = {.shape = out->shape};
+    bst_imgproc_source source = {.shape = out->shape};
     out->stamp = bst_fit_stamp(&source, reach(f), work->max_side, f->width, f->height);
     double margin = 0.5 * hypot(out->shape.dx_px, out->shape.dy_px);
     return is_alone(f, candidates, rank, &out->stamp, margin);
@@ -140,8 +140,8 @@ enum { ALL = LOCAL + COMMON, SUMS = ALL * (ALL + 3) / 2 };
 #include "sim/core/simd_each.inc"
 
 /* The star's pixels, all of which measure, and behind them 1 for each. */
-static void load_pixels(const bst_locate_frame *f, const bst_stamp *stamp, float *value) {
-    int stride = bst_lanes_up(stamp->width), n = stride * stamp->height;
+static void load_pixels(const bst_locate_frame *f, const bst_imgproc_stamp *stamp, float *value) {
+    int stride = bst_simd_layout_round_up(stamp->width), n = stride * stamp->height;
     float valid[BST_PSF_MAX_SIDE + BST_LANES];
     for (int x = 0; x < stride; x++) {
         valid[x] = x < stamp->width ? 1.0f : 0.0f;
@@ -157,11 +157,11 @@ static void load_pixels(const bst_locate_frame *f, const bst_stamp *stamp, float
 }
 
 /* Normal equations of one star at the present motion. */
-static bool accumulate(const bst_streak_motion *work, const bst_gauss *psf,
-                       const bst_profiles *profiles, star *s) {
-    int n = bst_lanes_up(s->stamp.width) * s->stamp.height;
-    bst_image_render_motion(profiles, psf, &s->shape, &s->stamp, work->ex, work->ey, work->scratch,
-                            work->planes);
+static bool accumulate(const bst_streak_motion *work, const bst_imgproc_gauss *psf,
+                       const bst_source_profiles *profiles, star *s) {
+    int n = bst_simd_layout_round_up(s->stamp.width) * s->stamp.height;
+    bst_source_profile_render_motion(profiles, psf, &s->shape, &s->stamp, work->ex, work->ey,
+                                     work->scratch, work->planes);
     memcpy(work->planes + BST_IMAGE_MOTION_PLANES * n, s->pixels,
            2 * (size_t)n * sizeof *s->pixels);
     float sums[SUMS * BST_LANES];
@@ -173,7 +173,7 @@ static bool accumulate(const bst_streak_motion *work, const bst_gauss *psf,
     const float *at = sums;
     for (int p = 0; p < ALL; p++) {
         for (int q = 0; q <= p; q++, at += BST_LANES) {
-            double v = bst_lane_sum(at);
+            double v = bst_simd_layout_sum(at);
             if (p < LOCAL) {
                 a[p][q] = v;
             } else if (q < LOCAL) {
@@ -182,7 +182,7 @@ static bool accumulate(const bst_streak_motion *work, const bst_gauss *psf,
                 common[p - LOCAL][q - LOCAL] = v;
             }
         }
-        *(p < LOCAL ? &right[0][p] : &g[p - LOCAL]) = bst_lane_sum(at);
+        *(p < LOCAL ? &right[0][p] : &g[p - LOCAL]) = bst_simd_layout_sum(at);
         at += BST_LANES;
     }
     for (int r = 0; r <= COMMON; r++) {
@@ -290,9 +290,9 @@ bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *f)
         return false;
     }
     double dx, dy, bend_x, bend_y;
-    bst_motion_streak(f->motion, f->camera, bst_camera_centre_x(f->camera),
-                      bst_camera_centre_y(f->camera), &dx, &dy);
-    bst_motion_bend(f->motion, f->camera, &bend_x, &bend_y);
+    bst_camera_motion_streak(f->motion, f->camera, bst_camera_centre_x(f->camera),
+                             bst_camera_centre_y(f->camera), &dx, &dy);
+    bst_camera_motion_bend(f->motion, f->camera, &bend_x, &bend_y);
     double length = hypot(dx, dy);
     work->ex = dx / length;
     work->ey = dy / length;
@@ -304,7 +304,7 @@ bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *f)
 
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *f,
                            const bst_candidates *candidates) {
-    size_t plane = (size_t)work->max_side * (size_t)bst_lanes_up(work->max_side);
+    size_t plane = (size_t)work->max_side * (size_t)bst_simd_layout_round_up(work->max_side);
     for (int k = 0; k < candidates->count && k < LOOKED_AT; k++) {
         if (work->count == BST_STREAK_MOTION_STARS ||
             (double)candidates->items[candidates->order[k]].snr < LEAST_SNR) {
@@ -320,14 +320,14 @@ void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *f,
     }
 }
 
-bool bst_streak_motion_solve(bst_streak_motion *work, const bst_gauss *psf, bst_profiles *profiles,
-                             const bst_camera *camera, double length_px, double bend_px,
-                             bst_motion *motion) {
+bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *psf,
+                             bst_source_profiles *profiles, const bst_camera *camera,
+                             double length_px, double bend_px, bst_camera_motion *motion) {
     star *stars = work->stars;
     int count = work->count, left = 0;
     double ex = work->ex, ey = work->ey, b = work->binning;
-    bst_profiles_on(profiles, 0.0, 0.0, (int)b);
-    bst_profiles_set(profiles, psf, work->sigma_px);
+    bst_source_profiles_on(profiles, 0.0, 0.0, (int)b);
+    bst_source_profiles_set(profiles, psf, work->sigma_px);
     /* what is known exactly leaves the matrix well conditioned */
     const double least = 1e-4;
     const double sigma[COMMON] = {fmax(length_px, least), fmax(length_px, least),
@@ -336,7 +336,7 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_gauss *psf, bst_
     for (int round = 0; round < ROUNDS; round++) {
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
-            bst_profiles_on(profiles, stars[i].origin_x_px, stars[i].origin_y_px, (int)b);
+            bst_source_profiles_on(profiles, stars[i].origin_x_px, stars[i].origin_y_px, (int)b);
             stars[i].used = stars[i].used && accumulate(work, psf, profiles, &stars[i]);
         }
         if (!agree(stars, count, sigma, away, step)) {
@@ -365,7 +365,7 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_gauss *psf, bst_
     if (left == 0) {
         return false;
     }
-    bst_motion_add(motion, camera, b * (away[0] * ex - away[1] * ey),
-                   b * (away[0] * ey + away[1] * ex), b * away[2] * ex, b * away[2] * ey);
+    bst_camera_motion_add(motion, camera, b * (away[0] * ex - away[1] * ey),
+                          b * (away[0] * ey + away[1] * ex), b * away[2] * ex, b * away[2] * ey);
     return true;
 }

@@ -10,8 +10,9 @@ enum {
 };
 
 typedef struct bst_streak_motion {
-    int max_side;  /* of a stamp */
-    float *planes; /* of bst_image_render_motion; then the pixels, and 1 where there is one */
+    int max_side; /* of a stamp */
+    float *
+        planes; /* of bst_source_profile_render_motion; then the pixels, and 1 where there is one */
     float *scratch;
     float *pixels; /* [BST_STREAK_MOTION_STARS]: each star's last two planes */
     struct bst_streak_motion_star *stars; /* [BST_STREAK_MOTION_STARS] */
@@ -39,8 +40,8 @@ void bst_streak_motion_free(bst_streak_motion *work);
 bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *frame);
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *frame,
                            const bst_candidates *candidates);
-bool bst_streak_motion_solve(bst_streak_motion *work, const bst_gauss *psf, bst_profiles *profiles,
-                             const bst_camera *camera, double length_px, double bend_px,
-                             bst_motion *motion);
+bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *psf,
+                             bst_source_profiles *profiles, const bst_camera *camera,
+                             double length_px, double bend_px, bst_camera_motion *motion);
 
 #endif

@@ -130,7 +130,7 @@ static void wander(const bst_generator *g, const generator_source *s,
         return;
     }
     const bst_obsgen_calibration *cal = &g->calibration;
-    bst_bound_at bound = bst_bound_of(&g->bound, s->flux_e, g->noise_e, s->length);
+    bst_crlb_table_at bound = bst_crlb_table_of(&g->bound, s->flux_e, g->noise_e, s->length);
     /* factors of fainter ones hold that noise has lifted them above the threshold, as it does here
      */
     double snr = fmax(s->flux_e * bound.norm / g->noise_e, UNLIFTED_SNR);
@@ -139,7 +139,7 @@ static void wander(const bst_generator *g, const generator_source *s,
     if (along * out->flat < WANDERS * g->total_sigma) {
         return;
     }
-    bst_wander_set(g->wander, g->streak, g->total_sigma);
+    bst_streak_centroid_error_set(g->wander, g->streak, g->total_sigma);
     if (g->wander->steps == 0) {
         return;
     }
@@ -154,18 +154,19 @@ static void wander(const bst_generator *g, const generator_source *s,
     double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;
     turned = fmin(fmax(turned, LEAST_NOISE), MOST_NOISE);
     double c = s->path.dx / s->length, n = s->path.dy / s->length;
-    bst_wander_source sources[BST_WANDER_SOURCES] = {{0.0, 0.0, own}};
+    bst_streak_centroid_error_source sources[BST_WANDER_SOURCES] = {{0.0, 0.0, own}};
     int used = 1;
     for (int k = 0; k < count && used < BST_WANDER_SOURCES; k++) {
         const generator_source *m = &merged[k];
         double dx = m->x - s->x, dy = m->y - s->y;
-        sources[used++] =
-            (bst_wander_source){dx * c + dy * n, dy * c - dx * n, own * m->flux_e / s->flux_e};
+        sources[used++] = (bst_streak_centroid_error_source){dx * c + dy * n, dy * c - dx * n,
+                                                             own * m->flux_e / s->flux_e};
     }
     bst_philox_words words = bst_rng_words(g->key, (uint64_t)g->exposure_id, WANDER | s->name);
     const bst_rng_key key = {{words.w[0], words.w[1]}};
     double threshold = g->filters[1].threshold - beside;
-    bst_wander_top top = bst_wander_draw(g->wander, key, sources, used, noise, threshold);
+    bst_streak_centroid_error_peak top =
+        bst_streak_centroid_error_draw(g->wander, key, sources, used, noise, threshold);
     if (!(top.snr > threshold)) {
         return; /* so faint that it is seen for another reason */
     }
@@ -213,7 +214,7 @@ static double longest_moment(const bst_generator *g, const generator_source *s,
  * that of all light in it: a bright pair that is seen as one. */
 static void take_for_streak(const bst_generator *g, const generator_source *s,
                             const generator_source *merged, int count, generator_blend *out) {
-    double snr = out->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e;
+    double snr = out->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
     double point = g->fitted_sigma * g->fitted_sigma;
     if (g->smeared || out->near || s->as_streak || snr < OWN_STREAK_SNR) {
         return;
@@ -276,8 +277,9 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         at.x = out.x;
         at.y = out.y;
         /* the fitted light's brightest pixel, over the noise's variance */
-        double bright =
-            g->smeared ? 0.0 : out.flux_e * bst_bound_norm(&g->bound, s->length) * g->fit_light;
+        double bright = g->smeared
+                            ? 0.0
+                            : out.flux_e * bst_crlb_table_norm(&g->bound, s->length) * g->fit_light;
         double sum = s->flux_e *
                      bst_blend_weight(&g->blend_weights, bright, bst_generator_overlap(g, s, &at));
         double x = 0.0, y = 0.0;

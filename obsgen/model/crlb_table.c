@@ -79,7 +79,7 @@ static double total_square(const profile *p) {
     return sum;
 }
 
-void bst_bound_init(bst_bound *b, double sigma_px) {
+void bst_crlb_table_init(bst_crlb_table *b, double sigma_px) {
     profile x, y;
     b->sigma_px = sigma_px = fmax(sigma_px, 0.2);
     for (int n = 0; n < BST_BOUND_LENGTHS; n++) {
@@ -109,7 +109,7 @@ void bst_bound_init(bst_bound *b, double sigma_px) {
 }
 
 /* Where a length lies among the nodes: the square root of its growth is straight enough. */
-static int length_node(const bst_bound *b, double length_px, double *part) {
+static int length_node(const bst_crlb_table *b, double length_px, double *part) {
     double x = length_px / b->sigma_px;
     if (!(x > 0.0)) {
         *part = 0.0;
@@ -132,13 +132,14 @@ static double between(const float (*table)[BST_BOUND_RATIOS], int n, double pn, 
     return exp(low + pn * (high - low));
 }
 
-double bst_bound_norm(const bst_bound *b, double length_px) {
+double bst_crlb_table_norm(const bst_crlb_table *b, double length_px) {
     double part;
     int n = length_node(b, length_px, &part);
     return exp(0.5 * ((double)b->squared[n] + part * (double)(b->squared[n + 1] - b->squared[n])));
 }
 
-bst_bound_at bst_bound_of(const bst_bound *b, double flux_e, double noise_e, double length_px) {
+bst_crlb_table_at bst_crlb_table_of(const bst_crlb_table *b, double flux_e, double noise_e,
+                                    double length_px) {
     double v = noise_e * noise_e, ratio = flux_e / v, pn;
     int n = length_node(b, length_px, &pn);
     double at = (log10(fmax(ratio, 1e-30)) - FIRST_RATIO) * PER_DECADE;
@@ -148,18 +149,18 @@ bst_bound_at bst_bound_of(const bst_bound *b, double flux_e, double noise_e, dou
     double pr = at - r;
     /* beyond the table's end shot noise is all: information grows with F alone */
     double beyond = fmax(ratio / pow(10.0, FIRST_RATIO + (BST_BOUND_RATIOS - 1) / PER_DECADE), 1.0);
-    bst_bound_at out;
+    bst_crlb_table_at out;
     out.var_along_px2 = beyond / (flux_e * ratio * between(b->along, n, pn, r, pr));
     out.var_across_px2 = beyond / (flux_e * ratio * between(b->across, n, pn, r, pr));
     out.flux_variance = v * beyond / between(b->flux, n, pn, r, pr);
-    out.norm = bst_bound_norm(b, length_px);
+    out.norm = bst_crlb_table_norm(b, length_px);
     return out;
 }
 
-bst_bound_at bst_bound_wider(const bst_bound *bound, double flux_e, double noise_e,
-                             double length_px, double wider) {
+bst_crlb_table_at bst_crlb_table_wider(const bst_crlb_table *bound, double flux_e, double noise_e,
+                                       double length_px, double wider) {
     /* in pixels that are as much larger, with the noise of as many more of them */
-    bst_bound_at b = bst_bound_of(bound, flux_e, noise_e * wider, length_px / wider);
+    bst_crlb_table_at b = bst_crlb_table_of(bound, flux_e, noise_e * wider, length_px / wider);
     b.var_along_px2 *= wider * wider;
     b.var_across_px2 *= wider * wider;
     b.norm /= wider;

@@ -14,12 +14,12 @@ static double uniform(const bst_generator *g, uint64_t draw) {
     return bst_rng_uniform(g->key, (uint64_t)g->exposure_id, draw);
 }
 
-bst_detection bst_generator_point(const bst_generator *g, double x, double y, double snr,
-                                  double length) {
+bst_detection bst_false_alarms_point(const bst_generator *g, double x, double y, double snr,
+                                     double length) {
     bst_detection d = {0};
-    double norm = bst_bound_norm(&g->bound, length), b = g->binning;
+    double norm = bst_crlb_table_norm(&g->bound, length), b = g->binning;
     d.flux_e = snr * g->noise_e / norm;
-    bst_bound_at bound = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
+    bst_crlb_table_at bound = bst_crlb_table_of(&g->bound, d.flux_e, g->noise_e, length);
     double c = length > 0.0 ? g->star_path.dx / g->streak : 1.0;
     double s = length > 0.0 ? g->star_path.dy / g->streak : 0.0;
     double a2 = bound.var_along_px2 * b * b, b2 = bound.var_across_px2 * b * b;
@@ -63,15 +63,16 @@ static double more_alarms(const bst_generator *g) {
     return more;
 }
 
-void bst_generator_false_alarms(bst_generator *g) {
+void bst_false_alarms_draw(bst_generator *g) {
     double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
     /* background that is found too bright takes from noise */
-    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    double taken = g->background_bias_e / (bst_crlb_table_norm(&g->bound, 0.0) * g->noise_e);
     expected *= exp(-taken * (g->threshold + 0.5 * taken));
     expected *= more_alarms(g);
     if (g->smeared) { /* nothing is looked at between the pixels */
-        double least = g->threshold * g->noise_e / g->dark_noise_e +
-                       g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->dark_noise_e);
+        double least =
+            g->threshold * g->noise_e / g->dark_noise_e +
+            g->background_bias_e / (bst_crlb_table_norm(&g->bound, 0.0) * g->dark_noise_e);
         least /= sqrt(g->filters[0].variance);
         expected = bst_matched_pixel_maxima(g->filter_sigma, least) * g->width * g->height;
     }
@@ -92,16 +93,16 @@ void bst_generator_false_alarms(bst_generator *g) {
             bst_generator_keep_rough(g, (int)lround(x), (int)lround(y), snr, -1);
             continue;
         }
-        bst_generated item = {
-            .detection = bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0),
+        bst_obsgen_generated item = {
+            .detection = bst_false_alarms_point(g, x, y, snr, streak ? g->streak : 0.0),
             .item = -1,
             .drawn = streak};
         bst_generator_keep(g, &item);
     }
 }
 
-void bst_generator_hits(bst_generator *g) {
-    const bst_hits_config *h = &g->camera->detector.hits;
+void bst_false_alarms_cosmic_rays(bst_generator *g) {
+    const bst_detector_cosmic_ray_config *h = &g->camera->detector.hits;
     if (!(h->rate_per_cm2_s > 0.0)) {
         return;
     }
@@ -110,7 +111,7 @@ void bst_generator_hits(bst_generator *g) {
         h->rate_per_cm2_s * pixel_cm2 * g->width * g->height * (g->exposure_s + h->frame_s);
     /* a point of one electron at the filter's output: its kernel's greatest value over the noise */
     double kernel = 1.0 / (2.0 * BST_PI * g->total_sigma * g->total_sigma) /
-                    bst_bound_norm(&g->bound, 0.0) / g->noise_e;
+                    bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
     double arrival = 0.0;
     for (uint64_t i = 0; i < 1000000; i++) {
         uint64_t draw = HIT + 16 * i;
@@ -135,8 +136,8 @@ void bst_generator_hits(bst_generator *g) {
             y > g->height - 0.5) {
             continue;
         }
-        bst_generated item = {
-            .detection = bst_generator_point(g, x, y, peak, 0.0), .item = -1, .hit = true};
+        bst_obsgen_generated item = {
+            .detection = bst_false_alarms_point(g, x, y, peak, 0.0), .item = -1, .hit = true};
         bst_detection *d = &item.detection;
         double hottest = charge / fmax(length, 1.0) / g->noise_e;
         bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;

@@ -30,10 +30,10 @@ static double along_itself(double d, double length, double s) {
     return s * (ramp(d + length, s) - 2.0 * ramp(d, s) + ramp(d - length, s)) / (length * length);
 }
 
-double bst_matched_product(bst_path_px p, bst_path_px q, double sigma_px) {
+double bst_matched_product(bst_obsgen_path_px p, bst_obsgen_path_px q, double sigma_px) {
     double lp = hypot(p.dx, p.dy), lq = hypot(q.dx, q.dy), s = sigma_px * sqrt(2.0);
     if (lp > lq) {
-        bst_path_px swapped = p;
+        bst_obsgen_path_px swapped = p;
         p = q;
         q = swapped;
         double length = lp;
@@ -58,7 +58,8 @@ double bst_matched_product(bst_path_px p, bst_path_px q, double sigma_px) {
     return sum / (parts * s * lq);
 }
 
-double bst_matched_efficiency(bst_path_px source, bst_path_px filter, double sigma_px) {
+double bst_matched_efficiency(bst_obsgen_path_px source, bst_obsgen_path_px filter,
+                              double sigma_px) {
     double both = bst_matched_product(source, source, sigma_px) *
                   bst_matched_product(filter, filter, sigma_px);
     return fmin(bst_matched_product(source, filter, sigma_px) / sqrt(both), 1.0);
@@ -105,8 +106,8 @@ double bst_matched_threshold(double sigma_px, double length_px, double false_ala
                                             : 2.0 * (density(0.0) - density(length_px / s)) /
                                                   (s * length_px * length_px);
         drawn = sqrt(steep * curve * s / along_itself(0.0, length_px, s));
-        shared = bst_matched_efficiency((bst_path_px){length_px, 0.0}, (bst_path_px){0.0, 0.0},
-                                        sigma_px);
+        shared = bst_matched_efficiency((bst_obsgen_path_px){length_px, 0.0},
+                                        (bst_obsgen_path_px){0.0, 0.0}, sigma_px);
     }
     double low = 2.5, high = 9.0, point = 0.0, streak = 0.0;
     for (int i = 0; i < 24; i++) {

@@ -5,18 +5,19 @@
 #define BST_OBSGEN_MODEL_MATCHED_FILTER_THEORY_H
 
 /* A straight path during the exposure, px; {0, 0}: at rest. */
-typedef struct bst_path_px {
+typedef struct bst_obsgen_path_px {
     double dx, dy;
-} bst_path_px;
+} bst_obsgen_path_px;
 
 /* Integral over the plane of the product of two unit images centred on one place, 1/px^2: uniform
  * segments p and q, each blurred by a Gaussian of sigma_px. Over one of them in closed form (error
  * functions), over the shorter one by midpoints half a sigma apart: right to 1 % of the value. */
-double bst_matched_product(bst_path_px p, bst_path_px q, double sigma_px);
+double bst_matched_product(bst_obsgen_path_px p, bst_obsgen_path_px q, double sigma_px);
 
 /* SNR that the filter for `filter` gives of a source that moved by `source`, over the greatest
  * possible: 1 where they are equal. */
-double bst_matched_efficiency(bst_path_px source, bst_path_px filter, double sigma_px);
+double bst_matched_efficiency(bst_obsgen_path_px source, bst_obsgen_path_px filter,
+                              double sigma_px);
 
 /* Output of a filter for a streak of length_px at (along, across) px from a source that it was made
  * for, over that at the source: the autocorrelation of the image. */

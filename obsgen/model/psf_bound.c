@@ -125,7 +125,7 @@ static void add_up(const sampled_image *image, double share, double sums[BST_BOU
 }
 
 bst_status bst_psf_bound_init(bst_ctx *ctx, const bst_response_side *side, int binning, double x_px,
-                              double y_px, double sigma_px, bst_bound *out) {
+                              double y_px, double sigma_px, bst_crlb_table *out) {
     bst_response_nodes nodes;
     bst_response_nodes_at(side, x_px, y_px, &nodes);
     out->sigma_px = fmax(sigma_px, 0.2);

@@ -6,7 +6,7 @@
 #include "obsgen/model/response.h"
 
 /* Tabulates the Fisher information of a PSF, integrated over pixels and drawn along x, as
- * bst_bound_init does for a Gaussian.
+ * bst_crlb_table_init does for a Gaussian.
  *
  * Given:
  *   side      the PSF and the Gaussian that widens it
@@ -21,6 +21,6 @@
  * taken on a grid of a third of a pixel; the image and its gradient are Fourier sums of the OTF.
  * A PSF without circular symmetry has the bound of streaks along x in all directions. */
 bst_status bst_psf_bound_init(bst_ctx *ctx, const bst_response_side *side, int binning, double x_px,
-                              double y_px, double sigma_px, bst_bound *out) BST_MUST_CHECK;
+                              double y_px, double sigma_px, bst_crlb_table *out) BST_MUST_CHECK;
 
 #endif

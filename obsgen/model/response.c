@@ -118,14 +118,14 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
     s->filtered = s->point[1];
 }
 
-static bst_image_width width_of(double point, double line) {
-    bst_image_width w = {.across_px = 1.0 / (2.0 * sqrt(BST_PI) * line)};
+static bst_obsgen_image_width width_of(double point, double line) {
+    bst_obsgen_image_width w = {.across_px = 1.0 / (2.0 * sqrt(BST_PI) * line)};
     w.along_px = 1.0 / (4.0 * BST_PI * point * w.across_px);
     return w;
 }
 
-static bst_image_width even(double variance_px2) {
-    return (bst_image_width){sqrt(variance_px2), sqrt(variance_px2)};
+static bst_obsgen_image_width even(double variance_px2) {
+    return (bst_obsgen_image_width){sqrt(variance_px2), sqrt(variance_px2)};
 }
 
 void bst_response_set(bst_response *out, const bst_response_side *source,
@@ -148,9 +148,9 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
     out->maxima_sigma_px = sqrt(0.5 / fmax(steep, 1e-6));
 }
 
-static bst_image_width widen(bst_image_width w, double variance_px2) {
-    return (bst_image_width){sqrt(w.across_px * w.across_px + variance_px2),
-                             sqrt(w.along_px * w.along_px + variance_px2)};
+static bst_obsgen_image_width widen(bst_obsgen_image_width w, double variance_px2) {
+    return (bst_obsgen_image_width){sqrt(w.across_px * w.across_px + variance_px2),
+                                    sqrt(w.along_px * w.along_px + variance_px2)};
 }
 
 bst_response bst_response_widened(const bst_response *r, double variance_px2) {
@@ -160,13 +160,14 @@ bst_response bst_response_widened(const bst_response *r, double variance_px2) {
     return out;
 }
 
-double bst_response_product(const bst_image_width *w, bst_path_px p, bst_path_px q) {
+double bst_response_product(const bst_obsgen_image_width *w, bst_obsgen_path_px p,
+                            bst_obsgen_path_px q) {
     double ratio = w->across_px / w->along_px;
-    bst_path_px longer = hypot(p.dx, p.dy) > hypot(q.dx, q.dy) ? p : q;
+    bst_obsgen_path_px longer = hypot(p.dx, p.dy) > hypot(q.dx, q.dy) ? p : q;
     double length = hypot(longer.dx, longer.dy);
     if (ratio != 1.0 && length > 0.0) { /* along shrunk until both widths are one */
         double c = longer.dx / length, s = longer.dy / length;
-        bst_path_px *const both[2] = {&p, &q};
+        bst_obsgen_path_px *const both[2] = {&p, &q};
         for (int k = 0; k < 2; k++) {
             double along = (both[k]->dx * c + both[k]->dy * s) * (ratio - 1.0);
             both[k]->dx += along * c;
@@ -176,7 +177,8 @@ double bst_response_product(const bst_image_width *w, bst_path_px p, bst_path_px
     return ratio * bst_matched_product(p, q, w->across_px);
 }
 
-double bst_response_efficiency(const bst_response *r, bst_path_px source, bst_path_px filter) {
+double bst_response_efficiency(const bst_response *r, bst_obsgen_path_px source,
+                               bst_obsgen_path_px filter) {
     double own = bst_response_product(&r->source, source, source) *
                  bst_response_product(&r->filter, filter, filter);
     return fmin(bst_response_product(&r->both, source, filter) / sqrt(own), 1.0);
@@ -184,7 +186,7 @@ double bst_response_efficiency(const bst_response *r, bst_path_px source, bst_pa
 
 double bst_response_norm_ratio(const bst_response *r, double length_px) {
     double sigma = sqrt(r->source.across_px * r->source.along_px);
-    bst_path_px path = {length_px, 0.0};
+    bst_obsgen_path_px path = {length_px, 0.0};
     return sqrt(bst_response_product(&r->source, path, path) /
                 bst_matched_product(path, path, sigma));
 }

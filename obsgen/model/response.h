@@ -9,12 +9,13 @@
 /* Widths of the Gaussian that stands for a product of two images, pixels that are read, with the
  * pixel's own width: its line spread's, and that along a streak, which together have the product's
  * area at rest: integral of the product = 1 / (4 pi across along). */
-typedef struct bst_image_width {
+typedef struct bst_obsgen_image_width {
     double across_px, along_px;
-} bst_image_width;
+} bst_obsgen_image_width;
 
 typedef struct bst_response {
-    bst_image_width source, filter, both; /* image by image, filter by filter, image by filter */
+    bst_obsgen_image_width source, filter,
+        both;               /* image by image, filter by filter, image by filter */
     double maxima_sigma_px; /* of the Gaussian whose filtered noise has as many maxima */
 } bst_response;
 
@@ -54,12 +55,13 @@ bst_response bst_response_widened(const bst_response *response, double variance_
 
 /* Integral of the product of two such images that moved along p and q, 1/px^2, as
  * bst_matched_product. */
-double bst_response_product(const bst_image_width *width, bst_path_px p, bst_path_px q);
+double bst_response_product(const bst_obsgen_image_width *width, bst_obsgen_path_px p,
+                            bst_obsgen_path_px q);
 
 /* SNR that the filter for the path `filter` gives of an image that moved along `source`, over that
  * of the filter for the image itself. */
-double bst_response_efficiency(const bst_response *response, bst_path_px source,
-                               bst_path_px filter);
+double bst_response_efficiency(const bst_response *response, bst_obsgen_path_px source,
+                               bst_obsgen_path_px filter);
 
 /* sqrt(sum p^2) of a real image of unit flux that moved by length_px, over that of a Gaussian of
  * the same noise-equivalent area at rest: 1 for a Gaussian. */

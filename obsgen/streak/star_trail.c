@@ -26,7 +26,7 @@ enum { GROUP = 8 };
 
 /* Nodes as they are laid, and the least box about each GROUP of them. */
 typedef struct laying {
-    bst_route_node *nodes;
+    bst_star_trail_node *nodes;
     int count;
     struct group_box {
         double x0, x1, y0, y1;
@@ -62,12 +62,12 @@ static void add_node(laying *l, double x, double y, double time) {
     b->x1 = x > b->x1 ? x : b->x1;
     b->y0 = y < b->y0 ? y : b->y0;
     b->y1 = y > b->y1 ? y : b->y1;
-    l->nodes[l->count++] = (bst_route_node){x, y, time, 0.0};
+    l->nodes[l->count++] = (bst_star_trail_node){x, y, time, 0.0};
 }
 
 /* Straight on from one node, away from another. */
 static void lay_on(laying *l, int end, int before, double sigma_px, double time) {
-    const bst_route_node e = l->nodes[end], b = l->nodes[before];
+    const bst_star_trail_node e = l->nodes[end], b = l->nodes[before];
     double dx = e.x - b.x, dy = e.y - b.y, length = hypot(dx, dy);
     for (int i = 1; i <= (int)ceil(BEYOND_SIGMAS * sigma_px) && length > 0.0; i++) {
         add_node(l, e.x + i * dx / length, e.y + i * dy / length, time);
@@ -81,7 +81,7 @@ typedef struct piece {
     double height;       /* of its light beside its middle: an equal share for each piece */
 } piece;
 
-static piece piece_of(const bst_route_path *p, int k, double s) {
+static piece piece_of(const bst_star_trail_path *p, int k, double s) {
     double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
     double length = hypot(dx, dy), share = 1.0 / (p->count - 1);
     piece out = {.x = 0.5 * (p->x_px[k] + p->x_px[k - 1]),
@@ -109,7 +109,8 @@ static double piece_light(const piece *p, double x, double y, double s) {
 }
 
 /* Adds the light of the whole path at its nodes. */
-static void add_light(const bst_route_path *path, double s, bst_route_node *nodes, int count) {
+static void add_light(const bst_star_trail_path *path, double s, bst_star_trail_node *nodes,
+                      int count) {
     for (int k = 1; k < path->count; k++) {
         piece p = piece_of(path, k, s);
         for (int i = 0; i < count; i++) {
@@ -121,7 +122,7 @@ static void add_light(const bst_route_path *path, double s, bst_route_node *node
     }
 }
 
-int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *nodes) {
+int bst_star_trail_lay(const bst_star_trail_path *p, double sigma_px, bst_star_trail_node *nodes) {
     laying l = {.nodes = nodes};
     add_node(&l, p->x_px[0], p->y_px[0], 0.0);
     for (int k = 1; k < p->count; k++) {
@@ -141,7 +142,7 @@ int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *node
         lay_on(&l, 0, last > 2 ? 3 : last, sigma_px, 0.0);
         int more = l.count - laid;
         for (int i = 0; i < more; i++) {
-            bst_route_node moved = nodes[l.count - 1];
+            bst_star_trail_node moved = nodes[l.count - 1];
             memmove(nodes + i + 1, nodes + i, (size_t)(l.count - 1 - i) * sizeof *nodes);
             nodes[i] = moved;
         }
@@ -198,7 +199,7 @@ static void find_curvature(const model *m, double s, double h[3]) {
 enum { MOST_STEPS = 512 };
 
 /* The path's steps with the share of the exposure that each holds; their number. */
-static int gather_steps(const bst_route_path *p, float *x, float *y, float *share) {
+static int gather_steps(const bst_star_trail_path *p, float *x, float *y, float *share) {
     int together = (p->count + MOST_STEPS - 1) / MOST_STEPS, count = 0;
     for (int from = 0; from < p->count; from += together, count++) {
         double sum_x = 0.0, sum_y = 0.0, sum = 0.0;
@@ -216,7 +217,7 @@ static int gather_steps(const bst_route_path *p, float *x, float *y, float *shar
 }
 
 /* The first step for a straight model in closed form: to first order that is all. */
-static void straight_bias(const bst_route_path *p, double dx_px, double dy_px, double s,
+static void straight_bias(const bst_star_trail_path *p, double dx_px, double dy_px, double s,
                           double bias_px[2]) {
     double length = hypot(dx_px, dy_px), along = 0.0, across = 0.0, value = 0.0;
     double c = length > 0.0 ? dx_px / length : 1.0, n = length > 0.0 ? dy_px / length : 0.0;
@@ -245,8 +246,8 @@ static void straight_bias(const bst_route_path *p, double dx_px, double dy_px, d
     bias_px[1] = a * n + b * c;
 }
 
-void bst_route_point_bias(const bst_route_path *p, const bst_blend_weights *weights, double light,
-                          double sigma_px, double bias_px[2]) {
+void bst_star_trail_point_bias(const bst_star_trail_path *p, const bst_blend_weights *weights,
+                               double light, double sigma_px, double bias_px[2]) {
     enum { ROUNDS = 4 };
     static const double ENOUGH_PX = 0.002, PER_SIGMA = 2.0;
     float row[BST_BLEND_DISTANCES];
@@ -277,8 +278,8 @@ void bst_route_point_bias(const bst_route_path *p, const bst_blend_weights *weig
     }
 }
 
-void bst_route_bias(const bst_route_path *p, double dx_px, double dy_px, double bend_x_px,
-                    double bend_y_px, double sigma_px, double bias_px[2]) {
+void bst_star_trail_bias(const bst_star_trail_path *p, double dx_px, double dy_px, double bend_x_px,
+                         double bend_y_px, double sigma_px, double bias_px[2]) {
     enum { ROUNDS = 6 };
     double s = sigma_px * sqrt(2.0), h[3], total = 0.0;
     if (hypot(bend_x_px, bend_y_px) < STRAIGHT_PX) {

@@ -200,7 +200,7 @@ static double taken_from(const bst_generator *g, double level, double noise) {
 }
 
 static void set_taken(bst_generator *g) {
-    g->streaks->norm = bst_bound_norm(&g->bound, 0.0);
+    g->streaks->norm = bst_crlb_table_norm(&g->bound, 0.0);
     g->streaks->taken =
         taken_from(g, g->background_bias_e / g->dark_noise_e, g->noise_e / g->dark_noise_e);
 }
@@ -438,7 +438,7 @@ bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *g, int wid
     return BST_OK;
 }
 
-bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
+bst_status bst_streak_breakup_fragments(bst_ctx *ctx, bst_generator *g) {
     BST_TRY(bst_generator_reserve_streaks(ctx, g, g->width, g->height));
     struct generator_streaks *w = g->streaks;
     bst_streak_noise_set(&w->noise, g->filter_sigma);
@@ -469,7 +469,7 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
     return status;
 }
 
-void bst_generator_free_streaks(struct generator_streaks *w) {
+void bst_streak_breakup_free(struct generator_streaks *w) {
     if (w) {
         bst_streak_light_free(&w->light);
         bst_local_sky_free(&w->sky);

@@ -9,8 +9,8 @@
  * of all of them and noise of its correlation, and keeps the maxima above the threshold that no
  * higher one nearby shares a ridge with, as image processing does where it fits nothing: parts of
  * streaks. After bst_generator_decide. BST_ERR_MEMORY. */
-bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *generator) BST_MUST_CHECK;
+bst_status bst_streak_breakup_fragments(bst_ctx *ctx, bst_generator *generator) BST_MUST_CHECK;
 
-void bst_generator_free_streaks(struct generator_streaks *streaks); /* NULL: nothing */
+void bst_streak_breakup_free(struct generator_streaks *streaks); /* NULL: nothing */
 
 #endif

@@ -19,7 +19,7 @@ static double below(double z) {
 }
 
 /* What makes of white rows those of the output (Cholesky). */
-static void set_mix(bst_wander *w) {
+static void set_mix(bst_streak_centroid_error *w) {
     for (int i = 0; i < ROWS; i++) {
         for (int k = 0; k <= i; k++) {
             double sum = exp(-0.25 * APART * APART * (i - k) * (i - k));
@@ -31,11 +31,12 @@ static void set_mix(bst_wander *w) {
     }
 }
 
-void bst_wander_set(bst_wander *w, double length_px, double sigma_px) {
+void bst_streak_centroid_error_set(bst_streak_centroid_error *w, double length_px,
+                                   double sigma_px) {
     if (w->length == length_px && w->sigma == sigma_px) {
         return;
     }
-    *w = (bst_wander){.length = length_px, .sigma = sigma_px};
+    *w = (bst_streak_centroid_error){.length = length_px, .sigma = sigma_px};
     w->half = (int)fmax(1.0, floor(length_px / sigma_px + 0.5));
     w->step = 0.5 * length_px / w->half;
     w->reach = (int)fmin(ceil(3.0 * sigma_px / w->step), TAPS);
@@ -63,8 +64,8 @@ void bst_wander_set(bst_wander *w, double length_px, double sigma_px) {
         square += value * value;
     }
     w->streak_norm = 1.0 / sqrt(square);
-    w->shared =
-        bst_matched_efficiency((bst_path_px){length_px, 0.0}, (bst_path_px){0.0, 0.0}, sigma_px);
+    w->shared = bst_matched_efficiency((bst_obsgen_path_px){length_px, 0.0},
+                                       (bst_obsgen_path_px){0.0, 0.0}, sigma_px);
     double d = 0.1 * sigma_px;
     w->curvature = 2.0 * (1.0 - bst_matched_falloff(d, 0.0, length_px, sigma_px)) / (d * d);
     set_mix(w);
@@ -76,7 +77,8 @@ typedef struct rows {
 } rows;
 
 /* Light of the sources. */
-static void add_light(const bst_wander *w, const bst_wander_source *sources, int count, rows *out) {
+static void add_light(const bst_streak_centroid_error *w,
+                      const bst_streak_centroid_error_source *sources, int count, rows *out) {
     double s = w->sigma * sqrt(2.0), half = 0.5 * w->length;
     double top = 2.0 * below(half / s) - 1.0;
     for (int k = 0; k < count; k++) {
@@ -98,7 +100,8 @@ static void add_light(const bst_wander *w, const bst_wander_source *sources, int
 }
 
 /* Noise of both filters: the same white noise under both. */
-static void add_noise(const bst_wander *w, bst_rng_key key, int attempt, double noise, rows *out) {
+static void add_noise(const bst_streak_centroid_error *w, bst_rng_key key, int attempt,
+                      double noise, rows *out) {
     double white[ROWS][STEPS], smooth[STEPS];
     int blocks = (w->steps + 2 * BST_RNG_BLOCK - 1) / (2 * BST_RNG_BLOCK);
     for (int r = 0; r < ROWS; r++) {
@@ -150,8 +153,9 @@ static double vertex(double before, double at, double after) {
     return bend > 1e-9 ? fmin(fmax(0.5 * (after - before) / bend, -0.5), 0.5) : 0.0;
 }
 
-static bst_wander_top find_top(const bst_wander *w, const rows *out) {
-    bst_wander_top top = {.snr = -INFINITY};
+static bst_streak_centroid_error_peak find_top(const bst_streak_centroid_error *w,
+                                               const rows *out) {
+    bst_streak_centroid_error_peak top = {.snr = -INFINITY};
     int row = 0, column = 0;
     for (int r = 0; r < ROWS; r++) {
         for (int i = 0; i <= 2 * w->side; i++) {
@@ -178,9 +182,9 @@ static bst_wander_top find_top(const bst_wander *w, const rows *out) {
     return top;
 }
 
-bst_wander_top bst_wander_draw(const bst_wander *w, bst_rng_key key,
-                               const bst_wander_source *sources, int count, double noise,
-                               double threshold) {
+bst_streak_centroid_error_peak bst_streak_centroid_error_draw(
+    const bst_streak_centroid_error *w, bst_rng_key key,
+    const bst_streak_centroid_error_source *sources, int count, double noise, double threshold) {
     rows light, out;
     for (int r = 0; r < ROWS; r++) {
         for (int i = 0; i <= 2 * w->side; i++) {
@@ -188,7 +192,7 @@ bst_wander_top bst_wander_draw(const bst_wander *w, bst_rng_key key,
         }
     }
     add_light(w, sources, count, &light);
-    bst_wander_top best = {.snr = -INFINITY};
+    bst_streak_centroid_error_peak best = {.snr = -INFINITY};
     for (int attempt = 0; attempt < TRIES && !(best.snr > threshold); attempt++) {
         for (int r = 0; r < ROWS; r++) {
             for (int i = 0; i <= 2 * w->side; i++) {
@@ -197,7 +201,7 @@ bst_wander_top bst_wander_draw(const bst_wander *w, bst_rng_key key,
             }
         }
         add_noise(w, key, attempt, noise, &out);
-        bst_wander_top top = find_top(w, &out);
+        bst_streak_centroid_error_peak top = find_top(w, &out);
         best = top.snr > best.snr ? top : best;
     }
     return best;

@@ -45,7 +45,7 @@ static void part_way(bst_streak_way *way) {
     }
 }
 
-static void set_way(bst_streak_way *way, const bst_route_node *nodes, int count) {
+static void set_way(bst_streak_way *way, const bst_star_trail_node *nodes, int count) {
     way->count = count;
     for (int k = 0; k < count; k++) {
         way->x[k] = nodes[k].x;
@@ -257,8 +257,8 @@ bst_status bst_streak_ways_add(bst_ctx *ctx, bst_streak_ways *w, bst_generator *
         g->object_x[k] = g->path_x[k] + u * by.dx;
         g->object_y[k] = g->path_y[k] + u * by.dy;
     }
-    const bst_route_path own = {g->object_x, g->object_y, g->path.count};
-    set_way(&w->own, g->way, bst_route_lay(&own, g->cross_sigma, g->way));
+    const bst_star_trail_path own = {g->object_x, g->object_y, g->path.count};
+    set_way(&w->own, g->way, bst_star_trail_lay(&own, g->cross_sigma, g->way));
     by.dx = by.dy = 0.0;
     return run_along(ctx, g, &w->limits, index, &w->own, &by, light);
 }

@@ -7,16 +7,16 @@
 
 enum { MOST_HITS = 1000000, REACH = 20 };
 
-struct bst_hits {
-    bst_hits_config config;
+struct bst_cosmic_rays {
+    bst_detector_cosmic_ray_config config;
     int width, height, stride;
-    bst_hit_pixel *pixels;
+    bst_cosmic_rays_pixel *pixels;
     int count, capacity;
 };
 
-bst_status bst_hits_create(bst_ctx *ctx, const bst_hits_config *config, int width, int height,
-                           int stride, bst_hits **out) {
-    bst_hits *h = calloc(1, sizeof *h);
+bst_status bst_cosmic_rays_create(bst_ctx *ctx, const bst_detector_cosmic_ray_config *config,
+                                  int width, int height, int stride, bst_cosmic_rays **out) {
+    bst_cosmic_rays *h = calloc(1, sizeof *h);
     *out = h;
     if (!h) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for radiation hits");
@@ -28,27 +28,27 @@ bst_status bst_hits_create(bst_ctx *ctx, const bst_hits_config *config, int widt
     return BST_OK;
 }
 
-void bst_hits_free(bst_hits *hits) {
+void bst_cosmic_rays_free(bst_cosmic_rays *hits) {
     if (hits) {
         free(hits->pixels);
         free(hits);
     }
 }
 
-static bst_status add_pixel(bst_ctx *ctx, bst_hits *h, int x, int y, double electrons) {
+static bst_status add_pixel(bst_ctx *ctx, bst_cosmic_rays *h, int x, int y, double electrons) {
     if (x < 0 || y < 0 || x >= h->width || y >= h->height || !(electrons > 0.0)) {
         return BST_OK;
     }
     if (h->count == h->capacity) {
         int capacity = h->capacity ? 2 * h->capacity : 1024;
-        bst_hit_pixel *more = realloc(h->pixels, (size_t)capacity * sizeof *more);
+        bst_cosmic_rays_pixel *more = realloc(h->pixels, (size_t)capacity * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pixels of radiation hits");
         }
         h->pixels = more;
         h->capacity = capacity;
     }
-    h->pixels[h->count++] = (bst_hit_pixel){y * h->stride + x, (float)electrons};
+    h->pixels[h->count++] = (bst_cosmic_rays_pixel){y * h->stride + x, (float)electrons};
     return BST_OK;
 }
 
@@ -65,8 +65,8 @@ static bool clip(double p, double d, double low, double high, double *t0, double
 
 /* Charge of a track from (x, y) along (dx, dy) px, spread evenly over it, to the pixels it crosses
  * (Amanatides and Woo, Eurographics 1987). Pixel n reaches from n - 1/2 to n + 1/2. */
-static bst_status add_track(bst_ctx *ctx, bst_hits *h, double x, double y, double dx, double dy,
-                            double electrons) {
+static bst_status add_track(bst_ctx *ctx, bst_cosmic_rays *h, double x, double y, double dx,
+                            double dy, double electrons) {
     double t = 0.0, end = 1.0;
     if (!clip(x, dx, -0.5, h->width - 0.5, &t, &end) ||
         !clip(y, dy, -0.5, h->height - 0.5, &t, &end)) {
@@ -90,16 +90,18 @@ static bst_status add_track(bst_ctx *ctx, bst_hits *h, double x, double y, doubl
 }
 
 static int by_index(const void *a, const void *b) {
-    int p = ((const bst_hit_pixel *)a)->index, q = ((const bst_hit_pixel *)b)->index;
+    int p = ((const bst_cosmic_rays_pixel *)a)->index,
+        q = ((const bst_cosmic_rays_pixel *)b)->index;
     return (p > q) - (p < q);
 }
 
-bst_status bst_hits_draw(bst_ctx *ctx, bst_hits *h, bst_rng_key key, int64_t exposure_id,
-                         double collect_s, const bst_hit_pixel **pixels,
-                         bst_hits_summary *summary) {
-    const bst_hits_config *c = &h->config;
+bst_status bst_cosmic_rays_draw(bst_ctx *ctx, bst_cosmic_rays *h, bst_rng_key key,
+                                int64_t exposure_id, double collect_s,
+                                const bst_cosmic_rays_pixel **pixels,
+                                bst_cosmic_rays_summary *summary) {
+    const bst_detector_cosmic_ray_config *c = &h->config;
     h->count = 0;
-    *summary = (bst_hits_summary){0};
+    *summary = (bst_cosmic_rays_summary){0};
     /* tracks that come in beside the sensor reach it from as far as most of them are long */
     double reach = ceil(REACH * c->depth_um / c->pixel_pitch_um);
     double width = h->width + 2.0 * reach, height = h->height + 2.0 * reach;

@@ -7,23 +7,24 @@
 #include "sim/optics/detector_config.h"
 
 /* Charge left in a pixel. */
-typedef struct bst_hit_pixel {
+typedef struct bst_cosmic_rays_pixel {
     int index; /* row * stride + column */
     float electrons;
-} bst_hit_pixel;
+} bst_cosmic_rays_pixel;
 
-typedef struct bst_hits_summary {
+typedef struct bst_cosmic_rays_summary {
     int tracks;       /* that touch the sensor */
     int pixels;       /* with charge */
     double electrons; /* left on the sensor */
-} bst_hits_summary;
+} bst_cosmic_rays_summary;
 
-typedef struct bst_hits bst_hits;
+typedef struct bst_cosmic_rays bst_cosmic_rays;
 
 /* width, height: of the sensor, px; stride: of the indices. */
-bst_status bst_hits_create(bst_ctx *ctx, const bst_hits_config *config, int width, int height,
-                           int stride, bst_hits **out) BST_MUST_CHECK;
-void bst_hits_free(bst_hits *hits);
+bst_status bst_cosmic_rays_create(bst_ctx *ctx, const bst_detector_cosmic_ray_config *config,
+                                  int width, int height, int stride,
+                                  bst_cosmic_rays **out) BST_MUST_CHECK;
+void bst_cosmic_rays_free(bst_cosmic_rays *hits);
 
 /* The hits of one exposure, keyed by it; *pixels are borrowed until the next call, each index once,
  * in ascending order.
@@ -33,8 +34,9 @@ void bst_hits_free(bst_hits *hits);
  * through the layer (length depth / mu, on the sensor depth sqrt(1/mu^2 - 1)) and leaves the same
  * charge per length in all its pixels: e_per_um (1 + straggling m), m a Moyal deviate -ln z^2
  * (Moyal 1955), cut at 0. BST_ERR_CONFIG for more than a million hits. */
-bst_status bst_hits_draw(bst_ctx *ctx, bst_hits *hits, bst_rng_key key, int64_t exposure_id,
-                         double collect_s, const bst_hit_pixel **pixels,
-                         bst_hits_summary *summary) BST_MUST_CHECK;
+bst_status bst_cosmic_rays_draw(bst_ctx *ctx, bst_cosmic_rays *hits, bst_rng_key key,
+                                int64_t exposure_id, double collect_s,
+                                const bst_cosmic_rays_pixel **pixels,
+                                bst_cosmic_rays_summary *summary) BST_MUST_CHECK;
 
 #endif

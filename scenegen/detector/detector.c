@@ -17,8 +17,8 @@ struct bst_detector {
     cl_mem gain, dark, overlay, offsets, codes, flags;
     cl_mem deposits; /* of the present frame; borrowed */
     cl_kernel deposit_kernel;
-    bst_hits *hits;
-    bst_hits_summary summary;
+    bst_cosmic_rays *hits;
+    bst_cosmic_rays_summary summary;
     float *rows; /* fixed offsets and those of one frame, DN: [2][height] */
 };
 
@@ -106,8 +106,9 @@ static bst_status make_offsets(bst_ctx *ctx, bst_detector *d) {
     d->rows = calloc(2 * height, sizeof *d->rows);
     bst_status status = BST_ERR_MEMORY;
     if (offsets && d->rows) {
-        bst_pattern_offsets(&d->camera, d->pattern, "columns", (int)d->camera.width_px, offsets);
-        bst_pattern_offsets(&d->camera, d->pattern, "rows", (int)height, d->rows);
+        bst_fixed_pattern_noise_offsets(&d->camera, d->pattern, "columns", (int)d->camera.width_px,
+                                        offsets);
+        bst_fixed_pattern_noise_offsets(&d->camera, d->pattern, "rows", (int)height, d->rows);
         memcpy(offsets + d->stride, d->rows, height * sizeof *offsets);
         status = make_buffer(ctx, d, count * sizeof *offsets, offsets, &d->offsets);
     } else {
@@ -122,7 +123,7 @@ static bst_status make_codes(bst_ctx *ctx, bst_detector *d) {
     if (!codes) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a table of codes");
     }
-    bst_status status = bst_pattern_codes(ctx, &d->camera, codes);
+    bst_status status = bst_fixed_pattern_noise_codes(ctx, &d->camera, codes);
     if (status == BST_OK) {
         status = make_buffer(ctx, d, sizeof *codes << d->camera.bits, codes, &d->codes);
     }
@@ -132,11 +133,11 @@ static bst_status make_codes(bst_ctx *ctx, bst_detector *d) {
 
 static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
     const bst_detector_config *c = &d->camera.detector;
-    if (bst_pattern_has_gain(&d->camera)) {
-        BST_TRY(make_map(ctx, d, bst_pattern_gain, &d->gain));
+    if (bst_fixed_pattern_noise_has_gain(&d->camera)) {
+        BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_gain, &d->gain));
     }
-    if (bst_pattern_has_dark(&d->camera)) {
-        BST_TRY(make_map(ctx, d, bst_pattern_dark, &d->dark));
+    if (bst_fixed_pattern_noise_has_dark(&d->camera)) {
+        BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_dark, &d->dark));
     }
     if (has_offsets(c)) {
         BST_TRY(make_offsets(ctx, d));
@@ -146,8 +147,8 @@ static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
     }
     if (c->hits.rate_per_cm2_s > 0.0) {
         BST_TRY(make_map(ctx, d, NULL, &d->overlay));
-        BST_TRY(bst_hits_create(ctx, &c->hits, (int)d->camera.width_px, (int)d->camera.height_px,
-                                d->stride, &d->hits));
+        BST_TRY(bst_cosmic_rays_create(ctx, &c->hits, (int)d->camera.width_px,
+                                       (int)d->camera.height_px, d->stride, &d->hits));
     }
     return BST_OK;
 }
@@ -188,7 +189,7 @@ void bst_detector_free(bst_detector *d) {
     if (d->deposit_kernel) {
         clReleaseKernel(d->deposit_kernel);
     }
-    bst_hits_free(d->hits);
+    bst_cosmic_rays_free(d->hits);
     clReleaseCommandQueue(d->queue);
     clReleaseContext(d->context);
     free(d->rows);
@@ -246,16 +247,16 @@ static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
         "placing radiation hits");
 }
 
-static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
                              int64_t exposure_id, double collect_s) {
-    const bst_hit_pixel *pixels;
-    BST_TRY(bst_hits_draw(ctx, d->hits, key, exposure_id, collect_s, &pixels, &d->summary));
+    const bst_cosmic_rays_pixel *pixels;
+    BST_TRY(bst_cosmic_rays_draw(ctx, d->hits, key, exposure_id, collect_s, &pixels, &d->summary));
     size_t bytes = (size_t)d->summary.pixels * sizeof *pixels;
-    BST_TRY(bst_stage_put(ctx, stage, BST_STAGE_HITS, pixels, bytes, &d->deposits));
+    BST_TRY(bst_upload_ring_put(ctx, stage, BST_STAGE_HITS, pixels, bytes, &d->deposits));
     return deposit(ctx, d, 1.0f);
 }
 
-static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
                              int64_t exposure_id) {
     size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);
     float *sum = d->rows + height;
@@ -264,7 +265,7 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bs
         sum[y] = d->rows[y] + (float)(rms * bst_rng_normal(key, (uint64_t)exposure_id, y));
     }
     cl_mem sent;
-    BST_TRY(bst_stage_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
+    BST_TRY(bst_upload_ring_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
     return bst_device_check(
         ctx,
         clEnqueueCopyBuffer(d->queue, sent, d->offsets, 0, (size_t)d->stride * sizeof(float), bytes,
@@ -272,11 +273,11 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bs
         "sending the rows' offsets");
 }
 
-bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
-                              int64_t exposure_id, double exposure_s) {
+bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage,
+                              bst_rng_key key, int64_t exposure_id, double exposure_s) {
     const bst_detector_config *c = &d->camera.detector;
     uint64_t run = ((uint64_t)key.k[1] << 32) | key.k[0];
-    d->summary = (bst_hits_summary){0};
+    d->summary = (bst_cosmic_rays_summary){0};
     if (d->hits) {
         BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
                            exposure_s + c->hits.frame_s));
@@ -292,6 +293,6 @@ bst_status bst_detector_end(bst_ctx *ctx, bst_detector *d) {
     return deposit(ctx, d, 0.0f);
 }
 
-bst_hits_summary bst_detector_hits(const bst_detector *d) {
+bst_cosmic_rays_summary bst_detector_hits(const bst_detector *d) {
     return d->summary;
 }

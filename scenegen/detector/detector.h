@@ -46,14 +46,14 @@ bst_status bst_detector_set_program(bst_ctx *ctx, bst_detector *detector,
                                     cl_program program) BST_MUST_CHECK;
 
 /* What an exposure brings of its own: radiation hits and the rows' offsets. */
-bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_stage *stage,
+bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_upload_ring *stage,
                               bst_rng_key key, int64_t exposure_id,
                               double exposure_s) BST_MUST_CHECK;
 /* Takes the exposure's hits off again; after the frame's kernels were enqueued. */
 bst_status bst_detector_end(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK;
 
 /* Hits of the latest exposure. */
-bst_hits_summary bst_detector_hits(const bst_detector *detector);
+bst_cosmic_rays_summary bst_detector_hits(const bst_detector *detector);
 
 /* Buffers for the kernels, NULL where the effect is off: gain, dark, overlay, offsets, codes, flags
  * of the frame's pixels. */

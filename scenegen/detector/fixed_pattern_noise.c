@@ -20,12 +20,12 @@ enum {
     DRAW_ROW_OFFSET
 };
 
-bool bst_pattern_has_gain(const bst_camera *camera) {
+bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera) {
     const bst_detector_config *d = &camera->detector;
     return d->prnu_rms > 0.0 || d->prnu_map[0] || d->dead_fraction > 0.0 || d->bad_columns > 0;
 }
 
-bool bst_pattern_has_dark(const bst_camera *camera) {
+bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera) {
     const bst_detector_config *d = &camera->detector;
     return (d->dsnu_rms > 0.0 && camera->dark_current_e_per_s > 0.0) || d->dark_map[0] ||
            d->hot_fraction > 0.0;
@@ -60,8 +60,8 @@ static bst_status load_map(bst_ctx *ctx, const bst_camera *camera, const char *w
     return status;
 }
 
-bst_status bst_pattern_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key, int stride,
-                            float *gain) {
+bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
+                                        int stride, float *gain) {
     const bst_detector_config *d = &camera->detector;
     int width = (int)camera->width_px, height = (int)camera->height_px;
     if (d->prnu_map[0]) {
@@ -91,8 +91,8 @@ bst_status bst_pattern_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key 
     return BST_OK;
 }
 
-bst_status bst_pattern_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key, int stride,
-                            float *dark) {
+bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
+                                        int stride, float *dark) {
     const bst_detector_config *d = &camera->detector;
     double warm = bst_detector_dark_factor(d), mean = bst_camera_dark_e_per_s(camera);
     int width = (int)camera->width_px, height = (int)camera->height_px;
@@ -117,8 +117,8 @@ bst_status bst_pattern_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key 
     return BST_OK;
 }
 
-void bst_pattern_offsets(const bst_camera *camera, bst_rng_key key, const char *which, int count,
-                         float *offsets) {
+void bst_fixed_pattern_noise_offsets(const bst_camera *camera, bst_rng_key key, const char *which,
+                                     int count, float *offsets) {
     bool columns = strcmp(which, "columns") == 0;
     double rms = columns ? camera->detector.column_offset_rms_e : camera->detector.row_offset_rms_e;
     uint64_t draw = columns ? DRAW_COLUMN_OFFSET : DRAW_ROW_OFFSET;
@@ -174,8 +174,8 @@ static bst_status read_table(bst_ctx *ctx, const bst_camera *camera, int *starts
     return status;
 }
 
-bst_status bst_pattern_codes(bst_ctx *ctx, const bst_camera *camera, uint16_t *codes) {
-    const bst_quantisation_config *q = &camera->detector.quantisation;
+bst_status bst_fixed_pattern_noise_codes(bst_ctx *ctx, const bst_camera *camera, uint16_t *codes) {
+    const bst_detector_quantisation_config *q = &camera->detector.quantisation;
     int top = 1 << camera->bits, count = 0;
     int *starts = malloc(65536 * sizeof *starts);
     if (!starts) {

@@ -8,28 +8,28 @@
 #include "sim/optics/camera.h"
 
 /* Whether the camera has such a map. */
-bool bst_pattern_has_gain(const bst_camera *camera);
-bool bst_pattern_has_dark(const bst_camera *camera);
+bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera);
+bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera);
 
 /* Response to light, [height][stride], stride >= width: 1 + prnu_rms z cut at 0, or prnu_map; 0 in
  * dead pixels and bad columns. */
-bst_status bst_pattern_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key, int stride,
-                            float *gain) BST_MUST_CHECK;
+bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
+                                        int stride, float *gain) BST_MUST_CHECK;
 
 /* Dark current at the detector's temperature, e/s, [height][stride]: log-normal of mean
  * dark_current_e_per_s and RMS dsnu_rms times that, or dark_map; hot pixels on top, log-normal
  * about their median. */
-bst_status bst_pattern_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key, int stride,
-                            float *dark) BST_MUST_CHECK;
+bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
+                                        int stride, float *dark) BST_MUST_CHECK;
 
 /* `count` offsets of columns or rows ("columns", "rows"), DN. */
-void bst_pattern_offsets(const bst_camera *camera, bst_rng_key key, const char *which, int count,
-                         float *offsets);
+void bst_fixed_pattern_noise_offsets(const bst_camera *camera, bst_rng_key key, const char *which,
+                                     int count, float *offsets);
 
 /* Number of the frame for each of 2^bits digital numbers of the converter: square root or table.
  * codes: [2^bits]. Square root: code = floor(C sqrt(dn / D) + 1/2), C and D the highest code and
  * number. */
-bst_status bst_pattern_codes(bst_ctx *ctx, const bst_camera *camera,
-                             uint16_t *codes) BST_MUST_CHECK;
+bst_status bst_fixed_pattern_noise_codes(bst_ctx *ctx, const bst_camera *camera,
+                                         uint16_t *codes) BST_MUST_CHECK;
 
 #endif

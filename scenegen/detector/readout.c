@@ -104,7 +104,7 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
 }
 
 /* Starts a kernel whose first argument is the parameters and whose others are buffers. */
-static bst_status start(bst_ctx *ctx, bst_readout *r, int kernel, const bst_scene_params *p,
+static bst_status start(bst_ctx *ctx, bst_readout *r, int kernel, const bst_kernel_frame_params *p,
                         const cl_mem *buffers, cl_uint count, size_t items) {
     cl_kernel k = r->kernels[kernel];
     size_t local = 64; /* left open, a driver may build the kernel anew for each number of items */
@@ -122,10 +122,10 @@ static bst_status start(bst_ctx *ctx, bst_readout *r, int kernel, const bst_scen
 }
 
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *detector,
-                           const bst_scene_params *params, bst_window window, int binning,
+                           const bst_kernel_frame_params *params, bst_window window, int binning,
                            cl_mem frame, cl_mem saturated) {
     bst_window light = bst_readout_light_window(r, window);
-    bst_scene_params p = *params;
+    bst_kernel_frame_params p = *params;
     cl_mem maps[BST_DETECTOR_BUFFERS];
     bst_detector_buffers(detector, maps);
     p.tiles_x0 = light.x0;

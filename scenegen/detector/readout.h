@@ -24,7 +24,7 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *readout, bst_window ligh
 /* Enqueues all that makes a frame from that image. params: of the frame (window, exposure, noise);
  * window: on the sensor, before binning; saturated: room for one int per row of the frame. */
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *readout, const bst_detector *detector,
-                           const bst_scene_params *params, bst_window window, int binning,
+                           const bst_kernel_frame_params *params, bst_window window, int binning,
                            cl_mem frame, cl_mem saturated) BST_MUST_CHECK;
 
 #endif

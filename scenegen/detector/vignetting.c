@@ -3,7 +3,7 @@
 #include <stdio.h>
 
 int bst_vignetting_options(const bst_camera *camera, char *text, size_t bytes) {
-    const bst_vignetting *v = &camera->optics.vignetting;
+    const bst_optics_vignetting *v = &camera->optics.vignetting;
     if (v->model == BST_VIGNETTING_NONE && !(v->limit_px > 0.0)) {
         return snprintf(text, bytes, "%s", "");
     }

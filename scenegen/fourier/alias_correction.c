@@ -7,7 +7,7 @@
 
 enum { PERIODS = 4 };
 
-struct bst_light_wrap {
+struct bst_alias_correction {
     int cells[2]; /* x, y */
     int size[2];  /* of the cells' transform */
     float *room;  /* [size y][2 (size x / 2 + 1)] */
@@ -38,7 +38,7 @@ static int good_size(int least) {
 typedef struct lattice {
     const bst_psf *psf;
     int spectrum;
-    const bst_light_wrap_axis *axis[2];
+    const bst_alias_correction_axis *axis[2];
     int n[2];
     fftwf_complex *data; /* [n y][n x / 2 + 1] */
 } lattice;
@@ -72,7 +72,7 @@ static void fill_rows(void *user, int begin, int end) {
 
 /* Puts the kernel for displacements within the cells into the transform's room; returns the largest
  * value for displacements within the used range. */
-static double crop(bst_light_wrap *w, const lattice *l) {
+static double crop(bst_alias_correction *w, const lattice *l) {
     const float *image = (const float *)l->data;
     double largest = 0.0;
     memset(w->room, 0, sizeof(float) * (size_t)w->size[1] * (size_t)padded(w->size[0]));
@@ -93,7 +93,7 @@ static double crop(bst_light_wrap *w, const lattice *l) {
     return largest;
 }
 
-static bst_status make_kernel(bst_ctx *ctx, bst_light_wrap *w, lattice *l, bst_parallel *pool,
+static bst_status make_kernel(bst_ctx *ctx, bst_alias_correction *w, lattice *l, bst_parallel *pool,
                               double *largest) {
     fftwf_plan plan =
         fftwf_plan_dft_c2r_2d(l->n[1], l->n[0], l->data, (float *)l->data, FFTW_ESTIMATE);
@@ -114,11 +114,12 @@ static bst_status make_kernel(bst_ctx *ctx, bst_light_wrap *w, lattice *l, bst_p
     return BST_OK;
 }
 
-bst_status bst_light_wrap_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
-                                 const bst_light_wrap_axis *x, const bst_light_wrap_axis *y,
-                                 bst_parallel *pool, bst_light_wrap **out) {
+bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
+                                       const bst_alias_correction_axis *x,
+                                       const bst_alias_correction_axis *y, bst_parallel *pool,
+                                       bst_alias_correction **out) {
     *out = NULL;
-    bst_light_wrap *w = calloc(1, sizeof *w);
+    bst_alias_correction *w = calloc(1, sizeof *w);
     lattice l = {psf, spectrum, {x, y}, {0, 0}, NULL};
     if (!w) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
@@ -145,14 +146,14 @@ bst_status bst_light_wrap_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
     }
     fftwf_free(l.data);
     if (status != BST_OK || largest * x->used_px * y->used_px < 1e-7) {
-        bst_light_wrap_free(w);
+        bst_alias_correction_free(w);
         return status;
     }
     *out = w;
     return BST_OK;
 }
 
-void bst_light_wrap_free(bst_light_wrap *w) {
+void bst_alias_correction_free(bst_alias_correction *w) {
     if (w) {
         fftwf_destroy_plan(w->forward);
         fftwf_destroy_plan(w->inverse);
@@ -162,7 +163,7 @@ void bst_light_wrap_free(bst_light_wrap *w) {
     }
 }
 
-void bst_light_wrap_run(bst_light_wrap *w, float *light) {
+void bst_alias_correction_run(bst_alias_correction *w, float *light) {
     int pitch = padded(w->size[0]);
     size_t count = (size_t)w->size[1] * (size_t)pitch;
     memset(w->room, 0, sizeof(float) * count);

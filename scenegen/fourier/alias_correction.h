@@ -12,25 +12,26 @@
 #include "sim/core/parallel.h"
 #include "sim/optics/psf.h"
 
-typedef struct bst_light_wrap bst_light_wrap;
+typedef struct bst_alias_correction bst_alias_correction;
 
 /* One axis: `cells` cells of cell_px cover the period of `pixels` px; light may sit on, and is
  * wanted on, `used_px` of them. */
-typedef struct bst_light_wrap_axis {
+typedef struct bst_alias_correction_axis {
     int pixels, cells;
     double cell_px;
     double used_px;
-} bst_light_wrap_axis;
+} bst_alias_correction_axis;
 
 /* The field's nodes are taken together, of one of the PSF's spectra. *out is NULL where so little
  * light wraps that a frame's sum stays right to 1e-7. */
-bst_status bst_light_wrap_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
-                                 const bst_light_wrap_axis *x, const bst_light_wrap_axis *y,
-                                 bst_parallel *pool, bst_light_wrap **out) BST_MUST_CHECK;
-void bst_light_wrap_free(bst_light_wrap *wrap);
+bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
+                                       const bst_alias_correction_axis *x,
+                                       const bst_alias_correction_axis *y, bst_parallel *pool,
+                                       bst_alias_correction **out) BST_MUST_CHECK;
+void bst_alias_correction_free(bst_alias_correction *wrap);
 
 /* light: electrons per cell, [y cells][x cells]; replaced by what is to be added to a pixel at each
  * cell's centre. */
-void bst_light_wrap_run(bst_light_wrap *wrap, float *light);
+void bst_alias_correction_run(bst_alias_correction *wrap, float *light);
 
 #endif

@@ -32,19 +32,19 @@ static double frequency(const lattice *l, int i) {
 
 /* Transforms of the alias of order 1 over the kernel's own, at the lattice's frequencies along an
  * axis. A point between the samples turns its phase and nothing else. */
-static void find_aliases(lattice *l, const bst_light_axis *axis, int a) {
+static void find_aliases(lattice *l, const bst_fourier_axis *axis, int a) {
     double density = (double)axis->samples / axis->pixels;
-    double whole = bst_spread_transform(&axis->spread, 0.0);
+    double whole = bst_nufft_kernel_transform(&axis->spread, 0.0);
     for (int i = 0; i < LATTICE; i++) {
         double nu = frequency(l, i) / density;
-        double own = fabs(bst_spread_transform(&axis->spread, nu));
+        double own = fabs(bst_nufft_kernel_transform(&axis->spread, nu));
         /* beyond the grid's band all is lost */
-        l->alias[a][i] =
-            fabs(nu) >= 0.5
-                ? 1.0
-                : fmin(
-                      (fabs(bst_spread_transform(&axis->spread, nu + 1.0)) + ROUNDED * whole) / own,
-                      1.0);
+        l->alias[a][i] = fabs(nu) >= 0.5
+                             ? 1.0
+                             : fmin((fabs(bst_nufft_kernel_transform(&axis->spread, nu + 1.0)) +
+                                     ROUNDED * whole) /
+                                        own,
+                                    1.0);
     }
 }
 
@@ -77,7 +77,7 @@ static void make_image(lattice *l, int node, int what) {
 #define SAFE 1.7
 
 /* Raises the errors of the classes by those of a field node. */
-static void take_node(lattice *l, int node, double peak, bst_light_error *out) {
+static void take_node(lattice *l, int node, double peak, bst_fourier_error *out) {
     double top = 0.0;
     for (int what = 0; what < IMAGES; what++) {
         make_image(l, node, what);
@@ -98,14 +98,14 @@ static void take_node(lattice *l, int node, double peak, bst_light_error *out) {
     }
 }
 
-bst_status bst_light_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_light_band *band,
-                                   const bst_light_axis axis[2], bst_light_error *out) {
+bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_fourier_band *band,
+                                     const bst_fourier_axis axis[2], bst_fourier_error *out) {
     lattice l = {.psf = psf,
                  .step = 2.0 * fmax(bst_psf_cutoff(psf), band->cutoff) / LATTICE,
                  .cutoff = band->cutoff,
                  .room = fftw_malloc(sizeof *l.room * SIDE * SIDE),
                  .image = fftw_malloc(sizeof *l.image * IMAGES * SIDE * SIDE)};
-    *out = (bst_light_error){{0.0}};
+    *out = (bst_fourier_error){{0.0}};
     if (l.room && l.image) {
         l.plan = fftw_plan_dft_2d(SIDE, SIDE, l.room, l.room, FFTW_BACKWARD, FFTW_ESTIMATE);
     }
@@ -125,8 +125,8 @@ bst_status bst_light_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_l
     return status;
 }
 
-double bst_light_error_sigma(const bst_light_error *error, bool wings, double peak_e,
-                             double dark_variance_e2) {
+double bst_fourier_error_sigma(const bst_fourier_error *error, bool wings, double peak_e,
+                               double dark_variance_e2) {
     double worst = 0.0, light_e = peak_e;
     for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
         light_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;

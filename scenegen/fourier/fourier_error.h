@@ -8,19 +8,19 @@
  * last one all that is less. */
 enum { BST_LIGHT_CLASSES = 20 };
 
-typedef struct bst_light_error {
+typedef struct bst_fourier_error {
     double most[BST_LIGHT_CLASSES]; /* error of a pixel of the class, over the PSF's peak */
-} bst_light_error;
+} bst_fourier_error;
 
 /* The largest errors for any place of the point between the grid's samples, of all field nodes.
  * axis: along x and y. BST_ERR_MEMORY. */
-bst_status bst_light_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_light_band *band,
-                                   const bst_light_axis axis[2],
-                                   bst_light_error *out) BST_MUST_CHECK;
+bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_fourier_band *band,
+                                     const bst_fourier_axis axis[2],
+                                     bst_fourier_error *out) BST_MUST_CHECK;
 
 /* Error of the worst pixel, in its sigma, of a point with `peak_e` electrons in its brightest pixel
  * on noise of variance dark_variance_e2; of its wings alone, if so asked. */
-double bst_light_error_sigma(const bst_light_error *error, bool wings, double peak_e,
-                             double dark_variance_e2);
+double bst_fourier_error_sigma(const bst_fourier_error *error, bool wings, double peak_e,
+                               double dark_variance_e2);
 
 #endif

@@ -32,7 +32,7 @@ static double modulus(const bst_psf *psf, int node, double fx, double fy) {
 
 /* The band is cut where what lies beyond is a `tolerance` of the peak's bound. The pixel's own sinc
  * keeps this finite for optics that pass far more than the pixels resolve. */
-static void find_cutoff(const bst_psf *psf, double tolerance, bst_light_band *out) {
+static void find_cutoff(const bst_psf *psf, double tolerance, bst_fourier_band *out) {
     enum { RINGS = 256, SECTORS = 24 };
     double most = bst_psf_cutoff(psf), step = most / RINGS, ring[RINGS], total = 0.0;
     for (int i = 0; i < RINGS; i++) {
@@ -78,7 +78,7 @@ static double binned(double f, int binning) {
  * derivatives are at most the sums of moduli, and its peak is at least what binned pixels about the
  * PSF's peak have. */
 static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
-                          bst_light_band *out) {
+                          bst_fourier_band *out) {
     enum { SIDE = LATTICE / 2 };
     double along[BST_PIXEL_PARTS][DIRECTIONS][3];
     double step = 2.0 * out->cutoff / SIDE, top[BST_PIXEL_PARTS] = {0.0};
@@ -116,7 +116,7 @@ static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
 
 /* Peak, sensitivity to coarse nodes and the strength of frequencies along x and y. */
 static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
-                               bst_light_band *out) {
+                               bst_fourier_band *out) {
     double step = 2.0 * out->cutoff / LATTICE, area = step * step, peak = 0.0;
     double(*peak_px)[2] = calloc((size_t)bst_psf_nodes(psf), sizeof *peak_px);
     if (!peak_px) {
@@ -196,7 +196,7 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
 
 /* The smallest distance beyond which the wings, smoothed over a few px, stay below REACH_SHARE. */
 static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
-                                bst_light_band *out) {
+                                bst_fourier_band *out) {
     double step = 1.0 / (WIDE * WIDE_CELL_PX), area = step * step, reach = 0.0;
     enum { RINGS = WIDE };
     double ring[RINGS] = {0.0}; /* by whole cells of distance */
@@ -233,8 +233,8 @@ static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex 
     return BST_OK;
 }
 
-bst_status bst_light_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
-                                  bst_light_band *out) {
+bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
+                                    bst_fourier_band *out) {
     fftwf_complex *room = fftwf_malloc(sizeof *room * IMAGE * IMAGE);
     if (!room) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");
@@ -248,22 +248,23 @@ bst_status bst_light_band_measure(bst_ctx *ctx, const bst_psf *psf, double toler
     return status;
 }
 
-double bst_light_density(const bst_light_band *band, int axis, int taps, double tolerance) {
-    bst_spread spread = {taps, 0.0};
+double bst_fourier_density(const bst_fourier_band *band, int axis, int taps, double tolerance) {
+    bst_nufft_kernel spread = {taps, 0.0};
     double low = fmax(0.5 * band->cutoff, LEAST_DENSITY), high = MOST_DENSITY;
-    if (bst_spread_choose(&spread, &band->axis[axis], high) > tolerance) {
+    if (bst_nufft_kernel_choose(&spread, &band->axis[axis], high) > tolerance) {
         return high;
     }
     for (int k = 0; k < 10; k++) {
         double mid = 0.5 * (low + high);
-        *(bst_spread_choose(&spread, &band->axis[axis], mid) > tolerance ? &low : &high) = mid;
+        *(bst_nufft_kernel_choose(&spread, &band->axis[axis], mid) > tolerance ? &low : &high) =
+            mid;
     }
     return high;
 }
 
-bst_light_axis bst_light_axis_choose(const bst_light_band *band, int axis, int taps, int least,
-                                     double density) {
-    bst_light_axis best = {0};
+bst_fourier_axis bst_fourier_axis_choose(const bst_fourier_band *band, int axis, int taps,
+                                         int least, double density) {
+    bst_fourier_axis best = {0};
     double lowest = INFINITY;
     int most = 32 + least + least / 3;
     for (int pixels = (least + 15) / 16 * 16; pixels <= most; pixels += 16) {
@@ -282,7 +283,7 @@ bst_light_axis bst_light_axis_choose(const bst_light_band *band, int axis, int t
         }
     }
     best.spread.taps = taps;
-    best.error =
-        bst_spread_choose(&best.spread, &band->axis[axis], (double)best.samples / best.pixels);
+    best.error = bst_nufft_kernel_choose(&best.spread, &band->axis[axis],
+                                         (double)best.samples / best.pixels);
     return best;
 }

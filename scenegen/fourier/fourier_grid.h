@@ -11,7 +11,7 @@
 enum { BST_PIXEL_PARTS = 8 };
 
 /* Independent of the window. */
-typedef struct bst_light_band {
+typedef struct bst_fourier_band {
     double cutoff;        /* cycles/px that are kept */
     double lost;          /* bound of the error of those that are not, over the PSF's peak */
     double peak;          /* largest share of a point's light in one pixel */
@@ -24,27 +24,27 @@ typedef struct bst_light_band {
     double share_sigma_px; /* of the Gaussian with the same peak */
     int reach_px;          /* beyond, a pixel gets less than 3e-7 of a point's light (16 to 160) */
     double beyond;         /* largest share of a point's light in a pixel beyond that */
-    bst_spread_band axis[2];
-} bst_light_band;
+    bst_nufft_kernel_band axis[2];
+} bst_fourier_band;
 
 /* Takes all field nodes together. BST_ERR_MEMORY. */
-bst_status bst_light_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
-                                  bst_light_band *out) BST_MUST_CHECK;
+bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
+                                    bst_fourier_band *out) BST_MUST_CHECK;
 
 /* One axis of a grid: a period of `pixels` px that `samples` samples cover. */
-typedef struct bst_light_axis {
+typedef struct bst_fourier_axis {
     int pixels, samples;
-    bst_spread spread;
+    bst_nufft_kernel spread;
     double error; /* bound, over the PSF's peak */
-} bst_light_axis;
+} bst_fourier_axis;
 
 /* Samples per px that an axis needs (axis 0: x, 1: y) for an error below `tolerance` of the PSF's
  * peak, at most 5. */
-double bst_light_density(const bst_light_band *band, int axis, int taps, double tolerance);
+double bst_fourier_density(const bst_fourier_band *band, int axis, int taps, double tolerance);
 
 /* Sizes with quick FFTs, for at least `least` px at `density` samples per px or more; lines are
  * transformed along x or y. */
-bst_light_axis bst_light_axis_choose(const bst_light_band *band, int axis, int taps, int least,
-                                     double density);
+bst_fourier_axis bst_fourier_axis_choose(const bst_fourier_band *band, int axis, int taps,
+                                         int least, double density);
 
 #endif

@@ -27,19 +27,19 @@ static const double FINER = 1.0 / 16.0;
 typedef struct setup {
     int width, height, quality;
     long long used; /* number of the call that used it last */
-    bst_light_fft *fft;
+    bst_otf_convolve *fft;
     cl_mem table; /* [2][BST_SPREAD_TABLE] */
     cl_mem grid;
 } setup;
 
-struct bst_fft_light {
+struct bst_fourier_render {
     bst_camera camera;
     const bst_psf *psf;
-    bst_fft_light_options options;
-    bst_light_band band;
+    bst_fourier_render_options options;
+    bst_fourier_band band;
     double density[QUALITIES][2];
     /* of any window, and of the whole sensor, whose grid is denser */
-    bst_light_error error[QUALITIES][2];
+    bst_fourier_error error[QUALITIES][2];
     double widest; /* widening of nodes that the spreading kernel takes, of the node variance */
     int margin;
     bst_parallel *pool;
@@ -53,13 +53,14 @@ struct bst_fft_light {
     cl_mem *fields;                           /* [field_nodes] */
 };
 
-bst_fft_light_options bst_fft_light_default_options(void) {
-    return (bst_fft_light_options){.taps = 8, .tolerance = 3e-5};
+bst_fourier_render_options bst_fourier_render_default_options(void) {
+    return (bst_fourier_render_options){.taps = 8, .tolerance = 3e-5};
 }
 
 /* Tiles for the deposit, and threads for the transforms: as many as the device has, if it is the
  * host's processor. */
-static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fft_light *l, int *threads) {
+static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fourier_render *l,
+                               int *threads) {
     cl_device_type type = 0;
     cl_ulong local_bytes = 0;
     cl_uint units = 0;
@@ -81,9 +82,9 @@ static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fft_light *
     return BST_OK;
 }
 
-static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
-    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
-                                          &bst_kernel_deposit_shared, &bst_kernel_deposit};
+static bst_status build(bst_ctx *ctx, bst_device *device, bst_fourier_render *l) {
+    const bst_device_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
+                                                 &bst_kernel_deposit_shared, &bst_kernel_deposit};
     char options[1024];
     int length = snprintf(
         options, sizeof options,
@@ -100,7 +101,7 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
 }
 
 /* The field nodes' weights on a lattice, which the kernel interpolates again. */
-static bst_status make_fields(bst_ctx *ctx, bst_fft_light *l) {
+static bst_status make_fields(bst_ctx *ctx, bst_fourier_render *l) {
     l->field_x = (int)l->camera.width_px / FIELD_STEP_PX + 2;
     l->field_y = (int)l->camera.height_px / FIELD_STEP_PX + 2;
     size_t places = (size_t)l->field_x * (size_t)l->field_y;
@@ -136,42 +137,42 @@ static bst_status make_fields(bst_ctx *ctx, bst_fft_light *l) {
 }
 
 /* The grid of a window of so many pixels. */
-static void choose_axes(const bst_fft_light *l, int quality, int width, int height,
-                        bst_light_axis axis[2]) {
+static void choose_axes(const bst_fourier_render *l, int quality, int width, int height,
+                        bst_fourier_axis axis[2]) {
     /* the least distance from which wings wrap around; nearer ones are not smooth */
     int taps = l->options.taps, pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
-    axis[0] = bst_light_axis_choose(&l->band, 0, taps, width + pad, l->density[quality][0]);
-    axis[1] = bst_light_axis_choose(&l->band, 1, taps, height + pad, l->density[quality][1]);
+    axis[0] = bst_fourier_axis_choose(&l->band, 0, taps, width + pad, l->density[quality][0]);
+    axis[1] = bst_fourier_axis_choose(&l->band, 1, taps, height + pad, l->density[quality][1]);
 }
 
 /* Densities and errors of a grid; widenings that it takes. */
-static bst_status prepare_quality(bst_ctx *ctx, bst_fft_light *l, int quality) {
+static bst_status prepare_quality(bst_ctx *ctx, bst_fourier_render *l, int quality) {
     double tolerance = 0.45 * l->options.tolerance * (quality == FINE ? FINER : 1.0);
-    bst_light_axis axis[2]; /* as sparse as any window's */
+    bst_fourier_axis axis[2]; /* as sparse as any window's */
     for (int a = 0; a < 2; a++) {
-        bst_spread spread = {.taps = l->options.taps};
-        bst_spread_shape shape;
-        double density = bst_light_density(&l->band, a, l->options.taps, tolerance);
+        bst_nufft_kernel spread = {.taps = l->options.taps};
+        bst_nufft_kernel_shape shape;
+        double density = bst_fourier_density(&l->band, a, l->options.taps, tolerance);
         l->density[quality][a] = density;
-        (void)bst_spread_choose(&spread, &l->band.axis[a], density);
-        axis[a] = (bst_light_axis){DENSITY_PX, (int)floor(DENSITY_PX * density), spread, 0.0};
+        (void)bst_nufft_kernel_choose(&spread, &l->band.axis[a], density);
+        axis[a] = (bst_fourier_axis){DENSITY_PX, (int)floor(DENSITY_PX * density), spread, 0.0};
         double sigma = l->band.node_sigma_px * density;
-        while (bst_spread_widen(&spread, &l->band.axis[a], density, l->widest * sigma * sigma,
-                                &shape) > WIDEN_ERROR) {
+        while (bst_nufft_kernel_widen(&spread, &l->band.axis[a], density, l->widest * sigma * sigma,
+                                      &shape) > WIDEN_ERROR) {
             l->widest *= 0.8;
         }
     }
-    BST_TRY(bst_light_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][0]));
+    BST_TRY(bst_fourier_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][0]));
     choose_axes(l, quality, (int)l->camera.width_px, (int)l->camera.height_px, axis);
-    return bst_light_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][1]);
+    return bst_fourier_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][1]);
 }
 
-static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
+static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *l) {
     int threads;
     BST_TRY(choose_tiles(ctx, device, l, &threads));
     BST_TRY(bst_parallel_create(ctx, threads, &l->pool));
     BST_TRY(build(ctx, device, l));
-    BST_TRY(bst_light_band_measure(ctx, l->psf, 0.1 * l->options.tolerance, &l->band));
+    BST_TRY(bst_fourier_band_measure(ctx, l->psf, 0.1 * l->options.tolerance, &l->band));
     l->widest = BST_WIDEST;
     l->margin = (l->band.reach_px + 15) / 16 * 16;
     for (int q = 0; q < QUALITIES; q++) {
@@ -180,18 +181,18 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
     return make_fields(ctx, l);
 }
 
-bst_status bst_fft_light_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
-                                const bst_psf *psf, const bst_fft_light_options *options,
-                                bst_fft_light **out) {
+bst_status bst_fourier_render_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                                     const bst_psf *psf, const bst_fourier_render_options *options,
+                                     bst_fourier_render **out) {
     *out = NULL;
-    bst_fft_light_options o = options ? *options : bst_fft_light_default_options();
+    bst_fourier_render_options o = options ? *options : bst_fourier_render_default_options();
     if ((o.taps != 4 && o.taps != 6 && o.taps != 8) || !(o.tolerance > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a spreading kernel of %d taps for a tolerance of %g: allowed are 4, 6 and "
                         "8 taps and tolerances above 0",
                         o.taps, o.tolerance);
     }
-    bst_fft_light *l = calloc(1, sizeof *l);
+    bst_fourier_render *l = calloc(1, sizeof *l);
     if (!l) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for light through a general PSF");
     }
@@ -207,7 +208,7 @@ bst_status bst_fft_light_create(bst_ctx *ctx, bst_device *device, const bst_came
     clRetainContext(l->context);
     bst_status status = prepare(ctx, device, l);
     if (status != BST_OK) {
-        bst_fft_light_free(l);
+        bst_fourier_render_free(l);
         return status;
     }
     *out = l;
@@ -222,13 +223,13 @@ static void release(cl_mem *buffer) {
 }
 
 static void free_setup(setup *s) {
-    bst_light_fft_free(s->fft);
+    bst_otf_convolve_free(s->fft);
     release(&s->table);
     release(&s->grid);
     *s = (setup){0};
 }
 
-void bst_fft_light_free(bst_fft_light *l) {
+void bst_fourier_render_free(bst_fourier_render *l) {
     if (!l) {
         return;
     }
@@ -250,71 +251,73 @@ void bst_fft_light_free(bst_fft_light *l) {
     free(l);
 }
 
-const bst_light_band *bst_fft_light_band(const bst_fft_light *l) {
+const bst_fourier_band *bst_fourier_render_band(const bst_fourier_render *l) {
     return &l->band;
 }
 
-int bst_fft_light_margin_px(const bst_fft_light *l) {
+int bst_fourier_render_margin_px(const bst_fourier_render *l) {
     return l->margin;
 }
 
-double bst_fft_light_density(const bst_fft_light *l) {
+double bst_fourier_render_density(const bst_fourier_render *l) {
     return fmin(l->density[PLAIN][0], l->density[PLAIN][1]);
 }
 
-void bst_fft_light_stamp(const bst_fft_light *l, bst_scene_source *source) {
-    double least = bst_fft_light_density(l);
+void bst_fourier_render_stamp(const bst_fourier_render *l, bst_kernel_source_record *source) {
+    double least = bst_fourier_render_density(l);
     source->radius = (int)ceil(0.5 * l->options.taps / least) + 1;
 }
 
-double bst_fft_light_widest(const bst_fft_light *l) {
+double bst_fourier_render_widest(const bst_fourier_render *l) {
     return l->widest;
 }
 
-int bst_fft_light_spectra(const bst_fft_light *l) {
+int bst_fourier_render_spectra(const bst_fourier_render *l) {
     return l->nodes / l->field_nodes;
 }
 
-double bst_fft_light_error_sigma(const bst_fft_light *l, bool fine, bool wings, bst_window window,
-                                 double peak_e, double dark_variance_e2) {
+double bst_fourier_render_error_sigma(const bst_fourier_render *l, bool fine, bool wings,
+                                      bst_window window, double peak_e, double dark_variance_e2) {
     bool whole = window.width == l->camera.width_px && window.height == l->camera.height_px;
-    return bst_light_error_sigma(&l->error[fine ? FINE : PLAIN][whole], wings, peak_e,
-                                 dark_variance_e2);
+    return bst_fourier_error_sigma(&l->error[fine ? FINE : PLAIN][whole], wings, peak_e,
+                                   dark_variance_e2);
 }
 
-double bst_fft_light_mixing_error(const bst_fft_light *l) {
+double bst_fourier_render_mixing_error(const bst_fourier_render *l) {
     return bst_psf_mixing_error(l->psf);
 }
 
 /* Table of the spreading kernel for a point `phase` samples right of sample taps / 2 - 1, and of
  * kernels for nodes that are wider by (n / BST_WIDTHS)^2 BST_WIDEST of the node variance. */
-static void tabulate(const bst_fft_light *l, int a, const bst_light_axis *axis, float *table) {
+static void tabulate(const bst_fourier_render *l, int a, const bst_fourier_axis *axis,
+                     float *table) {
     double density = (double)axis->samples / axis->pixels;
     int first = BST_SPREAD_TAPS / 2 - axis->spread.taps / 2;
     memset(table, 0, BST_SPREAD_TABLE * sizeof *table);
     for (int n = 0; n <= BST_WIDTHS; n++) {
         double share = (double)n / BST_WIDTHS, sigma = share * l->band.node_sigma_px * density;
         double variance = BST_WIDEST * sigma * sigma;
-        bst_spread_shape shape;
-        bst_spread_widen(&axis->spread, &l->band.axis[a], density, variance, &shape);
+        bst_nufft_kernel_shape shape;
+        bst_nufft_kernel_widen(&axis->spread, &l->band.axis[a], density, variance, &shape);
         for (int p = 0; p <= BST_SPREAD_PHASES; p++) {
             float *row = table + (n * (BST_SPREAD_PHASES + 1) + p) * BST_SPREAD_TAPS;
             for (int j = first; j < first + axis->spread.taps; j++) {
                 double t = j - (BST_SPREAD_TAPS / 2 - 1) - (double)p / BST_SPREAD_PHASES;
-                row[j] = (float)bst_spread_shape_value(&axis->spread, &shape, t);
+                row[j] = (float)bst_nufft_kernel_shape_value(&axis->spread, &shape, t);
             }
         }
     }
 }
 
-static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_window window,
+static bst_status make_setup(bst_ctx *ctx, bst_fourier_render *l, int quality, bst_window window,
                              setup *s) {
-    bst_light_shape shape = {.width = window.width, .height = window.height, .margin = l->margin};
-    bst_light_axis axis[2];
+    bst_otf_convolve_layout shape = {
+        .width = window.width, .height = window.height, .margin = l->margin};
+    bst_fourier_axis axis[2];
     choose_axes(l, quality, window.width, window.height, axis);
     shape.x = axis[0];
     shape.y = axis[1];
-    BST_TRY(bst_light_fft_create(ctx, l->psf, l->band.cutoff, &shape, l->pool, &s->fft));
+    BST_TRY(bst_otf_convolve_create(ctx, l->psf, l->band.cutoff, &shape, l->pool, &s->fft));
     s->width = window.width;
     s->height = window.height;
     s->quality = quality;
@@ -330,12 +333,12 @@ static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_wi
                               table, &code);
     free(table);
     BST_TRY(bst_device_check(ctx, code, "allocating the spreading kernel's table"));
-    size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
+    size_t bytes = bst_otf_convolve_floats(s->fft) * sizeof(float);
     return bst_device_buffer(ctx, l->context, bytes, NULL, "allocating the light's grid", &s->grid);
 }
 
 /* The setup for a window's size; an old one makes room for a new one. */
-static bst_status find_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_window window,
+static bst_status find_setup(bst_ctx *ctx, bst_fourier_render *l, int quality, bst_window window,
                              setup **out) {
     setup *oldest = &l->setups[0];
     l->calls++;
@@ -360,9 +363,10 @@ static bst_status find_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_wi
     return BST_OK;
 }
 
-static bst_status deposit(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue, bst_window window,
-                          const bst_fft_light_nodes *nodes, const setup *s, int node) {
-    const bst_light_shape *shape = bst_light_fft_shape(s->fft);
+static bst_status deposit(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue queue,
+                          bst_window window, const bst_fourier_render_nodes *nodes, const setup *s,
+                          int node) {
+    const bst_otf_convolve_layout *shape = bst_otf_convolve_shape(s->fft);
     bst_deposit_params p = {
         .x0 = (float)(window.x0 - shape->margin),
         .y0 = (float)(window.y0 - shape->margin),
@@ -401,25 +405,25 @@ static bst_status deposit(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue
         "spreading the light's nodes");
 }
 
-bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue,
-                                bst_window window, const bst_fft_light_nodes *nodes,
-                                bst_fft_light_image *out) {
+bst_status bst_fourier_render_frame(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue queue,
+                                    bst_window window, const bst_fourier_render_nodes *nodes,
+                                    bst_fourier_render_image *out) {
     setup *s;
     BST_TRY(find_setup(ctx, l, nodes->fine ? FINE : PLAIN, window, &s));
-    size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
+    size_t bytes = bst_otf_convolve_floats(s->fft) * sizeof(float);
     for (int n = 0; n < l->nodes; n++) {
         BST_TRY(deposit(ctx, l, queue, window, nodes, s, n));
         cl_int code;
         float *grid = clEnqueueMapBuffer(queue, s->grid, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE, 0,
                                          bytes, 0, NULL, NULL, &code);
         BST_TRY(bst_device_check(ctx, code, "mapping the light's grid"));
-        bst_light_fft_add(s->fft, n, n == 0, n == l->nodes - 1, grid);
+        bst_otf_convolve_add(s->fft, n, n == 0, n == l->nodes - 1, grid);
         if (n == l->nodes - 1) {
-            bst_light_fft_finish(s->fft, grid);
+            bst_otf_convolve_finish(s->fft, grid);
         }
         BST_TRY(bst_device_check(ctx, clEnqueueUnmapMemObject(queue, s->grid, grid, 0, NULL, NULL),
                                  "unmapping the light's grid"));
     }
-    *out = (bst_fft_light_image){s->grid, 0, bst_light_fft_pitch(s->fft)};
+    *out = (bst_fourier_render_image){s->grid, 0, bst_otf_convolve_pitch(s->fft)};
     return BST_OK;
 }

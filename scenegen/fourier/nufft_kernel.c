@@ -6,12 +6,12 @@
 
 enum { QUADRATURE = 40, TRIALS = 16 };
 
-double bst_spread_value(const bst_spread *spread, double t) {
+double bst_nufft_kernel_value(const bst_nufft_kernel *spread, double t) {
     double z = 2.0 * t / spread->taps, q = 1.0 - z * z;
     return q > 0.0 ? exp(spread->beta * (sqrt(q) - 1.0)) : 0.0;
 }
 
-double bst_spread_transform(const bst_spread *spread, double nu) {
+double bst_nufft_kernel_transform(const bst_nufft_kernel *spread, double nu) {
     /* t = taps / 2 sin(a): the midpoint rule in a converges exponentially down to exp(-beta) */
     double half = 0.5 * spread->taps, sum = 0.0;
     for (int i = 0; i < QUADRATURE; i++) {
@@ -22,7 +22,8 @@ double bst_spread_transform(const bst_spread *spread, double nu) {
 }
 
 /* Error of one choice: what the neighbouring bands leak into the PSF's frequencies. */
-static double leak(const bst_spread *spread, const bst_spread_band *band, double density) {
+static double leak(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
+                   double density) {
     double sum = 0.0;
     for (int i = 0; i < BST_SPREAD_BINS; i++) {
         double nu = (i + 0.5) * band->step / density;
@@ -33,17 +34,18 @@ static double leak(const bst_spread *spread, const bst_spread_band *band, double
             sum += band->weight[i];
             continue;
         }
-        double own = fabs(bst_spread_transform(spread, nu)), others = 0.0;
+        double own = fabs(bst_nufft_kernel_transform(spread, nu)), others = 0.0;
         for (int m = 1; m <= 2; m++) {
-            others += fabs(bst_spread_transform(spread, nu - m)) +
-                      fabs(bst_spread_transform(spread, nu + m));
+            others += fabs(bst_nufft_kernel_transform(spread, nu - m)) +
+                      fabs(bst_nufft_kernel_transform(spread, nu + m));
         }
         sum += band->weight[i] * fmin(others / own, 2.0);
     }
     return sum;
 }
 
-double bst_spread_choose(bst_spread *spread, const bst_spread_band *band, double density) {
+double bst_nufft_kernel_choose(bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
+                               double density) {
     double best = INFINITY, beta = 0.0;
     for (int n = 0; n < TRIALS; n++) {
         spread->beta = spread->taps * (0.8 + 1.8 * n / (TRIALS - 1));
@@ -58,7 +60,7 @@ double bst_spread_choose(bst_spread *spread, const bst_spread_band *band, double
 }
 
 /* Transforms of phi(t) z^(2k) at nu, k = 0 to 2. */
-static void transforms(const bst_spread *spread, double nu, double out[3]) {
+static void transforms(const bst_nufft_kernel *spread, double nu, double out[3]) {
     double half = 0.5 * spread->taps;
     out[0] = out[1] = out[2] = 0.0;
     for (int i = 0; i < QUADRATURE; i++) {
@@ -70,14 +72,15 @@ static void transforms(const bst_spread *spread, double nu, double out[3]) {
     }
 }
 
-double bst_spread_shape_value(const bst_spread *spread, const bst_spread_shape *shape, double t) {
+double bst_nufft_kernel_shape_value(const bst_nufft_kernel *spread,
+                                    const bst_nufft_kernel_shape *shape, double t) {
     double z = 2.0 * t / spread->taps, q = z * z;
-    return bst_spread_value(spread, t) * (shape->c[0] + q * (shape->c[1] + q * shape->c[2]));
+    return bst_nufft_kernel_value(spread, t) * (shape->c[0] + q * (shape->c[1] + q * shape->c[2]));
 }
 
-double bst_spread_widen(const bst_spread *spread, const bst_spread_band *band, double density,
-                        double variance, bst_spread_shape *out) {
-    *out = (bst_spread_shape){{1.0, 0.0, 0.0}};
+double bst_nufft_kernel_widen(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
+                              double density, double variance, bst_nufft_kernel_shape *out) {
+    *out = (bst_nufft_kernel_shape){{1.0, 0.0, 0.0}};
     if (!(variance > 0.0)) {
         return 0.0;
     }
@@ -102,7 +105,7 @@ double bst_spread_widen(const bst_spread *spread, const bst_spread_band *band, d
     double det = normal[0][0] * normal[1][1] - normal[0][1] * normal[1][0];
     double c1 = (right[0] * normal[1][1] - right[1] * normal[0][1]) / det;
     double c2 = (normal[0][0] * right[1] - normal[1][0] * right[0]) / det;
-    *out = (bst_spread_shape){{1.0 - (c1 * zero[1] + c2 * zero[2]) / zero[0], c1, c2}};
+    *out = (bst_nufft_kernel_shape){{1.0 - (c1 * zero[1] + c2 * zero[2]) / zero[0], c1, c2}};
     double error = 0.0;
     for (int i = 0; i < BST_SPREAD_BINS; i++) {
         error += band->weight[i] * fabs(c1 * a[i][0] + c2 * a[i][1] - aim[i]);

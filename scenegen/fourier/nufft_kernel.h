@@ -7,39 +7,41 @@
 #ifndef BST_SCENEGEN_FOURIER_NUFFT_KERNEL_H
 #define BST_SCENEGEN_FOURIER_NUFFT_KERNEL_H
 
-typedef struct bst_spread {
+typedef struct bst_nufft_kernel {
     int taps; /* 2 to 8 samples per axis */
     double beta;
-} bst_spread;
+} bst_nufft_kernel;
 
-double bst_spread_value(const bst_spread *spread, double t);
+double bst_nufft_kernel_value(const bst_nufft_kernel *spread, double t);
 
 /* Integral of phi(t) cos(2 pi nu t) dt, nu in cycles per sample. */
-double bst_spread_transform(const bst_spread *spread, double nu);
+double bst_nufft_kernel_transform(const bst_nufft_kernel *spread, double nu);
 
 /* The strength of a PSF's frequencies along one axis: weight[i], summing to 1, at
  * (i + 1/2) * step cycles/px. */
 enum { BST_SPREAD_BINS = 48 };
-typedef struct bst_spread_band {
+typedef struct bst_nufft_kernel_band {
     double step;
     double weight[BST_SPREAD_BINS];
-} bst_spread_band;
+} bst_nufft_kernel_band;
 
 /* Chooses beta for a grid of `density` samples per px. Returns a bound of the error that the grid
  * brings along this axis, relative to the PSF's peak: aliases and frequencies beyond the grid's
  * band. */
-double bst_spread_choose(bst_spread *spread, const bst_spread_band *band, double density);
+double bst_nufft_kernel_choose(bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
+                               double density);
 
 /* A kernel that also widens: phi(t) (c0 + c1 z^2 + c2 z^4), z = 2 t / taps. */
-typedef struct bst_spread_shape {
+typedef struct bst_nufft_kernel_shape {
     double c[3];
-} bst_spread_shape;
+} bst_nufft_kernel_shape;
 
 /* The coefficients with which the grid shows, after division by phi's own transform, the PSF
  * widened by a Gaussian of `variance` samples^2 (least squares over the band; the
  * light is kept exactly). Returns the error relative to the PSF's peak. */
-double bst_spread_widen(const bst_spread *spread, const bst_spread_band *band, double density,
-                        double variance, bst_spread_shape *out);
-double bst_spread_shape_value(const bst_spread *spread, const bst_spread_shape *shape, double t);
+double bst_nufft_kernel_widen(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
+                              double density, double variance, bst_nufft_kernel_shape *out);
+double bst_nufft_kernel_shape_value(const bst_nufft_kernel *spread,
+                                    const bst_nufft_kernel_shape *shape, double t);
 
 #endif

@@ -16,8 +16,8 @@ static bst_batch *allocate(size_t elements) {
  * two numbers, hence the half. */
 static void fill_table(void *user, int begin, int end) {
     const pass *p = user;
-    const bst_light_fft *f = p->fft;
-    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+    const bst_otf_convolve *f = p->fft;
+    const bst_fourier_axis *x = &f->shape.x, *y = &f->shape.y;
     double area = 0.5 / ((double)x->pixels * y->pixels);
     for (int i = begin; i < end; i++) {
         const strip *s = &f->strips[i];
@@ -40,8 +40,8 @@ static void fill_table(void *user, int begin, int end) {
 }
 
 /* Which frequencies are within the cut-off. */
-static bst_status find_strips(bst_ctx *ctx, bst_light_fft *f) {
-    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+static bst_status find_strips(bst_ctx *ctx, bst_otf_convolve *f) {
+    const bst_fourier_axis *x = &f->shape.x, *y = &f->shape.y;
     f->used = (int)fmin(floor(f->cutoff * x->pixels) + 1.0, 0.5 * x->samples);
     int blocks = (x->pixels / 2 + BLOCK) / BLOCK, folds = f->used / x->pixels + 1;
     size_t most = (size_t)blocks * (2 * (size_t)folds + 1);
@@ -80,8 +80,8 @@ static bst_status find_strips(bst_ctx *ctx, bst_light_fft *f) {
     return BST_OK;
 }
 
-static bst_status make_tables(bst_ctx *ctx, bst_light_fft *f) {
-    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+static bst_status make_tables(bst_ctx *ctx, bst_otf_convolve *f) {
+    const bst_fourier_axis *x = &f->shape.x, *y = &f->shape.y;
     size_t lines = (size_t)y->samples / 2 + 1;
     BST_TRY(find_strips(ctx, f));
     f->kernel_x = malloc((size_t)f->used * sizeof *f->kernel_x);
@@ -90,10 +90,10 @@ static bst_status make_tables(bst_ctx *ctx, bst_light_fft *f) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transfer function");
     }
     for (int c = 0; c < f->used; c++) {
-        f->kernel_x[c] = bst_spread_transform(&x->spread, (double)c / x->samples);
+        f->kernel_x[c] = bst_nufft_kernel_transform(&x->spread, (double)c / x->samples);
     }
     for (size_t k = 0; k < lines; k++) {
-        f->kernel_y[k] = bst_spread_transform(&y->spread, (double)k / y->samples);
+        f->kernel_y[k] = bst_nufft_kernel_transform(&y->spread, (double)k / y->samples);
     }
     for (int n = 0; n < bst_psf_nodes(f->psf); n++) {
         pass p = {.fft = f, .node = n};
@@ -102,12 +102,12 @@ static bst_status make_tables(bst_ctx *ctx, bst_light_fft *f) {
     return BST_OK;
 }
 
-static int longest_line(const bst_light_shape *s) {
+static int longest_line(const bst_otf_convolve_layout *s) {
     int x = s->x.samples > s->x.pixels ? s->x.samples : s->x.pixels;
     return x > s->y.pixels ? x : s->y.pixels;
 }
 
-static bst_status make_benches(bst_ctx *ctx, bst_light_fft *f) {
+static bst_status make_benches(bst_ctx *ctx, bst_otf_convolve *f) {
     size_t rows = (size_t)f->row_blocks * BLOCK;
     /* odd multiples of a block: strips a page's multiple apart would share cache sets */
     f->strip_pitch = rows + (f->row_blocks % 2 == 0 ? BLOCK : 0);
@@ -129,15 +129,15 @@ static bst_status make_benches(bst_ctx *ctx, bst_light_fft *f) {
     return ok ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
 }
 
-static bst_status make_plans(bst_ctx *ctx, bst_light_fft *f) {
+static bst_status make_plans(bst_ctx *ctx, bst_otf_convolve *f) {
     BST_TRY(bst_batch_fft_create(ctx, f->shape.x.samples, &f->row_forward));
     BST_TRY(bst_batch_fft_create(ctx, f->shape.x.pixels, &f->row_inverse));
     BST_TRY(bst_batch_fft_create(ctx, f->shape.y.samples, &f->column_forward));
     return bst_batch_fft_create(ctx, f->shape.y.pixels, &f->column_inverse);
 }
 
-double bst_light_fft_cell_place(const bst_light_fft *f, const bst_light_axis *axis, int cells,
-                                int pixel, int *lower) {
+double bst_otf_convolve_cell_place(const bst_otf_convolve *f, const bst_fourier_axis *axis,
+                                   int cells, int pixel, int *lower) {
     double sample = (pixel + f->shape.margin) * (double)axis->samples / axis->pixels;
     double place = (sample + 0.5) / f->cell - 0.5;
     *lower = (int)fmin(fmax(floor(place), 0.0), cells - 2.0);
@@ -145,7 +145,7 @@ double bst_light_fft_cell_place(const bst_light_fft *f, const bst_light_axis *ax
 }
 
 /* What the far wings need in the inverse of rows. */
-static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
+static bst_status make_shares(bst_ctx *ctx, bst_otf_convolve *f) {
     int blocks = (f->shape.width + BLOCK - 1) / BLOCK;
     size_t wings = (size_t)BLOCK * (size_t)(f->cells_x + SHARES);
     f->shares = malloc((size_t)blocks * sizeof *f->shares);
@@ -162,8 +162,8 @@ static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
         memset(s, 0, sizeof *s);
         for (int l = 0; l < BLOCK; l++) {
             int cell;
-            float u =
-                (float)bst_light_fft_cell_place(f, &f->shape.x, f->cells_x, i * BLOCK + l, &cell);
+            float u = (float)bst_otf_convolve_cell_place(f, &f->shape.x, f->cells_x, i * BLOCK + l,
+                                                         &cell);
             s->cell = l == 0 ? cell : s->cell;
             s->share[cell - s->cell][l] = 1.0f - u;
             s->share[cell - s->cell + 1][l] = u;
@@ -172,8 +172,8 @@ static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
     return BST_OK;
 }
 
-static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
-    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+static bst_status make_wrap(bst_ctx *ctx, bst_otf_convolve *f) {
+    const bst_fourier_axis *x = &f->shape.x, *y = &f->shape.y;
     /* cells well below the distance from which wings wrap */
     f->cell = x->samples > 14 * x->pixels / 10 ? 32 : 16;
     f->cells_x = (x->samples + f->cell - 1) / f->cell;
@@ -185,22 +185,22 @@ static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }
     BST_TRY(make_shares(ctx, f));
-    bst_light_wrap_axis wx = {x->pixels, f->cells_x, (double)f->cell * x->pixels / x->samples,
-                              f->shape.width + f->shape.margin};
-    bst_light_wrap_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
-                              f->shape.height + f->shape.margin};
+    bst_alias_correction_axis wx = {x->pixels, f->cells_x, (double)f->cell * x->pixels / x->samples,
+                                    f->shape.width + f->shape.margin};
+    bst_alias_correction_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
+                                    f->shape.height + f->shape.margin};
     for (int s = 0; s < f->spectra; s++) {
-        BST_TRY(bst_light_wrap_create(ctx, f->psf, s, &wx, &wy, f->pool, &f->wrap[s]));
+        BST_TRY(bst_alias_correction_create(ctx, f->psf, s, &wx, &wy, f->pool, &f->wrap[s]));
         f->wraps = f->wraps || f->wrap[s];
     }
     return BST_OK;
 }
 
-bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
-                                const bst_light_shape *shape, bst_parallel *pool,
-                                bst_light_fft **out) {
+bst_status bst_otf_convolve_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
+                                   const bst_otf_convolve_layout *shape, bst_parallel *pool,
+                                   bst_otf_convolve **out) {
     *out = NULL;
-    bst_light_fft *f = calloc(1, sizeof *f);
+    bst_otf_convolve *f = calloc(1, sizeof *f);
     if (!f) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
     }
@@ -223,14 +223,14 @@ bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
         status = make_wrap(ctx, f);
     }
     if (status != BST_OK) {
-        bst_light_fft_free(f);
+        bst_otf_convolve_free(f);
         return status;
     }
     *out = f;
     return BST_OK;
 }
 
-void bst_light_fft_free(bst_light_fft *f) {
+void bst_otf_convolve_free(bst_otf_convolve *f) {
     if (!f) {
         return;
     }
@@ -246,7 +246,7 @@ void bst_light_fft_free(bst_light_fft *f) {
         free(f->benches[i].wings);
     }
     for (int s = 0; s < f->spectra; s++) {
-        bst_light_wrap_free(f->wrap[s]);
+        bst_alias_correction_free(f->wrap[s]);
     }
     free(f->sum);
     free(f->image);
@@ -262,16 +262,16 @@ void bst_light_fft_free(bst_light_fft *f) {
     free(f);
 }
 
-const bst_light_shape *bst_light_fft_shape(const bst_light_fft *f) {
+const bst_otf_convolve_layout *bst_otf_convolve_shape(const bst_otf_convolve *f) {
     return &f->shape;
 }
 
-size_t bst_light_fft_floats(const bst_light_fft *f) {
+size_t bst_otf_convolve_floats(const bst_otf_convolve *f) {
     size_t grid = (size_t)f->shape.x.samples * (size_t)f->shape.y.samples;
     size_t image = (size_t)f->pitch * (size_t)f->shape.height;
     return grid > image ? grid : image;
 }
 
-int bst_light_fft_pitch(const bst_light_fft *f) {
+int bst_otf_convolve_pitch(const bst_otf_convolve *f) {
     return f->pitch;
 }

@@ -14,35 +14,36 @@
 #include "scenegen/fourier/fourier_grid.h"
 #include "sim/core/parallel.h"
 
-typedef struct bst_light_fft bst_light_fft;
+typedef struct bst_otf_convolve bst_otf_convolve;
 
 /* A window of width x height px that starts `margin` px into the period, a multiple of 16. */
-typedef struct bst_light_shape {
-    bst_light_axis x, y;
+typedef struct bst_otf_convolve_layout {
+    bst_fourier_axis x, y;
     int width, height, margin;
-} bst_light_shape;
+} bst_otf_convolve_layout;
 
 /* Plans, tabulates the OTF of all nodes of the PSF and prepares the far wings. The pool is
  * borrowed. BST_ERR_MEMORY. */
-bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
-                                const bst_light_shape *shape, bst_parallel *pool,
-                                bst_light_fft **out) BST_MUST_CHECK;
-void bst_light_fft_free(bst_light_fft *fft);
+bst_status bst_otf_convolve_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
+                                   const bst_otf_convolve_layout *shape, bst_parallel *pool,
+                                   bst_otf_convolve **out) BST_MUST_CHECK;
+void bst_otf_convolve_free(bst_otf_convolve *fft);
 
-const bst_light_shape *bst_light_fft_shape(const bst_light_fft *fft);
+const bst_otf_convolve_layout *bst_otf_convolve_shape(const bst_otf_convolve *fft);
 
 /* Floats of the memory that holds the grid and then the image, 64-byte aligned. */
-size_t bst_light_fft_floats(const bst_light_fft *fft);
+size_t bst_otf_convolve_floats(const bst_otf_convolve *fft);
 /* Floats from one row of the image to the next. */
-int bst_light_fft_pitch(const bst_light_fft *fft);
+int bst_otf_convolve_pitch(const bst_otf_convolve *fft);
 
 /* Takes the grid that holds the light of the PSF's node `node`: sample (i, j) at
  * grid[(j / 16 * x.samples + i) * 16 + j % 16]. The image is the sum over the nodes from the one
  * that is `first` to the one that is `last`. */
-void bst_light_fft_add(bst_light_fft *fft, int node, bool first, bool last, const float *grid);
+void bst_otf_convolve_add(bst_otf_convolve *fft, int node, bool first, bool last,
+                          const float *grid);
 
 /* After the last node: the image, pixel (i, j) of the window at image[j * pitch + i]; rows are
  * filled to a multiple of 16 with the pixels beyond the window. */
-void bst_light_fft_finish(bst_light_fft *fft, float *image);
+void bst_otf_convolve_finish(bst_otf_convolve *fft, float *image);
 
 #endif

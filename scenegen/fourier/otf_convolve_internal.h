@@ -37,9 +37,9 @@ typedef struct bench {
     float *wings;    /* [BLOCK][cells_x + SHARES] far wings of rows at the cells' centres */
 } bench;
 
-struct bst_light_fft {
+struct bst_otf_convolve {
     const bst_psf *psf;
-    bst_light_shape shape;
+    bst_otf_convolve_layout shape;
     double cutoff;
     bst_parallel *pool;
     int pitch, row_blocks, image_blocks; /* blocks of the grid's rows, of the window's rows */
@@ -56,9 +56,10 @@ struct bst_light_fft {
     bst_batch_fft *row_forward, *row_inverse, *column_forward, *column_inverse;
     bench *benches;
     int bench_count;
-    bst_light_wrap *wrap[BST_PSF_SPECTRA]; /* NULL: of such a spectrum, no light to speak of */
-    bool wraps;                            /* any does */
-    int cell, cells_x, cells_y;            /* samples per cell, per axis; cells */
+    bst_alias_correction
+        *wrap[BST_PSF_SPECTRA]; /* NULL: of such a spectrum, no light to speak of */
+    bool wraps;                 /* any does */
+    int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
     int spectra;
     float *cells;        /* [spectra][cells_y][cells_x] */
     cell_shares *shares; /* per block of a row's pixels */
@@ -66,7 +67,7 @@ struct bst_light_fft {
 
 /* What a loop's parts need to know. */
 typedef struct pass {
-    bst_light_fft *fft;
+    bst_otf_convolve *fft;
     const float *grid;
     float *image;
     int node;
@@ -75,7 +76,7 @@ typedef struct pass {
 
 /* Place on one axis of the cells' centres: the lower cell and the share of the way to the next,
  * which is below 0 or above 1 at the ends. */
-double bst_light_fft_cell_place(const bst_light_fft *f, const bst_light_axis *axis, int cells,
-                                int pixel, int *lower);
+double bst_otf_convolve_cell_place(const bst_otf_convolve *f, const bst_fourier_axis *axis,
+                                   int cells, int pixel, int *lower);
 
 #endif

@@ -5,7 +5,7 @@
 #include "scenegen/fourier/otf_convolve_internal.h"
 #include "sim/core/simd.h"
 
-static bench *take_bench(bst_light_fft *f) {
+static bench *take_bench(bst_otf_convolve *f) {
     for (int i = 0;; i = (i + 1) % f->bench_count) {
         if (!atomic_flag_test_and_set(&f->benches[i].taken)) {
             return &f->benches[i];
@@ -21,7 +21,7 @@ static bench *take_bench(bst_light_fft *f) {
 /* Pairs of blocks of rows, which fill whole rows of cells. */
 static void rows_forward(void *user, int begin, int end) {
     const pass *p = user;
-    bst_light_fft *f = p->fft;
+    bst_otf_convolve *f = p->fft;
     bench *w = take_bench(f);
     int per_cell = f->cell / BLOCK, fields = bst_psf_nodes(f->psf) / f->spectra;
     size_t spectrum = (size_t)(p->node / fields) * (size_t)f->cells_y;
@@ -52,14 +52,14 @@ static void rows_forward(void *user, int begin, int end) {
             }
         }
     }
-    bst_end_stream();
+    bst_simd_stream_end();
     atomic_flag_clear(&w->taken);
 }
 
 /* ------------------------------------------------------------------ columns */
 
 /* Far wings of all nodes' light, in place of it. */
-static void run_wrap(bst_light_fft *f) {
+static void run_wrap(bst_otf_convolve *f) {
     float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
     size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
     for (int s = 0; s < f->spectra; s++) {
@@ -68,7 +68,7 @@ static void run_wrap(bst_light_fft *f) {
             cells[i] *= f->wrap[s] ? scale : 0.0f;
         }
         if (f->wrap[s]) {
-            bst_light_wrap_run(f->wrap[s], cells);
+            bst_alias_correction_run(f->wrap[s], cells);
         }
         for (size_t i = 0; s > 0 && i < count; i++) {
             f->cells[i] += cells[i];
@@ -79,7 +79,7 @@ static void run_wrap(bst_light_fft *f) {
 /* Blocks of the image's columns; before them, with the last node, the far wings. */
 static void columns(void *user, int begin, int end) {
     const pass *p = user;
-    bst_light_fft *f = p->fft;
+    bst_otf_convolve *f = p->fft;
     bench *w = take_bench(f);
     size_t pixels = (size_t)f->shape.y.pixels;
     for (int i = begin; i < end; i++) {
@@ -103,11 +103,11 @@ static void columns(void *user, int begin, int end) {
             BST_SIMD_PICK(store_image)(f, c, sum);
         }
     }
-    bst_end_stream();
+    bst_simd_stream_end();
     atomic_flag_clear(&w->taken);
 }
 
-void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const float *grid) {
+void bst_otf_convolve_add(bst_otf_convolve *f, int node, bool first, bool last, const float *grid) {
     pass p = {.fft = f, .grid = grid, .node = node, .first = first, .last = last};
     bst_parallel_for(f->pool, (f->row_blocks + 1) / 2, 1, rows_forward, &p);
     bst_parallel_for(f->pool, f->column_blocks + (last && f->wraps), 1, columns, &p);
@@ -117,9 +117,9 @@ void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const 
 
 /* Far wings of a row at the cells' centres. */
 BST_CLONES
-static void row_of_wings(const bst_light_fft *f, int row, float *out) {
+static void row_of_wings(const bst_otf_convolve *f, int row, float *out) {
     int j;
-    float v = (float)bst_light_fft_cell_place(f, &f->shape.y, f->cells_y, row, &j);
+    float v = (float)bst_otf_convolve_cell_place(f, &f->shape.y, f->cells_y, row, &j);
     const float *a = f->cells + (size_t)j * (size_t)f->cells_x, *b = a + f->cells_x;
     for (int i = 0; i < f->cells_x; i++) {
         out[i] = a[i] + v * (b[i] - a[i]);
@@ -129,7 +129,7 @@ static void row_of_wings(const bst_light_fft *f, int row, float *out) {
 /* Pairs of blocks of rows of the window. */
 static void rows_inverse(void *user, int begin, int end) {
     const pass *p = user;
-    bst_light_fft *f = p->fft;
+    bst_otf_convolve *f = p->fft;
     bench *w = take_bench(f);
     for (int j = begin; j < end; j++) {
         int a = 2 * j, b = a + 1 < f->image_blocks ? a + 1 : a;
@@ -146,11 +146,11 @@ static void rows_inverse(void *user, int begin, int end) {
             BST_SIMD_PICK(store_rows)(f, w->line, k > a, rows, f->wraps ? w->wings : NULL, image);
         }
     }
-    bst_end_stream();
+    bst_simd_stream_end();
     atomic_flag_clear(&w->taken);
 }
 
-void bst_light_fft_finish(bst_light_fft *f, float *image) {
+void bst_otf_convolve_finish(bst_otf_convolve *f, float *image) {
     pass p = {.fft = f, .image = image};
     bst_parallel_for(f->pool, (f->image_blocks + 1) / 2, 1, rows_inverse, &p);
 }

@@ -5,7 +5,7 @@
 
 /* Bilinear between the nodes of bst_skylight_map. Nodes lie on multiples of a power of two, so
  * every weight is exact and a pixel's value does not depend on tile or window. */
-static void add_nodes(local float *sum, bst_scene_params p, int tile_x, int tile_y, int rows,
+static void add_nodes(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
                       int columns, global const float *background) {
     const float16 lanes = (float16)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f, 8.0f, 9.0f,
                                     10.0f, 11.0f, 12.0f, 13.0f, 14.0f, 15.0f);
@@ -38,7 +38,7 @@ static void add_nodes(local float *sum, bst_scene_params p, int tile_x, int tile
 }
 
 /* Pixel by pixel: the map is the window. */
-static void add_pixels(local float *sum, bst_scene_params p, int tile_x, int tile_y, int rows,
+static void add_pixels(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
                        int columns, global const float *background) {
     int first = max(0, p.map_x0 - tile_x), last = min(columns, p.map_x0 + p.map_columns - tile_x);
     for (int y = 0; y < rows; y++) {
@@ -51,7 +51,7 @@ static void add_pixels(local float *sum, bst_scene_params p, int tile_x, int til
     }
 }
 
-static void add_background(local float *sum, bst_scene_params p, int tile_x, int tile_y, int rows,
+static void add_background(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
                            int columns, global const float *background) {
     if (p.map_step > 32768) {
         return; /* this frame has no map */

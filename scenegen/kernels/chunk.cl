@@ -27,7 +27,7 @@ INLINE chunk load_chunk(global const float *from) {
     return c;
 }
 
-INLINE chunk_words chunk_random(bst_scene_params p, uint counter, uint stream) {
+INLINE chunk_words chunk_random(bst_kernel_frame_params p, uint counter, uint stream) {
     chunk_words w;
     philox16(p, counter, stream, &w.a, &w.b, &w.c, &w.d);
     return w;

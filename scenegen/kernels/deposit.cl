@@ -200,7 +200,7 @@ static int16 boxes_hit(global const float *box, float4 tile) {
  * and y. shares: of the spectra, by source. The boxes are those of the nodes kernel, which reach at least as far as the spreading kernel.
  */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
-    bst_deposit_params p, global const bst_scene_source *sources, global const float16 *nodes,
+    bst_deposit_params p, global const bst_kernel_source_record *sources, global const float16 *nodes,
     global const float *block_box, global const float *source_box, global const float *table,
     global const float *field, global float16 *grid
 #ifdef SPECTRA
@@ -237,7 +237,7 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
             if (!hits[i]) {
                 continue;
             }
-            bst_scene_source s = sources[g * BST_BLOCK + i];
+            bst_kernel_source_record s = sources[g * BST_BLOCK + i];
 #ifdef SPECTRA
             s.electrons *= shares[(g * BST_BLOCK + i) * BST_SPECTRA + p.spectrum];
             if (s.electrons == 0.0f) {

@@ -60,7 +60,7 @@ INLINE float16 poisson_expand16(float16 mean, float16 w) {
 
 /* Lanes for which one deviate does not do: small means with little read noise, and those near the
  * full well, where the charge is cut before the read noise comes. */
-INLINE int16 needs_two(bst_scene_params p, float16 mean) {
+INLINE int16 needs_two(bst_kernel_frame_params p, float16 mean) {
 #ifdef SEARCH
     return (mean < SINGLE_FROM) | (mean > p.near_full_e);
 #else
@@ -69,7 +69,7 @@ INLINE int16 needs_two(bst_scene_params p, float16 mean) {
 }
 
 /* What the amplifier makes of a charge. */
-INLINE float16 respond(bst_scene_params p, float16 e) {
+INLINE float16 respond(bst_kernel_frame_params p, float16 e) {
 #ifdef NONLINEAR
     float16 u = e * p.per_full_well;
     e = fma(e, u * fma(u, fma(u, (float16)C3, (float16)C2), (float16)C1), e);
@@ -77,7 +77,7 @@ INLINE float16 respond(bst_scene_params p, float16 e) {
     return e;
 }
 
-INLINE float16 read_out(bst_scene_params p, float16 charge, float16 z) {
+INLINE float16 read_out(bst_kernel_frame_params p, float16 charge, float16 z) {
     return fma((float16)p.read_noise_e, z, respond(p, charge));
 }
 
@@ -93,7 +93,7 @@ INLINE float16 draw_charge(float16 mean, uint16 word, float16 w, int16 wanted) {
 }
 
 /* Expected electrons of one chunk from its light; map: of its first pixel. */
-INLINE chunk expected_chunk(bst_scene_params p, detector_maps maps, size_t map, chunk light) {
+INLINE chunk expected_chunk(bst_kernel_frame_params p, detector_maps maps, size_t map, chunk light) {
     float sky = p.background_e - p.dark_e;
     chunk m;
 #ifdef GAIN_MAP
@@ -111,7 +111,7 @@ INLINE chunk expected_chunk(bst_scene_params p, detector_maps maps, size_t map, 
     return m;
 }
 
-INLINE chunk add_dark(bst_scene_params p, detector_maps maps, size_t map, chunk m) {
+INLINE chunk add_dark(bst_kernel_frame_params p, detector_maps maps, size_t map, chunk m) {
 #ifdef DARK_MAP
     chunk dark = load_chunk(maps.dark + map);
     m.a = fma(dark.a, (float16)p.exposure_s, m.a);
@@ -129,7 +129,7 @@ INLINE chunk add_dark(bst_scene_params p, detector_maps maps, size_t map, chunk 
 
 /* Electrons to digital numbers plus one half, not yet cut to the converter's range. row, column: of
  * the first pixel on the sensor. */
-INLINE chunk convert_chunk(bst_scene_params p, detector_maps maps, int row, int column, chunk e) {
+INLINE chunk convert_chunk(bst_kernel_frame_params p, detector_maps maps, int row, int column, chunk e) {
     float16 g = (float16)p.dn_per_e;
     chunk dn;
 #ifdef OFFSETS
@@ -164,7 +164,7 @@ typedef struct dark_law {
 #endif
 
 /* steps: the search's cumulated chances. poisson_search16 ends where these do. */
-INLINE dark_law dark_law_of(bst_scene_params p, uint *steps) {
+INLINE dark_law dark_law_of(bst_kernel_frame_params p, uint *steps) {
     dark_law dark;
     dark.mean = (p.background_e - p.dark_e) + p.dark_e; /* as the sum of the two below */
     float16 mean = (float16)dark.mean;
@@ -214,7 +214,7 @@ INLINE chunk dark_electrons(dark_law dark, const uint *steps, chunk_words w) {
 
 /* Electrons of 16 pixels, where `two` charge first, then read noise. full: lanes with a full well.
  */
-INLINE float16 draw_pixels(bst_scene_params p, float16 single, float16 charge, float16 z, int16 two,
+INLINE float16 draw_pixels(bst_kernel_frame_params p, float16 single, float16 charge, float16 z, int16 two,
                            int16 *full) {
     *full = two & (charge >= p.full_well_e);
     return select(single, read_out(p, fmin(charge, p.full_well_e), z), two);
@@ -223,7 +223,7 @@ INLINE float16 draw_pixels(bst_scene_params p, float16 single, float16 charge, f
 /* Digital numbers plus one half, not yet cut to the converter's range, of one chunk. counter: of
  * its first lane. row, column: of its first pixel on the sensor. light: electrons of the sources,
  * some of them where `lit`. brim: lanes with a full well. */
-INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark, near_law near,
+INLINE chunk detect_chunk(bst_kernel_frame_params p, detector_maps maps, dark_law dark, near_law near,
                           const uint *steps, const tail_block *tail, uint counter, int row,
                           int column, chunk light, int lit, chunk_flags *brim) {
     chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));

@@ -1,6 +1,6 @@
 /* Light on one tile from the Fourier path's image, in place of the nodes' stamps. The image starts
  * with the window's first pixel; its rows are p.light_pitch floats apart. */
-static void load_tile(local float *sum, bst_scene_params p, int left, int top,
+static void load_tile(local float *sum, bst_kernel_frame_params p, int left, int top,
                       global const float *image) {
     int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
     int first = max(0, -left); /* the tile may start before the window */

@@ -93,7 +93,7 @@ typedef struct node_block {
 } node_block;
 
 /* Block b of a source. */
-static node_block nodes_of(bst_scene_source s, int b, global const float16 *table) {
+static node_block nodes_of(bst_kernel_source_record s, int b, global const float16 *table) {
     global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
     node_block out;
     float16 depth = t[6] * s.x_px + t[7] * s.y_px;
@@ -117,13 +117,13 @@ static node_block nodes_of(bst_scene_source s, int b, global const float16 *tabl
  * blocks of a source that has several, from its first_box on; source_box: of sources; group_box: of
  * groups of sources. */
 __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nodes(
-    global const bst_scene_source *sources, int count, global const float16 *table,
+    global const bst_kernel_source_record *sources, int count, global const float16 *table,
     global float *block_box, global float *source_box, global float *group_box) {
     int i = (int)get_global_id(0), g = i / BST_BLOCK;
     global float *box = source_box + g * 4 * BST_BLOCK + i % BST_BLOCK;
     float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
     if (i < count) {
-        bst_scene_source s = sources[i];
+        bst_kernel_source_record s = sources[i];
         float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
             node_block n = nodes_of(s, b, table);

@@ -16,7 +16,7 @@ typedef struct noise_law {
  * Cornish-Fisher expansion (Abramowitz and Stegun 26.2.49) to order CF_ORDER of 1 / sigma. All
  * cumulants beyond the variance are the mean, so with a = 1 / sigma, b = mean / sigma^2 the
  * standardised ones are b a, b a^2, b a^3, b a^4. */
-INLINE noise_law noise_law_of(bst_scene_params p, float16 mean) {
+INLINE noise_law noise_law_of(bst_kernel_frame_params p, float16 mean) {
     noise_law law;
     float16 variance = fma((float16)p.read_noise_e, (float16)p.read_noise_e, mean);
     float16 a = rsqrt16(variance), a2 = a * a, b = mean * a2, b2 = b * b;
@@ -96,7 +96,7 @@ INLINE float4 cubic_through(float16 f) {
 
 /* For pixels with little or no light of sources: from a tenth of the dark pixels' variance below
  * their mean to half of it above. */
-static near_law near_law_of(bst_scene_params p) {
+static near_law near_law_of(bst_kernel_frame_params p) {
     float dark = p.background_e, read = p.read_noise_e * p.read_noise_e;
     near_law near;
     near.mean = fma(0.2f, dark + read, dark);

@@ -29,7 +29,7 @@ INLINE uint16 low_words(ulong8 even, ulong8 odd) {
 
 /* Philox4x32 (Salmon, Moraes, Dror and Shaw 2011) for the counters (first + lane, stream, exposure_low,
  * exposure_high): even lanes and odd lanes apart, since a product fills 64 bits. */
-INLINE void philox16(bst_scene_params p, uint first, uint stream, uint16 *w0, uint16 *w1,
+INLINE void philox16(bst_kernel_frame_params p, uint first, uint stream, uint16 *w0, uint16 *w1,
                      uint16 *w2, uint16 *w3) {
     ulong8 a0 = (ulong8)(0, 2, 4, 6, 8, 10, 12, 14) + (ulong)first, b0 = a0 + 1ul;
     ulong8 a1 = (ulong8)stream, b1 = a1;

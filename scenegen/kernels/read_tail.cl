@@ -30,7 +30,7 @@ INLINE int16 tail_gaps(uint16 words) {
 }
 
 /* The block that holds a read; width: of what is read. */
-static void draw_tail(bst_scene_params p, int row, int column, int width, tail_block *tail) {
+static void draw_tail(bst_kernel_frame_params p, int row, int column, int width, tail_block *tail) {
     uint block = (uint)(row / TAIL_ROWS) * ((uint)(width + 63) / 64u) + (uint)column / 64u;
     for (int y = 0; y < TAIL_ROWS; y++) {
         for (int x = 0; x < 64; x += 16) {

@@ -23,7 +23,7 @@ INLINE void store_chunk(global float *to, chunk c) {
  * collects while its charge runs through all other rows of its column. One work-item per 64
  * columns.
  */
-kernel void bst_detector_transfer(bst_scene_params p, global float *image,
+kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image,
                                   global const float *gain) {
     detector_maps maps = {gain, 0, 0, 0, 0};
     int x = (int)get_global_id(0) * 64;
@@ -52,7 +52,7 @@ kernel void bst_detector_transfer(bst_scene_params p, global float *image,
 #endif
 
 /* Charge of every pixel in place of its light. One work-item per row. */
-kernel void bst_detector_charge(bst_scene_params p, global float *image, global const float *gain,
+kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, global const float *gain,
                                 global const float *dark, global const float *overlay) {
     detector_maps maps = {gain, dark, overlay, 0, 0};
     int row = p.light_y0 + (int)get_global_id(0);
@@ -94,7 +94,7 @@ kernel void bst_detector_charge(bst_scene_params p, global float *image, global 
 /* Charge above the full well leaves its pixel by halves up and down its column and fills the pixels
  * it meets; what reaches the column's end is lost. `over`: a column of the halves on their way. One
  * work-item per 16 columns. */
-kernel void bst_detector_bloom(bst_scene_params p, global float *image, global float *over) {
+kernel void bst_detector_bloom(bst_kernel_frame_params p, global float *image, global float *over) {
     int x = (int)get_global_id(0) * 16;
     float16 carry = (float16)0.0f, full = (float16)p.full_well_e;
     for (int y = 0; y < p.light_height; y++) { /* upwards in y */
@@ -121,7 +121,7 @@ kernel void bst_detector_bloom(bst_scene_params p, global float *image, global f
 /* Digital numbers from charge: p.binning x p.binning pixels are added before they are read. frame:
  * [window_height][window_width], both after binning. saturated: pixels per row. One work-item per
  * row of the frame. */
-kernel void bst_detector_read(bst_scene_params p, global const float *image, global ushort *frame,
+kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags) {
     detector_maps maps = {0, 0, 0, offsets, codes};

@@ -32,7 +32,7 @@
 #define BST_FLAG_CONVERTER 2
 
 /* 32-bit members only, so that both languages lay it out alike. */
-typedef struct bst_scene_params {
+typedef struct bst_kernel_frame_params {
     int window_x0, window_y0, window_width, window_height;
     int sensor_width;
     int tiles_x0; /* sensor column of the first tile: a multiple of 64 */
@@ -56,10 +56,10 @@ typedef struct bst_scene_params {
         light_stride; /* of the image that is read out: sensor row, rows, floats */
     int binning;
     int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background, if it varies */
-} bst_scene_params;
+} bst_kernel_frame_params;
 
 /* One source on its way to its nodes. */
-typedef struct bst_scene_source {
+typedef struct bst_kernel_source_record {
     float x_px, y_px;     /* at the reference attitude, from the boresight, without distortion */
     int place_x, place_y; /* the same on the sensor, px times 2^PLACE_BITS */
     float electrons;      /* in the exposure */
@@ -67,6 +67,6 @@ typedef struct bst_scene_source {
     int blocks;
     int first_box; /* of the blocks' boxes, by groups of BST_BLOCK */
     int radius;    /* the stamp reaches this far beyond the two nearest pixels of a node */
-} bst_scene_source;
+} bst_kernel_source_record;
 
 #endif

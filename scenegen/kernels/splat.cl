@@ -295,7 +295,7 @@ INLINE int16 boxes_hit(global const float *box, int tile_x, int tile_y) {
            (vload16(3, box) >= (float)tile_y);
 }
 
-static void splat_source(local float *sum, int tile_x, int tile_y, bst_scene_source s,
+static void splat_source(local float *sum, int tile_x, int tile_y, bst_kernel_source_record s,
                          global const float16 *table, global const float *block_box,
                          global const float *law, splat_nodes *b) {
     int hits[BST_BLOCK] = {1}, taps = 2 * s.radius + 2;
@@ -324,8 +324,8 @@ static void splat_source(local float *sum, int tile_x, int tile_y, bst_scene_sou
 
 /* sum: [TILE_H + BST_SPARE_ROWS][STRIDE], the tile's light in electrons. tile_x, tile_y: its first
  * pixel on the full sensor. */
-static void splat_tile(bst_scene_params p, local float *sum, int tile_x, int tile_y,
-                       global const bst_scene_source *sources, global const float16 *table,
+static void splat_tile(bst_kernel_frame_params p, local float *sum, int tile_x, int tile_y,
+                       global const bst_kernel_source_record *sources, global const float16 *table,
                        global const float *block_box, global const float *source_box,
                        global const float *group_box, global const float *law) {
     splat_nodes b;

@@ -10,7 +10,7 @@ typedef struct tile_place {
     int x, y, left, top, rows, columns;
 } tile_place;
 
-static tile_place place_tile(bst_scene_params p, int tile) {
+static tile_place place_tile(bst_kernel_frame_params p, int tile) {
     tile_place t;
     t.x = p.tiles_x0 + tile % p.tiles_x * TILE_W;
     t.left = t.x - p.window_x0;
@@ -36,7 +36,7 @@ typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
 /* Digital numbers, plus one half, of 16 pixels to the window's row at `column`. Returns the pixels
  * that are saturated (`brim`, or converter at its top) as -1; those outside the window are none.
  * marks: the row of flags, with the option FLAGS. */
-INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 brim, int column,
+INLINE int16 store_dn(bst_kernel_frame_params p, detector_maps maps, float16 dn, int16 brim, int column,
                       global ushort *row, global uchar *marks) {
     ushort16 value = convert_ushort16(convert_int16(clamp(dn, 0.0f, p.max_dn)));
 #ifdef CODES
@@ -103,7 +103,7 @@ INLINE void fetch_maps(detector_maps maps, int row, int column, int columns) {
 /* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. flags: as the
  * frame, BST_FLAG_...; with the option FLAGS. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
-    bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
+    bst_kernel_frame_params p, global const bst_kernel_source_record *sources, global const float16 *table,
     global const float *block_box, global const float *source_box, global const float *group_box,
     global const float *light, global ushort *frame, global int *saturated,
     global const float *gain, global const float *dark, global const float *overlay,
@@ -167,7 +167,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
 
 /* image: [window_height][image_stride] expected electrons. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expected(
-    bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
+    bst_kernel_frame_params p, global const bst_kernel_source_record *sources, global const float16 *table,
     global const float *block_box, global const float *source_box, global const float *group_box,
     global const float *light, global float *image BACKGROUND_ARGUMENT) {
     local float sums[GROUP][(TILE_H + BST_SPARE_ROWS) * STRIDE] __attribute__((aligned(64)));

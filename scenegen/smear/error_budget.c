@@ -29,9 +29,9 @@ typedef struct cell {
     float squares, worst, second, shared, excess, worst_excess, border, worst_border;
 } cell;
 
-struct bst_crowd {
-    bst_crowd_motion motion;
-    bst_crowd_source *sources;
+struct bst_error_budget {
+    bst_error_budget_motion motion;
+    bst_error_budget_source *sources;
     int count, capacity;
     spot *spots;
     cell *cells;
@@ -41,13 +41,13 @@ struct bst_crowd {
     double error;     /* negative: not known yet */
 };
 
-bst_status bst_crowd_create(bst_ctx *ctx, bst_crowd **out) {
+bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) {
     *out = calloc(1, sizeof **out);
     return *out ? BST_OK
                 : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the predicted error of a frame");
 }
 
-void bst_crowd_free(bst_crowd *c) {
+void bst_error_budget_free(bst_error_budget *c) {
     if (c) {
         free(c->sources);
         free(c->spots);
@@ -57,7 +57,8 @@ void bst_crowd_free(bst_crowd *c) {
     }
 }
 
-bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool shift) {
+bst_error_budget_motion bst_error_budget_motion_of(const bst_smear_path_point *path, int count,
+                                                   bool shift) {
     const double *from = path[0].p, *to = path[count - 1].p;
     double chord[2] = {to[0] - from[0], to[1] - from[1]}, low[3] = {0}, high[3] = {0};
     double length = hypot(chord[0], chord[1]);
@@ -78,14 +79,14 @@ bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool
         way += sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
                     (p[2] - q[2]) * (p[2] - q[2]));
     }
-    return (bst_crowd_motion){
+    return (bst_error_budget_motion){
         .way_px = way,
         .direction = {shift ? along[0] : along[1], shift ? along[1] : -along[0]},
         .length_px = high[0] - low[0] + roll,
         .width_px = high[1] - low[1] + roll};
 }
 
-void bst_crowd_begin(bst_crowd *c, const bst_crowd_motion *motion) {
+void bst_error_budget_begin(bst_error_budget *c, const bst_error_budget_motion *motion) {
     c->motion = *motion;
     double psf = 3.0 * motion->sigma_px + 1.0;
     c->motion.overlap = fmin(
@@ -95,15 +96,16 @@ void bst_crowd_begin(bst_crowd *c, const bst_crowd_motion *motion) {
     c->error = -1.0;
 }
 
-void bst_crowd_miss(bst_crowd *c, double electrons) {
+void bst_error_budget_miss(bst_error_budget *c, double electrons) {
     c->missing_e += electrons;
     c->error = -1.0;
 }
 
-bst_status bst_crowd_add(bst_ctx *ctx, bst_crowd *c, const bst_crowd_source *source) {
+bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
+                                const bst_error_budget_source *source) {
     if (c->count == c->capacity) {
         int capacity = c->capacity > 0 ? 2 * c->capacity : 1024;
-        bst_crowd_source *sources = realloc(c->sources, (size_t)capacity * sizeof *sources);
+        bst_error_budget_source *sources = realloc(c->sources, (size_t)capacity * sizeof *sources);
         c->sources = sources ? sources : c->sources;
         /* twice as many places as entries, so that searches are short; the old content is done with
          */
@@ -135,7 +137,7 @@ static unsigned place_of(int64_t key) {
 }
 
 /* Number of the entry with this key, or of the empty one where it belongs. */
-static int find_spot(const bst_crowd *c, int64_t key) {
+static int find_spot(const bst_error_budget *c, int64_t key) {
     unsigned i = place_of(key) & c->mask;
     while (c->spots[i].frame == c->frame && c->spots[i].key != key) {
         i = (i + 1) & c->mask;
@@ -143,7 +145,7 @@ static int find_spot(const bst_crowd *c, int64_t key) {
     return (int)i;
 }
 
-static int find_cell(const bst_crowd *c, int64_t key) {
+static int find_cell(const bst_error_budget *c, int64_t key) {
     unsigned i = place_of(key) & c->mask;
     while (c->cells[i].frame == c->frame && c->cells[i].key != key) {
         i = (i + 1) & c->mask;
@@ -152,12 +154,12 @@ static int find_cell(const bst_crowd *c, int64_t key) {
 }
 
 /* Sources into spots; returns how many. *apart: the worst of those that move by themselves. */
-static int fill_spots(bst_crowd *c, float *apart) {
+static int fill_spots(bst_error_budget *c, float *apart) {
     float per_px = 1.0f / fmaxf((float)c->motion.sigma_px, 1.0f);
     float dark = (float)c->motion.dark_variance_e2;
     int spots = 0;
     for (int i = 0; i < c->count; i++) {
-        const bst_crowd_source *s = &c->sources[i];
+        const bst_error_budget_source *s = &c->sources[i];
         if (s->apart) {
             float e = (s->nodes_e + s->excess_e + s->shared_e) / sqrtf(s->peak_e + dark);
             *apart = fmaxf(*apart, fmaxf(e, s->border_e / sqrtf(dark)));
@@ -180,8 +182,8 @@ static int fill_spots(bst_crowd *c, float *apart) {
 }
 
 /* Spots into cells, whose numbers take the spots' place in `used`; returns how many. */
-static int fill_cells(bst_crowd *c, int spots) {
-    const bst_crowd_motion *m = &c->motion;
+static int fill_cells(bst_error_budget *c, int spots) {
+    const bst_error_budget_motion *m = &c->motion;
     float psf = 3.0f * (float)m->sigma_px + 1.0f, dark = (float)m->dark_variance_e2;
     float per_u = 2.0f / ((float)m->length_px + psf), per_v = 2.0f / ((float)m->width_px + psf);
     float dx = (float)m->direction[0], dy = (float)m->direction[1], quiet = 1.0f / sqrtf(dark);
@@ -211,7 +213,7 @@ static int fill_cells(bst_crowd *c, int spots) {
 }
 
 /* Error of the box about a cell. */
-static float box_error(const bst_crowd *c, const cell *middle) {
+static float box_error(const bst_error_budget *c, const cell *middle) {
     cell sum = {.key = 0};
     for (int u = -1; u <= 1; u++) {
         for (int v = -1; v <= 1; v++) {
@@ -239,7 +241,7 @@ static float box_error(const bst_crowd *c, const cell *middle) {
 
 /* Error where the border of the stamps in a cell meets another, as two circles do that are no
  * further apart than the sum of their radii. */
-static float crossing_error(const bst_crowd *c, const cell *middle) {
+static float crossing_error(const bst_error_budget *c, const cell *middle) {
     float other = fminf(middle->border - middle->worst_border, middle->worst_border);
     for (int u = -REACH; u <= REACH; u++) {
         for (int v = -REACH; v <= REACH; v++) {
@@ -252,7 +254,7 @@ static float crossing_error(const bst_crowd *c, const cell *middle) {
     return middle->worst_border + other;
 }
 
-double bst_crowd_error_sigma(bst_crowd *c) {
+double bst_error_budget_error_sigma(bst_error_budget *c) {
     if (c->error < 0.0) {
         float worst = 0.0f, apart = 0.0f, border = 0.0f;
         c->frame++;

@@ -13,24 +13,25 @@
 #include "scenegen/smear/smear_quadrature.h"
 #include "sim/core/status.h"
 
-typedef struct bst_crowd bst_crowd;
+typedef struct bst_error_budget bst_error_budget;
 
 /* How the stars of a frame move. */
-typedef struct bst_crowd_motion {
+typedef struct bst_error_budget_motion {
     double direction[2];        /* unit vector */
     double length_px, width_px; /* along it and across */
     double way_px;              /* length of the way, at most */
     double overlap;             /* part of length times width that a star's light falls on */
     double sigma_px;            /* of the PSF */
     double dark_variance_e2;    /* noise of a dark pixel */
-} bst_crowd_motion;
+} bst_error_budget_motion;
 
 /* Direction and extent of a path of tilts about x and y and roll (px in the sensor's corners), or
  * of shifts along x and y. */
-bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool shift);
+bst_error_budget_motion bst_error_budget_motion_of(const bst_smear_path_point *path, int count,
+                                                   bool shift);
 
 /* Error of one source's image. */
-typedef struct bst_crowd_source {
+typedef struct bst_error_budget_source {
     float x_px, y_px; /* anywhere on its way, the same instant for all */
     float peak_e;     /* largest light in one pixel */
     float nodes_e;    /* error by nodes, profiles and rounding where it is greatest, e- */
@@ -38,20 +39,20 @@ typedef struct bst_crowd_source {
     float excess_e;   /* light from beyond the stamp, on it */
     float border_e;   /* missing next to the stamp */
     bool apart;       /* moves further than the stars do */
-} bst_crowd_source;
+} bst_error_budget_source;
 
-bst_status bst_crowd_create(bst_ctx *ctx, bst_crowd **out) BST_MUST_CHECK;
-void bst_crowd_free(bst_crowd *crowd);
+bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) BST_MUST_CHECK;
+void bst_error_budget_free(bst_error_budget *crowd);
 
 /* Starts a frame. */
-void bst_crowd_begin(bst_crowd *crowd, const bst_crowd_motion *motion);
-bst_status bst_crowd_add(bst_ctx *ctx, bst_crowd *crowd,
-                         const bst_crowd_source *source) BST_MUST_CHECK;
+void bst_error_budget_begin(bst_error_budget *crowd, const bst_error_budget_motion *motion);
+bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *crowd,
+                                const bst_error_budget_source *source) BST_MUST_CHECK;
 
 /* Adds light that any pixel may lack, e-: of sources too far away to be drawn. */
-void bst_crowd_miss(bst_crowd *crowd, double electrons);
+void bst_error_budget_miss(bst_error_budget *crowd, double electrons);
 
 /* Largest error expected in any pixel, in its sigma. The work is done at the first call. */
-double bst_crowd_error_sigma(bst_crowd *crowd);
+double bst_error_budget_error_sigma(bst_error_budget *crowd);
 
 #endif

@@ -28,7 +28,7 @@ static const double gauss_weight[GAUSS_MOST][GAUSS_MOST] = {
 
 /* A disc on the focal plane. */
 typedef struct scan {
-    const bst_shape_view *view;
+    const bst_extended_source_view *view;
     bst_disc disc;
     bst_quat gcrf_from_focal;
     bst_vec3 middle;     /* of the disc, focal-plane axes, unit */
@@ -148,8 +148,8 @@ static bst_status scan_disc(bst_ctx *ctx, scan *s) {
 }
 
 /* Appends the points of some lights by quadrature, those that are wanted. */
-static bst_status add_quadrature(bst_ctx *ctx, const bst_source *source, int lights,
-                                 const bst_shape_view *view, double x0, double y0,
+static bst_status add_quadrature(bst_ctx *ctx, const bst_scene_source *source, int lights,
+                                 const bst_extended_source_view *view, double x0, double y0,
                                  bst_disc_points *points) {
     int first = points->count, kept = first;
     double a = view->scale_rad;
@@ -173,11 +173,12 @@ static bool thin(const bst_disc_aspect *aspect, double radius_px, double sigma_p
     return radius_px * (1.0 + aspect->cosine) < THIN_WIDTH * fmax(1.0, sigma_px);
 }
 
-bst_status bst_shape_points(bst_ctx *ctx, const bst_source *source, const bst_shape_view *view,
-                            bst_disc_points *points, double *peak) {
+bst_status bst_extended_source_points(bst_ctx *ctx, const bst_scene_source *source,
+                                      const bst_extended_source_view *view, bst_disc_points *points,
+                                      double *peak) {
     points->count = 0;
     *peak = 1.0;
-    const bst_source_shape *shape = source->shape;
+    const bst_scene_source_shape *shape = source->shape;
     bst_vec3 middle = bst_quat_rotate(view->q_focal_from_gcrf, bst_vec3_unit(source->apparent_mid));
     if (!(middle.z > 0.0)) {
         return BST_OK;
@@ -234,22 +235,22 @@ bst_status bst_shape_points(bst_ctx *ctx, const bst_source *source, const bst_sh
     return BST_OK;
 }
 
-bst_status bst_shape_spread(bst_ctx *ctx, const bst_disc_points *points, double stretch,
-                            bst_node_list *list) {
+bst_status bst_extended_source_spread(bst_ctx *ctx, const bst_disc_points *points, double stretch,
+                                      bst_smear_node_list *list) {
     long long need = (long long)list->count * points->count;
     if (need > INT32_MAX / 64) {
         return bst_fail(ctx, BST_ERR_MEMORY,
                         "a disc of %d points on a path of %d nodes is too much", points->count,
                         list->count);
     }
-    bst_node *items = malloc((size_t)(need > 0 ? need : 1) * sizeof *items);
+    bst_smear_node *items = malloc((size_t)(need > 0 ? need : 1) * sizeof *items);
     if (!items) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %lld nodes of a disc", need);
     }
     size_t n = 0;
     for (int p = 0; p < points->count; p++) {
         for (int k = 0; k < list->count; k++) {
-            bst_node node = list->items[k];
+            bst_smear_node node = list->items[k];
             node.p[0] += points->items[p].offset.x * stretch;
             node.p[1] += points->items[p].offset.y * stretch;
             node.weight *= points->items[p].share;

@@ -5,8 +5,8 @@
 
 #include "sim/core/vec.h"
 
-double bst_motion_spread_px(const bst_path_point *path, int count, double scale_rad, double stretch,
-                            double roll_px, double corner_px) {
+double bst_motion_spread_px(const bst_smear_path_point *path, int count, double scale_rad,
+                            double stretch, double roll_px, double corner_px) {
     double corner = corner_px * scale_rad, worst = 0.0;
     for (int k = 0; k < count; k++) {
         double tilt = hypot(path[k].p[0], path[k].p[1]) * scale_rad / stretch;
@@ -19,20 +19,21 @@ double bst_motion_spread_px(const bst_path_point *path, int count, double scale_
     return worst / scale_rad;
 }
 
-void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch, double roll_px) {
+void bst_motion_to_shift(bst_smear_path_point *point, double scale_rad, double stretch,
+                         double roll_px) {
     double tilt = scale_rad / stretch;
     bst_quat q = bst_quat_from_rotvec(
         (bst_vec3){point->p[0] * tilt, point->p[1] * tilt, point->p[2] / roll_px});
     bst_vec3 v = bst_quat_rotate(q, (bst_vec3){0.0, 0.0, 1.0});
     double f = v.z > 1e-6 ? 1.0 / (v.z * tilt) : 1e6 / tilt;
-    *point = (bst_path_point){{v.x * f, v.y * f, 0.0}, point->s};
+    *point = (bst_smear_path_point){{v.x * f, v.y * f, 0.0}, point->s};
 }
 
-bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
-                                bst_node_list *list) {
+bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_smear_path_point *path, int count,
+                                int parts, bst_smear_node_list *list) {
     if (list->count + parts > list->capacity) {
         int capacity = list->count + parts;
-        bst_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
+        bst_smear_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
         if (!items) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of a smear", capacity);
         }
@@ -47,8 +48,8 @@ bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int co
         }
         double length = path[k + 1].s - path[k].s;
         double u = length > 0.0 ? (s - path[k].s) / length : 0.0;
-        bst_node *node = &list->items[list->count++];
-        *node = (bst_node){.weight = 1.0 / parts};
+        bst_smear_node *node = &list->items[list->count++];
+        *node = (bst_smear_node){.weight = 1.0 / parts};
         for (int i = 0; i < 3; i++) {
             node->p[i] = path[k].p[i] + u * (path[k + 1].p[i] - path[k].p[i]);
         }
@@ -61,9 +62,9 @@ bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int co
 enum { RATE_PARTS = 512 };
 #define RATE_STEP 0.02
 
-double bst_motion_stretch(const bst_source *source, double begin_s, double length_s,
+double bst_motion_stretch(const bst_scene_source *source, double begin_s, double length_s,
                           double duration_s, double from, int *parts) {
-    const bst_source_rate *r = source->rate;
+    const bst_scene_source_rate *r = source->rate;
     *parts = 1;
     if (!r || !(length_s > 0.0) || !(duration_s > 0.0)) {
         return 1.0;
@@ -78,13 +79,14 @@ double bst_motion_stretch(const bst_source *source, double begin_s, double lengt
     }
     to = to > 1.0 - 1e-9 ? 1.0 : to;
     double end = start + (to - from) * per;
-    double change = fabs(bst_source_rate_at(source, end) - bst_source_rate_at(source, start));
+    double change =
+        fabs(bst_scene_source_rate_at(source, end) - bst_scene_source_rate_at(source, start));
     double wanted = fmin(fmax(change / RATE_STEP, (end - start) * RATE_PARTS), 1000.0);
     *parts = wanted > 1.0 ? (int)ceil(wanted) : 1;
     return to;
 }
 
-double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px) {
+double bst_smear_nodes_peak_share(const bst_smear_node *nodes, int count, double psf_sigma_px) {
     double scale = 0.5 / (psf_sigma_px * psf_sigma_px), best = 0.0;
     int stride = count / 128 + 1;
     for (int a = 0; a < count; a += stride) {

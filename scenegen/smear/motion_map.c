@@ -36,7 +36,7 @@ struct bst_motion_map {
     int side; /* cells per axis */
     double cell_px;
     unsigned frame, filled[MANY_CELLS * MANY_CELLS];
-    bst_star_motion_cell cells[MANY_CELLS * MANY_CELLS];
+    bst_smear_star_motion_cell cells[MANY_CELLS * MANY_CELLS];
 };
 
 bst_status bst_motion_map_create(bst_ctx *ctx, bst_motion_map **out) {
@@ -78,7 +78,7 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
     map->frame++;
     double low[3] = {0.0}, high[3] = {0.0};
     for (int n = 0; n < frame->count; n++) {
-        const bst_node *node = &frame->nodes[n];
+        const bst_smear_node *node = &frame->nodes[n];
         const float *t = frame->table + (size_t)(n / BST_BLOCK) * BST_TABLE_ROWS * BST_BLOCK;
         turn *out = &map->turns[n];
         for (int i = 0; i < 9; i++) {
@@ -167,7 +167,7 @@ static double cell_scale(const bst_motion_map *map, double radius_px) {
     return any ? worst : 1.0;
 }
 
-static void fill_cell(bst_motion_map *map, bst_star_motion_cell *cell, double x, double y) {
+static void fill_cell(bst_motion_map *map, bst_smear_star_motion_cell *cell, double x, double y) {
     double radius = map->cell_px * sqrt(0.5);
     place_cell(map, x, y);
     cell->share = cell->read_share = cell_share(map, 1, radius);
@@ -188,7 +188,7 @@ static void fill_cell(bst_motion_map *map, bst_star_motion_cell *cell, double x,
     }
 }
 
-const bst_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y) {
+const bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y) {
     double per = 1.0 / map->cell_px, most = map->side - 1.0;
     double i = fmin(fmax(floor((x + map->f.reach_px) * per), 0.0), most);
     double j = fmin(fmax(floor((y + map->f.reach_px) * per), 0.0), most);

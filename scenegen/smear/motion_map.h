@@ -11,18 +11,18 @@
 typedef struct bst_motion_map bst_motion_map;
 
 /* What holds for all stars of a cell. */
-typedef struct bst_star_motion_cell {
+typedef struct bst_smear_star_motion_cell {
     double share;           /* at most, of a star's light on one pixel */
     double read_share;      /* the same of a pixel that is read, binned from the sensor's */
     double scale;           /* at most, of its motion over the path's */
     double low[2], high[2]; /* box of its places about the place at the reference attitude, px */
-} bst_star_motion_cell;
+} bst_smear_star_motion_cell;
 
 bst_status bst_motion_map_create(bst_ctx *ctx, bst_motion_map **out) BST_MUST_CHECK;
 void bst_motion_map_free(bst_motion_map *map);
 
 typedef struct bst_motion_map_frame {
-    const bst_node *nodes; /* [count] of the camera's path, in the order of time */
+    const bst_smear_node *nodes; /* [count] of the camera's path, in the order of time */
     int count;
     const float *table; /* their maps of the tangent plane, blocks of BST_TABLE_ROWS x BST_BLOCK */
     double scale_rad;   /* per px */
@@ -46,6 +46,6 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
 
 /* The cell of a star at (x, y) px from the boresight, undistorted, at the reference attitude. Valid
  * until the next frame. */
-const bst_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y);
+const bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y);
 
 #endif

@@ -20,12 +20,12 @@ struct bst_rolling {
     double tolerance, sigma_px, share, reach_px, steepest;
     const bst_render_request *request;
     bst_row_times times;
-    bst_track_store store; /* of the band */
+    bst_los_track_store store; /* of the band */
     bst_los_track track;
-    source_rows *rows;      /* [count] of the request */
-    bst_source *sources;    /* of the band */
-    bst_source_part *parts; /* of the band's moving sources */
-    int *number;            /* in the request, of the band's sources */
+    source_rows *rows;            /* [count] of the request */
+    bst_scene_source *sources;    /* of the band */
+    bst_scene_source_part *parts; /* of the band's moving sources */
+    int *number;                  /* in the request, of the band's sources */
     int source_capacity, part_capacity;
     double *slope; /* per row: error of the worst source in sigma per second of delay */
     int row_capacity, next;
@@ -52,7 +52,7 @@ bst_status bst_rolling_create(bst_ctx *ctx, const bst_camera *camera, double tol
 
 void bst_rolling_free(bst_rolling *r) {
     if (r) {
-        bst_track_store_free(&r->store);
+        bst_los_track_store_free(&r->store);
         free(r->rows);
         free(r->sources);
         free(r->parts);
@@ -75,28 +75,28 @@ static void measure_motion(bst_rolling *r) {
         /* the way from start to end is longest where one of them is at a bend of the track */
         for (int end = 0; end < 2; end++) {
             double start = fmin(fmax(track->time_s[k] - (end ? exposure : 0.0), 0.0), spare);
-            r->moved_px =
-                fmax(r->moved_px, bst_track_moved_px(&r->camera, bst_track_attitude(track, start),
-                                                     bst_track_attitude(track, start + exposure)));
+            r->moved_px = fmax(r->moved_px, bst_los_track_moved_px(
+                                                &r->camera, bst_los_track_attitude(track, start),
+                                                bst_los_track_attitude(track, start + exposure)));
         }
         double step = k > 0 ? track->time_s[k] - track->time_s[k - 1] : 0.0;
         if (step > 0.0) {
-            double way = bst_track_moved_px(&r->camera, track->q_cam_from_gcrf[k - 1],
-                                            track->q_cam_from_gcrf[k]);
+            double way = bst_los_track_moved_px(&r->camera, track->q_cam_from_gcrf[k - 1],
+                                                track->q_cam_from_gcrf[k]);
             r->speed_pxps = fmax(r->speed_pxps, way / step);
         }
     }
 }
 
 /* Rows between which the source is during the track, and how far it moves in one row's exposure. */
-static source_rows rows_of(const bst_rolling *r, const bst_source *source, double reach_px,
+static source_rows rows_of(const bst_rolling *r, const bst_scene_source *source, double reach_px,
                            double *moved_px) {
     const bst_los_track *track = r->request->track;
     double duration = duration_of(r->request), x, y;
     const source_rows all = {-INFINITY, INFINITY};
     *moved_px = r->moved_px;
     if (!source->path) {
-        bst_quat q = bst_track_attitude(track, 0.5 * duration);
+        bst_quat q = bst_los_track_attitude(track, 0.5 * duration);
         bst_vec3 v = bst_quat_rotate(q, source->apparent_mid);
         bool front = bst_camera_project(&r->camera, v, &x, &y);
         return front && reach_px < 1e5 ? (source_rows){y - reach_px, y + reach_px} : all;
@@ -105,9 +105,9 @@ static source_rows rows_of(const bst_rolling *r, const bst_source *source, doubl
     double before = 0.0, step = 0.0;
     for (int k = 0; k < INSTANTS; k++) {
         double u = k / (INSTANTS - 1.0), to_x, to_y;
-        bst_quat q = bst_track_attitude(track, u * duration);
-        if (!bst_camera_project(&r->camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x,
-                                &y)) {
+        bst_quat q = bst_los_track_attitude(track, u * duration);
+        if (!bst_camera_project(
+                &r->camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)), &x, &y)) {
             *moved_px = INFINITY;
             return all;
         }
@@ -116,8 +116,8 @@ static source_rows rows_of(const bst_rolling *r, const bst_source *source, doubl
         step = k > 0 ? fmax(step, fabs(y - before)) : 0.0;
         before = y;
         double later = u + r->times.exposure_s / duration;
-        q = bst_track_attitude(track, fmin(later, 1.0) * duration);
-        bst_vec3 to = bst_quat_rotate(q, bst_source_direction(source, fmin(later, 1.0)));
+        q = bst_los_track_attitude(track, fmin(later, 1.0) * duration);
+        bst_vec3 to = bst_quat_rotate(q, bst_scene_source_direction(source, fmin(later, 1.0)));
         if (bst_camera_project(&r->camera, to, &to_x, &to_y)) {
             *moved_px =
                 k == 0 ? hypot(to_x - x, to_y - y) : fmax(*moved_px, hypot(to_x - x, to_y - y));
@@ -131,7 +131,7 @@ static source_rows rows_of(const bst_rolling *r, const bst_source *source, doubl
  * that of the first d: at most rate d times the PSF where they lie apart by `moved`, which no pixel
  * has more of than the PSF's peak. Where it is, light of the source lies that has its own noise:
  * with a as the share of the streak, exp(-z^2) / Q(z) <= 2.55 for z from the streak's end. */
-static double error_per_s(const bst_rolling *r, const bst_source *source, double moved_px,
+static double error_per_s(const bst_rolling *r, const bst_scene_source *source, double moved_px,
                           double dark_variance) {
     double rate = source->electrons_per_s * r->share;
     if (source->rate) {
@@ -200,10 +200,10 @@ bst_status bst_rolling_begin(bst_ctx *ctx, bst_rolling *r, const bst_render_requ
     }
     measure_motion(r);
     const bst_los_track *track = q->track;
-    bst_quat middle = bst_track_attitude(track, 0.5 * has);
+    bst_quat middle = bst_los_track_attitude(track, 0.5 * has);
     double reach = 0.0;
     for (int k = 0; k < track->count; k++) {
-        reach = fmax(reach, bst_track_moved_px(&r->camera, middle, track->q_cam_from_gcrf[k]));
+        reach = fmax(reach, bst_los_track_moved_px(&r->camera, middle, track->q_cam_from_gcrf[k]));
     }
     for (int y = 0; y < height; y++) {
         r->slope[y] = 0.0;
@@ -211,7 +211,7 @@ bst_status bst_rolling_begin(bst_ctx *ctx, bst_rolling *r, const bst_render_requ
     double read = r->camera.read_noise_e;
     double dark = q->background_e + (q->background ? q->background->least_e : 0.0) + read * read;
     for (int i = 0; i < q->count; i++) {
-        const bst_source *s = &q->sources[i];
+        const bst_scene_source *s = &q->sources[i];
         double moved,
             disc_px = s->shape ? s->shape->radius / bst_camera_scale_rad(&r->camera) : 0.0;
         r->rows[i] = rows_of(r, s, reach, &moved);
@@ -255,18 +255,18 @@ bst_status bst_rolling_next(bst_ctx *ctx, bst_rolling *r, bst_render_request *ba
     double spare = duration_of(q) - q->exposure_s;
     double start = bst_row_start_s(&r->times, q->track, q->window.y0 + 0.5 * (first + end - 1));
     start = fmin(fmax(start, 0.0), spare);
-    BST_TRY(bst_track_part(ctx, &r->store, q->track, start, start + q->exposure_s, &r->track));
+    BST_TRY(bst_los_track_part(ctx, &r->store, q->track, start, start + q->exposure_s, &r->track));
     int n = 0, used = 0;
     double u0 = duration_of(q) > 0.0 ? start / duration_of(q) : 0.0;
     double u1 = duration_of(q) > 0.0 ? (start + q->exposure_s) / duration_of(q) : 1.0;
     for (int i = 0; i < q->count; i++) {
-        const bst_source *s = &q->sources[i];
+        const bst_scene_source *s = &q->sources[i];
         if (r->rows[i].first > end - 1 + r->margin_px || r->rows[i].last < first - r->margin_px) {
             continue;
         }
         r->number[n] = i;
         if ((s->path || s->rate) && u1 > u0) {
-            bst_source_during(s, u0, fmin(u1, 1.0), &r->parts[used++], &r->sources[n]);
+            bst_scene_source_during(s, u0, fmin(u1, 1.0), &r->parts[used++], &r->sources[n]);
         } else {
             r->sources[n] = *s;
         }

@@ -42,8 +42,8 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
-    s->far_px = bst_place_far_px(camera);
-    s->place_parts = ldexp(1.0, bst_place_bits(camera));
+    s->far_px = bst_fixed_point_px_far_px(camera);
+    s->place_parts = ldexp(1.0, bst_fixed_point_px_bits(camera));
     s->half_diagonal_px =
         tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
     if (!camera->geometry.general) {
@@ -128,15 +128,15 @@ static bst_vec3 turned(const bst_smear *s, bst_vec3 v, double sign) {
 /* The camera's turn from the reference attitude as a path point, in the focal plane's axes: two
  * tilts in pixels of image motion where the distortion stretches most, and roll by what it moves in
  * the sensor's corners. */
-static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time) {
+static bst_smear_path_point attitude_point(const bst_smear *s, bst_quat q, double time) {
     bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(s->q_reference)));
     r = turned(s, r, 1.0);
     double scale = 1.0 / bst_camera_scale_rad(&s->camera) * s->stretch;
-    return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
+    return (bst_smear_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
 /* What the nodes' profiles miss of their image, over its peak. */
-static double profile_error(const bst_smear *s, const bst_node_list *list) {
+static double profile_error(const bst_smear *s, const bst_smear_node_list *list) {
     double psf = s->sigma_px * s->stretch, widest = 0.0, table = 0.0;
     for (int n = 0; n < list->count; n++) {
         double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
@@ -156,15 +156,15 @@ static double profile_error(const bst_smear *s, const bst_node_list *list) {
 }
 
 /* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
-static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *list,
-                               void (*to_table)(const bst_smear *, const bst_node *, float *),
+static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_node_list *list,
+                               void (*to_table)(const bst_smear *, const bst_smear_node *, float *),
                                bst_smear_level *out) {
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                               TABLE_FLOATS * sizeof(float)));
     *out = (bst_smear_level){
         .first_block = s->table_blocks, .blocks = blocks, .profile_error = profile_error(s, list)};
-    double part = bst_nodes_error_part(list->items, list->count, s->sigma_px);
+    double part = bst_smear_nodes_error_part(list->items, list->count, s->sigma_px);
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         out->error[k] = part * list->error[k];
     }
@@ -181,7 +181,7 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
 }
 
 /* A node's widening in PSF variances, before the distortion stretches it. */
-static double widening(const bst_smear *s, const bst_node *node) {
+static double widening(const bst_smear *s, const bst_smear_node *node) {
     double psf = s->sigma_px * s->stretch;
     return node->variance / (psf * psf);
 }
@@ -189,7 +189,7 @@ static double widening(const bst_smear *s, const bst_node *node) {
 /* Node of the camera's turn: v_node = M v_reference as a map of the undistorted tangent plane, in
  * pixels and the focal plane's axes,
  * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
-static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t) {
+static void attitude_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
     double a = bst_camera_scale_rad(&s->camera), tilt = a / (s->stretch * s->wide_field);
     bst_quat q = bst_quat_from_rotvec(
         (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
@@ -204,7 +204,7 @@ static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t
 }
 
 /* Node of an own path: a shift of the image. */
-static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
+static void shift_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
     double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
     double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight, widening(s, node)};
     for (int i = 0; i < BST_TABLE_ROWS; i++) {
@@ -218,12 +218,13 @@ double bst_smear_largest_share(bst_smear *s, double *read_share) {
         s->nodes.items[n].p[0] *= least;
         s->nodes.items[n].p[1] *= least;
     }
-    double share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
+    double share = bst_smear_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
     *read_share = share;
     if (s->binning > 1) {
         double spread, own, pixel = bst_motion_pixel_share(s->share_sigma_px, s->binning, &spread);
         double wider = bst_motion_pixel_share(spread, 1, &own);
-        *read_share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, spread) * pixel / wider;
+        *read_share =
+            bst_smear_nodes_peak_share(s->nodes.items, s->nodes.count, spread) * pixel / wider;
     }
     return share;
 }
@@ -239,24 +240,24 @@ void bst_smear_nodes_box(const bst_smear *s, double low[2], double high[2]) {
     }
 }
 
-bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
-                                double part, bool turns, double tolerance) {
+bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path_point *path,
+                                int count, double part, bool turns, double tolerance) {
     double parts = ceil(part * s->options.temporal_oversample - 1e-9);
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
-    bst_node_aim aim = {.psf_sigma_px = s->sigma_px,
-                        .tolerance = tolerance,
-                        .widest = s->widest,
-                        .wide_field = turns ? s->wide_field : 1.0,
-                        .curvature = turns ? s->curvature : 0.0};
+    bst_smear_node_aim aim = {.psf_sigma_px = s->sigma_px,
+                              .tolerance = tolerance,
+                              .widest = s->widest,
+                              .wide_field = turns ? s->wide_field : 1.0,
+                              .curvature = turns ? s->curvature : 0.0};
     memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
-    return bst_nodes_from_path(ctx, path, count, &aim, &s->nodes);
+    return bst_smear_nodes_from_path(ctx, path, count, &aim, &s->nodes);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
-        bst_nodes_clear(&s->nodes);
+        bst_smear_nodes_clear(&s->nodes);
         BST_TRY(
             bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]));
         BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
@@ -373,7 +374,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
             bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
             double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
             s->turn[s->path_count] = q;
-            bst_path_point *p = &s->path[s->path_count++];
+            bst_smear_path_point *p = &s->path[s->path_count++];
             *p = attitude_point(s, q, t * inverse);
             s->travel_px = fmax(s->travel_px, fabs(p->p[0]) + fabs(p->p[1]) + fabs(p->p[2]));
         }
@@ -458,8 +459,8 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
-bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
-                            bst_scene_source *out, bool *visible) {
+bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                            bst_kernel_source_record *out, bool *visible) {
     double x, y, electrons = source->electrons_per_s * s->duration_s;
     s->last_peak_e = s->last_read_e = s->chord_error = 0.0;
     s->last_leaves = true;
@@ -479,7 +480,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     if (!moving) {
         double share = s->star_share, read_share = s->read_share;
         if (!s->single) {
-            const bst_star_motion_cell *cell = bst_motion_map_at(s->map, x, y);
+            const bst_smear_star_motion_cell *cell = bst_motion_map_at(s->map, x, y);
             scale = cell->scale;
             share = cell->share;
             read_share = cell->read_share;
@@ -532,14 +533,15 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double parts = s->place_parts;
     /* what the stamp leaves out is put on the stamp, so that no light is lost */
     electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];
-    *out = (bst_scene_source){.x_px = (float)x,
-                              .y_px = (float)y,
-                              .place_x = (int)lrint((x + bst_camera_centre_x(&s->camera)) * parts),
-                              .place_y = (int)lrint((y + bst_camera_centre_y(&s->camera)) * parts),
-                              .electrons = (float)electrons,
-                              .first_table = used->first_block,
-                              .blocks = used->blocks,
-                              .radius = radius};
+    *out = (bst_kernel_source_record){
+        .x_px = (float)x,
+        .y_px = (float)y,
+        .place_x = (int)lrint((x + bst_camera_centre_x(&s->camera)) * parts),
+        .place_y = (int)lrint((y + bst_camera_centre_y(&s->camera)) * parts),
+        .electrons = (float)electrons,
+        .first_table = used->first_block,
+        .blocks = used->blocks,
+        .radius = radius};
     return BST_OK;
 }
 
@@ -563,12 +565,12 @@ bool bst_smear_last_leaves(const bst_smear *s) {
     return s->last_leaves;
 }
 
-const bst_crowd_source *bst_smear_last_error(const bst_smear *s) {
+const bst_error_budget_source *bst_smear_last_error(const bst_smear *s) {
     return &s->last_error;
 }
 
-bst_crowd_motion bst_smear_motion(const bst_smear *s) {
-    bst_crowd_motion motion = bst_crowd_motion_of(s->path, s->path_count, s->single);
+bst_error_budget_motion bst_smear_motion(const bst_smear *s) {
+    bst_error_budget_motion motion = bst_error_budget_motion_of(s->path, s->path_count, s->single);
     motion.sigma_px = s->sigma_px;
     motion.dark_variance_e2 = s->dark_variance_e2;
     return motion;

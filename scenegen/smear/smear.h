@@ -13,11 +13,11 @@
 typedef struct bst_smear bst_smear;
 
 /* Whose track the stars follow. */
-typedef enum bst_star_motion {
+typedef enum bst_smear_star_motion {
     BST_STAR_MOTION_AUTO,   /* the cheapest that meets the tolerance */
     BST_STAR_MOTION_SINGLE, /* all that of the star at the boresight, as a shift of the image */
     BST_STAR_MOTION_MULTI   /* each its own */
-} bst_star_motion;
+} bst_smear_star_motion;
 
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
@@ -26,15 +26,16 @@ typedef struct bst_smear_options {
      * widening up to which it serves, PSF variances (scenegen/stamp/profile_law.h); 0: there is
      * none */
     double law_error, law_widest;
-    bst_star_motion motion;
+    bst_smear_star_motion motion;
     int temporal_oversample; /* 0: by the tolerance; else so many equal parts of the exposure */
     int stamp_radius_px;     /* 0: by the tolerance; else of all stamps */
     /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
      * a point's light in one pixel */
     double node_sigma_px, share_sigma_px;
-    double grid_per_px;                    /* least samples per px that its nodes are spread on */
-    double pixel_part[BST_PIXEL_PARTS][3]; /* of it as in bst_node_aim, by binning from 1 on */
-    double widest; /* widening of nodes, PSF variances; 0: as much as nodes may be */
+    double grid_per_px; /* least samples per px that its nodes are spread on */
+    double pixel_part[BST_PIXEL_PARTS]
+                     [3]; /* of it as in bst_smear_node_aim, by binning from 1 on */
+    double widest;        /* widening of nodes, PSF variances; 0: as much as nodes may be */
 } bst_smear_options;
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
@@ -64,8 +65,8 @@ bool bst_smear_single(const bst_smear *smear);
 /* Chooses a source's nodes and stamp. *visible is false for one that gives the window no light
  * (occulted, not in front of the camera, a star too far off); *out is then untouched. first_block
  * is left 0. */
-bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_source *source,
-                            bst_scene_source *out, bool *visible) BST_MUST_CHECK;
+bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_scene_source *source,
+                            bst_kernel_source_record *out, bool *visible) BST_MUST_CHECK;
 
 /* Largest expected electrons in one pixel of the source given last; and in one that is read, if the
  * window holds it. */
@@ -79,10 +80,10 @@ bool bst_smear_last_leaves(const bst_smear *smear);
 /* Predicted error of the image of the source given last: in its worst pixel at most tolerance_sigma
  * of that pixel's sigma, unless the brightest level of detail does not reach it or a knob other
  * than the tolerance forbids it. With temporal_oversample errors are not foreseen. */
-const bst_crowd_source *bst_smear_last_error(const bst_smear *smear);
+const bst_error_budget_source *bst_smear_last_error(const bst_smear *smear);
 
 /* How the frame's stars move. */
-bst_crowd_motion bst_smear_motion(const bst_smear *smear);
+bst_error_budget_motion bst_smear_motion(const bst_smear *smear);
 
 /* The frame's node table so far: *blocks blocks of BST_TABLE_ROWS x BST_BLOCK floats. */
 const float *bst_smear_table(const bst_smear *smear, int *blocks);

@@ -5,8 +5,8 @@
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
 
-/* The parts of bst_node_aim for a Gaussian: its derivatives and itself, means over the side of
- * `binning` pixels; integrals of Hermite functions are those of the order below. */
+/* The parts of bst_smear_node_aim for a Gaussian: its derivatives and itself, means over the side
+ * of `binning` pixels; integrals of Hermite functions are those of the order below. */
 void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
     enum { STEPS = 48 };
     static const double greatest[3] = {1.0, 3.0, 15.0};
@@ -31,7 +31,7 @@ void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
 
 /* A level's error for an image that moves by `scale` of the path, over the peak. */
 double bst_smear_level_error(const bst_smear_level *level, double scale) {
-    return bst_nodes_error(level->error, scale) + level->profile_error;
+    return bst_smear_nodes_error(level->error, scale) + level->profile_error;
 }
 
 /* Error of a star `from_boresight_px` away that follows the boresight's track, in sigma of its
@@ -60,14 +60,15 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     double flank = sigma_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
     /* a border crosses a pixel that is read along its side at most */
     double tail = s->stamp.tail[border] * s->binning;
-    s->last_error = (bst_crowd_source){.x_px = (float)d->x,
-                                       .y_px = (float)d->y,
-                                       .peak_e = (float)peak_e,
-                                       .nodes_e = (float)((flank * error + rounded) * peak_e),
-                                       .shared_e = (float)(shared * sigma_e),
-                                       .excess_e = (float)(lost * peak_e),
-                                       .border_e = (float)(s->last_peak_e * tail),
-                                       .apart = d->moving && travel_px > s->travel_px};
+    s->last_error =
+        (bst_error_budget_source){.x_px = (float)d->x,
+                                  .y_px = (float)d->y,
+                                  .peak_e = (float)peak_e,
+                                  .nodes_e = (float)((flank * error + rounded) * peak_e),
+                                  .shared_e = (float)(shared * sigma_e),
+                                  .excess_e = (float)(lost * peak_e),
+                                  .border_e = (float)(s->last_peak_e * tail),
+                                  .apart = d->moving && travel_px > s->travel_px};
 }
 
 /* Beyond this many sigma of a node its errors fall: those of a Gaussian, the sixth derivative of
@@ -78,7 +79,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
 /* What of the last source's errors reaches the window, from where its places lie. */
 void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
     const double *low = d->low, *high = d->high;
-    bst_crowd_source *e = &s->last_error;
+    bst_error_budget_source *e = &s->last_error;
     bool gaussian = s->options.node_sigma_px <= 0.0;
     s->last_presence = 1.0;
     s->last_leaves = true;

@@ -17,7 +17,8 @@ enum { BST_SMEAR_LEVELS = 14 };
 
 typedef struct bst_smear_level {
     int first_block, blocks; /* blocks 0: not made in this frame */
-    /* expected, of the smeared image's peak: for motions as in bst_nodes_error, and of profiles */
+    /* expected, of the smeared image's peak: for motions as in bst_smear_nodes_error, and of
+     * profiles */
     double error[BST_NODE_SCALES], profile_error;
 } bst_smear_level;
 
@@ -39,7 +40,7 @@ struct bst_smear {
     bst_window window;
     double margin_px, dark_variance_e2, duration_s;
     int binning, sources;
-    double pixel_part[3]; /* as in bst_node_aim */
+    double pixel_part[3]; /* as in bst_smear_node_aim */
     double aim;           /* part of the tolerance */
     bst_quat q_reference;
     bst_quat *turn; /* attitude at each point of the path */
@@ -56,14 +57,14 @@ struct bst_smear {
     bool last_leaves;
     double chord_error;     /* of the last source's path, over its peak */
     double low[2], high[2]; /* box of one track's places about a star's, px */
-    bst_crowd_source last_error;
+    bst_error_budget_source last_error;
     bst_smear_level levels[BST_SMEAR_LEVELS];
 
-    bst_path_point *path, *own_path;
+    bst_smear_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
-    bst_node_list nodes;    /* scratch */
-    bst_disc_points points; /* scratch */
-    double disc_px;         /* radius of the present source's disc; 0: a point */
+    bst_smear_node_list nodes; /* scratch */
+    bst_disc_points points;    /* scratch */
+    double disc_px;            /* radius of the present source's disc; 0: a point */
     float *table;
     int table_blocks, table_capacity;
 };
@@ -78,8 +79,9 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
 
 /* Adds to the scratch nodes those of a path that takes `part` of the exposure. turns: a path of the
  * camera, not of the image. */
-bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
-                                double part, bool turns, double tolerance) BST_MUST_CHECK;
+bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path_point *path,
+                                int count, double part, bool turns,
+                                double tolerance) BST_MUST_CHECK;
 
 /* Largest share of light on one pixel over the scratch nodes, where the distortion stretches the
  * image least, and on one that is read. Spoils their places. */
@@ -98,10 +100,10 @@ int bst_smear_choose_level(const bst_smear *s, double scale);
 /* Makes the scratch nodes of a source that moves by itself, changes or is a disc, relative to the
  * place (x, y), last_peak_e and last_read_e; none when it gives the sensor no light. electrons: in
  * the exposure. */
-bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *source,
+bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                   double electrons, double x, double y) BST_MUST_CHECK;
 
-/* The parts of bst_node_aim for a Gaussian whose pixels are binned. */
+/* The parts of bst_smear_node_aim for a Gaussian whose pixels are binned. */
 void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]);
 
 /* A level's error for an image that moves by `scale` of the path, over the peak. */

@@ -20,13 +20,13 @@ static double far_px(const bst_smear *s) {
 /* How many chords the curved motion over the image wants for all to be off by at most miss_px:
  * of a parabola they miss (its bend) / chords^2. Seen at 17 instants; those that are off the sensor
  * do not count, but a chord must not step over it. */
-static double chords_of(const bst_smear *s, const bst_source *source, double miss_px) {
+static double chords_of(const bst_smear *s, const bst_scene_source *source, double miss_px) {
     enum { N = 16 };
     double x[N + 1], y[N + 1], far = far_px(s), chords = 0.0;
     bool front[N + 1];
     for (int k = 0; k <= N; k++) {
-        front[k] = bst_smear_project(s, s->q_reference, bst_source_direction(source, (double)k / N),
-                                     &x[k], &y[k]);
+        front[k] = bst_smear_project(
+            s, s->q_reference, bst_scene_source_direction(source, (double)k / N), &x[k], &y[k]);
     }
     for (int k = 0; k < N; k++) {
         if (!front[k] || !front[k + 1]) {
@@ -45,8 +45,8 @@ static double chords_of(const bst_smear *s, const bst_source *source, double mis
 }
 
 /* Neither end nor anything between is near the sensor. */
-static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_path_point *b,
-                      double x0, double y0, double far) {
+static bool passes_by(const bst_smear *s, const bst_smear_path_point *a,
+                      const bst_smear_path_point *b, double x0, double y0, double far) {
     double f = 1.0 / s->stretch;
     double ax = a->p[0] * f + x0, ay = a->p[1] * f + y0, bx = b->p[0] * f + x0,
            by = b->p[1] * f + y0;
@@ -55,8 +55,8 @@ static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_pat
 
 /* A moving source's path over the image, relative to (x0, y0); NAN where the source is not in front
  * of the camera. */
-static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double miss_px,
-                           double x0, double y0, int *count) {
+static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                           double miss_px, double x0, double y0, int *count) {
     const bst_los_track *track = &s->track;
     int chords = (int)chords_of(s, source, miss_px) / (track->count - 1) + 1;
     const bst_quat *turn = s->turn;
@@ -80,10 +80,10 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                 bst_quat q = known ? turn[n]
                                    : bst_quat_slerp(track->q_cam_from_gcrf[k],
                                                     track->q_cam_from_gcrf[k + 1], u);
-                bool front = bst_smear_project(s, q, bst_source_direction(source, t), &x, &y);
-                s->own_path[(*count)++] = (bst_path_point){
+                bool front = bst_smear_project(s, q, bst_scene_source_direction(source, t), &x, &y);
+                s->own_path[(*count)++] = (bst_smear_path_point){
                     {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
-                    bst_source_light(source, t)};
+                    bst_scene_source_light(source, t)};
             }
         }
     }
@@ -94,9 +94,9 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
  * shares of the whole exposure. */
 static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, double y0,
                             double tolerance) {
-    const bst_path_point *p = s->own_path;
+    const bst_smear_path_point *p = s->own_path;
     double far = far_px(s), total = p[count - 1].s - p[0].s;
-    bst_nodes_clear(&s->nodes);
+    bst_smear_nodes_clear(&s->nodes);
     for (int first = 0, last; first + 1 < count; first = last > first ? last : first + 1) {
         last = first;
         while (last + 1 < count && !isnan(p[last].p[0]) && !isnan(p[last + 1].p[0]) &&
@@ -118,7 +118,7 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
 
 /* Makes the points of a disc; the scratch nodes are those of its middle about (x, y). *peak: share
  * of the light on one pixel at most, without the smear. */
-static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
+static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source, double x,
                                double y, double *peak) {
     enum { MOST_NODES = 2000000 };
     double x0 = x, y0 = y, low[2] = {0.0, 0.0}, high[2] = {0.0, 0.0};
@@ -139,7 +139,7 @@ static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *sou
         turn = BST_PI - turn;
     }
     bst_quat focal = bst_quat_from_rotvec((bst_vec3){0.0, 0.0, turn});
-    bst_shape_view view = {
+    bst_extended_source_view view = {
         .q_focal_from_gcrf = general ? bst_quat_mul(focal, s->q_reference) : s->q_reference,
         .scale_rad = bst_camera_scale_rad(&s->camera),
         .edge_x_px = -cx - 0.5,
@@ -150,10 +150,10 @@ static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *sou
         .min_y_px = (general ? -all : -cy - margin) - high[1],
         .max_y_px = (general ? all : (double)s->camera.height_px - cy + margin) - low[1],
         .most_points = MOST_NODES / (s->nodes.count > 0 ? s->nodes.count : 1)};
-    return bst_shape_points(ctx, source, &view, &s->points, peak);
+    return bst_extended_source_points(ctx, source, &view, &s->points, peak);
 }
 
-bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *source,
+bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                   double electrons, double x, double y) {
     int count;
     BST_TRY(own_path(ctx, s, source, CHORD_PX, x, y, &count));
@@ -178,5 +178,6 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *
     s->chord_error = source->path ? CHORD_ERROR * miss_px / s->sigma_px : 0.0;
     int level = bst_smear_choose_level(s, 1.0);
     BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[level]));
-    return source->shape ? bst_shape_spread(ctx, &s->points, s->stretch, &s->nodes) : BST_OK;
+    return source->shape ? bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes)
+                         : BST_OK;
 }

@@ -8,15 +8,15 @@
 #include "sim/core/vec.h"
 
 typedef struct maker {
-    const bst_path_point *path;
+    const bst_smear_path_point *path;
     int count;
     double total;    /* duration */
     double variance; /* of the PSF, px^2 */
     double tolerance;
     bool widen;
-    bst_node_list *list;
+    bst_smear_node_list *list;
     double widest;     /* px^2 */
-    double wide_field; /* as in bst_node_aim */
+    double wide_field; /* as in bst_smear_node_aim */
     double curvature;
     double pixel_part[3];
     double image_share; /* variance of the image per variance of the path, mean over the field */
@@ -55,24 +55,24 @@ typedef struct rule {
     double fixed;    /* of it, the wrong widening of images that move by less than the path */
 } rule;
 
-static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], double weight,
+static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3], double weight,
                        double variance, double error) {
     if (list->count == list->capacity) {
         int capacity = list->capacity ? 2 * list->capacity : 256;
-        bst_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
+        bst_smear_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
         if (!items) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of a smear", capacity);
         }
         list->items = items;
         list->capacity = capacity;
     }
-    list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight, variance, error};
+    list->items[list->count++] = (bst_smear_node){{p[0], p[1], p[2]}, weight, variance, error};
     return BST_OK;
 }
 
 /* The part of segment k inside the group, as its two ends; its duration. */
 static double clip(const maker *m, const group *g, int k, double a[3], double b[3]) {
-    const bst_path_point *p = &m->path[k], *q = p + 1;
+    const bst_smear_path_point *p = &m->path[k], *q = p + 1;
     double length = q->s - p->s;
     double from = fmax(p->s, g->from), to = fmin(q->s, g->to);
     if (!(to > from)) {
@@ -152,7 +152,7 @@ enum { MANY_SEGMENTS = 6 };
 /* Fills the axis and the moments about it. */
 static void high_moments(const maker *m, const group *g, moments *out) {
     double a[3], b[3], weight = 0.0;
-    bst_nodes_main_axis(out->covariance, out->axis);
+    bst_smear_nodes_main_axis(out->covariance, out->axis);
     int segments = 0;
     while (segments < MANY_SEGMENTS && reaches(m, g, g->first + segments)) {
         segments++;
@@ -349,7 +349,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     }
     if (split) {
         double axis[3], length2 = 0.0;
-        bst_nodes_main_axis(d, axis);
+        bst_smear_nodes_main_axis(d, axis);
         for (int i = 0; i < 3; i++) {
             for (int j = 0; j < 3; j++) {
                 length2 += axis[i] * d[i][j] * axis[j];
@@ -410,7 +410,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     r->error = error + r->missed;
 }
 
-static void raise_error(bst_node_list *list, const rule *r) {
+static void raise_error(bst_smear_node_list *list, const rule *r) {
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         double square = exp2(k - (BST_NODE_SCALES - 2)), fourth = square * square;
         double low = square * (square > 1.0 ? sqrt(square) : 1.0);
@@ -530,8 +530,8 @@ static double spread_of(const extent *e) {
     return total;
 }
 
-bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               const bst_node_aim *aim, bst_node_list *list) {
+bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *path, int count,
+                                     const bst_smear_node_aim *aim, bst_smear_node_list *list) {
     double variance = aim->psf_sigma_px * aim->psf_sigma_px, tolerance = aim->tolerance;
     double wide = fmax(aim->wide_field, 1.0);
     maker m = {.path = path,
@@ -557,7 +557,7 @@ bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int cou
     group g = {0, path[0].s, path[0].s};
     extent e = {0};
     for (int k = 0; k + 1 < count; k++) {
-        const bst_path_point *p = &path[k], *q = p + 1;
+        const bst_smear_path_point *p = &path[k], *q = p + 1;
         if (!(q->s > p->s)) {
             continue;
         }

@@ -17,35 +17,35 @@
 /* A point of a path, straight and uniform in time up to the next one: two tilts of the camera in
  * pixels of image motion (or the two coordinates of the image), and its roll in pixels of motion at
  * the sensor's corners. */
-typedef struct bst_path_point {
+typedef struct bst_smear_path_point {
     double p[3];
     double s; /* time, 0 at exposure start to 1 at its end, ascending */
-} bst_path_point;
+} bst_smear_path_point;
 
-typedef struct bst_node {
+typedef struct bst_smear_node {
     double p[3];
     double weight;   /* share of the exposure; all nodes together: 1 */
     double variance; /* px^2, by which the node's PSF is wider per axis */
     double error;    /* of its group, over the peak that the group has alone */
-} bst_node;
+} bst_smear_node;
 
-/* Motions, over the path's, for which the error is estimated; see bst_nodes_error. */
+/* Motions, over the path's, for which the error is estimated; see bst_smear_nodes_error. */
 enum { BST_NODE_SCALES = 9 };
 
-/* A growing array; zero-initialise, free `items`. To use it again, bst_nodes_clear. */
-typedef struct bst_node_list {
-    bst_node *items;
+/* A growing array; zero-initialise, free `items`. To use it again, bst_smear_nodes_clear. */
+typedef struct bst_smear_node_list {
+    bst_smear_node *items;
     int count, capacity;
     /* largest estimate over the groups, in the units of the tolerance, for images that move by
      * scales of the path: 2^((k - BST_NODE_SCALES + 2) / 2), so that the last but one is 1 */
     double error[BST_NODE_SCALES];
-} bst_node_list;
+} bst_smear_node_list;
 
 /* Nodes are widened by at most this many PSF variances. */
 #define BST_NODE_WIDEST 1.0
 
 /* What nodes are made for. */
-typedef struct bst_node_aim {
+typedef struct bst_smear_node_aim {
     double psf_sigma_px;
     double tolerance;  /* of the smeared image's peak */
     double widest;     /* nodes are widened by at most so many PSF variances, BST_NODE_WIDEST at
@@ -57,18 +57,19 @@ typedef struct bst_node_aim {
     /* what pixels show, over their peak, of the PSF's second, fourth and sixth derivatives, over
      * those of a Gaussian of psf_sigma_px; 0 is 1 */
     double pixel_part[3];
-} bst_node_aim;
+} bst_smear_node_aim;
 
 /* Appends the nodes of a path of `count` >= 2 points (two points at one time: a single node), so
  * that the image is right to about the tolerance. Raises list->error. BST_ERR_MEMORY. */
-bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               const bst_node_aim *aim, bst_node_list *list) BST_MUST_CHECK;
+bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *path, int count,
+                                     const bst_smear_node_aim *aim,
+                                     bst_smear_node_list *list) BST_MUST_CHECK;
 
 /* Empties the list. */
-void bst_nodes_clear(bst_node_list *list);
+void bst_smear_nodes_clear(bst_smear_node_list *list);
 
 /* The error of an image that moves by `scale` of the path's motion: at least that of any group,
  * whose parts go with the second to sixth power of it. */
-double bst_nodes_error(const double error[BST_NODE_SCALES], double scale);
+double bst_smear_nodes_error(const double error[BST_NODE_SCALES], double scale);
 
 #endif

@@ -6,7 +6,7 @@
 #include "scenegen/smear/smear_quadrature_internal.h"
 
 /* By squaring the matrix over and over, until one column is left. */
-void bst_nodes_main_axis(double a[3][3], double axis[3]) {
+void bst_smear_nodes_main_axis(double a[3][3], double axis[3]) {
     double p[3][3];
     memcpy(p, a, sizeof p);
     for (int round = 0; round < 6; round++) {
@@ -30,7 +30,7 @@ void bst_nodes_main_axis(double a[3][3], double axis[3]) {
     }
 }
 
-double bst_nodes_error(const double error[BST_NODE_SCALES], double scale) {
+double bst_smear_nodes_error(const double error[BST_NODE_SCALES], double scale) {
     double k = 2.0 * log2(fmax(scale, 1e-9)) + BST_NODE_SCALES - 2;
     if (k <= 0.0) {
         return error[0];
@@ -43,12 +43,12 @@ double bst_nodes_error(const double error[BST_NODE_SCALES], double scale) {
     return error[n] > 0.0 ? error[n] * pow(error[n + 1] / error[n], k - n) : error[n + 1];
 }
 
-void bst_nodes_clear(bst_node_list *list) {
+void bst_smear_nodes_clear(bst_smear_node_list *list) {
     list->count = 0;
     memset(list->error, 0, sizeof list->error);
 }
 
-double bst_nodes_error_part(const bst_node *nodes, int count, double psf_sigma_px) {
+double bst_smear_nodes_error_part(const bst_smear_node *nodes, int count, double psf_sigma_px) {
     enum { ANCHORS = 24 };
     double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst = 0.0, least = INFINITY;
     int brightest = 0;
@@ -64,7 +64,7 @@ double bst_nodes_error_part(const bst_node *nodes, int count, double psf_sigma_p
     double light = 0.0, error = 0.0;
     int stride = count / ANCHORS + 1;
     for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
-        const bst_node *at = &nodes[a < 0 ? brightest : a];
+        const bst_smear_node *at = &nodes[a < 0 ? brightest : a];
         double here = 0.0, missed = 0.0;
         for (int n = 0; n < count; n++) {
             const double *p = nodes[n].p;

@@ -4,6 +4,6 @@
 
 /* Direction of the largest eigenvalue of a symmetric matrix that is not negative. A tie gives some
  * direction between. */
-void bst_nodes_main_axis(double a[3][3], double axis[3]);
+void bst_smear_nodes_main_axis(double a[3][3], double axis[3]);
 
 #endif

@@ -10,14 +10,14 @@ enum { BST_PLACE_TAPS = 512 };
 
 /* Light of points further than this from the boresight (px, without distortion) stays off the
  * sensor. */
-static inline double bst_place_far_px(const bst_camera *c) {
+static inline double bst_fixed_point_px_far_px(const bst_camera *c) {
     return tan(bst_camera_half_diagonal_rad(c)) / bst_camera_scale_rad(c) +
            BST_PLACE_TAPS / fmax(bst_camera_shrink(c), 0.01);
 }
 
 /* A pixel has 2^bits parts: of four times the distance above, fewer than BST_PLACE_LIMIT. */
-static inline int bst_place_bits(const bst_camera *c) {
-    return (int)fmax(floor(log2(BST_PLACE_LIMIT / (4.0 * bst_place_far_px(c)))), 1.0);
+static inline int bst_fixed_point_px_bits(const bst_camera *c) {
+    return (int)fmax(floor(log2(BST_PLACE_LIMIT / (4.0 * bst_fixed_point_px_far_px(c)))), 1.0);
 }
 
 #endif

@@ -234,7 +234,7 @@ static bst_status bench(bst_ctx *ctx, const bst_bench_options *options, const ch
     bst_status status = run_all(ctx, options, markdown, count, names, &device, results);
     if (status == BST_OK && json) {
         char *text = cJSON_Print(root);
-        status = text ? bst_write_file_atomic(ctx, json, text, strlen(text))
+        status = text ? bst_io_write_file_atomic(ctx, json, text, strlen(text))
                       : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the results");
         free(text);
     }
@@ -247,7 +247,7 @@ int bst_cmd_bench(int argc, char **argv) {
     const char *json = NULL, *report = "docs";
     int64_t threads = 0;
     char scenario[4096];
-    bst_app_shipped_file("scenarios/neossat_geo_track.json", scenario, sizeof scenario);
+    bst_cli_shipped_file("scenarios/neossat_geo_track.json", scenario, sizeof scenario);
     bst_bench_options options = {.scenario = scenario};
     const bst_option table[] = {
         {.name = "json",
@@ -295,7 +295,7 @@ int bst_cmd_bench(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "bench");

@@ -124,7 +124,7 @@ static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
         unlink(draft);
     } else {
         printf("%s: %s of %g s\n", path,
-               bst_count_text((char[BST_COUNT_TEXT]){0}, s->count, "frame", "frames"),
+               bst_text_of_count((char[BST_COUNT_TEXT]){0}, s->count, "frame", "frames"),
                s->exposure_s);
     }
     return status;
@@ -244,7 +244,7 @@ int bst_cmd_calframes(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_ERROR);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_ERROR);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "calframes");

@@ -19,7 +19,7 @@ typedef struct errand {
 } errand;
 
 typedef struct collecting {
-    bst_calibrator *calibrator;
+    bst_calibration_fitter *calibrator;
     double tick_rate_hz;
     int64_t width, height;
 } collecting;
@@ -28,14 +28,14 @@ static bst_status on_frame(void *user, bst_ctx *ctx, const bst_truth *truth,
                            const bst_detections *detections) {
     collecting *c = user;
     double exposure_s = (double)(truth->end_tick - truth->start_tick) / c->tick_rate_hz;
-    return bst_calibrator_add(ctx, c->calibrator, truth, detections, exposure_s);
+    return bst_calibration_fitter_add(ctx, c->calibrator, truth, detections, exposure_s);
 }
 
 /* A real value of the module of a role of the first sensor. */
 static bst_status setting(bst_ctx *ctx, const bst_scenario *s, const char *role, const char *key,
                           double *out) {
     for (int m = 0; m < s->module_count; m++) {
-        const bst_module_config *module = &s->modules[m];
+        const bst_scenario_module_config *module = &s->modules[m];
         if (module->observer != 0 || module->sensor != 0 || strcmp(module->desc->role, role) != 0) {
             continue;
         }
@@ -53,14 +53,14 @@ static bst_status setting(bst_ctx *ctx, const bst_scenario *s, const char *role,
 }
 
 static bst_status collect(bst_ctx *ctx, const errand *e, const char *file, int64_t n,
-                          bst_calibrator *calibrator) {
+                          bst_calibration_fitter *calibrator) {
     bst_json *json;
     bst_scenario scenario;
     BST_TRY(bst_load_scenario(ctx, file, &e->load, &json, &scenario));
     scenario.run += n;
     bst_observer_config *observer = scenario.observers.items;
     bst_sensor_config *sensor = observer->sensors.items;
-    bst_calibrated_path path = {.camera = &sensor->camera};
+    bst_calibration_path path = {.camera = &sensor->camera};
     bst_status status = BST_OK;
     if (sensor->observation_source != BST_OBSERVE_IMAGE || sensor->exposure.binning > 1) {
         status = bst_fail(ctx, BST_ERR_CONFIG,
@@ -82,11 +82,11 @@ static bst_status collect(bst_ctx *ctx, const errand *e, const char *file, int64
         status = setting(ctx, &scenario, "imgproc", "streak_max_px", &path.streak_max_px);
     }
     if (status == BST_OK) {
-        status = bst_calibrator_begin(ctx, calibrator, &path);
+        status = bst_calibration_fitter_begin(ctx, calibrator, &path);
     }
     if (status == BST_OK) {
         collecting c = {calibrator, (double)scenario.tick_rate_hz, 0, 0};
-        const bst_watcher watcher = {.user = &c, .frame = on_frame};
+        const bst_calibration_watcher watcher = {.user = &c, .frame = on_frame};
         status = bst_watch_run(ctx, &scenario, &watcher, e->device, (int)e->threads, NULL);
     }
     bst_scenario_free(&scenario);
@@ -116,8 +116,8 @@ static void print_calibration(const bst_obsgen_calibration *c, const bst_calibra
 }
 
 static bst_status calibrate(bst_ctx *ctx, const errand *e, int count, char **files) {
-    bst_calibrator *calibrator;
-    BST_TRY(bst_calibrator_create(ctx, &calibrator));
+    bst_calibration_fitter *calibrator;
+    BST_TRY(bst_calibration_fitter_create(ctx, &calibrator));
     bst_status status = BST_OK;
     for (int i = 0; i < count && status == BST_OK; i++) {
         for (int64_t n = 0; n < e->seeds && status == BST_OK; n++) {
@@ -127,7 +127,7 @@ static bst_status calibrate(bst_ctx *ctx, const errand *e, int count, char **fil
     bst_obsgen_calibration calibration;
     bst_calibration_counts counts;
     if (status == BST_OK) {
-        status = bst_calibrator_fit(ctx, calibrator, &calibration, &counts);
+        status = bst_calibration_fitter_fit(ctx, calibrator, &calibration, &counts);
     }
     if (status == BST_OK) {
         int used = snprintf(calibration.made_from, sizeof calibration.made_from,
@@ -141,22 +141,22 @@ static bst_status calibrate(bst_ctx *ctx, const errand *e, int count, char **fil
         print_calibration(&calibration, &counts);
         status = bst_obsgen_calibration_write(ctx, e->out, &calibration);
     }
-    bst_calibrator_free(calibrator);
+    bst_calibration_fitter_free(calibrator);
     return status;
 }
 
 static bst_status check(bst_ctx *ctx, const errand *e, int count, char **files, bool *equivalent) {
     *equivalent = true;
     for (int i = 0; i < count; i++) {
-        const bst_equivalence_options options = {.scenario = files[i],
-                                                 .calibration = e->calibration,
-                                                 .device = e->device,
-                                                 .load = &e->load,
-                                                 .seeds = (int)e->seeds,
-                                                 .threads = (int)e->threads,
-                                                 .json = e->json};
+        const bst_obsgen_validation_options options = {.scenario = files[i],
+                                                       .calibration = e->calibration,
+                                                       .device = e->device,
+                                                       .load = &e->load,
+                                                       .seeds = (int)e->seeds,
+                                                       .threads = (int)e->threads,
+                                                       .json = e->json};
         bool same;
-        BST_TRY(bst_equivalence_run(ctx, &options, &same));
+        BST_TRY(bst_obsgen_validation_run(ctx, &options, &same));
         *equivalent = *equivalent && same;
     }
     return BST_OK;
@@ -224,7 +224,7 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_ERROR);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_ERROR);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "calibrate-obsgen");

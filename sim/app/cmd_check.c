@@ -42,7 +42,7 @@ int bst_cmd_check(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_ERROR);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_ERROR);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "check");
@@ -61,7 +61,7 @@ int bst_cmd_check(int argc, char **argv) {
         return BST_EXIT_OK;
     }
     if (list_rules) {
-        bst_rules_print(stdout);
+        bst_check_rules_print(stdout);
         return BST_EXIT_OK;
     }
     if (arguments != 1) {
@@ -86,7 +86,7 @@ int bst_cmd_check(int argc, char **argv) {
         code = BST_EXIT_FAILED;
     } else {
         ctx.log_level = BST_LOG_WARNING;
-        if (bst_rules_apply(&ctx, &scenario, sim) != BST_OK) {
+        if (bst_check_rules_apply(&ctx, &scenario, sim) != BST_OK) {
             fprintf(stderr, "boresight: %s\n", ctx.message);
             code = BST_EXIT_FAILED;
         } else {
@@ -139,7 +139,7 @@ int bst_cmd_schema(int argc, char **argv) {
     for (int i = 0; i < plugins.count && status == BST_OK; i++) {
         status = bst_plugins_add(&ctx, plugins.items[i]);
     }
-    bst_registry registry;
+    bst_scenario_registry registry;
     if (status == BST_OK) {
         status = bst_plugins_registry(&ctx, &registry);
     }

@@ -11,7 +11,7 @@ int bst_cmd_icd(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_INFO);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_INFO);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK || arguments != 0) {
         if (arguments != 0) {

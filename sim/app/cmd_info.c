@@ -38,18 +38,18 @@ static void copy(cJSON *to, const char *key, const cJSON *from, const char *from
 
 /* A query's rows handed to `add`; a failure becomes a problem of the run. */
 static void each_row(bst_run_reader *run, const char *sql, int64_t parameter,
-                     void (*add)(cJSON *to, const bst_rows *rows), cJSON *to) {
+                     void (*add)(cJSON *to, const bst_io_rows *rows), cJSON *to) {
     bst_ctx ctx = {0};
-    bst_rows *rows = NULL;
+    bst_io_rows *rows = NULL;
     bool more = false;
     if (!bst_run_reader_has_tables(run)) {
         return;
     }
-    bst_status status = bst_rows_open(&ctx, run, sql, parameter, 0, &rows);
-    while (status == BST_OK && (status = bst_rows_next(&ctx, rows, &more)) == BST_OK && more) {
+    bst_status status = bst_io_rows_open(&ctx, run, sql, parameter, 0, &rows);
+    while (status == BST_OK && (status = bst_io_rows_next(&ctx, rows, &more)) == BST_OK && more) {
         add(to, rows);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     if (status != BST_OK) {
         bst_run_reader_note_problem(run, "%s", ctx.message);
     }
@@ -110,22 +110,22 @@ static void add_identity(bst_run_reader *run, cJSON *out) {
     add_span(run, out);
 }
 
-static void put_program(cJSON *to, const bst_rows *rows) {
+static void put_program(cJSON *to, const bst_io_rows *rows) {
     /* "boresight 0.1.0" */
-    const char *text = bst_rows_text(rows, 0), *space = strchr(text, ' ');
+    const char *text = bst_io_rows_text(rows, 0), *space = strchr(text, ' ');
     cJSON_ReplaceItemInObjectCaseSensitive(to, "version",
                                            cJSON_CreateString(space ? space + 1 : text));
 }
 
-static void put_sensor(cJSON *to, const bst_rows *rows) {
+static void put_sensor(cJSON *to, const bst_io_rows *rows) {
     cJSON *node = cJSON_CreateObject();
-    cJSON_AddNumberToObject(node, "sensor", (double)bst_rows_int(rows, 0));
-    cJSON_AddStringToObject(node, "observer", bst_rows_text(rows, 1));
-    cJSON_AddStringToObject(node, "name", bst_rows_text(rows, 2));
-    cJSON_AddStringToObject(node, "target", bst_rows_text(rows, 3));
-    cJSON_AddStringToObject(node, "file", bst_rows_text(rows, 4));
-    cJSON_AddNumberToObject(node, "width_px", (double)bst_rows_int(rows, 5));
-    cJSON_AddNumberToObject(node, "height_px", (double)bst_rows_int(rows, 6));
+    cJSON_AddNumberToObject(node, "sensor", (double)bst_io_rows_int(rows, 0));
+    cJSON_AddStringToObject(node, "observer", bst_io_rows_text(rows, 1));
+    cJSON_AddStringToObject(node, "name", bst_io_rows_text(rows, 2));
+    cJSON_AddStringToObject(node, "target", bst_io_rows_text(rows, 3));
+    cJSON_AddStringToObject(node, "file", bst_io_rows_text(rows, 4));
+    cJSON_AddNumberToObject(node, "width_px", (double)bst_io_rows_int(rows, 5));
+    cJSON_AddNumberToObject(node, "height_px", (double)bst_io_rows_int(rows, 6));
     cJSON_AddItemToArray(to, node);
 }
 
@@ -192,32 +192,32 @@ static void add_sensors(bst_run_reader *run, cJSON *out) {
     }
 }
 
-static void put_table(cJSON *to, const bst_rows *rows) {
+static void put_table(cJSON *to, const bst_io_rows *rows) {
     cJSON *node = cJSON_CreateObject();
-    cJSON_AddStringToObject(node, "name", bst_rows_text(rows, 0));
-    cJSON_AddStringToObject(node, "doc", bst_rows_text(rows, 1));
+    cJSON_AddStringToObject(node, "name", bst_io_rows_text(rows, 0));
+    cJSON_AddStringToObject(node, "doc", bst_io_rows_text(rows, 1));
     cJSON_AddItemToArray(to, node);
 }
 
 /* Puts a column under its table. */
-static void put_column(cJSON *to, const bst_rows *rows) {
+static void put_column(cJSON *to, const bst_io_rows *rows) {
     cJSON *table;
     cJSON_ArrayForEach(table, to) {
-        if (strcmp(text_of(table, "name", ""), bst_rows_text(rows, 0)) == 0) {
+        if (strcmp(text_of(table, "name", ""), bst_io_rows_text(rows, 0)) == 0) {
             cJSON *columns = cJSON_GetObjectItemCaseSensitive(table, "columns");
             cJSON *node = cJSON_CreateObject();
-            cJSON_AddStringToObject(node, "name", bst_rows_text(rows, 1));
-            cJSON_AddStringToObject(node, "type", bst_rows_text(rows, 2));
-            cJSON_AddStringToObject(node, "unit", bst_rows_text(rows, 3));
-            cJSON_AddStringToObject(node, "doc", bst_rows_text(rows, 4));
+            cJSON_AddStringToObject(node, "name", bst_io_rows_text(rows, 1));
+            cJSON_AddStringToObject(node, "type", bst_io_rows_text(rows, 2));
+            cJSON_AddStringToObject(node, "unit", bst_io_rows_text(rows, 3));
+            cJSON_AddStringToObject(node, "doc", bst_io_rows_text(rows, 4));
             cJSON_AddItemToArray(columns ? columns : cJSON_AddArrayToObject(table, "columns"),
                                  node);
         }
     }
 }
 
-static void put_count(cJSON *to, const bst_rows *rows) {
-    cJSON_AddNumberToObject(to, "rows", (double)bst_rows_int(rows, 0));
+static void put_count(cJSON *to, const bst_io_rows *rows) {
+    cJSON_AddNumberToObject(to, "rows", (double)bst_io_rows_int(rows, 0));
 }
 
 static void add_tables(bst_run_reader *run, cJSON *out) {
@@ -239,8 +239,8 @@ static void add_tables(bst_run_reader *run, cJSON *out) {
              0, put_column, list);
 }
 
-static void put_event(cJSON *to, const bst_rows *rows) {
-    cJSON_AddNumberToObject(to, bst_rows_text(rows, 0), (double)bst_rows_int(rows, 1));
+static void put_event(cJSON *to, const bst_io_rows *rows) {
+    cJSON_AddNumberToObject(to, bst_io_rows_text(rows, 0), (double)bst_io_rows_int(rows, 1));
 }
 
 static int by_name(const struct dirent **a, const struct dirent **b) {
@@ -475,7 +475,7 @@ int bst_cmd_info(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "info");

@@ -19,7 +19,7 @@ int bst_cmd_link_keys(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_INFO);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_INFO);
     if (bst_options_parse(&ctx, table, argc, argv, NULL) != BST_OK) {
         return bst_options_misuse(&ctx, "link-keys");
     }

@@ -119,7 +119,7 @@ int bst_cmd_loop(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "loop");

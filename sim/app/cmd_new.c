@@ -164,7 +164,7 @@ static bst_status find_satellite(bst_ctx *ctx, const char *option, const char *w
         }
     }
     for (int i = 0; i < SHIPPED_SETS; i++) {
-        bst_app_shipped_file(shipped_sets[i], file, sizeof file);
+        bst_cli_shipped_file(shipped_sets[i], file, sizeof file);
         BST_TRY(seek(ctx, file, &w, out));
     }
     return w.found ? BST_OK
@@ -228,7 +228,7 @@ static bst_status judge(void *user, bst_ctx *ctx, const bst_new_scene *scene, bo
     }
     if (status == BST_OK) {
         quiet.log_level = BST_LOG_WARNING;
-        status = bst_rules_apply(&quiet, &scenario, simulation);
+        status = bst_check_rules_apply(&quiet, &scenario, simulation);
     }
     bst_simulation_free(simulation);
     bst_scenario_free(&scenario);
@@ -330,7 +330,7 @@ static bst_status take_out(bst_ctx *ctx, const bst_option *table, int arguments,
 static int carry_out(const bst_option *table, int argc, char **argv, words *w, bst_new_request *q) {
     bst_ctx ctx;
     bst_time start;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "new");

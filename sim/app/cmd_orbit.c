@@ -62,14 +62,14 @@ typedef struct orbit {
     const bst_run_track *track;
     bst_od_observation *items;
     double *chi2;
-    const bst_eop *eop; /* the scenario's, or own_eop */
-    bst_eop *own_eop;
+    const bst_astro_eop *eop; /* the scenario's, or own_eop */
+    bst_astro_eop *own_eop;
     bst_sky_clock *clock;
     bst_gravity *gravity;
     bst_force_model forces;
     bst_od_sgp4 sgp4;
-    bst_object_motion motion; /* in the scenario */
-    const char *model;        /* what it is fitted with, in words */
+    bst_world_motion_law motion; /* in the scenario */
+    const char *model;           /* what it is fitted with, in words */
     bst_od_options options;
     bst_od_solution solution;
     bst_od_report report;
@@ -86,7 +86,7 @@ static bst_time time_at(const orbit *o, double seconds) {
 static bst_status open_forces(bst_ctx *ctx, orbit *o) {
     static const char *const words[] = {
         "forces of the scenario", "gravity to degree 20, Sun and Moon", "J2", "two bodies", "SGP4"};
-    const bst_object_motion *m = &o->motion;
+    const bst_world_motion_law *m = &o->motion;
     int kind = o->request->forces;
     if (kind == FORCES_SCENARIO && !m->forces) {
         kind = m->sgp4 ? FORCES_SGP4 : FORCES_FULL;
@@ -94,10 +94,10 @@ static bst_status open_forces(bst_ctx *ctx, orbit *o) {
     o->model = words[kind];
     o->options.motion.epoch = o->epoch;
     if (!o->eop) {
-        BST_TRY(bst_eop_builtin(ctx, &o->own_eop));
+        BST_TRY(bst_astro_eop_builtin(ctx, &o->own_eop));
         o->eop = o->own_eop;
     }
-    bst_eop_warn(
+    bst_astro_eop_warn(
         ctx, o->eop,
         time_at(o, o->track->items[o->track->count - 1].od.observer.time_s + o->request->predict_s),
         "");
@@ -149,9 +149,9 @@ static bst_status solve(bst_ctx *ctx, orbit *o) {
 static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
     enum { PLACES = 73 };
     bst_sgp4_place places[PLACES];
-    bst_sky sky;
+    bst_sky_rotation sky;
     const bst_od_state *s = &o->solution.state;
-    double a = bst_kepler_elements_of(BST_EARTH_MU_M3PS2, s->position_m, s->velocity_mps)
+    double a = bst_astro_kepler_elements_of(BST_EARTH_MU_M3PS2, s->position_m, s->velocity_mps)
                    .semi_major_axis_m;
     double half = BST_PI * sqrt(a * a * a / BST_EARTH_MU_M3PS2);
     half = fmax(half, fmax(o->items[o->track->count - 1].observer.time_s - s->time_s,
@@ -218,7 +218,7 @@ static bst_status write_oem(bst_ctx *ctx, const orbit *o, FILE *stream) {
     w.step_s = o->request->step_s > 0.0 ? o->request->step_s
                                         : fmin(60.0, fmax(1.0, (w.to_s - w.from_s) / 20.0));
     w.count = (int64_t)ceil((w.to_s - w.from_s) / w.step_s - 1e-9) + 1;
-    bst_creation_date(created);
+    bst_run_creation_date(created);
     snprintf(comment, sizeof comment,
              "from %d directions of %s/%s over %.6g s, angles only\nrms of residuals %.4f arcsec, "
              "chi2/dof %.4f, covariance multiplied by %.4f",
@@ -240,7 +240,7 @@ static bst_status write_oem(bst_ctx *ctx, const orbit *o, FILE *stream) {
 
 static bst_status write_omm(bst_ctx *ctx, const orbit *o, FILE *stream) {
     char created[32], comment[200];
-    bst_creation_date(created);
+    bst_run_creation_date(created);
     snprintf(comment, sizeof comment,
              "from %d directions, angles only; SGP4 follows the orbit to %.0f m rms",
              o->solution.used, o->mean_rms_m);
@@ -249,7 +249,7 @@ static bst_status write_omm(bst_ctx *ctx, const orbit *o, FILE *stream) {
 
 static bst_status write_tdm(bst_ctx *ctx, const orbit *o, FILE *stream) {
     char created[32];
-    bst_creation_date(created);
+    bst_run_creation_date(created);
     BST_TRY(bst_tdm_write_head(ctx, stream, created, "BORESIGHT", "angles of a simulated run"));
     return bst_track_write_tdm(ctx, stream, o->track, NULL,
                                "measured directions, independent from frame to frame");
@@ -269,8 +269,8 @@ static void add_vector(cJSON *node, const char *key, bst_vec3 v, double scale) {
 
 static bst_status write_report(bst_ctx *ctx, const orbit *o, FILE *stream) {
     const bst_od_solution *s = &o->solution;
-    bst_kepler_elements k = bst_kepler_elements_of(bst_od_gm(&o->options.motion),
-                                                   s->state.position_m, s->state.velocity_mps);
+    bst_astro_kepler_elements k = bst_astro_kepler_elements_of(
+        bst_od_gm(&o->options.motion), s->state.position_m, s->state.velocity_mps);
     char utc[40];
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "object", o->object);
@@ -347,7 +347,7 @@ static const double MOST_FACTOR = 4.0;
 static void print_orbit(const orbit *o) {
     const bst_od_solution *s = &o->solution;
     const bst_vec3 r = s->state.position_m, v = s->state.velocity_mps;
-    bst_kepler_elements k = bst_kepler_elements_of(bst_od_gm(&o->options.motion), r, v);
+    bst_astro_kepler_elements k = bst_astro_kepler_elements_of(bst_od_gm(&o->options.motion), r, v);
     char utc[40];
     const double(*c)[6] = s->covariance;
     double p = c[0][0] + c[1][1] + c[2][2], w = c[3][3] + c[4][4] + c[5][5];
@@ -421,7 +421,7 @@ static bst_status orbit_of(bst_ctx *ctx, const request *q, const char *path) {
     bst_od_path_free(o.path);
     bst_gravity_free(o.gravity);
     bst_sky_clock_free(o.clock);
-    bst_eop_free(o.own_eop);
+    bst_astro_eop_free(o.own_eop);
     free(o.items);
     free(o.chi2);
     bst_orbit_choice_free(&c);
@@ -538,7 +538,7 @@ int bst_cmd_orbit(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, options, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "orbit");

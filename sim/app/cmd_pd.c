@@ -130,7 +130,7 @@ static bst_status write_results(bst_ctx *ctx, const pd_request *r, const bst_sce
     if (r->json) {
         cJSON *root = bst_pd_json(scene, result, &figures);
         char *text = cJSON_Print(root);
-        bst_status status = text ? bst_write_file_atomic(ctx, r->json, text, strlen(text))
+        bst_status status = text ? bst_io_write_file_atomic(ctx, r->json, text, strlen(text))
                                  : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the results");
         free(text);
         cJSON_Delete(root);
@@ -321,7 +321,7 @@ int bst_cmd_pd(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "pd");

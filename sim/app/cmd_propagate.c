@@ -203,7 +203,7 @@ static bst_status state_km(bst_ctx *ctx, const satellite *s, int64_t row, bst_ti
     *r = (bst_vec3){p[0], p[1], p[2]};
     *v = (bst_vec3){w[0], w[1], w[2]};
     if (s->states->clock) {
-        bst_sky sky;
+        bst_sky_rotation sky;
         BST_TRY(bst_sky_clock_at(ctx, s->states->clock, *t, &sky));
         *r = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, *r);
         *v = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, *v);
@@ -350,18 +350,19 @@ static bst_status write_all(bst_ctx *ctx, const states *s, const bst_elements *s
 static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
     bst_elements *sets = NULL;
     int count = 0;
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     states s = {.request = q, .stream = stdout};
     bst_draft draft = {.stream = NULL};
     const bst_elements_options only = {.norad = q->norad};
     const char *name = q->output ? q->output : "standard output";
     bst_status status = bst_elements_load(ctx, q->elements, &only, &sets, &count);
     if (status == BST_OK && q->frame == FRAME_GCRF) {
-        status = q->eop_path ? bst_eop_load(ctx, q->eop_path, &eop) : bst_eop_builtin(ctx, &eop);
+        status = q->eop_path ? bst_astro_eop_load(ctx, q->eop_path, &eop)
+                             : bst_astro_eop_builtin(ctx, &eop);
         if (status == BST_OK) {
             status = bst_sky_clock_create(ctx, eop, &s.clock);
         }
-        bst_sky sky;
+        bst_sky_rotation sky;
         /* both ends first, so that nothing is written for dates that the table does not cover */
         for (int end = 0; end < 2 && status == BST_OK; end++) {
             status = bst_sky_clock_at(ctx, s.clock, time_of(q, end ? q->rows - 1 : 0), &sky);
@@ -371,7 +372,7 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
             }
         }
         if (status == BST_OK) {
-            bst_eop_warn(ctx, eop, time_of(q, q->rows - 1), "");
+            bst_astro_eop_warn(ctx, eop, time_of(q, q->rows - 1), "");
         }
     }
     if (status == BST_OK && q->output) {
@@ -389,7 +390,7 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
         }
     }
     bst_sky_clock_free(s.clock);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
     free(sets);
     return status;
 }
@@ -469,7 +470,7 @@ int bst_cmd_propagate(int argc, char **argv) {
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &q.help, .doc = "this text"},
         {.name = NULL}};
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     if (bst_options_parse(&ctx, table, argc, argv, NULL) != BST_OK) {
         return bst_options_misuse(&ctx, "propagate");
     }

@@ -64,7 +64,7 @@ int bst_cmd_run(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_INFO);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_INFO);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
@@ -117,7 +117,7 @@ int bst_cmd_run(int argc, char **argv) {
                         : bst_run_link_open(&ctx, sim); /* before anything is written */
     }
     if (status == BST_OK) {
-        status = bst_rules_apply(&ctx, &scenario, sim);
+        status = bst_check_rules_apply(&ctx, &scenario, sim);
     }
     if (status == BST_OK) {
         status = bst_run_scenario(&ctx, &scenario, sim, &request, NULL);

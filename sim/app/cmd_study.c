@@ -87,7 +87,7 @@ static bst_status settle_study(bst_ctx *ctx, const bst_study *study, const char 
     cJSON *echo = bst_study_echo(study);
     char *text = echo ? cJSON_Print(echo) : NULL;
     cJSON_Delete(echo);
-    bst_status status = text ? bst_write_file_atomic(ctx, path, text, strlen(text))
+    bst_status status = text ? bst_io_write_file_atomic(ctx, path, text, strlen(text))
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
     free(text);
     return status;
@@ -151,8 +151,8 @@ static void print_end(const bst_results *r, const bst_driver_outcome *o, double 
                       const char *out) {
     const bst_study *s = r->study;
     printf("%s: %" PRId64 " of %s in %s, %.1f s\n", s->config.name, r->done,
-           bst_count_text((char[BST_COUNT_TEXT]){0}, s->runs, "run", "runs"),
-           bst_count_text((char[BST_COUNT_TEXT]){0}, s->settings, "setting", "settings"), wall);
+           bst_text_of_count((char[BST_COUNT_TEXT]){0}, s->runs, "run", "runs"),
+           bst_text_of_count((char[BST_COUNT_TEXT]){0}, s->settings, "setting", "settings"), wall);
     for (int64_t i = 0; i < r->error_count && i < FAILURES_SHOWN; i++) {
         printf("  run %" PRId64 " failed: %s\n", r->errors[i].run, r->errors[i].text);
     }
@@ -162,7 +162,7 @@ static void print_end(const bst_results *r, const bst_driver_outcome *o, double 
     }
     if (o->missing > 0) {
         printf("  %s %s missing%s%s\n",
-               bst_count_text((char[BST_COUNT_TEXT]){0}, o->missing, "run", "runs"),
+               bst_text_of_count((char[BST_COUNT_TEXT]){0}, o->missing, "run", "runs"),
                o->missing == 1 ? "is" : "are", *o->why ? ": " : "", o->why);
         printf("  go on: boresight study %s --resume\n", out);
     } else {
@@ -170,7 +170,7 @@ static void print_end(const bst_results *r, const bst_driver_outcome *o, double 
     }
     if (r->differing > 0) {
         printf("  warning: made twice with different results: %s\n",
-               bst_count_text((char[BST_COUNT_TEXT]){0}, r->differing, "run", "runs"));
+               bst_text_of_count((char[BST_COUNT_TEXT]){0}, r->differing, "run", "runs"));
     }
 }
 
@@ -189,7 +189,7 @@ static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_st
     }
     if (gone > 0) {
         bst_log(ctx, BST_LOG_WARNING, "files of %s are gone or cut short; they are made again",
-                bst_count_text((char[BST_COUNT_TEXT]){0}, gone, "run", "runs"));
+                bst_text_of_count((char[BST_COUNT_TEXT]){0}, gone, "run", "runs"));
     }
 }
 
@@ -225,7 +225,7 @@ static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study 
     BST_TRY(bst_results_load_folder(ctx, results, out, 0, study->runs, true));
     forget_what_is_gone(ctx, results, kind, out);
     if (r->slurm) {
-        BST_TRY(bst_app_study_slurm(ctx, r->site, r->device ? r->device : "", out, &executor));
+        BST_TRY(bst_study_slurm(ctx, r->site, r->device ? r->device : "", out, &executor));
     } else {
         BST_TRY(open_pool(ctx, r, study, kind, out, lock, &executor));
     }
@@ -281,8 +281,8 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
 /* ------------------------------------------------------------------ one shard, by hand */
 
 /* "3/8": the third of eight equal parts; "40:20": 20 runs from run 40 on, *exact. */
-static bst_status parse_shard(bst_ctx *ctx, const char *text, int64_t runs, bst_shard_job *job,
-                              bool *exact) {
+static bst_status parse_shard(bst_ctx *ctx, const char *text, int64_t runs,
+                              bst_study_shard_job *job, bool *exact) {
     int64_t i, n;
     char rest;
     *exact = sscanf(text, "%" SCNd64 ":%" SCNd64 "%c", &i, &n, &rest) == 2;
@@ -303,13 +303,13 @@ static bst_status parse_shard(bst_ctx *ctx, const char *text, int64_t runs, bst_
     return BST_OK;
 }
 
-static bst_status run_part(bst_ctx *ctx, const bst_shard_job *part, bst_shard_worker *worker,
+static bst_status run_part(bst_ctx *ctx, const bst_study_shard_job *part, bst_shard_worker *worker,
                            bst_results *results, int64_t *done) {
     bst_status status = BST_OK;
     int64_t run = part->first, end = part->first + part->count;
     while (status == BST_OK && run < end) {
-        bst_shard_job job = {.first = run};
-        bst_shard_news news;
+        bst_study_shard_job job = {.first = run};
+        bst_study_shard_news news;
         while (run < end && results->state[run] == BST_ROW_MISSING && job.count < 5000) {
             job.count++;
             run++;
@@ -326,7 +326,7 @@ static bst_status run_part(bst_ctx *ctx, const bst_shard_job *part, bst_shard_wo
 
 static int run_shard(bst_ctx *ctx, const study_request *r, const bst_study *study,
                      const bst_study_kind *kind, const char *out) {
-    bst_shard_job part = {0};
+    bst_study_shard_job part = {0};
     bst_results results;
     int lock = -1;
     int64_t done = 0;
@@ -439,7 +439,7 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         return BST_EXIT_FAILED;
     }
     bst_study_plugins plugins = {.count = 0};
-    bst_study_kind with_plugins = *bst_app_study_kind(study.config.kind);
+    bst_study_kind with_plugins = *bst_study_kind_of(study.config.kind);
     const bst_study_kind *kind = &with_plugins;
     with_plugins.user = &plugins;
     snprintf(out, sizeof out, "%s%.4000s", r->out || folder ? "" : "studies/",
@@ -558,7 +558,7 @@ int bst_cmd_study(int argc, char **argv) {
         {.name = NULL},
     };
     bst_ctx ctx;
-    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "study");

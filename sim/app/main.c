@@ -104,7 +104,7 @@ static int help(int argc, char **argv) {
     char name[32], option[] = "--help";
     snprintf(name, sizeof name, "%s", found->name);
     char *words[] = {name, option, NULL};
-    return bst_app_run_with_stack(found->run, 2, words);
+    return bst_cli_run_with_stack(found->run, 2, words);
 }
 
 /* Takes the options before the command: argv[*first] is the command then. */
@@ -159,7 +159,7 @@ int main(int argc, char **argv) {
         return help(argc, argv);
     }
     if (strcmp(argv[1], "--version") == 0) {
-        printf("boresight %s (%s)\n", bst_version(), bst_git_revision());
+        printf("boresight %s (%s)\n", bst_version(), bst_version_git_revision());
         return BST_EXIT_OK;
     }
     int first = 1, code = before_command(argc, argv, &first);
@@ -167,6 +167,6 @@ int main(int argc, char **argv) {
         return code;
     }
     const command *found = find_command(argv[first]);
-    return found ? bst_app_run_with_stack(found->run, argc - first, argv + first)
+    return found ? bst_cli_run_with_stack(found->run, argc - first, argv + first)
                  : unknown_command(argv[first]);
 }

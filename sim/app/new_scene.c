@@ -88,7 +88,7 @@ typedef struct search {
     look *looks;
     double *cost; /* of a run that begins at a look; INFINITY: none can */
     bst_world *world;
-    bst_view *view;
+    bst_world_view *view;
     int near_earth, few_stars; /* runs with the Earth in the field; without an attitude */
     double best_v_mag;         /* of what was too faint only */
 } search;
@@ -159,19 +159,19 @@ static double exposure_of(const bst_new_request *q, const bst_new_scene *s, doub
 /* ------------------------------------------------------------------ what is seen */
 
 static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *out) {
-    bst_sight now, then;
-    bst_state eye;
+    bst_world_sight now, then;
+    bst_world_state eye;
     bst_bodies bodies;
-    BST_TRY(bst_view_sight(ctx, s->view, 0, 0, seconds, &now));
-    BST_TRY(bst_view_sight(ctx, s->view, 0, 0, seconds + 1.0, &then));
-    BST_TRY(bst_view_observer_state(ctx, s->view, 0, seconds, &eye));
-    BST_TRY(bst_view_bodies(ctx, s->view, seconds, &bodies));
+    BST_TRY(bst_world_view_sight(ctx, s->view, 0, 0, seconds, &now));
+    BST_TRY(bst_world_view_sight(ctx, s->view, 0, 0, seconds + 1.0, &then));
+    BST_TRY(bst_world_view_observer_state(ctx, s->view, 0, seconds, &eye));
+    BST_TRY(bst_world_view_bodies(ctx, s->view, seconds, &bodies));
     *out =
         (look){.v_mag = now.v_mag,
                .range_m = now.range_m,
                .direction = now.geometric,
                .rate_arcsec_per_s = bst_vec3_angle(now.geometric, then.geometric) / BST_ARCSEC_RAD};
-    out->limb_rad = bst_earth_limb_angle(eye.position_m, bodies.pole, now.geometric);
+    out->limb_rad = bst_astro_earth_limb_angle(eye.position_m, bodies.pole, now.geometric);
     double sun = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.sun_m, eye.position_m));
     double moon = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.moon_m, eye.position_m));
     out->why = now.occulted                                      ? BEHIND_EARTH
@@ -315,7 +315,7 @@ static bst_status open_world(bst_ctx *ctx, search *s) {
     }
     bst_scenario_free(&scenario);
     bst_json_free(json);
-    return status == BST_OK ? bst_view_create(ctx, s->world, &s->view) : status;
+    return status == BST_OK ? bst_world_view_create(ctx, s->world, &s->view) : status;
 }
 
 /* The first of the two days, within two weeks of both element sets. */
@@ -462,7 +462,7 @@ bst_status bst_new_scene_find(bst_ctx *ctx, const bst_new_request *request, bst_
                               void *user, bst_new_scene *out) {
     search s = {.request = request, .best_v_mag = INFINITY};
     bst_status status = find(ctx, &s, judge, user, out);
-    bst_view_free(s.view);
+    bst_world_view_free(s.view);
     bst_world_free(s.world);
     free(s.looks);
     free(s.cost);

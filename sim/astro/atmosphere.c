@@ -42,7 +42,7 @@ static const layer layers[] = {
 
 enum { LAYERS = sizeof layers / sizeof layers[0] };
 
-double bst_height_m(bst_vec3 p) {
+double bst_astro_height_m(bst_vec3 p) {
     const double squash = (1.0 - BST_EARTH_FLATTENING) * (1.0 - BST_EARTH_FLATTENING);
     double across2 = p.x * p.x + p.y * p.y, r2 = across2 + p.z * p.z;
     if (!(r2 > 0.0)) {

@@ -6,7 +6,7 @@
 
 /* Height (m) above the WGS-84 ellipsoid of a position in Earth-fixed axes, along the radius: 2 m
  * too high at most below 400 km of height, 10 m below 2000 km. */
-double bst_height_m(bst_vec3 position_itrf_m);
+double bst_astro_height_m(bst_vec3 position_itrf_m);
 
 /* Mean density (kg/m^3) at a height (m), of moderate solar activity: the base densities of the
  * exponential layers of Vallado, Fundamentals of Astrodynamics and Applications, table 8-4 (US

@@ -14,7 +14,7 @@
 /* An observer of the belt. */
 typedef struct bst_belt_eye {
     bst_vec3 position_m, velocity_mps; /* geocentric */
-    bst_vec3 earth_radps;              /* the Earth's rotation vector (bst_earth_rate_gcrf) */
+    bst_vec3 earth_radps;              /* the Earth's rotation vector (bst_astro_earth_rate_gcrf) */
 } bst_belt_eye;
 
 /* The place over an east longitude and a geocentric latitude at the belt's radius (geocentric). */

@@ -21,7 +21,7 @@ void bst_bodies_at(bst_time t, bst_bodies *out) {
     out->pole = scaled(of_date[2], 1.0);
 }
 
-double bst_sphere_phase(double specular_fraction, double phase_rad) {
+double bst_astro_sphere_phase(double specular_fraction, double phase_rad) {
     double phi = fabs(phase_rad);
     double diffuse =
         phi < BST_PI ? 2.0 / (3.0 * BST_PI * BST_PI) * ((BST_PI - phi) * cos(phi) + sin(phi)) : 0.0;

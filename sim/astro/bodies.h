@@ -51,21 +51,21 @@ static inline bst_vec3 bst_bodies_sunlight_from(const bst_bodies *b) {
  * Notes: the Sun is a circle and the limb next to it the circle that osculates it, both in the
  * plane that is tangent to the sky at the Sun. Contacts agree with rays round the ellipsoid to 1 ms
  * (tests/astro/test_shadow_rays.c). */
-double bst_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole);
+double bst_astro_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole);
 
-/* Wavelengths of bst_sunlight; the second stands for V. */
+/* Wavelengths of bst_astro_sunlight; the second stands for V. */
 enum { BST_SUNLIGHT_COLOURS = 4, BST_SUNLIGHT_V = 1 };
 extern const double bst_sunlight_wavelength_m[BST_SUNLIGHT_COLOURS];
 
-typedef struct bst_sunlight {
-    double disc;                        /* bst_sun_fraction */
+typedef struct bst_astro_sunlight {
+    double disc;                        /* bst_astro_sun_fraction */
     double light[BST_SUNLIGHT_COLOURS]; /* irradiance over that of the whole Sun, by wavelength */
-} bst_sunlight;
+} bst_astro_sunlight;
 
 /* Sunlight at a point, with the Sun's limb darkening and, if asked for, the refraction and
  * extinction of the Earth's atmosphere.
  *
- * Given:    as bst_sun_fraction; atmosphere: whether the Earth has air
+ * Given:    as bst_astro_sun_fraction; atmosphere: whether the Earth has air
  * Returned: *out
  * Notes: rays are bent and spread as in geometric optics, weakened by Rayleigh scattering and
  * ozone, and end at the cloud tops (8 km). What passes below 12 km, most of the light
@@ -75,62 +75,64 @@ typedef struct bst_sunlight {
  * Reference: Baum and Code, AJ 58, 108 (1953); Link, Eclipse Phenomena in
  * Astronomy (1969), chapter 2; limb darkening: Cox, Allen's Astrophysical Quantities (4th edition),
  * table 14.17. */
-void bst_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
-                     bst_sunlight *out);
+void bst_astro_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
+                           bst_astro_sunlight *out);
 
 /* Angle (rad) of a direction from the WGS-84 ellipsoid's limb, seen from position_m; negative where
  * the Earth is in the way, pi where the direction is more than a right angle beyond, -pi inside of
  * the Earth. Exact at the limb. */
-double bst_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction);
+double bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction);
 
 /* True when the segment between two geocentric points (GCRF) passes through the WGS-84 ellipsoid
  * about `pole`, also when an end lies inside it. A touch less than 1 cm deep does not count, so
  * that a point on the surface sees what is above its horizon. */
-bool bst_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole);
+bool bst_astro_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole);
 
 /* What turns a geometric direction into the one that an observer measures. */
-typedef struct bst_light {
+typedef struct bst_astro_light {
     bst_vec3 velocity_mps; /* observer relative to the barycentre */
     bst_vec3 sun_m;        /* observer to the Sun's centre */
-} bst_light;
+} bst_astro_light;
 
 /* Light of an observer with geocentric GCRF position and velocity. */
-bst_light bst_light_at(const bst_bodies *bodies, bst_vec3 position_m, bst_vec3 velocity_mps);
+bst_astro_light bst_astro_light_at(const bst_bodies *bodies, bst_vec3 position_m,
+                                   bst_vec3 velocity_mps);
 
 /* Apparent direction of a star (unit, ICRS axes): the Sun's light deflection (eraLdsun), then
  * stellar aberration with special relativity and the Sun's potential (eraAb). Without parallax.
  * Sources: Urban and Seidelmann, Explanatory Supplement (3rd edition), sections 7.2.3 and 7.2.4;
  * Klioner, AJ 125 (2003) 1580. */
-bst_vec3 bst_light_apparent_star(const bst_light *light, bst_vec3 icrs);
+bst_vec3 bst_astro_light_apparent_star(const bst_astro_light *light, bst_vec3 icrs);
 /* The inverse, to 1e-12 rad. */
-bst_vec3 bst_light_catalogue_star(const bst_light *light, bst_vec3 apparent);
+bst_vec3 bst_astro_light_catalogue_star(const bst_astro_light *light, bst_vec3 apparent);
 
 /* Aberration only, for objects of the Earth-Moon space (unit vectors). The velocity is
  * barycentric, so the geometric direction must run from the observer at reception to the object at
  * emission in the barycentric frame: with geocentric positions and light time tau that is
- * r_object(t - tau) - r_observer(t) - tau * earth_bary_mps (see bst_light_path). */
-bst_vec3 bst_light_aberrate(const bst_light *light, bst_vec3 direction);
-bst_vec3 bst_light_unaberrate(const bst_light *light, bst_vec3 apparent); /* to 1e-12 rad */
+ * r_object(t - tau) - r_observer(t) - tau * earth_bary_mps (see bst_astro_light_path). */
+bst_vec3 bst_astro_light_aberrate(const bst_astro_light *light, bst_vec3 direction);
+bst_vec3 bst_astro_light_unaberrate(const bst_astro_light *light,
+                                    bst_vec3 apparent); /* to 1e-12 rad */
 
-/* What bst_light_aberrate takes from the light alone, for many directions. */
-typedef struct bst_aberration {
+/* What bst_astro_light_aberrate takes from the light alone, for many directions. */
+typedef struct bst_astro_aberration {
     bst_vec3 velocity;                      /* in units of the speed of light */
     double inverse_gamma, share, potential; /* share: 1 / (1 + inverse_gamma) */
-} bst_aberration;
+} bst_astro_aberration;
 
-bst_aberration bst_aberration_of(const bst_light *light);
-static inline bst_vec3 bst_aberrate(const bst_aberration *a, bst_vec3 direction) {
+bst_astro_aberration bst_astro_aberration_of(const bst_astro_light *light);
+static inline bst_vec3 bst_astro_aberrate(const bst_astro_aberration *a, bst_vec3 direction) {
     double along = bst_vec3_dot(direction, a->velocity);
     bst_vec3 q = bst_vec3_scale(direction, a->inverse_gamma - a->potential * along);
     q = bst_vec3_axpy(q, 1.0 + along * a->share + a->potential, a->velocity);
     return bst_vec3_scale(q, 1.0 / bst_vec3_norm(q));
 }
 
-/* The vector from observer to object that bst_light_aberrate wants, from geocentric GCRF positions
- * of the object at emission, tau_s before the observer's instant. The Earth's own motion during
- * tau counts: 20 arcsec, which aberration by the Earth's velocity takes back. */
-static inline bst_vec3 bst_light_path(const bst_bodies *bodies, bst_vec3 object_at_emission_m,
-                                      bst_vec3 observer_m, double tau_s) {
+/* The vector from observer to object that bst_astro_light_aberrate wants, from geocentric GCRF
+ * positions of the object at emission, tau_s before the observer's instant. The Earth's own motion
+ * during tau counts: 20 arcsec, which aberration by the Earth's velocity takes back. */
+static inline bst_vec3 bst_astro_light_path(const bst_bodies *bodies, bst_vec3 object_at_emission_m,
+                                            bst_vec3 observer_m, double tau_s) {
     return bst_vec3_axpy(bst_vec3_sub(object_at_emission_m, observer_m), -tau_s,
                          bodies->earth_bary_mps);
 }
@@ -139,6 +141,6 @@ static inline bst_vec3 bst_light_path(const bst_bodies *bodies, bst_vec3 object_
  * cross-section `area` (McCue, Williams and Morford, Planetary and Space Science 19, 851, 1971):
  * (1 - s) 2 / (3 pi^2) ((pi - phi) cos phi + sin phi) + s / (4 pi). 0 at a phase of pi and beyond
  * for the diffuse part. */
-double bst_sphere_phase(double specular_fraction, double phase_rad);
+double bst_astro_sphere_phase(double specular_fraction, double phase_rad);
 
 #endif

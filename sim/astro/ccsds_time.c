@@ -15,11 +15,11 @@ typedef struct calendar {
     double second;
 } calendar;
 
-bool bst_time_system_find(const char *name, size_t length, bst_time_system *out) {
+bool bst_astro_time_system_find(const char *name, size_t length, bst_astro_time_system *out) {
     static const char *const names[] = {"UTC", "TAI", "TT", "TDB", "GPS"};
     for (int i = 0; i < 5; i++) {
         if (bst_text_is((bst_text_span){name, length}, names[i])) {
-            *out = (bst_time_system)i;
+            *out = (bst_astro_time_system)i;
             return true;
         }
     }
@@ -136,8 +136,8 @@ static double tdb_minus_tt(double jd1, double jd2) {
            0.000010 * t * sin(628.3076 * t + 4.2490);
 }
 
-bst_status bst_ccsds_time(bst_ctx *ctx, const char *text, size_t length, bst_time_system system,
-                          bst_time *out) {
+bst_status bst_ccsds_time(bst_ctx *ctx, const char *text, size_t length,
+                          bst_astro_time_system system, bst_time *out) {
     double jd1, jd2;
     BST_TRY(read_jd(ctx, (bst_text_span){text, length}, system == BST_TIME_UTC, &jd1, &jd2));
     switch (system) {

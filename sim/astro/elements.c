@@ -128,10 +128,10 @@ bst_status bst_elements_read_buffer(bst_ctx *ctx, const char *name, const char *
     bst_text_line line;
     switch (recognise(data, bytes, &line)) {
         case FORM_JSON:
-            return bst_elements_finish(&reader, bst_omm_read_json(&reader, data, bytes), false,
-                                       "orbit mean-elements messages", out, count);
+            return bst_elements_finish(&reader, bst_astro_omm_read_json(&reader, data, bytes),
+                                       false, "orbit mean-elements messages", out, count);
         case FORM_CSV:
-            return bst_elements_finish(&reader, bst_omm_read_csv(&reader, data, bytes), false,
+            return bst_elements_finish(&reader, bst_astro_omm_read_csv(&reader, data, bytes), false,
                                        "rows of orbit mean-elements messages", out, count);
         case FORM_OTHER:
             return bst_text_fail_at(&reader.source, &line,

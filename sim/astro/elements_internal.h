@@ -26,9 +26,9 @@ bst_status bst_elements_tolerate(bst_elements_reader *reader, bst_status status)
 bst_status bst_elements_finish(bst_elements_reader *reader, bst_status status, bool empty,
                                const char *expected, bst_elements **out, int *count) BST_MUST_CHECK;
 
-bst_status bst_omm_read_json(bst_elements_reader *reader, const char *data,
-                             size_t bytes) BST_MUST_CHECK;
-bst_status bst_omm_read_csv(bst_elements_reader *reader, const char *data,
-                            size_t bytes) BST_MUST_CHECK;
+bst_status bst_astro_omm_read_json(bst_elements_reader *reader, const char *data,
+                                   size_t bytes) BST_MUST_CHECK;
+bst_status bst_astro_omm_read_csv(bst_elements_reader *reader, const char *data,
+                                  size_t bytes) BST_MUST_CHECK;
 
 #endif

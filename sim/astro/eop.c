@@ -10,21 +10,21 @@
 
 #define MAX_FILE_BYTES ((uint64_t)64 << 20)
 
-struct bst_eop {
+struct bst_astro_eop {
     int first_mjd; /* of rows[0], 0h UTC */
     int count;     /* >= 2 */
-    bst_eop_values *rows;
-    bst_eop_prediction after;
+    bst_astro_eop_values *rows;
+    bst_astro_eop_prediction after;
 };
 
 static bst_status out_of_memory(bst_ctx *ctx) {
     return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the Earth-orientation table");
 }
 
-bst_status bst_eop_builtin(bst_ctx *ctx, bst_eop **out) {
+bst_status bst_astro_eop_builtin(bst_ctx *ctx, bst_astro_eop **out) {
     int count = bst_eop_table_rows;
-    bst_eop *eop = calloc(1, sizeof *eop);
-    bst_eop_values *rows = malloc((size_t)count * sizeof *rows);
+    bst_astro_eop *eop = calloc(1, sizeof *eop);
+    bst_astro_eop_values *rows = malloc((size_t)count * sizeof *rows);
     if (!eop || !rows) {
         free(eop);
         free(rows);
@@ -32,20 +32,21 @@ bst_status bst_eop_builtin(bst_ctx *ctx, bst_eop **out) {
     }
     for (int i = 0; i < count; i++) {
         const bst_eop_table_row *row = &bst_eop_table[i];
-        rows[i] = (bst_eop_values){row->ut1_minus_utc * 1e-7, row->xp_uas * (1e-6 * BST_ARCSEC_RAD),
+        rows[i] =
+            (bst_astro_eop_values){row->ut1_minus_utc * 1e-7, row->xp_uas * (1e-6 * BST_ARCSEC_RAD),
                                    row->yp_uas * (1e-6 * BST_ARCSEC_RAD)};
     }
-    *eop = (bst_eop){.first_mjd = bst_eop_table_first_mjd, .count = count, .rows = rows};
-    bst_status status = bst_eop_prediction_fit(ctx, eop->first_mjd, count, rows, &eop->after);
+    *eop = (bst_astro_eop){.first_mjd = bst_eop_table_first_mjd, .count = count, .rows = rows};
+    bst_status status = bst_astro_eop_prediction_fit(ctx, eop->first_mjd, count, rows, &eop->after);
     if (status != BST_OK) {
-        bst_eop_free(eop);
+        bst_astro_eop_free(eop);
         return status;
     }
     *out = eop;
     return BST_OK;
 }
 
-void bst_eop_free(bst_eop *eop) {
+void bst_astro_eop_free(bst_astro_eop *eop) {
     if (eop) {
         free(eop->rows);
         free(eop);
@@ -69,7 +70,7 @@ static int read_numbers(const char *text, double *values, int wanted) {
 }
 
 /* One data row: year month day [hour] MJD x y UT1-UTC ...; the hour tells the 20 C04 series. */
-static bst_status read_row(bst_ctx *ctx, const char *line, int *mjd, bst_eop_values *row) {
+static bst_status read_row(bst_ctx *ctx, const char *line, int *mjd, bst_astro_eop_values *row) {
     double v[8];
     int n = read_numbers(line, v, 8);
     int hour = n > 3 && v[3] < 24.0;
@@ -95,12 +96,12 @@ static bst_status read_row(bst_ctx *ctx, const char *line, int *mjd, bst_eop_val
                         line);
     }
     *mjd = (int)djm;
-    *row = (bst_eop_values){data[3], data[1] * BST_ARCSEC_RAD, data[2] * BST_ARCSEC_RAD};
+    *row = (bst_astro_eop_values){data[3], data[1] * BST_ARCSEC_RAD, data[2] * BST_ARCSEC_RAD};
     return BST_OK;
 }
 
-static bst_status append_row(bst_ctx *ctx, bst_eop *eop, int *capacity, int mjd,
-                             bst_eop_values row) {
+static bst_status append_row(bst_ctx *ctx, bst_astro_eop *eop, int *capacity, int mjd,
+                             bst_astro_eop_values row) {
     if (eop->count == 0) {
         eop->first_mjd = mjd;
     } else if (mjd != eop->first_mjd + eop->count) {
@@ -109,7 +110,7 @@ static bst_status append_row(bst_ctx *ctx, bst_eop *eop, int *capacity, int mjd,
     }
     if (eop->count == *capacity) {
         int grown = *capacity ? 2 * *capacity : 1024;
-        bst_eop_values *rows = realloc(eop->rows, (size_t)grown * sizeof *rows);
+        bst_astro_eop_values *rows = realloc(eop->rows, (size_t)grown * sizeof *rows);
         if (!rows) {
             return out_of_memory(ctx);
         }
@@ -130,7 +131,7 @@ static int count_words(const char *text) {
 }
 
 static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
-                            bst_eop *eop) {
+                            bst_astro_eop *eop) {
     char line[512];
     int capacity = 0, number = 0, columns = 0;
     for (const char *next = data, *end = data + bytes; next < end;) {
@@ -153,7 +154,7 @@ static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, si
             continue; /* the heading, a comment */
         }
         int mjd = 0;
-        bst_eop_values row = {0};
+        bst_astro_eop_values row = {0};
         bst_status status = read_row(ctx, line, &mjd, &row);
         /* a file that was cut short may end within a number */
         int words = count_words(line);
@@ -179,29 +180,30 @@ static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, si
     return BST_OK;
 }
 
-bst_status bst_eop_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
-                               bst_eop **out) {
+bst_status bst_astro_eop_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
+                                     bst_astro_eop **out) {
     *out = NULL;
     BST_TRY(bst_file_check_text(ctx, name, data, bytes));
-    bst_eop *eop = calloc(1, sizeof *eop);
+    bst_astro_eop *eop = calloc(1, sizeof *eop);
     bst_status status = eop ? read_rows(ctx, name, data, bytes, eop) : out_of_memory(ctx);
     if (status == BST_OK) {
-        status = bst_eop_prediction_fit(ctx, eop->first_mjd, eop->count, eop->rows, &eop->after);
+        status =
+            bst_astro_eop_prediction_fit(ctx, eop->first_mjd, eop->count, eop->rows, &eop->after);
     }
     if (status != BST_OK) {
-        bst_eop_free(eop);
+        bst_astro_eop_free(eop);
         return status;
     }
     *out = eop;
     return BST_OK;
 }
 
-bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) {
+bst_status bst_astro_eop_load(bst_ctx *ctx, const char *path, bst_astro_eop **out) {
     *out = NULL;
     char *data;
     size_t bytes;
     BST_TRY(bst_file_read(ctx, path, MAX_FILE_BYTES, "an IERS EOP C04 file", &data, &bytes));
-    bst_status status = bst_eop_read_buffer(ctx, path, data, bytes, out);
+    bst_status status = bst_astro_eop_read_buffer(ctx, path, data, bytes, out);
     free(data);
     return status;
 }
@@ -209,7 +211,7 @@ bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) {
 /* Days after the last row that are predicted. */
 static const double PREDICTED_DAYS = 365.25 * BST_EOP_PREDICTED_YEARS;
 
-static bst_status fail_outside(bst_ctx *ctx, const bst_eop *eop, bst_time t) {
+static bst_status fail_outside(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t) {
     char when[40];
     int first[3], last[3];
     double fraction;
@@ -225,13 +227,14 @@ static bst_status fail_outside(bst_ctx *ctx, const bst_eop *eop, bst_time t) {
 }
 
 /* Days after the first row, in two parts. */
-static double day_of(const bst_eop *eop, bst_time t, double *fraction) {
+static double day_of(const bst_astro_eop *eop, bst_time t, double *fraction) {
     double utc1;
     bst_time_utc(t, &utc1, fraction);
     return utc1 - ERFA_DJM0 - eop->first_mjd;
 }
 
-bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_eop_values *out) {
+bst_status bst_astro_eop_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
+                            bst_astro_eop_values *out) {
     double f, day = day_of(eop, t, &f);
     if (!(day >= 0.0 && day + f - (eop->count - 1) <= PREDICTED_DAYS)) {
         return fail_outside(ctx, eop, t);
@@ -240,11 +243,11 @@ bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_eop_valu
         if (day == eop->count - 1 && f == 0.0) {
             *out = eop->rows[eop->count - 1];
         } else {
-            bst_eop_prediction_at(&eop->after, eop->first_mjd + day + f, out);
+            bst_astro_eop_prediction_at(&eop->after, eop->first_mjd + day + f, out);
         }
         return BST_OK;
     }
-    const bst_eop_values *a = &eop->rows[(int)day], *b = a + 1;
+    const bst_astro_eop_values *a = &eop->rows[(int)day], *b = a + 1;
     /* A leap second at the end of the day moves UT1-UTC by a whole second at b. */
     double step = b->ut1_minus_utc_s - a->ut1_minus_utc_s;
     step -= round(step);
@@ -254,21 +257,22 @@ bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_eop_valu
     return BST_OK;
 }
 
-bool bst_eop_uncertainty_at(const bst_eop *eop, bst_time t, bst_eop_uncertainty *out) {
+bool bst_astro_eop_uncertainty_at(const bst_astro_eop *eop, bst_time t,
+                                  bst_astro_eop_uncertainty *out) {
     double f, day = day_of(eop, t, &f);
-    *out = (bst_eop_uncertainty){0};
+    *out = (bst_astro_eop_uncertainty){0};
     if (!(day + f > eop->count - 1)) {
         return false;
     }
-    bst_eop_prediction_error(&eop->after, eop->first_mjd + day + f, out);
+    bst_astro_eop_prediction_error(&eop->after, eop->first_mjd + day + f, out);
     return true;
 }
 
-void bst_eop_warn(bst_ctx *ctx, const bst_eop *eop, bst_time last, const char *where) {
-    bst_eop_uncertainty u;
+void bst_astro_eop_warn(bst_ctx *ctx, const bst_astro_eop *eop, bst_time last, const char *where) {
+    bst_astro_eop_uncertainty u;
     int end[3];
     double fraction;
-    if (!bst_eop_uncertainty_at(eop, last, &u)) {
+    if (!bst_astro_eop_uncertainty_at(eop, last, &u)) {
         return;
     }
     eraJd2cal(ERFA_DJM0, eop->after.last_mjd, &end[0], &end[1], &end[2], &fraction);
@@ -280,7 +284,8 @@ void bst_eop_warn(bst_ctx *ctx, const bst_eop *eop, bst_time last, const char *w
             15.041 * u.ut1_s, u.pole_arcsec);
 }
 
-bst_status bst_eop_nearest(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_time *out) {
+bst_status bst_astro_eop_nearest(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
+                                 bst_time *out) {
     bst_time first, last;
     BST_TRY(bst_time_from_utc_jd(ctx, ERFA_DJM0, eop->first_mjd, &first));
     BST_TRY(bst_time_from_utc_jd(ctx, ERFA_DJM0, eop->after.last_mjd + PREDICTED_DAYS, &last));

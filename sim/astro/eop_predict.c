@@ -45,12 +45,12 @@ static void terms_at(double days, double out[TERMS]) {
     }
 }
 
-static double pole_of(const bst_eop_values *row, int axis) {
+static double pole_of(const bst_astro_eop_values *row, int axis) {
     return (axis ? row->yp_rad : row->xp_rad) / BST_ARCSEC_RAD;
 }
 
-static bool fit_pole(int first_mjd, int count, const bst_eop_values *rows,
-                     bst_eop_prediction *out) {
+static bool fit_pole(int first_mjd, int count, const bst_astro_eop_values *rows,
+                     bst_astro_eop_prediction *out) {
     double n[TERMS][TERMS] = {{0}}, b[2][TERMS] = {{0}}, a[TERMS], mean[2];
     int last = count - 1, first = count > MOST_ROWS ? count - MOST_ROWS : 0;
     for (int k = 0; k < TERMS; k++) {
@@ -86,7 +86,7 @@ static bool fit_pole(int first_mjd, int count, const bst_eop_values *rows,
 }
 
 /* Slope of UT1-TAI without its seasons, s a day: least squares over the last rows. */
-static double rate_of(int first_mjd, int count, const bst_eop_values *rows) {
+static double rate_of(int first_mjd, int count, const bst_astro_eop_values *rows) {
     int rows_used = count < RATE_ROWS + 1 ? count : RATE_ROWS + 1, last = count - 1;
     double middle = -0.5 * (rows_used - 1), sum_tt = 0.0, sum_ty = 0.0, y = 0.0;
     for (int back = 0; back < rows_used; back++) {
@@ -115,9 +115,10 @@ static double tai_minus_utc_s(double mjd) {
     return seconds;
 }
 
-bst_status bst_eop_prediction_fit(bst_ctx *ctx, int first_mjd, int count,
-                                  const bst_eop_values *rows, bst_eop_prediction *out) {
-    *out = (bst_eop_prediction){.last_mjd = first_mjd + count - 1, .rows = count};
+bst_status bst_astro_eop_prediction_fit(bst_ctx *ctx, int first_mjd, int count,
+                                        const bst_astro_eop_values *rows,
+                                        bst_astro_eop_prediction *out) {
+    *out = (bst_astro_eop_prediction){.last_mjd = first_mjd + count - 1, .rows = count};
     out->ut1_minus_tai_s = rows[count - 1].ut1_minus_utc_s - tai_minus_utc_s(out->last_mjd);
     out->rate_s_per_day = rate_of(first_mjd, count, rows);
     return fit_pole(first_mjd, count, rows, out)
@@ -127,7 +128,8 @@ bst_status bst_eop_prediction_fit(bst_ctx *ctx, int first_mjd, int count,
                           "continued: its values are no numbers");
 }
 
-void bst_eop_prediction_at(const bst_eop_prediction *p, double mjd, bst_eop_values *out) {
+void bst_astro_eop_prediction_at(const bst_astro_eop_prediction *p, double mjd,
+                                 bst_astro_eop_values *out) {
     double days = mjd - p->last_mjd, a[TERMS], mean[2], pole[2];
     terms_at(days, a);
     secular_pole(mjd, mean);
@@ -159,7 +161,8 @@ enum { POLE_ROWS = 730, UT1_ROWS = 60 };
 static const double STATED = 2.5;
 static const double SHORT_POLE_ARCSEC = 0.12, SHORT_UT1 = 3.0;
 
-void bst_eop_prediction_error(const bst_eop_prediction *p, double mjd, bst_eop_uncertainty *out) {
+void bst_astro_eop_prediction_error(const bst_astro_eop_prediction *p, double mjd,
+                                    bst_astro_eop_uncertainty *out) {
     double days = fmax(mjd - p->last_mjd, 0.0), x = log(fmax(days, ERRORS[0].days));
     int i = 0;
     while (i < ERROR_ROWS - 2 && days > ERRORS[i + 1].days) {

@@ -14,7 +14,7 @@
 typedef struct node {
     int64_t index;
     bool has_bodies, has_earth;
-    bst_earth_parts parts;
+    bst_astro_earth_parts parts;
     bst_vec3 sun_m, moon_m;
 } node;
 
@@ -30,7 +30,7 @@ struct bst_forces {
 };
 
 static bst_status check(bst_ctx *ctx, const bst_force_model *m) {
-    const bst_spacecraft *s = &m->spacecraft;
+    const bst_astro_spacecraft *s = &m->spacecraft;
     if ((m->solar_pressure || m->drag) && !(s->mass_kg > 0.0 && isfinite(s->mass_kg))) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "solar pressure and drag need a mass above 0 (found %g kg)", s->mass_kg);
@@ -67,7 +67,7 @@ bst_status bst_forces_create(bst_ctx *ctx, const bst_force_model *model, bst_tim
     bst_bodies bodies;
     bst_bodies_at(epoch, &bodies);
     f->pole = bodies.pole; /* it moves by 0.06 arcsec a day, the limb by 6 mm */
-    const bst_spacecraft *s = &model->spacecraft;
+    const bst_astro_spacecraft *s = &model->spacecraft;
     if (model->solar_pressure) {
         f->light_accel_au =
             BST_SUNLIGHT_PRESSURE_PA * s->light_coefficient * s->light_area_m2 / s->mass_kg;
@@ -109,7 +109,7 @@ static bst_status earth_at(bst_ctx *ctx, bst_forces *f, int64_t index, const nod
     node *n = slot(f, index);
     if (!n->has_earth) {
         bst_time t = bst_time_add(f->epoch, NODE_STEP_S * (double)index);
-        BST_TRY(bst_earth_parts_at(ctx, f->model.eop, t, t, &n->parts));
+        BST_TRY(bst_astro_earth_parts_at(ctx, f->model.eop, t, t, &n->parts));
         n->has_earth = true;
     }
     *out = n;
@@ -148,7 +148,7 @@ static bst_vec3 third_body(double gm, bst_vec3 r, bst_vec3 s) {
 
 static bst_vec3 drag(const bst_forces *f, bst_vec3 fixed, bst_vec3 r, bst_vec3 v, bst_vec3 spin) {
     bst_vec3 wind = bst_vec3_sub(v, bst_vec3_cross(spin, r));
-    double density = bst_atmosphere_density_kgpm3(bst_height_m(fixed));
+    double density = bst_atmosphere_density_kgpm3(bst_astro_height_m(fixed));
     return bst_vec3_scale(wind, -f->drag_factor * density * bst_vec3_norm(wind));
 }
 
@@ -166,12 +166,13 @@ bst_status bst_forces_at(bst_ctx *ctx, bst_forces *f, double seconds, bst_vec3 r
         const node *before, *after;
         BST_TRY(earth_at(ctx, f, index, &before));
         BST_TRY(earth_at(ctx, f, index + 1, &after));
-        bst_earth_parts parts = bst_earth_parts_between(&before->parts, &after->parts, fraction);
-        bst_earth_frames frames = bst_earth_frames_from_parts(&parts);
+        bst_astro_earth_parts parts =
+            bst_astro_earth_parts_between(&before->parts, &after->parts, fraction);
+        bst_astro_earth_frames frames = bst_astro_earth_frames_from_parts(&parts);
         fixed = bst_mat3_mul_vec(&frames.itrf_from_gcrf, r);
         a = bst_mat3_transpose_mul_vec(&frames.itrf_from_gcrf,
                                        bst_gravity_acceleration(m->gravity, fixed));
-        spin = bst_earth_rate_gcrf(&frames);
+        spin = bst_astro_earth_rate_gcrf(&frames);
     } else {
         a = bst_gravity_acceleration(m->gravity, r);
     }
@@ -190,8 +191,8 @@ bst_status bst_forces_at(bst_ctx *ctx, bst_forces *f, double seconds, bst_vec3 r
         if (m->solar_pressure) {
             bst_vec3 d = bst_vec3_sub(r, sun);
             double d2 = bst_vec3_dot(d, d);
-            double size =
-                f->light_accel_au * bst_sun_fraction(r, sun, f->pole) * BST_AU_M * BST_AU_M / d2;
+            double size = f->light_accel_au * bst_astro_sun_fraction(r, sun, f->pole) * BST_AU_M *
+                          BST_AU_M / d2;
             a = bst_vec3_axpy(a, size / sqrt(d2), d);
         }
     }
@@ -205,5 +206,5 @@ double bst_forces_sunlight(bst_forces *f, double seconds, bst_vec3 position_m) {
     }
     bst_vec3 sun, moon;
     sun_and_moon(f, seconds, &sun, &moon);
-    return bst_sun_fraction(position_m, sun, f->pole);
+    return bst_astro_sun_fraction(position_m, sun, f->pole);
 }

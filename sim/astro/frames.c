@@ -21,7 +21,7 @@ static bst_mat3 turn_z_mul(double angle_rad, const bst_mat3 *a) {
 }
 
 /* TAI to UT1 in seconds at t. */
-static bst_status ut1_minus_tai(bst_ctx *ctx, bst_time t, const bst_eop_values *eop,
+static bst_status ut1_minus_tai(bst_ctx *ctx, bst_time t, const bst_astro_eop_values *eop,
                                 double *seconds) {
     double utc1, utc2, fraction, tai_minus_utc_s = 0.0;
     int year, month, day;
@@ -34,11 +34,11 @@ static bst_status ut1_minus_tai(bst_ctx *ctx, bst_time t, const bst_eop_values *
     return BST_OK;
 }
 
-bst_status bst_earth_parts_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_time read_at,
-                              bst_earth_parts *out) {
-    bst_eop_values values;
+bst_status bst_astro_earth_parts_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
+                                    bst_time read_at, bst_astro_earth_parts *out) {
+    bst_astro_eop_values values;
     double tt1, tt2, ut1_minus_tai_s = 0.0, m[3][3];
-    BST_TRY(bst_eop_at(ctx, eop, read_at, &values));
+    BST_TRY(bst_astro_eop_at(ctx, eop, read_at, &values));
     BST_TRY(ut1_minus_tai(ctx, read_at, &values, &ut1_minus_tai_s));
     double ut1 = t.jd1, ut2 = t.jd2 + ut1_minus_tai_s / ERFA_DAYSEC;
     bst_time_tt(t, &tt1, &tt2);
@@ -54,22 +54,22 @@ bst_status bst_earth_parts_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_
     return BST_OK;
 }
 
-bst_earth_frames bst_earth_frames_from_parts(const bst_earth_parts *parts) {
+bst_astro_earth_frames bst_astro_earth_frames_from_parts(const bst_astro_earth_parts *parts) {
     bst_mat3 teme_from_gcrf = turn_z_mul(-parts->teme_turn_rad, &parts->cirs_from_gcrf);
     bst_mat3 tirs_from_gcrf = turn_z_mul(parts->era_rad, &parts->cirs_from_gcrf);
-    return (bst_earth_frames){bst_mat3_transpose(&teme_from_gcrf),
-                              bst_mat3_mul(&parts->itrf_from_tirs, &tirs_from_gcrf)};
+    return (bst_astro_earth_frames){bst_mat3_transpose(&teme_from_gcrf),
+                                    bst_mat3_mul(&parts->itrf_from_tirs, &tirs_from_gcrf)};
 }
 
-bst_status bst_earth_frames_at(bst_ctx *ctx, const bst_eop *eop, bst_time t,
-                               bst_earth_frames *out) {
-    bst_earth_parts parts;
-    BST_TRY(bst_earth_parts_at(ctx, eop, t, t, &parts));
-    *out = bst_earth_frames_from_parts(&parts);
+bst_status bst_astro_earth_frames_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
+                                     bst_astro_earth_frames *out) {
+    bst_astro_earth_parts parts;
+    BST_TRY(bst_astro_earth_parts_at(ctx, eop, t, t, &parts));
+    *out = bst_astro_earth_frames_from_parts(&parts);
     return BST_OK;
 }
 
-bst_vec3 bst_earth_rate_gcrf(const bst_earth_frames *frames) {
+bst_vec3 bst_astro_earth_rate_gcrf(const bst_astro_earth_frames *frames) {
     /* TEME's z axis is the celestial intermediate pole. */
     const bst_mat3 *m = &frames->gcrf_from_teme;
     return (bst_vec3){EARTH_RATE_RADPS * m->m[0][2], EARTH_RATE_RADPS * m->m[1][2],

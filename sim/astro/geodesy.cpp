@@ -14,8 +14,8 @@ bst_status fail_exception(bst_ctx *ctx, const char *what) noexcept {
 
 }  // namespace
 
-bst_status bst_geodetic_to_itrf(bst_ctx *ctx, double latitude_rad, double longitude_rad,
-                                double height_m, double itrf_m[3]) noexcept {
+bst_status bst_astro_geodetic_to_itrf(bst_ctx *ctx, double latitude_rad, double longitude_rad,
+                                      double height_m, double itrf_m[3]) noexcept {
     if (!std::isfinite(latitude_rad) || !std::isfinite(longitude_rad) || !std::isfinite(height_m)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "geodetic position (%g, %g, %g) is not finite",
                         latitude_rad, longitude_rad, height_m);
@@ -40,8 +40,8 @@ bst_status bst_geodetic_to_itrf(bst_ctx *ctx, double latitude_rad, double longit
     }
 }
 
-bst_status bst_itrf_to_geodetic(bst_ctx *ctx, const double itrf_m[3], double *latitude_rad,
-                                double *longitude_rad, double *height_m) noexcept {
+bst_status bst_astro_itrf_to_geodetic(bst_ctx *ctx, const double itrf_m[3], double *latitude_rad,
+                                      double *longitude_rad, double *height_m) noexcept {
     if (!std::isfinite(itrf_m[0]) || !std::isfinite(itrf_m[1]) || !std::isfinite(itrf_m[2])) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "ITRF position (%g, %g, %g) is not finite",
                         itrf_m[0], itrf_m[1], itrf_m[2]);

@@ -1,6 +1,6 @@
 #include "sim/astro/interpolate.h"
 
-int64_t bst_interpolate_find(const bst_table_state *rows, int64_t count, double t_s) {
+int64_t bst_interpolate_find(const bst_astro_table_state *rows, int64_t count, double t_s) {
     int64_t low = 0, high = count;
     while (high - low > 1) {
         int64_t middle = low + (high - low) / 2;
@@ -13,7 +13,7 @@ int64_t bst_interpolate_find(const bst_table_state *rows, int64_t count, double 
     return low;
 }
 
-void bst_interpolate(const bst_table_state *rows, int64_t count, double t_s, int points,
+void bst_interpolate(const bst_astro_table_state *rows, int64_t count, double t_s, int points,
                      bool hermite, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     enum { MOST = BST_INTERPOLATE_MAX_ROWS };
     hermite = hermite || count == 1; /* else a single row would stand still */
@@ -28,11 +28,11 @@ void bst_interpolate(const bst_table_state *rows, int64_t count, double t_s, int
     first = first < 0 ? 0 : first;
     /* times relative to t_s in units of the points' span, positions relative to a near one: what is
      * rounded is small; from the nearest row outwards: what is added is smaller and smaller */
-    const bst_table_state *origin = &rows[near];
+    const bst_astro_table_state *origin = &rows[near];
     double span = rows[first + n - 1].t_s - rows[first].t_s, unit = span > 0.0 ? span : 1.0;
     double z[MOST];
     bst_vec3 f[MOST];
-    const bst_table_state *node[MOST];
+    const bst_astro_table_state *node[MOST];
     int m = 0;
     for (int64_t step = 0; m < (hermite ? 2 * n : n); step++) {
         int64_t row = near + (step % 2 ? (step + 1) / 2 : -step / 2);

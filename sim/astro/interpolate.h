@@ -8,22 +8,22 @@
 #include "sim/core/vec.h"
 
 /* A tabulated state, m and m/s in any axes, `t_s` seconds after any instant. */
-typedef struct bst_table_state {
+typedef struct bst_astro_table_state {
     double t_s;
     bst_vec3 position_m, velocity_mps;
-} bst_table_state;
+} bst_astro_table_state;
 
 enum { BST_INTERPOLATE_MAX_ROWS = 32 };
 
 /* The row with the greatest t_s <= t_s, 0 when there is none. Rows rise in t_s; count >= 1. */
-int64_t bst_interpolate_find(const bst_table_state *rows, int64_t count, double t_s);
+int64_t bst_interpolate_find(const bst_astro_table_state *rows, int64_t count, double t_s);
 
 /* The polynomial through `points` (taken into 1 to BST_INTERPOLATE_MAX_ROWS, half of it with
  * velocities, and count) rows around t_s: through positions, and with `hermite`, or where
  * there is one row only, also through velocities. Position and its derivative at t_s. The rows
  * reach equally far to both sides of the interval that holds t_s, shifted where the table ends.
  * Extrapolates outside the table. */
-void bst_interpolate(const bst_table_state *rows, int64_t count, double t_s, int points,
+void bst_interpolate(const bst_astro_table_state *rows, int64_t count, double t_s, int points,
                      bool hermite, bst_vec3 *position_m, bst_vec3 *velocity_mps);
 
 #endif

@@ -72,7 +72,7 @@ typedef struct reader {
     /* of the segment that is read */
     bst_text_line meta[META_KEYS]; /* `text` NULL: absent; the value only */
     bst_oem_segment_rows segment;
-    bst_time_system system;
+    bst_astro_time_system system;
     bst_time start, stop, use_start, use_stop;
     bool eme2000;
     bst_mat3 eme2000_from_gcrf;
@@ -89,11 +89,11 @@ static bst_status fail_memory(const reader *r) {
                     r->source.name);
 }
 
-static bst_status append_row(const reader *r, const bst_table_state *row) {
+static bst_status append_row(const reader *r, const bst_astro_table_state *row) {
     bst_oem *oem = r->oem;
     if (oem->row_count == oem->row_capacity) {
         int64_t capacity = oem->row_capacity ? 2 * oem->row_capacity : 64;
-        bst_table_state *rows = realloc(oem->rows, (size_t)capacity * sizeof *rows);
+        bst_astro_table_state *rows = realloc(oem->rows, (size_t)capacity * sizeof *rows);
         if (!rows) {
             return fail_memory(r);
         }
@@ -287,7 +287,7 @@ static bst_status finish_meta(reader *r) {
         char c = name->text[i];
         system[i] = c >= 'a' && c <= 'z' ? (char)(c - 'a' + 'A') : c;
     }
-    if (!bst_time_system_find(system, name->length, &r->system)) {
+    if (!bst_astro_time_system_find(system, name->length, &r->system)) {
         return fail_meta(r, KEY_TIME_SYSTEM, "is not one that is read", "UTC, TAI, TT, TDB or GPS");
     }
     bst_text_copy((bst_text_span){r->meta[KEY_OBJECT_NAME].text, r->meta[KEY_OBJECT_NAME].length},
@@ -343,8 +343,8 @@ static bst_status read_row(reader *r) {
         return fail_line(r, "fewer numbers than a state has",
                          "an epoch and 6 numbers, or 9 with accelerations");
     }
-    bst_table_state row = {.position_m = {1e3 * v[0], 1e3 * v[1], 1e3 * v[2]},
-                           .velocity_mps = {1e3 * v[3], 1e3 * v[4], 1e3 * v[5]}};
+    bst_astro_table_state row = {.position_m = {1e3 * v[0], 1e3 * v[1], 1e3 * v[2]},
+                                 .velocity_mps = {1e3 * v[3], 1e3 * v[4], 1e3 * v[5]}};
     if (r->segment.rows == 0) {
         r->segment.base = t;
     } else {

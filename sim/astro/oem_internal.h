@@ -26,7 +26,7 @@ typedef struct bst_oem_object {
 
 struct bst_oem {
     char *name; /* of the file, for messages */
-    bst_table_state *rows;
+    bst_astro_table_state *rows;
     int64_t row_count, row_capacity;
     bst_oem_segment_rows *segments; /* by object, then by time */
     int segment_count, segment_capacity;

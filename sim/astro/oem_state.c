@@ -126,7 +126,7 @@ bst_status bst_oem_state(bst_ctx *ctx, const bst_oem *oem, int object, bst_sky_c
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%.400s: TEME and ITRF need Earth orientation",
                         oem->name);
     }
-    bst_sky sky;
+    bst_sky_rotation sky;
     BST_TRY(bst_sky_clock_at(ctx, clock, t, &sky));
     if (s->axes == BST_OEM_TEME) {
         *position_m = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, r);
@@ -134,7 +134,8 @@ bst_status bst_oem_state(bst_ctx *ctx, const bst_oem *oem, int object, bst_sky_c
         return BST_OK;
     }
     *position_m = bst_mat3_transpose_mul_vec(&sky.frames.itrf_from_gcrf, r);
-    *velocity_mps = bst_vec3_add(bst_mat3_transpose_mul_vec(&sky.frames.itrf_from_gcrf, v),
-                                 bst_vec3_cross(bst_earth_rate_gcrf(&sky.frames), *position_m));
+    *velocity_mps =
+        bst_vec3_add(bst_mat3_transpose_mul_vec(&sky.frames.itrf_from_gcrf, v),
+                     bst_vec3_cross(bst_astro_earth_rate_gcrf(&sky.frames), *position_m));
     return BST_OK;
 }

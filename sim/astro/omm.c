@@ -281,7 +281,7 @@ static bst_status read_object(bst_elements_reader *reader, const cJSON *object, 
     return read_record(reader, &r);
 }
 
-bst_status bst_omm_read_json(bst_elements_reader *reader, const char *data, size_t bytes) {
+bst_status bst_astro_omm_read_json(bst_elements_reader *reader, const char *data, size_t bytes) {
     bst_json *json;
     bst_status status = bst_json_parse(reader->source.ctx, reader->source.name, data, bytes, &json);
     if (status != BST_OK) {
@@ -368,7 +368,7 @@ static bst_status read_rows(bst_elements_reader *reader, const char *data, size_
     return BST_OK;
 }
 
-bst_status bst_omm_read_csv(bst_elements_reader *reader, const char *data, size_t bytes) {
+bst_status bst_astro_omm_read_csv(bst_elements_reader *reader, const char *data, size_t bytes) {
     char *scratch = malloc(MAX_LINE);
     if (!scratch) {
         return bst_fail(reader->source.ctx, BST_ERR_MEMORY, "%.400s: no memory to read it",

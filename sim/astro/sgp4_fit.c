@@ -8,8 +8,8 @@ enum { ELEMENTS = 6, MAX_ITERATIONS = 40 };
 /* WGS-72, m^3/s^2, as SGP4 has it. */
 static const double MU_72 = 3.986008e14;
 
-bst_kepler_elements bst_kepler_elements_of(double mu, bst_vec3 r, bst_vec3 v) {
-    bst_kepler_elements k;
+bst_astro_kepler_elements bst_astro_kepler_elements_of(double mu, bst_vec3 r, bst_vec3 v) {
+    bst_astro_kepler_elements k;
     double distance = bst_vec3_norm(r), v2 = bst_vec3_dot(v, v), along = bst_vec3_dot(r, v);
     bst_vec3 h = bst_vec3_cross(r, v);
     bst_vec3 normal = bst_vec3_unit(h);
@@ -173,7 +173,8 @@ static bst_status fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, dou
 /* What both functions start from; false for what is no ellipse or turns backwards in the equator.
  */
 static bool start_from(bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps, double x[ELEMENTS]) {
-    bst_kepler_elements k = bst_kepler_elements_of(MU_72, position_teme_m, velocity_teme_mps);
+    bst_astro_kepler_elements k =
+        bst_astro_kepler_elements_of(MU_72, position_teme_m, velocity_teme_mps);
     if (!(k.semi_major_axis_m > 0.0) || !(k.eccentricity < 1.0) ||
         k.inclination_rad > BST_PI - 0.1 * BST_DEG_RAD) {
         return false;

@@ -39,12 +39,13 @@ bool bst_sgp4_motion(const bst_sgp4 *sgp4, double minutes, bst_vec3 *position_te
 
 /* Osculating elements of a state (m, m/s; any axes) about a centre of gravitational parameter mu
  * (m^3/s^2). Circular orbits have their perigee at the node, equatorial ones their node at x. */
-typedef struct bst_kepler_elements {
+typedef struct bst_astro_kepler_elements {
     double semi_major_axis_m; /* negative: hyperbola */
     double eccentricity;
     double inclination_rad, raan_rad, arg_perigee_rad;
     double mean_anomaly_rad; /* of a hyperbola the hyperbolic one */
-} bst_kepler_elements;
-bst_kepler_elements bst_kepler_elements_of(double mu, bst_vec3 position_m, bst_vec3 velocity_mps);
+} bst_astro_kepler_elements;
+bst_astro_kepler_elements bst_astro_kepler_elements_of(double mu, bst_vec3 position_m,
+                                                       bst_vec3 velocity_mps);
 
 #endif

@@ -118,7 +118,7 @@ bool bst_earth_limb_at(bst_vec3 position_m, bst_vec3 pole, double height_m, bst_
     return true;
 }
 
-double bst_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole) {
+double bst_astro_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole) {
     bst_vec3 to_sun = bst_vec3_sub(sun_m, position_m);
     double distance = bst_vec3_norm(position_m), sun_distance = bst_vec3_norm(to_sun);
     if (distance < BST_EARTH_RADIUS_M && bst_earth_depth(position_m, pole) < 0.0) {
@@ -140,7 +140,7 @@ double bst_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole) {
     return bst_earth_limb_share(&limb, sine / sqrt(1.0 - sine * sine));
 }
 
-double bst_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction) {
+double bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction) {
     bst_earth_limb limb;
     if (bst_earth_depth(position_m, pole) < 0.0) {
         return -BST_PI;
@@ -148,7 +148,7 @@ double bst_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 directi
     return bst_earth_limb_at(position_m, pole, 0.0, direction, &limb) ? atan(limb.beyond) : BST_PI;
 }
 
-bool bst_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole) {
+bool bst_astro_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole) {
     bst_vec3 near = bst_earth_unit_sphere(a_m, pole, 0.0);
     bst_vec3 far = bst_earth_unit_sphere(b_m, pole, 0.0);
     if (bst_vec3_dot(far, far) < bst_vec3_dot(near, near)) {

@@ -16,27 +16,28 @@ typedef struct node {
     int64_t index;
     bool valid;
     bool beyond; /* the Earth-orientation table */
-    bst_earth_parts parts;
+    bst_astro_earth_parts parts;
     bst_bodies bodies;
 } node;
 
-struct bst_sky_grid {
-    const bst_eop *eop;
+struct bst_sky_clock_grid {
+    const bst_astro_eop *eop;
     pthread_mutex_t lock;
     node nodes[SHARED_NODES];
 };
 
 struct bst_sky_clock {
-    const bst_eop *eop;
-    bst_sky_grid *grid; /* NULL: works its values out itself */
+    const bst_astro_eop *eop;
+    bst_sky_clock_grid *grid; /* NULL: works its values out itself */
     node nodes[NODES];
     bool asked; /* before, for the instant `last` */
     bst_time last;
-    bst_sky sky;
+    bst_sky_rotation sky;
 };
 
-bst_status bst_sky_grid_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_grid **out) {
-    bst_sky_grid *grid = calloc(1, sizeof *grid);
+bst_status bst_sky_clock_grid_create(bst_ctx *ctx, const bst_astro_eop *eop,
+                                     bst_sky_clock_grid **out) {
+    bst_sky_clock_grid *grid = calloc(1, sizeof *grid);
     *out = NULL;
     if (!grid) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the values of sky clocks");
@@ -47,20 +48,20 @@ bst_status bst_sky_grid_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_grid **
     return BST_OK;
 }
 
-void bst_sky_grid_free(bst_sky_grid *grid) {
+void bst_sky_clock_grid_free(bst_sky_clock_grid *grid) {
     if (grid) {
         pthread_mutex_destroy(&grid->lock);
         free(grid);
     }
 }
 
-bst_status bst_sky_clock_create_on(bst_ctx *ctx, bst_sky_grid *grid, bst_sky_clock **out) {
+bst_status bst_sky_clock_create_on(bst_ctx *ctx, bst_sky_clock_grid *grid, bst_sky_clock **out) {
     BST_TRY(bst_sky_clock_create(ctx, grid->eop, out));
     (*out)->grid = grid;
     return BST_OK;
 }
 
-bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_clock **out) {
+bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_astro_eop *eop, bst_sky_clock **out) {
     bst_sky_clock *clock = calloc(1, sizeof *clock);
     if (!clock) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a sky clock");
@@ -76,16 +77,16 @@ void bst_sky_clock_free(bst_sky_clock *clock) {
 
 /* Works out the grid value of an index. Beyond the Earth-orientation table it has the values of its
  * end, for instants just before. */
-static bst_status make_node(bst_ctx *ctx, const bst_eop *eop, int64_t index, node *n) {
+static bst_status make_node(bst_ctx *ctx, const bst_astro_eop *eop, int64_t index, node *n) {
     int64_t day = index / STEPS_PER_DAY, step = index % STEPS_PER_DAY;
     bst_time t = {(double)day + 0.5, (double)step / STEPS_PER_DAY};
     n->valid = false;
-    bst_status status = bst_earth_parts_at(ctx, eop, t, t, &n->parts);
+    bst_status status = bst_astro_earth_parts_at(ctx, eop, t, t, &n->parts);
     n->beyond = status == BST_ERR_RANGE;
     if (n->beyond) {
         bst_time read_at;
-        BST_TRY(bst_eop_nearest(ctx, eop, t, &read_at));
-        status = bst_earth_parts_at(ctx, eop, t, read_at, &n->parts);
+        BST_TRY(bst_astro_eop_nearest(ctx, eop, t, &read_at));
+        status = bst_astro_earth_parts_at(ctx, eop, t, read_at, &n->parts);
     }
     BST_TRY(status);
     bst_bodies_at(t, &n->bodies);
@@ -95,7 +96,7 @@ static bst_status make_node(bst_ctx *ctx, const bst_eop *eop, int64_t index, nod
 }
 
 /* The same by way of the shared grid. */
-static bst_status shared_node(bst_ctx *ctx, bst_sky_grid *grid, int64_t index, node *out) {
+static bst_status shared_node(bst_ctx *ctx, bst_sky_clock_grid *grid, int64_t index, node *out) {
     node *n = &grid->nodes[index % SHARED_NODES];
     bst_status status = BST_OK;
     pthread_mutex_lock(&grid->lock);
@@ -145,9 +146,9 @@ static double lerp_angle(double a, double b, double f) {
     return a + f * step;
 }
 
-bst_earth_parts bst_earth_parts_between(const bst_earth_parts *a, const bst_earth_parts *b,
-                                        double f) {
-    return (bst_earth_parts){
+bst_astro_earth_parts bst_astro_earth_parts_between(const bst_astro_earth_parts *a,
+                                                    const bst_astro_earth_parts *b, double f) {
+    return (bst_astro_earth_parts){
         .cirs_from_gcrf = lerp_rotation(&a->cirs_from_gcrf, &b->cirs_from_gcrf, f),
         .itrf_from_tirs = lerp_rotation(&a->itrf_from_tirs, &b->itrf_from_tirs, f),
         .era_rad = lerp_angle(a->era_rad, b->era_rad, f),
@@ -155,7 +156,7 @@ bst_earth_parts bst_earth_parts_between(const bst_earth_parts *a, const bst_eart
     };
 }
 
-bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_sky *out) {
+bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_sky_rotation *out) {
     /* one instant is asked for several times in a row */
     if (clock->asked && t.jd1 == clock->last.jd1 && t.jd2 == clock->last.jd2) {
         *out = clock->sky;
@@ -175,11 +176,11 @@ bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_
     BST_TRY(node_at(ctx, clock, index, &a));
     BST_TRY(node_at(ctx, clock, index + 1, &b));
     if (a->beyond || b->beyond) {
-        bst_eop_values covered;
-        BST_TRY(bst_eop_at(ctx, clock->eop, t, &covered));
+        bst_astro_eop_values covered;
+        BST_TRY(bst_astro_eop_at(ctx, clock->eop, t, &covered));
     }
-    bst_earth_parts parts = bst_earth_parts_between(&a->parts, &b->parts, f);
-    out->frames = bst_earth_frames_from_parts(&parts);
+    bst_astro_earth_parts parts = bst_astro_earth_parts_between(&a->parts, &b->parts, f);
+    out->frames = bst_astro_earth_frames_from_parts(&parts);
     out->bodies.sun_m = lerp(a->bodies.sun_m, b->bodies.sun_m, f);
     out->bodies.moon_m = lerp(a->bodies.moon_m, b->bodies.moon_m, f);
     out->bodies.earth_bary_m = lerp(a->bodies.earth_bary_m, b->bodies.earth_bary_m, f);

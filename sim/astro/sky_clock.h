@@ -5,10 +5,10 @@
 #include "sim/astro/bodies.h"
 #include "sim/astro/frames.h"
 
-typedef struct bst_sky {
-    bst_earth_frames frames;
+typedef struct bst_sky_rotation {
+    bst_astro_earth_frames frames;
     bst_bodies bodies;
-} bst_sky;
+} bst_sky_rotation;
 
 /* Interpolates between exact values on a fixed grid of TAI. Its memory is fixed for a run of any
  * length: a few grid values, worked out when first needed. Results depend on the instant alone,
@@ -17,24 +17,25 @@ typedef struct bst_sky_clock bst_sky_clock;
 
 /* The grid's values for several clocks, which then work each out once between them. Its memory is
  * fixed too. Clocks on it may run in different threads. eop is borrowed and must outlive it. */
-typedef struct bst_sky_grid bst_sky_grid;
-bst_status bst_sky_grid_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_grid **out) BST_MUST_CHECK;
-void bst_sky_grid_free(bst_sky_grid *grid); /* NULL allowed; after its clocks */
+typedef struct bst_sky_clock_grid bst_sky_clock_grid;
+bst_status bst_sky_clock_grid_create(bst_ctx *ctx, const bst_astro_eop *eop,
+                                     bst_sky_clock_grid **out) BST_MUST_CHECK;
+void bst_sky_clock_grid_free(bst_sky_clock_grid *grid); /* NULL allowed; after its clocks */
 
 /* Makes a clock on a grid, which is borrowed and must outlive it. Freed with bst_sky_clock_free. */
-bst_status bst_sky_clock_create_on(bst_ctx *ctx, bst_sky_grid *grid,
+bst_status bst_sky_clock_create_on(bst_ctx *ctx, bst_sky_clock_grid *grid,
                                    bst_sky_clock **out) BST_MUST_CHECK;
 
 /* Makes a clock of its own; eop is borrowed and must outlive it. Freed with bst_sky_clock_free. */
-bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_eop *eop,
+bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_astro_eop *eop,
                                 bst_sky_clock **out) BST_MUST_CHECK;
 void bst_sky_clock_free(bst_sky_clock *clock); /* NULL allowed */
 
-/* Values at t. Against bst_earth_frames_at and bst_bodies_at: rotations to 1 mm at a geostationary
- * distance, Sun, Moon and Earth to 15 m, the Earth's velocity to 1e-5 m/s. About 0.2 us; a step
- * into the next 120 s of the grid works out one exact value (about 0.1 ms).
- * Error: BST_ERR_RANGE where bst_eop_at has it, and in the last 120 s of the table. */
+/* Values at t. Against bst_astro_earth_frames_at and bst_bodies_at: rotations to 1 mm at a
+ * geostationary distance, Sun, Moon and Earth to 15 m, the Earth's velocity to 1e-5 m/s. About 0.2
+ * us; a step into the next 120 s of the grid works out one exact value (about 0.1 ms). Error:
+ * BST_ERR_RANGE where bst_astro_eop_at has it, and in the last 120 s of the table. */
 bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t,
-                            bst_sky *out) BST_MUST_CHECK;
+                            bst_sky_rotation *out) BST_MUST_CHECK;
 
 #endif

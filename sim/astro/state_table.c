@@ -34,17 +34,17 @@ static const char *const column_names[COLUMNS] = {
 typedef struct frame {
     bst_text_span name; /* in the file's text */
     int line;
-    bst_table_state start, end;
+    bst_astro_table_state start, end;
 } frame;
 
 typedef struct object {
     char *name;
-    int64_t first, count; /* in bst_injected.states */
+    int64_t first, count; /* in bst_state_table.states */
 } object;
 
-struct bst_injected {
-    char *name;              /* of the file, for messages */
-    bst_table_state *states; /* start and end of each frame, by object, then by time */
+struct bst_state_table {
+    char *name;                    /* of the file, for messages */
+    bst_astro_table_state *states; /* start and end of each frame, by object, then by time */
     object *objects;
     int object_count;
 };
@@ -236,7 +236,7 @@ static int compare_frames(const void *x, const void *y) {
 }
 
 /* The frames, by object, as states; frames of one object must follow each other in time. */
-static bst_status build(reader *r, bst_injected *out) {
+static bst_status build(reader *r, bst_state_table *out) {
     qsort(r->frames, (size_t)r->count, sizeof *r->frames, compare_frames);
     int objects = 0;
     for (int64_t i = 0; i < r->count; i++) {
@@ -269,12 +269,12 @@ static bst_status build(reader *r, bst_injected *out) {
     return BST_OK;
 }
 
-bst_status bst_injected_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
-                                    bst_time epoch, bst_injected **out) {
+bst_status bst_state_table_read_buffer(bst_ctx *ctx, const char *name, const char *data,
+                                       size_t bytes, bst_time epoch, bst_state_table **out) {
     *out = NULL;
     BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     reader r = {.source = {ctx, name}, .epoch = epoch};
-    bst_injected *injected = calloc(1, sizeof *injected);
+    bst_state_table *injected = calloc(1, sizeof *injected);
     char *scratch = malloc(MAX_LINE);
     bst_status status = injected && scratch ? BST_OK : fail_memory(&r);
     if (status == BST_OK) {
@@ -290,24 +290,25 @@ bst_status bst_injected_read_buffer(bst_ctx *ctx, const char *name, const char *
     free(scratch);
     free(r.frames);
     if (status != BST_OK) {
-        bst_injected_free(injected);
+        bst_state_table_free(injected);
         return status;
     }
     *out = injected;
     return BST_OK;
 }
 
-bst_status bst_injected_create(bst_ctx *ctx, const char *name, const bst_injected_frame *frames,
-                               int64_t count, bst_injected **out) {
+bst_status bst_state_table_create(bst_ctx *ctx, const char *name,
+                                  const bst_state_table_frame *frames, int64_t count,
+                                  bst_state_table **out) {
     *out = NULL;
     reader r = {.source = {ctx, name}, .frames = NULL};
-    bst_injected *injected = calloc(1, sizeof *injected);
+    bst_state_table *injected = calloc(1, sizeof *injected);
     bst_status status = injected && (injected->name = strdup(name)) ? BST_OK : fail_memory(&r);
     if (status == BST_OK && count < 1) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%.400s: holds no states of objects", name);
     }
     for (int64_t i = 0; status == BST_OK && i < count; i++) {
-        const bst_injected_frame *from = &frames[i];
+        const bst_state_table_frame *from = &frames[i];
         frame f = {.name = {from->object, strlen(from->object)},
                    .line = (int)from->number,
                    .start = {from->start_s, from->start_position_m, from->start_velocity_mps},
@@ -319,25 +320,26 @@ bst_status bst_injected_create(bst_ctx *ctx, const char *name, const bst_injecte
     }
     free(r.frames);
     if (status != BST_OK) {
-        bst_injected_free(injected);
+        bst_state_table_free(injected);
         return status;
     }
     *out = injected;
     return BST_OK;
 }
 
-bst_status bst_injected_load(bst_ctx *ctx, const char *path, bst_time epoch, bst_injected **out) {
+bst_status bst_state_table_load(bst_ctx *ctx, const char *path, bst_time epoch,
+                                bst_state_table **out) {
     *out = NULL;
     char *data;
     size_t bytes;
     BST_TRY(bst_file_read(ctx, path, MAX_FILE_BYTES, "a file of states per frame (CSV)", &data,
                           &bytes));
-    bst_status status = bst_injected_read_buffer(ctx, path, data, bytes, epoch, out);
+    bst_status status = bst_state_table_read_buffer(ctx, path, data, bytes, epoch, out);
     free(data);
     return status;
 }
 
-void bst_injected_free(bst_injected *injected) {
+void bst_state_table_free(bst_state_table *injected) {
     if (injected) {
         for (int i = 0; i < injected->object_count; i++) {
             free(injected->objects[i].name);
@@ -349,15 +351,15 @@ void bst_injected_free(bst_injected *injected) {
     }
 }
 
-int bst_injected_object_count(const bst_injected *injected) {
+int bst_state_table_object_count(const bst_state_table *injected) {
     return injected->object_count;
 }
-const char *bst_injected_object_name(const bst_injected *injected, int index) {
+const char *bst_state_table_object_name(const bst_state_table *injected, int index) {
     return injected->objects[index].name;
 }
 
-bst_status bst_injected_find(bst_ctx *ctx, const bst_injected *injected, const char *name,
-                             int *index) {
+bst_status bst_state_table_find(bst_ctx *ctx, const bst_state_table *injected, const char *name,
+                                int *index) {
     *index = 0;
     if (!*name && injected->object_count == 1) {
         return BST_OK;
@@ -373,24 +375,25 @@ bst_status bst_injected_find(bst_ctx *ctx, const bst_injected *injected, const c
                     name, injected->object_count, injected->objects[0].name);
 }
 
-void bst_injected_span(const bst_injected *injected, int index, double *start_s, double *end_s) {
+void bst_state_table_span(const bst_state_table *injected, int index, double *start_s,
+                          double *end_s) {
     const object *o = &injected->objects[index];
     *start_s = injected->states[o->first].t_s;
     *end_s = injected->states[o->first + o->count - 1].t_s;
 }
 
-bst_status bst_injected_state(bst_ctx *ctx, const bst_injected *injected, int index, double seconds,
-                              bst_vec3 *position_m, bst_vec3 *velocity_mps) {
+bst_status bst_state_table_state(bst_ctx *ctx, const bst_state_table *injected, int index,
+                                 double seconds, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const object *o = &injected->objects[index];
     double start_s, end_s;
-    bst_injected_span(injected, index, &start_s, &end_s);
+    bst_state_table_span(injected, index, &start_s, &end_s);
     if (!(seconds >= start_s - SLACK_S && seconds <= end_s + SLACK_S)) {
         return bst_fail(ctx, BST_ERR_NUMERIC,
                         "%.400s: no state of \"%s\" %.6f s after the epoch: the file covers %.6f s "
                         "to %.6f s",
                         injected->name, o->name, seconds, start_s, end_s);
     }
-    const bst_table_state *states = injected->states + o->first;
+    const bst_astro_table_state *states = injected->states + o->first;
     int64_t near = bst_interpolate_find(states, o->count, seconds);
     near = near < o->count - 1 ? near : o->count - 2;
     bst_interpolate(states + near, 2, seconds, 2, true, position_m, velocity_mps);

@@ -6,56 +6,59 @@
 #include "sim/core/vec.h"
 
 /* The states of one file; immutable once made, shareable between threads. */
-typedef struct bst_injected bst_injected;
+typedef struct bst_state_table bst_state_table;
 
 /* Reads a file of comma-separated values with a header row (docs/interfaces.md, "Injected states").
  * Columns, in any order: object; start_s and end_s (seconds after `epoch`) or start_utc and
  * end_utc; start_x_m, _y_m, _z_m, start_vx_mps, _vy_mps, _vz_mps and the same with end_. One row
  * per object and frame; an object's frames come in the order of time and do not overlap. Blank
  * lines and lines that start with # are left out.
- * *out is freed with bst_injected_free; NULL on error. Messages start with "path:line: ".
+ * *out is freed with bst_state_table_free; NULL on error. Messages start with "path:line: ".
  * BST_ERR_FORMAT for content, also when the file is over 128 MiB; BST_ERR_NOT_FOUND when there is
  * none; BST_ERR_IO when it cannot be read or is no regular file; BST_ERR_MEMORY. */
-bst_status bst_injected_load(bst_ctx *ctx, const char *path, bst_time epoch,
-                             bst_injected **out) BST_MUST_CHECK;
+bst_status bst_state_table_load(bst_ctx *ctx, const char *path, bst_time epoch,
+                                bst_state_table **out) BST_MUST_CHECK;
 
-/* As bst_injected_load, from memory: `bytes` bytes at data (any bytes, no terminator needed);
+/* As bst_state_table_load, from memory: `bytes` bytes at data (any bytes, no terminator needed);
  * `name` stands for the path in messages. */
-bst_status bst_injected_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
-                                    bst_time epoch, bst_injected **out) BST_MUST_CHECK;
+bst_status bst_state_table_read_buffer(bst_ctx *ctx, const char *name, const char *data,
+                                       size_t bytes, bst_time epoch,
+                                       bst_state_table **out) BST_MUST_CHECK;
 
 /* An object's states in one frame, seconds after the epoch. */
-typedef struct bst_injected_frame {
+typedef struct bst_state_table_frame {
     const char *object; /* borrowed for the call; at most 63 bytes */
     int64_t number;     /* ascends; for messages */
     double start_s, end_s;
     bst_vec3 start_position_m, start_velocity_mps, end_position_m, end_velocity_mps;
-} bst_injected_frame;
+} bst_state_table_frame;
 
 /* The same from states already read. BST_ERR_FORMAT when there are none, or an object's frames
  * overlap or do not follow each other in time. */
-bst_status bst_injected_create(bst_ctx *ctx, const char *name, const bst_injected_frame *frames,
-                               int64_t count, bst_injected **out) BST_MUST_CHECK;
+bst_status bst_state_table_create(bst_ctx *ctx, const char *name,
+                                  const bst_state_table_frame *frames, int64_t count,
+                                  bst_state_table **out) BST_MUST_CHECK;
 
-void bst_injected_free(bst_injected *injected); /* NULL allowed */
+void bst_state_table_free(bst_state_table *injected); /* NULL allowed */
 
-int bst_injected_object_count(const bst_injected *injected);
-const char *bst_injected_object_name(const bst_injected *injected, int object);
+int bst_state_table_object_count(const bst_state_table *injected);
+const char *bst_state_table_object_name(const bst_state_table *injected, int object);
 
 /* The object of this name; with "" the only one. BST_ERR_NOT_FOUND when there is none, or several,
  * with what the file has. */
-bst_status bst_injected_find(bst_ctx *ctx, const bst_injected *injected, const char *name,
-                             int *object) BST_MUST_CHECK;
+bst_status bst_state_table_find(bst_ctx *ctx, const bst_state_table *injected, const char *name,
+                                int *object) BST_MUST_CHECK;
 
 /* Start of the object's first frame and end of its last, seconds after the epoch. */
-void bst_injected_span(const bst_injected *injected, int object, double *start_s, double *end_s);
+void bst_state_table_span(const bst_state_table *injected, int object, double *start_s,
+                          double *end_s);
 
 /* State `seconds` after the epoch in the file's axes, m and m/s: the cubic that has the position
  * and velocity of both ends, within a frame and from a frame's end to the start of the next; the
  * velocity is its derivative. Where a frame starts as the one before it ends, its own state holds.
  * BST_ERR_NUMERIC outside the span by more than 1 us, with the span. O(log n). */
-bst_status bst_injected_state(bst_ctx *ctx, const bst_injected *injected, int object,
-                              double seconds, bst_vec3 *position_m,
-                              bst_vec3 *velocity_mps) BST_MUST_CHECK;
+bst_status bst_state_table_state(bst_ctx *ctx, const bst_state_table *injected, int object,
+                                 double seconds, bst_vec3 *position_m,
+                                 bst_vec3 *velocity_mps) BST_MUST_CHECK;
 
 #endif

@@ -67,7 +67,7 @@ static double transmission(const colour *c, int k) {
  * that comes from between their g, times by how much the bundle is thinned along and across the
  * limb. */
 static void through_air(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, double disc,
-                        bst_sunlight *out) {
+                        bst_astro_sunlight *out) {
     double distance = bst_vec3_norm(position_m);
     double way = sqrt(fmax(distance * distance - BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M, 0.0));
     double above[BST_SUNLIGHT_COLOURS], here[BST_SUNLIGHT_COLOURS], g_above = 0.0;
@@ -106,12 +106,12 @@ static void through_air(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, do
     }
 }
 
-void bst_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
-                     bst_sunlight *out) {
+void bst_astro_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
+                           bst_astro_sunlight *out) {
     const double top_m = 1e3 * limb_rows[LIMB_ROWS - 1].height_km;
     bst_vec3 to_sun = bst_vec3_sub(sun_m, position_m);
     double distance = bst_vec3_norm(position_m), sun_distance = bst_vec3_norm(to_sun);
-    *out = (bst_sunlight){.disc = bst_sun_fraction(position_m, sun_m, pole)};
+    *out = (bst_astro_sunlight){.disc = bst_astro_sun_fraction(position_m, sun_m, pole)};
     double sine = fmin(BST_SUN_RADIUS_M / sun_distance, 0.5);
     bool aired = atmosphere && distance > BST_EARTH_RADIUS_M + 1.001 * top_m;
     bst_vec3 down = bst_vec3_scale(position_m, -1.0);

@@ -36,7 +36,7 @@ struct bst_tdm {
 typedef struct metadata {
     char participant[PARTICIPANTS][80], ephemeris[PARTICIPANTS][256];
     bool has_system, radec, has_type, has_frame, eme2000, bad_frame, transmitted, applied;
-    bst_time_system system;
+    bst_astro_time_system system;
     int observer, object;                   /* numbers of participants, from 0 */
     double integration_s, integration_part; /* START: +1/2, END: -1/2, MIDDLE: 0 */
     double correction[KINDS];
@@ -132,7 +132,7 @@ static bst_status read_meta(reader *r) {
     } else if (numbered(name, "EPHEMERIS_NAME_", &index)) {
         bst_text_copy(rest, m->ephemeris[index], sizeof m->ephemeris[index]);
     } else if (bst_text_is(name, "TIME_SYSTEM")) {
-        m->has_system = bst_time_system_find(rest.text, rest.length, &m->system);
+        m->has_system = bst_astro_time_system_find(rest.text, rest.length, &m->system);
         return m->has_system
                    ? BST_OK
                    : fail(r, "the time system is not one that is read", "UTC, TAI, TT, TDB or GPS");

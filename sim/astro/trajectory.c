@@ -12,15 +12,15 @@
 /* All that changes, behind the mutex. */
 typedef struct core {
     mtx_t mutex;
-    bst_chain_context context;
-    bst_chain forward;
-    bst_chain *backward; /* NULL until it is wanted */
+    bst_trajectory_chain_context context;
+    bst_trajectory_chain forward;
+    bst_trajectory_chain *backward; /* NULL until it is wanted */
 } core;
 
 struct bst_trajectory {
     double at_s;
     bst_vec3 position_m, velocity_mps;
-    bst_edges edges;
+    bst_trajectory_edges edges;
     bst_radau radau;
     core *core;
 };
@@ -34,7 +34,7 @@ static bst_status check(bst_ctx *ctx, const bst_trajectory_options *o) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "the initial state of an orbit must be finite, its time within 1e10 s");
     }
-    double height = bst_height_m(o->position_m);
+    double height = bst_astro_height_m(o->position_m);
     if (!(height >= BST_TRAJECTORY_FLOOR_M)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "the initial state lies at a height of %.1f km, orbits end below %.0f km",
@@ -45,7 +45,7 @@ static bst_status check(bst_ctx *ctx, const bst_trajectory_options *o) {
                         o->tolerance);
     }
     for (int i = 0; i < o->burn_count; i++) {
-        const bst_thrust *b = &o->burns[i];
+        const bst_astro_thrust *b = &o->burns[i];
         if (!finite(b->dv_rtn_mps) || !(fabs(b->time_s) <= LAST_TIME_S) ||
             !(b->duration_s >= 0.0 && b->duration_s <= LAST_TIME_S)) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -73,7 +73,7 @@ bst_status bst_trajectory_create(bst_ctx *ctx, const bst_trajectory_options *o,
     t->position_m = o->position_m;
     t->velocity_mps = o->velocity_mps;
     bst_radau_init(&t->radau);
-    bst_status status = bst_edges_make(ctx, o->burns, o->burn_count, &t->edges);
+    bst_status status = bst_trajectory_edges_make(ctx, o->burns, o->burn_count, &t->edges);
     if (status == BST_OK) {
         status = bst_forces_create(ctx, &o->forces, o->epoch, &c->context.forces);
     }
@@ -84,7 +84,8 @@ bst_status bst_trajectory_create(bst_ctx *ctx, const bst_trajectory_options *o,
     c->context.radau = &t->radau;
     c->context.edges = &t->edges;
     c->context.tolerance = o->tolerance > 0.0 ? o->tolerance : DEFAULT_TOLERANCE;
-    bst_chain_start(&c->forward, &c->context, 1.0, o->at_s, o->position_m, o->velocity_mps);
+    bst_trajectory_chain_start(&c->forward, &c->context, 1.0, o->at_s, o->position_m,
+                               o->velocity_mps);
     *out = t;
     return BST_OK;
 }
@@ -93,7 +94,7 @@ void bst_trajectory_free(bst_trajectory *t) {
     if (t) {
         mtx_destroy(&t->core->mutex);
         bst_forces_free(t->core->context.forces);
-        bst_edges_free(&t->edges);
+        bst_trajectory_edges_free(&t->edges);
         free(t->core->backward);
         free(t->core);
         free(t);
@@ -107,7 +108,8 @@ static bst_status need_backward(bst_ctx *ctx, const bst_trajectory *t) {
         if (!c->backward) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a numerical orbit");
         }
-        bst_chain_start(c->backward, &c->context, -1.0, t->at_s, t->position_m, t->velocity_mps);
+        bst_trajectory_chain_start(c->backward, &c->context, -1.0, t->at_s, t->position_m,
+                                   t->velocity_mps);
     }
     return BST_OK;
 }
@@ -119,15 +121,15 @@ bst_status bst_trajectory_state(bst_ctx *ctx, const bst_trajectory *t, double se
     }
     core *c = t->core;
     (void)mtx_lock(&c->mutex);
-    bst_chain *chain = &c->forward;
+    bst_trajectory_chain *chain = &c->forward;
     bst_status status = BST_OK;
     if (seconds < t->at_s) {
         status = need_backward(ctx, t);
         chain = c->backward;
     }
-    const bst_chain_step *step = NULL;
+    const bst_trajectory_chain_step *step = NULL;
     if (status == BST_OK) {
-        status = bst_chain_find(ctx, chain, &c->context, seconds, &step);
+        status = bst_trajectory_chain_find(ctx, chain, &c->context, seconds, &step);
     }
     if (status == BST_OK) {
         double s = ((seconds - step->time_s) - step->time_low_s) / step->motion.h_s;

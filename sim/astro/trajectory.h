@@ -10,11 +10,11 @@
 /* A change of velocity along radius, transverse and normal (R along the position, N along position
  * x velocity, T = N x R). With duration_s = 0 an impulse, in the axes right before it; else a
  * constant acceleration dv / duration in axes that turn with the orbit, from time_s on. */
-typedef struct bst_thrust {
+typedef struct bst_astro_thrust {
     double time_s;
     double duration_s;
     bst_vec3 dv_rtn_mps;
-} bst_thrust;
+} bst_astro_thrust;
 
 /* An orbit that is integrated when it is asked for. To its users it never changes: the state at any
  * time is a pure function of time, equal to the bit whatever has been asked before, and threads may
@@ -29,7 +29,7 @@ typedef struct bst_trajectory_options {
     bst_time epoch;                    /* what seconds count from */
     double at_s;                       /* time of the initial state */
     bst_vec3 position_m, velocity_mps; /* GCRF, before a burn at that very time */
-    const bst_thrust *burns;           /* in any order, they may overlap; copied */
+    const bst_astro_thrust *burns;     /* in any order, they may overlap; copied */
     int burn_count;
     double tolerance; /* of a step, 1e-11 to 1e-3, see docs/equations.md; 0: 1e-9 */
 } bst_trajectory_options;

@@ -46,9 +46,9 @@ static bst_vec3 kick(const bst_radau_point *p, bst_vec3 dv_rtn) {
 }
 
 /* Crosses the edge that the chain stands at. */
-static bst_status cross_edge(bst_ctx *ctx, const bst_chain_context *context, double direction,
-                             bst_chain_point *p) {
-    const bst_edge *edge = &context->edges->items[p->edge];
+static bst_status cross_edge(bst_ctx *ctx, const bst_trajectory_chain_context *context,
+                             double direction, bst_trajectory_chain_point *p) {
+    const bst_trajectory_edge *edge = &context->edges->items[p->edge];
     const bst_vec3 *impulses = context->edges->impulses_rtn_mps + edge->first_impulse;
     for (int i = 0; i < edge->impulse_count; i++) {
         if (direction > 0.0) {
@@ -63,19 +63,21 @@ static bst_status cross_edge(bst_ctx *ctx, const bst_chain_context *context, dou
     return BST_OK;
 }
 
-static bool at_edge(const bst_chain_context *context, const bst_chain_point *p) {
+static bool at_edge(const bst_trajectory_chain_context *context,
+                    const bst_trajectory_chain_point *p) {
     return p->edge >= 0 && p->edge < context->edges->count &&
            context->edges->items[p->edge].time_s == p->time_s && p->time_low_s == 0.0;
 }
 
-static bst_vec3 thrust_now(const bst_chain_context *context, double direction,
-                           const bst_chain_point *p) {
+static bst_vec3 thrust_now(const bst_trajectory_chain_context *context, double direction,
+                           const bst_trajectory_chain_point *p) {
     int last = direction > 0.0 ? p->edge - 1 : p->edge; /* the last edge before the step */
     return last >= 0 && last < context->edges->count ? context->edges->items[last].thrust_rtn_mps2
                                                      : (bst_vec3){0.0, 0.0, 0.0};
 }
 
-static void end_chain(bst_chain *chain, double at_s, bst_status why, const char *message) {
+static void end_chain(bst_trajectory_chain *chain, double at_s, bst_status why,
+                      const char *message) {
     chain->ended = true;
     chain->end_s = at_s;
     chain->end_step = chain->here.step;
@@ -83,16 +85,17 @@ static void end_chain(bst_chain *chain, double at_s, bst_status why, const char 
     snprintf(chain->message, sizeof chain->message, "%.255s", message);
 }
 
-void bst_chain_start(bst_chain *chain, const bst_chain_context *context, double direction,
-                     double at_s, bst_vec3 position_m, bst_vec3 velocity_mps) {
+void bst_trajectory_chain_start(bst_trajectory_chain *chain,
+                                const bst_trajectory_chain_context *context, double direction,
+                                double at_s, bst_vec3 position_m, bst_vec3 velocity_mps) {
     memset(chain, 0, sizeof *chain);
     chain->direction = direction;
     chain->stride = BST_CHAIN_WINDOW / 2;
-    bst_chain_point *p = &chain->here;
+    bst_trajectory_chain_point *p = &chain->here;
     p->time_s = at_s;
     p->motion.position_m = position_m;
     p->motion.velocity_mps = velocity_mps;
-    const bst_edges *edges = context->edges;
+    const bst_trajectory_edges *edges = context->edges;
     while (p->edge < edges->count && edges->items[p->edge].time_s < at_s) {
         p->edge++;
     }
@@ -113,7 +116,7 @@ void bst_chain_start(bst_chain *chain, const bst_chain_context *context, double 
 /* What the force callback needs. */
 typedef struct step_forces {
     bst_ctx *ctx;
-    bst_chain_context *context;
+    bst_trajectory_chain_context *context;
     double time_s, time_low_s;
     bst_vec3 thrust_rtn;
 } step_forces;
@@ -142,7 +145,7 @@ static bool below_floor(const bst_radau_step *step, double s) {
     bst_vec3 r;
     bst_radau_state(step, s, &r, NULL);
     /* GCRF's pole for the Earth's own: 0.1 km at most */
-    return !(bst_height_m(r) >= BST_TRAJECTORY_FLOOR_M);
+    return !(bst_astro_height_m(r) >= BST_TRAJECTORY_FLOOR_M);
 }
 
 /* Where between s = low and high zone() leaves what it is at low, to EDGE_S, on the far side. */
@@ -198,7 +201,7 @@ static double floor_crossing(const step_forces *f, const bst_radau_step *step) {
 }
 
 /* Keeps way points at even distances in steps; when there is no more room every other one goes. */
-static void keep_way_point(bst_chain *chain) {
+static void keep_way_point(bst_trajectory_chain *chain) {
     if (chain->here.step != chain->way_count * chain->stride) {
         return;
     }
@@ -213,9 +216,10 @@ static void keep_way_point(bst_chain *chain) {
 }
 
 /* A step that the forces, the error and the shadow agree to. */
-static bst_status work_step(bst_ctx *ctx, bst_chain *chain, bst_chain_context *context,
-                            const bst_chain_point *p, bst_radau_step *step, double *next_h_s,
-                            bool *to_edge, double *floor_s) {
+static bst_status work_step(bst_ctx *ctx, bst_trajectory_chain *chain,
+                            bst_trajectory_chain_context *context,
+                            const bst_trajectory_chain_point *p, bst_radau_step *step,
+                            double *next_h_s, bool *to_edge, double *floor_s) {
     step_forces f = {ctx, context, p->time_s, p->time_low_s,
                      thrust_now(context, chain->direction, p)};
     double h = p->h_s, h_natural = 0.0; /* what the next step may try after a shadow's edge */
@@ -267,8 +271,9 @@ static bst_status work_step(bst_ctx *ctx, bst_chain *chain, bst_chain_context *c
 }
 
 /* Adds one step, or ends the chain. */
-static void extend(bst_ctx *ctx, bst_chain *chain, bst_chain_context *context) {
-    bst_chain_point *p = &chain->here;
+static void extend(bst_ctx *ctx, bst_trajectory_chain *chain,
+                   bst_trajectory_chain_context *context) {
+    bst_trajectory_chain_point *p = &chain->here;
     keep_way_point(chain);
     double next_h_s = 0.0, floor_s = 2.0;
     bool to_edge = false;
@@ -278,7 +283,7 @@ static void extend(bst_ctx *ctx, bst_chain *chain, bst_chain_context *context) {
         end_chain(chain, p->time_s, status, ctx->message);
         return;
     }
-    bst_chain_step *kept = &chain->window[p->step % BST_CHAIN_WINDOW];
+    bst_trajectory_chain_step *kept = &chain->window[p->step % BST_CHAIN_WINDOW];
     if (p->step - chain->first_kept == BST_CHAIN_WINDOW) {
         chain->first_kept++;
     }
@@ -319,13 +324,13 @@ static void extend(bst_ctx *ctx, bst_chain *chain, bst_chain_context *context) {
 
 /* Whether `seconds` lies before a point on the chain's way (at it: not, forward; yes, backward:
  * the state at a burn is the one after it). */
-static bool before(const bst_chain *chain, double seconds, double point_s) {
+static bool before(const bst_trajectory_chain *chain, double seconds, double point_s) {
     return chain->direction > 0.0 ? seconds < point_s : seconds >= point_s;
 }
 
 /* The latest point known from which `seconds` lies ahead. */
-static void stand_before(bst_chain *chain, double seconds) {
-    const bst_chain_point *best = NULL;
+static void stand_before(bst_trajectory_chain *chain, double seconds) {
+    const bst_trajectory_chain_point *best = NULL;
     for (int i = 0; i < chain->way_count; i++) {
         if (i == 0 || !before(chain, seconds, chain->way[i].time_s)) {
             best = &chain->way[i];
@@ -341,8 +346,9 @@ static void stand_before(bst_chain *chain, double seconds) {
     }
 }
 
-bst_status bst_chain_find(bst_ctx *ctx, bst_chain *chain, bst_chain_context *context,
-                          double seconds, const bst_chain_step **out) {
+bst_status bst_trajectory_chain_find(bst_ctx *ctx, bst_trajectory_chain *chain,
+                                     bst_trajectory_chain_context *context, double seconds,
+                                     const bst_trajectory_chain_step **out) {
     bool kept = chain->here.step > chain->first_kept &&
                 before(chain, seconds, chain->here.time_s) &&
                 !before(chain, seconds, chain->window[chain->first_kept % BST_CHAIN_WINDOW].time_s);

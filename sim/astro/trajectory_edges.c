@@ -4,25 +4,27 @@
 #include "sim/astro/trajectory_internal.h"
 
 static int by_time(const void *a, const void *b) {
-    double x = ((const bst_edge *)a)->time_s, y = ((const bst_edge *)b)->time_s;
+    double x = ((const bst_trajectory_edge *)a)->time_s,
+           y = ((const bst_trajectory_edge *)b)->time_s;
     return (x > y) - (x < y);
 }
 
 /* When a burn ends; its start for an impulse, also one too short for the clock to tell. */
-static double end_of(const bst_thrust *burn) {
+static double end_of(const bst_astro_thrust *burn) {
     return burn->time_s + burn->duration_s;
 }
 
-static bool is_impulse(const bst_thrust *burn) {
+static bool is_impulse(const bst_astro_thrust *burn) {
     return !(end_of(burn) > burn->time_s);
 }
 
-bst_status bst_edges_make(bst_ctx *ctx, const bst_thrust *burns, int count, bst_edges *out) {
-    *out = (bst_edges){NULL, 0, NULL};
+bst_status bst_trajectory_edges_make(bst_ctx *ctx, const bst_astro_thrust *burns, int count,
+                                     bst_trajectory_edges *out) {
+    *out = (bst_trajectory_edges){NULL, 0, NULL};
     out->items = calloc(2 * (size_t)count + 1, sizeof *out->items);
     out->impulses_rtn_mps = calloc((size_t)count + 1, sizeof *out->impulses_rtn_mps);
     if (!out->items || !out->impulses_rtn_mps) {
-        bst_edges_free(out);
+        bst_trajectory_edges_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d burns", count);
     }
     int n = 0;
@@ -39,10 +41,10 @@ bst_status bst_edges_make(bst_ctx *ctx, const bst_thrust *burns, int count, bst_
         if (out->count > 0 && out->items[out->count - 1].time_s == time) {
             continue;
         }
-        bst_edge *edge = &out->items[out->count++];
-        *edge = (bst_edge){.time_s = time, .first_impulse = impulses};
+        bst_trajectory_edge *edge = &out->items[out->count++];
+        *edge = (bst_trajectory_edge){.time_s = time, .first_impulse = impulses};
         for (int k = 0; k < count; k++) {
-            const bst_thrust *b = &burns[k];
+            const bst_astro_thrust *b = &burns[k];
             if (is_impulse(b) && b->time_s == time) {
                 out->impulses_rtn_mps[impulses++] = b->dv_rtn_mps;
             } else if (!is_impulse(b) && b->time_s <= time && time < end_of(b)) {
@@ -55,8 +57,8 @@ bst_status bst_edges_make(bst_ctx *ctx, const bst_thrust *burns, int count, bst_
     return BST_OK;
 }
 
-void bst_edges_free(bst_edges *edges) {
+void bst_trajectory_edges_free(bst_trajectory_edges *edges) {
     free(edges->items);
     free(edges->impulses_rtn_mps);
-    *edges = (bst_edges){NULL, 0, NULL};
+    *edges = (bst_trajectory_edges){NULL, 0, NULL};
 }

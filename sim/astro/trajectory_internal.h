@@ -8,45 +8,46 @@
 #include "sim/astro/trajectory.h"
 
 /* A time at which the acceleration or velocity jumps. */
-typedef struct bst_edge {
+typedef struct bst_trajectory_edge {
     double time_s;
     bst_vec3 thrust_rtn_mps2; /* from here to the next edge */
     int first_impulse, impulse_count;
-} bst_edge;
+} bst_trajectory_edge;
 
-typedef struct bst_edges {
-    bst_edge *items; /* by time */
+typedef struct bst_trajectory_edges {
+    bst_trajectory_edge *items; /* by time */
     int count;
     bst_vec3 *impulses_rtn_mps;
-} bst_edges;
+} bst_trajectory_edges;
 
-/* Sorts burns into edges; freed with bst_edges_free. */
-bst_status bst_edges_make(bst_ctx *ctx, const bst_thrust *burns, int count,
-                          bst_edges *out) BST_MUST_CHECK;
-void bst_edges_free(bst_edges *edges);
+/* Sorts burns into edges; freed with bst_trajectory_edges_free. */
+bst_status bst_trajectory_edges_make(bst_ctx *ctx, const bst_astro_thrust *burns, int count,
+                                     bst_trajectory_edges *out) BST_MUST_CHECK;
+void bst_trajectory_edges_free(bst_trajectory_edges *edges);
 
 enum { BST_CHAIN_WINDOW = 64, BST_CHAIN_WAY_POINTS = 32 };
 
 /* Where a chain of steps stands: all that its next step depends on. */
-typedef struct bst_chain_point {
+typedef struct bst_trajectory_chain_point {
     int64_t step; /* number of the step that begins here */
     double time_s, time_low_s;
     double h_s; /* length to try next */
     int edge;   /* forward: the next edge ahead; backward: the next one behind */
     bst_radau_point motion;
-} bst_chain_point;
+} bst_trajectory_chain_point;
 
-typedef struct bst_chain_step {
+typedef struct bst_trajectory_chain_step {
     double time_s, time_low_s, end_s;
     bst_radau_step motion;
-} bst_chain_step;
+} bst_trajectory_chain_step;
 
-typedef struct bst_chain {
+typedef struct bst_trajectory_chain {
     double direction; /* 1 or -1 */
-    bst_chain_point here, furthest;
-    bst_chain_step window[BST_CHAIN_WINDOW]; /* steps first_kept to here.step - 1, by number */
+    bst_trajectory_chain_point here, furthest;
+    bst_trajectory_chain_step
+        window[BST_CHAIN_WINDOW]; /* steps first_kept to here.step - 1, by number */
     int64_t first_kept;
-    bst_chain_point way[BST_CHAIN_WAY_POINTS]; /* at steps 0, stride, 2 stride, ... */
+    bst_trajectory_chain_point way[BST_CHAIN_WAY_POINTS]; /* at steps 0, stride, 2 stride, ... */
     int way_count;
     int64_t stride;
     bool ended; /* nothing beyond end_s, reached with step end_step */
@@ -54,20 +55,22 @@ typedef struct bst_chain {
     int64_t end_step;
     bst_status why;
     char message[256];
-} bst_chain;
+} bst_trajectory_chain;
 
-typedef struct bst_chain_context {
+typedef struct bst_trajectory_chain_context {
     bst_forces *forces;
     const bst_radau *radau;
-    const bst_edges *edges;
+    const bst_trajectory_edges *edges;
     double tolerance;
-} bst_chain_context;
+} bst_trajectory_chain_context;
 
-void bst_chain_start(bst_chain *chain, const bst_chain_context *context, double direction,
-                     double at_s, bst_vec3 position_m, bst_vec3 velocity_mps);
+void bst_trajectory_chain_start(bst_trajectory_chain *chain,
+                                const bst_trajectory_chain_context *context, double direction,
+                                double at_s, bst_vec3 position_m, bst_vec3 velocity_mps);
 /* The step that holds `seconds`, which lies in the chain's direction from its start. Errors as
  * bst_trajectory_state. */
-bst_status bst_chain_find(bst_ctx *ctx, bst_chain *chain, bst_chain_context *context,
-                          double seconds, const bst_chain_step **out) BST_MUST_CHECK;
+bst_status bst_trajectory_chain_find(bst_ctx *ctx, bst_trajectory_chain *chain,
+                                     bst_trajectory_chain_context *context, double seconds,
+                                     const bst_trajectory_chain_step **out) BST_MUST_CHECK;
 
 #endif

@@ -190,7 +190,7 @@ static bst_status run_frames(bst_ctx *ctx, bst_field *const *fields, bst_bench_c
             const bst_quat attitudes[2] = {q, q};
             const bst_los_track track = {2, times, attitudes};
             bst_truth truth;
-            const bst_source *sources;
+            const bst_scene_source *sources;
             int count;
             bst_bench_start(clock);
             BST_TRY(bst_field_query(ctx, fields[i], &track, (int64_t)f * RATE,
@@ -203,10 +203,10 @@ static bst_status run_frames(bst_ctx *ctx, bst_field *const *fields, bst_bench_c
 }
 
 /* Largest difference of an object's position from SGP4 at `seconds`, m. */
-static bst_status largest_difference(bst_ctx *ctx, const bst_world *world, bst_view *view,
+static bst_status largest_difference(bst_ctx *ctx, const bst_world *world, bst_world_view *view,
                                      const bst_elements *sets, double seconds, double *largest_m) {
-    bst_earth_frames frames;
-    BST_TRY(bst_view_earth_frames(ctx, view, seconds, &frames));
+    bst_astro_earth_frames frames;
+    BST_TRY(bst_world_view_earth_frames(ctx, view, seconds, &frames));
     int objects = bst_world_object_count(world), step = objects / CHECKED_OBJECTS + 1;
     for (int i = 0; i < objects; i += step) {
         const bst_elements *set = &sets[bst_world_object(world, i)->norad - 1];
@@ -218,8 +218,8 @@ static bst_status largest_difference(bst_ctx *ctx, const bst_world *world, bst_v
         double minutes = (bst_time_diff(bst_world_time(world, 0.0), epoch) + seconds) / 60.0;
         bst_sgp4_error error = bst_sgp4_propagate(sgp4, minutes, r_km, v_kmps);
         bst_sgp4_free(sgp4);
-        bst_state state;
-        bst_status status = bst_view_object_state(ctx, view, i, seconds, &state);
+        bst_world_state state;
+        bst_status status = bst_world_view_object_state(ctx, view, i, seconds, &state);
         if (error != BST_SGP4_OK || status == BST_ERR_NUMERIC) {
             continue; /* decayed */
         }
@@ -235,15 +235,15 @@ static bst_status largest_difference(bst_ctx *ctx, const bst_world *world, bst_v
  * orbits are interpolated. */
 static bst_status measure_error(bst_ctx *ctx, const bst_world *world, const bst_elements *sets,
                                 bst_bench_result *out) {
-    bst_view *view;
-    BST_TRY(bst_view_create(ctx, world, &view));
+    bst_world_view *view;
+    BST_TRY(bst_world_view_create(ctx, world, &view));
     double largest_m = 0.0;
     bst_status status = BST_OK;
     for (int k = 0; k < CHECKED_FRAMES && status == BST_OK; k++) {
         status = largest_difference(ctx, world, view, sets, 12345.678 * k, &largest_m);
     }
     out->error_px = 2.0 * largest_m / 1e4 / bst_camera_scale_rad(bst_world_camera(world, 0, 0));
-    bst_view_free(view);
+    bst_world_view_free(view);
     return status;
 }
 

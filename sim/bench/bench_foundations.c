@@ -22,7 +22,7 @@ bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_o
     if (options->tle_file) {
         snprintf(file, sizeof file, "%s", options->tle_file);
     } else {
-        bst_app_shipped_file("scenarios/catalogue_2022-06.tle", file, sizeof file);
+        bst_cli_shipped_file("scenarios/catalogue_2022-06.tle", file, sizeof file);
     }
     BST_TRY(bst_tle_load(ctx, file, &tle_options, &sets, &count));
     bst_sgp4 **models = calloc(SATELLITES, sizeof *models);
@@ -137,6 +137,6 @@ bst_status bst_bench_loop_obsgen(bst_ctx *ctx, const bst_bench *self,
     (void)self;
     const int hour_s = 3600, frames = 1800;
     char file[4096];
-    bst_app_shipped_file("scenarios/day_generator.json", file, sizeof file);
+    bst_cli_shipped_file("scenarios/day_generator.json", file, sizeof file);
     return run_in_parts(ctx, options, file, 86400.0, hour_s, frames, out);
 }

@@ -46,7 +46,7 @@ static bst_status time_scene(bst_ctx *ctx, void *user, void *out) {
 }
 
 static bst_status add(bst_ctx *ctx, const errand *e, const char *what, double size,
-                      bst_growth *growth) {
+                      bst_bench_growth_law *growth) {
     bst_bench_result r = bst_bench_nothing("growth");
     errand copy = *e;
     BST_TRY(bst_bench_apart(ctx, time_scene, &copy, &r, sizeof r));
@@ -62,7 +62,7 @@ static bst_status add(bst_ctx *ctx, const errand *e, const char *what, double si
 }
 
 /* Least squares of (offset + slope x) / y - 1. */
-void bst_growth_fit(bst_growth *g) {
+void bst_bench_growth_law_fit(bst_bench_growth_law *g) {
     double a = 0.0, b = 0.0, c = 0.0, u = 0.0, v = 0.0;
     for (int i = 0; i < g->count; i++) {
         double p = 1.0 / g->ms_min[i], q = g->size[i] * p;
@@ -82,8 +82,8 @@ void bst_growth_fit(bst_growth *g) {
     }
 }
 
-bst_status bst_bench_growth(bst_ctx *ctx, const bst_bench_options *options, bst_growth *stars,
-                            bst_growth *streak) {
+bst_status bst_bench_growth(bst_ctx *ctx, const bst_bench_options *options,
+                            bst_bench_growth_law *stars, bst_bench_growth_law *streak) {
     stars->count = streak->count = 0;
     printf("\n");
     for (size_t i = 0; i < sizeof star_counts / sizeof *star_counts; i++) {
@@ -94,7 +94,7 @@ bst_status bst_bench_growth(bst_ctx *ctx, const bst_bench_options *options, bst_
         errand e = {options, 1000, streak_lengths_px[i]};
         BST_TRY(add(ctx, &e, "px of streak", streak_lengths_px[i], streak));
     }
-    bst_growth_fit(stars);
-    bst_growth_fit(streak);
+    bst_bench_growth_law_fit(stars);
+    bst_bench_growth_law_fit(streak);
     return BST_OK;
 }

@@ -14,7 +14,7 @@ static const char PREFIX[] = "imgproc_", CROWDED[] = "imgproc_crowded";
 
 typedef struct shot {
     uint16_t *pixels;
-    bst_motion motion;
+    bst_camera_motion motion;
 } shot;
 
 typedef struct shots {
@@ -23,7 +23,7 @@ typedef struct shots {
 } shots;
 
 /* What perfect telemetry would say of the frame that was set last. */
-static bst_status motion_of(bst_ctx *ctx, const bst_bench_view *v, bst_motion *out) {
+static bst_status motion_of(bst_ctx *ctx, const bst_bench_view *v, bst_camera_motion *out) {
     int count = v->track.count;
     bst_pointing_telemetry *ring =
         calloc(1, sizeof *ring + (size_t)count * sizeof(bst_pointing_sample));
@@ -35,7 +35,7 @@ static bst_status motion_of(bst_ctx *ctx, const bst_bench_view *v, bst_motion *o
         ring->items[i].tick = i;
         ring->items[i].q_cam_from_gcrf = v->track.q_cam_from_gcrf[i];
     }
-    bool known = bst_motion_from_telemetry(ring, 0, count - 1, out);
+    bool known = bst_camera_motion_from_telemetry(ring, 0, count - 1, out);
     free(ring);
     return known ? BST_OK : bst_fail(ctx, BST_ERR_STATE, "a scene without attitudes");
 }

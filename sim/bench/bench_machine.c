@@ -77,7 +77,7 @@ cJSON *bst_bench_machine(const bst_bench_device *device) {
     cJSON_AddStringToObject(node, "device", device->description);
     cJSON_AddStringToObject(node, "driver", device->driver);
     cJSON_AddStringToObject(node, "version", bst_version());
-    cJSON_AddStringToObject(node, "git_revision", bst_git_revision());
+    cJSON_AddStringToObject(node, "git_revision", bst_version_git_revision());
     time_t now = time(NULL);
     struct tm utc;
     if (gmtime_r(&now, &utc) && strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc) > 0) {

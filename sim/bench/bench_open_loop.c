@@ -59,7 +59,7 @@ static bst_status one_run(bst_ctx *ctx, const bst_bench_options *options, const 
     snprintf(duration, sizeof duration, "%d", seconds);
     snprintf(threads, sizeof threads, "%d", options->threads);
     char file[4096];
-    bst_app_shipped_file("scenarios/neossat_geo_rate_open.json", file, sizeof file);
+    bst_cli_shipped_file("scenarios/neossat_geo_rate_open.json", file, sizeof file);
     const char *arguments[16] = {"boresight",   "run",     file,         "--out", folder,
                                  "--overwrite", "--quiet", "--duration", duration};
     int n = 9;

@@ -28,7 +28,7 @@ bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
     (void)options;
     static const int rounds = 5;
     bst_gravity *field = NULL;
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     bst_bench_clock clock = {.count = 0};
     bst_vec3 places[STATES], finer[STATES];
     bst_trajectory_options orbit = {.position_m = {0.0, 7e6, 0.0},
@@ -36,7 +36,7 @@ bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
     bst_status status =
         bst_gravity_builtin(ctx, BST_GRAVITY_BUILTIN_DEGREE, BST_GRAVITY_BUILTIN_DEGREE, &field);
     if (status == BST_OK) {
-        status = bst_eop_builtin(ctx, &eop);
+        status = bst_astro_eop_builtin(ctx, &eop);
     }
     if (status == BST_OK) {
         status = bst_time_from_utc(ctx, "2022-06-16T22:10:00Z", &orbit.epoch);
@@ -64,7 +64,7 @@ bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
         }
         bst_bench_summarise(&clock, out);
     }
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
     bst_gravity_free(field);
     return status;
 }

@@ -27,13 +27,13 @@ bst_status bst_bench_plant_second_order(bst_ctx *ctx, const bst_bench *self,
                                         const bst_bench_options *options, bst_bench_result *out) {
     (void)self;
     (void)options;
-    bst_two_axis_config config;
+    bst_mount_two_axis_config config;
     BST_TRY(bst_config_defaults(ctx, bst_two_axis_config_table, &config));
     config.platform = demo_platform(config.platform);
-    bst_two_axis plant;
-    bst_two_axis_keys keys = {{{1, 2}}, {{3, 4}}, {{5, 6}}};
-    BST_TRY(bst_two_axis_init(ctx, &plant, &config, BST_QUAT_IDENTITY, 3.0 * BST_ARCSEC_RAD,
-                              PLANT_DT, &keys));
+    bst_mount_two_axis plant;
+    bst_mount_two_axis_keys keys = {{{1, 2}}, {{3, 4}}, {{5, 6}}};
+    BST_TRY(bst_mount_two_axis_init(ctx, &plant, &config, BST_QUAT_IDENTITY, 3.0 * BST_ARCSEC_RAD,
+                                    PLANT_DT, &keys));
     bst_bench_clock clock = {.count = 0};
     bst_los_command command = command_at(0.0);
     double commanded = 0.0, sum = 0.0;
@@ -45,7 +45,7 @@ bst_status bst_bench_plant_second_order(bst_ctx *ctx, const bst_bench *self,
                 command = command_at(t);
                 commanded = t;
             }
-            bst_two_axis_step(&plant, &command, t - commanded, i % TELEMETRY_STEPS == 0);
+            bst_mount_two_axis_step(&plant, &command, t - commanded, i % TELEMETRY_STEPS == 0);
             sum += plant.q_cam_from_gcrf.x;
         }
         bst_bench_stop(&clock, PLANT_STEPS);

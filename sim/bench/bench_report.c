@@ -24,12 +24,12 @@ static const struct knob {
 };
 enum { KNOBS = sizeof knobs / sizeof *knobs };
 
-void bst_curve_mark_best(bst_curve *curve) {
+void bst_bench_error_curve_mark_best(bst_bench_error_curve *curve) {
     for (int i = 0; i < curve->count; i++) {
-        bst_curve_point *p = &curve->points[i];
+        bst_bench_error_curve_point *p = &curve->points[i];
         p->best = true;
         for (int k = 0; k < curve->count; k++) {
-            const bst_curve_point *q = &curve->points[k];
+            const bst_bench_error_curve_point *q = &curve->points[k];
             bool as_good = q->ms_min <= p->ms_min && q->error_sigma_max <= p->error_sigma_max;
             bool better = q->ms_min < p->ms_min || q->error_sigma_max < p->error_sigma_max;
             p->best &= !(as_good && better);
@@ -37,7 +37,7 @@ void bst_curve_mark_best(bst_curve *curve) {
     }
 }
 
-static bool has_knob(const bst_curve *curve, const char *knob) {
+static bool has_knob(const bst_bench_error_curve *curve, const char *knob) {
     for (int i = 0; i < curve->count; i++) {
         if (strcmp(curve->points[i].knob, knob) == 0) {
             return true;
@@ -61,11 +61,11 @@ static bst_status plot_knob(bst_ctx *ctx, const bst_bench_report *r, const char 
     BST_TRY(bst_plot_begin(ctx, &plot, path, WIDTH, HEIGHT));
     FILE *f = plot.script;
     for (int c = 0; c < r->curve_count; c++) {
-        const bst_curve *curve = &r->curves[c];
+        const bst_bench_error_curve *curve = &r->curves[c];
         for (int best = 0; best < 2; best++) {
             fprintf(f, "$%s%d << EOD\n", best ? "best" : "all", c);
             for (int i = 0; i < curve->count; i++) {
-                const bst_curve_point *p = &curve->points[i];
+                const bst_bench_error_curve_point *p = &curve->points[i];
                 if (strcmp(p->knob, knob) == 0 && (!best || p->best)) {
                     fprintf(f, "%.4g %.4g \"%s\"\n", p->ms_min, fmax(p->error_sigma_max, 1e-6),
                             p->value);
@@ -94,7 +94,7 @@ static bst_status plot_knob(bst_ctx *ctx, const bst_bench_report *r, const char 
     return bst_plot_end(ctx, &plot, made);
 }
 
-static bst_status plot_growth(bst_ctx *ctx, const bst_growth *g, const char *title,
+static bst_status plot_growth(bst_ctx *ctx, const bst_bench_growth_law *g, const char *title,
                               const char *path, bool *made) {
     bst_plot plot;
     BST_TRY(bst_plot_begin(ctx, &plot, path, WIDTH, HEIGHT));
@@ -150,7 +150,7 @@ static void write_knob(FILE *f, const bst_bench_report *r, const struct knob *k,
             "flux error | |\n|---|---|---|---|---|---|---|---|---|\n");
     for (int c = 0; c < r->curve_count; c++) {
         for (int i = 0; i < r->curves[c].count; i++) {
-            const bst_curve_point *p = &r->curves[c].points[i];
+            const bst_bench_error_curve_point *p = &r->curves[c].points[i];
             if (strcmp(p->knob, k->name) != 0) {
                 continue;
             }
@@ -192,8 +192,8 @@ static void write_factors(FILE *f, const bst_bench_report *r) {
     fputc('\n', f);
 }
 
-static void write_growth(FILE *f, const bst_growth *g, const char *title, const char *what,
-                         const char *image, bool picture) {
+static void write_growth(FILE *f, const bst_bench_growth_law *g, const char *title,
+                         const char *what, const char *image, bool picture) {
     fprintf(f, "### %s\n\n", title);
     if (picture) {
         fprintf(f, "![%s](images/%s)\n\n", title, image);
@@ -249,7 +249,7 @@ static bst_status write_text(bst_ctx *ctx, const bst_bench_report *r, const cJSO
     while (bytes > 1 && text[bytes - 1] == '\n' && text[bytes - 2] == '\n') {
         bytes--;
     }
-    bst_status status = bst_write_file_atomic(ctx, path, text, bytes);
+    bst_status status = bst_io_write_file_atomic(ctx, path, text, bytes);
     free(text);
     return status;
 }

@@ -158,9 +158,9 @@ static void move(bst_bench_view *v, int frame) {
     }
 }
 
-static bst_source place(const bst_camera *camera, int kind, double x, double y, double rate) {
+static bst_scene_source place(const bst_camera *camera, int kind, double x, double y, double rate) {
     bst_vec3 v = bst_camera_unproject(camera, x, y);
-    return (bst_source){.kind = kind, .apparent_mid = v, .electrons_per_s = rate};
+    return (bst_scene_source){.kind = kind, .apparent_mid = v, .electrons_per_s = rate};
 }
 
 static void make_stars(bst_bench_view *v) {
@@ -189,9 +189,9 @@ static void place_targets(bst_bench_view *v, int frame) {
             xy[a] = 0.5 * s->side +
                     field * (bst_rng_uniform(key, (uint64_t)n, (uint64_t)(2 * i + a)) - 0.5);
         }
-        bst_source *t = &v->sources[s->stars + i];
+        bst_scene_source *t = &v->sources[s->stars + i];
         *t = place(&v->camera, BST_SOURCE_OBJECT, xy[0], xy[1], 2000.0);
-        v->paths[i] = bst_source_path_through(
+        v->paths[i] = bst_scene_source_path_through(
             bst_camera_unproject(&v->camera, xy[0] + half, xy[1] + half), t->apparent_mid,
             bst_camera_unproject(&v->camera, xy[0] - half, xy[1] - half));
         t->path = &v->paths[i];
@@ -244,8 +244,8 @@ void bst_bench_view_set(bst_bench_view *v, int frame) {
 /* What differs between the frames of a view, made before the clock runs. */
 typedef struct pose {
     bst_quat *q;
-    bst_source targets[BST_BENCH_TARGETS];
-    bst_source_path paths[BST_BENCH_TARGETS];
+    bst_scene_source targets[BST_BENCH_TARGETS];
+    bst_scene_source_path paths[BST_BENCH_TARGETS];
     bst_render_request request;
 } pose;
 

@@ -35,9 +35,9 @@ typedef struct bst_bench_view {
     bst_bench_scene scene;
     bst_camera camera;
     bst_window window;
-    bst_source *sources; /* targets last */
+    bst_scene_source *sources; /* targets last */
     int count;
-    bst_source_path paths[BST_BENCH_TARGETS];
+    bst_scene_source_path paths[BST_BENCH_TARGETS];
     double *time_s;
     bst_quat *q;
     bst_los_track track;
@@ -60,7 +60,7 @@ bst_status bst_bench_view_time(bst_ctx *ctx, bst_renderer *renderer, bst_bench_v
  * comparisons. */
 typedef struct bst_bench_truth {
     bst_bench_view *view;
-    bst_source *sources; /* chosen */
+    bst_scene_source *sources; /* chosen */
     int count;
     double *image; /* [height][width] of the window */
     struct bst_bench_moment {

@@ -64,8 +64,8 @@ static bst_status make_rows(bst_ctx *ctx, const bst_study *study, const bst_stud
     bst_shard_worker worker = {.study = study, .kind = kind, .out = folder, .place = {1, ""}};
     bst_status status = BST_OK;
     for (int64_t first = 0; first < RUNS && status == BST_OK; first += SHARD) {
-        const bst_shard_job job = {.first = first, .count = SHARD};
-        bst_shard_news news;
+        const bst_study_shard_job job = {.first = first, .count = SHARD};
+        bst_study_shard_news news;
         status = bst_shard_execute(ctx, &worker, &job, NULL, NULL, &news);
     }
     bst_shard_worker_close(&worker);
@@ -76,7 +76,7 @@ static bst_status measure(bst_ctx *ctx, const char *folder, const char *file,
                           bst_bench_result *out) {
     bst_study study;
     bst_results results;
-    bst_study_kind kind = bst_app_study_loop;
+    bst_study_kind kind = bst_study_loop_kind;
     kind.run = run_nothing;
     kind.series_count = 0;
     double started = bst_wall_seconds();
@@ -126,7 +126,7 @@ bst_status bst_bench_study(bst_ctx *ctx, const bst_bench *self, const bst_bench_
                             : bst_fail(ctx, BST_ERR_IO, "%s: %s", path, strerror(errno));
     snprintf(path, sizeof path, "%s/bench.json", folder);
     if (status == BST_OK) {
-        status = bst_write_file_atomic(ctx, path, text, strlen(text));
+        status = bst_io_write_file_atomic(ctx, path, text, strlen(text));
     }
     if (status == BST_OK) {
         status = measure(ctx, folder, path, out);

@@ -8,15 +8,15 @@
 #define REACH_SIGMAS 9.5
 
 static int compare_rates(const void *a, const void *b) {
-    double p = ((const bst_source *)a)->electrons_per_s,
-           q = ((const bst_source *)b)->electrons_per_s;
+    double p = ((const bst_scene_source *)a)->electrons_per_s,
+           q = ((const bst_scene_source *)b)->electrons_per_s;
     return (p < q) - (p > q);
 }
 
 /* Targets, the brightest stars and an even choice of the others. */
 static bst_status choose_sources(bst_ctx *ctx, const bst_bench_view *v, bst_bench_truth *t) {
     int stars = v->scene.stars, want = v->scene.error_sources, brightest = want / 8 + 1;
-    bst_source *sorted = malloc((size_t)v->count * sizeof *sorted);
+    bst_scene_source *sorted = malloc((size_t)v->count * sizeof *sorted);
     t->sources = malloc((size_t)v->count * sizeof *t->sources);
     if (!sorted || !t->sources) {
         free(sorted);
@@ -38,14 +38,15 @@ static bst_status choose_sources(bst_ctx *ctx, const bst_bench_view *v, bst_benc
 
 /* Pixels that a source's light touches in the exposure, clipped to the window; false when it
  * touches none. *inside: no clipping was needed. */
-static bool box_of(const bst_bench_view *v, const bst_source *s, bst_window *box, bool *inside) {
+static bool box_of(const bst_bench_view *v, const bst_scene_source *s, bst_window *box,
+                   bool *inside) {
     double x0 = INFINITY, y0 = INFINITY, x1 = -INFINITY, y1 = -INFINITY;
     double reach = REACH_SIGMAS * bst_camera_psf_sigma_px(&v->camera) + 3.0;
     bst_window w = v->window;
     for (int k = 0; k < v->track.count; k++) {
         double x, y, u = v->time_s[k] / v->time_s[v->track.count - 1];
-        if (bst_camera_project(&v->camera, bst_quat_rotate(v->q[k], bst_source_direction(s, u)), &x,
-                               &y)) {
+        if (bst_camera_project(
+                &v->camera, bst_quat_rotate(v->q[k], bst_scene_source_direction(s, u)), &x, &y)) {
             x0 = fmin(x0, x);
             x1 = fmax(x1, x);
             y0 = fmin(y0, y);
@@ -171,7 +172,7 @@ bst_status bst_bench_truth_compare(bst_ctx *ctx, bst_renderer *renderer, const b
     const bst_bench_view *v = t->view;
     size_t pixels = (size_t)v->window.width * (size_t)v->window.height;
     float *image = malloc(pixels * sizeof *image);
-    bst_source *drawn = malloc((size_t)(t->count + 1) * sizeof *drawn);
+    bst_scene_source *drawn = malloc((size_t)(t->count + 1) * sizeof *drawn);
     if (!image || !drawn) {
         free(image);
         free(drawn);

@@ -61,7 +61,7 @@ static bst_status measure(bst_ctx *ctx, sweep *s, const bst_renderer_options *op
     return status;
 }
 
-static bst_status add_point(bst_ctx *ctx, sweep *s, bst_curve *curve, const char *knob,
+static bst_status add_point(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve, const char *knob,
                             const char *value, const bst_renderer_options *options,
                             double faintest_e_per_s) {
     bst_bench_result r;
@@ -69,13 +69,13 @@ static bst_status add_point(bst_ctx *ctx, sweep *s, bst_curve *curve, const char
         return bst_fail(ctx, BST_ERR_STATE, "more than %d points in a curve", BST_CURVE_POINTS);
     }
     BST_TRY(measure(ctx, s, options, faintest_e_per_s, &r));
-    bst_curve_point *p = &curve->points[curve->count++];
-    *p = (bst_curve_point){.ms_min = r.ms_min,
-                           .ms_median = r.ms_median,
-                           .cpu_ms = r.cpu_ms,
-                           .error_sigma_max = r.error_sigma_max,
-                           .predicted_sigma = r.predicted_error_sigma,
-                           .flux_error_rel = r.flux_error_rel};
+    bst_bench_error_curve_point *p = &curve->points[curve->count++];
+    *p = (bst_bench_error_curve_point){.ms_min = r.ms_min,
+                                       .ms_median = r.ms_median,
+                                       .cpu_ms = r.cpu_ms,
+                                       .error_sigma_max = r.error_sigma_max,
+                                       .predicted_sigma = r.predicted_error_sigma,
+                                       .flux_error_rel = r.flux_error_rel};
     snprintf(p->knob, sizeof p->knob, "%s", knob);
     snprintf(p->value, sizeof p->value, "%s", value);
     printf("%-26s %-20s %-14s %9.2f ms %10.5f sigma\n", s->name, knob, value, p->ms_min,
@@ -85,7 +85,7 @@ static bst_status add_point(bst_ctx *ctx, sweep *s, bst_curve *curve, const char
 }
 
 /* Numbers to put into one of the renderer's options. */
-static bst_status vary_int(bst_ctx *ctx, sweep *s, bst_curve *curve, const char *knob,
+static bst_status vary_int(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve, const char *knob,
                            size_t offset, const int *values) {
     for (; *values > 0; values++) {
         bst_renderer_options options = bst_renderer_default_options();
@@ -98,7 +98,7 @@ static bst_status vary_int(bst_ctx *ctx, sweep *s, bst_curve *curve, const char 
     return BST_OK;
 }
 
-static bst_status vary_tolerance(bst_ctx *ctx, sweep *s, bst_curve *curve) {
+static bst_status vary_tolerance(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve) {
     static const double values[] = {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         bst_renderer_options options = bst_renderer_default_options();
@@ -110,12 +110,12 @@ static bst_status vary_tolerance(bst_ctx *ctx, sweep *s, bst_curve *curve) {
     return BST_OK;
 }
 
-static bst_status vary_motion(bst_ctx *ctx, sweep *s, bst_curve *curve) {
+static bst_status vary_motion(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve) {
     static const char *const names[] = {"auto", "single_kernel", "multi_kernel"};
     for (int i = 0; i < 3; i++) {
         bst_renderer_options options = bst_renderer_default_options();
         options.tolerance_sigma = s->view.scene.tolerance_sigma;
-        options.motion = (bst_star_motion)i;
+        options.motion = (bst_smear_star_motion)i;
         BST_TRY(add_point(ctx, s, curve, "renderer", names[i], &options, 0.0));
     }
     return BST_OK;
@@ -134,7 +134,7 @@ static void drop_faint(bst_bench_view *v, double faintest_e_per_s) {
 }
 
 /* Last of all: the stars that are timed grow fewer. */
-static bst_status vary_faint_limit(bst_ctx *ctx, sweep *s, bst_curve *curve) {
+static bst_status vary_faint_limit(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve) {
     double brightest = 0.0;
     for (int i = 0; i < s->view.scene.stars; i++) {
         brightest = fmax(brightest, s->view.sources[i].electrons_per_s);
@@ -151,7 +151,7 @@ static bst_status vary_faint_limit(bst_ctx *ctx, sweep *s, bst_curve *curve) {
     return BST_OK;
 }
 
-static bst_status vary_all(bst_ctx *ctx, sweep *s, bst_curve *curve) {
+static bst_status vary_all(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve) {
     static const int temporal[] = {15, 51, 151, 501, 1501, 0}, spatial[] = {1, 3, 5, 11, 33, 99, 0},
                      stamp[] = {1, 2, 3, 4, 5, 6, 0}, degree[] = {1, 3, 5, 7, 9, 0},
                      taps[] = {4, 6, 8, 0};
@@ -184,7 +184,7 @@ typedef struct errand {
 
 static bst_status make_curve(bst_ctx *ctx, void *user, void *out) {
     const errand *e = user;
-    bst_curve *curve = out;
+    bst_bench_error_curve *curve = out;
     sweep s;
     bst_status status = sweep_open(ctx, e->options, e->name, &s);
     curve->count = 0;
@@ -193,13 +193,13 @@ static bst_status make_curve(bst_ctx *ctx, void *user, void *out) {
         status = vary_all(ctx, &s, curve);
     }
     sweep_close(&s);
-    bst_curve_mark_best(curve);
+    bst_bench_error_curve_mark_best(curve);
     return status;
 }
 
 static bst_status make_factors(bst_ctx *ctx, void *user, void *out) {
     const errand *e = user;
-    bst_factor_column *column = out;
+    bst_bench_factor_column *column = out;
     sweep s;
     bst_status status = sweep_open(ctx, e->options, e->name, &s);
     snprintf(column->scene, sizeof column->scene, "%s", e->name);

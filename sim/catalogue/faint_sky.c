@@ -27,7 +27,7 @@ faint_cell bst_faint_cell(const bst_faint_sky *sky, int band, uint32_t cell) {
 }
 
 int bst_faint_zone(bst_vec3 icrs) {
-    bst_vec3 g = bst_galactic_from_icrs(icrs);
+    bst_vec3 g = bst_catalogue_galactic_from_icrs(icrs);
     int band = (int)(0.5 * (g.z + 1.0) * FAINT_ZONE_BANDS);
     int sector = (int)((atan2(g.y, g.x) / (2.0 * BST_PI) + 0.5) * FAINT_ZONE_SECTORS);
     band = band < 0 ? 0 : band >= FAINT_ZONE_BANDS ? FAINT_ZONE_BANDS - 1 : band;
@@ -96,7 +96,7 @@ static void expect_zone(const bst_faint_sky *sky, int zone, double *expected) {
             2.0 * BST_PI *
             ((zone % FAINT_ZONE_SECTORS + (i % SIDE + 0.5) / SIDE) / FAINT_ZONE_SECTORS - 0.5);
         double s = sqrt(1.0 - z * z);
-        bst_vec3 at = bst_icrs_from_galactic((bst_vec3){s * cos(l), s * sin(l), z});
+        bst_vec3 at = bst_catalogue_icrs_from_galactic((bst_vec3){s * cos(l), s * sin(l), z});
         expect(at, area, sky->complete_to_v, expected);
     }
 }

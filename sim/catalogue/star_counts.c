@@ -12,18 +12,18 @@ static const bst_vec3 galactic_axes[3] = {
     {0.4941094278755837, -0.4448296299600112, 0.7469822444972189},
     {-0.8676661490190047, -0.1980763734312015, 0.4559837761750669}};
 
-bst_vec3 bst_galactic_from_icrs(bst_vec3 v) {
+bst_vec3 bst_catalogue_galactic_from_icrs(bst_vec3 v) {
     return (bst_vec3){bst_vec3_dot(galactic_axes[0], v), bst_vec3_dot(galactic_axes[1], v),
                       bst_vec3_dot(galactic_axes[2], v)};
 }
 
-bst_vec3 bst_icrs_from_galactic(bst_vec3 v) {
+bst_vec3 bst_catalogue_icrs_from_galactic(bst_vec3 v) {
     bst_vec3 sum = bst_vec3_scale(galactic_axes[0], v.x);
     return bst_vec3_axpy(bst_vec3_axpy(sum, v.y, galactic_axes[1]), v.z, galactic_axes[2]);
 }
 
 void bst_star_counts_at(bst_vec3 icrs, bst_star_counts *out) {
-    bst_vec3 g = bst_galactic_from_icrs(icrs);
+    bst_vec3 g = bst_catalogue_galactic_from_icrs(icrs);
     double b = fmin(atan2(fabs(g.z), hypot(g.x, g.y)) / BST_DEG_RAD, 90.0);
     double l = atan2(fabs(g.y), g.x) / BST_DEG_RAD; /* |l|, 0 to 180 */
     int i = 0;

@@ -16,8 +16,8 @@ typedef struct bst_star_counts {
 
 /* ICRS unit vector to galactic axes: x to the galactic centre, z to the north galactic pole (ESA
  * SP-1200, The Hipparcos and Tycho Catalogues, 1997, vol. 1, eq. 1.5.11). */
-bst_vec3 bst_galactic_from_icrs(bst_vec3 icrs);
-bst_vec3 bst_icrs_from_galactic(bst_vec3 galactic);
+bst_vec3 bst_catalogue_galactic_from_icrs(bst_vec3 icrs);
+bst_vec3 bst_catalogue_icrs_from_galactic(bst_vec3 galactic);
 
 /* The counts towards `icrs` (unit): bilinear in |b| and |l| between the table's nodes.
  * From V 15 on the mean over longitude is the counts by latitude of Allen's Astrophysical

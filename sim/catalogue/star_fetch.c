@@ -110,10 +110,10 @@ static bst_status run_apt(bst_ctx *ctx, const char *folder, const char *const co
     BST_TRY(join(ctx, conf, folder, "apt/apt.conf"));
     BST_TRY(join(ctx, log, folder, "apt/messages.txt"));
     const char *argv[8] = {"apt-get", "-q", "-c", conf, command[0], command[1], command[2], NULL};
-    bst_child child;
-    BST_TRY(bst_child_start(ctx, argv, folder, false, log, &child));
+    bst_subprocess child;
+    BST_TRY(bst_subprocess_start(ctx, argv, folder, false, log, &child));
     int code = 0;
-    while (!bst_child_poll(&child, &code)) {
+    while (!bst_subprocess_poll(&child, &code)) {
         struct stat st;
         if (progress) {
             bool is_there = watched && stat(watched, &st) == 0;

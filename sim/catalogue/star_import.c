@@ -326,11 +326,11 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
     close(fd);
     const char *argv[] = {"tar",         "-xJf",         tarball_path,  "--to-stdout",
                           "--wildcards", "*suppl_1.dat", "*tyc2.dat.*", NULL};
-    bst_child tar;
-    BST_TRY(bst_child_start(ctx, argv, NULL, true, NULL, &tar));
+    bst_subprocess tar;
+    BST_TRY(bst_subprocess_start(ctx, argv, NULL, true, NULL, &tar));
     import_list list = {0};
     bst_status status = read_rows(ctx, tar.output, options, &list);
-    int code = bst_child_wait(&tar);
+    int code = bst_subprocess_wait(&tar);
     /* A reader that stops early ends tar by a closed pipe: then its own message counts. */
     if (code != 0 && (status == BST_OK || list.count == 0)) {
         status = bst_fail(ctx, BST_ERR_FORMAT,

@@ -13,6 +13,6 @@ enum {
 };
 
 /* Log sink that writes to standard error: "boresight: warning: ...". */
-void bst_app_log(void *user, bst_log_level level, const char *message);
+void bst_cli_log(void *user, bst_log_level level, const char *message);
 
 #endif

@@ -2,7 +2,7 @@
 
 #include "sim/cli/cli.h"
 
-void bst_app_log(void *user, bst_log_level level, const char *message) {
+void bst_cli_log(void *user, bst_log_level level, const char *message) {
     (void)user;
     static const char *const names[] = {"error", "warning", "info", "debug"};
     if (level == BST_LOG_INFO) {

@@ -130,8 +130,8 @@ static bst_status check_owner(bst_ctx *ctx, const output *o) {
     if (o->option->path == BST_PATH_OUTPUT_FOLDER) {
         return BST_OK;
     }
-    bool run = bst_run_owns(o->name) && bst_folder_is_run(o->folder);
-    bool study = bst_study_owns(o->name) && bst_folder_is_study(o->folder);
+    bool run = bst_run_owns(o->name) && bst_io_folder_is_run(o->folder);
+    bool study = bst_io_study_owns(o->name) && bst_io_folder_is_study(o->folder);
     return !run && !study
                ? BST_OK
                : bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -155,7 +155,7 @@ static bst_status spare_folder(bst_ctx *ctx, const output *o, const char *folder
     bst_status status = BST_OK;
     for (struct dirent *entry; dir && status == BST_OK && (entry = readdir(dir)) != NULL;) {
         struct stat info;
-        if ((bst_run_owns(entry->d_name) || bst_study_owns(entry->d_name)) &&
+        if ((bst_run_owns(entry->d_name) || bst_io_study_owns(entry->d_name)) &&
             fstatat(dirfd(dir), entry->d_name, &info, 0) == 0 && same(&info, &o->there)) {
             status =
                 bst_fail(ctx, BST_ERR_ARGUMENT,

@@ -34,13 +34,13 @@ bst_status bst_plugins_refuse(bst_ctx *ctx) {
                : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for --no-plugins");
 }
 
-static bst_plugin_policy policy_of_environment(void) {
+static bst_scenario_plugin_policy policy_of_environment(void) {
     const char *refused = getenv(BST_NO_PLUGINS_VARIABLE);
     return refused && *refused ? BST_PLUGINS_REFUSE : BST_PLUGINS_LOAD;
 }
 
 static bst_status append(bst_ctx *ctx, const char *path, const bst_module_desc *module,
-                         bst_registry *registry) {
+                         bst_scenario_registry *registry) {
     for (int i = 0; i < registry->count; i++) {
         const bst_module_desc *other = registry->modules[i];
         if (strcmp(other->role, module->role) == 0 && strcmp(other->type, module->type) == 0) {
@@ -60,7 +60,7 @@ static bst_status append(bst_ctx *ctx, const char *path, const bst_module_desc *
     return BST_OK;
 }
 
-static bst_status load(bst_ctx *ctx, const char *path, bst_registry *registry) {
+static bst_status load(bst_ctx *ctx, const char *path, bst_scenario_registry *registry) {
     bst_plugin plugin;
     BST_TRY(bst_plugin_open(ctx, path, &plugin));
     for (int i = 0; plugin.modules && plugin.modules[i]; i++) {
@@ -76,7 +76,7 @@ static bst_status load(bst_ctx *ctx, const char *path, bst_registry *registry) {
     return BST_OK;
 }
 
-static bst_status load_all(bst_ctx *ctx, const char *paths, bst_registry *registry) {
+static bst_status load_all(bst_ctx *ctx, const char *paths, bst_scenario_registry *registry) {
     while (*paths) {
         size_t length = strcspn(paths, ":");
         char path[PATH_BYTES];
@@ -94,16 +94,16 @@ static bst_status load_all(bst_ctx *ctx, const char *paths, bst_registry *regist
     return BST_OK;
 }
 
-bst_status bst_plugins_registry(bst_ctx *ctx, bst_registry *out) {
-    const bst_registry *own = bst_app_registry();
+bst_status bst_plugins_registry(bst_ctx *ctx, bst_scenario_registry *out) {
+    const bst_scenario_registry *own = bst_registry_shipped();
     const char *paths = getenv(BST_PLUGINS_VARIABLE);
-    *out = (bst_registry){.modules = NULL};
+    *out = (bst_scenario_registry){.modules = NULL};
     const bst_module_desc **list = calloc((size_t)own->count, sizeof *list);
     if (!list) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d modules", own->count);
     }
     memcpy(list, own->modules, (size_t)own->count * sizeof *list);
-    *out = (bst_registry){.modules = list, .count = own->count};
+    *out = (bst_scenario_registry){.modules = list, .count = own->count};
     bst_status status = load_all(ctx, paths ? paths : "", out);
     if (status != BST_OK) {
         bst_plugins_free(out);
@@ -111,15 +111,15 @@ bst_status bst_plugins_registry(bst_ctx *ctx, bst_registry *out) {
     return status;
 }
 
-void bst_plugins_free(bst_registry *registry) {
+void bst_plugins_free(bst_scenario_registry *registry) {
     free((void *)(uintptr_t)registry->modules);
     free((void *)(uintptr_t)registry->plugins);
-    *registry = (bst_registry){.modules = NULL};
+    *registry = (bst_scenario_registry){.modules = NULL};
 }
 
-static bst_status read_with(bst_ctx *ctx, const bst_json *json, bst_plugin_policy policy,
+static bst_status read_with(bst_ctx *ctx, const bst_json *json, bst_scenario_plugin_policy policy,
                             bst_scenario *out) {
-    bst_registry registry;
+    bst_scenario_registry registry;
     *out = (bst_scenario){.format = 0}; /* may be freed after a failure */
     BST_TRY(bst_plugins_registry(ctx, &registry));
     registry.policy = policy;
@@ -142,7 +142,7 @@ void bst_plugins_tell(const bst_scenario *scenario, cJSON *to) {
     }
     cJSON *list = cJSON_AddArrayToObject(to, "plugins");
     for (int i = 0; i < scenario->plugin_count; i++) {
-        const bst_plugin_use *use = &scenario->plugins[i];
+        const bst_scenario_plugin_use *use = &scenario->plugins[i];
         cJSON *item = cJSON_CreateObject();
         cJSON_AddStringToObject(item, "where", use->where);
         cJSON_AddStringToObject(item, "type", use->type);
@@ -152,7 +152,8 @@ void bst_plugins_tell(const bst_scenario *scenario, cJSON *to) {
     }
 }
 
-bst_status bst_plugins_of_scenario(bst_ctx *ctx, const char *path, bst_registry *registry) {
+bst_status bst_plugins_of_scenario(bst_ctx *ctx, const char *path,
+                                   bst_scenario_registry *registry) {
     bst_json *json;
     bst_scenario scenario = {.format = 0};
     BST_TRY(bst_json_load_extended(ctx, path, &json));

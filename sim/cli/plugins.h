@@ -17,16 +17,16 @@ bst_status bst_plugins_refuse(bst_ctx *ctx) BST_MUST_CHECK;
 /* Adds a library to the variable's list. BST_ERR_ARGUMENT for a path with ':' in it. */
 bst_status bst_plugins_add(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
 
-/* All modules that a scenario can name: bst_app_registry and the plugins'. Libraries stay loaded
- * until the process ends; *out is freed with bst_plugins_free. BST_ERR_IO for a library that cannot
- * be loaded, BST_ERR_CONFIG for one that is no plugin, of another version, or whose module has the
- * role and type of another. */
-bst_status bst_plugins_registry(bst_ctx *ctx, bst_registry *out) BST_MUST_CHECK;
-void bst_plugins_free(bst_registry *registry);
+/* All modules that a scenario can name: bst_registry_shipped and the plugins'. Libraries stay
+ * loaded until the process ends; *out is freed with bst_plugins_free. BST_ERR_IO for a library that
+ * cannot be loaded, BST_ERR_CONFIG for one that is no plugin, of another version, or whose module
+ * has the role and type of another. */
+bst_status bst_plugins_registry(bst_ctx *ctx, bst_scenario_registry *out) BST_MUST_CHECK;
+void bst_plugins_free(bst_scenario_registry *registry);
 
 /* Adds the libraries that a scenario file names to the registry. */
 bst_status bst_plugins_of_scenario(bst_ctx *ctx, const char *path,
-                                   bst_registry *registry) BST_MUST_CHECK;
+                                   bst_scenario_registry *registry) BST_MUST_CHECK;
 
 /* bst_scenario_read with all these modules; plug-ins that it names are loaded. */
 bst_status bst_plugins_scenario_read(bst_ctx *ctx, const bst_json *json,

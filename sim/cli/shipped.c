@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
-void bst_app_shipped_file(const char *name, char *path, size_t bytes) {
+void bst_cli_shipped_file(const char *name, char *path, size_t bytes) {
     static const char *const places[] = {"../share/boresight", ".."};
     char folder[4096];
     ssize_t length = readlink("/proc/self/exe", folder, sizeof folder - 1);

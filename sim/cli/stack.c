@@ -32,7 +32,7 @@ static void set_default(void) {
     }
 }
 
-int bst_app_run_with_stack(int (*command)(int argc, char **argv), int argc, char **argv) {
+int bst_cli_run_with_stack(int (*command)(int argc, char **argv), int argc, char **argv) {
     struct rlimit limit;
     if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY ||
         limit.rlim_cur >= BST_THREAD_STACK_BYTES) {
@@ -41,7 +41,7 @@ int bst_app_run_with_stack(int (*command)(int argc, char **argv), int argc, char
     set_default();
     call c = {.command = command, .argc = argc, .argv = argv, .code = BST_EXIT_FAILED};
     pthread_t thread;
-    int error = bst_thread_start(&thread, run, &c);
+    int error = bst_core_thread_start(&thread, run, &c);
     if (error) {
         fprintf(stderr, "boresight: no thread with a stack of %d bytes: %s; raise ulimit -s\n",
                 BST_THREAD_STACK_BYTES, strerror(error));

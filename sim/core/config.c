@@ -407,12 +407,12 @@ static size_t table_bytes(const bst_config_desc *table) {
 
 bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const cJSON *node, const char *path,
                            const bst_config_desc *table, void *object) {
-    return bst_config_read_stages(ctx, json, node, path, table, NULL, object);
+    return bst_stage_read_config(ctx, json, node, path, table, NULL, object);
 }
 
-bst_status bst_config_read_stages(bst_ctx *ctx, const bst_json *json, const cJSON *node,
-                                  const char *path, const bst_config_desc *table,
-                                  const bst_stage_loader *loader, void *object) {
+bst_status bst_stage_read_config(bst_ctx *ctx, const bst_json *json, const cJSON *node,
+                                 const char *path, const bst_config_desc *table,
+                                 const bst_stage_loader *loader, void *object) {
     memset(object, 0, table_bytes(table));
     reader r = {ctx, bst_json_name(json), json, loader};
     bst_status status = read_object(&r, node, path, table, object);

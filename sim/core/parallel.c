@@ -67,7 +67,7 @@ bst_status bst_parallel_create(bst_ctx *ctx, int threads, bst_parallel **out) {
     pthread_cond_init(&pool->work, NULL);
     pthread_cond_init(&pool->done, NULL);
     for (int i = 0; i < threads - 1 && i < MOST_THREADS; i++) {
-        if (bst_thread_start(&pool->workers[i], work, pool) != 0) {
+        if (bst_core_thread_start(&pool->workers[i], work, pool) != 0) {
             break;
         }
         pool->worker_count++;
@@ -121,7 +121,7 @@ void bst_parallel_for(bst_parallel *pool, int count, int grain, bst_parallel_fn 
     pthread_mutex_unlock(&pool->lock);
 }
 
-int bst_thread_start(pthread_t *thread, void *(*body)(void *user), void *user) {
+int bst_core_thread_start(pthread_t *thread, void *(*body)(void *user), void *user) {
     pthread_attr_t attributes;
     int error = pthread_attr_init(&attributes);
     if (error) {

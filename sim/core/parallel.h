@@ -29,6 +29,6 @@ void bst_parallel_for(bst_parallel *pool, int count, int grain, bst_parallel_fn 
 
 /* pthread_create with a stack of BST_THREAD_STACK_BYTES, whatever the limit of the process is.
  * Returned: 0, or the error's number. */
-int bst_thread_start(pthread_t *thread, void *(*body)(void *user), void *user);
+int bst_core_thread_start(pthread_t *thread, void *(*body)(void *user), void *user);
 
 #endif

@@ -56,10 +56,11 @@ BST_SIMD_TYPES(16)
 #define BST_SIMD_INLINE static inline __attribute__((always_inline))
 
 /* A vector of kernels to memory that lies on 16 bytes, past the caches: what is written is not read
- * first, as it is when a part of a line is written. bst_end_stream() before other threads read. */
+ * first, as it is when a part of a line is written. bst_simd_stream_end() before other threads
+ * read. */
 #ifdef BST_SIMD_X86
-#define BST_STREAM(to, v) bst_stream(to, (const char *)&(v), BST_WIDTH)
-BST_SIMD_INLINE void bst_stream(float *to, const char *from, int floats) {
+#define BST_STREAM(to, v) bst_simd_stream(to, (const char *)&(v), BST_WIDTH)
+BST_SIMD_INLINE void bst_simd_stream(float *to, const char *from, int floats) {
     for (int i = 0; i < floats; i += 4) {
         bst_floats_4 part;
         memcpy(&part, from + sizeof(float) * (size_t)i, sizeof part);
@@ -71,7 +72,7 @@ BST_SIMD_INLINE void bst_stream(float *to, const char *from, int floats) {
 #endif
 
 /* Makes what was streamed visible to other threads. */
-static inline void bst_end_stream(void) {
+static inline void bst_simd_stream_end(void) {
 #ifdef BST_SIMD_X86
     __builtin_ia32_sfence();
 #endif

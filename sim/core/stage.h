@@ -40,7 +40,7 @@ typedef struct bst_stage_use {
         .size = sizeof(bst_stage_use)                                                          \
     }
 
-/* Who opens libraries for bst_config_read_stages. */
+/* Who opens libraries for bst_stage_read_config. */
 typedef struct bst_stage_loader {
     void *user;
     /* The stage `type` (NULL: the only one) of `kind` of the library that the text `plugin` at the
@@ -53,8 +53,8 @@ typedef struct bst_stage_loader {
 
 /* bst_config_read of a table in which there may be stages; bst_config_read itself refuses
  * plug-ins. */
-bst_status bst_config_read_stages(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
-                                  const char *path, const bst_config_desc *table,
-                                  const bst_stage_loader *loader, void *object) BST_MUST_CHECK;
+bst_status bst_stage_read_config(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
+                                 const char *path, const bst_config_desc *table,
+                                 const bst_stage_loader *loader, void *object) BST_MUST_CHECK;
 
 #endif

@@ -39,11 +39,12 @@ static bool make_pipe(int ends[2]) {
 }
 
 static bst_status start(bst_ctx *ctx, const char *const argv[], const char *directory,
-                        bool want_input, bool want_output, const char *error_path, bst_child *out) {
+                        bool want_input, bool want_output, const char *error_path,
+                        bst_subprocess *out) {
     int input[2] = {-1, -1};
     int output[2] = {-1, -1};
     int report[2] = {-1, -1}; /* carries errno when exec fails, closes when it succeeds */
-    *out = (bst_child){.pid = -1};
+    *out = (bst_subprocess){.pid = -1};
     if ((want_input && !make_pipe(input)) || (want_output && !make_pipe(output)) ||
         !make_pipe(report)) {
         goto failed;
@@ -78,7 +79,7 @@ static bst_status start(bst_ctx *ctx, const char *const argv[], const char *dire
         if (!out->output) {
             close(output[0]);
             output[0] = -1;
-            bst_child_wait(out);
+            bst_subprocess_wait(out);
             goto failed;
         }
     }
@@ -87,7 +88,7 @@ static bst_status start(bst_ctx *ctx, const char *const argv[], const char *dire
         if (!out->input) {
             close(input[1]);
             input[1] = -1;
-            bst_child_wait(out);
+            bst_subprocess_wait(out);
             goto failed;
         }
     }
@@ -105,13 +106,13 @@ failed:;
                     argv[0], strerror(why));
 }
 
-bst_status bst_child_start(bst_ctx *ctx, const char *const argv[], const char *directory,
-                           bool want_output, const char *error_path, bst_child *out) {
+bst_status bst_subprocess_start(bst_ctx *ctx, const char *const argv[], const char *directory,
+                                bool want_output, const char *error_path, bst_subprocess *out) {
     return start(ctx, argv, directory, false, want_output, error_path, out);
 }
 
-bst_status bst_child_start_fed(bst_ctx *ctx, const char *const argv[], const char *error_path,
-                               bst_child *out) {
+bst_status bst_subprocess_start_fed(bst_ctx *ctx, const char *const argv[], const char *error_path,
+                                    bst_subprocess *out) {
     return start(ctx, argv, NULL, true, false, error_path, out);
 }
 
@@ -119,7 +120,7 @@ static int exit_code_of(int wait_status) {
     return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
 }
 
-bool bst_child_poll(bst_child *child, int *exit_code) {
+bool bst_subprocess_poll(bst_subprocess *child, int *exit_code) {
     int status = 0;
     if (waitpid(child->pid, &status, WNOHANG) != child->pid) {
         return false;
@@ -129,7 +130,7 @@ bool bst_child_poll(bst_child *child, int *exit_code) {
     return true;
 }
 
-int bst_child_wait(bst_child *child) {
+int bst_subprocess_wait(bst_subprocess *child) {
     if (child->input) {
         fclose(child->input);
         child->input = NULL;

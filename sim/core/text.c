@@ -41,8 +41,8 @@ bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
     return true;
 }
 
-const char *bst_count_text(char text[BST_COUNT_TEXT], int64_t count, const char *one,
-                           const char *many) {
+const char *bst_text_of_count(char text[BST_COUNT_TEXT], int64_t count, const char *one,
+                              const char *many) {
     snprintf(text, BST_COUNT_TEXT, "%lld %s", (long long)count, count == 1 ? one : many);
     return text;
 }

@@ -21,8 +21,8 @@ bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
 
 /* A count with its noun, "1 frame" or "5 frames", in `text`, which is returned. */
 enum { BST_COUNT_TEXT = 64 };
-const char *bst_count_text(char text[BST_COUNT_TEXT], int64_t count, const char *one,
-                           const char *many);
+const char *bst_text_of_count(char text[BST_COUNT_TEXT], int64_t count, const char *one,
+                              const char *many);
 
 /* Whether a word can be the name of a file or folder that is made: 1 to 255 bytes without "/" and
  * control characters, not beginning with "." (which also refuses "." and ".."). */

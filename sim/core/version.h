@@ -9,7 +9,7 @@ extern "C" {
 /* "0.1.0": major, minor and patch by semantic versioning. Never NULL. */
 const char *bst_version(void);
 /* The revision of the sources as `git describe` names it; "" when they were no git tree. */
-const char *bst_git_revision(void);
+const char *bst_version_git_revision(void);
 
 #ifdef __cplusplus
 }

@@ -16,7 +16,7 @@ enum { MAX_BUILT = 64, MAX_PROGRAMS = 64, PROGRAM_SOURCES = 32 };
 /* A program that was built. */
 typedef struct kept_program {
     cl_program program;
-    const bst_kernel_source *sources[PROGRAM_SOURCES];
+    const bst_device_kernel_source *sources[PROGRAM_SOURCES];
     int count;
     char *options;
 } kept_program;
@@ -28,7 +28,7 @@ struct bst_device {
     char description[4 * NAME_BYTES];
     time_t opened;
     bool pocl;
-    const bst_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
+    const bst_device_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
     int built_count;
     kept_program programs[MAX_PROGRAMS];
     int program_count;
@@ -332,7 +332,7 @@ static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_progr
     return status;
 }
 
-static void note_built(bst_device *device, const bst_kernel_source *source) {
+static void note_built(bst_device *device, const bst_device_kernel_source *source) {
     for (int i = 0; i < device->built_count; i++) {
         if (device->built[i] == source) {
             return;
@@ -343,7 +343,7 @@ static void note_built(bst_device *device, const bst_kernel_source *source) {
     }
 }
 
-const bst_kernel_source *bst_device_built(const bst_device *device, int index) {
+const bst_device_kernel_source *bst_device_built(const bst_device *device, int index) {
     return index >= 0 && index < device->built_count ? device->built[index] : NULL;
 }
 
@@ -351,8 +351,9 @@ void bst_device_begin_list(bst_device *device) {
     device->built_count = 0;
 }
 
-static cl_program find_program(const bst_device *device, const bst_kernel_source *const *sources,
-                               int count, const char *options) {
+static cl_program find_program(const bst_device *device,
+                               const bst_device_kernel_source *const *sources, int count,
+                               const char *options) {
     for (int i = 0; i < device->program_count; i++) {
         const kept_program *kept = &device->programs[i];
         if (kept->count == count && strcmp(kept->options, options) == 0 &&
@@ -364,8 +365,8 @@ static cl_program find_program(const bst_device *device, const bst_kernel_source
 }
 
 /* Keeps a reference of its own, where there is room. */
-static void keep_program(bst_device *device, const bst_kernel_source *const *sources, int count,
-                         const char *options, cl_program program) {
+static void keep_program(bst_device *device, const bst_device_kernel_source *const *sources,
+                         int count, const char *options, cl_program program) {
     kept_program *kept = &device->programs[device->program_count];
     if (device->program_count == MAX_PROGRAMS || count > PROGRAM_SOURCES ||
         !(kept->options = strdup(options))) {
@@ -386,8 +387,8 @@ static const char no_abi_warnings[] =
     "#endif\n";
 
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
-                            const bst_kernel_source *const *sources, int count, const char *options,
-                            cl_program *out) {
+                            const bst_device_kernel_source *const *sources, int count,
+                            const char *options, cl_program *out) {
     *out = find_program(device, sources, count, options ? options : "");
     if (*out) {
         clRetainProgram(*out);

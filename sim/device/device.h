@@ -30,22 +30,22 @@ bst_status bst_device_buffer(bst_ctx *ctx, cl_context context, size_t bytes, con
                              const char *what, cl_mem *out) BST_MUST_CHECK;
 
 /* A kernel source that was embedded at build time (see cmake/embed.cmake). */
-typedef struct bst_kernel_source {
+typedef struct bst_device_kernel_source {
     const char *name; /* file name, for messages */
     const char *text;
     unsigned hash_high, hash_low; /* FNV-1a 64 of the text, for the manifest */
-} bst_kernel_source;
+} bst_device_kernel_source;
 
 /* Builds the concatenation of `count` sources with the given options, or takes what was built of
  * them on this device before: programs are kept until it is closed. A build error's message holds
  * the log's first lines with file names. */
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
-                            const bst_kernel_source *const *sources, int count, const char *options,
-                            cl_program *out) BST_MUST_CHECK;
+                            const bst_device_kernel_source *const *sources, int count,
+                            const char *options, cl_program *out) BST_MUST_CHECK;
 
 /* The kernel sources that were built on this device, in the order of first use; NULL after the
  * last. */
-const bst_kernel_source *bst_device_built(const bst_device *device, int index);
+const bst_device_kernel_source *bst_device_built(const bst_device *device, int index);
 /* Begins that list anew, for a user of a device that others have used. */
 void bst_device_begin_list(bst_device *device);
 

@@ -10,37 +10,37 @@ const char *const bst_compensator_kinds[] = {BST_STAGE_COMPENSATOR, NULL};
 const char *const bst_compensator_types[] = {"pi", "pid", "lead_lag", NULL};
 
 const bst_config_desc bst_notch_config_table[] = {
-    BST_REAL(bst_notch_config, frequency_hz, "Hz", 1e-6, 1e5, NULL, "Centre."),
-    BST_REAL(bst_notch_config, width_hz, "Hz", 0, 1e5, "0",
+    BST_REAL(bst_dynamics_notch_config, frequency_hz, "Hz", 1e-6, 1e5, NULL, "Centre."),
+    BST_REAL(bst_dynamics_notch_config, width_hz, "Hz", 0, 1e5, "0",
              "Width of the dip, 3 dB down from its shoulders when it is deep; 0: its frequency."),
-    BST_REAL(bst_notch_config, depth_db, "dB", 0, 120, "40", "Attenuation at the centre."),
+    BST_REAL(bst_dynamics_notch_config, depth_db, "dB", 0, 120, "40", "Attenuation at the centre."),
     BST_CONFIG_END};
 
 const bst_config_desc bst_compensator_config_table[] = {
     BST_COMPENSATOR_KEYS(bst_compensator_types, "\"pid\""), BST_CONFIG_END};
 
-bst_biquad bst_biquad_tustin(const double num[3], const double den[3], double dt_s,
-                             double prewarp_hz) {
+bst_dynamics_biquad bst_dynamics_biquad_tustin(const double num[3], const double den[3],
+                                               double dt_s, double prewarp_hz) {
     double w = two_pi * prewarp_hz;
     double k = prewarp_hz > 0.0 ? w / tan(0.5 * w * dt_s) : 2.0 / dt_s;
     if (num[2] == 0.0 && den[2] == 0.0) {
         if (num[1] == 0.0 && den[1] == 0.0) {
-            return (bst_biquad){.b0 = num[0] / den[0]};
+            return (bst_dynamics_biquad){.b0 = num[0] / den[0]};
         }
         double a = den[0] + den[1] * k;
-        return (bst_biquad){.b0 = (num[0] + num[1] * k) / a,
-                            .b1 = (num[0] - num[1] * k) / a,
-                            .a1 = (den[0] - den[1] * k) / a};
+        return (bst_dynamics_biquad){.b0 = (num[0] + num[1] * k) / a,
+                                     .b1 = (num[0] - num[1] * k) / a,
+                                     .a1 = (den[0] - den[1] * k) / a};
     }
     double k2 = k * k, a = den[0] + den[1] * k + den[2] * k2;
-    return (bst_biquad){.b0 = (num[0] + num[1] * k + num[2] * k2) / a,
-                        .b1 = 2.0 * (num[0] - num[2] * k2) / a,
-                        .b2 = (num[0] - num[1] * k + num[2] * k2) / a,
-                        .a1 = 2.0 * (den[0] - den[2] * k2) / a,
-                        .a2 = (den[0] - den[1] * k + den[2] * k2) / a};
+    return (bst_dynamics_biquad){.b0 = (num[0] + num[1] * k + num[2] * k2) / a,
+                                 .b1 = 2.0 * (num[0] - num[2] * k2) / a,
+                                 .b2 = (num[0] - num[1] * k + num[2] * k2) / a,
+                                 .a1 = 2.0 * (den[0] - den[2] * k2) / a,
+                                 .a2 = (den[0] - den[1] * k + den[2] * k2) / a};
 }
 
-double complex bst_biquad_response(const bst_biquad *q, double omega_per_sample) {
+double complex bst_dynamics_biquad_response(const bst_dynamics_biquad *q, double omega_per_sample) {
     double complex d = cexp(-I * omega_per_sample);
     return (q->b0 + d * (q->b1 + d * q->b2)) / (1.0 + d * (q->a1 + d * q->a2));
 }
@@ -56,14 +56,14 @@ static bst_status below_nyquist(bst_ctx *ctx, const char *key, double hz, double
 }
 
 static void add(bst_compensator *c, const double num[3], const double den[3], double prewarp_hz) {
-    c->stage[c->stages++] = bst_biquad_tustin(num, den, c->dt_s, prewarp_hz);
+    c->stage[c->stages++] = bst_dynamics_biquad_tustin(num, den, c->dt_s, prewarp_hz);
 }
 
 static bst_status add_filters(bst_ctx *ctx, bst_compensator *c,
                               const bst_compensator_config *config) {
-    const bst_notch_config *notches = config->notches.items;
+    const bst_dynamics_notch_config *notches = config->notches.items;
     for (int i = 0; i < config->notches.count; i++) {
-        const bst_notch_config *n = &notches[i];
+        const bst_dynamics_notch_config *n = &notches[i];
         BST_TRY(below_nyquist(ctx, "notches/frequency_hz", n->frequency_hz, c->dt_s));
         double w = two_pi * n->frequency_hz;
         double width = two_pi * (n->width_hz > 0.0 ? n->width_hz : n->frequency_hz);
@@ -174,11 +174,11 @@ static bst_status build(bst_ctx *ctx, bst_compensator *c, const bst_compensator_
     c->integrates = config->type == BST_COMPENSATOR_LEAD_LAG
                         ? config->lag_zero_hz > 0.0 && config->lag_pole_hz == 0.0
                         : config->integral_per_s * config->gain_scale > 0.0;
-    const bst_biquad *last = &c->stage[c->stages - 1];
+    const bst_dynamics_biquad *last = &c->stage[c->stages - 1];
     /* with poles at 1 and p the excess moves the pole at 1 by -back / (1 - p), and p = a2 */
     c->back = tracking_s > 0.0 ? fmin(1.0, (1.0 - last->a2) * dt_s / tracking_s) : 1.0;
     for (int i = 0; i < c->stages; i++) {
-        const bst_biquad *q = &c->stage[i];
+        const bst_dynamics_biquad *q = &c->stage[i];
         if (!isfinite(q->b0 + q->b1 + q->b2 + q->a1 + q->a2)) {
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "the compensator's coefficients at %g Hz are not finite; lower its "
@@ -212,7 +212,7 @@ static bst_status plug(bst_ctx *ctx, bst_compensator *c, const bst_stage_use *us
 
 bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *c,
                                 const bst_compensator_config *config, double dt_s,
-                                bst_response_fn plant, const void *user) {
+                                bst_dynamics_response_fn plant, const void *user) {
     if (config->plug.desc) {
         return plug(ctx, c, &config->plug, dt_s);
     }
@@ -235,7 +235,8 @@ bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *c,
     return build(ctx, c, &designed, dt_s);
 }
 
-static double advance(const bst_biquad *q, double state[2], double x, double y, double fed_back) {
+static double advance(const bst_dynamics_biquad *q, double state[2], double x, double y,
+                      double fed_back) {
     state[0] = q->b1 * x - q->a1 * fed_back + state[1];
     state[1] = q->b2 * x - q->a2 * fed_back;
     return y;
@@ -284,7 +285,7 @@ double bst_compensator_step(bst_compensator *c, double error, double feed_forwar
 }
 
 /* States in which a constant input x gives y, after y - ramp and before y + ramp. */
-static void rest(const bst_biquad *q, double state[2], double x, double y, double ramp) {
+static void rest(const bst_dynamics_biquad *q, double state[2], double x, double y, double ramp) {
     state[0] = y - q->b0 * x;
     state[1] = q->b2 * x - q->a2 * (y - ramp);
 }
@@ -301,13 +302,13 @@ void bst_compensator_set(bst_compensator *c, double error, double feed_forward, 
         return;
     }
     for (int i = 0; i < last; i++) {
-        const bst_biquad *q = &c->stage[i];
+        const bst_dynamics_biquad *q = &c->stage[i];
         double y = x * (q->b0 + q->b1 + q->b2) / (1.0 + q->a1 + q->a2);
         rest(q, c->state[i], x, y, 0.0);
         x = y;
     }
     /* with poles at 1 and p = a2 */
-    const bst_biquad *q = &c->stage[last];
+    const bst_dynamics_biquad *q = &c->stage[last];
     double ramp = c->integrates ? (q->b0 + q->b1 + q->b2) * x / (1.0 - q->a2) : 0.0;
     rest(q, c->state[last], x, given - c->feed_forward * feed_forward, ramp);
     c->output = given;
@@ -325,7 +326,7 @@ double complex bst_compensator_response(const bst_compensator *c, double omega_r
     double complex out =
         cexp(-I * w * c->delay_whole) * (1.0 - c->delay_part + c->delay_part * cexp(-I * w));
     for (int i = 0; i < c->stages; i++) {
-        out *= bst_biquad_response(&c->stage[i], w);
+        out *= bst_dynamics_biquad_response(&c->stage[i], w);
     }
     return out;
 }

@@ -10,20 +10,21 @@
 #include "sim/core/stage.h"
 
 /* (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2) */
-typedef struct bst_biquad {
+typedef struct bst_dynamics_biquad {
     double b0, b1, b2, a1, a2;
-} bst_biquad;
+} bst_dynamics_biquad;
 
 /* Tustin's rule with prewarping: (num[0] + num[1] s + num[2] s^2) / (den[0] + den[1] s + den[2]
  * s^2) with s = k (z - 1) / (z + 1), k = w / tan(w dt / 2) at w = 2 pi prewarp_hz, where the two
  * agree; prewarp_hz 0: k = 2 / dt. Powers that neither polynomial has are left out, so that a
  * first-order section gets no pole at z = -1. prewarp_hz < 0.5 / dt_s; den not zero. (Franklin,
  * Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., section 6.1.) */
-bst_biquad bst_biquad_tustin(const double num[3], const double den[3], double dt_s,
-                             double prewarp_hz);
+bst_dynamics_biquad bst_dynamics_biquad_tustin(const double num[3], const double den[3],
+                                               double dt_s, double prewarp_hz);
 
 /* Response at omega rad per sample. */
-double complex bst_biquad_response(const bst_biquad *biquad, double omega_per_sample);
+double complex bst_dynamics_biquad_response(const bst_dynamics_biquad *biquad,
+                                            double omega_per_sample);
 
 typedef enum bst_compensator_type {
     BST_COMPENSATOR_PI = 0,
@@ -34,9 +35,9 @@ typedef enum bst_compensator_type {
 
 /* (s^2 + 2 d z w s + w^2) / (s^2 + 2 z w s + w^2): w = 2 pi frequency_hz, 2 z w = 2 pi width_hz,
  * d = 10^(-depth_db / 20). Prewarped at its own frequency. */
-typedef struct bst_notch_config {
+typedef struct bst_dynamics_notch_config {
     double frequency_hz, width_hz, depth_db;
-} bst_notch_config;
+} bst_dynamics_notch_config;
 
 /* A "compensator" block. With s in rad/s and w = 2 pi f for each frequency f:
  *   pi        kp + ki / s
@@ -50,7 +51,7 @@ typedef struct bst_compensator_config {
     double bandwidth_hz, crossover_hz, phase_margin_deg, integral_ratio;
     double proportional, integral_per_s, derivative_s, derivative_filter_hz;
     double gain, lead_zero_hz, lead_pole_hz, lag_zero_hz, lag_pole_hz;
-    bst_config_list notches; /* bst_notch_config */
+    bst_config_list notches; /* bst_dynamics_notch_config */
     double low_pass_hz, prewarp_hz;
     double feed_forward;
     double output_limit, output_rate_limit_per_s, anti_windup_s;
@@ -126,8 +127,8 @@ extern const bst_config_desc bst_compensator_config_table[];
                  "Zero of the lag; 0: no lag."),                                                   \
         BST_REAL(bst_compensator_config, lag_pole_hz, "Hz", 0, 1e5, "0",                           \
                  "Pole of the lag; 0: an integrator."),                                            \
-        BST_LIST(bst_compensator_config, notches, bst_notch_config, bst_notch_config_table, 0, 8,  \
-                 "[]", "Notches in cascade."),                                                     \
+        BST_LIST(bst_compensator_config, notches, bst_dynamics_notch_config,                       \
+                 bst_notch_config_table, 0, 8, "[]", "Notches in cascade."),                       \
         BST_REAL(bst_compensator_config, low_pass_hz, "Hz", 0, 1e5, "0",                           \
                  "Corner of a second-order Butterworth low-pass in cascade; 0: none."),            \
         BST_REAL(bst_compensator_config, prewarp_hz, "Hz", 0, 1e5, "0",                            \
@@ -162,7 +163,7 @@ extern const bst_config_desc bst_compensator_config_table[];
 typedef struct bst_compensator {
     double dt_s;
     int stages; /* at least 1; the last one holds the integrator and the gain */
-    bst_biquad stage[BST_COMPENSATOR_STAGES];
+    bst_dynamics_biquad stage[BST_COMPENSATOR_STAGES];
     double state[BST_COMPENSATOR_STAGES][2]; /* direct form II transposed */
     bool integrates;                         /* the last stage has a pole at 1 */
     double back; /* share of a limited output's excess that goes back into the last stage */
@@ -180,7 +181,7 @@ typedef struct bst_compensator {
 /* Frequency response of what the loop holds besides the compensator, from its output to the
  * (negative of the) error, at omega rad/s: for a sampled loop that of the sampled signals, holds
  * and delays in it. */
-typedef double complex (*bst_response_fn)(const void *user, double omega_radps);
+typedef double complex (*bst_dynamics_response_fn)(const void *user, double omega_radps);
 
 /* The configuration with the gains that meet its specification in its place (unchanged when it has
  * none); *out shares the list of notches. gain_scale and delay_s are left out of the design and
@@ -191,7 +192,7 @@ typedef double complex (*bst_response_fn)(const void *user, double omega_radps);
  * to give away); lead_lag the same with a lead centred on the crossover, poles at most 100 times
  * its zero. BST_ERR_CONFIG, saying the best that can be had, when it cannot be met. */
 bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *config, double dt_s,
-                                  bst_response_fn plant, const void *user,
+                                  bst_dynamics_response_fn plant, const void *user,
                                   bst_compensator_config *out) BST_MUST_CHECK;
 
 /* A compensator at rest, stepped every dt_s, by gains or, designed against `plant`, by its
@@ -200,7 +201,7 @@ bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *co
  * specification without a plant or that cannot be met. */
 bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *compensator,
                                 const bst_compensator_config *config, double dt_s,
-                                bst_response_fn plant, const void *user) BST_MUST_CHECK;
+                                bst_dynamics_response_fn plant, const void *user) BST_MUST_CHECK;
 
 /* The output for this sample's error: cascade, plus feed_forward times its share, limited in value
  * and rate. What the limits cut goes back into the last stage's state (in direct form II transposed

@@ -16,7 +16,7 @@ static const double two_pi = 2.0 * BST_PI;
 typedef struct design {
     const bst_compensator_config *config;
     double dt_s;
-    bst_response_fn plant;
+    bst_dynamics_response_fn plant;
     const void *user;
     bst_compensator filters; /* notches and low-pass with a gain of one */
     /* phase of the rest of the loop, followed from the lowest frequency up: there it is within
@@ -274,7 +274,7 @@ static bst_status for_bandwidth(bst_ctx *ctx, const design *d, double margin_rad
 }
 
 bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *config, double dt_s,
-                                  bst_response_fn plant, const void *user,
+                                  bst_dynamics_response_fn plant, const void *user,
                                   bst_compensator_config *out) {
     *out = *config;
     if (config->bandwidth_hz == 0.0 && config->crossover_hz == 0.0) {

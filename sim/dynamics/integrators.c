@@ -6,7 +6,8 @@
 
 const char *const bst_integrator_names[] = {"symplectic", "symplectic4", "rk4", NULL};
 
-void bst_rk4_step(bst_rate_fn rate, const void *user, int count, double dt_s, double *y) {
+void bst_dynamics_rk4_step(bst_dynamics_rate_fn rate, const void *user, int count, double dt_s,
+                           double *y) {
     assert(count <= BST_RK4_MOST);
     static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
     double stage[BST_RK4_MOST], slope[BST_RK4_MOST] = {0}, sum[BST_RK4_MOST] = {0};
@@ -38,7 +39,7 @@ static inline void sine_cosine(double h, double *s, double *c) {
 
 /* The motion under one axis's part of the energy: the body turns about axis i, at a constant rate.
  * q holds {x, y, z, w}. */
-static inline void turn_about(const bst_free_body *body, int i, double dt_s, double q[4],
+static inline void turn_about(const bst_dynamics_free_body *body, int i, double dt_s, double q[4],
                               double pi[3]) {
     int j = i == 2 ? 0 : i + 1, k = 3 - i - j;
     double s, c;
@@ -55,8 +56,8 @@ static inline void turn_about(const bst_free_body *body, int i, double dt_s, dou
     q[3] = c * qw + s * qi;
 }
 
-void bst_turn_free_body(const bst_free_body *body, double dt_s, bst_quat *q_from_gcrf,
-                        double pi[3]) {
+void bst_dynamics_turn_free_body(const bst_dynamics_free_body *body, double dt_s,
+                                 bst_quat *q_from_gcrf, double pi[3]) {
     double q[4] = {q_from_gcrf->x, q_from_gcrf->y, q_from_gcrf->z, q_from_gcrf->w};
     turn_about(body, 0, 0.5 * dt_s, q, pi);
     turn_about(body, 1, 0.5 * dt_s, q, pi);
@@ -66,14 +67,14 @@ void bst_turn_free_body(const bst_free_body *body, double dt_s, bst_quat *q_from
     *q_from_gcrf = (bst_quat){q[0], q[1], q[2], q[3]};
 }
 
-void bst_turn_free_body4(const bst_free_body *body, double dt_s, bst_quat *q_from_gcrf,
-                         double pi[3]) {
+void bst_dynamics_turn_free_body4(const bst_dynamics_free_body *body, double dt_s,
+                                  bst_quat *q_from_gcrf, double pi[3]) {
     const double s = 0.41449077179437573714; /* 1 / (4 - 4^(1/3)) */
-    bst_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
-    bst_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
-    bst_turn_free_body(body, (1.0 - 4.0 * s) * dt_s, q_from_gcrf, pi);
-    bst_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
-    bst_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
+    bst_dynamics_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
+    bst_dynamics_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
+    bst_dynamics_turn_free_body(body, (1.0 - 4.0 * s) * dt_s, q_from_gcrf, pi);
+    bst_dynamics_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
+    bst_dynamics_turn_free_body(body, s * dt_s, q_from_gcrf, pi);
 }
 
 static void multiply(int n, const double *a, const double *b, double *out) {
@@ -88,7 +89,7 @@ static void multiply(int n, const double *a, const double *b, double *out) {
     }
 }
 
-void bst_matrix_exp(int n, const double *a, double *out) {
+void bst_dynamics_matrix_exp(int n, const double *a, double *out) {
     assert(n <= BST_LINEAR_MOST);
     double scaled[BST_LINEAR_MOST * BST_LINEAR_MOST], term[BST_LINEAR_MOST * BST_LINEAR_MOST],
         next[BST_LINEAR_MOST * BST_LINEAR_MOST];
@@ -150,7 +151,7 @@ static void rotate(int n, double *a, double *v, int p, int q) {
     a[p * n + q] = a[q * n + p] = 0.0;
 }
 
-void bst_symmetric_eigen(int n, const double *a, double *values, double *vectors) {
+void bst_dynamics_symmetric_eigen(int n, const double *a, double *values, double *vectors) {
     assert(n <= BST_LINEAR_MOST);
     double m[BST_LINEAR_MOST * BST_LINEAR_MOST], v[BST_LINEAR_MOST * BST_LINEAR_MOST] = {0};
     size_t cells = (size_t)(n * n);

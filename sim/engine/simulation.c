@@ -58,7 +58,7 @@ static double longest_exposure_s(const bst_scenario *scenario, int observer, int
     const bst_sensor_config *sensors = observers[observer].sensors.items;
     double longest = sensors[sensor].exposure.exposure_s;
     for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         bool commands = false;
         for (int p = 0; p < module->desc->port_count; p++) {
             const bst_port *port = &module->desc->ports[p];
@@ -82,7 +82,7 @@ static double longest_exposure_s(const bst_scenario *scenario, int observer, int
 /* When the sensor's line of sight is written. */
 static void los_ticks(const bst_scenario *scenario, bst_instance_spec *spec) {
     for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         for (int p = 0; p < module->desc->port_count; p++) {
             const bst_port *port = &module->desc->ports[p];
             if (module->observer == spec->observer && module->sensor == spec->sensor &&
@@ -124,7 +124,7 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
 
 /* The module that options->only names, if this is it, and who writes its inputs. */
 static bst_status add_only(bst_ctx *ctx, const bst_simulation_options *options, const char *scope,
-                           const bst_module_config *module, bst_instance_spec *spec,
+                           const bst_scenario_module_config *module, bst_instance_spec *spec,
                            bst_simulation *sim) {
     char source[256];
     if (strcmp(spec->instance, options->only) != 0) {
@@ -156,7 +156,7 @@ static bst_status add_only(bst_ctx *ctx, const bst_simulation_options *options, 
 /* Adds the modules that link sensors. */
 static bst_status add_links(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
     for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         if (module->observer >= 0) {
             continue;
         }
@@ -212,7 +212,7 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
                 BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
             }
             for (int m = 0; m < scenario->module_count; m++) {
-                const bst_module_config *module = &scenario->modules[m];
+                const bst_scenario_module_config *module = &scenario->modules[m];
                 if (module->observer != i || module->sensor != s || module->off) {
                     continue;
                 }
@@ -285,7 +285,7 @@ static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
                             const bst_simulation_options *options, bst_simulation *sim) {
     bool needed = false;
     for (int m = 0; m < scenario->module_count && !options->only; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         needed |= !module->off && (module->desc->flags & BST_MODULE_NEEDS_LINK);
     }
     if (!needed) {

@@ -29,7 +29,7 @@ static double gamma_fraction(double a, double x) {
     return h * exp(-x + a * log(x) - lgamma(a));
 }
 
-double bst_chi2_cdf(double x, double dof) {
+double bst_eval_chi2_cdf(double x, double dof) {
     if (!(x > 0.0)) {
         return isnan(x) ? NAN : 0.0;
     }
@@ -37,12 +37,12 @@ double bst_chi2_cdf(double x, double dof) {
     return y < a + 1.0 ? gamma_series(a, y) : 1.0 - gamma_fraction(a, y);
 }
 
-double bst_chi2_quantile(double probability, double dof) {
+double bst_eval_chi2_quantile(double probability, double dof) {
     if (!(probability > 0.0 && probability < 1.0 && dof > 0.0)) {
         return NAN;
     }
     double low = 0.0, high = dof + 10.0;
-    while (bst_chi2_cdf(high, dof) < probability) {
+    while (bst_eval_chi2_cdf(high, dof) < probability) {
         high *= 2.0;
     }
     while (high - low > 1e-14 * high) {
@@ -50,7 +50,7 @@ double bst_chi2_quantile(double probability, double dof) {
         if (middle <= low || middle >= high) {
             break;
         }
-        if (bst_chi2_cdf(middle, dof) < probability) {
+        if (bst_eval_chi2_cdf(middle, dof) < probability) {
             low = middle;
         } else {
             high = middle;
@@ -80,8 +80,8 @@ void bst_consistency_check(const double *values, int runs, int steps, int dof, d
             continue;
         }
         if (n != bounds_for) {
-            low = bst_chi2_quantile(tail, (double)n * dof);
-            high = bst_chi2_quantile(1.0 - tail, (double)n * dof);
+            low = bst_eval_chi2_quantile(tail, (double)n * dof);
+            high = bst_eval_chi2_quantile(1.0 - tail, (double)n * dof);
             bounds_for = n;
         }
         total += sum;

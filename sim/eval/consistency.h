@@ -6,10 +6,10 @@
 /* Probability that a chi-square variable with `dof` > 0 degrees of freedom is at most x: the
  * regularised incomplete gamma function P(dof/2, x/2), by series or continued fraction (Abramowitz
  * and Stegun 6.5.29, 6.5.31); relative error about 1e-14. */
-double bst_chi2_cdf(double x, double dof);
+double bst_eval_chi2_cdf(double x, double dof);
 
-/* The x with bst_chi2_cdf(x, dof) = probability, 0 < probability < 1; NAN beyond. */
-double bst_chi2_quantile(double probability, double dof);
+/* The x with bst_eval_chi2_cdf(x, dof) = probability, 0 < probability < 1; NAN beyond. */
+double bst_eval_chi2_quantile(double probability, double dof);
 
 typedef struct bst_consistency {
     int runs, steps;

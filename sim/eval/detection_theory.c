@@ -9,7 +9,7 @@ static double density(double x) {
     return exp(-0.5 * x * x) / sqrt(2.0 * BST_PI);
 }
 
-double bst_normal_tail(double x) {
+double bst_eval_normal_tail(double x) {
     /* what rounding x / sqrt 2 loses grows with x in erfc, so it is put back to first order */
     const double root_half = 0.70710678118654752440;
     double t = x * root_half;
@@ -44,14 +44,14 @@ static double far_inverse(double tail) {
             double slope, miss = log_tail(x, &slope) - log(tail);
             x += miss / slope;
         } else {
-            double miss = (bst_normal_tail(x) - tail) / density(x);
+            double miss = (bst_eval_normal_tail(x) - tail) / density(x);
             x += miss / (1.0 + 0.5 * x * miss); /* Halley */
         }
     }
     return x;
 }
 
-double bst_normal_tail_inverse(double tail) {
+double bst_eval_normal_tail_inverse(double tail) {
     if (!(tail >= 0.0 && tail <= 1.0)) {
         return NAN;
     }
@@ -73,33 +73,35 @@ double bst_normal_tail_inverse(double tail) {
     return x;
 }
 
-double bst_ideal_pd(double pfa, double snr) {
-    return bst_normal_tail(bst_normal_tail_inverse(pfa) - snr);
+double bst_eval_ideal_pd(double pfa, double snr) {
+    return bst_eval_normal_tail(bst_eval_normal_tail_inverse(pfa) - snr);
 }
 
-double bst_ideal_snr(double pfa, double pd) {
-    return bst_normal_tail_inverse(pfa) - bst_normal_tail_inverse(pd);
+double bst_eval_ideal_snr(double pfa, double pd) {
+    return bst_eval_normal_tail_inverse(pfa) - bst_eval_normal_tail_inverse(pd);
 }
 
-double bst_matched_filter_pd(double pfa, double snr, double own_light) {
-    return bst_normal_tail((bst_normal_tail_inverse(pfa) - snr) / sqrt(1.0 + own_light * snr));
+double bst_eval_matched_filter_pd(double pfa, double snr, double own_light) {
+    return bst_eval_normal_tail((bst_eval_normal_tail_inverse(pfa) - snr) /
+                                sqrt(1.0 + own_light * snr));
 }
 
-double bst_matched_filter_snr(double pfa, double pd, double own_light) {
+double bst_eval_matched_filter_snr(double pfa, double pd, double own_light) {
     /* (snr - t)^2 = z^2 (1 + own_light snr), the root on the side of z */
-    double t = bst_normal_tail_inverse(pfa), z = -bst_normal_tail_inverse(pd);
+    double t = bst_eval_normal_tail_inverse(pfa), z = -bst_eval_normal_tail_inverse(pd);
     double half = 0.5 * own_light * z;
     return t + z * (half + sqrt(half * half + 1.0 + own_light * t));
 }
 
-bst_interval bst_wilson_interval(int64_t hits, int64_t trials, double z) {
+bst_eval_interval bst_eval_wilson_interval(int64_t hits, int64_t trials, double z) {
     if (trials <= 0) {
-        return (bst_interval){0.0, 1.0};
+        return (bst_eval_interval){0.0, 1.0};
     }
     double n = (double)trials, p = (double)hits / n, z2 = z * z / n;
     double middle = (p + 0.5 * z2) / (1.0 + z2);
     double half = z / (1.0 + z2) * sqrt(p * (1.0 - p) / n + 0.25 * z2 / n);
-    return (bst_interval){hits <= 0 ? 0.0 : middle - half, hits >= trials ? 1.0 : middle + half};
+    return (bst_eval_interval){hits <= 0 ? 0.0 : middle - half,
+                               hits >= trials ? 1.0 : middle + half};
 }
 
 /* Regularised incomplete gamma functions P(a, x) and Q(a, x) = 1 - P, each to full relative
@@ -136,7 +138,7 @@ static void gamma_parts(double a, double x, double *lower, double *upper) {
 /* x at which the lower (or upper) part of gamma(a) is p < 1/2: Newton, halving where that would
  * leave the bracket. */
 static double gamma_quantile(double a, double p, bool upper_tail) {
-    double z = bst_normal_tail_inverse(p) * (upper_tail ? 1.0 : -1.0);
+    double z = bst_eval_normal_tail_inverse(p) * (upper_tail ? 1.0 : -1.0);
     double wilson_hilferty = 1.0 - 1.0 / (9.0 * a) + z / (3.0 * sqrt(a));
     double guess = a * pow(fmax(wilson_hilferty, 1e-3), 3.0);
     double lo = 0.0, hi = guess + 10.0 * sqrt(a) + 10.0 - log(p);
@@ -157,8 +159,8 @@ static double gamma_quantile(double a, double p, bool upper_tail) {
     return x;
 }
 
-bst_interval bst_poisson_interval(int64_t count, double alpha) {
+bst_eval_interval bst_eval_poisson_interval(int64_t count, double alpha) {
     double k = (double)(count > 0 ? count : 0);
-    return (bst_interval){k > 0.0 ? gamma_quantile(k, 0.5 * alpha, false) : 0.0,
-                          gamma_quantile(k + 1.0, 0.5 * alpha, true)};
+    return (bst_eval_interval){k > 0.0 ? gamma_quantile(k, 0.5 * alpha, false) : 0.0,
+                               gamma_quantile(k + 1.0, 0.5 * alpha, true)};
 }

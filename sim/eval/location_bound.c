@@ -11,7 +11,7 @@ enum { N = BST_BOUND_COUNT };
 
 bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double *by_x,
                                  const double *by_y, int count, double flux_e,
-                                 const bst_bound_noise *noise, bst_location_bound *out) {
+                                 const bst_eval_bound_noise *noise, bst_location_bound *out) {
     double variance = noise->noise_e * noise->noise_e, fisher[N][N] = {{0.0}}, sharpness = 0.0;
     if (!(flux_e > 0.0 && variance > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -97,7 +97,7 @@ static const double gauss_node[3] = {0.5 * 0.238619186083197, 0.5 * 0.6612093864
 static const double gauss_weight[3] = {0.5 * 0.467913934572691, 0.5 * 0.360761573048139,
                                        0.5 * 0.171324492379170};
 
-static void draw(image *m, const bst_bound_source *s) {
+static void draw(image *m, const bst_eval_bound_source *s) {
     double length = hypot(s->dx_px, s->dy_px) / s->sigma_px;
     if (length == 0.0) {
         add_node(m, s->x_px, s->y_px, s->sigma_px, 1.0);
@@ -114,7 +114,7 @@ static void draw(image *m, const bst_bound_source *s) {
     }
 }
 
-static bst_status open_image(bst_ctx *ctx, const bst_bound_source *s, double margin_px,
+static bst_status open_image(bst_ctx *ctx, const bst_eval_bound_source *s, double margin_px,
                              image *out) {
     double half_x = 0.5 * fabs(s->dx_px) + margin_px, half_y = 0.5 * fabs(s->dy_px) + margin_px;
     if (!(s->sigma_px >= 0.01 && s->sigma_px <= 1000.0 && margin_px >= 0.0 && fabs(s->x_px) < 1e8 &&
@@ -144,8 +144,8 @@ static bst_status open_image(bst_ctx *ctx, const bst_bound_source *s, double mar
     return BST_OK;
 }
 
-bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_bound_source *source,
-                                       const bst_bound_noise *noise, double margin_px,
+bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_eval_bound_source *source,
+                                       const bst_eval_bound_noise *noise, double margin_px,
                                        bst_location_bound *out) {
     image m = {.pixels = 0};
     BST_TRY(open_image(ctx, source, margin_px, &m));
@@ -156,7 +156,8 @@ bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_bound_source *sou
     return status;
 }
 
-bst_status bst_gaussian_powers(bst_ctx *ctx, const bst_bound_source *source, double out[2]) {
+bst_status bst_eval_gaussian_powers(bst_ctx *ctx, const bst_eval_bound_source *source,
+                                    double out[2]) {
     image m = {.pixels = 0};
     BST_TRY(open_image(ctx, source, 8.3 * source->sigma_px + 1.0, &m));
     draw(&m, source);

@@ -16,10 +16,10 @@ enum {
 
 /* Noise of a pixel: variance noise_e^2, plus the source's expected light in it if own_shot_noise
  * (its photons arrive as a Poisson process). */
-typedef struct bst_bound_noise {
+typedef struct bst_eval_bound_noise {
     double noise_e;
     bool own_shot_noise;
-} bst_bound_noise;
+} bst_eval_bound_noise;
 
 /* Least covariance of any unbiased estimate of (x, y, flux, background), and the source's SNR,
  * sqrt(sum s^2) / noise_e: without its own light's noise. */
@@ -36,22 +36,22 @@ typedef struct bst_location_bound {
  * not positive, BST_ERR_NUMERIC where the pixels do not determine the four numbers. */
 bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double *by_x,
                                  const double *by_y, int count, double flux_e,
-                                 const bst_bound_noise *noise,
+                                 const bst_eval_bound_noise *noise,
                                  bst_location_bound *out) BST_MUST_CHECK;
 
 /* A Gaussian PSF integrated over pixels, its centroid at (x_px, y_px), moved uniformly along
  * (dx_px, dy_px) during the exposure; 0, 0: at rest. */
-typedef struct bst_bound_source {
+typedef struct bst_eval_bound_source {
     double x_px, y_px, dx_px, dy_px;
     double sigma_px; /* before the pixel's own integration */
     double flux_e;
-} bst_bound_source;
+} bst_eval_bound_source;
 
 /* The bound on the pixels whose centres lie within margin_px of the rectangle around the streak, no
  * sensor's edge near. Smear by Gauss-Legendre quadrature to 1e-9 of the peak. BST_ERR_ARGUMENT for
  * sigma_px outside 0.01 .. 1000 or a region above 1e7 pixels, BST_ERR_MEMORY; and as above. */
-bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_bound_source *source,
-                                       const bst_bound_noise *noise, double margin_px,
+bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_eval_bound_source *source,
+                                       const bst_eval_bound_noise *noise, double margin_px,
                                        bst_location_bound *out) BST_MUST_CHECK;
 
 /* Variances of the place along and across the direction (dx, dy), px^2: out = {along, across}.
@@ -60,7 +60,7 @@ void bst_location_bound_along(const bst_location_bound *bound, double dx, double
 
 /* Sums of share^2 and of share^3 over all pixels of such a Gaussian of unit flux: its SNR is flux
  * times the root of the first over noise_e. */
-bst_status bst_gaussian_powers(bst_ctx *ctx, const bst_bound_source *source,
-                               double out[2]) BST_MUST_CHECK;
+bst_status bst_eval_gaussian_powers(bst_ctx *ctx, const bst_eval_bound_source *source,
+                                    double out[2]) BST_MUST_CHECK;
 
 #endif

@@ -2,9 +2,9 @@
 
 #include "sim/messages/messages.h"
 
-double bst_pointing_error_px(const bst_camera *camera, double pixel_scale_arcsec,
-                             bst_quat q_cam_from_gcrf, bst_vec3 apparent, double *x_px,
-                             double *y_px) {
+double bst_eval_pointing_error_px(const bst_camera *camera, double pixel_scale_arcsec,
+                                  bst_quat q_cam_from_gcrf, bst_vec3 apparent, double *x_px,
+                                  double *y_px) {
     bst_vec3 v = bst_quat_rotate(q_cam_from_gcrf, apparent);
     double scale_rad =
         (pixel_scale_arcsec > 0.0 ? pixel_scale_arcsec : camera->pixel_scale_arcsec) *
@@ -22,8 +22,8 @@ double bst_pointing_error_px(const bst_camera *camera, double pixel_scale_arcsec
     return error_px;
 }
 
-bool bst_track_is_on_target(bst_vec3 direction, bst_vec3 rate_radps, double seconds, bst_vec3 truth,
-                            double scale_rad) {
+bool bst_eval_track_is_on_target(bst_vec3 direction, bst_vec3 rate_radps, double seconds,
+                                 bst_vec3 truth, double scale_rad) {
     bst_vec3 carried = bst_vec3_axpy(direction, seconds, rate_radps);
     return bst_vec3_angle(carried, truth) <= BST_RIGHT_TARGET_PX * scale_rad;
 }

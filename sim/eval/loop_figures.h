@@ -65,14 +65,14 @@ typedef struct bst_loop_tally {
  * Given: the camera (rotation); pixel_scale_arcsec of the exposure, <= 0: the camera's; the true
  * attitude; the apparent direction (GCRF axes, any length).
  * Returned: the size, px; its components in *x_px, *y_px. */
-double bst_pointing_error_px(const bst_camera *camera, double pixel_scale_arcsec,
-                             bst_quat q_cam_from_gcrf, bst_vec3 apparent, double *x_px,
-                             double *y_px);
+double bst_eval_pointing_error_px(const bst_camera *camera, double pixel_scale_arcsec,
+                                  bst_quat q_cam_from_gcrf, bst_vec3 apparent, double *x_px,
+                                  double *y_px);
 
 /* Whether a track is of the object in the true direction `truth`: its direction, carried on by its
  * rate (rad/s) for `seconds`, lies within BST_RIGHT_TARGET_PX pixels of scale_rad. */
-bool bst_track_is_on_target(bst_vec3 direction, bst_vec3 rate_radps, double seconds, bst_vec3 truth,
-                            double scale_rad);
+bool bst_eval_track_is_on_target(bst_vec3 direction, bst_vec3 rate_radps, double seconds,
+                                 bst_vec3 truth, double scale_rad);
 
 /* Whether the loop is settled by this frame: it was acquired before, is in mode track, and points
  * to within BST_SETTLED_PX. */

@@ -21,7 +21,7 @@ typedef struct waiting_frame {
 
 struct bst_loop_summary {
     bst_camera camera;
-    bst_view *view;
+    bst_world_view *view;
     int observer;
     double rate_hz;
     int target;
@@ -49,7 +49,7 @@ bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int obs
     if (!s) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the summary");
     }
-    bst_status status = bst_view_create(ctx, world, &s->view);
+    bst_status status = bst_world_view_create(ctx, world, &s->view);
     if (status != BST_OK) {
         free(s);
         return status;
@@ -69,7 +69,7 @@ bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int obs
 
 void bst_loop_summary_free(bst_loop_summary *s) {
     if (s) {
-        bst_view_free(s->view);
+        bst_world_view_free(s->view);
         free(s);
     }
 }
@@ -86,9 +86,9 @@ static bst_vec3 track_direction_at(const bst_track *track, double seconds) {
 /* Whether the track, carried to the frame's middle, is on the true target. */
 static bool on_target(const bst_loop_summary *s, const waiting_frame *w, const bst_track *track,
                       int64_t tick) {
-    return w->known && bst_track_is_on_target(track->direction_gcrf, track->rate_gcrf_radps,
-                                              (double)(w->mid_tick - tick) / s->rate_hz,
-                                              w->direction, bst_camera_scale_rad(&s->camera));
+    return w->known && bst_eval_track_is_on_target(track->direction_gcrf, track->rate_gcrf_radps,
+                                                   (double)(w->mid_tick - tick) / s->rate_hz,
+                                                   w->direction, bst_camera_scale_rad(&s->camera));
 }
 
 /* Whether a track whose target cannot be seen foretells a place that the true one does not
@@ -154,23 +154,25 @@ static void retire(bst_loop_summary *s) {
 static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_truth *truth,
                                  waiting_frame *w) {
     bst_loop_frame *f = &w->frame;
-    bst_sight sight;
-    bst_status status = bst_view_sight(ctx, s->view, s->observer, s->target, f->time_s, &sight);
+    bst_world_sight sight;
+    bst_status status =
+        bst_world_view_sight(ctx, s->view, s->observer, s->target, f->time_s, &sight);
     if (status == BST_ERR_NUMERIC) {
         return BST_OK; /* decayed: nothing to see */
     }
     BST_TRY(status);
     w->known = true;
     w->direction = sight.geometric;
-    f->visible = !sight.occulted && bst_glow_electrons_per_s(&s->camera, &sight.glow, NULL) > 0.0;
-    f->error_px =
-        bst_pointing_error_px(&s->camera, truth->pixel_scale_arcsec, truth->q_cam_from_gcrf_mid,
-                              sight.apparent, &f->error_x_px, &f->error_y_px);
+    f->visible =
+        !sight.occulted && bst_scene_glow_electrons_per_s(&s->camera, &sight.glow, NULL) > 0.0;
+    f->error_px = bst_eval_pointing_error_px(&s->camera, truth->pixel_scale_arcsec,
+                                             truth->q_cam_from_gcrf_mid, sight.apparent,
+                                             &f->error_x_px, &f->error_y_px);
     const bst_camera *camera = &s->camera;
     bst_camera scaled;
     if (truth->pixel_scale_arcsec > 0.0 &&
         truth->pixel_scale_arcsec != camera->pixel_scale_arcsec) {
-        BST_TRY(bst_camera_at_scale(ctx, camera, truth->pixel_scale_arcsec, &scaled));
+        BST_TRY(bst_world_camera_at_scale(ctx, camera, truth->pixel_scale_arcsec, &scaled));
         camera = &scaled;
     }
     /* without an image the place stays unknown */

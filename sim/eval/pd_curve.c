@@ -95,8 +95,8 @@ static double log_likelihood(const fit *f, const double theta[TERMS]) {
         const bst_pd_point *p = &f->points[i];
         if (tells(f, p)) {
             double eta = value(f, theta, p->snr);
-            double hit = f->chance + (1.0 - f->chance) * bst_normal_tail(-eta);
-            double miss = (1.0 - f->chance) * bst_normal_tail(eta);
+            double hit = f->chance + (1.0 - f->chance) * bst_eval_normal_tail(-eta);
+            double miss = (1.0 - f->chance) * bst_eval_normal_tail(eta);
             sum += (double)p->detected * log(fmax(hit, 1e-300)) +
                    (double)(p->trials - p->detected) * log(fmax(miss, 1e-300));
         }
@@ -121,9 +121,9 @@ static bool run(fit *f) {
             }
             double b[TERMS], eta = value(f, f->theta, p->snr), n = (double)p->trials;
             if (round == 0) { /* a regression of the counted shares to begin with */
-                eta = -bst_normal_tail_inverse(share(p, f->chance));
+                eta = -bst_eval_normal_tail_inverse(share(p, f->chance));
             }
-            double hit = f->chance + (1.0 - f->chance) * bst_normal_tail(-eta);
+            double hit = f->chance + (1.0 - f->chance) * bst_eval_normal_tail(-eta);
             double slope = (1.0 - f->chance) * exp(-0.5 * eta * eta) / sqrt(2.0 * BST_PI);
             double weight = n * slope * slope / fmax(hit * (1.0 - hit), 1e-12);
             double off = round == 0 ? eta : ((double)p->detected / n - hit) / fmax(slope, 1e-12);
@@ -198,7 +198,8 @@ bst_pd_needed bst_pd_snr_at(const bst_pd_point *points, int count, double chance
     }
     /* half a step beyond the points that tell, for where they end just short of pd */
     double reach = 0.5 * (high - low) / (f.used - 1);
-    double want = -bst_normal_tail_inverse(pd), at = crossing(&f, want, low - reach, high + reach);
+    double want = -bst_eval_normal_tail_inverse(pd),
+           at = crossing(&f, want, low - reach, high + reach);
     if (isnan(at)) {
         return none;
     }
@@ -217,5 +218,5 @@ double bst_pd_loss_db(double snr, double pfa, double pd) {
     if (!(pfa > 0.0 && pfa < pd && pd < 1.0)) {
         return NAN;
     }
-    return 20.0 * log10(snr / bst_ideal_snr(pfa, pd));
+    return 20.0 * log10(snr / bst_eval_ideal_snr(pfa, pd));
 }

@@ -38,17 +38,17 @@ typedef struct frame {
     bool valid;
     int64_t exposure_id;
     double mid_s;
-    bst_light light;
+    bst_astro_light light;
     int count;
     seen_object objects[IN_FRAME];
-    bst_match_target targets[IN_FRAME];
+    bst_eval_match_target targets[IN_FRAME];
 } frame;
 
 /* What is known of an object: of one sensor, with the pass under way, or of all. */
 typedef struct record {
     bst_sighting sum;
-    bst_pass pass; /* frames 0: none */
-    int next;      /* record of the object's next sensor, -1: none */
+    bst_eval_pass pass; /* frames 0: none */
+    int next;           /* record of the object's next sensor, -1: none */
 } record;
 
 typedef struct sensor {
@@ -64,7 +64,7 @@ typedef struct sensor {
 struct bst_sightings {
     const bst_world *world;
     double tick_rate_hz, custody_s, end_s;
-    bst_pass_fn fn;
+    bst_eval_pass_fn fn;
     void *user;
     int sensor_count, object_count;
     sensor *sensors;
@@ -77,7 +77,7 @@ struct bst_sightings {
 };
 
 bst_status bst_sightings_create(bst_ctx *ctx, const bst_world *world, int64_t tick_rate_hz,
-                                double custody_s, bst_pass_fn pass, void *user,
+                                double custody_s, bst_eval_pass_fn pass, void *user,
                                 bst_sightings **out) {
     *out = NULL;
     bst_sightings *s = calloc(1, sizeof *s);
@@ -193,7 +193,7 @@ static void note_detection(const bst_sightings *s, bst_sighting *sum, double sec
     sum->last_s = seconds;
 }
 
-static void add_pass(bst_sighting *sum, const bst_pass *pass) {
+static void add_pass(bst_sighting *sum, const bst_eval_pass *pass) {
     sum->passes++;
     sum->passes_seen += pass->detected > 0;
     sum->frames += pass->frames;
@@ -242,13 +242,13 @@ static bst_status begin_pass(bst_ctx *ctx, bst_sightings *s, int sensor_index, i
     }
     e->open[e->open_count++] = index;
     record *r = &s->records[index];
-    r->pass = (bst_pass){.sensor = sensor_index,
-                         .object = r->sum.object,
-                         .start_s = seconds,
-                         .first_s = NAN,
-                         .last_s = NAN,
-                         .v_mag = INFINITY,
-                         .range_m = INFINITY};
+    r->pass = (bst_eval_pass){.sensor = sensor_index,
+                              .object = r->sum.object,
+                              .start_s = seconds,
+                              .first_s = NAN,
+                              .last_s = NAN,
+                              .v_mag = INFINITY,
+                              .range_m = INFINITY};
     return BST_OK;
 }
 
@@ -262,7 +262,7 @@ bst_status bst_sightings_truth(bst_ctx *ctx, bst_sightings *s, int sensor_index,
     f->valid = true;
     f->exposure_id = truth->exposure_id;
     f->mid_s = mid_s;
-    f->light = (bst_light){.sun_m = truth->sun_m, .velocity_mps = truth->velocity_bary_mps};
+    f->light = (bst_astro_light){.sun_m = truth->sun_m, .velocity_mps = truth->velocity_bary_mps};
     f->count = 0;
     BST_TRY(end_passes(ctx, s, e, mid_s - BST_PASS_BREAK_S));
     for (int i = 0; i < truth->count; i++) {
@@ -276,7 +276,7 @@ bst_status bst_sightings_truth(bst_ctx *ctx, bst_sightings *s, int sensor_index,
         if (s->records[index].pass.frames == 0) {
             BST_TRY(begin_pass(ctx, s, sensor_index, index, mid_s));
         }
-        bst_pass *pass = &s->records[index].pass;
+        bst_eval_pass *pass = &s->records[index].pass;
         pass->end_s = mid_s;
         pass->frames++;
         pass->lit += item->electrons > 0.0;
@@ -286,10 +286,11 @@ bst_status bst_sightings_truth(bst_ctx *ctx, bst_sightings *s, int sensor_index,
             pass->v_mag = item->v_mag;
         }
         if (item->electrons > 0.0 && f->count < IN_FRAME && !truth->dropped) {
-            f->targets[f->count] = (bst_match_target){.x_px = item->x_centroid_px,
-                                                      .y_px = item->y_centroid_px,
-                                                      .dx_px = item->x_end_px - item->x_start_px,
-                                                      .dy_px = item->y_end_px - item->y_start_px};
+            f->targets[f->count] =
+                (bst_eval_match_target){.x_px = item->x_centroid_px,
+                                        .y_px = item->y_centroid_px,
+                                        .dx_px = item->x_end_px - item->x_start_px,
+                                        .dy_px = item->y_end_px - item->y_start_px};
             f->objects[f->count++] = (seen_object){
                 .record = index, .direction = bst_vec3_from_radec(item->ra_rad, item->dec_rad)};
         }
@@ -326,7 +327,8 @@ void bst_sightings_detections(bst_sightings *s, int sensor_index, const bst_dete
         s->of_detection = more;
         s->detection_room = d->count;
     }
-    (void)bst_match_targets(f->targets, f->count, e->reach_px, d, s->of_target, s->of_detection);
+    (void)bst_eval_match_targets(f->targets, f->count, e->reach_px, d, s->of_target,
+                                 s->of_detection);
     for (int i = 0; i < f->count; i++) {
         const bst_detection *match = s->of_target[i] >= 0 ? &d->items[s->of_target[i]] : NULL;
         if (!match || is_taken_for_else(match)) {
@@ -369,10 +371,10 @@ void bst_sightings_tracks(bst_sightings *s, int sensor_index, const bst_tracks *
     bst_quat back = bst_quat_conj(tracks->attitude.q_cam_from_gcrf);
     for (int i = 0; i < f->count; i++) {
         const seen_object *o = &f->objects[i];
-        bst_pass *pass = &s->records[o->record].pass;
+        bst_eval_pass *pass = &s->records[o->record].pass;
         if (o->detected && tracks->attitude.valid) {
             bst_vec3 v = bst_camera_unproject(e->camera, o->x_px, o->y_px);
-            bst_vec3 seen = bst_light_unaberrate(&f->light, bst_quat_rotate(back, v));
+            bst_vec3 seen = bst_astro_light_unaberrate(&f->light, bst_quat_rotate(back, v));
             add_error(&pass->place, bst_vec3_angle(seen, o->direction) / BST_ARCSEC_RAD);
         }
         const bst_track *track = track_of(tracks, o->direction, reach);

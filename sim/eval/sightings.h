@@ -15,7 +15,7 @@ double bst_sighting_rms(const bst_sighting_error *error); /* NAN: there are none
 
 /* An object in a sensor's field, without a break of more than BST_PASS_BREAK_S. */
 #define BST_PASS_BREAK_S 60.0
-typedef struct bst_pass {
+typedef struct bst_eval_pass {
     int sensor, object;
     double start_s, end_s;    /* middles of the first and the last frame */
     int64_t frames, lit;      /* frames that it was in; with light of it */
@@ -27,7 +27,7 @@ typedef struct bst_pass {
     double range_m;           /* shortest */
     bst_sighting_error place; /* of detections, by the attitude from stars */
     bst_sighting_error track; /* of confirmed tracks */
-} bst_pass;
+} bst_eval_pass;
 
 /* All passes of an object over a sensor; of all sensors with sensor -1. */
 typedef struct bst_sighting {
@@ -61,13 +61,13 @@ typedef struct bst_sightings_figures {
 typedef struct bst_sightings bst_sightings;
 
 /* Takes a pass that is over; lent. */
-typedef bst_status (*bst_pass_fn)(void *user, bst_ctx *ctx, const bst_pass *pass);
+typedef bst_status (*bst_eval_pass_fn)(void *user, bst_ctx *ctx, const bst_eval_pass *pass);
 typedef bst_status (*bst_sighting_fn)(void *user, bst_ctx *ctx, const bst_sighting *sighting);
 
 /* The sensors are all of the world's, in its order. custody_s: how long an object counts as known
  * after a detection. The world outlives it. */
 bst_status bst_sightings_create(bst_ctx *ctx, const bst_world *world, int64_t tick_rate_hz,
-                                double custody_s, bst_pass_fn pass, void *user,
+                                double custody_s, bst_eval_pass_fn pass, void *user,
                                 bst_sightings **out) BST_MUST_CHECK;
 void bst_sightings_free(bst_sightings *sightings);
 

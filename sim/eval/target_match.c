@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-bool bst_match_belongs(const bst_match_target *t, double reach, const bst_detection *d) {
+bool bst_eval_match_belongs(const bst_eval_match_target *t, double reach, const bst_detection *d) {
     double x = d->x_px - t->x_px, y = d->y_px - t->y_px, length = hypot(t->dx_px, t->dy_px);
     if (0.5 * length <= reach) {
         return hypot(x, y) <= reach;
@@ -12,12 +12,12 @@ bool bst_match_belongs(const bst_match_target *t, double reach, const bst_detect
     return fabs(along) <= 0.5 * length && fabs(across) <= reach;
 }
 
-static double distance(const bst_match_target *t, const bst_detection *d) {
+static double distance(const bst_eval_match_target *t, const bst_detection *d) {
     return hypot(d->x_px - t->x_px, d->y_px - t->y_px);
 }
 
-int bst_match_targets(const bst_match_target *targets, int count, double reach_px,
-                      const bst_detections *detections, int *of_target, int *of_detection) {
+int bst_eval_match_targets(const bst_eval_match_target *targets, int count, double reach_px,
+                           const bst_detections *detections, int *of_target, int *of_detection) {
     int matched = 0;
     double widest = reach_px;
     for (int t = 0; t < count; t++) {
@@ -30,7 +30,7 @@ int bst_match_targets(const bst_match_target *targets, int count, double reach_p
         for (int t = 0; t < count; t++) {
             if (fabs(d->y_px - targets[t].y_px) > widest ||
                 fabs(d->x_px - targets[t].x_px) > widest ||
-                !bst_match_belongs(&targets[t], reach_px, d)) {
+                !bst_eval_match_belongs(&targets[t], reach_px, d)) {
                 continue;
             }
             if (nearest < 0 || distance(&targets[t], d) < distance(&targets[nearest], d)) {

@@ -74,7 +74,7 @@ bool bst_track_bound_covariance(const bst_track_bound *bound, double covariance[
 #define REACH 6.0
 #define DRAWS 200000
 
-double bst_information_factor(double pd, double density) {
+double bst_eval_information_factor(double pd, double density) {
     if (!(density > 0.0)) {
         return pd;
     }

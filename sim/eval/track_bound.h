@@ -19,7 +19,7 @@ bool bst_track_bound_start(bst_track_bound *bound, const double r1[3], const dou
 /* One step of the recursion of Tichavsky, Muravchik and Nehorai (IEEE Trans. SP 46, 1998), which
  * for linear motion with noise is J' = (Q + F J^-1 F^T)^-1 + factor H^T R^-1 H: dt_s onward along a
  * great circle at rate_radps, then a measurement of covariance r (as above). factor is the share of
- * a measurement's information that is left on average: bst_information_factor, or 1 with and 0
+ * a measurement's information that is left on average: bst_eval_information_factor, or 1 with and 0
  * without a detection for the bound given who was detected when. False when it cannot be inverted.
  */
 bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps,
@@ -35,6 +35,6 @@ bool bst_track_bound_covariance(const bst_track_bound *bound, double covariance[
  * score of the likelihood (1 - pd) + pd / density * sum of phi(z_i). pd without false alarms. 0 <
  * pd <= 1, density >= 0. By 2e5 pseudo-random draws, always the same: relative error about 0.003.
  */
-double bst_information_factor(double pd, double density);
+double bst_eval_information_factor(double pd, double density);
 
 #endif

@@ -10,11 +10,11 @@
 #include "sim/run/run_sensors.h"
 #include "sim/world/world.h"
 
-typedef enum bst_observation_format {
+typedef enum bst_export_observation_format {
     BST_OBSERVATIONS_TDM,
     BST_OBSERVATIONS_JSON,
     BST_OBSERVATIONS_CSV
-} bst_observation_format;
+} bst_export_observation_format;
 
 typedef struct bst_export {
     const bst_run_reader *run;
@@ -30,7 +30,7 @@ typedef struct bst_export {
     double step_s;
     const char *objects; /* see bst_orbit_selection_make; NULL: its default */
     /* observations */
-    int observation_format; /* bst_observation_format */
+    int observation_format; /* bst_export_observation_format */
     bool filtered;          /* the tracker's states instead of measured directions */
     /* SatNet */
     const char *satnet; /* folder */
@@ -48,7 +48,8 @@ bst_status bst_export_tables(bst_ctx *ctx, const bst_export *e, const char *tabl
 bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 /* The sensors' fields of view, as packets of a CZML document that holds their observers. */
 bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                            const bst_world *world, bst_view *view, FILE *stream) BST_MUST_CHECK;
+                            const bst_world *world, bst_world_view *view,
+                            FILE *stream) BST_MUST_CHECK;
 /* Shares of training, validation and test, made to add up to 1. BST_ERR_ARGUMENT for a text that is
  * not three numbers of 0 or more, or all 0. */
 bst_status bst_export_split(bst_ctx *ctx, const char *text, double shares[3]) BST_MUST_CHECK;
@@ -57,7 +58,7 @@ bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 /* PNG images with bounding boxes, as COCO and YOLO have them, below e->coco and e->yolo. */
 bst_status bst_export_boxes(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 /* Name of a set of frames: that of the run's folder, with the sensor's (NULL: without). */
-void bst_export_set_name(const bst_run_reader *run, const bst_export_sensor *sensor, char out[256]);
+void bst_export_set_name(const bst_run_reader *run, const bst_run_sensor *sensor, char out[256]);
 /* BST_ERR_NOT_FOUND for a run without truth, by which frames are labelled. */
 bst_status bst_export_need_truth(bst_ctx *ctx, const bst_run_reader *run) BST_MUST_CHECK;
 /* observations.tdm, .json or .csv: what sensors measured of tracks. */

@@ -37,9 +37,9 @@ typedef struct extent {
 
 typedef struct job {
     const bst_export *e;
-    const bst_export_sensor *sensor;
+    const bst_run_sensor *sensor;
     bst_fits_reader *fits;
-    bst_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
+    bst_io_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
     bool truth_more;
     char set[256];
     bst_fits_reader *masks;  /* NULL: the run has none */
@@ -91,22 +91,22 @@ static bool clip(const double v[3], double margin, double size, double *from, do
 
 /* The box of the current row of the truth; false when there is none in the image. */
 static bool box_of(const job *j, const frame_row *f, box *out) {
-    const bst_rows *r = j->truth;
+    const bst_io_rows *r = j->truth;
     double x[3], y[3], margin = fmax(0.5 * j->e->box_px, 0.5 * LEAST_PX);
     /* boxes hold the light, which the optics put beside the chief ray */
-    double beside_x = bst_rows_real(r, 13) - bst_rows_real(r, 11);
-    double beside_y = bst_rows_real(r, 14) - bst_rows_real(r, 12);
+    double beside_x = bst_io_rows_real(r, 13) - bst_io_rows_real(r, 11);
+    double beside_y = bst_io_rows_real(r, 14) - bst_io_rows_real(r, 12);
     bool finite = true;
     for (int k = 0; k < 3; k++) {
-        x[k] = (bst_rows_real(r, 2 + k) + beside_x - f->x0_px + 0.5) / f->binning;
-        y[k] = (bst_rows_real(r, 5 + k) + beside_y - f->y0_px + 0.5) / f->binning;
+        x[k] = (bst_io_rows_real(r, 2 + k) + beside_x - f->x0_px + 0.5) / f->binning;
+        y[k] = (bst_io_rows_real(r, 5 + k) + beside_y - f->y0_px + 0.5) / f->binning;
         finite = finite && isfinite(x[k]) && isfinite(y[k]);
     }
-    out->class = strcmp(bst_rows_text(r, 1), "star") == 0 ? STAR : SATELLITE;
-    out->x_centroid = (bst_rows_real(r, 13) - f->x0_px + 0.5) / f->binning;
-    out->y_centroid = (bst_rows_real(r, 14) - f->y0_px + 0.5) / f->binning;
-    bool bright = bst_rows_real(r, 9) > 0.0 &&
-                  (out->class != STAR || bst_rows_real(r, 8) <= j->e->star_limit);
+    out->class = strcmp(bst_io_rows_text(r, 1), "star") == 0 ? STAR : SATELLITE;
+    out->x_centroid = (bst_io_rows_real(r, 13) - f->x0_px + 0.5) / f->binning;
+    out->y_centroid = (bst_io_rows_real(r, 14) - f->y0_px + 0.5) / f->binning;
+    bool bright = bst_io_rows_real(r, 9) > 0.0 &&
+                  (out->class != STAR || bst_io_rows_real(r, 8) <= j->e->star_limit);
     return finite && bright && clip(x, margin, f->width, &out->x, &out->width) &&
            clip(y, margin, f->height, &out->y, &out->height);
 }
@@ -184,7 +184,7 @@ static bst_status read_mask(bst_ctx *ctx, job *j, const frame_row *f, int64_t in
 /* "segmentation" and "area" of the current row of the truth: of its pixels in the mask; without
  * any no polygons and the area of the box. */
 static bst_status add_segmentation(bst_ctx *ctx, const job *j, const box *b, cJSON *node) {
-    int64_t item = bst_rows_int(j->truth, 17);
+    int64_t item = bst_io_rows_int(j->truth, 17);
     bool shown = j->mask.items && item > 0 && item < j->extent_count && j->extents[item].pixels > 0;
     char *text = NULL;
     size_t bytes;
@@ -223,10 +223,10 @@ static bst_status add_coco_box(bst_ctx *ctx, job *j, const box *b) {
     bst_status status = add_segmentation(ctx, j, b, node);
     bst_json_add_number(node, "x_centroid", b->x_centroid);
     bst_json_add_number(node, "y_centroid", b->y_centroid);
-    bst_json_add_number(node, "v_mag", bst_rows_real(j->truth, 8));
-    bst_json_add_number(node, "snr", bst_rows_real(j->truth, 10));
-    cJSON_AddStringToObject(node, "object_name", bst_rows_text(j->truth, 15));
-    cJSON_AddNumberToObject(node, "norad", (double)bst_rows_int(j->truth, 16));
+    bst_json_add_number(node, "v_mag", bst_io_rows_real(j->truth, 8));
+    bst_json_add_number(node, "snr", bst_io_rows_real(j->truth, 10));
+    cJSON_AddStringToObject(node, "object_name", bst_io_rows_text(j->truth, 15));
+    cJSON_AddNumberToObject(node, "norad", (double)bst_io_rows_int(j->truth, 16));
     cJSON_AddItemToArray(j->annotations, node);
     return status;
 }
@@ -247,9 +247,9 @@ static void add_coco_image(job *j, const frame_row *f) {
 /* Boxes of a frame: the rows of its exposure, of which earlier ones are left behind. `yolo` NULL:
  * none. */
 static bst_status write_boxes(bst_ctx *ctx, job *j, const frame_row *f, FILE *yolo) {
-    for (; j->truth_more && bst_rows_int(j->truth, 0) <= f->id;) {
+    for (; j->truth_more && bst_io_rows_int(j->truth, 0) <= f->id;) {
         box b;
-        if (bst_rows_int(j->truth, 0) == f->id && box_of(j, f, &b)) {
+        if (bst_io_rows_int(j->truth, 0) == f->id && box_of(j, f, &b)) {
             if (yolo) {
                 fprintf(yolo, "%d %.9f %.9f %.9f %.9f\n", b.class, (b.x + 0.5 * b.width) / f->width,
                         (b.y + 0.5 * b.height) / f->height, b.width / f->width,
@@ -260,7 +260,7 @@ static bst_status write_boxes(bst_ctx *ctx, job *j, const frame_row *f, FILE *yo
             }
             j->boxes++;
         }
-        BST_TRY(bst_rows_next(ctx, j->truth, &j->truth_more));
+        BST_TRY(bst_io_rows_next(ctx, j->truth, &j->truth_more));
     }
     return BST_OK;
 }
@@ -279,7 +279,7 @@ static bst_status write_image(bst_ctx *ctx, const job *j, const char *folder, co
     if (!bgr) {
         return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
     }
-    bst_stretch stretch = bst_stretch_of(image->pixels, f->width, f->height);
+    bst_io_stretch stretch = bst_io_stretch_of(image->pixels, f->width, f->height);
     bst_status status = bst_frame_picture(ctx, image->pixels, f->width, f->height, stretch, NULL,
                                           f->width, f->height, &picture);
     if (status == BST_OK) {
@@ -324,22 +324,22 @@ static bst_status write_frame(bst_ctx *ctx, job *j, frame_row *f) {
 }
 
 static bst_status write_frames(bst_ctx *ctx, job *j) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     bst_progress progress;
     bst_status status;
-    BST_TRY(bst_rows_open(ctx, j->e->run, frames_sql, j->sensor->index, 0, &rows));
+    BST_TRY(bst_io_rows_open(ctx, j->e->run, frames_sql, j->sensor->index, 0, &rows));
     bst_progress_start(
         &progress, j->set, "frames",
         bst_run_reader_int(j->e->run, "SELECT count(*) FROM frames WHERE sensor = ?1",
                            j->sensor->index, 0));
-    for (int64_t n = 0; (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more; n++) {
-        frame_row f = {.id = bst_rows_int(rows, 0),
-                       .fits_index = bst_rows_int(rows, 1),
-                       .x0_px = bst_rows_real(rows, 2),
-                       .y0_px = bst_rows_real(rows, 3),
-                       .binning = fmax(1.0, bst_rows_real(rows, 4))};
-        snprintf(f.utc, sizeof f.utc, "%s", bst_rows_text(rows, 5));
+    for (int64_t n = 0; (status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more; n++) {
+        frame_row f = {.id = bst_io_rows_int(rows, 0),
+                       .fits_index = bst_io_rows_int(rows, 1),
+                       .x0_px = bst_io_rows_real(rows, 2),
+                       .y0_px = bst_io_rows_real(rows, 3),
+                       .binning = fmax(1.0, bst_io_rows_real(rows, 4))};
+        snprintf(f.utc, sizeof f.utc, "%s", bst_io_rows_text(rows, 5));
         if (f.id < j->e->first || f.id > j->e->last || (f.id - j->e->first) % j->e->every != 0) {
             continue;
         }
@@ -351,7 +351,7 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
         bst_progress_update(&progress, n + 1);
     }
     bst_progress_end(&progress);
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
@@ -359,8 +359,8 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     char path[4096];
     bst_export_set_name(j->e->run, several ? j->sensor : NULL, j->set);
     BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));
-    BST_TRY(bst_rows_open(ctx, j->e->run, truth_sql, j->sensor->index, 0, &j->truth));
-    bst_status status = bst_rows_next(ctx, j->truth, &j->truth_more);
+    BST_TRY(bst_io_rows_open(ctx, j->e->run, truth_sql, j->sensor->index, 0, &j->truth));
+    bst_status status = bst_io_rows_next(ctx, j->truth, &j->truth_more);
     j->fits = j->masks = NULL;
     j->sensors++;
     if (status == BST_OK) {
@@ -370,7 +370,7 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     status = status == BST_OK ? write_frames(ctx, j) : status;
     bst_fits_reader_close(j->fits);
     bst_fits_reader_close(j->masks);
-    bst_rows_close(j->truth);
+    bst_io_rows_close(j->truth);
     return status;
 }
 
@@ -412,10 +412,10 @@ static bst_status make_folders(bst_ctx *ctx, const char *folder, bool labels) {
 }
 
 static bst_status export_all(bst_ctx *ctx, job *j) {
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
     int count, kept = 0;
     bool several = bst_run_reader_int(j->e->run, "SELECT count(*) FROM sensors", 0, 1) > 1;
-    BST_TRY(bst_export_sensors(ctx, j->e->run, j->e->sensor, sensors, &count));
+    BST_TRY(bst_run_sensors(ctx, j->e->run, j->e->sensor, sensors, &count));
     BST_TRY(bst_export_need_truth(ctx, j->e->run));
     for (int i = 0; i < count; i++) {
         if (sensors[i].file[0]) {
@@ -455,8 +455,8 @@ bst_status bst_export_boxes(bst_ctx *ctx, const bst_export *e) {
         if (folders[k]) {
             char frames[BST_COUNT_TEXT], boxes[BST_COUNT_TEXT];
             printf("%s: %s with %s\n", folders[k],
-                   bst_count_text(frames, j.written, "frame", "frames"),
-                   bst_count_text(boxes, j.boxes, "box", "boxes"));
+                   bst_text_of_count(frames, j.written, "frame", "frames"),
+                   bst_text_of_count(boxes, j.boxes, "box", "boxes"));
             if (k == 0 && j.masked < j.sensors) {
                 printf(
                     "  \"segmentation\" is empty: the run has no masks; record them with "

@@ -17,14 +17,14 @@ enum { STRETCH_FRAMES = 9 };
 /* The frames of one sensor on their way. */
 typedef struct job {
     const bst_export *e;
-    const bst_export_sensor *sensor;
+    const bst_run_sensor *sensor;
     bst_fits_reader *fits;
     bst_frame_marks *marks;
     int64_t *chosen; /* indices into the file */
     int64_t *ids;    /* numbers of their exposures */
     int64_t count;
     int width, height; /* of a picture */
-    bst_stretch stretch;
+    bst_io_stretch stretch;
     bst_video *video;
     bool refused; /* ffmpeg took no more */
     uint8_t *bgr;
@@ -68,7 +68,7 @@ static bst_status find_stretch(bst_ctx *ctx, job *j) {
         bst_fits_read_frame frame;
         int64_t at = n > 1 ? i * (j->count - 1) / (n - 1) : 0;
         BST_TRY(bst_fits_reader_frame(ctx, j->fits, j->chosen[at], &frame));
-        bst_stretch s = bst_stretch_of(frame.pixels, frame.width, frame.height);
+        bst_io_stretch s = bst_io_stretch_of(frame.pixels, frame.width, frame.height);
         values[0][i] = s.black;
         values[1][i] = s.white - s.black;
         values[2][i] = s.softening;
@@ -77,20 +77,21 @@ static bst_status find_stretch(bst_ctx *ctx, job *j) {
         qsort(values[k], (size_t)n, sizeof **values, ascending);
     }
     double black = values[0][n / 2];
-    j->stretch = (bst_stretch){black, black + values[1][n / 2], values[2][n / 2]};
+    j->stretch = (bst_io_stretch){black, black + values[1][n / 2], values[2][n / 2]};
     return BST_OK;
 }
 
 static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
     bst_fits_read_frame frame;
-    bst_overlay overlay;
+    bst_io_overlay overlay;
     bst_picture *picture;
     BST_TRY(bst_fits_reader_frame(ctx, j->fits, j->chosen[k], &frame));
     if (j->e->annotate) {
         BST_TRY(bst_frame_marks_get(ctx, j->marks, j->ids[k], &overlay));
     }
-    bst_stretch stretch =
-        j->e->each_stretch ? bst_stretch_of(frame.pixels, frame.width, frame.height) : j->stretch;
+    bst_io_stretch stretch = j->e->each_stretch
+                                 ? bst_io_stretch_of(frame.pixels, frame.width, frame.height)
+                                 : j->stretch;
     /* a PNG has its frame's own size, a film one for all */
     int width = j->width, height = j->height;
     if (!j->e->film) {
@@ -164,7 +165,7 @@ static bst_status export_sensor(bst_ctx *ctx, job *j) {
     const bst_fits_file_info *info = bst_fits_reader_info(j->fits);
     if (j->count == 0) {
         bst_log(ctx, BST_LOG_WARNING, "%s: of its %s none is among those asked for", path,
-                bst_count_text((char[BST_COUNT_TEXT]){0}, info->frames, "frame", "frames"));
+                bst_text_of_count((char[BST_COUNT_TEXT]){0}, info->frames, "frame", "frames"));
         return BST_OK;
     }
     double longest = info->width > info->height ? info->width : info->height;
@@ -178,14 +179,14 @@ static bst_status export_sensor(bst_ctx *ctx, job *j) {
     BST_TRY(open_output(ctx, j));
     BST_TRY(write_frames(ctx, j));
     printf("%s%s: %s\n", j->path, j->e->film ? "" : "/",
-           bst_count_text((char[BST_COUNT_TEXT]){0}, j->count, "frame", "frames"));
+           bst_text_of_count((char[BST_COUNT_TEXT]){0}, j->count, "frame", "frames"));
     return BST_OK;
 }
 
 bst_status bst_export_frames(bst_ctx *ctx, const bst_export *e) {
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
     int count, kept = 0;
-    BST_TRY(bst_export_sensors(ctx, e->run, e->sensor, sensors, &count));
+    BST_TRY(bst_run_sensors(ctx, e->run, e->sensor, sensors, &count));
     for (int i = 0; i < count; i++) {
         if (!sensors[i].file[0]) {
             continue;

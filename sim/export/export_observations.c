@@ -43,12 +43,12 @@ static bst_status write_track(void *user, bst_ctx *ctx, const bst_run_track *tra
 }
 
 static bst_status write_all(bst_ctx *ctx, output *o) {
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
     char created[32];
     int count;
-    BST_TRY(bst_export_sensors(ctx, o->e->run, o->e->sensor, sensors, &count));
+    BST_TRY(bst_run_sensors(ctx, o->e->run, o->e->sensor, sensors, &count));
     if (o->e->observation_format == BST_OBSERVATIONS_TDM) {
-        bst_creation_date(created);
+        bst_run_creation_date(created);
         BST_TRY(
             bst_tdm_write_head(ctx, o->stream, created, "BORESIGHT", "angles of a simulated run"));
     } else if (o->e->observation_format == BST_OBSERVATIONS_JSON) {
@@ -91,9 +91,10 @@ bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) {
     }
     bst_run_scene_close(&scene);
     BST_TRY(status);
-    printf("%s: %s of %s\n", path,
-           bst_count_text((char[BST_COUNT_TEXT]){0}, o.observations, "observation", "observations"),
-           bst_count_text((char[BST_COUNT_TEXT]){0}, o.tracks, "track", "tracks"));
+    printf(
+        "%s: %s of %s\n", path,
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, o.observations, "observation", "observations"),
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, o.tracks, "track", "tracks"));
     if (o.skipped > 0) {
         bst_log(ctx, BST_LOG_WARNING,
                 "%" PRId64

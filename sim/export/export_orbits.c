@@ -36,26 +36,26 @@ enum { MOST_BREAKS = 4096, MOST_KEPT_ROWS = 65536 };
 
 /* One orbit, a stretch of it without a burn inside, on a grid of times. */
 typedef struct track {
-    bst_view *view;
+    bst_world_view *view;
     const bst_world *world;
     int observer, object; /* one is -1 */
     int sensor;           /* whose knowledge of the observer is meant; -1: the truth */
     double step_s, span_s;
     double breaks[MOST_BREAKS + 2]; /* 0, where burns begin and end, the end */
     int break_count;
-    double from_s, to_s; /* of the stretch */
-    int64_t inner;       /* first row of the grid after from_s */
-    int64_t first;       /* row of the stretch that a series begins with */
-    bst_state *kept;     /* the first rows of the stretch, up to MOST_KEPT_ROWS; NULL: none */
+    double from_s, to_s;   /* of the stretch */
+    int64_t inner;         /* first row of the grid after from_s */
+    int64_t first;         /* row of the stretch that a series begins with */
+    bst_world_state *kept; /* the first rows of the stretch, up to MOST_KEPT_ROWS; NULL: none */
 } track;
 
-static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
+static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_world_state *out) {
     bst_bodies bodies;
     if (t->sensor >= 0) {
-        return bst_view_believed(ctx, t->view, t->observer, t->sensor, seconds, out, &bodies);
+        return bst_world_view_nav(ctx, t->view, t->observer, t->sensor, seconds, out, &bodies);
     }
-    return t->observer >= 0 ? bst_view_observer_state(ctx, t->view, t->observer, seconds, out)
-                            : bst_view_object_state(ctx, t->view, t->object, seconds, out);
+    return t->observer >= 0 ? bst_world_view_observer_state(ctx, t->view, t->observer, seconds, out)
+                            : bst_world_view_object_state(ctx, t->view, t->object, seconds, out);
 }
 
 /* Rows of a stretch: its ends, and step, 2 step ... between them. */
@@ -70,7 +70,7 @@ static double seconds_of(const track *t, int64_t row) {
 }
 
 /* State of a row; at a stretch's end that of before a burn there. */
-static bst_status row_state(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
+static bst_status row_state(const track *t, bst_ctx *ctx, double seconds, bst_world_state *out) {
     if (seconds < t->to_s || t->to_s >= t->span_s) {
         return state_of(t, ctx, seconds, out);
     }
@@ -83,7 +83,7 @@ static bst_status row_state(const track *t, bst_ctx *ctx, double seconds, bst_st
 static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
                          bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const track *t = user;
-    bst_state state;
+    bst_world_state state;
     row += t->first;
     double seconds = seconds_of(t, row);
     if (t->kept && row < MOST_KEPT_ROWS) {
@@ -152,7 +152,8 @@ static void find_breaks(const bst_scenario *scenario, bool czml, track *t) {
 /* Writes `rows` rows from t->first on, the `piece`th stretch in which there is an orbit. */
 static bst_status write_piece(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t,
                               int64_t rows, int piece) {
-    const bst_object_info *info = t->object >= 0 ? bst_world_object(t->world, t->object) : NULL;
+    const bst_world_object_info *info =
+        t->object >= 0 ? bst_world_object(t->world, t->object) : NULL;
     const char *name = info ? info->name : bst_world_observer_name(t->world, t->observer);
     char id[96], number[24] = "";
     bst_state_series series = {.rows = rows, .state = row_of, .user = t};
@@ -200,7 +201,7 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenari
         }
         const int64_t rows = rows_of(t);
         for (int64_t row = 0; row < rows;) {
-            bst_state state;
+            bst_world_state state;
             t->first = row;
             while (row < rows && row_state(t, ctx, seconds_of(t, row), &state) == BST_OK) {
                 if (t->kept && row < MOST_KEPT_ROWS) {
@@ -252,8 +253,8 @@ static bst_status write_tracks(bst_ctx *ctx, const bst_export *e, const bst_scen
 }
 
 static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                               const bst_world *world, bst_view *view, const bst_orbit_selection *s,
-                               FILE *stream, int *written) {
+                               const bst_world *world, bst_world_view *view,
+                               const bst_orbit_selection *s, FILE *stream, int *written) {
     track t = {.view = view, .world = world, .sensor = -1, .span_s = recorded_s(e->run, scenario)};
     t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
     if (!(t.span_s > 0.0)) {
@@ -265,7 +266,7 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
                                     bst_world_time(world, t.span_s), 1.0));
     } else {
         char created[32];
-        bst_creation_date(created);
+        bst_run_creation_date(created);
         BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
                                    "true states of a simulated run"));
     }
@@ -283,11 +284,11 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
 
 /* The observers' orbits as they believe them; of several sensors the first that is asked for. */
 static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                                 const bst_world *world, bst_view *view,
+                                 const bst_world *world, bst_world_view *view,
                                  const bst_orbit_selection *s, FILE *stream, int *written) {
     (void)s; /* no objects */
     track t = {.view = view, .world = world, .object = -1, .span_s = recorded_s(e->run, scenario)};
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
     char created[32];
     int count;
     t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
@@ -295,8 +296,8 @@ static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const bst_sc
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no time span to write orbits for",
                         bst_run_reader_folder(e->run));
     }
-    BST_TRY(bst_export_sensors(ctx, e->run, e->sensor, sensors, &count));
-    bst_creation_date(created);
+    BST_TRY(bst_run_sensors(ctx, e->run, e->sensor, sensors, &count));
+    bst_run_creation_date(created);
     BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
                                "states of a simulated run's observers as they are known on board"));
     const bst_run_scene scene = {.run = e->run, .scenario = *scenario};
@@ -319,7 +320,7 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     char path[4096];
     bst_draft draft;
     bst_world *world = NULL;
-    bst_view *view = NULL;
+    bst_world_view *view = NULL;
     bst_orbit_selection selection = {0};
     int written = 0;
     /* orbits need no stars */
@@ -333,7 +334,7 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     }
     BST_TRY(bst_world_create(ctx, scenario->file, &config, &scenario->observers, scenario->base_dir,
                              scenario->epoch, &world));
-    bst_status status = bst_view_create(ctx, world, &view);
+    bst_status status = bst_world_view_create(ctx, world, &view);
     if (status == BST_OK && !believed) {
         status = bst_orbit_selection_make(ctx, e->run, world, e->objects, &selection);
     }
@@ -347,17 +348,17 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     }
     if (status == BST_OK) {
         printf("%s: %s", path,
-               bst_count_text((char[BST_COUNT_TEXT]){0}, written, "orbit", "orbits"));
+               bst_text_of_count((char[BST_COUNT_TEXT]){0}, written, "orbit", "orbits"));
         if (selection.left_out > 0) {
-            printf(
-                "; %s that came into no field %s left out (--objects all)",
-                bst_count_text((char[BST_COUNT_TEXT]){0}, selection.left_out, "object", "objects"),
-                selection.left_out == 1 ? "is" : "are");
+            printf("; %s that came into no field %s left out (--objects all)",
+                   bst_text_of_count((char[BST_COUNT_TEXT]){0}, selection.left_out, "object",
+                                     "objects"),
+                   selection.left_out == 1 ? "is" : "are");
         }
         printf("\n");
     }
     bst_orbit_selection_free(&selection);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
     return status;
 }

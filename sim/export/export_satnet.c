@@ -45,11 +45,11 @@ bst_status bst_export_split(bst_ctx *ctx, const char *text, double shares[PARTS]
 /* The frames of one sensor on their way. */
 typedef struct job {
     const bst_export *e;
-    const bst_export_sensor *sensor;
+    const bst_run_sensor *sensor;
     const bst_scenario *scenario;
     const bst_camera *camera;
     bst_fits_reader *fits;
-    bst_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
+    bst_io_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
     bool truth_more;
     bool mask; /* the run has a segmentation mask */
     int64_t written;
@@ -77,32 +77,33 @@ static const char frames_sql[] =
     " FROM frames f JOIN exposures e USING (sensor, exposure_id)"
     " WHERE f.sensor = ?1 AND f.fits_index IS NOT NULL ORDER BY f.exposure_id";
 
-static bst_vec3 vector(const bst_rows *rows, int column) {
-    return (bst_vec3){bst_rows_real(rows, column), bst_rows_real(rows, column + 1),
-                      bst_rows_real(rows, column + 2)};
+static bst_vec3 vector(const bst_io_rows *rows, int column) {
+    return (bst_vec3){bst_io_rows_real(rows, column), bst_io_rows_real(rows, column + 1),
+                      bst_io_rows_real(rows, column + 2)};
 }
 
-static bst_status read_frame_row(bst_ctx *ctx, const job *j, const bst_rows *rows, frame_row *r) {
-    *r = (frame_row){.id = bst_rows_int(rows, 0), .fits_index = bst_rows_int(rows, 1)};
-    snprintf(r->start_utc, sizeof r->start_utc, "%s", bst_rows_text(rows, 10));
+static bst_status read_frame_row(bst_ctx *ctx, const job *j, const bst_io_rows *rows,
+                                 frame_row *r) {
+    *r = (frame_row){.id = bst_io_rows_int(rows, 0), .fits_index = bst_io_rows_int(rows, 1)};
+    snprintf(r->start_utc, sizeof r->start_utc, "%s", bst_io_rows_text(rows, 10));
     bst_fits_frame *f = &r->frame;
     f->id = r->id;
     f->start =
-        bst_time_at_tick(j->scenario->epoch, bst_rows_int(rows, 2), j->scenario->tick_rate_hz);
-    f->exposure_s = bst_rows_real(rows, 3);
-    f->window = (bst_window){(int)bst_rows_int(rows, 4), (int)bst_rows_int(rows, 5),
-                             (int)bst_rows_int(rows, 6), (int)bst_rows_int(rows, 7)};
-    f->binning = (int)bst_rows_int(rows, 8);
-    f->bits = (int)bst_rows_int(rows, 9);
-    f->pixel_scale_arcsec = bst_rows_real(rows, 11);
-    bst_quat q = {bst_rows_real(rows, 12), bst_rows_real(rows, 13), bst_rows_real(rows, 14),
-                  bst_rows_real(rows, 15)};
+        bst_time_at_tick(j->scenario->epoch, bst_io_rows_int(rows, 2), j->scenario->tick_rate_hz);
+    f->exposure_s = bst_io_rows_real(rows, 3);
+    f->window = (bst_window){(int)bst_io_rows_int(rows, 4), (int)bst_io_rows_int(rows, 5),
+                             (int)bst_io_rows_int(rows, 6), (int)bst_io_rows_int(rows, 7)};
+    f->binning = (int)bst_io_rows_int(rows, 8);
+    f->bits = (int)bst_io_rows_int(rows, 9);
+    f->pixel_scale_arcsec = bst_io_rows_real(rows, 11);
+    bst_quat q = {bst_io_rows_real(rows, 12), bst_io_rows_real(rows, 13),
+                  bst_io_rows_real(rows, 14), bst_io_rows_real(rows, 15)};
     f->has_observer = true;
     f->observer_gcrf_m = vector(rows, 16);
     f->observer_gcrf_mps = vector(rows, 19);
-    bst_light light = {.velocity_mps = vector(rows, 22), .sun_m = vector(rows, 25)};
+    bst_astro_light light = {.velocity_mps = vector(rows, 22), .sun_m = vector(rows, 25)};
     bst_camera camera;
-    BST_TRY(bst_camera_at_scale(ctx, j->camera, f->pixel_scale_arcsec, &camera));
+    BST_TRY(bst_world_camera_at_scale(ctx, j->camera, f->pixel_scale_arcsec, &camera));
     f->has_wcs = bst_wcs_fit(ctx, &camera, q, &light, &f->wcs) == BST_OK;
     return BST_OK;
 }
@@ -137,16 +138,17 @@ static const char truth_sql[] =
 
 /* The label of the current row of the truth; NULL when it is none of the frame's. */
 static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height) {
-    const bst_rows *r = j->truth;
-    bool star = strcmp(bst_rows_text(r, 1), "star") == 0;
-    double x[3], y[3], v_mag = bst_rows_real(r, 10), electrons = bst_rows_real(r, 11);
+    const bst_io_rows *r = j->truth;
+    bool star = strcmp(bst_io_rows_text(r, 1), "star") == 0;
+    double x[3], y[3], v_mag = bst_io_rows_real(r, 10), electrons = bst_io_rows_real(r, 11);
     double binning = f->binning > 1 ? f->binning : 1;
-    double chief_x = bst_rows_real(r, 17), chief_y = bst_rows_real(r, 18);
+    double chief_x = bst_io_rows_real(r, 17), chief_y = bst_io_rows_real(r, 18);
     /* boxes hold the light, which the optics put beside the chief ray */
-    double beside_x = bst_rows_real(r, 19) - chief_x, beside_y = bst_rows_real(r, 20) - chief_y;
+    double beside_x = bst_io_rows_real(r, 19) - chief_x,
+           beside_y = bst_io_rows_real(r, 20) - chief_y;
     for (int k = 0; k < 3; k++) {
-        x[k] = (bst_rows_real(r, 4 + k) + beside_x - f->window.x0 + 0.5) / binning / width;
-        y[k] = (bst_rows_real(r, 7 + k) + beside_y - f->window.y0 + 0.5) / binning / height;
+        x[k] = (bst_io_rows_real(r, 4 + k) + beside_x - f->window.x0 + 0.5) / binning / width;
+        y[k] = (bst_io_rows_real(r, 7 + k) + beside_y - f->window.y0 + 0.5) / binning / height;
         if (!isfinite(x[k]) || !isfinite(y[k])) {
             return NULL;
         }
@@ -170,16 +172,16 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
     cJSON_AddStringToObject(node, "source", "boresight");
     bst_json_add_number(node, "magnitude", v_mag);
     bst_json_add_number(node, "pe_per_sec", f->exposure_s > 0.0 ? electrons / f->exposure_s : NAN);
-    cJSON_AddNumberToObject(node, "seg_id", j->mask ? (double)bst_rows_int(r, 15) : -1.0);
-    cJSON_AddStringToObject(node, "object_name", bst_rows_text(r, 16));
-    int64_t norad = bst_rows_int(r, 3);
-    snprintf(id, sizeof id, "%" PRId64, star || norad == 0 ? bst_rows_int(r, 2) : norad);
+    cJSON_AddNumberToObject(node, "seg_id", j->mask ? (double)bst_io_rows_int(r, 15) : -1.0);
+    cJSON_AddStringToObject(node, "object_name", bst_io_rows_text(r, 16));
+    int64_t norad = bst_io_rows_int(r, 3);
+    snprintf(id, sizeof id, "%" PRId64, star || norad == 0 ? bst_io_rows_int(r, 2) : norad);
     cJSON_AddStringToObject(node, "object_id", id);
     cJSON_AddItemToObject(node, "pixels", cJSON_CreateArray());
     cJSON_AddItemToObject(node, "snr", cJSON_CreateArray());
-    bst_json_add_number(node, "snr_aperture", bst_rows_real(r, 12));
-    bst_json_add_number(node, "ra", bst_rows_real(r, 13));
-    bst_json_add_number(node, "dec", bst_rows_real(r, 14));
+    bst_json_add_number(node, "snr_aperture", bst_io_rows_real(r, 12));
+    bst_json_add_number(node, "ra", bst_io_rows_real(r, 13));
+    bst_json_add_number(node, "dec", bst_io_rows_real(r, 14));
     return node;
 }
 
@@ -187,15 +189,15 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
 static bst_status add_labels(bst_ctx *ctx, job *j, const frame_row *row, int width, int height,
                              cJSON *list, int *satellites) {
     *satellites = 0;
-    while (j->truth_more && bst_rows_int(j->truth, 0) <= row->id) {
-        if (bst_rows_int(j->truth, 0) == row->id) {
+    while (j->truth_more && bst_io_rows_int(j->truth, 0) <= row->id) {
+        if (bst_io_rows_int(j->truth, 0) == row->id) {
             cJSON *node = label(j, &row->frame, width, height);
             if (node) {
-                *satellites += strcmp(bst_rows_text(j->truth, 1), "star") != 0;
+                *satellites += strcmp(bst_io_rows_text(j->truth, 1), "star") != 0;
                 cJSON_AddItemToArray(list, node);
             }
         }
-        BST_TRY(bst_rows_next(ctx, j->truth, &j->truth_more));
+        BST_TRY(bst_io_rows_next(ctx, j->truth, &j->truth_more));
     }
     return BST_OK;
 }
@@ -293,24 +295,24 @@ static bst_status write_frame(bst_ctx *ctx, job *j, const frame_row *row) {
 /* ------------------------------------------------------------------ a sensor, a run */
 
 static bst_status write_frames(bst_ctx *ctx, job *j) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     bst_progress progress;
-    BST_TRY(bst_rows_open(ctx, j->e->run, truth_sql, j->sensor->index, 0, &j->truth));
-    bst_status status = bst_rows_next(ctx, j->truth, &j->truth_more);
+    BST_TRY(bst_io_rows_open(ctx, j->e->run, truth_sql, j->sensor->index, 0, &j->truth));
+    bst_status status = bst_io_rows_next(ctx, j->truth, &j->truth_more);
     if (status == BST_OK) {
-        status = bst_rows_open(ctx, j->e->run, frames_sql, j->sensor->index, 0, &rows);
+        status = bst_io_rows_open(ctx, j->e->run, frames_sql, j->sensor->index, 0, &rows);
     }
     if (status != BST_OK) {
-        bst_rows_close(j->truth);
+        bst_io_rows_close(j->truth);
         return status;
     }
     bst_progress_start(
         &progress, j->set, "frames",
         bst_run_reader_int(j->e->run, "SELECT count(*) FROM frames WHERE sensor = ?1",
                            j->sensor->index, 0));
-    for (int64_t n = 0; (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more; n++) {
-        int64_t id = bst_rows_int(rows, 0);
+    for (int64_t n = 0; (status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more; n++) {
+        int64_t id = bst_io_rows_int(rows, 0);
         frame_row row;
         if (id < j->e->first || id > j->e->last || (id - j->e->first) % j->e->every != 0) {
             continue;
@@ -324,13 +326,12 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
         bst_progress_update(&progress, n + 1);
     }
     bst_progress_end(&progress);
-    bst_rows_close(rows);
-    bst_rows_close(j->truth);
+    bst_io_rows_close(rows);
+    bst_io_rows_close(j->truth);
     return status;
 }
 
-void bst_export_set_name(const bst_run_reader *run, const bst_export_sensor *sensor,
-                         char out[256]) {
+void bst_export_set_name(const bst_run_reader *run, const bst_run_sensor *sensor, char out[256]) {
     const char *folder = bst_run_reader_folder(run);
     size_t length = strlen(folder);
     while (length > 1 && folder[length - 1] == '/') {
@@ -387,10 +388,10 @@ static bst_status make_folders(bst_ctx *ctx, const char *folder) {
 }
 
 static bst_status export_all(bst_ctx *ctx, job *j) {
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
     int count, kept = 0;
     int64_t several = bst_run_reader_int(j->e->run, "SELECT count(*) FROM sensors", 0, 1);
-    BST_TRY(bst_export_sensors(ctx, j->e->run, j->e->sensor, sensors, &count));
+    BST_TRY(bst_run_sensors(ctx, j->e->run, j->e->sensor, sensors, &count));
     BST_TRY(bst_export_need_truth(ctx, j->e->run));
     for (int i = 0; i < count; i++) {
         if (sensors[i].file[0]) {
@@ -441,7 +442,7 @@ bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) {
     }
     if (status == BST_OK) {
         printf("%s: %s with annotations\n", e->satnet,
-               bst_count_text((char[BST_COUNT_TEXT]){0}, j.written, "frame", "frames"));
+               bst_text_of_count((char[BST_COUNT_TEXT]){0}, j.written, "frame", "frames"));
     }
     bst_scenario_free(&scenario);
     bst_json_free(json);

@@ -21,19 +21,19 @@ static bool is_listed(const char *list, const char *name) {
 static bst_status check_names(bst_ctx *ctx, const bst_export *e, const char *tables) {
     for (const char *word = tables; word; word = strchr(word, ',')) {
         word += *word == ',';
-        bst_rows *rows;
+        bst_io_rows *rows;
         bool more = true, known = false;
         char name[64], all[700] = "";
         snprintf(name, sizeof name, "%.*s", (int)strcspn(word, ","), word);
-        BST_TRY(
-            bst_rows_open(ctx, e->run, "SELECT \"table\" FROM tables ORDER BY rowid", 0, 0, &rows));
+        BST_TRY(bst_io_rows_open(ctx, e->run, "SELECT \"table\" FROM tables ORDER BY rowid", 0, 0,
+                                 &rows));
         bst_status status = BST_OK;
-        while (!known && (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
-            known = strcmp(bst_rows_text(rows, 0), name) == 0;
+        while (!known && (status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+            known = strcmp(bst_io_rows_text(rows, 0), name) == 0;
             size_t n = strlen(all);
-            snprintf(all + n, sizeof all - n, "%s%s", n ? ", " : "", bst_rows_text(rows, 0));
+            snprintf(all + n, sizeof all - n, "%s%s", n ? ", " : "", bst_io_rows_text(rows, 0));
         }
-        bst_rows_close(rows);
+        bst_io_rows_close(rows);
         BST_TRY(status);
         if (!known) {
             return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: has no table \"%s\"; it has %s",
@@ -51,15 +51,15 @@ static const char time_column[] =
 
 static bst_status make_sql(bst_ctx *ctx, const bst_export *e, int64_t number, const char *name,
                            char *sql, size_t bytes) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
-    BST_TRY(bst_rows_open(ctx, e->run, time_column, number, 0, &rows));
-    bst_status status = bst_rows_next(ctx, rows, &more);
+    BST_TRY(bst_io_rows_open(ctx, e->run, time_column, number, 0, &rows));
+    bst_status status = bst_io_rows_next(ctx, rows, &more);
     char utc[100] = "";
     if (status == BST_OK && more) {
-        snprintf(utc, sizeof utc, "utc(%.60s) AS utc, ", bst_rows_text(rows, 0));
+        snprintf(utc, sizeof utc, "utc(%.60s) AS utc, ", bst_io_rows_text(rows, 0));
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     /* stars and objects are numbered apart; together they need a name of their own */
     bool truth = strcmp(name, "truth") == 0;
     snprintf(sql, bytes, "SELECT %s%s* FROM \"%s\"", utc,
@@ -88,30 +88,30 @@ static bst_status export_table(bst_ctx *ctx, const bst_export *e, int64_t number
     bst_status status = bst_csv_write(ctx, e->run, sql, path, report, &progress, &rows);
     bst_progress_end(&progress);
     if (status == BST_OK) {
-        printf("%s: %s\n", path, bst_count_text((char[BST_COUNT_TEXT]){0}, rows, "row", "rows"));
+        printf("%s: %s\n", path, bst_text_of_count((char[BST_COUNT_TEXT]){0}, rows, "row", "rows"));
     }
     return status;
 }
 
 bst_status bst_export_tables(bst_ctx *ctx, const bst_export *e, const char *tables) {
-    bst_rows *list;
+    bst_io_rows *list;
     BST_TRY(check_names(ctx, e, tables));
-    BST_TRY(bst_rows_open(ctx, e->run, "SELECT rowid, \"table\" FROM tables ORDER BY rowid", 0, 0,
-                          &list));
+    BST_TRY(bst_io_rows_open(ctx, e->run, "SELECT rowid, \"table\" FROM tables ORDER BY rowid", 0,
+                             0, &list));
     bst_status status;
     bool more;
-    while ((status = bst_rows_next(ctx, list, &more)) == BST_OK && more) {
+    while ((status = bst_io_rows_next(ctx, list, &more)) == BST_OK && more) {
         char name[64];
-        snprintf(name, sizeof name, "%s", bst_rows_text(list, 1));
+        snprintf(name, sizeof name, "%s", bst_io_rows_text(list, 1));
         /* names that the recorder does not give are no tables of a run */
         if (strpbrk(name, "\"'/.") || (tables && !is_listed(tables, name))) {
             continue;
         }
-        status = export_table(ctx, e, bst_rows_int(list, 0), name);
+        status = export_table(ctx, e, bst_io_rows_int(list, 0), name);
         if (status != BST_OK) {
             break;
         }
     }
-    bst_rows_close(list);
+    bst_io_rows_close(list);
     return status;
 }

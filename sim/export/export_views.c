@@ -20,7 +20,7 @@ typedef struct pose {
 } pose;
 
 typedef struct frustum {
-    bst_view *view;
+    bst_world_view *view;
     const bst_world *world;
     const bst_camera *camera;
     int observer, corner; /* corner < 0: the eye itself */
@@ -34,8 +34,8 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
                          bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const frustum *f = user;
     const pose *p = &f->poses[row];
-    bst_state eye;
-    BST_TRY(bst_view_observer_state(ctx, f->view, f->observer, p->seconds, &eye));
+    bst_world_state eye;
+    BST_TRY(bst_world_view_observer_state(ctx, f->view, f->observer, p->seconds, &eye));
     *time = bst_world_time(f->world, p->seconds);
     *position_m = eye.position_m;
     *velocity_mps = eye.velocity_mps;
@@ -43,7 +43,7 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
         return BST_OK;
     }
     bst_camera camera;
-    BST_TRY(bst_camera_at_scale(ctx, f->camera, p->pixel_scale_arcsec, &camera));
+    BST_TRY(bst_world_camera_at_scale(ctx, f->camera, p->pixel_scale_arcsec, &camera));
     bool right = f->corner == 1 || f->corner == 2, top = f->corner >= 2;
     bst_vec3 ray = bst_camera_unproject(&camera, right ? (double)camera.width_px - 0.5 : -0.5,
                                         top ? (double)camera.height_px - 0.5 : -0.5);
@@ -54,7 +54,7 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
 
 /* Reads the poses of a sensor, thinned out where there are very many. */
 static bst_status read_poses(bst_ctx *ctx, const bst_export *e, int64_t sensor, frustum *f) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     int64_t total =
         bst_run_reader_int(e->run, "SELECT count(*) FROM exposures WHERE sensor = ?1", sensor, 0);
@@ -64,38 +64,38 @@ static bst_status read_poses(bst_ctx *ctx, const bst_export *e, int64_t sensor, 
     if (!f->poses) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for fields of view");
     }
-    BST_TRY(bst_rows_open(ctx, e->run,
-                          "SELECT mid_s, pixel_scale_arcsec, q_cam_from_gcrf_mid_x,"
-                          " q_cam_from_gcrf_mid_y, q_cam_from_gcrf_mid_z, q_cam_from_gcrf_mid_w"
-                          " FROM exposures WHERE sensor = ?1 ORDER BY exposure_id",
-                          sensor, 0, &rows));
+    BST_TRY(bst_io_rows_open(ctx, e->run,
+                             "SELECT mid_s, pixel_scale_arcsec, q_cam_from_gcrf_mid_x,"
+                             " q_cam_from_gcrf_mid_y, q_cam_from_gcrf_mid_z, q_cam_from_gcrf_mid_w"
+                             " FROM exposures WHERE sensor = ?1 ORDER BY exposure_id",
+                             sensor, 0, &rows));
     bst_status status;
-    for (int64_t n = 0; (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more; n++) {
-        pose p = {bst_rows_real(rows, 0),
-                  bst_rows_real(rows, 1),
-                  {bst_rows_real(rows, 2), bst_rows_real(rows, 3), bst_rows_real(rows, 4),
-                   bst_rows_real(rows, 5)}};
+    for (int64_t n = 0; (status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more; n++) {
+        pose p = {bst_io_rows_real(rows, 0),
+                  bst_io_rows_real(rows, 1),
+                  {bst_io_rows_real(rows, 2), bst_io_rows_real(rows, 3), bst_io_rows_real(rows, 4),
+                   bst_io_rows_real(rows, 5)}};
         bool later = f->count == 0 || p.seconds > f->poses[f->count - 1].seconds;
         if (n % every == 0 && later && f->count < total / every + 2) {
             f->poses[f->count++] = p;
         }
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
 static double length_of(bst_ctx *ctx, const bst_export *e, int64_t sensor) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more = false;
     double length = NAN;
-    if (bst_rows_open(ctx, e->run,
-                      "SELECT avg(range_m) FROM truth WHERE sensor = ?1 AND kind = 'object'"
-                      " AND in_field = 1",
-                      sensor, 0, &rows) == BST_OK) {
-        if (bst_rows_next(ctx, rows, &more) == BST_OK && more) {
-            length = bst_rows_real(rows, 0);
+    if (bst_io_rows_open(ctx, e->run,
+                         "SELECT avg(range_m) FROM truth WHERE sensor = ?1 AND kind = 'object'"
+                         " AND in_field = 1",
+                         sensor, 0, &rows) == BST_OK) {
+        if (bst_io_rows_next(ctx, rows, &more) == BST_OK && more) {
+            length = bst_io_rows_real(rows, 0);
         }
-        bst_rows_close(rows);
+        bst_io_rows_close(rows);
     }
     return length > 0.0 ? length : LENGTH_M;
 }
@@ -127,7 +127,7 @@ static bst_status write_frustum(bst_ctx *ctx, FILE *stream, const char *name, fr
 }
 
 bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                            const bst_world *world, bst_view *view, FILE *stream) {
+                            const bst_world *world, bst_world_view *view, FILE *stream) {
     /* a run that did not record the truth has no attitudes */
     if (!bst_run_reader_has_tables(e->run) ||
         bst_run_reader_int(e->run, "SELECT count(*) FROM exposures", 0, 0) < 1) {

@@ -12,8 +12,8 @@
 
 /* Rows of a table in the order of their first column. */
 typedef struct cursor {
-    bst_rows *rows; /* NULL: no such table, or all are read */
-    bool held;      /* the current row waits for its turn */
+    bst_io_rows *rows; /* NULL: no such table, or all are read */
+    bool held;         /* the current row waits for its turn */
 } cursor;
 
 enum { FRAMES, EXPOSURES, OBJECTS, DETECTIONS, TRACKS, MODES, CURSORS };
@@ -43,7 +43,7 @@ struct bst_frame_marks {
     const cJSON *objects; /* of the scenario; NULL when there is none */
     char target[80];
     cursor cursors[CURSORS], planes;
-    bst_overlay_mark *marks;
+    bst_io_overlay_mark *marks;
     int count, room;
     bool has_target; /* its true place on the frame */
     double target_x_px, target_y_px;
@@ -63,14 +63,14 @@ bst_status bst_frame_marks_create(bst_ctx *ctx, const bst_run_reader *run, int64
     m->objects = cJSON_GetObjectItemCaseSensitive(world, "objects");
     bst_ctx unheard = {0};
     for (int i = 0; i < CURSORS; i++) {
-        if (bst_rows_open(&unheard, run, queries[i], sensor, 0, &m->cursors[i].rows) != BST_OK) {
+        if (bst_io_rows_open(&unheard, run, queries[i], sensor, 0, &m->cursors[i].rows) != BST_OK) {
             m->cursors[i].rows = NULL; /* not recorded */
         }
     }
-    if (bst_rows_open(&unheard, run,
-                      "SELECT fits_index, exposure_id FROM frames WHERE sensor = ?1"
-                      " AND fits_index IS NOT NULL",
-                      sensor, 0, &m->planes.rows) != BST_OK) {
+    if (bst_io_rows_open(&unheard, run,
+                         "SELECT fits_index, exposure_id FROM frames WHERE sensor = ?1"
+                         " AND fits_index IS NOT NULL",
+                         sensor, 0, &m->planes.rows) != BST_OK) {
         m->planes.rows = NULL;
     }
     return BST_OK;
@@ -79,9 +79,9 @@ bst_status bst_frame_marks_create(bst_ctx *ctx, const bst_run_reader *run, int64
 void bst_frame_marks_free(bst_frame_marks *m) {
     if (m) {
         for (int i = 0; i < CURSORS; i++) {
-            bst_rows_close(m->cursors[i].rows);
+            bst_io_rows_close(m->cursors[i].rows);
         }
-        bst_rows_close(m->planes.rows);
+        bst_io_rows_close(m->planes.rows);
         free(m->marks);
         free(m);
     }
@@ -93,14 +93,14 @@ static bst_status advance(bst_ctx *ctx, cursor *c, int64_t low, int64_t high, bo
     while (c->rows) {
         if (!c->held) {
             bool more;
-            BST_TRY(bst_rows_next(ctx, c->rows, &more));
+            BST_TRY(bst_io_rows_next(ctx, c->rows, &more));
             if (!more) {
-                bst_rows_close(c->rows);
+                bst_io_rows_close(c->rows);
                 c->rows = NULL;
                 break;
             }
         }
-        int64_t key = bst_rows_int(c->rows, 0);
+        int64_t key = bst_io_rows_int(c->rows, 0);
         c->held = key > high;
         if (c->held || key >= low) {
             *found = !c->held;
@@ -114,16 +114,16 @@ bst_status bst_frame_marks_exposure(bst_ctx *ctx, bst_frame_marks *m, int64_t fi
                                     int64_t *exposure_id) {
     bool found;
     BST_TRY(advance(ctx, &m->planes, fits_index, fits_index, &found));
-    *exposure_id = found ? bst_rows_int(m->planes.rows, 1) : -1;
+    *exposure_id = found ? bst_io_rows_int(m->planes.rows, 1) : -1;
     return BST_OK;
 }
 
 /* A new mark at a place of the sensor. */
-static bst_status add(bst_ctx *ctx, bst_frame_marks *m, bst_overlay_kind kind, double importance,
+static bst_status add(bst_ctx *ctx, bst_frame_marks *m, bst_io_overlay_kind kind, double importance,
                       double x_px, double y_px) {
     if (m->count == m->room) {
         int room = 2 * m->room + 256;
-        bst_overlay_mark *more = realloc(m->marks, (size_t)room * sizeof *more);
+        bst_io_overlay_mark *more = realloc(m->marks, (size_t)room * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the marks");
         }
@@ -131,28 +131,28 @@ static bst_status add(bst_ctx *ctx, bst_frame_marks *m, bst_overlay_kind kind, d
         m->room = room;
     }
     double middle = 0.5 * (m->binning - 1.0); /* of a binned pixel, from its first pixel's centre */
-    m->marks[m->count++] = (bst_overlay_mark){.kind = kind,
-                                              .x_px = (x_px - m->x0 - middle) / m->binning,
-                                              .y_px = (y_px - m->y0 - middle) / m->binning,
-                                              .importance = importance};
+    m->marks[m->count++] = (bst_io_overlay_mark){.kind = kind,
+                                                 .x_px = (x_px - m->x0 - middle) / m->binning,
+                                                 .y_px = (y_px - m->y0 - middle) / m->binning,
+                                                 .importance = importance};
     return BST_OK;
 }
 
-static bst_status add_object(bst_ctx *ctx, bst_frame_marks *m, const bst_rows *rows) {
+static bst_status add_object(bst_ctx *ctx, bst_frame_marks *m, const bst_io_rows *rows) {
     const cJSON *object =
-        m->objects ? cJSON_GetArrayItem(m->objects, (int)bst_rows_int(rows, 1)) : NULL;
+        m->objects ? cJSON_GetArrayItem(m->objects, (int)bst_io_rows_int(rows, 1)) : NULL;
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(object, "name");
     char text[48];
     if (cJSON_IsString(name)) {
         snprintf(text, sizeof text, "%s", name->valuestring);
     } else {
-        snprintf(text, sizeof text, "NORAD %" PRId64, bst_rows_int(rows, 2));
+        snprintf(text, sizeof text, "NORAD %" PRId64, bst_io_rows_int(rows, 2));
     }
     bool target = m->target[0] && strcmp(text, m->target) == 0;
     BST_TRY(add(ctx, m, target ? BST_OVERLAY_TARGET : BST_OVERLAY_OBJECT,
-                target ? BST_OVERLAY_FIRST : BST_OVERLAY_OF_OBJECT, bst_rows_real(rows, 3),
-                bst_rows_real(rows, 4)));
-    bst_overlay_mark *mark = &m->marks[m->count - 1];
+                target ? BST_OVERLAY_FIRST : BST_OVERLAY_OF_OBJECT, bst_io_rows_real(rows, 3),
+                bst_io_rows_real(rows, 4)));
+    bst_io_overlay_mark *mark = &m->marks[m->count - 1];
     memcpy(mark->label, text, sizeof mark->label);
     if (target) {
         m->has_target = true;
@@ -162,16 +162,17 @@ static bst_status add_object(bst_ctx *ctx, bst_frame_marks *m, const bst_rows *r
     return BST_OK;
 }
 
-static bst_status add_detection(bst_ctx *ctx, bst_frame_marks *m, const bst_rows *rows) {
-    bool star = strcmp(bst_rows_text(rows, 1), "star") == 0;
-    double flux_e = bst_rows_real(rows, 6);
+static bst_status add_detection(bst_ctx *ctx, bst_frame_marks *m, const bst_io_rows *rows) {
+    bool star = strcmp(bst_io_rows_text(rows, 1), "star") == 0;
+    double flux_e = bst_io_rows_real(rows, 6);
     BST_TRY(add(ctx, m,
-                !star                        ? BST_OVERLAY_DETECTION
-                : bst_rows_int(rows, 5) != 0 ? BST_OVERLAY_STAR
-                                             : BST_OVERLAY_REST,
-                isfinite(flux_e) ? flux_e : 0.0, bst_rows_real(rows, 2), bst_rows_real(rows, 3)));
-    bst_overlay_mark *mark = &m->marks[m->count - 1];
-    mark->radius_px = 0.5 * bst_rows_real(rows, 4) / m->binning + 2.0;
+                !star                           ? BST_OVERLAY_DETECTION
+                : bst_io_rows_int(rows, 5) != 0 ? BST_OVERLAY_STAR
+                                                : BST_OVERLAY_REST,
+                isfinite(flux_e) ? flux_e : 0.0, bst_io_rows_real(rows, 2),
+                bst_io_rows_real(rows, 3)));
+    bst_io_overlay_mark *mark = &m->marks[m->count - 1];
+    mark->radius_px = 0.5 * bst_io_rows_real(rows, 4) / m->binning + 2.0;
     if (m->has_target && hypot(mark->x_px - m->target_x_px, mark->y_px - m->target_y_px) <=
                              BST_RIGHT_TARGET_PX / m->binning) {
         mark->importance = BST_OVERLAY_OF_TARGET;
@@ -179,19 +180,19 @@ static bst_status add_detection(bst_ctx *ctx, bst_frame_marks *m, const bst_rows
     return BST_OK;
 }
 
-static bst_status add_track(bst_ctx *ctx, bst_frame_marks *m, const bst_rows *rows) {
+static bst_status add_track(bst_ctx *ctx, bst_frame_marks *m, const bst_io_rows *rows) {
     BST_TRY(add(ctx, m, BST_OVERLAY_TRACK,
-                bst_rows_int(rows, 3) ? BST_OVERLAY_FIRST : BST_OVERLAY_OF_OBJECT,
-                bst_rows_real(rows, 4), bst_rows_real(rows, 5)));
-    bst_overlay_mark *mark = &m->marks[m->count - 1];
+                bst_io_rows_int(rows, 3) ? BST_OVERLAY_FIRST : BST_OVERLAY_OF_OBJECT,
+                bst_io_rows_real(rows, 4), bst_io_rows_real(rows, 5)));
+    bst_io_overlay_mark *mark = &m->marks[m->count - 1];
     snprintf(mark->label, sizeof mark->label, "%s%" PRId64 " SNR %.1f",
-             bst_rows_int(rows, 3) ? "target: track " : "track ", bst_rows_int(rows, 1),
-             bst_rows_real(rows, 6));
+             bst_io_rows_int(rows, 3) ? "target: track " : "track ", bst_io_rows_int(rows, 1),
+             bst_io_rows_real(rows, 6));
     return BST_OK;
 }
 
 static int by_importance(const void *a, const void *b) {
-    const bst_overlay_mark *p = a, *q = b;
+    const bst_io_overlay_mark *p = a, *q = b;
     return (p->importance < q->importance) - (p->importance > q->importance);
 }
 
@@ -205,26 +206,26 @@ static bst_status get_frame(bst_ctx *ctx, bst_frame_marks *m, int64_t id) {
     if (!found) {
         return BST_OK;
     }
-    m->x0 = (double)bst_rows_int(c->rows, 1);
-    m->y0 = (double)bst_rows_int(c->rows, 2);
-    m->binning = fmax(1.0, (double)bst_rows_int(c->rows, 3));
+    m->x0 = (double)bst_io_rows_int(c->rows, 1);
+    m->y0 = (double)bst_io_rows_int(c->rows, 2);
+    m->binning = fmax(1.0, (double)bst_io_rows_int(c->rows, 3));
     char utc[32];
-    snprintf(utc, sizeof utc, "%.23sZ", bst_rows_text(c->rows, 4)); /* to the millisecond */
-    double exposure_s = bst_rows_real(c->rows, 5);
-    int64_t tick = bst_rows_int(c->rows, 6);
+    snprintf(utc, sizeof utc, "%.23sZ", bst_io_rows_text(c->rows, 4)); /* to the millisecond */
+    double exposure_s = bst_io_rows_real(c->rows, 5);
+    int64_t tick = bst_io_rows_int(c->rows, 6);
     for (cursor *modes = &m->cursors[MODES];;) {
         BST_TRY(advance(ctx, modes, INT64_MIN, tick, &found));
         if (!found) {
             break;
         }
-        snprintf(m->mode, sizeof m->mode, "%s", bst_rows_text(modes->rows, 1));
+        snprintf(m->mode, sizeof m->mode, "%s", bst_io_rows_text(modes->rows, 1));
     }
     snprintf(m->caption, sizeof m->caption, "frame %" PRId64 "   %s   %.3f s%s%s", id, utc,
              exposure_s, m->mode[0] ? "   mode: " : "", m->mode);
     return BST_OK;
 }
 
-bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst_overlay *out) {
+bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst_io_overlay *out) {
     bool found;
     m->count = 0;
     m->has_target = false;
@@ -235,10 +236,10 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
             if (!found) {
                 break;
             }
-            const bst_rows *rows = m->cursors[i].rows;
+            const bst_io_rows *rows = m->cursors[i].rows;
             if (i == EXPOSURES) {
                 BST_TRY(add(ctx, m, BST_OVERLAY_BORESIGHT, BST_OVERLAY_FIRST,
-                            bst_rows_real(rows, 1), bst_rows_real(rows, 2)));
+                            bst_io_rows_real(rows, 1), bst_io_rows_real(rows, 2)));
             } else {
                 BST_TRY((i == OBJECTS      ? add_object
                          : i == DETECTIONS ? add_detection
@@ -247,6 +248,6 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
         }
     }
     qsort(m->marks, (size_t)m->count, sizeof *m->marks, by_importance);
-    *out = (bst_overlay){.marks = m->marks, .count = m->count, .caption = m->caption};
+    *out = (bst_io_overlay){.marks = m->marks, .count = m->count, .caption = m->caption};
     return BST_OK;
 }

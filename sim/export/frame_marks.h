@@ -22,6 +22,6 @@ bst_status bst_frame_marks_exposure(bst_ctx *ctx, bst_frame_marks *marks, int64_
 /* Marks by falling importance, and caption, of an exposure, in pixels of its frame; valid until the
  * next call. Ask in ascending order. */
 bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *marks, int64_t exposure_id,
-                               bst_overlay *out) BST_MUST_CHECK;
+                               bst_io_overlay *out) BST_MUST_CHECK;
 
 #endif

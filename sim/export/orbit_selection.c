@@ -13,23 +13,23 @@ static void choose(bst_orbit_selection *s, int object) {
  * has none. */
 static bst_status choose_rows(bst_ctx *ctx, const bst_run_reader *run, const bst_world *world,
                               const char *sql, bst_orbit_selection *s) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     bst_ctx quiet;
     bst_ctx_init(&quiet, NULL, NULL, BST_LOG_ERROR);
-    if (bst_rows_open(&quiet, run, sql, 0, 0, &rows) != BST_OK) {
+    if (bst_io_rows_open(&quiet, run, sql, 0, 0, &rows) != BST_OK) {
         return BST_OK;
     }
     bst_status status;
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        int64_t object = bst_rows_kind(rows, 0) == BST_CELL_TEXT
-                             ? bst_world_find_object(world, bst_rows_text(rows, 0))
-                             : bst_rows_int(rows, 0);
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        int64_t object = bst_io_rows_kind(rows, 0) == BST_CELL_TEXT
+                             ? bst_world_find_object(world, bst_io_rows_text(rows, 0))
+                             : bst_io_rows_int(rows, 0);
         if (object >= 0 && object < bst_world_object_count(world)) {
             choose(s, (int)object);
         }
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
@@ -48,7 +48,7 @@ static bool choose_entry(const bst_world *world, const char *entry, size_t lengt
     char digits[16];
     snprintf(digits, sizeof digits, "%.*s", (int)(length < 15 ? length : 15), entry);
     for (int i = 0; i < bst_world_object_count(world); i++) {
-        const bst_object_info *info = bst_world_object(world, i);
+        const bst_world_object_info *info = bst_world_object(world, i);
         bool named = strlen(info->name) == length && strncmp(info->name, entry, length) == 0;
         if (named || (number && length < 10 && info->norad > 0 && info->norad == atoi(digits))) {
             choose(s, i);

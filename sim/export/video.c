@@ -21,15 +21,15 @@ struct bst_video {
     char path[4096], draft[4160], words[4160];
     size_t bytes; /* of a frame */
     bool refused; /* a frame was not taken: whatever is there is not whole */
-    bst_child child;
+    bst_subprocess child;
 };
 
 /* Whether this ffmpeg can encode H.264. */
 static bst_status has_x264(bst_ctx *ctx, bool *out) {
     const char *const argv[] = {"ffmpeg", "-hide_banner", "-encoders", NULL};
-    bst_child child;
+    bst_subprocess child;
     char line[512];
-    bst_status status = bst_child_start(ctx, argv, NULL, true, NULL, &child);
+    bst_status status = bst_subprocess_start(ctx, argv, NULL, true, NULL, &child);
     if (status != BST_OK) {
         return bst_fail(ctx, status,
                         "mp4 needs the program ffmpeg, which cannot be run; install it (Debian: "
@@ -39,7 +39,7 @@ static bst_status has_x264(bst_ctx *ctx, bool *out) {
     while (fgets(line, sizeof line, child.output)) {
         *out = *out || strstr(line, " libx264 ");
     }
-    bst_child_wait(&child);
+    bst_subprocess_wait(&child);
     return BST_OK;
 }
 
@@ -93,7 +93,7 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
         /* the marks' colours stay, which the grey noise does not need */
         x264 ? "-x264-params" : "-qmin", x264 ? "chroma-qp-offset=-12" : "2", "-maxrate", most,
         "-bufsize", buffer, "-movflags", "+faststart", "-f", "mp4", output, NULL};
-    status = bst_child_start_fed(ctx, argv, v->words, &v->child);
+    status = bst_subprocess_start_fed(ctx, argv, v->words, &v->child);
     if (status != BST_OK) {
         unlink(v->draft);
         unlink(v->words);
@@ -130,7 +130,7 @@ static void read_words(const bst_video *video, char *text, size_t bytes) {
 bst_status bst_video_end(bst_ctx *ctx, bst_video *video) {
     bst_status status = BST_OK;
     char words[400];
-    int code = bst_child_wait(&video->child);
+    int code = bst_subprocess_wait(&video->child);
     if (code != 0 || video->refused) {
         read_words(video, words, sizeof words);
         status = bst_fail(ctx, BST_ERR_IO, "%s: ffmpeg failed (exit code %d): %s", video->path,
@@ -149,7 +149,7 @@ bst_status bst_video_end(bst_ctx *ctx, bst_video *video) {
 
 void bst_video_abandon(bst_video *video) {
     if (video) {
-        bst_child_wait(&video->child);
+        bst_subprocess_wait(&video->child);
         unlink(video->draft);
         unlink(video->words);
         free(video);

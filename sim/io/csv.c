@@ -26,32 +26,32 @@ void bst_csv_put_text(FILE *file, const char *text) {
     putc('"', file);
 }
 
-static void put_cell(FILE *file, const bst_rows *rows, int column) {
-    switch (bst_rows_kind(rows, column)) {
+static void put_cell(FILE *file, const bst_io_rows *rows, int column) {
+    switch (bst_io_rows_kind(rows, column)) {
         case BST_CELL_NULL:
             break;
         case BST_CELL_INT:
-            fprintf(file, "%" PRId64, bst_rows_int(rows, column));
+            fprintf(file, "%" PRId64, bst_io_rows_int(rows, column));
             break;
         case BST_CELL_REAL:
-            fprintf(file, "%.17g", bst_rows_real(rows, column));
+            fprintf(file, "%.17g", bst_io_rows_real(rows, column));
             break;
         case BST_CELL_TEXT:
-            bst_csv_put_text(file, bst_rows_text(rows, column));
+            bst_csv_put_text(file, bst_io_rows_text(rows, column));
             break;
     }
 }
 
-static bst_status write_rows(bst_ctx *ctx, bst_rows *rows, FILE *file, bst_csv_progress progress,
+static bst_status write_rows(bst_ctx *ctx, bst_io_rows *rows, FILE *file, bst_csv_progress progress,
                              void *user, int64_t *count) {
-    int columns = bst_rows_columns(rows);
+    int columns = bst_io_rows_columns(rows);
     for (int i = 0; i < columns; i++) {
-        bst_csv_put_text(file, bst_rows_column_name(rows, i));
+        bst_csv_put_text(file, bst_io_rows_column_name(rows, i));
         fputs(i + 1 < columns ? "," : "\r\n", file);
     }
     for (;;) {
         bool more;
-        BST_TRY(bst_rows_next(ctx, rows, &more));
+        BST_TRY(bst_io_rows_next(ctx, rows, &more));
         if (!more || ferror(file)) {
             return BST_OK;
         }
@@ -69,14 +69,14 @@ bst_status bst_csv_write(bst_ctx *ctx, const bst_run_reader *reader, const char 
                          const char *path, bst_csv_progress progress, void *user, int64_t *rows) {
     bst_draft draft;
     int64_t count = 0;
-    bst_rows *query;
-    BST_TRY(bst_rows_open(ctx, reader, sql, 0, 0, &query));
+    bst_io_rows *query;
+    BST_TRY(bst_io_rows_open(ctx, reader, sql, 0, 0, &query));
     bst_status status = bst_draft_open(ctx, path, &draft);
     if (status == BST_OK) {
         status = write_rows(ctx, query, draft.stream, progress, user, &count);
         status = bst_draft_close(ctx, &draft, status);
     }
-    bst_rows_close(query);
+    bst_io_rows_close(query);
     if (status == BST_OK && rows) {
         *rows = count;
     }

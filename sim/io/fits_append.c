@@ -115,7 +115,7 @@ void bst_fits_memory_close(bst_fits_memory *memory, int *code) {
 }
 
 bst_status bst_fits_start_file(bst_ctx *ctx, bst_fits *fits, const char *hdu, long long bytes) {
-    BST_TRY(bst_write_file_atomic(ctx, fits->path, hdu, (size_t)bytes));
+    BST_TRY(bst_io_write_file_atomic(ctx, fits->path, hdu, (size_t)bytes));
     fits->file = open(fits->path, O_RDWR | O_NOFOLLOW | O_CLOEXEC);
     if (fits->file < 0) {
         return bst_fits_fail_errno(ctx, fits, "cannot be opened");

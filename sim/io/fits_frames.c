@@ -294,7 +294,7 @@ bst_status bst_fits_write_single(bst_ctx *ctx, const char *path, const bst_fits_
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
     if (status == BST_OK) {
-        status = bst_write_file_atomic(ctx, path, hdu, (size_t)bytes);
+        status = bst_io_write_file_atomic(ctx, path, hdu, (size_t)bytes);
     }
     bst_fits_memory_close(&fits->memory, &code);
     free_fits(fits);

@@ -73,7 +73,7 @@ bst_status bst_fits_queue_create(bst_ctx *ctx, bst_fits *fits) {
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    int error = bst_thread_start(&q->thread, work, fits);
+    int error = bst_core_thread_start(&q->thread, work, fits);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (error) {
         pthread_cond_destroy(&q->changed);

@@ -34,7 +34,7 @@ void bst_fits_put_lens(fitsfile *file, const bst_camera *c, int *code) {
     if (!bst_camera_distorted(c)) {
         return;
     }
-    const bst_distortion *d = &c->distortion;
+    const bst_camera_distortion *d = &c->distortion;
     const double values[] = {d->k1, d->k2, d->k3, d->p1, d->p2};
     static const char *const keys[] = {"DISTK1", "DISTK2", "DISTK3", "DISTP1", "DISTP2"};
     for (int i = 0; i < 5; i++) {

@@ -4,16 +4,16 @@
 
 #include "sim/io/marks_internal.h"
 
-static const bst_colour black = {0, 0, 0}, white = BST_WHITE, soft = BST_SOFT;
+static const bst_io_colour black = {0, 0, 0}, white = BST_WHITE, soft = BST_SOFT;
 
-static const bst_colour colours[] = {
+static const bst_io_colour colours[] = {
     [BST_OVERLAY_TARGET] = BST_TARGET_COLOUR,    [BST_OVERLAY_OBJECT] = BST_SOFT,
     [BST_OVERLAY_STAR] = BST_STAR_COLOUR,        [BST_OVERLAY_REST] = BST_REST_COLOUR,
     [BST_OVERLAY_DETECTION] = BST_OBJECT_COLOUR, [BST_OVERLAY_TRACK] = BST_TRACK_COLOUR,
     [BST_OVERLAY_BORESIGHT] = BST_CROSS_COLOUR};
 
 void bst_mark_cross(bst_picture *p, double x, double y, double gap, double arm) {
-    const bst_colour colour = BST_CROSS_COLOUR;
+    const bst_io_colour colour = BST_CROSS_COLOUR;
     bst_picture_line(p, x - arm, y, x - gap, y, colour, 1.3);
     bst_picture_line(p, x + gap, y, x + arm, y, colour, 1.3);
     bst_picture_line(p, x, y - arm, x, y - gap, colour, 1.3);
@@ -21,7 +21,7 @@ void bst_mark_cross(bst_picture *p, double x, double y, double gap, double arm) 
 }
 
 void bst_mark_diamond(bst_picture *p, double x, double y, double r) {
-    const bst_colour colour = BST_TRACK_COLOUR;
+    const bst_io_colour colour = BST_TRACK_COLOUR;
     const double dx[4] = {r, 0, -r, 0}, dy[4] = {0, r, 0, -r};
     for (int i = 0; i < 4; i++) {
         int j = (i + 1) % 4;
@@ -30,7 +30,7 @@ void bst_mark_diamond(bst_picture *p, double x, double y, double r) {
 }
 
 /* A mark at (x, y) of the picture; returns how far it reaches to the right. */
-static double draw_mark(bst_picture *p, bst_overlay_kind kind, double x, double y, double r) {
+static double draw_mark(bst_picture *p, bst_io_overlay_kind kind, double x, double y, double r) {
     switch (kind) {
         case BST_OVERLAY_TARGET:
         case BST_OVERLAY_OBJECT:
@@ -55,10 +55,10 @@ static double draw_mark(bst_picture *p, bst_overlay_kind kind, double x, double 
 }
 
 /* A line of text with a dark ground, so that it can be read over stars. */
-static double put_line(bst_picture *p, double x, double y, double height, bst_colour colour,
+static double put_line(bst_picture *p, double x, double y, double height, bst_io_colour colour,
                        const char *text) {
     double width = bst_picture_text_width(height, false, text);
-    bst_box ground = {(int)x - 3, (int)(y - height) - 4, (int)width + 6, (int)height + 8};
+    bst_io_box ground = {(int)x - 3, (int)(y - height) - 4, (int)width + 6, (int)height + 8};
     bst_picture_fill(p, ground, black);
     bst_picture_text(p, x, y, height, colour, false, text);
     return width;
@@ -66,7 +66,7 @@ static double put_line(bst_picture *p, double x, double y, double height, bst_co
 
 static void draw_legend(bst_picture *p, int width, int height, double h) {
     static const struct {
-        bst_overlay_kind kind;
+        bst_io_overlay_kind kind;
         const char *text;
     } entries[] = {
         {BST_OVERLAY_TARGET, "target (truth)"}, {BST_OVERLAY_OBJECT, "object (truth)"},
@@ -83,12 +83,12 @@ static void draw_legend(bst_picture *p, int width, int height, double h) {
     }
 }
 
-static void draw_overlay(bst_picture *p, const bst_overlay *overlay, int width, int height,
-                         bst_box box, double scale) {
+static void draw_overlay(bst_picture *p, const bst_io_overlay *overlay, int width, int height,
+                         bst_io_box box, double scale) {
     double h = fmin(fmax(width / 100.0, 7.0), 14.0); /* of capital letters */
     bst_picture_clip(p, box);
     for (int i = overlay->count - 1; i >= 0; i--) {
-        const bst_overlay_mark *m = &overlay->marks[i];
+        const bst_io_overlay_mark *m = &overlay->marks[i];
         if (!isfinite(m->x_px) || !isfinite(m->y_px)) {
             continue;
         }
@@ -109,15 +109,15 @@ static void draw_overlay(bst_picture *p, const bst_overlay *overlay, int width, 
 }
 
 bst_status bst_frame_picture(bst_ctx *ctx, const uint16_t *pixels, int columns, int rows,
-                             bst_stretch stretch, const bst_overlay *overlay, int width, int height,
-                             bst_picture **out) {
+                             bst_io_stretch stretch, const bst_io_overlay *overlay, int width,
+                             int height, bst_picture **out) {
     *out = NULL;
     if (columns < 1 || rows < 1) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "a frame without pixels");
     }
     double scale = fmin((double)width / columns, (double)height / rows);
-    bst_box box = {.width = (int)fmax(1.0, floor(columns * scale + 0.5)),
-                   .height = (int)fmax(1.0, floor(rows * scale + 0.5))};
+    bst_io_box box = {.width = (int)fmax(1.0, floor(columns * scale + 0.5)),
+                      .height = (int)fmax(1.0, floor(rows * scale + 0.5))};
     box.width = box.width < width ? box.width : width;
     box.height = box.height < height ? box.height : height;
     box.x = (width - box.width) / 2;

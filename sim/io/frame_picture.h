@@ -7,7 +7,7 @@
 
 #include "sim/io/picture.h"
 
-typedef enum bst_overlay_kind {
+typedef enum bst_io_overlay_kind {
     BST_OVERLAY_TARGET,    /* true place of the target: red square */
     BST_OVERLAY_OBJECT,    /* true place of another object: grey square */
     BST_OVERLAY_STAR,      /* detection that was identified with a star: green circle */
@@ -15,16 +15,16 @@ typedef enum bst_overlay_kind {
     BST_OVERLAY_DETECTION, /* any other detection: yellow circle */
     BST_OVERLAY_TRACK,     /* a track: blue diamond */
     BST_OVERLAY_BORESIGHT  /* violet cross */
-} bst_overlay_kind;
+} bst_io_overlay_kind;
 
 /* A mark at a place of the frame, in pixels of the frame. */
-typedef struct bst_overlay_mark {
-    bst_overlay_kind kind;
+typedef struct bst_io_overlay_mark {
+    bst_io_overlay_kind kind;
     double x_px, y_px;
     double radius_px;  /* detections: size of the circle; 0: a default */
     double importance; /* where there is no room for all marks those with most are drawn */
     char label[48];    /* "" for none */
-} bst_overlay_mark;
+} bst_io_overlay_mark;
 
 /* Importance of marks that are not detections, and of the target's own detection; that of any other
  * detection is its light in electrons. */
@@ -32,17 +32,18 @@ typedef struct bst_overlay_mark {
 #define BST_OVERLAY_OF_TARGET 1e302
 #define BST_OVERLAY_OF_OBJECT 1e301
 
-typedef struct bst_overlay {
-    const bst_overlay_mark *marks; /* drawn from the last to the first: the most important on top */
+typedef struct bst_io_overlay {
+    const bst_io_overlay_mark
+        *marks; /* drawn from the last to the first: the most important on top */
     int count;
     const char *caption; /* one line, upper left; NULL for none */
-} bst_overlay;
+} bst_io_overlay;
 
 /* Makes a picture of width x height that holds a frame of columns x rows pixels as large as it
  * fits, in the middle, and black around it. `overlay` may be NULL. A frame that has the picture's
  * size is shown pixel for pixel. The caller frees. */
 bst_status bst_frame_picture(bst_ctx *ctx, const uint16_t *pixels, int columns, int rows,
-                             bst_stretch stretch, const bst_overlay *overlay, int width, int height,
-                             bst_picture **out) BST_MUST_CHECK;
+                             bst_io_stretch stretch, const bst_io_overlay *overlay, int width,
+                             int height, bst_picture **out) BST_MUST_CHECK;
 
 #endif

@@ -19,7 +19,7 @@ static bst_status write_png(bst_ctx *ctx, const char *path, const void *pixels, 
     }
     bst_status status =
         png_image_write_to_memory(&png, encoded, &bytes, 0, pixels, width, NULL)
-            ? bst_write_file_atomic(ctx, path, encoded, bytes)
+            ? bst_io_write_file_atomic(ctx, path, encoded, bytes)
             : bst_fail(ctx, BST_ERR_IO, "%s: no PNG can be made: %s", path, png.message);
     free(encoded);
     return status;

@@ -23,7 +23,8 @@ static bool write_all(int fd, const char *data, size_t bytes) {
     return true;
 }
 
-bst_status bst_write_file_atomic(bst_ctx *ctx, const char *path, const void *data, size_t bytes) {
+bst_status bst_io_write_file_atomic(bst_ctx *ctx, const char *path, const void *data,
+                                    size_t bytes) {
     char draft[4160];
     int fd;
     BST_TRY(bst_draft_make(ctx, path, draft, sizeof draft, &fd));
@@ -44,8 +45,8 @@ bst_status bst_write_file_atomic(bst_ctx *ctx, const char *path, const void *dat
     return BST_OK;
 }
 
-bst_status bst_run_write_json(bst_ctx *ctx, const bst_run *run, const char *name,
-                              const struct cJSON *json) {
+bst_status bst_io_run_write_json(bst_ctx *ctx, const bst_run *run, const char *name,
+                                 const struct cJSON *json) {
     char path[4096];
     BST_TRY(bst_run_file(ctx, run, name, path, sizeof path));
     char *text = cJSON_Print(json);
@@ -55,7 +56,7 @@ bst_status bst_run_write_json(bst_ctx *ctx, const bst_run *run, const char *name
     /* the terminating zero makes room for the newline */
     size_t bytes = strlen(text);
     text[bytes] = '\n';
-    bst_status status = bst_write_file_atomic(ctx, path, text, bytes + 1);
+    bst_status status = bst_io_write_file_atomic(ctx, path, text, bytes + 1);
     cJSON_free(text);
     return status;
 }

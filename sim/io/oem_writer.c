@@ -6,10 +6,10 @@ enum { LAGRANGE_DEGREE = 9 };
 
 bst_status bst_oem_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,
                               const char *originator, const char *comment) {
-    bst_kvn_write(stream, "CCSDS_OEM_VERS", "2.0");
-    bst_kvn_comment(stream, comment);
-    bst_kvn_write(stream, "CREATION_DATE", creation_utc);
-    bst_kvn_write(stream, "ORIGINATOR", originator);
+    bst_io_kvn_write(stream, "CCSDS_OEM_VERS", "2.0");
+    bst_io_kvn_comment(stream, comment);
+    bst_io_kvn_write(stream, "CREATION_DATE", creation_utc);
+    bst_io_kvn_write(stream, "ORIGINATOR", originator);
     return bst_text_stream_ok(ctx, stream);
 }
 
@@ -26,17 +26,17 @@ static bst_status write_metadata(bst_ctx *ctx, FILE *stream, const bst_oem_segme
     int lagrange = most < LAGRANGE_DEGREE ? (int)most : LAGRANGE_DEGREE;
     snprintf(degree, sizeof degree, "%d", s->hermite_degree > 0 ? s->hermite_degree : lagrange);
     fputs("\nMETA_START\n", stream);
-    bst_kvn_write(stream, "OBJECT_NAME", s->object_name);
-    bst_kvn_write(stream, "OBJECT_ID", s->object_id);
-    bst_kvn_write(stream, "CENTER_NAME", "EARTH");
-    bst_kvn_write(stream, "REF_FRAME", s->ref_frame);
-    bst_kvn_write(stream, "TIME_SYSTEM", "UTC");
-    bst_kvn_write(stream, "START_TIME", start);
-    bst_kvn_write(stream, "STOP_TIME", stop);
-    bst_kvn_write(stream, "INTERPOLATION", s->hermite_degree > 0 ? "HERMITE" : "LAGRANGE");
-    bst_kvn_write(stream, "INTERPOLATION_DEGREE", degree);
+    bst_io_kvn_write(stream, "OBJECT_NAME", s->object_name);
+    bst_io_kvn_write(stream, "OBJECT_ID", s->object_id);
+    bst_io_kvn_write(stream, "CENTER_NAME", "EARTH");
+    bst_io_kvn_write(stream, "REF_FRAME", s->ref_frame);
+    bst_io_kvn_write(stream, "TIME_SYSTEM", "UTC");
+    bst_io_kvn_write(stream, "START_TIME", start);
+    bst_io_kvn_write(stream, "STOP_TIME", stop);
+    bst_io_kvn_write(stream, "INTERPOLATION", s->hermite_degree > 0 ? "HERMITE" : "LAGRANGE");
+    bst_io_kvn_write(stream, "INTERPOLATION_DEGREE", degree);
     fputs("META_STOP\n\n", stream);
-    bst_kvn_comment(stream, s->comment);
+    bst_io_kvn_comment(stream, s->comment);
     return bst_text_stream_ok(ctx, stream);
 }
 
@@ -44,8 +44,8 @@ static void write_covariance(FILE *stream, const bst_oem_segment *s) {
     char text[BST_TIME_TEXT_BYTES];
     bst_text_utc(s->covariance->epoch, text);
     fputs("\nCOVARIANCE_START\n", stream);
-    bst_kvn_write(stream, "EPOCH", text);
-    bst_kvn_write(stream, "COV_REF_FRAME", s->ref_frame);
+    bst_io_kvn_write(stream, "EPOCH", text);
+    bst_io_kvn_write(stream, "COV_REF_FRAME", s->ref_frame);
     for (int i = 0; i < 6; i++) {
         for (int k = 0; k <= i; k++) {
             fprintf(stream, "%s%.12e", k ? " " : "", s->covariance->matrix[i][k] * 1e-6);

@@ -24,7 +24,7 @@ struct bst_picture {
 
 namespace {
 
-cv::Scalar scalar(bst_colour c) {
+cv::Scalar scalar(bst_io_colour c) {
     return cv::Scalar(c.b, c.g, c.r);
 }
 
@@ -38,7 +38,7 @@ int stroke(double thickness) {
     return std::max(1, static_cast<int>(std::lround(std::min(thickness, 1000.0) * kOver)));
 }
 
-cv::Rect enlarged(bst_box box) {
+cv::Rect enlarged(bst_io_box box) {
     return cv::Rect(box.x * kOver, box.y * kOver, box.width * kOver, box.height * kOver);
 }
 
@@ -76,7 +76,7 @@ std::string ascii(const char *text) {
     return s;
 }
 
-cv::Mat to_grey(const cv::Mat &frame, bst_stretch s) {
+cv::Mat to_grey(const cv::Mat &frame, bst_io_stretch s) {
     cv::Mat table(1, 65536, CV_8U);
     double top = std::asinh((s.white - s.black) / s.softening);
     for (int i = 0; i < 65536; i++) {
@@ -96,8 +96,8 @@ cv::Mat to_grey(const cv::Mat &frame, bst_stretch s) {
 
 }  // namespace
 
-extern "C" bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_colour background,
-                                         bst_picture **out) noexcept {
+extern "C" bst_status bst_picture_create(bst_ctx *ctx, int width, int height,
+                                         bst_io_colour background, bst_picture **out) noexcept {
     *out = nullptr;
     if (width < 1 || height < 1 || width > 16384 || height > 16384) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "a picture of %d x %d pixels", width, height);
@@ -124,7 +124,8 @@ extern "C" void bst_picture_free(bst_picture *picture) noexcept {
     delete picture;
 }
 
-extern "C" bst_stretch bst_stretch_of(const uint16_t *pixels, int width, int height) noexcept {
+extern "C" bst_io_stretch bst_io_stretch_of(const uint16_t *pixels, int width,
+                                            int height) noexcept {
     size_t count = static_cast<size_t>(width) * static_cast<size_t>(height);
     uint32_t histogram[65536] = {0};
     for (size_t i = 0; i < count; i++) {
@@ -143,13 +144,13 @@ extern "C" bst_stretch bst_stretch_of(const uint16_t *pixels, int width, int hei
         }
     }
     double sigma = std::max(1.0, 1.4826 * (median - quarter));
-    return bst_stretch{median - 1.0 * sigma, median + 15.0 * sigma, 1.5 * sigma};
+    return bst_io_stretch{median - 1.0 * sigma, median + 15.0 * sigma, 1.5 * sigma};
 }
 
-extern "C" bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_box to,
+extern "C" bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_io_box to,
                                         const uint16_t *pixels, int width, int height, int x0,
                                         int y0, int columns, int rows,
-                                        bst_stretch stretch) noexcept {
+                                        bst_io_stretch stretch) noexcept {
     if (columns < 1 || rows < 1 || to.width < 1 || to.height < 1 ||
         !(stretch.white > stretch.black) || !(stretch.softening > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "an empty part of a frame, box or stretch");
@@ -179,7 +180,7 @@ extern "C" bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_
     }
 }
 
-extern "C" void bst_picture_clip(bst_picture *picture, bst_box box) noexcept {
+extern "C" void bst_picture_clip(bst_picture *picture, bst_io_box box) noexcept {
     picture->clip = enlarged(box);
 }
 
@@ -188,7 +189,7 @@ extern "C" void bst_picture_unclip(bst_picture *picture) noexcept {
 }
 
 extern "C" void bst_picture_line(bst_picture *picture, double x0, double y0, double x1, double y1,
-                                 bst_colour colour, double thickness) noexcept {
+                                 bst_io_colour colour, double thickness) noexcept {
     draw(picture, [&](cv::Mat &view, cv::Point origin) {
         cv::line(view, cv::Point(fixed(x0), fixed(y0)) - origin,
                  cv::Point(fixed(x1), fixed(y1)) - origin, scalar(colour), stroke(thickness),
@@ -197,7 +198,7 @@ extern "C" void bst_picture_line(bst_picture *picture, double x0, double y0, dou
 }
 
 extern "C" void bst_picture_circle(bst_picture *picture, double x, double y, double radius,
-                                   bst_colour colour, double thickness) noexcept {
+                                   bst_io_colour colour, double thickness) noexcept {
     draw(picture, [&](cv::Mat &view, cv::Point origin) {
         int r = static_cast<int>(std::lround(std::clamp(radius, 0.0, 1e5) * kOver * (1 << kShift)));
         cv::circle(view, cv::Point(fixed(x), fixed(y)) - origin, r, scalar(colour),
@@ -206,7 +207,8 @@ extern "C" void bst_picture_circle(bst_picture *picture, double x, double y, dou
 }
 
 extern "C" void bst_picture_rectangle(bst_picture *picture, double x, double y, double width,
-                                      double height, bst_colour colour, double thickness) noexcept {
+                                      double height, bst_io_colour colour,
+                                      double thickness) noexcept {
     draw(picture, [&](cv::Mat &view, cv::Point origin) {
         cv::rectangle(view, cv::Point(fixed(x), fixed(y)) - origin,
                       cv::Point(fixed(x + width), fixed(y + height)) - origin, scalar(colour),
@@ -214,7 +216,8 @@ extern "C" void bst_picture_rectangle(bst_picture *picture, double x, double y, 
     });
 }
 
-extern "C" void bst_picture_fill(bst_picture *picture, bst_box box, bst_colour colour) noexcept {
+extern "C" void bst_picture_fill(bst_picture *picture, bst_io_box box,
+                                 bst_io_colour colour) noexcept {
     draw(picture, [&](cv::Mat &view, cv::Point origin) {
         cv::Rect r = enlarged(box) - cv::Point(origin.x >> kShift, origin.y >> kShift);
         cv::rectangle(view, r, scalar(colour), cv::FILLED);
@@ -222,7 +225,7 @@ extern "C" void bst_picture_fill(bst_picture *picture, bst_box box, bst_colour c
 }
 
 extern "C" double bst_picture_text(bst_picture *picture, double x, double y, double height,
-                                   bst_colour colour, bool bold, const char *text) noexcept {
+                                   bst_io_colour colour, bool bold, const char *text) noexcept {
     draw(picture, [&](cv::Mat &view, cv::Point origin) {
         cv::Point at((fixed(x) - origin.x) >> kShift, (fixed(y) - origin.y) >> kShift);
         cv::putText(view, ascii(text), at, kFont, font_scale(height), scalar(colour),
@@ -324,7 +327,7 @@ extern "C" bst_status bst_picture_save(bst_ctx *ctx, const bst_picture *picture,
                                        static_cast<png_int_32>(final_size.step[0]), nullptr)) {
             return bst_fail(ctx, BST_ERR_IO, "%s: no PNG can be made: %s", path, png.message);
         }
-        return bst_write_file_atomic(ctx, path, bytes.data(), size);
+        return bst_io_write_file_atomic(ctx, path, bytes.data(), size);
     } catch (const std::exception &e) {
         return bst_fail(ctx, BST_ERR_MEMORY, "%s: %s", path, e.what());
     } catch (...) {

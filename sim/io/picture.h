@@ -17,52 +17,53 @@ extern "C" {
 
 typedef struct bst_picture bst_picture;
 
-typedef struct bst_colour {
+typedef struct bst_io_colour {
     uint8_t r, g, b;
-} bst_colour;
+} bst_io_colour;
 
 /* Grey levels of a frame: what is shown as black and as white, and how hard the asinh bends. */
-typedef struct bst_stretch {
+typedef struct bst_io_stretch {
     double black, white; /* DN */
     double softening; /* > 0: DN above black at which the scale turns from linear to logarithmic */
-} bst_stretch;
+} bst_io_stretch;
 
 /* A rectangle in picture pixels. */
-typedef struct bst_box {
+typedef struct bst_io_box {
     int x, y, width, height;
-} bst_box;
+} bst_io_box;
 
-bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_colour background,
+bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_io_colour background,
                               bst_picture **out) BST_NOEXCEPT BST_MUST_CHECK;
 void bst_picture_free(bst_picture *picture) BST_NOEXCEPT;
 
 /* A stretch from the frame's own histogram: black a little below the median, white far above the
  * noise (robust sigma from the lower quartile). A flat frame gives a valid stretch. */
-bst_stretch bst_stretch_of(const uint16_t *pixels, int width, int height) BST_NOEXCEPT;
+bst_io_stretch bst_io_stretch_of(const uint16_t *pixels, int width, int height) BST_NOEXCEPT;
 
 /* Fills `to` with the part of a frame that begins at (x0, y0), `columns` x `rows` pixels large,
  * row 0 at the top. Reduced by area averaging, enlarged by whole pixels as they are. The part is
  * clipped to the frame; what lies outside is painted black. */
-bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_box to, const uint16_t *pixels,
-                             int width, int height, int x0, int y0, int columns, int rows,
-                             bst_stretch stretch) BST_NOEXCEPT BST_MUST_CHECK;
+bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_io_box to,
+                             const uint16_t *pixels, int width, int height, int x0, int y0,
+                             int columns, int rows,
+                             bst_io_stretch stretch) BST_NOEXCEPT BST_MUST_CHECK;
 
 /* Anti-aliased shapes; coordinates in picture pixels (centre of the first: 0, 0), thickness in
  * pixels. What lies outside the picture, or outside the box last given to bst_picture_clip, is cut.
  */
-void bst_picture_clip(bst_picture *picture, bst_box box) BST_NOEXCEPT;
+void bst_picture_clip(bst_picture *picture, bst_io_box box) BST_NOEXCEPT;
 void bst_picture_unclip(bst_picture *picture) BST_NOEXCEPT;
 void bst_picture_line(bst_picture *picture, double x0, double y0, double x1, double y1,
-                      bst_colour colour, double thickness) BST_NOEXCEPT;
-void bst_picture_circle(bst_picture *picture, double x, double y, double radius, bst_colour colour,
-                        double thickness) BST_NOEXCEPT;
+                      bst_io_colour colour, double thickness) BST_NOEXCEPT;
+void bst_picture_circle(bst_picture *picture, double x, double y, double radius,
+                        bst_io_colour colour, double thickness) BST_NOEXCEPT;
 void bst_picture_rectangle(bst_picture *picture, double x, double y, double width, double height,
-                           bst_colour colour, double thickness) BST_NOEXCEPT;
-void bst_picture_fill(bst_picture *picture, bst_box box, bst_colour colour) BST_NOEXCEPT;
+                           bst_io_colour colour, double thickness) BST_NOEXCEPT;
+void bst_picture_fill(bst_picture *picture, bst_io_box box, bst_io_colour colour) BST_NOEXCEPT;
 /* Text (ASCII; other bytes are shown as '?') with its base line's left end at (x, y); `height` is
  * that of a capital letter, px. Returns the width, px. */
-double bst_picture_text(bst_picture *picture, double x, double y, double height, bst_colour colour,
-                        bool bold, const char *text) BST_NOEXCEPT;
+double bst_picture_text(bst_picture *picture, double x, double y, double height,
+                        bst_io_colour colour, bool bold, const char *text) BST_NOEXCEPT;
 double bst_picture_text_width(double height, bool bold, const char *text) BST_NOEXCEPT;
 
 /* Copies the picture to `bgr`: height x width pixels of three bytes, blue first, no padding. */

@@ -29,20 +29,20 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
 bst_status bst_plot_end(bst_ctx *ctx, bst_plot *plot, bool *made) BST_MUST_CHECK;
 
 /* One point of a pointing plot. */
-typedef struct bst_pointing_point {
+typedef struct bst_io_pointing_point {
     double time_s;
     double dx_px, dy_px; /* true target from the boresight, mean of the exposure */
     int mode;            /* bst_mode */
     bool in_track;       /* the right target is in confirmed track */
     bool counted;        /* among the frames of the pointing figures */
     bool visible;        /* false: the point is not drawn */
-} bst_pointing_point;
+} bst_io_pointing_point;
 
 /* Plots the pointing error against time: radial error on a logarithmic scale with the modes as
  * coloured ground, and both components of the points that are counted. `title` and `label`, a line
  * of figures, may be NULL; `limit_px` > 0 draws a line at the error that is asked for. */
-bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title, const char *label,
-                             const bst_pointing_point *points, int count, double limit_px,
-                             bool *made) BST_MUST_CHECK;
+bst_status bst_io_pointing_plot(bst_ctx *ctx, const char *path, const char *title,
+                                const char *label, const bst_io_pointing_point *points, int count,
+                                double limit_px, bool *made) BST_MUST_CHECK;
 
 #endif

@@ -19,14 +19,14 @@ typedef struct extent {
     double spread; /* largest component of points that are counted */
 } extent;
 
-static double radial(const bst_pointing_point *p) {
+static double radial(const bst_io_pointing_point *p) {
     return hypot(p->dx_px, p->dy_px);
 }
 
-static extent measure(const bst_pointing_point *points, int count) {
+static extent measure(const bst_io_pointing_point *points, int count) {
     extent e = {.counted = 0};
     for (int i = 0; i < count; i++) {
-        const bst_pointing_point *p = &points[i];
+        const bst_io_pointing_point *p = &points[i];
         double r = radial(p);
         if (!p->visible || !isfinite(r)) {
             continue;
@@ -47,10 +47,10 @@ static void put_text(FILE *script, const char *text) {
     }
 }
 
-static void put_data(FILE *s, const bst_pointing_point *points, int count) {
+static void put_data(FILE *s, const bst_io_pointing_point *points, int count) {
     fputs("$points << BST_END\n", s);
     for (int i = 0; i < count; i++) {
-        const bst_pointing_point *p = &points[i];
+        const bst_io_pointing_point *p = &points[i];
         if (p->visible && isfinite(radial(p))) {
             fprintf(s, "%.9g %.9g %.9g %.9g %d %d\n", p->time_s, fmax(radial(p), FLOOR_PX),
                     p->dx_px, p->dy_px, p->in_track ? 1 : 0, p->counted ? 1 : 0);
@@ -62,7 +62,7 @@ static void put_data(FILE *s, const bst_pointing_point *points, int count) {
 }
 
 /* The modes as coloured ground; returns a bit per mode that occurs. */
-static unsigned put_modes(FILE *s, const bst_pointing_point *points, int count, double end_s) {
+static unsigned put_modes(FILE *s, const bst_io_pointing_point *points, int count, double end_s) {
     unsigned seen = 0;
     for (int i = 0; i < count;) {
         int mode = points[i].mode, next = i + 1;
@@ -82,7 +82,7 @@ static unsigned put_modes(FILE *s, const bst_pointing_point *points, int count, 
     return seen;
 }
 
-static void put_upper(FILE *s, const char *title, const bst_pointing_point *points, int count,
+static void put_upper(FILE *s, const char *title, const bst_io_pointing_point *points, int count,
                       double limit_px, const extent *e) {
     double end_s = points[count - 1].time_s;
     fputs(
@@ -150,9 +150,9 @@ static void put_lower(FILE *s, const char *label, double limit_px, const extent 
         s);
 }
 
-bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title, const char *label,
-                             const bst_pointing_point *points, int count, double limit_px,
-                             bool *made) {
+bst_status bst_io_pointing_plot(bst_ctx *ctx, const char *path, const char *title,
+                                const char *label, const bst_io_pointing_point *points, int count,
+                                double limit_px, bool *made) {
     if (made) {
         *made = false;
     }

@@ -15,14 +15,14 @@
 #define INSET 208   /* side of the inset */
 #define INSET_PX 48 /* pixels of the frame in it */
 
-static const bst_colour ground = {16, 20, 28}, white = BST_WHITE, soft = BST_SOFT,
-                        target_colour = BST_TARGET_COLOUR, track_colour = BST_TRACK_COLOUR,
-                        object_colour = BST_OBJECT_COLOUR, star_colour = BST_STAR_COLOUR,
-                        rest_colour = BST_REST_COLOUR;
+static const bst_io_colour ground = {16, 20, 28}, white = BST_WHITE, soft = BST_SOFT,
+                           target_colour = BST_TARGET_COLOUR, track_colour = BST_TRACK_COLOUR,
+                           object_colour = BST_OBJECT_COLOUR, star_colour = BST_STAR_COLOUR,
+                           rest_colour = BST_REST_COLOUR;
 
 /* How frame pixels come to picture pixels in one view. */
 typedef struct view {
-    bst_box box;
+    bst_io_box box;
     double x0, y0; /* frame pixel coordinates of the box's outer corner */
     double scale;  /* picture pixels per frame pixel */
 } view;
@@ -35,11 +35,11 @@ static double view_y(const view *v, double y_px) {
 }
 
 static int by_importance(const void *a, const void *b) {
-    const bst_mark *p = a, *q = b;
+    const bst_io_mark *p = a, *q = b;
     return (p->importance < q->importance) - (p->importance > q->importance);
 }
 
-void bst_mark_sort(bst_mark *marks, int count) {
+void bst_io_mark_sort(bst_io_mark *marks, int count) {
     qsort(marks, (size_t)count, sizeof *marks, by_importance);
 }
 
@@ -51,7 +51,7 @@ static int drawn_of(const bst_quicklook_frame *f) {
 static void draw_marks(bst_picture *p, const bst_quicklook_frame *f, const view *v, double size) {
     bst_picture_clip(p, v->box);
     for (int i = drawn_of(f) - 1; i >= 0; i--) {
-        const bst_mark *m = &f->detections[i];
+        const bst_io_mark *m = &f->detections[i];
         double r = fmax(m->radius_px * v->scale, 5.0 * size);
         bst_picture_circle(p, view_x(v, m->x_px), view_y(v, m->y_px), r,
                            m->kind == BST_MARK_STAR   ? star_colour
@@ -132,7 +132,7 @@ static void draw_pointer(bst_picture *p, const bst_quicklook_frame *f, const vie
 /* The surroundings of the target, enlarged, in the panel's upper right corner, or in the upper left
  * when that would hide what it shows. */
 static bst_status draw_inset(bst_ctx *ctx, bst_picture *p, const bst_quicklook_frame *f,
-                             const view *panel, bst_stretch stretch) {
+                             const view *panel, bst_io_stretch stretch) {
     bool inside = target_is_inside(f);
     double x = inside ? f->target_x_px : f->boresight_x_px;
     double y = inside ? f->target_y_px : f->boresight_y_px;
@@ -173,7 +173,7 @@ static bst_status draw_panel(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
         .scale = scale};
     v.box.width = v.box.width < 1 ? 1 : v.box.width;
     v.box.height = v.box.height < 1 ? 1 : v.box.height;
-    bst_stretch stretch = bst_stretch_of(f->pixels, f->width, f->height);
+    bst_io_stretch stretch = bst_io_stretch_of(f->pixels, f->width, f->height);
     BST_TRY(bst_picture_frame(ctx, p, v.box, f->pixels, f->width, f->height, 0, 0, f->width,
                               f->height, stretch));
     draw_marks(p, f, &v, 1.0);

@@ -64,7 +64,7 @@ bool bst_run_owns(const char *name) {
     return matches(run_names, name);
 }
 
-bool bst_study_owns(const char *name) {
+bool bst_io_study_owns(const char *name) {
     return matches(study_names, name);
 }
 
@@ -75,11 +75,11 @@ static bool has(const char *folder, const char *name) {
     return n > 0 && (size_t)n < sizeof path && lstat(path, &info) == 0;
 }
 
-bool bst_folder_is_run(const char *folder) {
+bool bst_io_folder_is_run(const char *folder) {
     return has(folder, "run.sqlite") ||
            (has(folder, "manifest.json") && has(folder, "scenario.json"));
 }
 
-bool bst_folder_is_study(const char *folder) {
+bool bst_io_folder_is_study(const char *folder) {
     return has(folder, "study.sqlite") || has(folder, "shards");
 }

@@ -16,11 +16,11 @@ extern "C" {
 bool bst_run_owns(const char *name);
 
 /* The same of a study's folder: tables, CSV files, description, lock, shards and kept runs. */
-bool bst_study_owns(const char *name);
+bool bst_io_study_owns(const char *name);
 
 /* Whether `folder` is that of a run (complete or not), and of a study. */
-bool bst_folder_is_run(const char *folder);
-bool bst_folder_is_study(const char *folder);
+bool bst_io_folder_is_run(const char *folder);
+bool bst_io_folder_is_study(const char *folder);
 
 #ifdef __cplusplus
 }

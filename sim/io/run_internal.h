@@ -10,13 +10,13 @@
 #define BST_RUN_PATH_BYTES 4096
 #define BST_RUN_DATABASE "run.sqlite"
 
-struct bst_table {
+struct bst_io_table {
     bst_run *run;
-    bst_table *next;
+    bst_io_table *next;
     sqlite3_stmt *insert;
     char name[64];
     int columns;
-    bst_column_type types[BST_TABLE_COLUMNS];
+    bst_io_column_type types[BST_TABLE_COLUMNS];
 };
 
 struct bst_run {
@@ -25,7 +25,7 @@ struct bst_run {
     bool overwrite;
     int lock; /* descriptor that holds the lock on folder/lock */
     sqlite3 *db;
-    bst_table *tables;
+    bst_io_table *tables;
     sqlite3_stmt *note_table, *note_column;
     bool in_batch;
     int batch_rows;

@@ -29,7 +29,7 @@ struct bst_run_reader {
     int problem_count;
 };
 
-struct bst_rows {
+struct bst_io_rows {
     const bst_run_reader *reader;
     sqlite3_stmt *statement;
 };
@@ -107,14 +107,14 @@ static void sql_utc(sqlite3_context *context, int count, sqlite3_value **values)
 /* The epoch, from the table run, else from scenario.json. */
 static void find_epoch(bst_run_reader *reader) {
     bst_ctx unheard = {0};
-    bst_rows *rows = NULL;
+    bst_io_rows *rows = NULL;
     bool more = false;
-    if (bst_rows_open(&unheard, reader, "SELECT epoch_utc FROM run", 0, 0, &rows) == BST_OK &&
-        bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
+    if (bst_io_rows_open(&unheard, reader, "SELECT epoch_utc FROM run", 0, 0, &rows) == BST_OK &&
+        bst_io_rows_next(&unheard, rows, &more) == BST_OK && more) {
         reader->has_epoch =
-            bst_time_from_utc(&unheard, bst_rows_text(rows, 0), &reader->epoch) == BST_OK;
+            bst_time_from_utc(&unheard, bst_io_rows_text(rows, 0), &reader->epoch) == BST_OK;
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     const cJSON *text =
         cJSON_GetObjectItemCaseSensitive(bst_run_reader_scenario(reader), "epoch_utc");
     if (!reader->has_epoch && cJSON_IsString(text)) {
@@ -371,14 +371,14 @@ static bst_status fail_sql(bst_ctx *ctx, const bst_run_reader *reader) {
                     sqlite3_errmsg(reader->db));
 }
 
-bst_status bst_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
-                         int64_t parameter1, int64_t parameter2, bst_rows **out) {
+bst_status bst_io_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
+                            int64_t parameter1, int64_t parameter2, bst_io_rows **out) {
     *out = NULL;
     if (!reader->db) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: has no tables that could be read",
                         reader->folder);
     }
-    bst_rows *rows = calloc(1, sizeof *rows);
+    bst_io_rows *rows = calloc(1, sizeof *rows);
     if (!rows) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
@@ -395,22 +395,22 @@ bst_status bst_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char 
     return BST_OK;
 }
 
-bst_status bst_rows_next(bst_ctx *ctx, bst_rows *rows, bool *more) {
+bst_status bst_io_rows_next(bst_ctx *ctx, bst_io_rows *rows, bool *more) {
     int code = sqlite3_step(rows->statement);
     *more = code == SQLITE_ROW;
     return code == SQLITE_ROW || code == SQLITE_DONE ? BST_OK : fail_sql(ctx, rows->reader);
 }
 
-int bst_rows_columns(const bst_rows *rows) {
+int bst_io_rows_columns(const bst_io_rows *rows) {
     return sqlite3_column_count(rows->statement);
 }
 
-const char *bst_rows_column_name(const bst_rows *rows, int column) {
+const char *bst_io_rows_column_name(const bst_io_rows *rows, int column) {
     const char *name = sqlite3_column_name(rows->statement, column);
     return name ? name : "";
 }
 
-bst_cell_kind bst_rows_kind(const bst_rows *rows, int column) {
+bst_io_cell_kind bst_io_rows_kind(const bst_io_rows *rows, int column) {
     switch (sqlite3_column_type(rows->statement, column)) {
         case SQLITE_NULL:
             return BST_CELL_NULL;
@@ -423,24 +423,24 @@ bst_cell_kind bst_rows_kind(const bst_rows *rows, int column) {
     }
 }
 
-bool bst_rows_is_null(const bst_rows *rows, int column) {
-    return bst_rows_kind(rows, column) == BST_CELL_NULL;
+bool bst_io_rows_is_null(const bst_io_rows *rows, int column) {
+    return bst_io_rows_kind(rows, column) == BST_CELL_NULL;
 }
 
-int64_t bst_rows_int(const bst_rows *rows, int column) {
+int64_t bst_io_rows_int(const bst_io_rows *rows, int column) {
     return sqlite3_column_int64(rows->statement, column);
 }
 
-double bst_rows_real(const bst_rows *rows, int column) {
-    return bst_rows_is_null(rows, column) ? NAN : sqlite3_column_double(rows->statement, column);
+double bst_io_rows_real(const bst_io_rows *rows, int column) {
+    return bst_io_rows_is_null(rows, column) ? NAN : sqlite3_column_double(rows->statement, column);
 }
 
-const char *bst_rows_text(const bst_rows *rows, int column) {
+const char *bst_io_rows_text(const bst_io_rows *rows, int column) {
     const char *text = (const char *)sqlite3_column_text(rows->statement, column);
     return text ? text : "";
 }
 
-void bst_rows_close(bst_rows *rows) {
+void bst_io_rows_close(bst_io_rows *rows) {
     if (rows) {
         sqlite3_finalize(rows->statement);
         free(rows);
@@ -449,16 +449,17 @@ void bst_rows_close(bst_rows *rows) {
 
 int64_t bst_run_reader_int(const bst_run_reader *reader, const char *sql, int64_t parameter,
                            int64_t fallback) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_ctx unheard = {0};
     bool more = false;
-    if (bst_rows_open(&unheard, reader, sql, parameter, 0, &rows) != BST_OK) {
+    if (bst_io_rows_open(&unheard, reader, sql, parameter, 0, &rows) != BST_OK) {
         return fallback;
     }
     int64_t value = fallback;
-    if (bst_rows_next(&unheard, rows, &more) == BST_OK && more && !bst_rows_is_null(rows, 0)) {
-        value = bst_rows_int(rows, 0);
+    if (bst_io_rows_next(&unheard, rows, &more) == BST_OK && more &&
+        !bst_io_rows_is_null(rows, 0)) {
+        value = bst_io_rows_int(rows, 0);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return value;
 }

@@ -58,32 +58,33 @@ bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const
                                char *buffer, size_t bytes) BST_MUST_CHECK;
 
 /* A query on the run's tables, row by row. Memory does not grow with the rows. */
-typedef struct bst_rows bst_rows;
+typedef struct bst_io_rows bst_io_rows;
 
 /* Prepares one SELECT with up to two integer parameters (?1, ?2). utc(seconds) in it is the instant
  * so long after the epoch, ISO 8601 to 1e-6 s. BST_ERR_FORMAT, with SQLite's
  * reason, when the database has no such table or column, or is damaged; BST_ERR_NOT_FOUND when the
  * run has no database. */
-bst_status bst_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
-                         int64_t parameter1, int64_t parameter2, bst_rows **out) BST_MUST_CHECK;
+bst_status bst_io_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
+                            int64_t parameter1, int64_t parameter2,
+                            bst_io_rows **out) BST_MUST_CHECK;
 /* Goes to the next row; *more is false after the last. BST_ERR_FORMAT when the file is damaged. */
-bst_status bst_rows_next(bst_ctx *ctx, bst_rows *rows, bool *more) BST_MUST_CHECK;
+bst_status bst_io_rows_next(bst_ctx *ctx, bst_io_rows *rows, bool *more) BST_MUST_CHECK;
 /* The current row's columns, counted from 0. A NULL is 0, NAN and "". Text lives until the next
- * call of bst_rows_next. */
-int bst_rows_columns(const bst_rows *rows);
-const char *bst_rows_column_name(const bst_rows *rows, int column);
-bool bst_rows_is_null(const bst_rows *rows, int column);
-int64_t bst_rows_int(const bst_rows *rows, int column);
-double bst_rows_real(const bst_rows *rows, int column);
-const char *bst_rows_text(const bst_rows *rows, int column);
-typedef enum bst_cell_kind {
+ * call of bst_io_rows_next. */
+int bst_io_rows_columns(const bst_io_rows *rows);
+const char *bst_io_rows_column_name(const bst_io_rows *rows, int column);
+bool bst_io_rows_is_null(const bst_io_rows *rows, int column);
+int64_t bst_io_rows_int(const bst_io_rows *rows, int column);
+double bst_io_rows_real(const bst_io_rows *rows, int column);
+const char *bst_io_rows_text(const bst_io_rows *rows, int column);
+typedef enum bst_io_cell_kind {
     BST_CELL_NULL,
     BST_CELL_INT,
     BST_CELL_REAL,
     BST_CELL_TEXT
-} bst_cell_kind;
-bst_cell_kind bst_rows_kind(const bst_rows *rows, int column);
-void bst_rows_close(bst_rows *rows);
+} bst_io_cell_kind;
+bst_io_cell_kind bst_io_rows_kind(const bst_io_rows *rows, int column);
+void bst_io_rows_close(bst_io_rows *rows);
 
 /* First integer of a query's only row; `fallback` when it has none or fails. */
 int64_t bst_run_reader_int(const bst_run_reader *reader, const char *sql, int64_t parameter,

@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 typedef struct bst_run bst_run;
-typedef struct bst_table bst_table;
+typedef struct bst_io_table bst_io_table;
 
 /* Makes "<out>.partial" (and missing parents, as mkdir -p) with an empty database in it. Nothing is
  * written before this call.
@@ -55,57 +55,57 @@ void bst_run_abandon(bst_run *run);
  * -1 when the system does not tell. */
 int64_t bst_run_free_bytes(const char *path);
 
-typedef enum bst_column_type {
+typedef enum bst_io_column_type {
     BST_COLUMN_INT,
     BST_COLUMN_REAL,
     BST_COLUMN_TEXT,
-} bst_column_type;
+} bst_io_column_type;
 
 /* A column. `name` carries the unit as the project names fields (x_px, ra_deg); unit and doc go
  * into the table "columns". */
-typedef struct bst_column {
+typedef struct bst_io_column {
     const char *name;
-    bst_column_type type;
+    bst_io_column_type type;
     const char *unit; /* "px", "deg", "" ... */
     const char *doc;
-} bst_column;
+} bst_io_column;
 
 /* A cell. What is no finite number (the magnitude of what sends no light, say) and NULL text are
  * stored as SQL NULL. */
-typedef struct bst_value {
-    bst_column_type type;
+typedef struct bst_io_value {
+    bst_io_column_type type;
     bool is_null;
     union {
         int64_t integer;
         double real;
         const char *text;
     } as;
-} bst_value;
+} bst_io_value;
 
-static inline bst_value bst_int_value(int64_t value) {
-    bst_value v;
+static inline bst_io_value bst_io_int_value(int64_t value) {
+    bst_io_value v;
     v.type = BST_COLUMN_INT;
     v.is_null = false;
     v.as.integer = value;
     return v;
 }
-static inline bst_value bst_real_value(double value) {
-    bst_value v;
+static inline bst_io_value bst_io_real_value(double value) {
+    bst_io_value v;
     v.type = BST_COLUMN_REAL;
     v.is_null = !isfinite(value);
     v.as.real = value;
     return v;
 }
-static inline bst_value bst_text_value(const char *value) {
-    bst_value v;
+static inline bst_io_value bst_io_text_value(const char *value) {
+    bst_io_value v;
     v.type = BST_COLUMN_TEXT;
     v.is_null = value == NULL;
     v.as.text = value;
     return v;
 }
 
-static inline bst_value bst_null_value(bst_column_type type) {
-    bst_value v = bst_int_value(0);
+static inline bst_io_value bst_io_null_value(bst_io_column_type type) {
+    bst_io_value v = bst_io_int_value(0);
     v.type = type;
     v.is_null = true;
     return v;
@@ -114,13 +114,15 @@ static inline bst_value bst_null_value(bst_column_type type) {
 /* Creates a table of `count` columns (1 to BST_TABLE_COLUMNS) and notes it in "tables" and
  * "columns". Names are ASCII letters, digits and underscores. The handle is owned by the run. */
 #define BST_TABLE_COLUMNS 64
-bst_status bst_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
-                            const bst_column *columns, int count, bst_table **out) BST_MUST_CHECK;
+bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
+                               const bst_io_column *columns, int count,
+                               bst_io_table **out) BST_MUST_CHECK;
 
 /* Appends one row of as many values as the table has columns, of their types. Rows are committed in
  * batches: after 50,000 rows, or with the first row that comes 2 s after the batch's first, so that
  * a killed run loses no more than that. */
-bst_status bst_table_append(bst_ctx *ctx, bst_table *table, const bst_value *values) BST_MUST_CHECK;
+bst_status bst_io_table_append(bst_ctx *ctx, bst_io_table *table,
+                               const bst_io_value *values) BST_MUST_CHECK;
 
 /* Commits the open batch now. BST_ERR_IO also when the folder is no longer where it was made. */
 bst_status bst_run_commit(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;

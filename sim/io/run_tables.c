@@ -112,7 +112,7 @@ bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) {
         return BST_OK;
     }
     bst_status status = bst_run_commit(ctx, run);
-    for (bst_table *table = run->tables, *next; table; table = next) {
+    for (bst_io_table *table = run->tables, *next; table; table = next) {
         next = table->next;
         sqlite3_finalize(table->insert);
         free(table);
@@ -137,12 +137,12 @@ static bool is_name(const char *name, size_t limit) {
     return n > 0 && n < limit && name[n] == '\0';
 }
 
-static const char *type_name(bst_column_type type) {
+static const char *type_name(bst_io_column_type type) {
     return type == BST_COLUMN_INT ? "INTEGER" : type == BST_COLUMN_REAL ? "REAL" : "TEXT";
 }
 
 /* Texts of the SQL that makes the table and of the one that inserts a row. */
-static bst_status write_sql(bst_ctx *ctx, const char *name, const bst_column *columns, int count,
+static bst_status write_sql(bst_ctx *ctx, const char *name, const bst_io_column *columns, int count,
                             char create[SQL_BYTES], char insert[SQL_BYTES]) {
     size_t c = (size_t)snprintf(create, SQL_BYTES, "CREATE TABLE \"%s\" (", name);
     size_t i = (size_t)snprintf(insert, SQL_BYTES, "INSERT INTO \"%s\" VALUES (", name);
@@ -160,7 +160,7 @@ static bst_status write_sql(bst_ctx *ctx, const char *name, const bst_column *co
 }
 
 static bst_status note_columns(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
-                               const bst_column *columns, int count) {
+                               const bst_io_column *columns, int count) {
     sqlite3_bind_text(run->note_table, 1, name, -1, SQLITE_STATIC);
     sqlite3_bind_text(run->note_table, 2, doc, -1, SQLITE_STATIC);
     BST_TRY(step_once(ctx, run, run->note_table, name));
@@ -177,10 +177,10 @@ static bst_status note_columns(bst_ctx *ctx, bst_run *run, const char *name, con
     return BST_OK;
 }
 
-bst_status bst_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
-                            const bst_column *columns, int count, bst_table **out) {
+bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
+                               const bst_io_column *columns, int count, bst_io_table **out) {
     *out = NULL;
-    if (!is_name(name, sizeof((bst_table *)0)->name) || count < 1 || count > BST_TABLE_COLUMNS) {
+    if (!is_name(name, sizeof((bst_io_table *)0)->name) || count < 1 || count > BST_TABLE_COLUMNS) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "table '%s' with %d columns cannot be made", name,
                         count);
     }
@@ -190,7 +190,7 @@ bst_status bst_table_create(bst_ctx *ctx, bst_run *run, const char *name, const 
     BST_TRY(begin_batch(ctx, run));
     BST_TRY(execute(ctx, run, create, "cannot make a table"));
     BST_TRY(note_columns(ctx, run, name, doc, columns, count));
-    bst_table *table = calloc(1, sizeof *table);
+    bst_io_table *table = calloc(1, sizeof *table);
     if (!table) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
@@ -211,7 +211,7 @@ bst_status bst_table_create(bst_ctx *ctx, bst_run *run, const char *name, const 
     return BST_OK;
 }
 
-bst_status bst_table_append(bst_ctx *ctx, bst_table *table, const bst_value *values) {
+bst_status bst_io_table_append(bst_ctx *ctx, bst_io_table *table, const bst_io_value *values) {
     bst_run *run = table->run;
     BST_TRY(begin_batch(ctx, run));
     for (int k = 0; k < table->columns; k++) {

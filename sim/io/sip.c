@@ -14,14 +14,14 @@ static const double INVERSE_PX = 1e-4;  /* aim of the inverse */
 typedef struct mapping {
     const bst_camera *camera;
     bst_quat q_gcrf_from_cam;
-    const bst_light *light;
+    const bst_astro_light *light;
     double x0, y0;         /* boresight */
     double cx, cy, hx, hy; /* middle and half sides of the sensor, px */
 } mapping;
 
 static bst_vec3 place(const mapping *m, double x, double y) {
     bst_vec3 cam = bst_camera_unproject(m->camera, x, y);
-    return bst_light_catalogue_star(m->light, bst_quat_rotate(m->q_gcrf_from_cam, cam));
+    return bst_astro_light_catalogue_star(m->light, bst_quat_rotate(m->q_gcrf_from_cam, cam));
 }
 
 static double evaluate(const double *c, int order, double u, double v) {
@@ -104,11 +104,11 @@ typedef struct samples {
     double c[2][NODES][NODES]; /* Chebyshev coefficients of xi and eta, rad */
 } samples;
 
-static bool transform_plane(const bst_sky_plane *t, samples *s) {
+static bool transform_plane(const bst_io_sky_plane *t, samples *s) {
     double value[2][NODES][NODES];
     for (int y = 0; y < NODES; y++) {
         for (int x = 0; x < NODES; x++) {
-            if (!bst_sky_to_plane(t, s->icrs[y][x], &value[0][y][x], &value[1][y][x])) {
+            if (!bst_io_sky_to_plane(t, s->icrs[y][x], &value[0][y][x], &value[1][y][x])) {
                 return false;
             }
         }
@@ -259,7 +259,7 @@ static void misfit(const bst_sip *sip, const pair *pairs, int count, double *for
     }
 }
 
-bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_light *light,
+bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_astro_light *light,
                  double crval_rad[2], double cd[2][2], bst_sip *out, double *residual_px) {
     double w = (double)camera->width_px, h = (double)camera->height_px;
     mapping m = {.camera = camera,
@@ -280,19 +280,19 @@ bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_l
     }
     bst_vec3_to_radec(place(&m, m.x0, m.y0), &crval_rad[0], &crval_rad[1]);
     double powers[2][BST_SIP_TERMS];
-    bst_sky_plane plane;
+    bst_io_sky_plane plane;
     memset(out, 0, sizeof *out);
     /* the polynomial's own value at the boresight becomes the tangent point */
     for (int round = 0; round < ROUNDS; round++) {
-        plane = bst_sky_plane_at(crval_rad[0], crval_rad[1]);
+        plane = bst_io_sky_plane_at(crval_rad[0], crval_rad[1]);
         if (!transform_plane(&plane, &s)) {
             return false;
         }
         out->order = choose_order(&s, bst_camera_scale_rad(camera));
         powers_of(&m, &s, out->order, powers);
         if (round + 1 < ROUNDS) {
-            bst_vec3_to_radec(bst_sky_from_plane(&plane, powers[0][0], powers[1][0]), &crval_rad[0],
-                              &crval_rad[1]);
+            bst_vec3_to_radec(bst_io_sky_from_plane(&plane, powers[0][0], powers[1][0]),
+                              &crval_rad[0], &crval_rad[1]);
         }
     }
     for (int k = 0; k < 2; k++) {
@@ -317,7 +317,7 @@ bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_l
         p->v = m.cy + y - m.y0;
         bst_vec3 icrs = g < 0 ? s.icrs[i / NODES][i % NODES] : place(&m, m.cx + x, m.cy + y);
         double xi, eta;
-        if (!bst_sky_to_plane(&plane, icrs, &xi, &eta)) {
+        if (!bst_io_sky_to_plane(&plane, icrs, &xi, &eta)) {
             return false;
         }
         apply_inverse((const double(*)[2])cd, xi, eta, &p->big_u, &p->big_v);

@@ -8,17 +8,18 @@
 #include "sim/core/vec.h"
 
 /* Tangent plane at a place: unit vectors to it, east and north. */
-typedef struct bst_sky_plane {
+typedef struct bst_io_sky_plane {
     bst_vec3 centre, east, north;
-} bst_sky_plane;
+} bst_io_sky_plane;
 
-static inline bst_sky_plane bst_sky_plane_at(double ra_rad, double dec_rad) {
+static inline bst_io_sky_plane bst_io_sky_plane_at(double ra_rad, double dec_rad) {
     double sr = sin(ra_rad), cr = cos(ra_rad), sd = sin(dec_rad), cd = cos(dec_rad);
-    return (bst_sky_plane){{cd * cr, cd * sr, sd}, {-sr, cr, 0.0}, {-sd * cr, -sd * sr, cd}};
+    return (bst_io_sky_plane){{cd * cr, cd * sr, sd}, {-sr, cr, 0.0}, {-sd * cr, -sd * sr, cd}};
 }
 
 /* Standard coordinates (rad); false beyond the plane's horizon. */
-static inline bool bst_sky_to_plane(const bst_sky_plane *t, bst_vec3 v, double *xi, double *eta) {
+static inline bool bst_io_sky_to_plane(const bst_io_sky_plane *t, bst_vec3 v, double *xi,
+                                       double *eta) {
     double z = bst_vec3_dot(t->centre, v);
     if (!(z > 0.0)) {
         return false;
@@ -28,7 +29,7 @@ static inline bool bst_sky_to_plane(const bst_sky_plane *t, bst_vec3 v, double *
     return true;
 }
 
-static inline bst_vec3 bst_sky_from_plane(const bst_sky_plane *t, double xi, double eta) {
+static inline bst_vec3 bst_io_sky_from_plane(const bst_io_sky_plane *t, double xi, double eta) {
     return bst_vec3_unit(bst_vec3_axpy(bst_vec3_axpy(t->centre, xi, t->east), eta, t->north));
 }
 

@@ -7,10 +7,10 @@
 
 bst_status bst_tdm_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,
                               const char *originator, const char *comment) {
-    bst_kvn_write(stream, "CCSDS_TDM_VERS", "2.0");
-    bst_kvn_comment(stream, comment);
-    bst_kvn_write(stream, "CREATION_DATE", creation_utc);
-    bst_kvn_write(stream, "ORIGINATOR", originator);
+    bst_io_kvn_write(stream, "CCSDS_TDM_VERS", "2.0");
+    bst_io_kvn_comment(stream, comment);
+    bst_io_kvn_write(stream, "CREATION_DATE", creation_utc);
+    bst_io_kvn_write(stream, "ORIGINATOR", originator);
     return bst_text_stream_ok(ctx, stream);
 }
 
@@ -40,47 +40,47 @@ static void write_metadata(FILE *stream, const bst_tdm_segment *s) {
     bst_text_utc(s->observations[0].time, start);
     bst_text_utc(s->observations[s->count - 1].time, stop);
     fputs("\nMETA_START\n", stream);
-    bst_kvn_comment(stream, s->comment);
-    bst_kvn_comment(stream,
-                    s->aberration_removed
-                        ? "Stellar aberration of the observer (Earth's and orbital velocity) "
-                          "removed from each observation."
-                        : "Stellar aberration of the observer is contained in the angles.");
-    bst_kvn_comment(stream, s->light_time_removed
-                                ? "Light time removed: object and observer at one instant."
-                                : "Light time contained: observer at reception, object at "
-                                  "emission.");
-    bst_kvn_write(stream, "TIME_SYSTEM", "UTC");
-    bst_kvn_write(stream, "START_TIME", start);
-    bst_kvn_write(stream, "STOP_TIME", stop);
-    bst_kvn_write(stream, "PARTICIPANT_1", s->observer);
-    bst_kvn_write(stream, "PARTICIPANT_2", s->object);
-    bst_kvn_write(stream, "MODE", "SEQUENTIAL");
-    bst_kvn_write(stream, "PATH", "2,1");
+    bst_io_kvn_comment(stream, s->comment);
+    bst_io_kvn_comment(stream,
+                       s->aberration_removed
+                           ? "Stellar aberration of the observer (Earth's and orbital velocity) "
+                             "removed from each observation."
+                           : "Stellar aberration of the observer is contained in the angles.");
+    bst_io_kvn_comment(stream, s->light_time_removed
+                                   ? "Light time removed: object and observer at one instant."
+                                   : "Light time contained: observer at reception, object at "
+                                     "emission.");
+    bst_io_kvn_write(stream, "TIME_SYSTEM", "UTC");
+    bst_io_kvn_write(stream, "START_TIME", start);
+    bst_io_kvn_write(stream, "STOP_TIME", stop);
+    bst_io_kvn_write(stream, "PARTICIPANT_1", s->observer);
+    bst_io_kvn_write(stream, "PARTICIPANT_2", s->object);
+    bst_io_kvn_write(stream, "MODE", "SEQUENTIAL");
+    bst_io_kvn_write(stream, "PATH", "2,1");
     if (s->observer_ephemeris) {
-        bst_kvn_write(stream, "EPHEMERIS_NAME_1", s->observer_ephemeris);
+        bst_io_kvn_write(stream, "EPHEMERIS_NAME_1", s->observer_ephemeris);
     }
-    bst_kvn_write(stream, "TIMETAG_REF", "RECEIVE");
+    bst_io_kvn_write(stream, "TIMETAG_REF", "RECEIVE");
     if (s->integration_s > 0.0) {
         snprintf(number, sizeof number, "%.9g", s->integration_s);
-        bst_kvn_write(stream, "INTEGRATION_INTERVAL", number);
-        bst_kvn_write(stream, "INTEGRATION_REF", "MIDDLE");
+        bst_io_kvn_write(stream, "INTEGRATION_INTERVAL", number);
+        bst_io_kvn_write(stream, "INTEGRATION_REF", "MIDDLE");
     }
-    bst_kvn_write(stream, "ANGLE_TYPE", "RADEC");
-    bst_kvn_write(stream, "REFERENCE_FRAME", "ICRF");
+    bst_io_kvn_write(stream, "ANGLE_TYPE", "RADEC");
+    bst_io_kvn_write(stream, "REFERENCE_FRAME", "ICRF");
     bool sizes = false;
     if (s->aberration_removed && isfinite(s->aberration_yearly_deg)) {
         snprintf(number, sizeof number, "%.9f", s->aberration_yearly_deg);
-        bst_kvn_write(stream, "CORRECTION_ABERRATION_YEARLY", number);
+        bst_io_kvn_write(stream, "CORRECTION_ABERRATION_YEARLY", number);
         sizes = true;
     }
     if (s->aberration_removed && isfinite(s->aberration_orbital_deg)) {
         snprintf(number, sizeof number, "%.9f", s->aberration_orbital_deg);
-        bst_kvn_write(stream, "CORRECTION_ABERRATION_DIURNAL", number);
+        bst_io_kvn_write(stream, "CORRECTION_ABERRATION_DIURNAL", number);
         sizes = true;
     }
     if (sizes) {
-        bst_kvn_write(stream, "CORRECTIONS_APPLIED", "YES");
+        bst_io_kvn_write(stream, "CORRECTIONS_APPLIED", "YES");
     }
     fputs("META_STOP\n\n", stream);
 }

@@ -19,13 +19,13 @@ static void write_printable(FILE *stream, const char *text, size_t length) {
     }
 }
 
-void bst_kvn_write(FILE *stream, const char *key, const char *value) {
+void bst_io_kvn_write(FILE *stream, const char *key, const char *value) {
     fprintf(stream, "%s = ", key);
     write_printable(stream, value, strlen(value));
     fputc('\n', stream);
 }
 
-void bst_kvn_comment(FILE *stream, const char *text) {
+void bst_io_kvn_comment(FILE *stream, const char *text) {
     while (text && *text) {
         size_t length = strcspn(text, "\n");
         fputs("COMMENT ", stream);

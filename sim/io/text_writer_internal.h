@@ -12,10 +12,10 @@ enum { BST_TIME_TEXT_BYTES = 40 };
 void bst_text_utc(bst_time t, char text[BST_TIME_TEXT_BYTES]);
 
 /* "KEY = value\n", what is not printable ASCII as '_'. */
-void bst_kvn_write(FILE *stream, const char *key, const char *value);
+void bst_io_kvn_write(FILE *stream, const char *key, const char *value);
 
 /* Each line of a text as "COMMENT line\n"; NULL and "": nothing. */
-void bst_kvn_comment(FILE *stream, const char *text);
+void bst_io_kvn_comment(FILE *stream, const char *text);
 
 /* BST_ERR_IO when the stream has an error. */
 bst_status bst_text_stream_ok(bst_ctx *ctx, FILE *stream) BST_MUST_CHECK;

@@ -15,12 +15,12 @@ typedef struct sample {
 
 /* Fits (xi, eta) = offset + cd * (dx, dy). The grid is symmetric about the boresight, so that the
  * normal equations are diagonal. */
-static bool fit_plane(const bst_sky_plane *t, const sample *samples, double offset[2],
+static bool fit_plane(const bst_io_sky_plane *t, const sample *samples, double offset[2],
                       double cd[2][2]) {
     double sum[2] = {0, 0}, sx[2] = {0, 0}, sy[2] = {0, 0}, sxx = 0, syy = 0;
     for (int i = 0; i < GRID * GRID; i++) {
         double p[2];
-        if (!bst_sky_to_plane(t, samples[i].icrs, &p[0], &p[1])) {
+        if (!bst_io_sky_to_plane(t, samples[i].icrs, &p[0], &p[1])) {
             return false;
         }
         sxx += samples[i].dx * samples[i].dx;
@@ -46,7 +46,7 @@ static bst_status too_wide(bst_ctx *ctx) {
 }
 
 static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
-                                const bst_light *light, bst_wcs *out) {
+                                const bst_astro_light *light, bst_wcs *out) {
     double crval[2], cd[2][2];
     *out =
         (bst_wcs){.crpix = {bst_camera_centre_x(camera) + 1.0, bst_camera_centre_y(camera) + 1.0}};
@@ -63,7 +63,7 @@ static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat
 }
 
 bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
-                       const bst_light *light, bst_wcs *out) {
+                       const bst_astro_light *light, bst_wcs *out) {
     if (bst_camera_distorted(camera)) {
         return fit_distorted(ctx, camera, q_cam_from_gcrf, light, out);
     }
@@ -78,28 +78,28 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
         s->dx = half_x * (2.0 * (i % GRID) / (GRID - 1) - 1.0);
         s->dy = half_y * (2.0 * (i / GRID) / (GRID - 1) - 1.0);
         bst_vec3 cam = bst_camera_unproject(camera, cx + s->dx, cy + s->dy);
-        s->icrs = bst_light_catalogue_star(light, bst_quat_rotate(q_gcrf_from_cam, cam));
+        s->icrs = bst_astro_light_catalogue_star(light, bst_quat_rotate(q_gcrf_from_cam, cam));
     }
     double ra, dec, offset[2], cd[2][2];
     bst_vec3_to_radec(samples[GRID * GRID / 2].icrs, &ra, &dec);
     bool good = true;
     /* moving the tangent point by the mean offset converges at once: two rounds and a check */
     for (int round = 0; round < 3 && good; round++) {
-        bst_sky_plane t = bst_sky_plane_at(ra, dec);
+        bst_io_sky_plane t = bst_io_sky_plane_at(ra, dec);
         good = fit_plane(&t, samples, offset, cd);
         if (good && round < 2) {
-            bst_vec3_to_radec(bst_sky_from_plane(&t, offset[0], offset[1]), &ra, &dec);
+            bst_vec3_to_radec(bst_io_sky_from_plane(&t, offset[0], offset[1]), &ra, &dec);
         }
     }
     double det = good ? cd[0][0] * cd[1][1] - cd[0][1] * cd[1][0] : 0.0;
     if (!good || !(fabs(det) > 0.0)) {
         return too_wide(ctx);
     }
-    bst_sky_plane t = bst_sky_plane_at(ra, dec);
+    bst_io_sky_plane t = bst_io_sky_plane_at(ra, dec);
     double worst = 0.0;
     for (int i = 0; i < GRID * GRID; i++) {
         double xi, eta;
-        if (!bst_sky_to_plane(&t, samples[i].icrs, &xi, &eta)) {
+        if (!bst_io_sky_to_plane(&t, samples[i].icrs, &xi, &eta)) {
             return bst_fail(ctx, BST_ERR_NUMERIC, "the field is too wide for one tangent plane");
         }
         double ex = (cd[1][1] * xi - cd[0][1] * eta) / det - samples[i].dx;
@@ -115,7 +115,7 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
 
 double bst_wcs_distortion_misfit_px(const bst_camera *camera) {
     /* the Sun behind the camera, which looks along z, so that it deflects nothing */
-    const bst_light at_rest = {.sun_m = {0.0, 0.0, -BST_AU_M}};
+    const bst_astro_light at_rest = {.sun_m = {0.0, 0.0, -BST_AU_M}};
     const bst_quat q = {0.0, 0.0, 0.0, 1.0};
     double crval[2], cd[2][2], misfit;
     bst_sip sip;
@@ -143,9 +143,9 @@ bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning) {
 
 bool bst_wcs_sky_to_px(const bst_wcs *wcs, double ra_rad, double dec_rad, double *x_px,
                        double *y_px) {
-    bst_sky_plane t = bst_sky_plane_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
+    bst_io_sky_plane t = bst_io_sky_plane_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
     double xi, eta;
-    if (!bst_sky_to_plane(&t, bst_vec3_from_radec(ra_rad, dec_rad), &xi, &eta)) {
+    if (!bst_io_sky_to_plane(&t, bst_vec3_from_radec(ra_rad, dec_rad), &xi, &eta)) {
         return false;
     }
     const double(*m)[2] = wcs->cd_deg;
@@ -159,11 +159,11 @@ bool bst_wcs_sky_to_px(const bst_wcs *wcs, double ra_rad, double dec_rad, double
 
 void bst_wcs_px_to_sky(const bst_wcs *wcs, double x_px, double y_px, double *ra_rad,
                        double *dec_rad) {
-    bst_sky_plane t = bst_sky_plane_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
+    bst_io_sky_plane t = bst_io_sky_plane_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
     double dx, dy;
     bst_sip_undistort(&wcs->sip, x_px + 1.0 - wcs->crpix[0], y_px + 1.0 - wcs->crpix[1], &dx, &dy);
     const double(*m)[2] = wcs->cd_deg;
-    bst_vec3_to_radec(bst_sky_from_plane(&t, (m[0][0] * dx + m[0][1] * dy) / DEG,
-                                         (m[1][0] * dx + m[1][1] * dy) / DEG),
+    bst_vec3_to_radec(bst_io_sky_from_plane(&t, (m[0][0] * dx + m[0][1] * dy) / DEG,
+                                            (m[1][0] * dx + m[1][1] * dy) / DEG),
                       ra_rad, dec_rad);
 }

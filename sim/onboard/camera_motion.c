@@ -52,7 +52,7 @@ static void add_sample(roughness *s, double step, bst_vec3 r) {
 /* Fewest third differences that tell the noise. */
 enum { FEWEST_DIFFERENCES = 5 };
 
-static void judge_bend(const roughness *s, double samples, bst_motion *motion) {
+static void judge_bend(const roughness *s, double samples, bst_camera_motion *motion) {
     if (s->count < FEWEST_DIFFERENCES) {
         return;
     }
@@ -65,8 +65,8 @@ static void judge_bend(const roughness *s, double samples, bst_motion *motion) {
     motion->bend_sigma_rad = sqrt(share * variance);
 }
 
-bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
-                               int64_t end_tick, bst_motion *out) {
+bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
+                                      int64_t end_tick, bst_camera_motion *out) {
     if (telemetry->written <= 0 || telemetry->capacity <= 0) {
         return false;
     }
@@ -136,8 +136,8 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
     return true;
 }
 
-void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, double x_px, double y_px,
-                       double *dx_px, double *dy_px) {
+void bst_camera_motion_streak(const bst_camera_motion *motion, const bst_camera *camera,
+                              double x_px, double y_px, double *dx_px, double *dy_px) {
     bst_vec3 v = bst_camera_unproject(camera, x_px, y_px);
     bst_quat half = bst_quat_from_rotvec(bst_vec3_scale(motion->turn_cam_rad, 0.5));
     double x0, y0, x1, y1;
@@ -149,8 +149,8 @@ void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, doubl
     }
 }
 
-void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double *x_px,
-                     double *y_px) {
+void bst_camera_motion_bend(const bst_camera_motion *motion, const bst_camera *camera, double *x_px,
+                            double *y_px) {
     double scale = bst_camera_scale_rad(camera), k[2][2];
     bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
     double a = motion->bend_cam_rad.y, b = -motion->bend_cam_rad.x;
@@ -167,8 +167,8 @@ static void widen(double x, double y, bst_detection *d) {
     d->cov_yy += y * y;
 }
 
-void bst_motion_widen(double bend_x_px, double bend_y_px, double followed_x_px,
-                      double followed_y_px, bst_detection *d) {
+void bst_camera_motion_widen(double bend_x_px, double bend_y_px, double followed_x_px,
+                             double followed_y_px, bst_detection *d) {
     widen(0.5 * (bend_x_px - followed_x_px), 0.5 * (bend_y_px - followed_y_px), d);
     widen(BEND_LEFT * followed_x_px, BEND_LEFT * followed_y_px, d);
 }
@@ -182,8 +182,8 @@ static bst_vec3 rotation_of(const bst_camera *camera, double x_px, double y_px) 
                       (k[1][1] * x_px - k[0][1] * y_px) * scale / det, 0.0};
 }
 
-void bst_motion_add(bst_motion *motion, const bst_camera *camera, double dx_px, double dy_px,
-                    double bend_x_px, double bend_y_px) {
+void bst_camera_motion_add(bst_camera_motion *motion, const bst_camera *camera, double dx_px,
+                           double dy_px, double bend_x_px, double bend_y_px) {
     motion->turn_cam_rad = bst_vec3_add(motion->turn_cam_rad, rotation_of(camera, dx_px, dy_px));
     motion->bend_cam_rad =
         bst_vec3_add(motion->bend_cam_rad, rotation_of(camera, bend_x_px, bend_y_px));

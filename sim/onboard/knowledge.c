@@ -146,13 +146,13 @@ static const world_sensor *sensor_of(const bst_knowledge *k) {
     return &k->world->observers[k->observer].sensors[k->sensor];
 }
 
-bst_status bst_believed_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
-                            bst_state *eye) {
+bst_status bst_onboard_nav_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
+                               bst_world_state *eye) {
     const bst_knowledge *k = view->knowledge;
-    *t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds);
-    BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
-                            k->world->epoch, *t, true, eye));
-    bst_believe(k->world, k->observer, k->sensor, *t, eye);
+    *t = bst_world_nav_seconds(k->world, k->observer, k->sensor, seconds);
+    BST_TRY(bst_world_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
+                                  k->world->epoch, *t, true, eye));
+    bst_world_nav_estimate(k->world, k->observer, k->sensor, *t, eye);
     return BST_OK;
 }
 
@@ -161,24 +161,25 @@ static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, doub
                                     bst_vec3 *out) {
     const bst_knowledge *k = view->knowledge;
     double t;
-    bst_state eye;
-    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &eye));
+    bst_world_state eye;
+    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &eye));
     if (view->tasked) {
-        BST_TRY(
-            bst_object_nominal_line(ctx, k->world, view->task.object, view->clock, t, &eye, out));
+        BST_TRY(bst_world_object_nominal_line(ctx, k->world, view->task.object, view->clock, t,
+                                              &eye, out));
         *out = bst_vec3_unit(*out);
         return BST_OK;
     }
-    return bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
-                                     out);
+    return bst_world_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t,
+                                           &eye, out);
 }
 
 static bst_quat error_of(const bst_knowledge_view *view) {
     return view->tasked ? (bst_quat){0.0, 0.0, 0.0, 1.0} : view->cue_error;
 }
 
-static const bst_cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
-    bst_cue_knot *knot = &view->knots[((second % BST_CUE_KNOTS) + BST_CUE_KNOTS) % BST_CUE_KNOTS];
+static const bst_onboard_cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
+    bst_onboard_cue_knot *knot =
+        &view->knots[((second % BST_CUE_KNOTS) + BST_CUE_KNOTS) % BST_CUE_KNOTS];
     if (!knot->made || knot->second != second) {
         bst_ctx quiet = {0}; /* beyond the end of an orbit there is none, which is no error here */
         knot->made = true;
@@ -193,7 +194,7 @@ static bool is_smooth(bst_knowledge_view *view, int64_t second) {
     if (!view->any_checked || view->checked != second) {
         bool known = true;
         for (int i = 0; i < BST_QUINTIC_POINTS; i++) {
-            const bst_cue_knot *knot = knot_at(view, second - BST_QUINTIC_BEFORE + i);
+            const bst_onboard_cue_knot *knot = knot_at(view, second - BST_QUINTIC_BEFORE + i);
             known = known && knot->known;
             view->cued[i] = bst_quat_rotate(error_of(view), knot->direction);
         }
@@ -219,7 +220,7 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
 }
 
 bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_cue *out) {
+                                bst_onboard_cue *out) {
     const bst_knowledge *k = view->knowledge;
     /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-11 rad/s */
     const double h = 0.5;
@@ -262,7 +263,7 @@ bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view
 void bst_knowledge_region(const bst_knowledge *k, bst_region *out) {
     const bst_region_config *region = &sensor_of(k)->config.cue.region;
     *out = (bst_region){.kind = region->kind,
-                        .half_length_rad = bst_region_half_length_rad(region),
+                        .half_length_rad = bst_world_region_half_length_rad(region),
                         .half_width_rad = region->half_width_deg * BST_DEG_RAD};
 }
 
@@ -278,11 +279,11 @@ bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *v
                                              bst_vec3 *direction) {
     const bst_knowledge *k = view->knowledge;
     double t;
-    bst_state eye;
+    bst_world_state eye;
     bst_vec3 nominal;
-    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &eye));
-    BST_TRY(bst_region_place(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye, along_rad,
-                             across_rad, &nominal));
+    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &eye));
+    BST_TRY(bst_world_region_place(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
+                                   along_rad, across_rad, &nominal));
     *direction = bst_quat_rotate(view->cue_error, nominal);
     return BST_OK;
 }
@@ -295,13 +296,13 @@ bst_status bst_knowledge_belt_eye_at(bst_ctx *ctx, bst_knowledge_view *view, dou
         return BST_OK;
     }
     double t;
-    bst_state state;
-    bst_sky sky;
-    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &state));
+    bst_world_state state;
+    bst_sky_rotation sky;
+    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &state));
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(k->world->epoch, t), &sky));
     *eye = (bst_belt_eye){.position_m = state.position_m,
                           .velocity_mps = state.velocity_mps,
-                          .earth_radps = bst_earth_rate_gcrf(&sky.frames)};
+                          .earth_radps = bst_astro_earth_rate_gcrf(&sky.frames)};
     return BST_OK;
 }
 
@@ -318,10 +319,10 @@ bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, do
     *known = object >= 0;
     for (int i = 0; *known && i < 3; i++) {
         double t;
-        bst_state eye;
+        bst_world_state eye;
         bst_vec3 line;
-        BST_TRY(bst_believed_eye(ctx, view, seconds + (i - 1) * h, &t, &eye));
-        BST_TRY(bst_object_nominal_line(ctx, k->world, object, view->clock, t, &eye, &line));
+        BST_TRY(bst_onboard_nav_eye(ctx, view, seconds + (i - 1) * h, &t, &eye));
+        BST_TRY(bst_world_object_nominal_line(ctx, k->world, object, view->clock, t, &eye, &line));
         range[i] = bst_vec3_norm(line);
     }
     if (*known) {

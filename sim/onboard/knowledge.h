@@ -25,7 +25,7 @@ double bst_knowledge_julian_year(
     const bst_knowledge *knowledge); /* at the epoch, for proper motion */
 
 /* The cue: where the target is believed to be. */
-typedef struct bst_cue {
+typedef struct bst_onboard_cue {
     bool valid;
     bst_vec3
         direction_gcrf; /* unit, geometric (light time in, aberration out), cue error included */
@@ -33,9 +33,9 @@ typedef struct bst_cue {
     double sigma_rad;          /* 1 sigma per axis of the direction's error */
     double rate_sigma_radps;   /* 1 sigma per axis of the rate's error */
     double v_mag, v_mag_sigma; /* believed brightness; sigma INFINITY: unknown */
-} bst_cue;
+} bst_onboard_cue;
 
-/* A cheap per-user window, as bst_view is for the world. */
+/* A cheap per-user window, as bst_world_view is for the world. */
 typedef struct bst_knowledge_view bst_knowledge_view;
 bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledge,
                                      bst_knowledge_view **out) BST_MUST_CHECK;
@@ -43,8 +43,8 @@ void bst_knowledge_view_free(bst_knowledge_view *view);
 
 /* The cue at `seconds` after the epoch. */
 bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_cue *out) BST_MUST_CHECK;
-/* Its direction alone, at a third of the cost; *valid as bst_cue has it. */
+                                bst_onboard_cue *out) BST_MUST_CHECK;
+/* Its direction alone, at a third of the cost; *valid as bst_onboard_cue has it. */
 bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                           bool *valid, bst_vec3 *direction) BST_MUST_CHECK;
 
@@ -84,7 +84,7 @@ bst_quat bst_knowledge_body_attitude(const bst_knowledge *knowledge);
 /* ---- the onboard catalogue: the scenario's objects on their orbits as catalogued ---- */
 
 int bst_knowledge_object_count(const bst_knowledge *knowledge);
-const bst_object_info *bst_knowledge_object(const bst_knowledge *knowledge, int object);
+const bst_world_object_info *bst_knowledge_object(const bst_knowledge *knowledge, int object);
 /* -1: there is no object of this name. */
 int bst_knowledge_find_object(const bst_knowledge *knowledge, const char *name);
 /* Whether an object is the spacecraft itself: by catalogue number, or its place in a constellation.
@@ -101,9 +101,9 @@ double bst_knowledge_places(const bst_knowledge *knowledge, double seconds, doub
                             double *y_m, double *z_m);
 /* Where the spacecraft believes to be, and the bodies by its clock. */
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_state *eye, bst_bodies *bodies) BST_MUST_CHECK;
+                                bst_world_state *eye, bst_bodies *bodies) BST_MUST_CHECK;
 /* How an object should be seen from there. BST_ERR_NUMERIC when either has no orbit then. */
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
-                                  double seconds, bst_sight *out) BST_MUST_CHECK;
+                                  double seconds, bst_world_sight *out) BST_MUST_CHECK;
 
 #endif

@@ -8,7 +8,7 @@ int bst_knowledge_object_count(const bst_knowledge *k) {
     return k->world->object_count;
 }
 
-const bst_object_info *bst_knowledge_object(const bst_knowledge *k, int object) {
+const bst_world_object_info *bst_knowledge_object(const bst_knowledge *k, int object) {
     return &k->world->objects[object].info;
 }
 
@@ -27,9 +27,9 @@ bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee
     const bst_world *world = view->knowledge->world;
     const double mu = BST_EARTH_MU_M3PS2;
     bst_ctx quiet = {0};
-    bst_state state;
-    if (bst_orbit_state(&quiet, &world->objects[object].orbit, view->clock, world->epoch, 0.0,
-                        false, &state) != BST_OK) {
+    bst_world_state state;
+    if (bst_world_orbit_state(&quiet, &world->objects[object].orbit, view->clock, world->epoch, 0.0,
+                              false, &state) != BST_OK) {
         return false;
     }
     bst_vec3 h = bst_vec3_cross(state.position_m, state.velocity_mps);
@@ -54,10 +54,10 @@ double bst_knowledge_places(const bst_knowledge *k, double seconds, double *x_m,
 }
 
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_state *eye, bst_bodies *bodies) {
+                                bst_world_state *eye, bst_bodies *bodies) {
     double t;
-    bst_sky sky;
-    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, eye));
+    bst_sky_rotation sky;
+    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, eye));
     BST_TRY(
         bst_sky_clock_at(ctx, view->clock, bst_time_add(view->knowledge->world->epoch, t), &sky));
     *bodies = sky.bodies;
@@ -65,41 +65,41 @@ bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 }
 
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
-                                  double seconds, bst_sight *out) {
+                                  double seconds, bst_world_sight *out) {
     const bst_world *world = view->knowledge->world;
-    const bst_object_info *info = &world->objects[object].info;
+    const bst_world_object_info *info = &world->objects[object].info;
     double t, emission_s;
-    bst_state eye, target;
-    bst_sky sky;
+    bst_world_state eye, target;
+    bst_sky_rotation sky;
     bst_vec3 line;
-    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &eye));
+    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &eye));
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(world->epoch, t), &sky));
-    BST_TRY(bst_orbit_line_of_sight(ctx, &world->objects[object].orbit, &eye, view->clock,
-                                    world->epoch, &sky.bodies, t, false, &line, &target,
-                                    &emission_s));
-    bst_light light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
+    BST_TRY(bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, &eye, view->clock,
+                                          world->epoch, &sky.bodies, t, false, &line, &target,
+                                          &emission_s));
+    bst_astro_light light = bst_astro_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
     bst_vec3 to_eye = bst_vec3_sub(eye.position_m, target.position_m);
     bst_vec3 to_sun = bst_vec3_sub(sky.bodies.sun_m, target.position_m);
-    bst_sunlight sunlight;
-    bst_sunlight_at(target.position_m, bst_bodies_sunlight_from(&sky.bodies), sky.bodies.pole,
-                    world->shadow_atmosphere, &sunlight);
-    *out = (bst_sight){.geometric = bst_vec3_unit(line),
-                       .range_m = bst_vec3_norm(to_eye),
-                       .light_time_s = t - emission_s,
-                       .phase_rad = bst_vec3_angle(to_eye, to_sun),
-                       .sunlit_fraction = sunlight.disc};
-    out->apparent = bst_light_aberrate(&light, out->geometric);
-    bst_lighting lighting = {.area_m2 = info->area_m2,
-                             .albedo = info->albedo,
-                             .object_m = target.position_m,
-                             .eye_m = eye.position_m,
-                             .sun_m = sky.bodies.sun_m,
-                             .seconds = emission_s,
-                             .sunlit_fraction = sunlight.disc,
-                             .sunlight = &sunlight};
+    bst_astro_sunlight sunlight;
+    bst_astro_sunlight_at(target.position_m, bst_bodies_sunlight_from(&sky.bodies), sky.bodies.pole,
+                          world->shadow_atmosphere, &sunlight);
+    *out = (bst_world_sight){.geometric = bst_vec3_unit(line),
+                             .range_m = bst_vec3_norm(to_eye),
+                             .light_time_s = t - emission_s,
+                             .phase_rad = bst_vec3_angle(to_eye, to_sun),
+                             .sunlit_fraction = sunlight.disc};
+    out->apparent = bst_astro_light_aberrate(&light, out->geometric);
+    bst_scene_lighting lighting = {.area_m2 = info->area_m2,
+                                   .albedo = info->albedo,
+                                   .object_m = target.position_m,
+                                   .eye_m = eye.position_m,
+                                   .sun_m = sky.bodies.sun_m,
+                                   .seconds = emission_s,
+                                   .sunlit_fraction = sunlight.disc,
+                                   .sunlight = &sunlight};
     bst_brightness_at(info->brightness, &lighting, &out->glow);
     out->v_mag = out->glow.v_mag;
-    out->occulted = bst_earth_occults(eye.position_m, target.position_m, sky.bodies.pole);
+    out->occulted = bst_astro_earth_occults(eye.position_m, target.position_m, sky.bodies.pole);
     return BST_OK;
 }
 

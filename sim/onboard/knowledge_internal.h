@@ -20,16 +20,16 @@ struct bst_knowledge {
 /* The cue's direction is kept at whole seconds and interpolated by six of them. */
 enum { BST_CUE_KNOTS = 16 };
 
-typedef struct bst_cue_knot {
+typedef struct bst_onboard_cue_knot {
     bool made, known; /* known: there is a direction */
     int64_t second;
     bst_vec3 direction;
-} bst_cue_knot;
+} bst_onboard_cue_knot;
 
 struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
-    bst_cue_knot knots[BST_CUE_KNOTS];
+    bst_onboard_cue_knot knots[BST_CUE_KNOTS];
     bst_quat cue_error; /* turns where the own cue's target nominally is to where the cue has it */
     /* the second that was looked at last, and the quintic about it, of where the cue has the
      * target */
@@ -41,7 +41,7 @@ struct bst_knowledge_view {
 };
 
 /* Onboard time, and where the observer believes to be. */
-bst_status bst_believed_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
-                            bst_state *eye) BST_MUST_CHECK;
+bst_status bst_onboard_nav_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
+                               bst_world_state *eye) BST_MUST_CHECK;
 
 #endif

@@ -14,6 +14,6 @@ void bst_nav_state_after(const bst_nav_telemetry *nav, double dt_s, bst_vec3 *po
 /* What aberrates light that the observer receives dt_s after the telemetry's tick: its velocity of
  * that time. A low orbit's velocity turns by 8.5 m/s, 6 mas of aberration, each second. The Sun's
  * direction and the Earth's barycentric velocity are those of the telemetry. */
-bst_light bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
+bst_astro_light bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
 
 #endif

@@ -37,7 +37,8 @@ typedef struct bst_detector_frame {
     bst_window window;      /* full-sensor pixels */
     int binning, bits;
     double exposure_s;
-    const bst_motion *motion; /* how the camera turned, as telemetry tells it; NULL: not known */
+    const bst_camera_motion
+        *motion; /* how the camera turned, as telemetry tells it; NULL: not known */
 } bst_detector_frame;
 
 typedef struct bst_detector_stage {

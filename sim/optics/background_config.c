@@ -3,9 +3,9 @@
 static const char *const models[] = {"uniform", "sky", NULL};
 
 static const bst_config_desc pst_table[] = {
-    BST_REAL(bst_pst_point, angle_deg, "deg", 0, 180, NULL,
+    BST_REAL(bst_optics_pst_point, angle_deg, "deg", 0, 180, NULL,
              "Angle of the source from the boresight."),
-    BST_REAL(bst_pst_point, pst, "", 0, 1e6, NULL,
+    BST_REAL(bst_optics_pst_point, pst, "", 0, 1e6, NULL,
              "Irradiance on the detector over that at the entrance, normal to the source's light."),
     BST_CONFIG_END,
 };
@@ -38,7 +38,7 @@ const bst_config_desc bst_background_config_table[] = {
              "Height over which the light of the Earth's limb fades to 1/e above the surface; 0: a "
              "sharp limb."),
     BST_LIST(
-        bst_background_config, pst, bst_pst_point, pst_table, 0, 1000, "[]",
+        bst_background_config, pst, bst_optics_pst_point, pst_table, 0, 1000, "[]",
         "sky: point source transmittance by angle, for the stray light of Sun, Moon and Earth; "
         "log-linear between points, the first and last value beyond. Empty: none."),
     BST_PATH(bst_background_config, pst_file, "\"\"",

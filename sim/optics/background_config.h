@@ -10,9 +10,9 @@
 enum { BST_BACKGROUND_UNIFORM, BST_BACKGROUND_SKY };
 
 /* A point of the table of point source transmittance. */
-typedef struct bst_pst_point {
+typedef struct bst_optics_pst_point {
     double angle_deg, pst;
-} bst_pst_point;
+} bst_optics_pst_point;
 
 typedef struct bst_background_config {
     int32_t model; /* BST_BACKGROUND_... */
@@ -20,7 +20,7 @@ typedef struct bst_background_config {
     double diffuse_galactic_fraction;
     bool earth, moon, sun; /* their discs and, in `sky` through the PST, their stray light */
     double earth_albedo, earth_night_mag_arcsec2, earth_temperature_k, limb_scale_height_m;
-    bst_config_list pst; /* bst_pst_point; empty: no stray light */
+    bst_config_list pst; /* bst_optics_pst_point; empty: no stray light */
     char pst_file[512];  /* the same from a CSV file; "": none */
     double pixel_um;     /* pitch, for stray light; 0: that of the optics */
     /* added in either model: with u, v from -1 to 1 over the sensor's columns and rows,

@@ -30,7 +30,7 @@ static const double gauss_weight[GAUSS / 2] = {0.3626837833783620, 0.31370664587
 
 /* A piecewise linear table. */
 typedef struct table {
-    const bst_response_point *points;
+    const bst_optics_response_point *points;
     int count;
 } table;
 
@@ -41,26 +41,28 @@ typedef struct quadrature {
 } quadrature;
 
 struct bst_band {
-    bst_response_point *points[2]; /* detector, transmission */
+    bst_optics_response_point *points[2]; /* detector, transmission */
     int count[2];
     quadrature rule; /* weights hold the response */
     double sun, mean_m;
-    double sun_share[BST_SUNLIGHT_COLOURS]; /* of `sun`, next to each wavelength of bst_sunlight */
+    double sun_share[BST_SUNLIGHT_COLOURS]; /* of `sun`, next to each wavelength of
+                                               bst_astro_sunlight */
     double log_star[COLOURS];
 };
 
 /* Flat tops with the edges that real bands have; the silicon curve is that of a back-illuminated
  * detector with a coating for the visible, no particular one. */
-static const bst_response_point silicon[] = {
+static const bst_optics_response_point silicon[] = {
     {0.30, 0.10}, {0.35, 0.40}, {0.40, 0.65}, {0.45, 0.85}, {0.50, 0.95}, {0.55, 1.00},
     {0.60, 1.00}, {0.65, 0.98}, {0.70, 0.94}, {0.75, 0.88}, {0.80, 0.78}, {0.85, 0.65},
     {0.90, 0.48}, {0.95, 0.30}, {1.00, 0.13}, {1.05, 0.04}, {1.10, 0.00}};
-static const bst_response_point swir[] = {{0.85, 0}, {0.95, 0.8}, {1.05, 1}, {1.60, 1}, {1.70, 0}};
-static const bst_response_point mwir[] = {{3.30, 0}, {3.50, 1}, {4.90, 1}, {5.10, 0}};
-static const bst_response_point lwir[] = {{7.80, 0}, {8.20, 1}, {11.80, 1}, {12.20, 0}};
+static const bst_optics_response_point swir[] = {
+    {0.85, 0}, {0.95, 0.8}, {1.05, 1}, {1.60, 1}, {1.70, 0}};
+static const bst_optics_response_point mwir[] = {{3.30, 0}, {3.50, 1}, {4.90, 1}, {5.10, 0}};
+static const bst_optics_response_point lwir[] = {{7.80, 0}, {8.20, 1}, {11.80, 1}, {12.20, 0}};
 #define COUNT_OF(a) ((int)(sizeof(a) / sizeof *(a)))
 /* For the preset v a table of the optics alone has Bessell's V as its detector. */
-static const bst_response_point bessell_v[] = {
+static const bst_optics_response_point bessell_v[] = {
     {0.47, 0},     {0.48, 0.03},  {0.49, 0.163}, {0.50, 0.458}, {0.51, 0.78},  {0.52, 0.967},
     {0.53, 1},     {0.54, 0.973}, {0.55, 0.898}, {0.56, 0.792}, {0.57, 0.684}, {0.58, 0.574},
     {0.59, 0.461}, {0.60, 0.359}, {0.61, 0.27},  {0.62, 0.197}, {0.63, 0.135}, {0.64, 0.081},
@@ -81,7 +83,7 @@ static table preset_table(int preset) {
     }
 }
 
-static double table_at(const bst_response_point *points, int count, double wavelength_um) {
+static double table_at(const bst_optics_response_point *points, int count, double wavelength_um) {
     if (count == 0 || wavelength_um < points[0].wavelength_um ||
         wavelength_um > points[count - 1].wavelength_um) {
         return 0.0;
@@ -96,7 +98,7 @@ static double table_at(const bst_response_point *points, int count, double wavel
     return points[low].value + u * (points[high].value - points[low].value);
 }
 
-double bst_planck_photons(double wavelength_m, double temperature_k) {
+double bst_optics_planck_photons(double wavelength_m, double temperature_k) {
     if (!(temperature_k > 0.0)) {
         return 0.0;
     }
@@ -109,7 +111,7 @@ static double photon_energy_j(double wavelength_m) {
     return PLANCK_JS * BST_LIGHT_SPEED_MPS / wavelength_m;
 }
 
-double bst_sun_irradiance(double wavelength_m) {
+double bst_optics_sun_irradiance(double wavelength_m) {
     double nm = wavelength_m * 1e9;
     const int last = SOLAR_NODES - 1;
     if (!(nm >= (double)solar_table[0][0])) {
@@ -118,9 +120,9 @@ double bst_sun_irradiance(double wavelength_m) {
     if (nm >= (double)solar_table[last][0]) {
         const double temperature_k = 5562.5;
         double edge_m = (double)solar_table[last][0] * 1e-9;
-        double ratio = bst_planck_photons(wavelength_m, temperature_k) *
+        double ratio = bst_optics_planck_photons(wavelength_m, temperature_k) *
                        photon_energy_j(wavelength_m) /
-                       (bst_planck_photons(edge_m, temperature_k) * photon_energy_j(edge_m));
+                       (bst_optics_planck_photons(edge_m, temperature_k) * photon_energy_j(edge_m));
         return (double)solar_table[last][1] * 1e9 * ratio;
     }
     int low = 0, high = last;
@@ -135,14 +137,14 @@ double bst_sun_irradiance(double wavelength_m) {
     return a < 1000.0 ? from + u * (to - from) : from * pow(to / from, log(nm / a) / log(b / a));
 }
 
-double bst_star_temperature_k(double b_minus_v) {
+double bst_optics_star_temperature_k(double b_minus_v) {
     double x = 0.92 * b_minus_v;
     return 4600.0 * (1.0 / (x + 1.7) + 1.0 / (x + 0.62));
 }
 
-double bst_star_spectrum_k(double b_minus_v) {
+double bst_optics_star_spectrum_k(double b_minus_v) {
     double colour = isnan(b_minus_v) ? BST_SUN_B_MINUS_V : b_minus_v;
-    return bst_star_temperature_k(
+    return bst_optics_star_temperature_k(
         fmin(fmax(colour, COLOUR_FIRST), COLOUR_FIRST + (COLOURS - 1) * COLOUR_STEP));
 }
 
@@ -224,7 +226,8 @@ static double star_scale(double temperature_k) {
         for (int i = 0; i < pieces; i++) { /* midpoints: 1e-6 of the integral */
             double u = (i + 0.5) / pieces, lambda = a + u * (b - a);
             double v = (bessell_v[k].value * (1.0 - u) + bessell_v[k + 1].value * u) * (b - a);
-            through += v * bst_planck_photons(lambda, temperature_k) * photon_energy_j(lambda);
+            through +=
+                v * bst_optics_planck_photons(lambda, temperature_k) * photon_energy_j(lambda);
             width += v;
         }
     }
@@ -252,8 +255,9 @@ static bst_status prepare(bst_ctx *ctx, bst_band *band) {
     for (int i = 0; i < q->count; i++) {
         total += q->weight[i];
         band->mean_m += q->weight[i] * q->place[i];
-        add_sunlight(band, q->place[i],
-                     q->weight[i] * bst_sun_irradiance(q->place[i]) / photon_energy_j(q->place[i]));
+        add_sunlight(
+            band, q->place[i],
+            q->weight[i] * bst_optics_sun_irradiance(q->place[i]) / photon_energy_j(q->place[i]));
     }
     if (!(total > 0.0)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -264,7 +268,7 @@ static bst_status prepare(bst_ctx *ctx, bst_band *band) {
         band->sun_share[k] = band->sun > 0.0 ? band->sun_share[k] / band->sun : 0.0;
     }
     for (int i = 0; i < COLOURS; i++) {
-        double temperature = bst_star_temperature_k(COLOUR_FIRST + COLOUR_STEP * i);
+        double temperature = bst_optics_star_temperature_k(COLOUR_FIRST + COLOUR_STEP * i);
         band->log_star[i] = log(bst_band_radiance(band, temperature) * star_scale(temperature));
     }
     return BST_OK;
@@ -272,12 +276,12 @@ static bst_status prepare(bst_ctx *ctx, bst_band *band) {
 
 /* One of the two tables, from the list or the file. */
 static bst_status take_table(bst_ctx *ctx, const bst_config_list *list, const char *file,
-                             const char *base_dir, const char *key, bst_response_point **points,
-                             int *count) {
+                             const char *base_dir, const char *key,
+                             bst_optics_response_point **points, int *count) {
     static const char *const wavelength[] = {"wavelength_um", NULL};
     static const char *const response[] = {"response", NULL};
     static const char *const transmission[] = {"transmission", NULL};
-    bst_curve curve = {0};
+    bst_bench_error_curve curve = {0};
     if (*file && list->count > 0) {
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: give either the list or %s_file, not both", key,
                         key);
@@ -300,14 +304,14 @@ static bst_status take_table(bst_ctx *ctx, const bst_config_list *list, const ch
         }
     }
     *count = *file ? curve.count : list->count;
-    const bst_response_point *given = list->items;
+    const bst_optics_response_point *given = list->items;
     bst_status status = BST_OK;
     *points = malloc(((size_t)*count + 1) * sizeof **points);
     if (!*points) {
         status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for a table of %d wavelengths", *count);
     }
     for (int i = 0; i < *count && status == BST_OK; i++) {
-        (*points)[i] = *file ? (bst_response_point){curve.x[i], curve.y[i]} : given[i];
+        (*points)[i] = *file ? (bst_optics_response_point){curve.x[i], curve.y[i]} : given[i];
         if (i > 0 && !((*points)[i].wavelength_um > (*points)[i - 1].wavelength_um)) {
             status = bst_fail(ctx, BST_ERR_CONFIG,
                               "%s/%d/wavelength_um: wavelengths have to ascend (found %g after %g)",
@@ -396,7 +400,7 @@ double bst_band_reddened_sun(const bst_band *band, const double light[BST_SUNLIG
 double bst_band_radiance(const bst_band *band, double temperature_k) {
     double sum = 0.0;
     for (int i = 0; i < band->rule.count; i++) {
-        sum += band->rule.weight[i] * bst_planck_photons(band->rule.place[i], temperature_k);
+        sum += band->rule.weight[i] * bst_optics_planck_photons(band->rule.place[i], temperature_k);
     }
     return sum;
 }

@@ -32,7 +32,7 @@ void bst_band_free(bst_band *band);
  * between -0.4 and 2.5. */
 double bst_band_star(const bst_band *band, double b_minus_v);
 
-/* Sunlight at 1 au, 1/s/m2, from bst_sun_irradiance. */
+/* Sunlight at 1 au, 1/s/m2, from bst_optics_sun_irradiance. */
 double bst_band_sun(const bst_band *band);
 
 /* Sunlight that has passed the Earth's air over unweakened sunlight in the band, `light` being that
@@ -51,17 +51,17 @@ bool bst_band_is_thermal(const bst_band *band);
 
 /* Planck's law in photons: spectral radiance of a black body, 1/s/m2/sr per m of wavelength:
  * 2 c / lambda^4 / (exp(h c / (lambda k T)) - 1). */
-double bst_planck_photons(double wavelength_m, double temperature_k);
+double bst_optics_planck_photons(double wavelength_m, double temperature_k);
 
 /* Spectral irradiance of the Sun at 1 au, W/m2 per m of wavelength: ASTM G173-03 extraterrestrial
  * from 0.28 to 4 um, beyond a black body with the table's brightness temperature at 4 um (5558 K)
  * and the Sun's solid angle; 0 below. */
-double bst_sun_irradiance(double wavelength_m);
+double bst_optics_sun_irradiance(double wavelength_m);
 
 /* Temperature of a star of colour B-V, K: Ballesteros 2012, equation 14. */
-double bst_star_temperature_k(double b_minus_v);
+double bst_optics_star_temperature_k(double b_minus_v);
 /* Temperature of the black body that bst_band_star takes a star of colour B-V (NAN: the Sun's) for,
  * K: 2725 to 21707. */
-double bst_star_spectrum_k(double b_minus_v);
+double bst_optics_star_spectrum_k(double b_minus_v);
 
 #endif

@@ -15,15 +15,16 @@ enum {
 };
 
 /* A point of a spectral table, linear between points and zero beyond them. */
-typedef struct bst_response_point {
+typedef struct bst_optics_response_point {
     double wavelength_um, value;
-} bst_response_point;
+} bst_optics_response_point;
 
 typedef struct bst_band_config {
-    int32_t preset;               /* BST_BAND_... */
-    bst_config_list response;     /* bst_response_point: of the detector, instead of the preset's */
+    int32_t preset; /* BST_BAND_... */
+    bst_config_list
+        response; /* bst_optics_response_point: of the detector, instead of the preset's */
     char response_file[512];      /* the same from a CSV file; "": none */
-    bst_config_list transmission; /* bst_response_point: of the optics; empty: 1 */
+    bst_config_list transmission; /* bst_optics_response_point: of the optics; empty: 1 */
     char transmission_file[512];
     double optics_temperature_k;
     double optics_emissivity;

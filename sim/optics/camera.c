@@ -1,6 +1,6 @@
 #include "sim/optics/camera.h"
 
-#define DISTORTION(k, doc) BST_REAL(bst_distortion, k, "", -1e30, 1e30, "0", doc)
+#define DISTORTION(k, doc) BST_REAL(bst_camera_distortion, k, "", -1e30, 1e30, "0", doc)
 const bst_config_desc bst_distortion_config[] = {
     DISTORTION(k1,
                "Radial, factor of r^2, r the tangent of the angle from the boresight (Brown "
@@ -66,7 +66,7 @@ const bst_config_desc bst_camera_config[] = {
 };
 
 double bst_camera_illumination(const bst_camera *c, double x_px, double y_px) {
-    const bst_vignetting *v = &c->optics.vignetting;
+    const bst_optics_vignetting *v = &c->optics.vignetting;
     if (v->model == BST_VIGNETTING_NONE && !(v->limit_px > 0.0)) {
         return 1.0;
     }

@@ -18,10 +18,10 @@
  * coefficients are OpenCV's):
  *   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
  *   y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y */
-typedef struct bst_distortion {
+typedef struct bst_camera_distortion {
     double k1, k2, k3; /* radial */
     double p1, p2;     /* tangential */
-} bst_distortion;
+} bst_camera_distortion;
 
 /* What bst_camera_prepare works out. */
 typedef struct bst_camera_geometry {
@@ -52,7 +52,7 @@ typedef struct bst_camera {
     int64_t bits;
     double rotation_deg; /* of the focal plane about the boresight, from camera +x towards +y */
     double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
-    bst_distortion distortion;
+    bst_camera_distortion distortion;
     bst_optics_config optics;  /* PSF (see psf.h) and vignetting */
     const struct bst_psf *psf; /* made of this camera, lent to its copies, or NULL; a copy whose
                                   optics, aperture or scale are changed must clear it */
@@ -61,7 +61,7 @@ typedef struct bst_camera {
     const bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
                                  photon_flux_v0_per_s_m2, the same for all colours */
     bst_background_config background;
-    const struct bst_pst *pst; /* made from `background` and kept by the world; NULL: none */
+    const struct bst_scene_pst *pst; /* made from `background` and kept by the world; NULL: none */
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;
@@ -154,7 +154,7 @@ double bst_camera_reach_rad(const bst_camera *c, bst_vec3 centre, double x0, dou
 void bst_camera_field_px(const bst_camera *c, double *width_px, double *height_px);
 
 static inline bool bst_camera_distorted(const bst_camera *c) {
-    const bst_distortion *d = &c->distortion;
+    const bst_camera_distortion *d = &c->distortion;
     return d->k1 != 0.0 || d->k2 != 0.0 || d->k3 != 0.0 || d->p1 != 0.0 || d->p2 != 0.0;
 }
 

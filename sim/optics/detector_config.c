@@ -6,32 +6,34 @@ static const char *const wells[] = {"clip", "bloom", NULL};
 static const char *const quantisers[] = {"uniform", "square_root", "table", NULL};
 
 static const bst_config_desc hits_table[] = {
-    BST_REAL(bst_hits_config, rate_per_cm2_s, "1/cm2/s", 0, 1e6, "0",
+    BST_REAL(bst_detector_cosmic_ray_config, rate_per_cm2_s, "1/cm2/s", 0, 1e6, "0",
              "Energetic particles through the detector; 0: none."),
-    BST_REAL(bst_hits_config, pixel_pitch_um, "um", 0.5, 200, "13", "Side of a pixel."),
-    BST_REAL(bst_hits_config, depth_um, "um", 0.1, 2000, "15",
+    BST_REAL(bst_detector_cosmic_ray_config, pixel_pitch_um, "um", 0.5, 200, "13",
+             "Side of a pixel."),
+    BST_REAL(bst_detector_cosmic_ray_config, depth_um, "um", 0.1, 2000, "15",
              "Thickness of the layer whose charge is collected."),
-    BST_REAL(bst_hits_config, e_per_um, "e/um", 0.1, 1e6, "75",
+    BST_REAL(bst_detector_cosmic_ray_config, e_per_um, "e/um", 0.1, 1e6, "75",
              "Most probable charge per length of path (a minimum-ionising particle in silicon)."),
-    BST_REAL(bst_hits_config, straggling, "", 0, 1, "0.15",
+    BST_REAL(bst_detector_cosmic_ray_config, straggling, "", 0, 1, "0.15",
              "Spread of that charge from track to track: scale of a Moyal distribution, in most "
              "probable values."),
-    BST_REAL(bst_hits_config, frame_s, "s", 0, 1e4, "0",
+    BST_REAL(bst_detector_cosmic_ray_config, frame_s, "s", 0, 1e4, "0",
              "Time besides the exposure in which hits are collected (transfer and read-out)."),
     BST_CONFIG_END,
 };
 
 static const bst_config_desc quantisation_table[] = {
     BST_ENUM(
-        bst_quantisation_config, model, quantisers, "\"uniform\"",
+        bst_detector_quantisation_config, model, quantisers, "\"uniform\"",
         "uniform: digital numbers; square_root: companded to codes of `bits`; table: codes by a "
         "file."),
-    BST_INT(bst_quantisation_config, bits, "", 4, 16, "8", "square_root: bits of the codes."),
-    BST_PATH(bst_quantisation_config, table, "\"\"",
+    BST_INT(bst_detector_quantisation_config, bits, "", 4, 16, "8",
+            "square_root: bits of the codes."),
+    BST_PATH(bst_detector_quantisation_config, table, "\"\"",
              "table: text file, on line k the first digital number of code k - 1, increasing, from "
              "0 on."),
     BST_BOOL(
-        bst_quantisation_config, expand, "true",
+        bst_detector_quantisation_config, expand, "true",
         "Frames hold the middle of each code's digital numbers, as after expansion; false: the "
         "codes."),
     BST_CONFIG_END,

@@ -11,21 +11,21 @@ enum { BST_WELL_CLIP, BST_WELL_BLOOM };
 enum { BST_QUANTISE_UNIFORM, BST_QUANTISE_SQUARE_ROOT, BST_QUANTISE_TABLE };
 
 /* Energetic particles. */
-typedef struct bst_hits_config {
+typedef struct bst_detector_cosmic_ray_config {
     double rate_per_cm2_s;           /* through the detector's surface, both sides together */
     double pixel_pitch_um, depth_um; /* of a pixel: its side, and the sensitive layer's thickness */
     double e_per_um;                 /* most probable charge per path */
     double straggling; /* width of the Landau-like spread over the most probable value */
     double frame_s; /* time in which the detector collects hits besides the exposure: transfer and
                        read-out */
-} bst_hits_config;
+} bst_detector_cosmic_ray_config;
 
-typedef struct bst_quantisation_config {
+typedef struct bst_detector_quantisation_config {
     int32_t model;   /* BST_QUANTISE_... */
     int64_t bits;    /* of the codes, square root */
     char table[512]; /* file: the converter's number at which each code begins */
     bool expand;     /* the frame holds the middle of each code's numbers, not the code */
-} bst_quantisation_config;
+} bst_detector_quantisation_config;
 
 typedef struct bst_detector_config {
     double temperature_c, reference_temperature_c, dark_doubling_k;
@@ -43,8 +43,8 @@ typedef struct bst_detector_config {
     int32_t full_well; /* BST_WELL_... */
     double frame_transfer_s;
     double row_time_s; /* rolling shutter */
-    bst_hits_config hits;
-    bst_quantisation_config quantisation;
+    bst_detector_cosmic_ray_config hits;
+    bst_detector_quantisation_config quantisation;
 } bst_detector_config;
 
 extern const bst_config_desc bst_detector_table[];

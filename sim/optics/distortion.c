@@ -59,21 +59,21 @@ static int roots(const double *c, int degree, double most, double *out) {
     return count;
 }
 
-static double radial(const bst_distortion *d, double s) {
+static double radial(const bst_camera_distortion *d, double s) {
     return 1.0 + s * (d->k1 + s * (d->k2 + s * d->k3));
 }
-static double radial_slope(const bst_distortion *d, double s) {
+static double radial_slope(const bst_camera_distortion *d, double s) {
     return 1.0 + s * (3.0 * d->k1 + s * (5.0 * d->k2 + s * 7.0 * d->k3));
 }
 
-static plane distort(const bst_distortion *d, plane u) {
+static plane distort(const bst_camera_distortion *d, plane u) {
     double s = u.x * u.x + u.y * u.y, l = radial(d, s), xy = 2.0 * u.x * u.y;
     return (plane){u.x * l + d->p1 * xy + d->p2 * (s + 2.0 * u.x * u.x),
                    u.y * l + d->p1 * (s + 2.0 * u.y * u.y) + d->p2 * xy};
 }
 
 /* xx, xy, yy of the symmetric Jacobian. */
-static void slopes(const bst_distortion *d, plane u, double j[3]) {
+static void slopes(const bst_camera_distortion *d, plane u, double j[3]) {
     double s = u.x * u.x + u.y * u.y, l = radial(d, s);
     double by_s = 2.0 * (d->k1 + s * (2.0 * d->k2 + s * 3.0 * d->k3));
     j[0] = l + u.x * u.x * by_s + 2.0 * d->p1 * u.y + 6.0 * d->p2 * u.x;
@@ -84,7 +84,7 @@ static void slopes(const bst_distortion *d, plane u, double j[3]) {
 /* Newton's method for distort(u) = target from *u; false, with *u spoilt, when it leaves the domain
  * or does not settle. */
 static bool newton(const bst_camera *c, plane target, plane *u) {
-    const bst_distortion *d = &c->distortion;
+    const bst_camera_distortion *d = &c->distortion;
     double domain2 = c->geometry.domain * c->geometry.domain;
     double size = hypot(target.x, target.y), before = INFINITY;
     for (int k = 0; k < 30; k++) {
@@ -257,7 +257,7 @@ double bst_camera_half_diagonal_rad(const bst_camera *c) {
 /* Bounds of scale and curvature out to the farthest corner and some. */
 static void bound_field(bst_camera *c) {
     bst_camera_geometry *g = &c->geometry;
-    const bst_distortion *d = &c->distortion;
+    const bst_camera_distortion *d = &c->distortion;
     double q = hypot(d->p1, d->p2);
     double reach = fmin(FIELD_MARGIN * tan(bst_camera_half_diagonal_rad(c)), g->domain);
     g->stretch = g->shrink = 1.0;
@@ -273,7 +273,7 @@ static void bound_field(bst_camera *c) {
 }
 
 bst_status bst_camera_prepare(bst_ctx *ctx, bst_camera *c) {
-    const bst_distortion *d = &c->distortion;
+    const bst_camera_distortion *d = &c->distortion;
     bst_camera_geometry *g = &c->geometry;
     memset(g, 0, sizeof *g);
     double q = hypot(d->p1, d->p2);

@@ -8,9 +8,10 @@ static const double LEAST_SNR = 10.0, CLIP_SIGMA = 3.0;
 static const double MAG_PER_SHARE = 1.0857362047581296;    /* 2.5 / ln 10 */
 static const double SIGMA_PER_MEDIAN = 1.4826022185056018; /* of a normal deviate's size */
 
-bst_status bst_photometer_create(bst_ctx *ctx, int capacity, bst_photometer *out) {
+bst_status bst_optics_photometer_create(bst_ctx *ctx, int capacity, bst_optics_photometer *out) {
     size_t n = (size_t)capacity;
-    *out = (bst_photometer){.capacity = capacity, .excess = calloc(3 * n + 1, sizeof(double))};
+    *out =
+        (bst_optics_photometer){.capacity = capacity, .excess = calloc(3 * n + 1, sizeof(double))};
     if (!out->excess) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the magnitudes of %d stars", capacity);
     }
@@ -19,12 +20,12 @@ bst_status bst_photometer_create(bst_ctx *ctx, int capacity, bst_photometer *out
     return BST_OK;
 }
 
-void bst_photometer_free(bst_photometer *p) {
+void bst_optics_photometer_free(bst_optics_photometer *p) {
     free(p->excess);
-    *p = (bst_photometer){.capacity = 0};
+    *p = (bst_optics_photometer){.capacity = 0};
 }
 
-void bst_photometer_begin(bst_photometer *p) {
+void bst_optics_photometer_begin(bst_optics_photometer *p) {
     p->count = 0;
 }
 
@@ -32,7 +33,7 @@ double bst_photometry_noise_mag(const bst_detection *item) {
     return item->flux_e > 0.0 ? MAG_PER_SHARE * item->flux_sigma_e / item->flux_e : INFINITY;
 }
 
-void bst_photometer_add(bst_photometer *p, const bst_detection *star, double v_mag) {
+void bst_optics_photometer_add(bst_optics_photometer *p, const bst_detection *star, double v_mag) {
     const uint32_t spoilt = BST_DETECTION_SATURATED | BST_DETECTION_EDGE | BST_DETECTION_BLEND;
     double noise = bst_photometry_noise_mag(star), excess = v_mag - star->v_mag;
     if (p->count < p->capacity && (star->flags & spoilt) == 0 && star->snr >= LEAST_SNR &&
@@ -43,7 +44,7 @@ void bst_photometer_add(bst_photometer *p, const bst_detection *star, double v_m
 }
 
 /* Of the numbers in work, which are sorted (Shell's method). */
-static double median_of_work(bst_photometer *p) {
+static double median_of_work(bst_optics_photometer *p) {
     double *v = p->work;
     int n = p->count, gap = 1;
     while (gap < n / 3) {
@@ -62,8 +63,8 @@ static double median_of_work(bst_photometer *p) {
     return 0.5 * (v[(n - 1) / 2] + v[n / 2]);
 }
 
-bst_zero_point bst_photometer_zero_point(bst_photometer *p) {
-    const bst_zero_point none = {.stars = 0};
+bst_optics_zero_point bst_optics_photometer_zero_point(bst_optics_photometer *p) {
+    const bst_optics_zero_point none = {.stars = 0};
     if (p->count < LEAST_STARS) {
         return none;
     }
@@ -91,15 +92,15 @@ bst_zero_point bst_photometer_zero_point(bst_photometer *p) {
     if (kept < LEAST_STARS) {
         return none;
     }
-    return (bst_zero_point){kept, middle + sum / weights, sqrt(1.0 / weights), sqrt(shared)};
+    return (bst_optics_zero_point){kept, middle + sum / weights, sqrt(1.0 / weights), sqrt(shared)};
 }
 
-void bst_photometry_correct(const bst_zero_point *zero_point, bst_detection *item) {
+void bst_photometry_correct(const bst_optics_zero_point *zero_point, bst_detection *item) {
     item->v_mag += zero_point->offset_mag;
     item->v_mag_sigma = hypot(bst_photometry_noise_mag(item), zero_point->sigma_mag);
 }
 
-void bst_photometry_apply(const bst_zero_point *zero_point, double camera_zero_point_mag,
+void bst_photometry_apply(const bst_optics_zero_point *zero_point, double camera_zero_point_mag,
                           bst_detections *detections) {
     detections->zero_point_mag = camera_zero_point_mag + zero_point->offset_mag;
     detections->zero_point_sigma_mag = zero_point->sigma_mag;

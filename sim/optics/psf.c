@@ -22,10 +22,10 @@ static double sinc(double x) {
 void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[2]) {
     const bst_psf_node *n = &psf->nodes[node];
     double f2 = fx * fx + fy * fy;
-    out[0] = n->radial ? bst_radial_at(n->radial, sqrt(f2)) : 0.0;
+    out[0] = n->radial ? bst_optics_radial_at(n->radial, sqrt(f2)) : 0.0;
     out[1] = 0.0;
     if (n->grid.step > 0.0) {
-        bst_grid_otf_add(&n->grid, fx, fy, out);
+        bst_optics_grid_otf_add(&n->grid, fx, fy, out);
     } else if (!n->radial) {
         out[0] = 1.0; /* nothing but Gaussians */
     }
@@ -181,7 +181,7 @@ void bst_psf_free(bst_psf *psf) {
     }
     for (int k = 0; !psf->base && psf->nodes && k < bst_psf_nodes(psf); k++) {
         free(psf->nodes[k].own_radial.value);
-        bst_grid_otf_free(&psf->nodes[k].grid);
+        bst_optics_grid_otf_free(&psf->nodes[k].grid);
     }
     for (int s = 0; !psf->base && s < psf->spectra; s++) {
         free(psf->shared[s].value);
@@ -201,17 +201,18 @@ static bst_status make_moffat(bst_ctx *ctx, bst_psf_node *node, double fwhm_px, 
     /* the OTF falls at least as fast as (pi alpha f)^(beta - 1.5) exp(-2 pi alpha f) times a
      * constant, for large beta as a Gaussian: find 1e-9 by doubling and bisection */
     double low = 0.0, high = 0.1 / alpha;
-    while (bst_moffat_otf(alpha, beta, high) > 1e-9) {
+    while (bst_optics_moffat_otf(alpha, beta, high) > 1e-9) {
         low = high;
         high *= 2.0;
     }
     for (int k = 0; k < 40; k++) {
         double middle = 0.5 * (low + high);
-        *(bst_moffat_otf(alpha, beta, middle) > 1e-9 ? &low : &high) = middle;
+        *(bst_optics_moffat_otf(alpha, beta, middle) > 1e-9 ? &low : &high) = middle;
     }
-    BST_TRY(bst_radial_create(ctx, high, &node->own_radial));
+    BST_TRY(bst_optics_radial_create(ctx, high, &node->own_radial));
     for (int i = 0; i < BST_RADIAL_NODES; i++) {
-        node->own_radial.value[i] = bst_moffat_otf(alpha, beta, bst_radial_frequency(high, i));
+        node->own_radial.value[i] =
+            bst_optics_moffat_otf(alpha, beta, bst_optics_radial_frequency(high, i));
     }
     node->radial = &node->own_radial;
     return BST_OK;
@@ -332,8 +333,8 @@ bst_status bst_psf_create(bst_ctx *ctx, const bst_camera *camera, bst_psf **out)
     return bst_psf_create_from(ctx, camera, &none, out);
 }
 
-bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
-                              bst_camera *out) {
+bst_status bst_psf_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
+                                  bst_camera *out) {
     bst_psf *base;
     *out = *camera;
     out->psf = NULL;
@@ -359,8 +360,9 @@ bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sig
     return BST_OK;
 }
 
-bst_status bst_camera_trembling(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
-                                double jitter_rad2, bst_camera *out, bst_psf **psf) {
+bst_status bst_psf_camera_trembling(bst_ctx *ctx, const bst_camera *camera,
+                                    double pixel_scale_arcsec, double jitter_rad2, bst_camera *out,
+                                    bst_psf **psf) {
     bst_camera scaled;
     *psf = NULL;
     scaled = *camera;
@@ -369,7 +371,7 @@ bst_status bst_camera_trembling(bst_ctx *ctx, const bst_camera *camera, double p
     *out = scaled;
     if (jitter_rad2 > 0.0) {
         double sigma_px = sqrt(jitter_rad2) / bst_camera_scale_rad(&scaled);
-        BST_TRY(bst_camera_blurred(ctx, &scaled, sigma_px, out));
+        BST_TRY(bst_psf_camera_blurred(ctx, &scaled, sigma_px, out));
         *psf = (bst_psf *)out->psf;
     }
     return BST_OK;

@@ -51,14 +51,15 @@ void bst_psf_free(bst_psf *psf);
 /* A copy of the camera whose PSF is widened by line-of-sight motion that is fast against the
  * exposure: every OTF times exp(-2 pi^2 sigma^2 f^2), as charge diffusion does. out->psf is new and
  * the caller's to free. */
-bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
-                              bst_camera *out) BST_MUST_CHECK;
+bst_status bst_psf_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
+                                  bst_camera *out) BST_MUST_CHECK;
 
 /* A camera at another pixel scale, its PSF widened by a line of sight that trembles with this
  * variance per axis. *psf: what the caller frees after the camera, NULL without jitter.
  * BST_ERR_CONFIG as bst_camera_prepare. */
-bst_status bst_camera_trembling(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
-                                double jitter_rad2, bst_camera *out, bst_psf **psf) BST_MUST_CHECK;
+bst_status bst_psf_camera_trembling(bst_ctx *ctx, const bst_camera *camera,
+                                    double pixel_scale_arcsec, double jitter_rad2, bst_camera *out,
+                                    bst_psf **psf) BST_MUST_CHECK;
 
 /* The OTF at (fx, fy) of a node: out = {real, imaginary}. */
 void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[2]);

@@ -35,7 +35,7 @@ double bst_psf_anchor_k(bool thermal, int spectrum) {
 static void photons_of(const bst_psf_rule *rule, double temperature_k, double *out) {
     double sum = 0.0;
     for (int k = 0; k < rule->count; k++) {
-        double photons = bst_planck_photons(rule->wavelength_m[k], temperature_k);
+        double photons = bst_optics_planck_photons(rule->wavelength_m[k], temperature_k);
         out[k] = rule->weight[k] * rule->response[k] * photons;
         sum += out[k];
     }
@@ -116,7 +116,7 @@ static void fill_rings(const bst_psf_rule *rule, const double *q, double inner, 
     for (int i = 0; i < RINGS; i++) {
         double f = (i + 0.5) / (RINGS * least_q), x = BST_PI * f * sqrt(0.5), pixel = sin(x) / x;
         for (int k = 0; k < rule->count; k++) {
-            h[i * rule->count + k] = f * pixel * pixel * bst_annulus_otf(inner, f * q[k]);
+            h[i * rule->count + k] = f * pixel * pixel * bst_optics_annulus_otf(inner, f * q[k]);
         }
     }
 }

@@ -10,7 +10,8 @@ static const char *const vignetting_models[] = {"none", "cos4", "polynomial", NU
     {                                                                                             \
         .key = "z" #j, .type = BST_CONFIG_REAL, .unit = "waves", .minimum = -100, .maximum = 100, \
         .fallback = "0", .doc = "RMS of Noll's term " #j ", n = " #n ", m = " #m ".",             \
-        .offset = offsetof(bst_zernike_waves, waves) + (j - BST_ZERNIKE_FIRST) * sizeof(double),  \
+        .offset =                                                                                 \
+            offsetof(bst_optics_zernike_waves, waves) + (j - BST_ZERNIKE_FIRST) * sizeof(double), \
         .size = sizeof(double)                                                                    \
     }
 
@@ -28,10 +29,10 @@ static const bst_config_desc zernike_table[] = {
 };
 
 static const bst_config_desc spiders_table[] = {
-    BST_INT(bst_spiders, count, "", 0, 32, "0",
+    BST_INT(bst_optics_spiders, count, "", 0, 32, "0",
             "Vanes that hold the secondary, from the rim to the centre, evenly spread."),
-    BST_REAL(bst_spiders, width_m, "m", 0, 1, "0", "Width of each vane."),
-    BST_REAL(bst_spiders, angle_deg, "deg", -360, 360, "0",
+    BST_REAL(bst_optics_spiders, width_m, "m", 0, 1, "0", "Width of each vane."),
+    BST_REAL(bst_optics_spiders, angle_deg, "deg", -360, 360, "0",
              "Direction of the first vane, from the focal plane's +x towards its +y."),
     BST_CONFIG_END,
 };
@@ -47,13 +48,13 @@ static const bst_config_desc field_node_table[] = {
 };
 
 static const bst_config_desc vignetting_table[] = {
-    BST_ENUM(bst_vignetting, model, vignetting_models, "\"none\"",
+    BST_ENUM(bst_optics_vignetting, model, vignetting_models, "\"none\"",
              "Illumination over the field: even, the fourth power of the cosine of the angle to "
              "the boresight, or a polynomial of the distance from it."),
-    BST_REALS(bst_vignetting, coefficients, "", -10, 10, "[0, 0, 0]",
+    BST_REALS(bst_optics_vignetting, coefficients, "", -10, 10, "[0, 0, 0]",
               "polynomial: c1, c2, c3 of 1 + c1 r^2 + c2 r^4 + c3 r^6, r in half diagonals of the "
               "sensor; never below 0."),
-    BST_REAL(bst_vignetting, limit_px, "px", 0, 1e5, "0",
+    BST_REAL(bst_optics_vignetting, limit_px, "px", 0, 1e5, "0",
              "No light beyond this distance from the boresight; 0: no limit."),
     BST_CONFIG_END,
 };

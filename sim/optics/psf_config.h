@@ -24,28 +24,28 @@ enum { BST_ZERNIKE_FIRST = 2, BST_ZERNIKE_LAST = 37, BST_ZERNIKE_TERMS = 36 };
 enum { BST_PSF_FIELD_MAX = 16 };
 
 /* Root mean square over the full circular aperture, term j at [j - 2]. */
-typedef struct bst_zernike_waves {
+typedef struct bst_optics_zernike_waves {
     double waves[BST_ZERNIKE_TERMS];
-} bst_zernike_waves;
+} bst_optics_zernike_waves;
 
-typedef struct bst_spiders {
+typedef struct bst_optics_spiders {
     int64_t count;    /* vanes from the rim inwards to the centre, evenly spread */
     double width_m;   /* of each, at the aperture */
     double angle_deg; /* of the first, from the focal plane's +x towards its +y */
-} bst_spiders;
+} bst_optics_spiders;
 
 /* What one node of the field grid has of its own, on top of what holds for all. */
 typedef struct bst_psf_field_node {
     double psf_fwhm_px; /* Gaussian, Moffat: instead of the camera's; 0: the camera's */
     double defocus_um;  /* added */
-    bst_zernike_waves zernike_waves; /* added */
+    bst_optics_zernike_waves zernike_waves; /* added */
 } bst_psf_field_node;
 
-typedef struct bst_vignetting {
+typedef struct bst_optics_vignetting {
     int32_t model;          /* BST_VIGNETTING_... */
     double coefficients[3]; /* polynomial: c1, c2, c3 of 1 + c1 r^2 + c2 r^4 + c3 r^6 */
     double limit_px;        /* no light beyond this distance from the boresight; 0: no limit */
-} bst_vignetting;
+} bst_optics_vignetting;
 
 typedef struct bst_optics_config {
     int32_t psf;                /* BST_PSF_... */
@@ -56,9 +56,9 @@ typedef struct bst_optics_config {
     int32_t spectrum;           /* BST_SPECTRUM_... */
     int64_t wavelengths;        /* of the band's quadrature; 0: 8 */
     double central_obstruction; /* diameter over that of the aperture; 0: sqrt(obscuration) */
-    bst_spiders spiders;
+    bst_optics_spiders spiders;
     double zernike_nm; /* wavelength of the waves; 0: 550 */
-    bst_zernike_waves zernike_waves;
+    bst_optics_zernike_waves zernike_waves;
     double defocus_um;       /* detector behind the focus */
     double diffusion_px;     /* charge diffusion, standard deviation of a Gaussian */
     double pixel_fill[2];    /* light-sensitive part of the pitch, along x and y; 0: 1 */
@@ -68,7 +68,7 @@ typedef struct bst_optics_config {
     int64_t field_columns;   /* of the field grid; 0: 1 */
     int64_t field_rows;
     bst_config_list field; /* bst_psf_field_node, row by row; empty: the same all over */
-    bst_vignetting vignetting;
+    bst_optics_vignetting vignetting;
 } bst_optics_config;
 
 extern const bst_config_desc bst_optics_config_table[];

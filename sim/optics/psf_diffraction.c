@@ -74,7 +74,7 @@ static bst_status make_spectrum(bst_ctx *ctx, bool solar, band *b, int s) {
         double photons = 1.0;
         if (solar || b->spectra > 1) {
             double temperature_k = s > 0 ? bst_psf_anchor_k(rule->thermal, s) : SUN_K;
-            photons = bst_planck_photons(rule->wavelength_m[k], temperature_k);
+            photons = bst_optics_planck_photons(rule->wavelength_m[k], temperature_k);
         }
         b->weight[s][k] = rule->weight[k] * (photons * rule->response[k]);
         sum += b->weight[s][k];
@@ -185,7 +185,7 @@ static bool aberrated(const bst_zernike_polynomial *w) {
 }
 
 /* Tables of one node, as many as there are spectra. */
-typedef bst_grid_otf *tables[BST_PSF_SPECTRA];
+typedef bst_optics_grid_otf *tables[BST_PSF_SPECTRA];
 
 /* Adds the band's OTF of an aperture to a node's tables. */
 static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
@@ -201,7 +201,8 @@ static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *
         for (int ky = -reach; ky <= reach; ky++) {
             const float *row = h + 2 * (size_t)((ky + side) % side) * (size_t)stride;
             for (int s = 0; s < b->spectra; s++) {
-                float *to = bst_grid_otf_node(out[s], 0, ky), weight = (float)b->weight[s][k];
+                float *to = bst_optics_grid_otf_node(out[s], 0, ky),
+                      weight = (float)b->weight[s][k];
                 for (int i = 0; i < 2 * (reach + 1); i++) {
                     to[i] += weight * row[i];
                 }
@@ -213,7 +214,7 @@ static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *
 
 static bst_status create_tables(bst_ctx *ctx, const band *b, double step, int reach, tables out) {
     for (int s = 0; s < b->spectra; s++) {
-        BST_TRY(bst_grid_otf_create(ctx, step, reach, out[s]));
+        BST_TRY(bst_optics_grid_otf_create(ctx, step, reach, out[s]));
     }
     return BST_OK;
 }
@@ -231,16 +232,16 @@ static bst_status make_node(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil 
     BST_TRY(add_band(ctx, work, pupil, b, true, out));
     for (int s = 0; s < b->spectra; s++) {
         for (int ky = -reach; ky <= reach; ky++) {
-            const float *less = bst_grid_otf_node(base[s], 0, ky);
-            float *node = bst_grid_otf_node(out[s], 0, ky);
+            const float *less = bst_optics_grid_otf_node(base[s], 0, ky);
+            float *node = bst_optics_grid_otf_node(out[s], 0, ky);
             for (int i = 0; i < 2 * (reach + 1); i++) {
                 node[i] -= less[i];
             }
         }
         /* cells that are half open lose light at no shift alone */
-        float *centre = bst_grid_otf_node(out[s], 0, 0);
+        float *centre = bst_optics_grid_otf_node(out[s], 0, 0);
         centre[0] = centre[1] = 0.0F;
-        bst_grid_otf_mirror(out[s]);
+        bst_optics_grid_otf_mirror(out[s]);
     }
     return BST_OK;
 }
@@ -276,7 +277,7 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
     int reach = (int)cells + 1;
     bst_pupil_work *work;
     BST_TRY(bst_pupil_work_create(ctx, reach, &work));
-    bst_grid_otf annulus[BST_PSF_SPECTRA] = {{0}};
+    bst_optics_grid_otf annulus[BST_PSF_SPECTRA] = {{0}};
     tables base, own;
     bst_status status = BST_OK;
     for (int s = 0; s < b->spectra; s++) {
@@ -292,7 +293,7 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
         }
     }
     for (int s = 0; s < b->spectra; s++) {
-        bst_grid_otf_free(base[s]);
+        bst_optics_grid_otf_free(base[s]);
     }
     bst_pupil_work_free(work);
     return status;
@@ -329,11 +330,11 @@ bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
     psf->reach_px = q_most * cbrt(4e9 / (pow(BST_PI, 4.0) * (1.0 - e) * (1.0 - e) * (1.0 + e)));
     int nodes = psf->columns * psf->rows;
     for (int s = 0; s < b.spectra; s++) {
-        BST_TRY(bst_radial_create(ctx, psf->cutoff, &psf->shared[s]));
+        BST_TRY(bst_optics_radial_create(ctx, psf->cutoff, &psf->shared[s]));
         for (int i = 0; i < BST_RADIAL_NODES; i++) {
-            double f = bst_radial_frequency(psf->cutoff, i), sum = 0.0;
+            double f = bst_optics_radial_frequency(psf->cutoff, i), sum = 0.0;
             for (int k = 0; k < b.rule.count; k++) {
-                sum += b.weight[s][k] * bst_annulus_otf(pupil.inner, f * b.q[k]);
+                sum += b.weight[s][k] * bst_optics_annulus_otf(pupil.inner, f * b.q[k]);
             }
             psf->shared[s].value[i] = sum;
         }

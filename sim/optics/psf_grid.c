@@ -3,7 +3,8 @@
 
 #include "sim/optics/psf_internal.h"
 
-bst_status bst_grid_otf_create(bst_ctx *ctx, double step, int reach, bst_grid_otf *out) {
+bst_status bst_optics_grid_otf_create(bst_ctx *ctx, double step, int reach,
+                                      bst_optics_grid_otf *out) {
     int stride = reach + 1 + 2 * BST_GRID_MARGIN, rows = 2 * (reach + BST_GRID_MARGIN) + 1;
     out->node = calloc((size_t)stride * (size_t)rows, 2 * sizeof *out->node);
     if (!out->node) {
@@ -16,17 +17,17 @@ bst_status bst_grid_otf_create(bst_ctx *ctx, double step, int reach, bst_grid_ot
     return BST_OK;
 }
 
-void bst_grid_otf_free(bst_grid_otf *table) {
+void bst_optics_grid_otf_free(bst_optics_grid_otf *table) {
     free(table->node);
-    *table = (bst_grid_otf){0};
+    *table = (bst_optics_grid_otf){0};
 }
 
-void bst_grid_otf_mirror(bst_grid_otf *table) {
+void bst_optics_grid_otf_mirror(bst_optics_grid_otf *table) {
     int rows = table->reach + BST_GRID_MARGIN;
     for (int ky = -rows; ky <= rows; ky++) {
         for (int kx = 1; kx <= BST_GRID_MARGIN; kx++) {
-            const float *from = bst_grid_otf_node(table, kx, -ky);
-            float *to = bst_grid_otf_node(table, -kx, ky);
+            const float *from = bst_optics_grid_otf_node(table, kx, -ky);
+            float *to = bst_optics_grid_otf_node(table, -kx, ky);
             to[0] = from[0];
             to[1] = -from[1];
         }
@@ -44,7 +45,8 @@ static void lagrange6(double t, double w[6]) {
     w[5] = a * b * t * c * d * (1.0 / 120.0);
 }
 
-void bst_grid_otf_add(const bst_grid_otf *table, double fx, double fy, double out[2]) {
+void bst_optics_grid_otf_add(const bst_optics_grid_otf *table, double fx, double fy,
+                             double out[2]) {
     double sign = 1.0;
     if (fx < 0.0) {
         fx = -fx;
@@ -60,7 +62,7 @@ void bst_grid_otf_add(const bst_grid_otf *table, double fx, double fy, double ou
     lagrange6(u - i, wx);
     lagrange6(v - j, wy);
     for (int row = 0; row < 6; row++) {
-        const float *node = bst_grid_otf_node(table, i - 2, j - 2 + row);
+        const float *node = bst_optics_grid_otf_node(table, i - 2, j - 2 + row);
         double sum_re = 0.0, sum_im = 0.0;
         for (int k = 0; k < 6; k++) {
             sum_re += wx[k] * (double)node[2 * k];

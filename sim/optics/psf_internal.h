@@ -9,50 +9,51 @@
 /* A real, circular OTF: values at f = limit (i / (BST_RADIAL_NODES - 1))^2, which follow a power of
  * the frequency at 0, as that of every PSF with wings has it. */
 enum { BST_RADIAL_NODES = 16384 };
-typedef struct bst_radial_otf {
+typedef struct bst_optics_radial_otf {
     double limit;  /* cycles/px; 0 beyond */
     double *value; /* [BST_RADIAL_NODES] */
-} bst_radial_otf;
+} bst_optics_radial_otf;
 
-bst_status bst_radial_create(bst_ctx *ctx, double limit, bst_radial_otf *out) BST_MUST_CHECK;
+bst_status bst_optics_radial_create(bst_ctx *ctx, double limit,
+                                    bst_optics_radial_otf *out) BST_MUST_CHECK;
 /* Frequency of node i of a table that ends at `limit`. */
-double bst_radial_frequency(double limit, int i);
+double bst_optics_radial_frequency(double limit, int i);
 /* Value at f >= 0: cubic between nodes. */
-double bst_radial_at(const bst_radial_otf *table, double f);
+double bst_optics_radial_at(const bst_optics_radial_otf *table, double f);
 
 /* A complex OTF (or a part of one) with the symmetry of a real image, on the half-plane of a square
  * grid: rows fy = -reach .. reach, columns fx = 0 .. reach, in steps of `step` cycles/px. */
-typedef struct bst_grid_otf {
+typedef struct bst_optics_grid_otf {
     double step; /* 0: no table, nothing to add */
     int reach;   /* nodes to either side of 0 */
     int stride;  /* complex numbers per row */
     float *node; /* complex pairs; BST_GRID_MARGIN more on each side than reach says */
-} bst_grid_otf;
+} bst_optics_grid_otf;
 
 /* What the interpolation reaches over. */
 enum { BST_GRID_MARGIN = 3 };
 
-bst_status bst_grid_otf_create(bst_ctx *ctx, double step, int reach,
-                               bst_grid_otf *out) BST_MUST_CHECK;
-void bst_grid_otf_free(bst_grid_otf *table);
+bst_status bst_optics_grid_otf_create(bst_ctx *ctx, double step, int reach,
+                                      bst_optics_grid_otf *out) BST_MUST_CHECK;
+void bst_optics_grid_otf_free(bst_optics_grid_otf *table);
 /* The node (column kx >= -BST_GRID_MARGIN, row ky) as {real, imaginary}. */
-static inline float *bst_grid_otf_node(const bst_grid_otf *t, int kx, int ky) {
+static inline float *bst_optics_grid_otf_node(const bst_optics_grid_otf *t, int kx, int ky) {
     return t->node + 2 * ((size_t)(ky + t->reach + BST_GRID_MARGIN) * (size_t)t->stride +
                           (size_t)(kx + BST_GRID_MARGIN));
 }
 /* Fills the columns left of fx = 0 from the symmetry, once all others are set. */
-void bst_grid_otf_mirror(bst_grid_otf *table);
+void bst_optics_grid_otf_mirror(bst_optics_grid_otf *table);
 /* Adds the value at (fx, fy): sextic (six-point Lagrange) along both axes; nothing beyond. */
-void bst_grid_otf_add(const bst_grid_otf *table, double fx, double fy, double out[2]);
+void bst_optics_grid_otf_add(const bst_optics_grid_otf *table, double fx, double fy, double out[2]);
 
 /* One node of the field grid. */
 typedef struct bst_psf_node {
     double equivalent_fwhm_px;
-    double centroid_px[2];        /* of a point's image, from its place */
-    double sigma_px;              /* Gaussian part: the profile itself, or 0 */
-    const bst_radial_otf *radial; /* NULL: none; lent by the PSF */
-    bst_radial_otf own_radial;    /* where nodes differ in it */
-    bst_grid_otf grid;
+    double centroid_px[2];               /* of a point's image, from its place */
+    double sigma_px;                     /* Gaussian part: the profile itself, or 0 */
+    const bst_optics_radial_otf *radial; /* NULL: none; lent by the PSF */
+    bst_optics_radial_otf own_radial;    /* where nodes differ in it */
+    bst_optics_grid_otf grid;
 } bst_psf_node;
 
 /* Wavelengths of a band's average at most. */
@@ -83,10 +84,10 @@ struct bst_psf {
     double diffusion_px, fill[2];
     double cutoff, reach_px;
     bst_psf *base; /* NULL, or the PSF that lends its tables to this wider one */
-    bst_radial_otf shared[BST_PSF_SPECTRA]; /* diffraction: unaberrated annulus, the same at all
-                                               nodes of a spectrum */
-    bst_psf_colours *colours;               /* NULL: one spectrum */
-    bst_psf_node *nodes;                    /* [spectra][rows][columns] */
+    bst_optics_radial_otf shared[BST_PSF_SPECTRA]; /* diffraction: unaberrated annulus, the same at
+                                               all nodes of a spectrum */
+    bst_psf_colours *colours;                      /* NULL: one spectrum */
+    bst_psf_node *nodes;                           /* [spectra][rows][columns] */
 };
 
 /* What fills psf->nodes and psf->cutoff for the models that need more than a formula. */
@@ -96,9 +97,9 @@ bst_status bst_psf_make_sampled(bst_ctx *ctx, const bst_camera *camera,
                                 const bst_psf_samples *samples, bst_psf *psf) BST_MUST_CHECK;
 
 /* OTF of the profile (1 + (r / alpha)^2)^-beta at f >= 0. */
-double bst_moffat_otf(double alpha_px, double beta, double f);
+double bst_optics_moffat_otf(double alpha_px, double beta, double f);
 /* OTF of a circular aperture of diameter 1 with a concentric obstruction of diameter `inner` at a
  * shift s of pupils, in diameters (O'Neill 1956, J. Opt. Soc. Am. 46, 285). */
-double bst_annulus_otf(double inner, double s);
+double bst_optics_annulus_otf(double inner, double s);
 
 #endif

@@ -3,18 +3,18 @@
 
 #include "sim/optics/psf_internal.h"
 
-bst_status bst_radial_create(bst_ctx *ctx, double limit, bst_radial_otf *out) {
+bst_status bst_optics_radial_create(bst_ctx *ctx, double limit, bst_optics_radial_otf *out) {
     out->limit = limit;
     out->value = calloc(BST_RADIAL_NODES, sizeof *out->value);
     return out->value ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a PSF's table");
 }
 
-double bst_radial_frequency(double limit, int i) {
+double bst_optics_radial_frequency(double limit, int i) {
     double t = (double)i / (BST_RADIAL_NODES - 1);
     return limit * t * t;
 }
 
-double bst_radial_at(const bst_radial_otf *table, double f) {
+double bst_optics_radial_at(const bst_optics_radial_otf *table, double f) {
     if (!(f < table->limit)) {
         return 0.0;
     }
@@ -30,7 +30,7 @@ double bst_radial_at(const bst_radial_otf *table, double f) {
 /* The transform of (1 + r^2 / a^2)^-b is 2 (x / 2)^v K_v(x) / Gamma(v), x = 2 pi a f, v = b - 1
  * (Abramowitz and Stegun 11.4.44), with K_v(x) = integral exp(-x cosh t) cosh(v t) dt from 0 to
  * infinity (9.6.24): the trapezoid rule converges geometrically. */
-double bst_moffat_otf(double alpha_px, double beta, double f) {
+double bst_optics_moffat_otf(double alpha_px, double beta, double f) {
     const double step = 0.05;
     double x = 2.0 * BST_PI * alpha_px * f, v = beta - 1.0;
     if (!(x > 1e-12)) {
@@ -68,7 +68,7 @@ static double lens(double a, double b, double d) {
     return a * a * (at_a - 0.5 * sin(2.0 * at_a)) + b * b * (at_b - 0.5 * sin(2.0 * at_b));
 }
 
-double bst_annulus_otf(double inner, double s) {
+double bst_optics_annulus_otf(double inner, double s) {
     double whole = 0.25 * BST_PI * (1.0 - inner * inner);
     double area = lens(0.5, 0.5, s);
     if (inner > 0.0) {

@@ -116,17 +116,17 @@ static bst_status make_plane(bst_ctx *ctx, const transform *t, const bst_psf_sam
         }
     }
     int reach = (int)fmin(ceil(sqrt(reach2)), n / 2);
-    BST_TRY(bst_grid_otf_create(ctx, samples->oversampling / n, reach, &node->grid));
+    BST_TRY(bst_optics_grid_otf_create(ctx, samples->oversampling / n, reach, &node->grid));
     for (int ky = -reach - BST_GRID_MARGIN; ky <= reach + BST_GRID_MARGIN; ky++) {
         for (int kx = 0; kx <= reach + BST_GRID_MARGIN; kx++) {
             double v[2];
             at_node(t, sum, centre, kx, ky, v);
-            float *to = bst_grid_otf_node(&node->grid, kx, ky);
+            float *to = bst_optics_grid_otf_node(&node->grid, kx, ky);
             to[0] = (float)v[0];
             to[1] = (float)v[1];
         }
     }
-    bst_grid_otf_mirror(&node->grid);
+    bst_optics_grid_otf_mirror(&node->grid);
     return BST_OK;
 }
 

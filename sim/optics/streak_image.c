@@ -4,7 +4,7 @@
 
 #include "sim/core/vec.h"
 
-double bst_image_squared(double along, double across, double length) {
+double bst_optics_image_squared(double along, double across, double length) {
     const double root_pi = sqrt(BST_PI);
     double a = length / (2.0 * along);
     double line = a < 1e-3 ? 1.0 / (2.0 * root_pi * along) * (1.0 - a * a / 6.0)

@@ -6,6 +6,6 @@
  * by a Gaussian of standard deviation `along` in its direction and `across` at right angles.
  * 1 / (4 pi along across) for L = 0; else (1 / (2 sqrt(pi) across)) times the line integral of the
  * autocorrelation of a uniform segment. */
-double bst_image_squared(double along, double across, double length);
+double bst_optics_image_squared(double along, double across, double length);
 
 #endif

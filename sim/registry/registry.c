@@ -28,9 +28,9 @@ static const bst_module_desc *const modules[] = {
     &bst_tasking_priority_module,
 };
 
-static const bst_registry registry = {.modules = modules,
-                                      .count = sizeof modules / sizeof *modules};
+static const bst_scenario_registry registry = {.modules = modules,
+                                               .count = sizeof modules / sizeof *modules};
 
-const bst_registry *bst_app_registry(void) {
+const bst_scenario_registry *bst_registry_shipped(void) {
     return &registry;
 }

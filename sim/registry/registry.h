@@ -5,6 +5,6 @@
 #include "sim/engine/scenario/scenario.h"
 
 /* Every module that a scenario can name. Static: lives for ever. */
-const bst_registry *bst_app_registry(void);
+const bst_scenario_registry *bst_registry_shipped(void);
 
 #endif

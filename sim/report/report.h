@@ -15,48 +15,48 @@
 /* ---- report_page.c: the page's own elements ---- */
 
 /* Head of the page; `title` is its first heading. */
-void bst_page_begin(FILE *out, const char *title);
-void bst_page_end(FILE *out);
+void bst_report_page_begin(FILE *out, const char *title);
+void bst_report_page_end(FILE *out);
 /* A heading of level 2 or 3 that opens a section, and its end. */
-void bst_page_section(FILE *out, int level, const char *heading);
-void bst_page_section_end(FILE *out);
+void bst_report_page_section(FILE *out, int level, const char *heading);
+void bst_report_page_section_end(FILE *out);
 typedef enum bst_page_width { BST_PAGE_WIDE, BST_PAGE_HALF, BST_PAGE_THIRD } bst_page_width;
 /* A grid of figures of half or a third of the page, as many beside each other as there is room for.
  */
-void bst_page_grid(FILE *out, bst_page_width width);
-void bst_page_grid_end(FILE *out);
+void bst_report_page_grid(FILE *out, bst_page_width width);
+void bst_report_page_grid_end(FILE *out);
 /* A figure round a chart. */
-void bst_page_figure(FILE *out, bst_page_width width);
-void bst_page_figure_end(FILE *out, const char *caption);
+void bst_report_page_figure(FILE *out, bst_page_width width);
+void bst_report_page_figure_end(FILE *out, const char *caption);
 /* A box with a figure that is to be seen at once; `unit` and `note` may be "". */
-void bst_page_card(FILE *out, const char *value, const char *unit, const char *name,
-                   const char *note);
+void bst_report_page_card(FILE *out, const char *value, const char *unit, const char *name,
+                          const char *note);
 /* A row of a table of two columns. */
-void bst_page_row(FILE *out, const char *name, const char *format, ...) BST_PRINTF(3, 4);
+void bst_report_page_row(FILE *out, const char *name, const char *format, ...) BST_PRINTF(3, 4);
 /* "12.3", with so many significant digits; "-" for what is not a number. */
-const char *bst_page_number(char text[32], double value, int digits);
+const char *bst_report_page_number(char text[32], double value, int digits);
 
 /* ---- warnings, gathered before the page begins ---- */
 
 enum { BST_REPORT_WARNINGS = 128 };
 
-typedef struct bst_warnings {
+typedef struct bst_report_warnings {
     struct {
-        bst_severity severity;
+        bst_run_severity severity;
         char text[400];
     } items[BST_REPORT_WARNINGS];
     int count;
     int more; /* that found no room */
-} bst_warnings;
+} bst_report_warnings;
 
-void bst_warnings_add(bst_warnings *warnings, bst_severity severity, const char *format, ...)
-    BST_PRINTF(3, 4);
+void bst_report_warnings_add(bst_report_warnings *warnings, bst_run_severity severity,
+                             const char *format, ...) BST_PRINTF(3, 4);
 /* The section "Warnings": the worst first, otherwise in their order. */
-void bst_warnings_write(FILE *out, const bst_warnings *warnings);
+void bst_report_warnings_write(FILE *out, const bst_report_warnings *warnings);
 
 /* ---- report_data.c: what one sensor recorded, frame by frame ---- */
 
-/* NAN: not known. Errors are bst_pointing_error_px's. */
+/* NAN: not known. Errors are bst_eval_pointing_error_px's. */
 typedef struct bst_report_frame {
     int64_t exposure_id;
     double mid_s, end_s;
@@ -94,7 +94,7 @@ typedef struct bst_report_mode {
 } bst_report_mode;
 
 typedef struct bst_report_sensor {
-    bst_export_sensor sensor;
+    bst_run_sensor sensor;
     char name[164]; /* "observer/sensor" */
     int64_t width_px, height_px;
     double pixel_scale_arcsec;
@@ -121,7 +121,7 @@ typedef struct bst_report_sensor {
  * do then. `summary`: the sensor's in the manifest (cJSON), NULL: none. Tables that are missing
  * leave their columns NAN. */
 bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *scene,
-                           const bst_export_sensor *sensor, const struct cJSON *summary,
+                           const bst_run_sensor *sensor, const struct cJSON *summary,
                            bst_report_sensor *out) BST_MUST_CHECK;
 void bst_report_sensor_free(bst_report_sensor *sensor);
 
@@ -141,7 +141,7 @@ const char *bst_report_local(const bst_run_reader *run, const char *message);
 
 /* What the manifest, counters, tables and events of a run say of what went wrong. */
 void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *sensors, int count,
-                             const bst_scenario *scenario, bst_warnings *warnings);
+                             const bst_scenario *scenario, bst_report_warnings *warnings);
 /* The charts of a sensor. `span_s`: length of the run as far as it went. */
 bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *sensor,
                             double span_s) BST_MUST_CHECK;

@@ -62,21 +62,21 @@ static const bst_report_frame unknown = {.tracked_s = NAN,
 /* Calls `take` for each row of a query on one sensor. A table that is not there is no error:
  * *missing. */
 static bst_status each_row(bst_ctx *ctx, reading *r, const char *sql, int64_t parameter,
-                           bst_status (*take)(bst_ctx *ctx, reading *r, const bst_rows *rows),
+                           bst_status (*take)(bst_ctx *ctx, reading *r, const bst_io_rows *rows),
                            bool *missing) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_ctx unheard = {0};
     bool more;
     *missing =
-        bst_rows_open(&unheard, r->run, sql, r->out->sensor.index, parameter, &rows) != BST_OK;
+        bst_io_rows_open(&unheard, r->run, sql, r->out->sensor.index, parameter, &rows) != BST_OK;
     if (*missing) {
         return BST_OK;
     }
     bst_status status;
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more &&
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more &&
            (status = take(ctx, r, rows)) == BST_OK) {
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     if (status == BST_ERR_FORMAT) { /* a database with a damaged page: what came before it holds */
         r->out->damaged = true;
         return BST_OK;
@@ -101,9 +101,9 @@ static bst_report_frame *find(const reading *r, int64_t exposure_id) {
 
 /* ------------------------------------------------------------------ frames */
 
-static bst_vec3 vec3_of(const bst_rows *rows, int column) {
-    return (bst_vec3){bst_rows_real(rows, column), bst_rows_real(rows, column + 1),
-                      bst_rows_real(rows, column + 2)};
+static bst_vec3 vec3_of(const bst_io_rows *rows, int column) {
+    return (bst_vec3){bst_io_rows_real(rows, column), bst_io_rows_real(rows, column + 1),
+                      bst_io_rows_real(rows, column + 2)};
 }
 
 /* Adds a frame; NULL when it is one of those left out. */
@@ -121,7 +121,7 @@ static bst_report_frame *add_frame(reading *r, int64_t id, double mid_s) {
     return f;
 }
 
-static bst_status take_task(bst_ctx *ctx, reading *r, const bst_rows *rows) {
+static bst_status take_task(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     if ((r->task_count & (r->task_count - 1)) == 0) { /* room doubles */
         task *more = realloc(r->tasks, (r->task_count ? 2 * r->task_count : 1) * sizeof *more);
         if (!more) {
@@ -129,7 +129,7 @@ static bst_status take_task(bst_ctx *ctx, reading *r, const bst_rows *rows) {
         }
         r->tasks = more;
     }
-    r->tasks[r->task_count++] = (task){bst_rows_real(rows, 0), bst_rows_int(rows, 1)};
+    r->tasks[r->task_count++] = (task){bst_io_rows_real(rows, 0), bst_io_rows_int(rows, 1)};
     return BST_OK;
 }
 
@@ -150,13 +150,13 @@ static int64_t object_at(const reading *r, double seconds) {
 /* The target as the world has it. */
 static bst_status look(bst_ctx *ctx, reading *r, bst_report_frame *f, bst_quat q_cam_from_gcrf,
                        double pixel_scale_arcsec) {
-    bst_sight sight;
+    bst_world_sight sight;
     int64_t object = object_at(r, f->mid_s);
     if (object < 0 || object >= bst_world_object_count(r->scene->world)) {
         return BST_OK;
     }
     bst_status status =
-        bst_view_sight(ctx, r->scene->view, r->observer, (int)object, f->mid_s, &sight);
+        bst_world_view_sight(ctx, r->scene->view, r->observer, (int)object, f->mid_s, &sight);
     if (status == BST_ERR_NUMERIC) {
         return BST_OK; /* decayed */
     }
@@ -165,7 +165,7 @@ static bst_status look(bst_ctx *ctx, reading *r, bst_report_frame *f, bst_quat q
     f->known = true;
     f->occulted = sight.occulted;
     f->dark = sight.sunlit_fraction <= 0.0;
-    f->visible = !sight.occulted && bst_glow_electrons_per_s(camera, &sight.glow, NULL) > 0.0;
+    f->visible = !sight.occulted && bst_scene_glow_electrons_per_s(camera, &sight.glow, NULL) > 0.0;
     f->v_mag = isfinite(sight.v_mag) ? sight.v_mag : NAN;
     f->range_m = sight.range_m;
     f->phase_rad = sight.phase_rad;
@@ -176,8 +176,8 @@ static bst_status look(bst_ctx *ctx, reading *r, bst_report_frame *f, bst_quat q
     bst_vec3_to_radec(sight.apparent, &ra, &dec);
     f->apparent_ra_deg = ra / BST_DEG_RAD;
     f->apparent_dec_deg = dec / BST_DEG_RAD;
-    f->error_px = bst_pointing_error_px(camera, pixel_scale_arcsec, q_cam_from_gcrf, sight.apparent,
-                                        &f->error_x_px, &f->error_y_px);
+    f->error_px = bst_eval_pointing_error_px(camera, pixel_scale_arcsec, q_cam_from_gcrf,
+                                             sight.apparent, &f->error_x_px, &f->error_y_px);
     return BST_OK;
 }
 
@@ -189,19 +189,19 @@ static const char exposures_sql[] =
     " CAST(end_tick AS REAL) / (SELECT tick_rate_hz FROM run)"
     " FROM exposures WHERE sensor = ?1";
 
-static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_rows *rows) {
-    bst_report_frame *f = add_frame(r, bst_rows_int(rows, 0), bst_rows_real(rows, 1));
+static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
+    bst_report_frame *f = add_frame(r, bst_io_rows_int(rows, 0), bst_io_rows_real(rows, 1));
     if (!f) {
         return BST_OK;
     }
-    f->dropped = bst_rows_int(rows, 2) == 1;
-    f->end_s = bst_rows_real(rows, 18);
-    bst_quat q = {bst_rows_real(rows, 3), bst_rows_real(rows, 4), bst_rows_real(rows, 5),
-                  bst_rows_real(rows, 6)};
-    f->boresight_x_px = bst_rows_real(rows, 7);
-    f->boresight_y_px = bst_rows_real(rows, 8);
-    f->ra_deg = bst_rows_real(rows, 9);
-    f->dec_deg = bst_rows_real(rows, 10);
+    f->dropped = bst_io_rows_int(rows, 2) == 1;
+    f->end_s = bst_io_rows_real(rows, 18);
+    bst_quat q = {bst_io_rows_real(rows, 3), bst_io_rows_real(rows, 4), bst_io_rows_real(rows, 5),
+                  bst_io_rows_real(rows, 6)};
+    f->boresight_x_px = bst_io_rows_real(rows, 7);
+    f->boresight_y_px = bst_io_rows_real(rows, 8);
+    f->ra_deg = bst_io_rows_real(rows, 9);
+    f->dec_deg = bst_io_rows_real(rows, 10);
     bst_vec3 here = vec3_of(rows, 11), sun = vec3_of(rows, 14);
     bst_vec3 look_to = bst_vec3_from_radec(f->ra_deg * BST_DEG_RAD, f->dec_deg * BST_DEG_RAD);
     double distance = bst_vec3_norm(here);
@@ -215,19 +215,20 @@ static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_rows *rows) 
     if (!r->scene) {
         return BST_OK;
     }
-    bst_earth_frames frames;
-    BST_TRY(bst_view_earth_frames(ctx, r->scene->view, f->mid_s, &frames));
+    bst_astro_earth_frames frames;
+    BST_TRY(bst_world_view_earth_frames(ctx, r->scene->view, f->mid_s, &frames));
     bst_vec3 ground = bst_mat3_mul_vec(&frames.itrf_from_gcrf, here);
     double height, itrf[3] = {ground.x, ground.y, ground.z};
     if (isfinite(distance)) {
-        BST_TRY(bst_itrf_to_geodetic(ctx, itrf, &f->latitude_rad, &f->longitude_rad, &height));
+        BST_TRY(
+            bst_astro_itrf_to_geodetic(ctx, itrf, &f->latitude_rad, &f->longitude_rad, &height));
     }
-    return look(ctx, r, f, q, bst_rows_real(rows, 17));
+    return look(ctx, r, f, q, bst_io_rows_real(rows, 17));
 }
 
-static bst_status take_frame(bst_ctx *ctx, reading *r, const bst_rows *rows) {
+static bst_status take_frame(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
-    add_frame(r, bst_rows_int(rows, 0), bst_rows_real(rows, 1));
+    add_frame(r, bst_io_rows_int(rows, 0), bst_io_rows_real(rows, 1));
     return BST_OK;
 }
 
@@ -235,7 +236,7 @@ static bst_status take_frame(bst_ctx *ctx, reading *r, const bst_rows *rows) {
 static bst_status read_frames(bst_ctx *ctx, reading *r) {
     static const struct {
         const char *count, *rows;
-        bst_status (*take)(bst_ctx *ctx, reading *r, const bst_rows *rows);
+        bst_status (*take)(bst_ctx *ctx, reading *r, const bst_io_rows *rows);
     } sources[] = {
         {"SELECT count(*) FROM exposures WHERE sensor = ?1", exposures_sql, take_exposure},
         {"SELECT count(*) FROM frames WHERE sensor = ?1",
@@ -265,14 +266,14 @@ static bst_status read_frames(bst_ctx *ctx, reading *r) {
 /* ------------------------------------------------------------------ truth */
 
 /* What the table truth says of the target where it was in the field. */
-static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_rows *rows) {
+static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
-    bst_report_frame *f = find(r, bst_rows_int(rows, 0));
-    if (!f || bst_rows_int(rows, 12) != object_at(r, f->mid_s)) {
+    bst_report_frame *f = find(r, bst_io_rows_int(rows, 0));
+    if (!f || bst_io_rows_int(rows, 12) != object_at(r, f->mid_s)) {
         return BST_OK;
     }
-    f->in_field = bst_rows_int(rows, 3) == 1;
-    double snr = bst_rows_real(rows, 4);
+    f->in_field = bst_io_rows_int(rows, 3) == 1;
+    double snr = bst_io_rows_real(rows, 4);
     f->snr = f->in_field && snr > 0.0 ? snr : NAN;
     if (f->known) {
         return BST_OK;
@@ -280,17 +281,17 @@ static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_rows *rows) {
     /* no world: the recorded place, relative to the boresight; in the field it differs from the
      * angle by the lens' distortion alone */
     f->known = true;
-    f->error_x_px = bst_rows_real(rows, 1) - f->boresight_x_px;
-    f->error_y_px = bst_rows_real(rows, 2) - f->boresight_y_px;
+    f->error_x_px = bst_io_rows_real(rows, 1) - f->boresight_x_px;
+    f->error_y_px = bst_io_rows_real(rows, 2) - f->boresight_y_px;
     f->error_px = hypot(f->error_x_px, f->error_y_px);
-    f->occulted = bst_rows_int(rows, 5) == 1;
-    f->dark = bst_rows_real(rows, 6) <= 0.0;
-    f->v_mag = bst_rows_real(rows, 7);
+    f->occulted = bst_io_rows_int(rows, 5) == 1;
+    f->dark = bst_io_rows_real(rows, 6) <= 0.0;
+    f->v_mag = bst_io_rows_real(rows, 7);
     f->visible = !f->occulted && isfinite(f->v_mag);
-    f->range_m = bst_rows_real(rows, 8);
-    f->phase_rad = bst_rows_real(rows, 9) * BST_DEG_RAD;
-    f->target_ra_deg = bst_rows_real(rows, 10);
-    f->target_dec_deg = bst_rows_real(rows, 11);
+    f->range_m = bst_io_rows_real(rows, 8);
+    f->phase_rad = bst_io_rows_real(rows, 9) * BST_DEG_RAD;
+    f->target_ra_deg = bst_io_rows_real(rows, 10);
+    f->target_dec_deg = bst_io_rows_real(rows, 11);
     f->apparent_ra_deg = f->target_ra_deg;
     f->apparent_dec_deg = f->target_dec_deg;
     return BST_OK;
@@ -299,14 +300,14 @@ static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_rows *rows) {
 /* Number of the target in the table truth. */
 static int64_t find_object(const bst_run_reader *run, const char *name) {
     bst_ctx unheard = {0};
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     int64_t id = -1;
-    if (bst_rows_open(&unheard, run, "SELECT id, name FROM objects", 0, 0, &rows) == BST_OK) {
-        while (id < 0 && bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
-            id = strcmp(bst_rows_text(rows, 1), name) == 0 ? bst_rows_int(rows, 0) : -1;
+    if (bst_io_rows_open(&unheard, run, "SELECT id, name FROM objects", 0, 0, &rows) == BST_OK) {
+        while (id < 0 && bst_io_rows_next(&unheard, rows, &more) == BST_OK && more) {
+            id = strcmp(bst_io_rows_text(rows, 1), name) == 0 ? bst_io_rows_int(rows, 0) : -1;
         }
-        bst_rows_close(rows);
+        bst_io_rows_close(rows);
     }
     if (id >= 0) {
         return id;
@@ -326,21 +327,21 @@ static int64_t find_object(const bst_run_reader *run, const char *name) {
 
 /* ------------------------------------------------------------------ image processing, modes */
 
-static bst_status take_detections(bst_ctx *ctx, reading *r, const bst_rows *rows) {
+static bst_status take_detections(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
-    bst_report_frame *f = find(r, bst_rows_int(rows, 0));
+    bst_report_frame *f = find(r, bst_io_rows_int(rows, 0));
     if (f) {
-        f->detections = bst_rows_real(rows, 1);
-        f->stars = bst_rows_real(rows, 2);
+        f->detections = bst_io_rows_real(rows, 1);
+        f->stars = bst_io_rows_real(rows, 2);
     }
     return BST_OK;
 }
 
-static bst_status take_mode(bst_ctx *ctx, reading *r, const bst_rows *rows) {
+static bst_status take_mode(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     bst_report_sensor *s = r->out;
     int mode = -1;
     for (int i = 0; i < BST_MODE_COUNT; i++) {
-        mode = strcmp(bst_rows_text(rows, 1), bst_mode_name(i)) == 0 ? i : mode;
+        mode = strcmp(bst_io_rows_text(rows, 1), bst_mode_name(i)) == 0 ? i : mode;
     }
     if (s->mode_count > 0 && s->modes[s->mode_count - 1].mode == mode) {
         return BST_OK;
@@ -353,7 +354,7 @@ static bst_status take_mode(bst_ctx *ctx, reading *r, const bst_rows *rows) {
         }
         s->modes = more;
     }
-    s->modes[s->mode_count++] = (bst_report_mode){bst_rows_real(rows, 0), mode};
+    s->modes[s->mode_count++] = (bst_report_mode){bst_io_rows_real(rows, 0), mode};
     return BST_OK;
 }
 
@@ -380,11 +381,11 @@ static void spread_tasks(const reading *r) {
 
 /* ------------------------------------------------------------------ all of it */
 
-static bst_status take_size(bst_ctx *ctx, reading *r, const bst_rows *rows) {
+static bst_status take_size(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
-    r->out->width_px = bst_rows_int(rows, 0);
-    r->out->height_px = bst_rows_int(rows, 1);
-    r->out->pixel_scale_arcsec = bst_rows_real(rows, 2);
+    r->out->width_px = bst_io_rows_int(rows, 0);
+    r->out->height_px = bst_io_rows_int(rows, 1);
+    r->out->pixel_scale_arcsec = bst_io_rows_real(rows, 2);
     return BST_OK;
 }
 
@@ -423,7 +424,7 @@ static bst_status read_all(bst_ctx *ctx, reading *r) {
 }
 
 bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *scene,
-                           const bst_export_sensor *sensor, const cJSON *summary,
+                           const bst_run_sensor *sensor, const cJSON *summary,
                            bst_report_sensor *out) {
     *out = (bst_report_sensor){.sensor = *sensor, .every = 1, .pixel_scale_arcsec = NAN};
     snprintf(out->name, sizeof out->name, "%s/%s", sensor->observer, sensor->name);

@@ -35,14 +35,14 @@ typedef struct part {
 } part;
 
 static bst_status put_pixels(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
-                             bst_stretch stretch, const part *p, int width, int height) {
+                             bst_io_stretch stretch, const part *p, int width, int height) {
     bst_picture *picture;
     uint8_t *png = NULL;
     size_t bytes;
-    BST_TRY(bst_picture_create(ctx, width, height, (bst_colour){0, 0, 0}, &picture));
-    bst_status status =
-        bst_picture_frame(ctx, picture, (bst_box){0, 0, width, height}, frame->pixels, frame->width,
-                          frame->height, p->column, p->row, p->columns, p->rows, stretch);
+    BST_TRY(bst_picture_create(ctx, width, height, (bst_io_colour){0, 0, 0}, &picture));
+    bst_status status = bst_picture_frame(ctx, picture, (bst_io_box){0, 0, width, height},
+                                          frame->pixels, frame->width, frame->height, p->column,
+                                          p->row, p->columns, p->rows, stretch);
     if (status == BST_OK) {
         status = bst_picture_grey_png(ctx, picture, GREYS, &png, &bytes);
     }
@@ -60,7 +60,7 @@ static bst_status put_pixels(bst_ctx *ctx, FILE *out, const bst_fits_read_frame 
 }
 
 /* A mark at (x, y), units, `size` times as large as usual. */
-static void put_mark(FILE *out, bst_overlay_kind kind, double x, double y, double radius,
+static void put_mark(FILE *out, bst_io_overlay_kind kind, double x, double y, double radius,
                      double size) {
     double r = radius, arm = 11.0 * size, gap = 4.0 * size;
     switch (kind) {
@@ -90,19 +90,19 @@ static void put_mark(FILE *out, bst_overlay_kind kind, double x, double y, doubl
             kind == BST_OVERLAY_STAR || kind == BST_OVERLAY_REST ? ".7" : "1.2");
 }
 
-static bool is_detection(const bst_overlay_mark *m) {
+static bool is_detection(const bst_io_overlay_mark *m) {
     return m->kind == BST_OVERLAY_STAR || m->kind == BST_OVERLAY_REST ||
            m->kind == BST_OVERLAY_DETECTION;
 }
 
 /* Where a mark lies in a part; false: not there, or at a place that is not a number. */
-static bool find_mark(const bst_overlay_mark *m, const part *p, double *x, double *y) {
+static bool find_mark(const bst_io_overlay_mark *m, const part *p, double *x, double *y) {
     *x = (m->x_px - p->column + 0.5) * p->scale;
     *y = (m->y_px - p->row + 0.5) * p->scale;
     return *x > -20.0 && *y > -20.0 && *x < p->width + 20.0 && *y < p->height + 20.0;
 }
 
-static void put_label(FILE *out, const bst_overlay_mark *m, const part *p, double x, double y) {
+static void put_label(FILE *out, const bst_io_overlay_mark *m, const part *p, double x, double y) {
     /* beside the mark, or where that would leave the frame on its other side */
     bool left = x > p->width - 110.0;
     bool track = m->kind == BST_OVERLAY_TRACK;
@@ -116,7 +116,7 @@ static void put_label(FILE *out, const bst_overlay_mark *m, const part *p, doubl
 /* Draws the most important MOST_MARKS of a part's marks of detections and as many of the others,
  * the first of them on top. *detections and *drawn count those of detections, in the part and
  * drawn. */
-static void put_marks(FILE *out, const bst_overlay *overlay, const part *p, int *detections,
+static void put_marks(FILE *out, const bst_io_overlay *overlay, const part *p, int *detections,
                       int *drawn) {
     double x, y;
     int chosen[2 * MOST_MARKS], count = 0, others = 0;
@@ -131,7 +131,7 @@ static void put_marks(FILE *out, const bst_overlay *overlay, const part *p, int 
     fprintf(out, "<svg x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\">", p->x, p->y, p->width,
             p->height);
     while (count-- > 0) {
-        const bst_overlay_mark *m = &overlay->marks[chosen[count]];
+        const bst_io_overlay_mark *m = &overlay->marks[chosen[count]];
         find_mark(m, p, &x, &y);
         put_mark(out, m->kind, x, y, m->radius_px * p->scale, p->marks);
         if (p->labels && m->label[0]) {
@@ -142,15 +142,15 @@ static void put_marks(FILE *out, const bst_overlay *overlay, const part *p, int 
 }
 
 /* Where the inset's middle is: the target, else the track, else the boresight, else the middle. */
-static void find_middle(const bst_overlay *overlay, const bst_fits_read_frame *frame, double *x,
+static void find_middle(const bst_io_overlay *overlay, const bst_fits_read_frame *frame, double *x,
                         double *y) {
-    static const bst_overlay_kind order[] = {BST_OVERLAY_TARGET, BST_OVERLAY_TRACK,
-                                             BST_OVERLAY_BORESIGHT};
+    static const bst_io_overlay_kind order[] = {BST_OVERLAY_TARGET, BST_OVERLAY_TRACK,
+                                                BST_OVERLAY_BORESIGHT};
     *x = 0.5 * frame->width;
     *y = 0.5 * frame->height;
     for (size_t k = 0; k < sizeof order / sizeof *order; k++) {
         for (int i = 0; i < overlay->count; i++) {
-            const bst_overlay_mark *m = &overlay->marks[i];
+            const bst_io_overlay_mark *m = &overlay->marks[i];
             if (m->kind == order[k] && m->x_px >= 0.0 && m->y_px >= 0.0 && m->x_px < frame->width &&
                 m->y_px < frame->height) {
                 *x = m->x_px;
@@ -172,7 +172,7 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
         snprintf(lines[0], sizeof lines[0], "on the boresight");
     } else if (isfinite(f->error_px)) {
         snprintf(lines[0], sizeof lines[0], "%s px from the boresight",
-                 bst_page_number(number, f->error_px, 3));
+                 bst_report_page_number(number, f->error_px, 3));
     }
     if (isfinite(f->snr)) {
         snprintf(lines[1], sizeof lines[1], "SNR %.1f%s", f->snr,
@@ -200,9 +200,9 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
 }
 
 static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
-                            const bst_overlay *overlay, const bst_report_frame *facts, bool tracked,
-                            int *detections, int *drawn) {
-    bst_stretch stretch = bst_stretch_of(frame->pixels, frame->width, frame->height);
+                            const bst_io_overlay *overlay, const bst_report_frame *facts,
+                            bool tracked, int *detections, int *drawn) {
+    bst_io_stretch stretch = bst_io_stretch_of(frame->pixels, frame->width, frame->height);
     double scale = (double)SIDE / (frame->width > frame->height ? frame->width : frame->height);
     part whole = {.columns = frame->width,
                   .rows = frame->height,
@@ -297,18 +297,18 @@ static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s
                 kinds[k].colour, kinds[k].name);
     }
     fputs("</ul>\n", out);
-    bst_page_grid(out, BST_PAGE_HALF);
+    bst_report_page_grid(out, BST_PAGE_HALF);
     bst_status status = BST_OK;
     for (int i = 0; i < count && status == BST_OK; i++) {
         bst_fits_read_frame frame;
-        bst_overlay overlay = {0};
+        bst_io_overlay overlay = {0};
         int64_t id = ids[chosen[i]];
         status = bst_fits_reader_frame(ctx, fits, chosen[i], &frame);
         if (status == BST_OK && id >= 0) {
             status = bst_frame_marks_get(ctx, marks, id, &overlay);
         }
         if (status == BST_OK) {
-            bst_page_figure(out, BST_PAGE_HALF);
+            bst_report_page_figure(out, BST_PAGE_HALF);
             int detections, drawn;
             char caption[280];
             status = put_frame(ctx, out, &frame, &overlay, facts_of(s, id), s->has_tracks,
@@ -319,10 +319,10 @@ static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s
                          "   %d of %d detections drawn: the target's and the brightest", drawn,
                          detections);
             }
-            bst_page_figure_end(out, caption);
+            bst_report_page_figure_end(out, caption);
         }
     }
-    bst_page_grid_end(out);
+    bst_report_page_grid_end(out);
     return status;
 }
 

@@ -46,7 +46,7 @@ static const char style[] =
     "h2,h3{break-after:avoid}tr,.card,li{break-inside:avoid}"
     ".halves{grid-template-columns:1fr 1fr}.thirds{grid-template-columns:1fr 1fr 1fr}}\n";
 
-void bst_page_begin(FILE *out, const char *title) {
+void bst_report_page_begin(FILE *out, const char *title) {
     fputs(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
@@ -61,7 +61,7 @@ void bst_page_begin(FILE *out, const char *title) {
     fputs("</h1>\n", out);
 }
 
-void bst_page_end(FILE *out) {
+void bst_report_page_end(FILE *out) {
     fputs("</body>\n</html>\n", out);
 }
 
@@ -91,38 +91,38 @@ static void put_prose(FILE *out, const char *text) {
     }
 }
 
-void bst_page_section(FILE *out, int level, const char *heading) {
+void bst_report_page_section(FILE *out, int level, const char *heading) {
     fprintf(out, "<section>\n<h%d>", level);
     bst_html_text(out, heading);
     fprintf(out, "</h%d>\n", level);
 }
 
-void bst_page_section_end(FILE *out) {
+void bst_report_page_section_end(FILE *out) {
     fputs("</section>\n", out);
 }
 
-void bst_page_grid(FILE *out, bst_page_width width) {
+void bst_report_page_grid(FILE *out, bst_page_width width) {
     static const char *const classes[] = {
         [BST_PAGE_WIDE] = "", [BST_PAGE_HALF] = "halves", [BST_PAGE_THIRD] = "thirds"};
     fprintf(out, "<div class=\"%s\">\n", classes[width]);
 }
 
-void bst_page_grid_end(FILE *out) {
+void bst_report_page_grid_end(FILE *out) {
     fputs("</div>\n", out);
 }
 
-void bst_page_figure(FILE *out, bst_page_width width) {
+void bst_report_page_figure(FILE *out, bst_page_width width) {
     fputs(width == BST_PAGE_WIDE ? "<figure class=\"wide\">\n" : "<figure>\n", out);
 }
 
-void bst_page_figure_end(FILE *out, const char *caption) {
+void bst_report_page_figure_end(FILE *out, const char *caption) {
     fputs("<figcaption>", out);
     put_prose(out, caption);
     fputs("</figcaption>\n</figure>\n", out);
 }
 
-void bst_page_card(FILE *out, const char *value, const char *unit, const char *name,
-                   const char *note) {
+void bst_report_page_card(FILE *out, const char *value, const char *unit, const char *name,
+                          const char *note) {
     fputs("<div class=\"card\"><small>", out);
     bst_html_text(out, name);
     fputs("</small><b>", out);
@@ -141,7 +141,7 @@ void bst_page_card(FILE *out, const char *value, const char *unit, const char *n
     fputs("</div>\n", out);
 }
 
-void bst_page_row(FILE *out, const char *name, const char *format, ...) {
+void bst_report_page_row(FILE *out, const char *name, const char *format, ...) {
     char text[1024];
     va_list arguments;
     va_start(arguments, format);
@@ -154,7 +154,7 @@ void bst_page_row(FILE *out, const char *name, const char *format, ...) {
     fputs("</td></tr>\n", out);
 }
 
-const char *bst_page_number(char text[32], double value, int digits) {
+const char *bst_report_page_number(char text[32], double value, int digits) {
     if (!isfinite(value)) {
         return strcpy(text, "-");
     }
@@ -169,7 +169,8 @@ const char *bst_page_number(char text[32], double value, int digits) {
     return text;
 }
 
-void bst_warnings_add(bst_warnings *w, bst_severity severity, const char *format, ...) {
+void bst_report_warnings_add(bst_report_warnings *w, bst_run_severity severity, const char *format,
+                             ...) {
     if (w->count == BST_REPORT_WARNINGS) {
         w->more++;
         return;
@@ -181,10 +182,10 @@ void bst_warnings_add(bst_warnings *w, bst_severity severity, const char *format
     w->items[w->count++].severity = severity;
 }
 
-void bst_warnings_write(FILE *out, const bst_warnings *w) {
+void bst_report_warnings_write(FILE *out, const bst_report_warnings *w) {
     static const char *const classes[] = {"bad", "fair", "note"}, *const words[] = {
                                                                       "Problem", "Warning", "Note"};
-    bst_page_section(out, 2, "Warnings");
+    bst_report_page_section(out, 2, "Warnings");
     if (w->count == 0) {
         fputs("<p class=\"good\">Nothing to warn of.</p>\n", out);
     } else {
@@ -203,5 +204,5 @@ void bst_warnings_write(FILE *out, const bst_warnings *w) {
     if (w->more > 0) {
         fprintf(out, "<p>%d more are not listed.</p>\n", w->more);
     }
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
 }

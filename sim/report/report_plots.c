@@ -231,11 +231,12 @@ static void describe(char text[200], double rms, double median, double p95, doub
                      double largest, const char *unit) {
     char words[5][32], tail[48] = "";
     if (isfinite(p99)) {
-        snprintf(tail, sizeof tail, " 99 %% below %s,", bst_page_number(words[3], p99, 3));
+        snprintf(tail, sizeof tail, " 99 %% below %s,", bst_report_page_number(words[3], p99, 3));
     }
     snprintf(text, 200, "RMS %s, median %s, 95 %% below %s,%s largest %s %s",
-             bst_page_number(words[0], rms, 3), bst_page_number(words[1], median, 3),
-             bst_page_number(words[2], p95, 3), tail, bst_page_number(words[4], largest, 3), unit);
+             bst_report_page_number(words[0], rms, 3), bst_report_page_number(words[1], median, 3),
+             bst_report_page_number(words[2], p95, 3), tail,
+             bst_report_page_number(words[4], largest, 3), unit);
 }
 
 /* ------------------------------------------------------------------ charts */
@@ -258,7 +259,7 @@ static void plot_pointing(const bst_report_drawing *d) {
         fputs("<p class=\"note\">The boresight is on the true target.</p>\n", d->out);
         return;
     }
-    bst_page_figure(d->out, BST_PAGE_WIDE);
+    bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c =
         bst_report_time_chart(d, "Distance from the boresight to the true target over time",
                               "pointing error, px", fmax(low, fmin(1e-2, 1e-3 * high)), high, true);
@@ -278,8 +279,8 @@ static void plot_pointing(const bst_report_drawing *d) {
     snprintf(
         caption, sizeof caption,
         POINTING_ERROR " In the %s in mode track with the visible target, from settling on: %s.",
-        bst_count_text((char[BST_COUNT_TEXT]){0}, f->pointing_frames, "frame", "frames"), text);
-    bst_page_figure_end(d->out, f->pointing_frames > 0 ? caption : POINTING_ERROR);
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, f->pointing_frames, "frame", "frames"), text);
+    bst_report_page_figure_end(d->out, f->pointing_frames > 0 ? caption : POINTING_ERROR);
 }
 
 static void plot_axes(const bst_report_drawing *d) {
@@ -303,7 +304,7 @@ static void plot_axes(const bst_report_drawing *d) {
     free(sizes);
     /* the settling at the start is not to flatten the rest */
     double limit = fmin(m.worst, 4.0 * m.p95);
-    bst_page_figure(d->out, BST_PAGE_WIDE);
+    bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c = bst_report_time_chart(d, "Pointing error along the sensor's columns and rows",
                                         "pointing error, px", -limit, limit, false);
     bst_chart_rule(&c, 0.0, BST_CHART_GREY);
@@ -314,7 +315,7 @@ static void plot_axes(const bst_report_drawing *d) {
     bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_BLUE, "x (columns)");
     bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_ORANGE, "y (rows)");
     fputs("</ul>\n", d->out);
-    bst_page_figure_end(
+    bst_report_page_figure_end(
         d->out,
         "Pointing error per axis, in mode track with the visible target, from settling on; errors "
         "beyond the axis are cut off.");
@@ -333,7 +334,7 @@ static void plot_track(const bst_report_drawing *d) {
     bst_report_fill(d, track_sigma, d->z);
     bst_chart_widen(d->y, n, true, &low, &high);
     bst_chart_widen(d->z, n, true, &low, &high);
-    bst_page_figure(d->out, BST_PAGE_WIDE);
+    bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c = bst_report_time_chart(d, "Error of the track of interest and its own sigma",
                                         "track error, arcsec", fmax(low, 1e-4 * high), high, true);
     bst_chart_line(&c, d->x, d->y, n, BST_CHART_BLUE, false);
@@ -354,7 +355,7 @@ static void plot_track(const bst_report_drawing *d) {
                              "and in track: %s of %.4g arcsec.",
                  s->track_frames, text, s->pixel_scale_arcsec);
     }
-    bst_page_figure_end(d->out, caption);
+    bst_report_page_figure_end(d->out, caption);
 }
 
 static void plot_nees(const bst_report_drawing *d) {
@@ -367,7 +368,7 @@ static void plot_nees(const bst_report_drawing *d) {
         return;
     }
     bst_chart_widen(d->y, n, true, &low, &high);
-    bst_page_figure(d->out, BST_PAGE_WIDE);
+    bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c = bst_report_time_chart(d, "Normalised error squared of the track of interest",
                                         "NEES", fmax(low, 1e-3), high, true);
     bst_chart_rule(&c, lower, BST_CHART_RED);
@@ -385,9 +386,10 @@ static void plot_nees(const bst_report_drawing *d) {
              "covariance agree). In the %zu frames that gave it a detection: mean %s, median %s "
              "(1.39), %.0f %% between the dotted lines, where 95 %% belong. Errors of neighbouring "
              "frames are correlated.",
-             count, bst_page_number(words[0], m.mean, 3), bst_page_number(words[1], m.median, 3),
+             count, bst_report_page_number(words[0], m.mean, 3),
+             bst_report_page_number(words[1], m.median, 3),
              100.0 * (double)inside / fmax(1.0, (double)count));
-    bst_page_figure_end(d->out, caption);
+    bst_report_page_figure_end(d->out, caption);
 }
 
 static void plot_snr(const bst_report_drawing *d) {
@@ -399,7 +401,7 @@ static void plot_snr(const bst_report_drawing *d) {
     }
     bst_chart_widen(d->y, n, false, &low, &high);
     bst_chart_widen(d->z, n, false, &low, &high);
-    bst_page_figure(d->out, BST_PAGE_WIDE);
+    bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c = bst_report_time_chart(d, "Signal-to-noise ratio of the target over time", "SNR",
                                         fmin(low, 0.0), high, false);
     bst_chart_dots(&c, d->x, d->z, n, BST_CHART_ORANGE);
@@ -414,7 +416,7 @@ static void plot_snr(const bst_report_drawing *d) {
                          "measured: detections of the track of interest");
     }
     fputs("</ul>\n", d->out);
-    bst_page_figure_end(d->out, "Signal-to-noise ratio of the target.");
+    bst_report_page_figure_end(d->out, "Signal-to-noise ratio of the target.");
 }
 
 static void plot_detections(const bst_report_drawing *d) {
@@ -424,7 +426,7 @@ static void plot_detections(const bst_report_drawing *d) {
         return;
     }
     bst_chart_widen(d->y, n, false, &low, &high);
-    bst_page_figure(d->out, BST_PAGE_WIDE);
+    bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c =
         bst_report_time_chart(d, "Detections per frame", "detections per frame", 0.0, high, false);
     bst_chart_line(&c, d->x, d->y, n, BST_CHART_BLUE, false);
@@ -445,9 +447,10 @@ static void plot_detections(const bst_report_drawing *d) {
     snprintf(caption, sizeof caption,
              "Detections per frame: %s on average, of which %s are identified as stars and %s are "
              "not.",
-             bst_page_number(numbers[0], words[0], 3), bst_page_number(numbers[1], words[1], 3),
-             bst_page_number(numbers[2], words[2], 3));
-    bst_page_figure_end(d->out, caption);
+             bst_report_page_number(numbers[0], words[0], 3),
+             bst_report_page_number(numbers[1], words[1], 3),
+             bst_report_page_number(numbers[2], words[2], 3));
+    bst_report_page_figure_end(d->out, caption);
 }
 
 static double normal(double x, const void *user) {
@@ -473,29 +476,29 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
     double inner = 0.5 * (percentile(d->y, n, 0.8413) - percentile(d->y, n, 0.1587));
     double law[2] = {m.median, fmax(inner, 1e-9)}, half = 5.0 * law[1];
     char caption[160], words[2][32];
-    bst_page_figure(d->out, BST_PAGE_THIRD);
+    bst_report_page_figure(d->out, BST_PAGE_THIRD);
     bst_report_histogram(d->out, label, label, "frames", d->y, n, m.median - half, m.median + half,
                          40, colour, normal, law);
-    snprintf(caption, sizeof caption,
-             "Mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
-             bst_page_number(words[0], m.mean, 2), bst_page_number(words[1], m.rms, 3));
-    bst_page_figure_end(d->out, caption);
+    snprintf(
+        caption, sizeof caption, "Mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
+        bst_report_page_number(words[0], m.mean, 2), bst_report_page_number(words[1], m.rms, 3));
+    bst_report_page_figure_end(d->out, caption);
 }
 
 static void plot_histograms(const bst_report_drawing *d) {
-    bst_page_grid(d->out, BST_PAGE_THIRD);
+    bst_report_page_grid(d->out, BST_PAGE_THIRD);
     histogram_of_axis(d, pointing_x, "pointing error in x, px", BST_CHART_BLUE);
     histogram_of_axis(d, pointing_y, "pointing error in y, px", BST_CHART_ORANGE);
     bst_report_fill(d, nees_updated, d->y);
     size_t n = gather(d->y, d->sensor->count);
     if (n >= 20) {
-        bst_page_figure(d->out, BST_PAGE_THIRD);
+        bst_report_page_figure(d->out, BST_PAGE_THIRD);
         bst_report_histogram(d->out, "NEES of the track", "NEES of the track", "frames", d->y, n,
                              0.0, 12.0, 40, BST_CHART_GREEN, chi_square_2, NULL);
-        bst_page_figure_end(
+        bst_report_page_figure_end(
             d->out, "Frames with a detection; the curve is chi-square with 2 degrees of freedom.");
     }
-    bst_page_grid_end(d->out);
+    bst_report_page_grid_end(d->out);
 }
 
 bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *s, double span_s) {

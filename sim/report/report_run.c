@@ -17,11 +17,11 @@ typedef struct page {
     bst_run_reader *run;
     bst_run_scene scene;
     bool has_scene;
-    bst_export_sensor list[BST_EXPORT_SENSORS];
+    bst_run_sensor list[BST_EXPORT_SENSORS];
     bst_report_sensor sensors[BST_EXPORT_SENSORS];
     int count;
     double span_s; /* simulated, as far as the run goes */
-    bst_warnings warnings;
+    bst_report_warnings warnings;
 } page;
 
 static const cJSON *get(const cJSON *node, const char *key) {
@@ -69,7 +69,7 @@ static bst_status read_sensors(bst_ctx *ctx, page *p) {
     int count = 0;
     bst_ctx unheard = {0};
     if (!bst_run_reader_has_tables(p->run) ||
-        bst_export_sensors(&unheard, p->run, NULL, p->list, &count) != BST_OK) {
+        bst_run_sensors(&unheard, p->run, NULL, p->list, &count) != BST_OK) {
         count = 0;
     }
     for (int i = 0; i < count; i++) {
@@ -119,13 +119,13 @@ static void put_times(const page *p) {
             bst_time_to_utc(bst_time_add(epoch, p->span_s), 3, to, sizeof to);
         }
     }
-    bst_page_row(p->out, "from (UTC)", "%s", from);
-    bst_page_row(p->out, "to (UTC)", "%s", to);
+    bst_report_page_row(p->out, "from (UTC)", "%s", from);
+    bst_report_page_row(p->out, "to (UTC)", "%s", to);
     double whole = number_of(scenario, "duration_s");
     if (bst_run_reader_state(p->run) == BST_RUN_COMPLETE) {
-        bst_page_row(p->out, "duration", "%.9g s", p->span_s);
+        bst_report_page_row(p->out, "duration", "%.9g s", p->span_s);
     } else {
-        bst_page_row(p->out, "duration", "%.9g s of %.9g s", p->span_s, whole);
+        bst_report_page_row(p->out, "duration", "%.9g s of %.9g s", p->span_s, whole);
     }
 }
 
@@ -143,50 +143,51 @@ static void put_objects(const page *p) {
     }
     const cJSON *catalogues = get(world, "catalogues"), *catalogue;
     if (count > 0 || cJSON_GetArraySize(catalogues) == 0) {
-        bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
-                     count > 8 ? " ..." : "");
+        bst_report_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
+                            count > 8 ? " ..." : "");
     }
     cJSON_ArrayForEach(catalogue, catalogues) {
         const char *file = text_of(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
-        bst_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
-                     slash ? slash + 1 : file);
+        bst_report_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
+                            slash ? slash + 1 : file);
     }
 }
 
 static void put_identity(const page *p) {
     const cJSON *manifest = bst_run_reader_manifest(p->run),
                 *scenario = bst_run_reader_scenario(p->run);
-    bst_page_section(p->out, 2, "What was run");
+    bst_report_page_section(p->out, 2, "What was run");
     fputs("<div class=\"scroll\"><table class=\"two\">\n", p->out);
-    bst_page_row(p->out, "scenario", "%s",
-                 text_of(scenario, "name", text_of(manifest, "scenario", "-")));
-    bst_page_row(p->out, "scenario file", "%s", text_of(manifest, "scenario_file", "-"));
+    bst_report_page_row(p->out, "scenario", "%s",
+                        text_of(scenario, "name", text_of(manifest, "scenario", "-")));
+    bst_report_page_row(p->out, "scenario file", "%s", text_of(manifest, "scenario_file", "-"));
     put_times(p);
-    bst_page_row(p->out, "program", "Boresight %s",
-                 text_of(manifest, "version", "(version unknown)"));
-    bst_page_row(p->out, "git revision", "%s", text_of(manifest, "git_revision", "-"));
+    bst_report_page_row(p->out, "program", "Boresight %s",
+                        text_of(manifest, "version", "(version unknown)"));
+    bst_report_page_row(p->out, "git revision", "%s", text_of(manifest, "git_revision", "-"));
     const cJSON *identity = manifest ? manifest : scenario;
-    bst_page_row(p->out, "seed", "%s, run %.0f", text_of(identity, "seed", "-"),
-                 isfinite(number_of(identity, "run")) ? number_of(identity, "run") : 0.0);
+    bst_report_page_row(p->out, "seed", "%s, run %.0f", text_of(identity, "seed", "-"),
+                        isfinite(number_of(identity, "run")) ? number_of(identity, "run") : 0.0);
     const char *device = text_of(manifest, "device", "");
-    bst_page_row(p->out, "device", "%s", device[0] || !manifest ? device : "none: no images");
+    bst_report_page_row(p->out, "device", "%s",
+                        device[0] || !manifest ? device : "none: no images");
     if (isfinite(number_of(manifest, "stars"))) {
-        bst_page_row(p->out, "star catalogue", "%s, %.0f stars",
-                     text_of(manifest, "star_catalogue", ""), number_of(manifest, "stars"));
+        bst_report_page_row(p->out, "star catalogue", "%s, %.0f stars",
+                            text_of(manifest, "star_catalogue", ""), number_of(manifest, "stars"));
     }
     put_objects(p);
     for (int i = 0; i < p->count; i++) {
         const bst_report_sensor *s = &p->sensors[i];
-        bst_page_row(p->out, i == 0 ? "sensors" : "",
-                     "%s: %" PRId64 " × %" PRId64 " px of %.4g arcsec%s%s", s->name, s->width_px,
-                     s->height_px, s->pixel_scale_arcsec, s->sensor.target[0] ? ", target " : "",
-                     s->sensor.target);
+        bst_report_page_row(p->out, i == 0 ? "sensors" : "",
+                            "%s: %" PRId64 " × %" PRId64 " px of %.4g arcsec%s%s", s->name,
+                            s->width_px, s->height_px, s->pixel_scale_arcsec,
+                            s->sensor.target[0] ? ", target " : "", s->sensor.target);
     }
     if (isfinite(number_of(manifest, "wall_time_s"))) {
-        bst_page_row(p->out, "wall time", "%.3g s", number_of(manifest, "wall_time_s"));
+        bst_report_page_row(p->out, "wall time", "%.3g s", number_of(manifest, "wall_time_s"));
     }
     fputs("</table></div>\n", p->out);
-    bst_page_section_end(p->out);
+    bst_report_page_section_end(p->out);
 }
 
 /* ------------------------------------------------------------------ headline figures */
@@ -202,73 +203,74 @@ static void put_cards(const page *p, int i) {
     fputs("<div class=\"cards\">\n", p->out);
     if (s->sensor.target[0] && s->has_tracks) {
         snprintf(note, sizeof note, "of the visible frames in track; %s %% from acquisition on",
-                 bst_page_number(words[0], 100.0 * f->track_fraction, 4));
-        bst_page_card(p->out, bst_page_number(text, 100.0 * f->custody, 4), "%", "custody", note);
+                 bst_report_page_number(words[0], 100.0 * f->track_fraction, 4));
+        bst_report_page_card(p->out, bst_report_page_number(text, 100.0 * f->custody, 4), "%",
+                             "custody", note);
         snprintf(note, sizeof note, "confirmed after %s s, settled after %s s",
-                 bst_page_number(words[0], f->time_to_confirm_s, 4),
-                 bst_page_number(words[1], f->time_to_settle_s, 4));
-        bst_page_card(p->out, bst_page_number(text, f->time_to_acquire_s, 4), "s",
-                      "time to acquire", note);
+                 bst_report_page_number(words[0], f->time_to_confirm_s, 4),
+                 bst_report_page_number(words[1], f->time_to_settle_s, 4));
+        bst_report_page_card(p->out, bst_report_page_number(text, f->time_to_acquire_s, 4), "s",
+                             "time to acquire", note);
         snprintf(note, sizeof note, "99 %% below %s px, bias %s px",
-                 bst_page_number(words[0], f->pointing_p99_px, 3),
-                 bst_page_number(words[1], f->pointing_bias_px, 2));
-        bst_page_card(p->out, bst_page_number(text, f->pointing_rms_px, 3), "px", "pointing RMS",
-                      note);
-        bst_page_card(p->out, f->final_mode >= 0 ? bst_mode_name(f->final_mode) : "-", "",
-                      "mode at the end", "");
+                 bst_report_page_number(words[0], f->pointing_p99_px, 3),
+                 bst_report_page_number(words[1], f->pointing_bias_px, 2));
+        bst_report_page_card(p->out, bst_report_page_number(text, f->pointing_rms_px, 3), "px",
+                             "pointing RMS", note);
+        bst_report_page_card(p->out, f->final_mode >= 0 ? bst_mode_name(f->final_mode) : "-", "",
+                             "mode at the end", "");
     }
     snprintf(text, sizeof text, "%" PRId64, f->frames);
-    bst_page_card(p->out, text, "", "exposures", "");
+    bst_report_page_card(p->out, text, "", "exposures", "");
     int64_t frames = count_of(p, "SELECT count(*) FROM detection_frames WHERE sensor = ?1", i);
     if (frames > 0) {
         int64_t all =
             count_of(p, "SELECT sum(detections) FROM detection_frames WHERE sensor = ?1", i);
         snprintf(text, sizeof text, "%" PRId64, all);
         snprintf(note, sizeof note, "%s a frame",
-                 bst_page_number(words[0], (double)all / (double)frames, 3));
-        bst_page_card(p->out, text, "", "detections", note);
+                 bst_report_page_number(words[0], (double)all / (double)frames, 3));
+        bst_report_page_card(p->out, text, "", "detections", note);
     }
     if (isfinite(s->real_time_factor)) {
-        bst_page_card(p->out, bst_page_number(text, s->real_time_factor, 3), "×", "speed",
-                      "simulated time over wall time");
+        bst_report_page_card(p->out, bst_report_page_number(text, s->real_time_factor, 3), "×",
+                             "speed", "simulated time over wall time");
     }
     fputs("</div>\n", p->out);
 }
 
 /* ------------------------------------------------------------------ events */
 
-static void put_event(FILE *out, const bst_rows *rows) {
-    fprintf(out, "<tr><td class=\"n\">%.3f</td><td>", bst_rows_real(rows, 0));
+static void put_event(FILE *out, const bst_io_rows *rows) {
+    fprintf(out, "<tr><td class=\"n\">%.3f</td><td>", bst_io_rows_real(rows, 0));
     for (int k = 1; k < 5; k++) {
         char utc[32];
-        snprintf(utc, sizeof utc, "%.19s", bst_rows_text(rows, 1));
-        bst_html_text(out, k == 1 ? utc : bst_rows_text(rows, k));
+        snprintf(utc, sizeof utc, "%.19s", bst_io_rows_text(rows, 1));
+        bst_html_text(out, k == 1 ? utc : bst_io_rows_text(rows, k));
         fputs(k < 4 ? "</td><td>" : "</td></tr>\n", out);
     }
 }
 
 static bst_status put_events(bst_ctx *ctx, const page *p) {
     bst_ctx unheard = {0};
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     int64_t total = bst_run_reader_int(p->run, "SELECT count(*) FROM events", 0, 0), shown = 0;
-    bst_page_section(p->out, 2, "Events");
-    if (total == 0 || bst_rows_open(&unheard, p->run,
-                                    "SELECT time_s, utc(time_s), source, kind, text FROM events"
-                                    " ORDER BY tick, rowid",
-                                    0, 0, &rows) != BST_OK) {
+    bst_report_page_section(p->out, 2, "Events");
+    if (total == 0 || bst_io_rows_open(&unheard, p->run,
+                                       "SELECT time_s, utc(time_s), source, kind, text FROM events"
+                                       " ORDER BY tick, rowid",
+                                       0, 0, &rows) != BST_OK) {
         fputs("<p class=\"note\">No events are recorded.</p>\n", p->out);
-        bst_page_section_end(p->out);
+        bst_report_page_section_end(p->out);
         return BST_OK;
     }
     fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
-            bst_count_text((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
+            bst_text_of_count((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
     fputs(
         "<div class=\"scroll\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
         "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
         p->out);
     bst_status status;
-    while ((status = bst_rows_next(&unheard, rows, &more)) == BST_OK && more) {
+    while ((status = bst_io_rows_next(&unheard, rows, &more)) == BST_OK && more) {
         /* of very many the first and the last ones */
         bool middle =
             total > MOST_EVENTS && shown >= MOST_EVENTS / 2 && shown < total - MOST_EVENTS / 2;
@@ -280,14 +282,14 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         }
         shown++;
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     fputs("</tbody></table></div>\n</details>\n", p->out);
     if (status == BST_ERR_FORMAT) {
         fputs("<p class=\"bad\">The table is damaged beyond here.</p>\n", p->out);
         bst_run_reader_note_problem(p->run, "%s", unheard.message);
         status = BST_OK;
     }
-    bst_page_section_end(p->out);
+    bst_report_page_section_end(p->out);
     return status == BST_OK ? BST_OK : bst_fail(ctx, status, "%s", unheard.message);
 }
 
@@ -297,31 +299,31 @@ static bst_status put_sensor(bst_ctx *ctx, const page *p, int i) {
     const bst_report_sensor *s = &p->sensors[i];
     char heading[200];
     snprintf(heading, sizeof heading, "Sensor %s", s->name);
-    bst_page_section(p->out, 2, heading);
+    bst_report_page_section(p->out, 2, heading);
     put_cards(p, i);
     BST_TRY(bst_report_plots(ctx, p->out, s, p->span_s));
-    bst_page_section(p->out, 3, "Frames");
+    bst_report_page_section(p->out, 3, "Frames");
     BST_TRY(bst_report_frames(ctx, p->out, p->run, s));
-    bst_page_section_end(p->out);
-    bst_page_section_end(p->out);
+    bst_report_page_section_end(p->out);
+    bst_report_page_section_end(p->out);
     return BST_OK;
 }
 
 /* The summary alone, of a run without tables. */
 static void put_summary(const page *p) {
     const cJSON *summary = get(bst_run_reader_manifest(p->run), "summary"), *item;
-    bst_page_section(p->out, 2, "Summary");
+    bst_report_page_section(p->out, 2, "Summary");
     fputs("<table class=\"two\">\n", p->out);
     cJSON_ArrayForEach(item, summary) {
         char text[32];
-        bst_page_row(
+        bst_report_page_row(
             p->out, item->string, "%s",
             cJSON_IsString(item)
                 ? item->valuestring
-                : bst_page_number(text, cJSON_IsNumber(item) ? item->valuedouble : NAN, 6));
+                : bst_report_page_number(text, cJSON_IsNumber(item) ? item->valuedouble : NAN, 6));
     }
     fputs("</table>\n", p->out);
-    bst_page_section_end(p->out);
+    bst_report_page_section_end(p->out);
 }
 
 static bst_status put_page(bst_ctx *ctx, page *p) {
@@ -330,9 +332,9 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
                 *manifest = bst_run_reader_manifest(p->run);
     snprintf(title, sizeof title, "Run of %.150s",
              text_of(scenario, "name", text_of(manifest, "scenario", "an unknown scenario")));
-    bst_page_begin(p->out, title);
+    bst_report_page_begin(p->out, title);
     put_head(p);
-    bst_warnings_write(p->out, &p->warnings);
+    bst_report_warnings_write(p->out, &p->warnings);
     put_identity(p);
     bst_status status = bst_report_sightings(ctx, p->out, p->run, p->span_s);
     if (status != BST_OK && status != BST_ERR_FORMAT) {
@@ -353,7 +355,7 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
             "<p class=\"note\">Made by Boresight %s. boresight info lists the folder's tables and "
             "files, boresight export takes them out.</p>\n",
             bst_version());
-    bst_page_end(p->out);
+    bst_report_page_end(p->out);
     return BST_OK;
 }
 
@@ -369,7 +371,7 @@ bst_status bst_report_run(bst_ctx *ctx, bst_run_reader *run, FILE *out) {
     p->has_scene =
         bst_run_reader_scenario(run) && bst_run_scene_open(&unheard, run, &p->scene) == BST_OK;
     if (!p->has_scene) {
-        bst_warnings_add(
+        bst_report_warnings_add(
             &p->warnings, BST_SEVERITY_NOTE,
             "The run's world cannot be made again (%s): what lies outside the field is "
             "not shown.",

@@ -9,7 +9,7 @@ enum { METRICS = 6, AXES = 24 };
 
 /* What an axis does to a metric: a row of the table sensitivity or speed_sensitivity. */
 typedef struct effect {
-    const bst_study_axis_view *axis;
+    const bst_report_study_axis_view *axis;
     double size, error; /* ranks, and its standard error */
     double sigma;       /* spread of the elementary effects */
     int count;
@@ -17,7 +17,7 @@ typedef struct effect {
     double at[2], value[2];
 } effect;
 
-static const bst_study_axis_view *axis_of(const bst_study_view *v, const char *name) {
+static const bst_report_study_axis_view *axis_of(const bst_report_study_view *v, const char *name) {
     for (int i = 0; i < v->axis_count; i++) {
         if (v->axes[i].swept && strcmp(v->axes[i].name, name) == 0) {
             return &v->axes[i];
@@ -27,11 +27,11 @@ static const bst_study_axis_view *axis_of(const bst_study_view *v, const char *n
 }
 
 /* The effects of a design's axes on a metric, as they are ranked; `table` is theirs. */
-static bst_status read_effects(bst_ctx *ctx, const bst_study_view *v, const char *table,
+static bst_status read_effects(bst_ctx *ctx, const bst_report_study_view *v, const char *table,
                                const char *design, const char *metric, effect list[AXES],
                                int *count) {
     char sql[200];
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
     *count = 0;
@@ -39,21 +39,21 @@ static bst_status read_effects(bst_ctx *ctx, const bst_study_view *v, const char
              "SELECT design, metric, axis, effect, effect_error, spread, effects FROM %s "
              "ORDER BY sweep, rank",
              table);
-    BST_TRY(bst_rows_open(ctx, v->tables, sql, 0, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        const bst_study_axis_view *axis = axis_of(v, bst_rows_text(rows, 2));
-        double size = bst_rows_real(rows, 3);
+    BST_TRY(bst_io_rows_open(ctx, v->tables, sql, 0, 0, &rows));
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        const bst_report_study_axis_view *axis = axis_of(v, bst_io_rows_text(rows, 2));
+        double size = bst_io_rows_real(rows, 3);
         if (axis && *count < AXES && isfinite(size) &&
-            strcmp(bst_rows_text(rows, 0), design) == 0 &&
-            strcmp(bst_rows_text(rows, 1), metric) == 0) {
+            strcmp(bst_io_rows_text(rows, 0), design) == 0 &&
+            strcmp(bst_io_rows_text(rows, 1), metric) == 0) {
             list[(*count)++] = (effect){.axis = axis,
                                         .size = size,
-                                        .error = bst_rows_real(rows, 4),
-                                        .sigma = bst_rows_real(rows, 5),
-                                        .count = (int)bst_rows_int(rows, 6)};
+                                        .error = bst_io_rows_real(rows, 4),
+                                        .sigma = bst_io_rows_real(rows, 5),
+                                        .count = (int)bst_io_rows_int(rows, 6)};
         }
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
@@ -76,16 +76,17 @@ static void put_row_names(const bst_chart *c, const effect *list, int count) {
     }
 }
 
-static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *list, int count) {
+static void put_morris(FILE *out, const bst_report_study_metric_view *m, const effect *list,
+                       int count) {
     char label[128], text[160];
     double most = 0.0, spread = 0.0;
     for (int i = 0; i < count; i++) {
         most = fmax(most, high_of(&list[i]));
         spread = fmax(spread, list[i].sigma);
     }
-    bst_study_label(m, label);
+    bst_report_study_label(m, label);
     snprintf(text, sizeof text, "Ranked effects on %s", m->name);
-    bst_page_figure(out, BST_PAGE_HALF);
+    bst_report_page_figure(out, BST_PAGE_HALF);
     bst_chart c = {.out = out,
                    .name = text,
                    .width = 540.0,
@@ -106,9 +107,9 @@ static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *
              "Mean size of %d elementary effects (mu*), over the axis' whole range; with its 95 %% "
              "interval.",
              list[0].count);
-    bst_page_figure_end(out, text);
+    bst_report_page_figure_end(out, text);
     snprintf(text, sizeof text, "Spread against size of the effects on %s", m->name);
-    bst_page_figure(out, BST_PAGE_HALF);
+    bst_report_page_figure(out, BST_PAGE_HALF);
     bst_chart d = {.out = out,
                    .name = text,
                    .width = 540.0,
@@ -124,9 +125,10 @@ static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *
                        i % 2 ? "end" : "start", text);
     }
     bst_chart_end(&d);
-    bst_page_figure_end(out,
-                        "Numbers are the ranks beside. A large sigma: the effect is not linear, or "
-                        "depends on the other axes.");
+    bst_report_page_figure_end(
+        out,
+        "Numbers are the ranks beside. A large sigma: the effect is not linear, or "
+        "depends on the other axes.");
 }
 
 /* ------------------------------------------------------------------ one at a time */
@@ -137,9 +139,10 @@ static bool same_value(double a, double b) {
 }
 
 /* Whether a setting differs from setting 0, the scenario's own, in this axis alone. */
-static bool differs_in(const bst_study_view *v, const bst_study_axis_view *axis, int64_t setting) {
+static bool differs_in(const bst_report_study_view *v, const bst_report_study_axis_view *axis,
+                       int64_t setting) {
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *x = &v->axes[i];
+        const bst_report_study_axis_view *x = &v->axes[i];
         if (x->swept && same_value(x->of_setting[setting], x->of_setting[0]) == (x == axis)) {
             return false;
         }
@@ -147,7 +150,8 @@ static bool differs_in(const bst_study_view *v, const bst_study_axis_view *axis,
     return true;
 }
 
-static void find_ends(const bst_study_view *v, const bst_study_metric_view *m, effect *e) {
+static void find_ends(const bst_report_study_view *v, const bst_report_study_metric_view *m,
+                      effect *e) {
     e->at[0] = INFINITY;
     e->at[1] = -INFINITY;
     e->value[0] = e->value[1] = NAN;
@@ -167,15 +171,16 @@ static void find_ends(const bst_study_view *v, const bst_study_metric_view *m, e
     }
 }
 
-static void put_tornado(FILE *out, const bst_study_metric_view *m, const effect *list, int count) {
+static void put_tornado(FILE *out, const bst_report_study_metric_view *m, const effect *list,
+                        int count) {
     char label[128], text[200];
     double low = m->mean[0], high = low;
     for (int i = 0; i < count; i++) {
         bst_chart_widen(list[i].value, 2, false, &low, &high);
     }
-    bst_study_label(m, label);
+    bst_report_study_label(m, label);
     snprintf(text, sizeof text, "Change of %s with one axis at a time", m->name);
-    bst_page_figure(out, BST_PAGE_HALF);
+    bst_report_page_figure(out, BST_PAGE_HALF);
     bst_chart c = {.out = out,
                    .name = text,
                    .width = 540.0,
@@ -194,7 +199,7 @@ static void put_tornado(FILE *out, const bst_study_metric_view *m, const effect 
                 double y = count - i - (end ? 0.5 : 0.1);
                 bst_chart_bar(&c, m->mean[0], value, y, y - 0.36,
                               end ? BST_CHART_ORANGE : BST_CHART_BLUE, NULL);
-                bst_study_word(list[i].axis, list[i].at[end], word);
+                bst_report_study_word(list[i].axis, list[i].at[end], word);
                 bool left = value < m->mean[0];
                 bst_chart_word(&c, value, y - 0.18, left ? -4.0 : 4.0, 4.0, left ? "end" : "start",
                                word);
@@ -209,13 +214,14 @@ static void put_tornado(FILE *out, const bst_study_metric_view *m, const effect 
              "%s From the scenario's own values (dotted) to the least and the greatest value of "
              "each axis.",
              strncmp(m->doc, "The same", 8) == 0 ? "" : m->doc);
-    bst_page_figure_end(out, caption);
+    bst_report_page_figure_end(out, caption);
 }
 
 /* ------------------------------------------------------------------ both */
 
-static bst_status put_metric(bst_ctx *ctx, FILE *out, const bst_study_view *v,
-                             const bst_study_metric_view *m, const char *table, bool morris) {
+static bst_status put_metric(bst_ctx *ctx, FILE *out, const bst_report_study_view *v,
+                             const bst_report_study_metric_view *m, const char *table,
+                             bool morris) {
     effect list[AXES];
     int count;
     BST_TRY(
@@ -231,7 +237,7 @@ static bst_status put_metric(bst_ctx *ctx, FILE *out, const bst_study_view *v,
     return BST_OK;
 }
 
-static bool has_design(const bst_study_view *v, const char *design) {
+static bool has_design(const bst_report_study_view *v, const char *design) {
     for (int i = 0; i < v->axis_count; i++) {
         if (v->axes[i].swept && strcmp(v->axes[i].design, design) == 0) {
             return true;
@@ -240,25 +246,26 @@ static bool has_design(const bst_study_view *v, const char *design) {
     return false;
 }
 
-bst_status bst_study_plot_sensitivity(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
-    int metrics[METRICS], count = bst_study_key_metrics(v, metrics, METRICS);
+bst_status bst_report_study_plot_sensitivity(bst_ctx *ctx, FILE *out,
+                                             const bst_report_study_view *v) {
+    int metrics[METRICS], count = bst_report_study_key_metrics(v, metrics, METRICS);
     bool there[2] = {has_design(v, "one_at_a_time"), has_design(v, "morris")};
     if ((!there[0] && !there[1]) || v->settings < 2) {
         return BST_OK;
     }
-    bst_page_section(out, 2, "What matters");
+    bst_report_page_section(out, 2, "What matters");
     for (int morris = 0; morris < 2; morris++) {
         if (!there[morris]) {
             continue;
         }
-        bst_page_grid(out, BST_PAGE_HALF);
+        bst_report_page_grid(out, BST_PAGE_HALF);
         for (int k = 0; k < count; k++) {
             BST_TRY(put_metric(ctx, out, v, &v->metrics[metrics[k]], "sensitivity", morris == 1));
         }
         BST_TRY(put_metric(ctx, out, v, &v->wall, "speed_sensitivity", morris == 1));
         BST_TRY(put_metric(ctx, out, v, &v->cpu, "speed_sensitivity", morris == 1));
-        bst_page_grid_end(out);
+        bst_report_page_grid_end(out);
     }
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
     return BST_OK;
 }

@@ -28,18 +28,20 @@ static int colour_of(int64_t sensor) {
 }
 
 static bst_status read_names(bst_ctx *ctx, const bst_run_reader *run, sensor_names *out) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
     out->count = 0;
-    BST_TRY(
-        bst_rows_open(ctx, run, "SELECT observer, name FROM sensors ORDER BY sensor", 0, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more && out->count < SENSORS) {
+    BST_TRY(bst_io_rows_open(ctx, run, "SELECT observer, name FROM sensors ORDER BY sensor", 0, 0,
+                             &rows));
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more &&
+           out->count < SENSORS) {
         char *name = out->names[out->count++];
-        size_t n = (size_t)snprintf(name, sizeof out->names[0], "%.49s/", bst_rows_text(rows, 0));
-        snprintf(name + n, sizeof out->names[0] - n, "%.49s", bst_rows_text(rows, 1));
+        size_t n =
+            (size_t)snprintf(name, sizeof out->names[0], "%.49s/", bst_io_rows_text(rows, 0));
+        snprintf(name + n, sizeof out->names[0] - n, "%.49s", bst_io_rows_text(rows, 1));
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
@@ -66,27 +68,28 @@ static void put_cards(FILE *out, const bst_run_reader *run) {
     snprintf(text, sizeof text, "%.0f", number_of(f, "objects_seen"));
     snprintf(note, sizeof note, "of %.0f, %.0f of them in a field", number_of(f, "objects"),
              number_of(f, "objects_in_field"));
-    bst_page_card(out, text, "", "objects seen", note);
+    bst_report_page_card(out, text, "", "objects seen", note);
     snprintf(text, sizeof text, "%.0f", number_of(f, "passes_seen"));
     snprintf(note, sizeof note, "of %.0f through a field", number_of(f, "passes"));
-    bst_page_card(out, text, "", "passes seen", note);
+    bst_report_page_card(out, text, "", "passes seen", note);
     snprintf(note, sizeof note, "at most %s s",
-             bst_page_number(more, number_of(f, "revisit_most_s"), 4));
-    bst_page_card(out, bst_page_number(text, number_of(f, "revisit_mean_s"), 4), "s",
-                  "revisit, mean", note);
+             bst_report_page_number(more, number_of(f, "revisit_most_s"), 4));
+    bst_report_page_card(out, bst_report_page_number(text, number_of(f, "revisit_mean_s"), 4), "s",
+                         "revisit, mean", note);
     snprintf(note, sizeof note, "%s %% of those seen",
-             bst_page_number(more, 100.0 * number_of(f, "custody_fraction_seen"), 3));
-    bst_page_card(out, bst_page_number(text, 100.0 * number_of(f, "custody_fraction_all"), 3), "%",
-                  "object custody, mean of all", note);
+             bst_report_page_number(more, 100.0 * number_of(f, "custody_fraction_seen"), 3));
+    bst_report_page_card(
+        out, bst_report_page_number(text, 100.0 * number_of(f, "custody_fraction_all"), 3), "%",
+        "object custody, mean of all", note);
     snprintf(note, sizeof note, "tracks %s arcsec",
-             bst_page_number(more, number_of(f, "track_rms_arcsec"), 3));
-    bst_page_card(out, bst_page_number(text, number_of(f, "place_rms_arcsec"), 3), "arcsec",
-                  "detections from truth, RMS", note);
+             bst_report_page_number(more, number_of(f, "track_rms_arcsec"), 3));
+    bst_report_page_card(out, bst_report_page_number(text, number_of(f, "place_rms_arcsec"), 3),
+                         "arcsec", "detections from truth, RMS", note);
     if (number_of(f, "tasks") > 0.0) {
         snprintf(text, sizeof text, "%.0f", number_of(f, "tasks_done"));
         snprintf(note, sizeof note, "of %.0f; %.0f not found, %.0f lost", number_of(f, "tasks"),
                  number_of(f, "tasks_not_found"), number_of(f, "tasks_lost"));
-        bst_page_card(out, text, "", "tasks done", note);
+        bst_report_page_card(out, text, "", "tasks done", note);
     }
     fputs("</div>\n", out);
 }
@@ -96,45 +99,45 @@ static void put_cards(FILE *out, const bst_run_reader *run) {
 /* Numbers of the objects with most detections. */
 static bst_status choose(bst_ctx *ctx, const bst_run_reader *run, int64_t objects[ROWS],
                          char names[ROWS][48], int *count) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
     *count = 0;
-    BST_TRY(bst_rows_open(ctx, run,
-                          "SELECT object, name, sum(detected) FROM passes GROUP BY object"
-                          " HAVING sum(detected) > 0 ORDER BY 3 DESC, 1 LIMIT ?1",
-                          ROWS, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more && *count < ROWS) {
-        objects[*count] = bst_rows_int(rows, 0);
-        snprintf(names[(*count)++], 48, "%.22s", bst_rows_text(rows, 1));
+    BST_TRY(bst_io_rows_open(ctx, run,
+                             "SELECT object, name, sum(detected) FROM passes GROUP BY object"
+                             " HAVING sum(detected) > 0 ORDER BY 3 DESC, 1 LIMIT ?1",
+                             ROWS, 0, &rows));
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more && *count < ROWS) {
+        objects[*count] = bst_io_rows_int(rows, 0);
+        snprintf(names[(*count)++], 48, "%.22s", bst_io_rows_text(rows, 1));
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
 static bst_status put_passes(bst_ctx *ctx, const bst_chart *c, const bst_run_reader *run,
                              const sensor_names *names, int64_t object, int row, double unit_s) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
-    BST_TRY(bst_rows_open(ctx, run,
-                          "SELECT sensor, start_s, end_s, detected, frames FROM passes"
-                          " WHERE object = ?1 ORDER BY start_s, sensor",
-                          object, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        int64_t sensor = bst_rows_int(rows, 0), detected = bst_rows_int(rows, 3);
-        double from = bst_rows_real(rows, 1) / unit_s, to = bst_rows_real(rows, 2) / unit_s;
+    BST_TRY(bst_io_rows_open(ctx, run,
+                             "SELECT sensor, start_s, end_s, detected, frames FROM passes"
+                             " WHERE object = ?1 ORDER BY start_s, sensor",
+                             object, 0, &rows));
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        int64_t sensor = bst_io_rows_int(rows, 0), detected = bst_io_rows_int(rows, 3);
+        double from = bst_io_rows_real(rows, 1) / unit_s, to = bst_io_rows_real(rows, 2) / unit_s;
         double least = 1.5 * (c->x.high - c->x.low) / c->inner_width; /* that can be seen */
         char title[200];
-        snprintf(
-            title, sizeof title, "%s: %.6g s to %.6g s, detected in %" PRId64 " of %s",
-            sensor >= 0 && sensor < names->count ? names->names[sensor] : "a sensor", from * unit_s,
-            to * unit_s, detected,
-            bst_count_text((char[BST_COUNT_TEXT]){0}, bst_rows_int(rows, 4), "frame", "frames"));
+        snprintf(title, sizeof title, "%s: %.6g s to %.6g s, detected in %" PRId64 " of %s",
+                 sensor >= 0 && sensor < names->count ? names->names[sensor] : "a sensor",
+                 from * unit_s, to * unit_s, detected,
+                 bst_text_of_count((char[BST_COUNT_TEXT]){0}, bst_io_rows_int(rows, 4), "frame",
+                                   "frames"));
         bst_chart_bar(c, from, fmax(to, from + least), row + 0.15, row + 0.85,
                       detected > 0 ? colour_of(sensor) : BST_CHART_GREY, title);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
@@ -152,7 +155,7 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
     double unit_s = bst_chart_time_unit(span_s, &unit);
     char label[40], caption[200];
     snprintf(label, sizeof label, "time since the epoch, %s", unit);
-    bst_page_figure(out, BST_PAGE_WIDE);
+    bst_report_page_figure(out, BST_PAGE_WIDE);
     bst_chart c = {.out = out,
                    .name = "Timeline of the objects' passes through the sensors' fields",
                    .width = 1100.0,
@@ -170,8 +173,8 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
     bst_chart_end(&c);
     put_legend(out, names, BST_KEY_GROUND, true);
     snprintf(caption, sizeof caption, "Who saw what, when: passes of the %s with most detections.",
-             bst_count_text((char[BST_COUNT_TEXT]){0}, count, "object", "objects"));
-    bst_page_figure_end(out, caption);
+             bst_text_of_count((char[BST_COUNT_TEXT]){0}, count, "object", "objects"));
+    bst_report_page_figure_end(out, caption);
     return status;
 }
 
@@ -180,20 +183,20 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
 /* First detections of objects by a sensor (-1: by any) as a curve of their number over time. */
 static bst_status put_count(bst_ctx *ctx, bst_chart *c, const bst_run_reader *run, int sensor,
                             double unit_s, double *x, double *y, size_t room, size_t *total) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
     size_t n = 0;
-    BST_TRY(bst_rows_open(ctx, run,
-                          "SELECT min(first_s) FROM passes WHERE first_s IS NOT NULL"
-                          " AND (?1 < 0 OR sensor = ?1) GROUP BY object ORDER BY 1",
-                          sensor, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more && n + 1 < room) {
-        x[n] = bst_rows_real(rows, 0) / unit_s;
+    BST_TRY(bst_io_rows_open(ctx, run,
+                             "SELECT min(first_s) FROM passes WHERE first_s IS NOT NULL"
+                             " AND (?1 < 0 OR sensor = ?1) GROUP BY object ORDER BY 1",
+                             sensor, 0, &rows));
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more && n + 1 < room) {
+        x[n] = bst_io_rows_real(rows, 0) / unit_s;
         y[n] = (double)(n + 1);
         n++;
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     *total = n;
     if (c && status == BST_OK) {
         x[n] = c->x.high;
@@ -217,7 +220,7 @@ static bst_status put_counts(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
     snprintf(label, sizeof label, "time since the epoch, %s", unit);
     bst_status status = put_count(ctx, NULL, run, -1, unit_s, x, x + room, room, &total);
     if (status == BST_OK && total > 0) {
-        bst_page_figure(out, BST_PAGE_WIDE);
+        bst_report_page_figure(out, BST_PAGE_WIDE);
         bst_chart c = {
             .out = out,
             .name = "Number of objects seen so far over time",
@@ -233,8 +236,8 @@ static bst_status put_counts(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
         }
         bst_chart_end(&c);
         put_legend(out, names, BST_KEY_LINE, false);
-        bst_page_figure_end(out,
-                            "Objects that were detected at least once; dashed: by any sensor.");
+        bst_report_page_figure_end(
+            out, "Objects that were detected at least once; dashed: by any sensor.");
     }
     free(x);
     return status;
@@ -244,7 +247,7 @@ static bst_status put_counts(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
 
 static bst_status put_histogram(bst_ctx *ctx, FILE *out, const bst_run_reader *run, const char *sql,
                                 const char *label, double scale, const char *caption) {
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
     size_t n = 0,
@@ -253,18 +256,18 @@ static bst_status put_histogram(bst_ctx *ctx, FILE *out, const bst_run_reader *r
     if (!values) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for who saw what");
     }
-    status = bst_rows_open(ctx, run, sql, 0, 0, &rows);
-    while (status == BST_OK && (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more &&
+    status = bst_io_rows_open(ctx, run, sql, 0, 0, &rows);
+    while (status == BST_OK && (status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more &&
            n < room) {
-        values[n++] = scale * bst_rows_real(rows, 0);
+        values[n++] = scale * bst_io_rows_real(rows, 0);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     bst_chart_widen(values, n, false, &low, &high);
     if (status == BST_OK && n >= 10 && high > low) {
-        bst_page_figure(out, BST_PAGE_THIRD);
+        bst_report_page_figure(out, BST_PAGE_THIRD);
         bst_report_histogram(out, caption, label, "objects", values, n, low,
                              high + 1e-9 * (high - low), 30, BST_CHART_BLUE, NULL, NULL);
-        bst_page_figure_end(out, caption);
+        bst_report_page_figure_end(out, caption);
     }
     free(values);
     return status;
@@ -275,16 +278,16 @@ static bst_status put_table(bst_ctx *ctx, FILE *out, const bst_run_reader *run) 
                                         "detected",         "tracked",        "object custody, %",
                                         "revisit, s",       "longest gap, s", "place RMS, arcsec",
                                         "track RMS, arcsec"};
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
-    BST_TRY(bst_rows_open(ctx, run,
-                          "SELECT name, norad, passes_seen, detected, tracked,"
-                          " 100.0 * custody_fraction, revisit_mean_s, longest_gap_s,"
-                          " place_rms_arcsec, track_rms_arcsec FROM sightings"
-                          " WHERE sensor IS NULL AND detected > 0"
-                          " ORDER BY detected DESC, object LIMIT ?1",
-                          LISTED, 0, &rows));
+    BST_TRY(bst_io_rows_open(ctx, run,
+                             "SELECT name, norad, passes_seen, detected, tracked,"
+                             " 100.0 * custody_fraction, revisit_mean_s, longest_gap_s,"
+                             " place_rms_arcsec, track_rms_arcsec FROM sightings"
+                             " WHERE sensor IS NULL AND detected > 0"
+                             " ORDER BY detected DESC, object LIMIT ?1",
+                             LISTED, 0, &rows));
     fprintf(out,
             "<details><summary>The %d objects with most detections</summary>\n"
             "<div class=\"scroll\"><table>\n<thead><tr>",
@@ -293,18 +296,18 @@ static bst_status put_table(bst_ctx *ctx, FILE *out, const bst_run_reader *run) 
         fprintf(out, "<th scope=\"col\"%s>%s</th>", k ? " class=\"n\"" : "", heads[k]);
     }
     fputs("</tr></thead>\n<tbody>\n", out);
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
         fputs("<tr>", out);
         for (int k = 0; k < 10; k++) {
             char text[32];
             fputs(k ? "<td class=\"n\">" : "<td>", out);
-            bst_html_text(out, k < 5 ? bst_rows_text(rows, k)
-                                     : bst_page_number(text, bst_rows_real(rows, k), 4));
+            bst_html_text(out, k < 5 ? bst_io_rows_text(rows, k)
+                                     : bst_report_page_number(text, bst_io_rows_real(rows, k), 4));
             fputs("</td>", out);
         }
         fputs("</tr>\n", out);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     fputs("</tbody></table></div>\n</details>\n", out);
     return status;
 }
@@ -315,7 +318,7 @@ static bst_status put_all(bst_ctx *ctx, FILE *out, const bst_run_reader *run, do
     put_cards(out, run);
     BST_TRY(put_timeline(ctx, out, run, &names, span_s));
     BST_TRY(put_counts(ctx, out, run, &names, span_s));
-    bst_page_grid(out, BST_PAGE_THIRD);
+    bst_report_page_grid(out, BST_PAGE_THIRD);
     bst_status status = put_histogram(
         ctx, out, run,
         "SELECT custody_fraction FROM sightings WHERE sensor IS NULL AND detected > 0",
@@ -337,7 +340,7 @@ static bst_status put_all(bst_ctx *ctx, FILE *out, const bst_run_reader *run, do
             "place, arcsec", 1.0,
             "RMS of the detections' places from the truth, by object; 20 stands for more.");
     }
-    bst_page_grid_end(out);
+    bst_report_page_grid_end(out);
     return status == BST_OK ? put_table(ctx, out, run) : status;
 }
 
@@ -346,8 +349,8 @@ bst_status bst_report_sightings(bst_ctx *ctx, FILE *out, const bst_run_reader *r
         bst_run_reader_int(run, "SELECT count(DISTINCT object) FROM passes", 0, 0) < 2) {
         return BST_OK;
     }
-    bst_page_section(out, 2, "Who saw what");
+    bst_report_page_section(out, 2, "Who saw what");
     bst_status status = put_all(ctx, out, run, span_s > 0.0 ? span_s : 1.0);
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
     return status;
 }

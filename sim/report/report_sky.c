@@ -47,7 +47,7 @@ static void put_quantity(const bst_report_drawing *d, bst_report_quantity quanti
         return;
     }
     bst_chart_widen(d->y, n, false, &low, &high);
-    bst_page_figure(d->out, BST_PAGE_THIRD);
+    bst_report_page_figure(d->out, BST_PAGE_THIRD);
     bst_chart c = {.out = d->out,
                    .name = caption,
                    .width = 360.0,
@@ -58,7 +58,7 @@ static void put_quantity(const bst_report_drawing *d, bst_report_quantity quanti
     bst_chart_begin(&c);
     bst_chart_line(&c, d->x, d->y, n, BST_CHART_BLUE, false);
     bst_chart_end(&c);
-    bst_page_figure_end(d->out, caption);
+    bst_report_page_figure_end(d->out, caption);
 }
 
 /* Right ascensions of boresight (y) and target (z), made continuous where they do not go round. */
@@ -103,7 +103,7 @@ static void put_sky_path(const bst_report_drawing *d) {
     bst_chart_widen(d->w, n, false, &bottom, &top);
     bst_report_fill(d, boresight_dec, d->w);
     bst_chart_widen(d->w, n, false, &bottom, &top);
-    bst_page_figure(d->out, BST_PAGE_HALF);
+    bst_report_page_figure(d->out, BST_PAGE_HALF);
     bst_chart c = {.out = d->out,
                    .name = "Paths of the boresight and of the target among the stars",
                    .width = 540.0,
@@ -123,7 +123,7 @@ static void put_sky_path(const bst_report_drawing *d) {
         bst_chart_legend(d->out, BST_KEY_DOT, BST_CHART_BLUE, "target");
     }
     fputs("</ul>\n", d->out);
-    bst_page_figure_end(d->out, "Among the stars: where the camera looked, and the target.");
+    bst_report_page_figure_end(d->out, "Among the stars: where the camera looked, and the target.");
 }
 
 static void put_ground_path(const bst_report_drawing *d) {
@@ -132,7 +132,7 @@ static void put_ground_path(const bst_report_drawing *d) {
         return;
     }
     bst_report_fill(d, latitude_deg, d->z);
-    bst_page_figure(d->out, BST_PAGE_HALF);
+    bst_report_page_figure(d->out, BST_PAGE_HALF);
     bst_chart c = {.out = d->out,
                    .name = "Path of the observer's sub-satellite point",
                    .width = 540.0,
@@ -143,20 +143,21 @@ static void put_ground_path(const bst_report_drawing *d) {
     bst_chart_rule(&c, 0.0, BST_CHART_GREY);
     bst_chart_dots(&c, d->y, d->z, n, BST_CHART_GREEN);
     bst_chart_end(&c);
-    bst_page_figure_end(d->out, "Below the observer: geodetic places on the ground (WGS 84).");
+    bst_report_page_figure_end(d->out,
+                               "Below the observer: geodetic places on the ground (WGS 84).");
 }
 
 void bst_report_sky(const bst_report_drawing *d) {
-    bst_page_grid(d->out, BST_PAGE_HALF);
+    bst_report_page_grid(d->out, BST_PAGE_HALF);
     put_sky_path(d);
     put_ground_path(d);
-    bst_page_grid_end(d->out);
-    bst_page_grid(d->out, BST_PAGE_THIRD);
+    bst_report_page_grid_end(d->out);
+    bst_report_page_grid(d->out, BST_PAGE_THIRD);
     put_quantity(d, range_km, "range, km", "Distance of the target from the observer.");
     put_quantity(d, phase_deg, "phase angle, deg", "Angle Sun - target - observer.");
     put_quantity(d, v_mag, "V, mag", "Brightness of the target; larger is fainter.");
     put_quantity(d, sun_deg, "angle, deg", "Angle from the boresight to the Sun.");
     put_quantity(d, limb_deg, "angle, deg",
                  "Angle from the boresight to the Earth's limb; below 0: on the Earth.");
-    bst_page_grid_end(d->out);
+    bst_report_page_grid_end(d->out);
 }

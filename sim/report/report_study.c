@@ -25,7 +25,8 @@ static void put_head_cell(FILE *out, bool number, const char *text) {
 
 /* ------------------------------------------------------------------ warnings */
 
-static const bst_study_metric_view *find_metric(const bst_study_view *v, const char *name) {
+static const bst_report_study_metric_view *find_metric(const bst_report_study_view *v,
+                                                       const char *name) {
     for (int i = 0; i < v->metric_count; i++) {
         if (strcmp(v->metrics[i].name, name) == 0) {
             return &v->metrics[i];
@@ -34,7 +35,7 @@ static const bst_study_metric_view *find_metric(const bst_study_view *v, const c
     return NULL;
 }
 
-static int64_t numbers_of(const bst_study_view *v, const bst_study_metric_view *m) {
+static int64_t numbers_of(const bst_report_study_view *v, const bst_report_study_metric_view *m) {
     int64_t n = 0;
     for (int64_t r = 0; r < v->runs; r++) {
         n += isfinite(m->of_run[r]);
@@ -42,7 +43,7 @@ static int64_t numbers_of(const bst_study_view *v, const bst_study_metric_view *
     return n;
 }
 
-static void gather_warnings(const bst_study_view *v, bst_warnings *w) {
+static void gather_warnings(const bst_report_study_view *v, bst_report_warnings *w) {
     int64_t failed = 0, done = 0;
     char text[BST_COUNT_TEXT];
     for (int64_t r = 0; r < v->runs; r++) {
@@ -50,80 +51,81 @@ static void gather_warnings(const bst_study_view *v, bst_warnings *w) {
         done += v->done[r];
     }
     if (v->runs < v->expected_runs) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM,
-                         "%" PRId64 " of %" PRId64
-                         " runs are missing: boresight study FOLDER "
-                         "--resume makes them.",
-                         v->expected_runs - v->runs, v->expected_runs);
+        bst_report_warnings_add(w, BST_SEVERITY_PROBLEM,
+                                "%" PRId64 " of %" PRId64
+                                " runs are missing: boresight study FOLDER "
+                                "--resume makes them.",
+                                v->expected_runs - v->runs, v->expected_runs);
     }
     if (failed > 0) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%" PRId64 " of %" PRId64 " runs failed.", failed,
-                         v->runs);
+        bst_report_warnings_add(w, BST_SEVERITY_PROBLEM, "%" PRId64 " of %" PRId64 " runs failed.",
+                                failed, v->runs);
     }
-    const bst_study_metric_view *acquired = find_metric(v, "acquired");
+    const bst_report_study_metric_view *acquired = find_metric(v, "acquired");
     int64_t never = 0, lost = 0;
     for (int64_t r = 0; acquired && r < v->runs; r++) {
         never += acquired->of_run[r] == 0.0;
     }
     if (never > 0) {
-        bst_warnings_add(w, BST_SEVERITY_WARNING,
-                         "In %" PRId64 " of %" PRId64
-                         " runs the target was never acquired: "
-                         "figures of pointing and track are of the others alone.",
-                         never, done);
+        bst_report_warnings_add(w, BST_SEVERITY_WARNING,
+                                "In %" PRId64 " of %" PRId64
+                                " runs the target was never acquired: "
+                                "figures of pointing and track are of the others alone.",
+                                never, done);
     }
-    const bst_study_metric_view *end = find_metric(v, "in_track_at_end");
+    const bst_report_study_metric_view *end = find_metric(v, "in_track_at_end");
     for (int64_t r = 0; end && acquired && r < v->runs; r++) {
         lost += end->of_run[r] == 0.0 && acquired->of_run[r] == 1.0;
     }
     if (lost > 0) {
-        bst_warnings_add(w, BST_SEVERITY_WARNING,
-                         "In %s the target was acquired and not in track at the end.",
-                         bst_count_text(text, lost, "run", "runs"));
+        bst_report_warnings_add(w, BST_SEVERITY_WARNING,
+                                "In %s the target was acquired and not in track at the end.",
+                                bst_text_of_count(text, lost, "run", "runs"));
     }
     static const struct {
         const char *metric, *text;
     } counts[] = {{"wrong_target_frames", "frames with another object for target"},
                   {"false_tracks", "tracks near no object"}};
     for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
-        const bst_study_metric_view *m = find_metric(v, counts[k].metric);
+        const bst_report_study_metric_view *m = find_metric(v, counts[k].metric);
         int64_t n = 0;
         for (int64_t r = 0; m && r < v->runs; r++) {
             n += m->of_run[r] > 0.0;
         }
         if (n > 0) {
-            bst_warnings_add(w, BST_SEVERITY_WARNING, "%s with %s (%s).",
-                             bst_count_text(text, n, "run", "runs"), counts[k].text,
-                             counts[k].metric);
+            bst_report_warnings_add(w, BST_SEVERITY_WARNING, "%s with %s (%s).",
+                                    bst_text_of_count(text, n, "run", "runs"), counts[k].text,
+                                    counts[k].metric);
         }
     }
     for (int i = 0; i < v->metric_count; i++) {
-        const bst_study_metric_view *m = &v->metrics[i];
+        const bst_report_study_metric_view *m = &v->metrics[i];
         int64_t n = numbers_of(v, m);
         if (n == 0 && done > 0) {
-            bst_warnings_add(w, BST_SEVERITY_NOTE, "No run has a number for %s.", m->name);
+            bst_report_warnings_add(w, BST_SEVERITY_NOTE, "No run has a number for %s.", m->name);
         }
     }
     if (v->replicates > 1 && v->replicates < 10) {
-        bst_warnings_add(w, BST_SEVERITY_NOTE,
-                         "Settings have %" PRId64
-                         " runs each: their bootstrap intervals are too "
-                         "short.",
-                         v->replicates);
+        bst_report_warnings_add(w, BST_SEVERITY_NOTE,
+                                "Settings have %" PRId64
+                                " runs each: their bootstrap intervals are too "
+                                "short.",
+                                v->replicates);
     }
 }
 
 /* ------------------------------------------------------------------ what was varied */
 
 /* "5 values from 3 to 48", or the values themselves. */
-static void describe_axis(const bst_study_view *v, const bst_study_axis_view *a, char text[400]) {
+static void describe_axis(const bst_report_study_view *v, const bst_report_study_axis_view *a,
+                          char text[400]) {
     size_t n = 0;
     text[0] = '\0';
     if (a->swept && a->level_count <= 8) {
         for (int k = 0; k < a->level_count; k++) {
             char word[32];
             n += (size_t)snprintf(text + n, 400 - n, "%s%s", k ? ", " : "",
-                                  bst_study_word(a, a->levels[k], word));
+                                  bst_report_study_word(a, a->levels[k], word));
         }
         return;
     }
@@ -140,23 +142,23 @@ static void describe_axis(const bst_study_view *v, const bst_study_axis_view *a,
     }
 }
 
-static void put_identity(FILE *out, const bst_study_view *v) {
-    bst_page_section(out, 2, "What was varied");
+static void put_identity(FILE *out, const bst_report_study_view *v) {
+    bst_report_page_section(out, 2, "What was varied");
     fputs("<table class=\"two\">\n", out);
-    bst_page_row(out, "kind", "%s", v->kind);
-    bst_page_row(out, "settings", "%" PRId64, v->settings);
-    bst_page_row(out, "runs", "%" PRId64 " of %" PRId64 ", %" PRId64 " a setting", v->runs,
-                 v->expected_runs, v->replicates);
-    bst_page_row(out, "seed", "%s", v->seed);
-    bst_page_row(out, "program", "Boresight %s", v->version);
-    bst_page_row(out, "digest of the study", "%s", v->digest);
+    bst_report_page_row(out, "kind", "%s", v->kind);
+    bst_report_page_row(out, "settings", "%" PRId64, v->settings);
+    bst_report_page_row(out, "runs", "%" PRId64 " of %" PRId64 ", %" PRId64 " a setting", v->runs,
+                        v->expected_runs, v->replicates);
+    bst_report_page_row(out, "seed", "%s", v->seed);
+    bst_report_page_row(out, "program", "Boresight %s", v->version);
+    bst_report_page_row(out, "digest of the study", "%s", v->digest);
     fputs(
         "</table>\n<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">axis</th>"
         "<th scope=\"col\">role</th><th scope=\"col\">values</th><th scope=\"col\">path</th></tr>"
         "</thead>\n<tbody>\n",
         out);
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *a = &v->axes[i];
+        const bst_report_study_axis_view *a = &v->axes[i];
         char values[400], role[64];
         describe_axis(v, a, values);
         snprintf(role, sizeof role, "%s%s%s",
@@ -172,26 +174,26 @@ static void put_identity(FILE *out, const bst_study_view *v) {
         fputs("</tr>\n", out);
     }
     fputs("</tbody></table></div>\n", out);
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
 }
 
 /* ------------------------------------------------------------------ figures of all runs */
 
-static bst_status put_overall(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
-    bst_rows *rows;
+static bst_status put_overall(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
+    bst_io_rows *rows;
     bst_status status;
     bool more;
-    BST_TRY(
-        bst_rows_open(ctx, v->tables,
-                      "SELECT s.metric, m.unit, s.mean, s.low, s.high, s.std, s.minimum, s.median,"
-                      " s.p95, s.maximum, s.runs, s.missing, m.doc FROM statistics s"
-                      " LEFT JOIN metrics m ON m.metric = s.metric WHERE s.setting IS NULL"
-                      " ORDER BY s.rowid",
-                      0, 0, &rows));
+    BST_TRY(bst_io_rows_open(
+        ctx, v->tables,
+        "SELECT s.metric, m.unit, s.mean, s.low, s.high, s.std, s.minimum, s.median,"
+        " s.p95, s.maximum, s.runs, s.missing, m.doc FROM statistics s"
+        " LEFT JOIN metrics m ON m.metric = s.metric WHERE s.setting IS NULL"
+        " ORDER BY s.rowid",
+        0, 0, &rows));
     static const char *const heads[] = {"metric", "unit",    "mean",   "95 % from", "to",
                                         "std",    "least",   "median", "95 %",      "greatest",
                                         "runs",   "missing", "meaning"};
-    bst_page_section(out, 2, "Figures of all runs");
+    bst_report_page_section(out, 2, "Figures of all runs");
     if (v->settings > 1) {
         fputs(
             "<p class=\"note\">All settings together, each as often as it was run: the figures "
@@ -204,41 +206,42 @@ static bst_status put_overall(bst_ctx *ctx, FILE *out, const bst_study_view *v) 
         put_head_cell(out, k > 1 && k < 12, heads[k]);
     }
     fputs("</tr></thead>\n<tbody>\n", out);
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
         fputs("<tr>", out);
         for (int k = 0; k < 13; k++) {
             char text[32];
             bool number = k > 1 && k < 10;
-            put_cell(
-                out, k > 1 && k < 12,
-                number ? bst_page_number(text, bst_rows_real(rows, k), 4) : bst_rows_text(rows, k));
+            put_cell(out, k > 1 && k < 12,
+                     number ? bst_report_page_number(text, bst_io_rows_real(rows, k), 4)
+                            : bst_io_rows_text(rows, k));
         }
         fputs("</tr>\n", out);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     fputs("</tbody></table></div>\n", out);
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
     return status;
 }
 
 /* ------------------------------------------------------------------ settings */
 
-static void put_setting(FILE *out, const bst_study_view *v, int64_t i, const int *metrics,
+static void put_setting(FILE *out, const bst_report_study_view *v, int64_t i, const int *metrics,
                         int count) {
     char text[32], ends[2][32], cell[120];
     fprintf(out, "<tr><td class=\"n\">%" PRId64 "</td>", i);
     for (int a = 0; a < v->axis_count; a++) {
         if (v->axes[a].swept) {
             put_cell(out, !v->axes[a].is_text,
-                     bst_study_word(&v->axes[a], v->axes[a].of_setting[i], text));
+                     bst_report_study_word(&v->axes[a], v->axes[a].of_setting[i], text));
         }
     }
     for (int k = 0; k < count; k++) {
-        const bst_study_metric_view *m = &v->metrics[metrics[k]];
-        bst_page_number(text, m->mean[i], 3);
+        const bst_report_study_metric_view *m = &v->metrics[metrics[k]];
+        bst_report_page_number(text, m->mean[i], 3);
         if (isfinite(m->low[i]) && isfinite(m->high[i])) {
-            snprintf(cell, sizeof cell, "%s [%s, %s]", text, bst_page_number(ends[0], m->low[i], 3),
-                     bst_page_number(ends[1], m->high[i], 3));
+            snprintf(cell, sizeof cell, "%s [%s, %s]", text,
+                     bst_report_page_number(ends[0], m->low[i], 3),
+                     bst_report_page_number(ends[1], m->high[i], 3));
         } else {
             snprintf(cell, sizeof cell, "%s", text);
         }
@@ -247,13 +250,13 @@ static void put_setting(FILE *out, const bst_study_view *v, int64_t i, const int
     fputs("</tr>\n", out);
 }
 
-static void put_settings(FILE *out, const bst_study_view *v) {
-    int metrics[COLUMNS], count = bst_study_key_metrics(v, metrics, COLUMNS);
+static void put_settings(FILE *out, const bst_report_study_view *v) {
+    int metrics[COLUMNS], count = bst_report_study_key_metrics(v, metrics, COLUMNS);
     if (v->settings < 2) {
         return;
     }
     int64_t shown = v->settings < MOST_SETTINGS ? v->settings : MOST_SETTINGS;
-    bst_page_section(out, 2, "Settings");
+    bst_report_page_section(out, 2, "Settings");
     fprintf(out, "<details%s><summary>%" PRId64 " settings</summary>\n",
             v->settings <= 40 ? " open=\"open\"" : "", v->settings);
     fputs("<div class=\"scroll\"><table>\n<thead><tr>", out);
@@ -265,7 +268,7 @@ static void put_settings(FILE *out, const bst_study_view *v) {
     }
     for (int k = 0; k < count; k++) {
         char label[128];
-        put_head_cell(out, true, bst_study_label(&v->metrics[metrics[k]], label));
+        put_head_cell(out, true, bst_report_study_label(&v->metrics[metrics[k]], label));
     }
     fputs("</tr></thead>\n<tbody>\n", out);
     for (int64_t i = 0; i < shown; i++) {
@@ -280,14 +283,14 @@ static void put_settings(FILE *out, const bst_study_view *v) {
     fputs(v->replicates > 1 ? "<p class=\"note\">Means of the runs with their 95 % intervals.</p>\n"
                             : "",
           out);
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
 }
 
 /* ------------------------------------------------------------------ runs that ask to be looked at
  */
 
-static bst_status put_failed(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
-    bst_rows *rows;
+static bst_status put_failed(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
+    bst_io_rows *rows;
     bst_status status;
     bool more;
     int64_t failed =
@@ -295,26 +298,26 @@ static bst_status put_failed(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
     if (failed == 0) {
         return BST_OK;
     }
-    BST_TRY(bst_rows_open(ctx, v->tables,
-                          "SELECT count(*), min(run), error FROM runs WHERE status <> 'done'"
-                          " GROUP BY error ORDER BY count(*) DESC, min(run) LIMIT ?1",
-                          MOST_FAILED, 0, &rows));
-    bst_page_section(out, 2, "Failed runs");
+    BST_TRY(bst_io_rows_open(ctx, v->tables,
+                             "SELECT count(*), min(run), error FROM runs WHERE status <> 'done'"
+                             " GROUP BY error ORDER BY count(*) DESC, min(run) LIMIT ?1",
+                             MOST_FAILED, 0, &rows));
+    bst_report_page_section(out, 2, "Failed runs");
     fputs(
         "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\" class=\"n\">runs</th>"
         "<th scope=\"col\" class=\"n\">first</th><th "
         "scope=\"col\">why</th></tr></thead>\n<tbody>\n",
         out);
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
         fputs("<tr>", out);
-        put_cell(out, true, bst_rows_text(rows, 0));
-        put_cell(out, true, bst_rows_text(rows, 1));
-        put_cell(out, false, bst_rows_text(rows, 2));
+        put_cell(out, true, bst_io_rows_text(rows, 0));
+        put_cell(out, true, bst_io_rows_text(rows, 1));
+        put_cell(out, false, bst_io_rows_text(rows, 2));
         fputs("</tr>\n", out);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     fputs("</tbody></table></div>\n", out);
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
     return status;
 }
 
@@ -330,11 +333,11 @@ static int worst_first(const void *a, const void *b) {
 }
 
 /* The runs with the least custody, or else the largest pointing error. */
-static void put_worst(FILE *out, const bst_study_view *v) {
-    const bst_study_metric_view *custody = find_metric(v, "custody"),
-                                *pointing = find_metric(v, "pointing_rms_px");
+static void put_worst(FILE *out, const bst_report_study_view *v) {
+    const bst_report_study_metric_view *custody = find_metric(v, "custody"),
+                                       *pointing = find_metric(v, "pointing_rms_px");
     ranked *list = malloc((size_t)(v->runs > 0 ? v->runs : 1) * sizeof *list);
-    int metrics[COLUMNS], count = bst_study_key_metrics(v, metrics, COLUMNS);
+    int metrics[COLUMNS], count = bst_report_study_key_metrics(v, metrics, COLUMNS);
     int64_t n = 0;
     for (int64_t r = 0; list && custody && pointing && r < v->runs; r++) {
         double held = custody->of_run[r], error = pointing->of_run[r];
@@ -346,7 +349,7 @@ static void put_worst(FILE *out, const bst_study_view *v) {
     }
     if (n >= 2 * MOST_WORST) {
         qsort(list, (size_t)n, sizeof *list, worst_first);
-        bst_page_section(out, 2, "Runs with the least custody");
+        bst_report_page_section(out, 2, "Runs with the least custody");
         fputs("<div class=\"scroll\"><table>\n<thead><tr>", out);
         put_head_cell(out, true, "run");
         for (int a = 0; a < v->axis_count; a++) {
@@ -354,7 +357,7 @@ static void put_worst(FILE *out, const bst_study_view *v) {
         }
         for (int k = 0; k < count; k++) {
             char label[128];
-            put_head_cell(out, true, bst_study_label(&v->metrics[metrics[k]], label));
+            put_head_cell(out, true, bst_report_study_label(&v->metrics[metrics[k]], label));
         }
         fputs("</tr></thead>\n<tbody>\n", out);
         for (int i = 0; i < MOST_WORST; i++) {
@@ -363,10 +366,11 @@ static void put_worst(FILE *out, const bst_study_view *v) {
             fprintf(out, "<tr><td class=\"n\">%" PRId64 "</td>", v->run_numbers[r]);
             for (int a = 0; a < v->axis_count; a++) {
                 put_cell(out, !v->axes[a].is_text,
-                         bst_study_word(&v->axes[a], v->axes[a].of_run[r], text));
+                         bst_report_study_word(&v->axes[a], v->axes[a].of_run[r], text));
             }
             for (int k = 0; k < count; k++) {
-                put_cell(out, true, bst_page_number(text, v->metrics[metrics[k]].of_run[r], 4));
+                put_cell(out, true,
+                         bst_report_page_number(text, v->metrics[metrics[k]].of_run[r], 4));
             }
             fputs("</tr>\n", out);
         }
@@ -376,7 +380,7 @@ static void put_worst(FILE *out, const bst_study_view *v) {
             "scenario of one, to be run by hand; what it gives is the same to the last "
             "digit.</p>\n",
             out);
-        bst_page_section_end(out);
+        bst_report_page_section_end(out);
     }
     free(list);
 }
@@ -384,50 +388,52 @@ static void put_worst(FILE *out, const bst_study_view *v) {
 /* ------------------------------------------------------------------ cards */
 
 /* The mean over all runs of a study with one setting, with its interval. */
-static void put_mean_card(FILE *out, const bst_study_view *v, const bst_study_metric_view *m) {
-    bst_rows *rows;
+static void put_mean_card(FILE *out, const bst_report_study_view *v,
+                          const bst_report_study_metric_view *m) {
+    bst_io_rows *rows;
     bst_ctx unheard = {0};
     bool more;
     char text[32], note[120], ends[2][32];
-    if (bst_rows_open(&unheard, v->tables,
-                      "SELECT metric, mean, low, high FROM statistics WHERE setting IS NULL", 0, 0,
-                      &rows) != BST_OK) {
+    if (bst_io_rows_open(&unheard, v->tables,
+                         "SELECT metric, mean, low, high FROM statistics WHERE setting IS NULL", 0,
+                         0, &rows) != BST_OK) {
         return;
     }
-    while (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
-        if (strcmp(bst_rows_text(rows, 0), m->name) == 0) {
+    while (bst_io_rows_next(&unheard, rows, &more) == BST_OK && more) {
+        if (strcmp(bst_io_rows_text(rows, 0), m->name) == 0) {
             snprintf(note, sizeof note, "95 %%: %s to %s",
-                     bst_page_number(ends[0], bst_rows_real(rows, 2), 3),
-                     bst_page_number(ends[1], bst_rows_real(rows, 3), 3));
-            bst_page_card(out, bst_page_number(text, bst_rows_real(rows, 1), 3), m->unit, m->name,
-                          note);
+                     bst_report_page_number(ends[0], bst_io_rows_real(rows, 2), 3),
+                     bst_report_page_number(ends[1], bst_io_rows_real(rows, 3), 3));
+            bst_report_page_card(out, bst_report_page_number(text, bst_io_rows_real(rows, 1), 3),
+                                 m->unit, m->name, note);
         }
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
 }
 
 /* From the least to the greatest mean of a setting: a mean over settings would depend on the values
  * that were swept. */
-static void put_range_card(FILE *out, const bst_study_view *v, const bst_study_metric_view *m) {
+static void put_range_card(FILE *out, const bst_report_study_view *v,
+                           const bst_report_study_metric_view *m) {
     double low = INFINITY, high = -INFINITY;
     char text[80], ends[2][32];
     bst_chart_widen(m->mean, (size_t)v->settings, false, &low, &high);
     if (low <= high) {
-        bst_page_number(ends[0], low, 3);
-        bst_page_number(ends[1], high, 3);
+        bst_report_page_number(ends[0], low, 3);
+        bst_report_page_number(ends[1], high, 3);
         bool same = strcmp(ends[0], ends[1]) == 0;
         snprintf(text, sizeof text, "%s%s%s", ends[0], same ? "" : " to ", same ? "" : ends[1]);
-        bst_page_card(out, text, m->unit, m->name, "");
+        bst_report_page_card(out, text, m->unit, m->name, "");
     }
 }
 
-static void put_cards(FILE *out, const bst_study_view *v) {
+static void put_cards(FILE *out, const bst_report_study_view *v) {
     char text[32], note[120];
-    int metrics[COLUMNS], count = bst_study_key_metrics(v, metrics, 5);
+    int metrics[COLUMNS], count = bst_report_study_key_metrics(v, metrics, 5);
     fputs("<div class=\"cards\">\n", out);
     snprintf(text, sizeof text, "%" PRId64, v->runs - v->failed);
     snprintf(note, sizeof note, "of %" PRId64 "; %" PRId64 " failed", v->expected_runs, v->failed);
-    bst_page_card(out, text, "", "runs done", note);
+    bst_report_page_card(out, text, "", "runs done", note);
     for (int k = 0; k < count; k++) {
         (v->settings > 1 ? put_range_card : put_mean_card)(out, v, &v->metrics[metrics[k]]);
     }
@@ -444,15 +450,15 @@ static void put_cards(FILE *out, const bst_study_view *v) {
 
 /* ------------------------------------------------------------------ all of it */
 
-static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
+static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
     char title[200], folder[256];
-    bst_warnings *warnings = calloc(1, sizeof *warnings);
+    bst_report_warnings *warnings = calloc(1, sizeof *warnings);
     if (!warnings) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the report");
     }
     gather_warnings(v, warnings);
     snprintf(title, sizeof title, "Study %.150s", v->name);
-    bst_page_begin(out, title);
+    bst_report_page_begin(out, title);
     bool whole = v->runs == v->expected_runs;
     fprintf(out, "<p class=\"sub\"><span class=\"badge %s\">%s</span> Folder ",
             !whole          ? "bad"
@@ -463,17 +469,17 @@ static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
                             : "complete");
     bst_html_text(out, bst_report_folder(v->tables, folder));
     fputs("</p>\n", out);
-    bst_warnings_write(out, warnings);
+    bst_report_warnings_write(out, warnings);
     free(warnings);
     BST_TRY(put_failed(ctx, out, v));
     put_identity(out, v);
-    bst_page_section(out, 2, "In short");
+    bst_report_page_section(out, 2, "In short");
     put_cards(out, v);
-    bst_page_section_end(out);
-    BST_TRY(bst_study_plot_sensitivity(ctx, out, v));
-    BST_TRY(bst_study_plot_curves(ctx, out, v));
-    bst_study_plot_axes(out, v);
-    bst_study_plot_histograms(out, v);
+    bst_report_page_section_end(out);
+    BST_TRY(bst_report_study_plot_sensitivity(ctx, out, v));
+    BST_TRY(bst_report_study_plot_curves(ctx, out, v));
+    bst_report_study_plot_axes(out, v);
+    bst_report_study_plot_histograms(out, v);
     put_worst(out, v);
     put_settings(out, v);
     BST_TRY(put_overall(ctx, out, v));
@@ -481,16 +487,16 @@ static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
             "<p class=\"note\">Made by Boresight %s. study.sqlite and the CSV files beside it hold "
             "all tables.</p>\n",
             bst_version());
-    bst_page_end(out);
+    bst_report_page_end(out);
     return BST_OK;
 }
 
 bst_status bst_report_study(bst_ctx *ctx, bst_run_reader *tables, FILE *out) {
-    bst_study_view view;
-    bst_status status = bst_study_view_read(ctx, tables, &view);
+    bst_report_study_view view;
+    bst_status status = bst_report_study_view_read(ctx, tables, &view);
     if (status == BST_OK) {
         status = put_page(ctx, out, &view);
     }
-    bst_study_view_free(&view);
+    bst_report_study_view_free(&view);
     return status;
 }

@@ -15,36 +15,37 @@ typedef struct series {
 
 /* Finds the series that has a rate over a key: its statistics' columns begin with setting, runs,
  * the key. */
-static bool find_series(const bst_study_view *v, series *out) {
+static bool find_series(const bst_report_study_view *v, series *out) {
     bst_ctx unheard = {0};
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     *out = (series){.table = ""};
-    if (bst_rows_open(&unheard, v->tables,
-                      "SELECT tab, name, unit FROM columns WHERE tab LIKE '%\\_statistics' ESCAPE"
-                      " '\\' AND tab IN (SELECT tab FROM columns WHERE name = 'rate_low')"
-                      " ORDER BY rowid",
-                      0, 0, &rows) != BST_OK) {
+    if (bst_io_rows_open(
+            &unheard, v->tables,
+            "SELECT tab, name, unit FROM columns WHERE tab LIKE '%\\_statistics' ESCAPE"
+            " '\\' AND tab IN (SELECT tab FROM columns WHERE name = 'rate_low')"
+            " ORDER BY rowid",
+            0, 0, &rows) != BST_OK) {
         return false;
     }
-    while (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
-        const char *name = bst_rows_text(rows, 1);
+    while (bst_io_rows_next(&unheard, rows, &more) == BST_OK && more) {
+        const char *name = bst_io_rows_text(rows, 1);
         bool plain = strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_") == strlen(name);
-        if (!plain || (out->table[0] && strcmp(out->table, bst_rows_text(rows, 0)) != 0)) {
+        if (!plain || (out->table[0] && strcmp(out->table, bst_io_rows_text(rows, 0)) != 0)) {
             continue;
         }
-        snprintf(out->table, sizeof out->table, "%s", bst_rows_text(rows, 0));
+        snprintf(out->table, sizeof out->table, "%s", bst_io_rows_text(rows, 0));
         bool key = !out->x[0][0] && strcmp(name, "setting") != 0 && strcmp(name, "runs") != 0;
         bool magnitude = strcmp(name, "v_mag") == 0;
         if (key || magnitude) {
             snprintf(out->x[!key], sizeof out->x[0], "%s", name);
-            snprintf(out->unit[!key], sizeof out->unit[0], "%s", bst_rows_text(rows, 2));
+            snprintf(out->unit[!key], sizeof out->unit[0], "%s", bst_io_rows_text(rows, 2));
         }
         if (strstr(name, "ideal") == name) {
             snprintf(out->ideal, sizeof out->ideal, "%s", name);
         }
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return out->table[0] && out->x[0][0] &&
            strspn(out->table, "abcdefghijklmnopqrstuvwxyz0123456789_") == strlen(out->table);
 }
@@ -54,10 +55,10 @@ typedef struct curve {
     int count;
 } curve;
 
-static bst_status read_curve(bst_ctx *ctx, const bst_study_view *v, const series *s, int x,
+static bst_status read_curve(bst_ctx *ctx, const bst_report_study_view *v, const series *s, int x,
                              int64_t setting, curve *out) {
     char sql[500];
-    bst_rows *rows;
+    bst_io_rows *rows;
     bst_status status;
     bool more;
     out->count = 0;
@@ -66,38 +67,39 @@ static bst_status read_curve(bst_ctx *ctx, const bst_study_view *v, const series
              " ORDER BY 1",
              s->x[x], s->ideal[0] ? "\"" : "", s->ideal[0] ? s->ideal : "NULL",
              s->ideal[0] ? "\"" : "", s->table);
-    BST_TRY(bst_rows_open(ctx, v->tables, sql, setting, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more && out->count < POINTS) {
+    BST_TRY(bst_io_rows_open(ctx, v->tables, sql, setting, 0, &rows));
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more && out->count < POINTS) {
         int i = out->count++;
-        out->x[i] = bst_rows_real(rows, 0);
-        out->rate[i] = bst_rows_real(rows, 1);
-        out->low[i] = bst_rows_real(rows, 2);
-        out->high[i] = bst_rows_real(rows, 3);
-        out->ideal[i] = bst_rows_real(rows, 4);
+        out->x[i] = bst_io_rows_real(rows, 0);
+        out->rate[i] = bst_io_rows_real(rows, 1);
+        out->low[i] = bst_io_rows_real(rows, 2);
+        out->high[i] = bst_io_rows_real(rows, 3);
+        out->ideal[i] = bst_io_rows_real(rows, 4);
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
 /* "read_noise_e 3, aperture_m 0.1" */
-static void describe(const bst_study_view *v, int64_t setting, const bst_study_axis_view *without,
-                     const bst_study_axis_view *only, char text[200]) {
+static void describe(const bst_report_study_view *v, int64_t setting,
+                     const bst_report_study_axis_view *without,
+                     const bst_report_study_axis_view *only, char text[200]) {
     size_t n = 0;
     text[0] = '\0';
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *a = &v->axes[i];
+        const bst_report_study_axis_view *a = &v->axes[i];
         char word[32];
         if (a->swept && a->level_count > 1 && a != without && (!only || a == only) && n < 190) {
             n += (size_t)snprintf(text + n, 200 - n, "%s%s %s", n ? ", " : "", a->name,
-                                  bst_study_word(a, a->of_setting[setting], word));
+                                  bst_report_study_word(a, a->of_setting[setting], word));
         }
     }
 }
 
 /* One chart over s->x[x]: the settings `group` with `count` curves. */
-static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_study_view *v, const series *s,
-                            int x, const int64_t *group, int count,
-                            const bst_study_axis_view *lines) {
+static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_report_study_view *v,
+                            const series *s, int x, const int64_t *group, int count,
+                            const bst_report_study_axis_view *lines) {
     static const int colours[CURVES] = {BST_CHART_BLUE,   BST_CHART_ORANGE, BST_CHART_GREEN,
                                         BST_CHART_VIOLET, BST_CHART_CYAN,   BST_CHART_BROWN};
     curve *curves = calloc((size_t)count, sizeof *curves);
@@ -112,7 +114,7 @@ static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_study_view *v, co
         snprintf(label, sizeof label, "%s%s%s", strcmp(s->x[x], "snr") == 0 ? "SNR" : s->x[x],
                  s->unit[x][0] ? ", " : "", s->unit[x]);
         describe(v, group[0], lines, NULL, where);
-        bst_page_figure(out, BST_PAGE_HALF);
+        bst_report_page_figure(out, BST_PAGE_HALF);
         bst_chart c = {.out = out,
                        .name = "Rate of detection with 95 % intervals and the ideal",
                        .width = 540.0,
@@ -152,17 +154,17 @@ static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_study_view *v, co
                  "the place: noise "
                  "of the trials, or the highest of several places, can lie above it.",
                  where, where[0] ? ". " : "");
-        bst_page_figure_end(out, caption);
+        bst_report_page_figure_end(out, caption);
     }
     free(curves);
     return status;
 }
 
 /* The axis whose values become lines of one chart: the fewest values, CURVES at most. */
-static const bst_study_axis_view *choose_lines(const bst_study_view *v) {
-    const bst_study_axis_view *best = NULL;
+static const bst_report_study_axis_view *choose_lines(const bst_report_study_view *v) {
+    const bst_report_study_axis_view *best = NULL;
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *a = &v->axes[i];
+        const bst_report_study_axis_view *a = &v->axes[i];
         bool grid = strcmp(a->design, "grid") == 0 || strcmp(a->design, "list") == 0;
         if (a->swept && grid && a->level_count > 1 && a->level_count <= CURVES &&
             (!best || a->level_count > best->level_count)) {
@@ -173,10 +175,10 @@ static const bst_study_axis_view *choose_lines(const bst_study_view *v) {
 }
 
 /* Whether two settings differ in no axis but `free_axis`. */
-static bool alike(const bst_study_view *v, int64_t a, int64_t b,
-                  const bst_study_axis_view *free_axis) {
+static bool alike(const bst_report_study_view *v, int64_t a, int64_t b,
+                  const bst_report_study_axis_view *free_axis) {
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *x = &v->axes[i];
+        const bst_report_study_axis_view *x = &v->axes[i];
         if (x->swept && x != free_axis && x->of_setting[a] != x->of_setting[b]) {
             return false;
         }
@@ -184,12 +186,12 @@ static bool alike(const bst_study_view *v, int64_t a, int64_t b,
     return true;
 }
 
-bst_status bst_study_plot_curves(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
+bst_status bst_report_study_plot_curves(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
     series s;
     if (v->settings < 1 || !find_series(v, &s)) {
         return BST_OK;
     }
-    const bst_study_axis_view *lines = choose_lines(v);
+    const bst_report_study_axis_view *lines = choose_lines(v);
     bool *taken = calloc((size_t)v->settings, sizeof *taken);
     if (!taken) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for curves");
@@ -197,8 +199,8 @@ bst_status bst_study_plot_curves(bst_ctx *ctx, FILE *out, const bst_study_view *
     bst_status status = BST_OK;
     int charts = 0;
     int64_t left_out = 0;
-    bst_page_section(out, 2, "Curves");
-    bst_page_grid(out, BST_PAGE_HALF);
+    bst_report_page_section(out, 2, "Curves");
+    bst_report_page_grid(out, BST_PAGE_HALF);
     for (int64_t i = 0; i < v->settings && status == BST_OK; i++) {
         int64_t group[CURVES];
         int count = 0;
@@ -221,11 +223,11 @@ bst_status bst_study_plot_curves(bst_ctx *ctx, FILE *out, const bst_study_view *
         }
     }
     free(taken);
-    bst_page_grid_end(out);
+    bst_report_page_grid_end(out);
     if (left_out > 0) {
         fprintf(out, "<p class=\"note\">%lld more settings are in the table %s.</p>\n",
                 (long long)left_out, s.table);
     }
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
     return status;
 }

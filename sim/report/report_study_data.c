@@ -25,25 +25,25 @@ static double *numbers(int64_t count) {
 }
 
 /* Calls take(user, rows) for each row of a query. */
-static bst_status each_row(bst_ctx *ctx, const bst_study_view *v, const char *sql,
-                           bst_status (*take)(bst_ctx *ctx, bst_study_view *v,
-                                              const bst_rows *rows),
-                           bst_study_view *user) {
-    bst_rows *rows;
+static bst_status each_row(bst_ctx *ctx, const bst_report_study_view *v, const char *sql,
+                           bst_status (*take)(bst_ctx *ctx, bst_report_study_view *v,
+                                              const bst_io_rows *rows),
+                           bst_report_study_view *user) {
+    bst_io_rows *rows;
     bst_status status;
     bool more;
-    BST_TRY(bst_rows_open(ctx, v->tables, sql, 0, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more &&
+    BST_TRY(bst_io_rows_open(ctx, v->tables, sql, 0, 0, &rows));
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more &&
            (status = take(ctx, user, rows)) == BST_OK) {
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     return status;
 }
 
 /* ------------------------------------------------------------------ what there is */
 
-static bst_status take_about(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
-    const char *key = bst_rows_text(rows, 0), *value = bst_rows_text(rows, 1);
+static bst_status take_about(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
+    const char *key = bst_io_rows_text(rows, 0), *value = bst_io_rows_text(rows, 1);
     (void)ctx;
     const struct {
         const char *key;
@@ -67,12 +67,12 @@ static bst_status take_about(bst_ctx *ctx, bst_study_view *v, const bst_rows *ro
     return BST_OK;
 }
 
-static bst_status add_axis(bst_ctx *ctx, bst_study_view *v, const char *name, const char *path,
-                           const char *design, bool swept) {
+static bst_status add_axis(bst_ctx *ctx, bst_report_study_view *v, const char *name,
+                           const char *path, const char *design, bool swept) {
     if (!is_name(name) || v->axis_count == MOST_COLUMNS / 2) {
         return BST_OK;
     }
-    bst_study_axis_view *a = &v->axes[v->axis_count++];
+    bst_report_study_axis_view *a = &v->axes[v->axis_count++];
     snprintf(a->name, sizeof a->name, "%s", name);
     snprintf(a->path, sizeof a->path, "%s", path);
     snprintf(a->design, sizeof a->design, "%s", design);
@@ -85,27 +85,27 @@ static bst_status add_axis(bst_ctx *ctx, bst_study_view *v, const char *name, co
                                                                               : no_memory(ctx);
 }
 
-static bst_status take_axis(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
+static bst_status take_axis(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
     int before = v->axis_count;
-    BST_TRY(add_axis(ctx, v, bst_rows_text(rows, 0), bst_rows_text(rows, 1), bst_rows_text(rows, 3),
-                     strcmp(bst_rows_text(rows, 2), "sweep") == 0));
+    BST_TRY(add_axis(ctx, v, bst_io_rows_text(rows, 0), bst_io_rows_text(rows, 1),
+                     bst_io_rows_text(rows, 3), strcmp(bst_io_rows_text(rows, 2), "sweep") == 0));
     if (v->axis_count > before) {
-        v->axes[before].population = strcmp(bst_rows_text(rows, 2), "population") == 0;
+        v->axes[before].population = strcmp(bst_io_rows_text(rows, 2), "population") == 0;
     }
     return BST_OK;
 }
 
-static bst_status take_scenario(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
+static bst_status take_scenario(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
     (void)ctx;
-    bst_study_axis_view *a = &v->axes[v->axis_count - 1];
+    bst_report_study_axis_view *a = &v->axes[v->axis_count - 1];
     if (a->word_count < BST_STUDY_LEVELS) {
-        snprintf(a->words[a->word_count++], BST_STUDY_WORD, "%.60s", bst_rows_text(rows, 0));
+        snprintf(a->words[a->word_count++], BST_STUDY_WORD, "%.60s", bst_io_rows_text(rows, 0));
     }
     return BST_OK;
 }
 
 /* Several scenarios are varied in turn: an axis of its own, whose values are numbers of names. */
-static bst_status add_scenarios(bst_ctx *ctx, bst_study_view *v) {
+static bst_status add_scenarios(bst_ctx *ctx, bst_report_study_view *v) {
     int before = v->axis_count;
     BST_TRY(add_axis(ctx, v, "scenario", "the scenarios that are varied", "list", true));
     if (v->axis_count == before) {
@@ -115,7 +115,8 @@ static bst_status add_scenarios(bst_ctx *ctx, bst_study_view *v) {
     return each_row(ctx, v, "SELECT name FROM scenarios ORDER BY scenario", take_scenario, v);
 }
 
-static bst_status make_room(bst_ctx *ctx, const bst_study_view *v, bst_study_metric_view *m) {
+static bst_status make_room(bst_ctx *ctx, const bst_report_study_view *v,
+                            bst_report_study_metric_view *m) {
     m->of_run = numbers(v->runs);
     m->mean = numbers(v->settings);
     m->low = numbers(v->settings);
@@ -123,15 +124,15 @@ static bst_status make_room(bst_ctx *ctx, const bst_study_view *v, bst_study_met
     return m->of_run && m->mean && m->low && m->high ? BST_OK : no_memory(ctx);
 }
 
-static bst_status take_metric(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
-    if (!is_name(bst_rows_text(rows, 0)) || v->metric_count == MOST_COLUMNS / 2) {
+static bst_status take_metric(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
+    if (!is_name(bst_io_rows_text(rows, 0)) || v->metric_count == MOST_COLUMNS / 2) {
         return BST_OK;
     }
-    bst_study_metric_view *m = &v->metrics[v->metric_count++];
-    snprintf(m->name, sizeof m->name, "%s", bst_rows_text(rows, 0));
-    snprintf(m->unit, sizeof m->unit, "%s", bst_rows_text(rows, 1));
-    snprintf(m->doc, sizeof m->doc, "%s", bst_rows_text(rows, 2));
-    m->rate = strcmp(bst_rows_text(rows, 3), "rate") == 0;
+    bst_report_study_metric_view *m = &v->metrics[v->metric_count++];
+    snprintf(m->name, sizeof m->name, "%s", bst_io_rows_text(rows, 0));
+    snprintf(m->unit, sizeof m->unit, "%s", bst_io_rows_text(rows, 1));
+    snprintf(m->doc, sizeof m->doc, "%s", bst_io_rows_text(rows, 2));
+    m->rate = strcmp(bst_io_rows_text(rows, 3), "rate") == 0;
     return make_room(ctx, v, m);
 }
 
@@ -139,12 +140,12 @@ static bst_status take_metric(bst_ctx *ctx, bst_study_view *v, const bst_rows *r
 
 /* Value of an axis in a row: a number, or the number of a word. More words than there is room for
  * are as the last one. */
-static double axis_value(bst_study_axis_view *a, const bst_rows *rows, int column) {
-    if (bst_rows_kind(rows, column) != BST_CELL_TEXT) {
-        return bst_rows_real(rows, column);
+static double axis_value(bst_report_study_axis_view *a, const bst_io_rows *rows, int column) {
+    if (bst_io_rows_kind(rows, column) != BST_CELL_TEXT) {
+        return bst_io_rows_real(rows, column);
     }
     char word[BST_STUDY_WORD];
-    snprintf(word, sizeof word, "%.60s", bst_rows_text(rows, column));
+    snprintf(word, sizeof word, "%.60s", bst_io_rows_text(rows, column));
     a->is_text = true;
     int i = 0;
     while (i < a->word_count && strcmp(a->words[i], word) != 0) {
@@ -156,9 +157,9 @@ static double axis_value(bst_study_axis_view *a, const bst_rows *rows, int colum
     return i < BST_STUDY_LEVELS ? i : BST_STUDY_LEVELS - 1;
 }
 
-static bst_status take_setting(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
+static bst_status take_setting(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
     (void)ctx;
-    int64_t setting = bst_rows_int(rows, 0);
+    int64_t setting = bst_io_rows_int(rows, 0);
     int column = 1;
     for (int i = 0; i < v->axis_count; i++) {
         if (v->axes[i].swept && setting >= 0 && setting < v->settings) {
@@ -168,48 +169,48 @@ static bst_status take_setting(bst_ctx *ctx, bst_study_view *v, const bst_rows *
     return BST_OK;
 }
 
-static bst_status take_run(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
+static bst_status take_run(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
     (void)ctx;
     if (v->read == v->runs) {
         return BST_OK;
     }
     int64_t r = v->read++;
     int column = 3;
-    v->run_numbers[r] = bst_rows_int(rows, 0);
-    v->setting_of_run[r] = bst_rows_int(rows, 1);
-    v->done[r] = strcmp(bst_rows_text(rows, 2), "done") == 0;
+    v->run_numbers[r] = bst_io_rows_int(rows, 0);
+    v->setting_of_run[r] = bst_io_rows_int(rows, 1);
+    v->done[r] = strcmp(bst_io_rows_text(rows, 2), "done") == 0;
     v->failed += !v->done[r];
     for (int i = 0; i < v->axis_count; i++) {
         v->axes[i].of_run[r] = axis_value(&v->axes[i], rows, column++);
     }
     for (int i = 0; i < v->metric_count; i++) {
-        v->metrics[i].of_run[r] = bst_rows_real(rows, column++);
+        v->metrics[i].of_run[r] = bst_io_rows_real(rows, column++);
     }
     return BST_OK;
 }
 
 /* Rows of the table speed, which has the runs of the table runs in their order. */
-static bst_status take_speed(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
+static bst_status take_speed(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
     (void)ctx;
-    while (v->read < v->runs && v->run_numbers[v->read] < bst_rows_int(rows, 0)) {
+    while (v->read < v->runs && v->run_numbers[v->read] < bst_io_rows_int(rows, 0)) {
         v->read++;
     }
-    if (v->read < v->runs && v->run_numbers[v->read] == bst_rows_int(rows, 0)) {
-        v->wall.of_run[v->read] = bst_rows_real(rows, 1);
-        v->cpu.of_run[v->read] = bst_rows_real(rows, 2);
+    if (v->read < v->runs && v->run_numbers[v->read] == bst_io_rows_int(rows, 0)) {
+        v->wall.of_run[v->read] = bst_io_rows_real(rows, 1);
+        v->cpu.of_run[v->read] = bst_io_rows_real(rows, 2);
     }
     return BST_OK;
 }
 
-static bst_status take_statistics(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
+static bst_status take_statistics(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
     (void)ctx;
-    int64_t setting = bst_rows_int(rows, 0);
+    int64_t setting = bst_io_rows_int(rows, 0);
     for (int i = 0; i < v->metric_count && setting >= 0 && setting < v->settings; i++) {
-        bst_study_metric_view *m = &v->metrics[i];
-        if (strcmp(m->name, bst_rows_text(rows, 1)) == 0) {
-            m->mean[setting] = bst_rows_real(rows, 2);
-            m->low[setting] = bst_rows_real(rows, 3);
-            m->high[setting] = bst_rows_real(rows, 4);
+        bst_report_study_metric_view *m = &v->metrics[i];
+        if (strcmp(m->name, bst_io_rows_text(rows, 1)) == 0) {
+            m->mean[setting] = bst_io_rows_real(rows, 2);
+            m->low[setting] = bst_io_rows_real(rows, 3);
+            m->high[setting] = bst_io_rows_real(rows, 4);
         }
     }
     return BST_OK;
@@ -217,8 +218,8 @@ static bst_status take_statistics(bst_ctx *ctx, bst_study_view *v, const bst_row
 
 /* "SELECT fixed, "name", ... FROM table": columns of the axes (all, or the swept ones), and of the
  * metrics. */
-static void write_query(const bst_study_view *v, const char *fixed, const char *table, bool all,
-                        char sql[SQL_BYTES]) {
+static void write_query(const bst_report_study_view *v, const char *fixed, const char *table,
+                        bool all, char sql[SQL_BYTES]) {
     size_t n = (size_t)snprintf(sql, SQL_BYTES, "SELECT %s", fixed);
     for (int i = 0; i < v->axis_count; i++) {
         if (all || v->axes[i].swept) {
@@ -233,7 +234,7 @@ static void write_query(const bst_study_view *v, const char *fixed, const char *
 
 /* ------------------------------------------------------------------ what follows from them */
 
-static void find_levels(bst_study_axis_view *a, int64_t settings) {
+static void find_levels(bst_report_study_axis_view *a, int64_t settings) {
     for (int64_t i = 0; i < settings && a->level_count <= BST_STUDY_LEVELS; i++) {
         double value = a->of_setting[i];
         int k = 0;
@@ -264,7 +265,7 @@ static void find_levels(bst_study_axis_view *a, int64_t settings) {
 
 /* Means over the runs of each setting; of speed, with `least`, what the quickest took, as the table
  * speed_sensitivity has it. */
-static void average(const bst_study_view *v, bst_study_metric_view *m, bool least) {
+static void average(const bst_report_study_view *v, bst_report_study_metric_view *m, bool least) {
     for (int64_t r = 0; r < v->runs;) {
         int64_t setting = v->setting_of_run[r], n = 0;
         double sum = 0.0, quickest = INFINITY;
@@ -281,14 +282,14 @@ static void average(const bst_study_view *v, bst_study_metric_view *m, bool leas
     }
 }
 
-static void finish(bst_study_view *v) {
+static void finish(bst_report_study_view *v) {
     for (int i = 0; i < v->axis_count; i++) {
         if (v->axes[i].swept) {
             find_levels(&v->axes[i], v->settings);
         }
     }
     for (int i = 0; i < v->metric_count; i++) {
-        bst_study_metric_view *m = &v->metrics[i];
+        bst_report_study_metric_view *m = &v->metrics[i];
         double low = INFINITY, high = -INFINITY;
         bst_chart_widen(m->of_run, (size_t)v->runs, false, &low, &high);
         m->varies = high > low;
@@ -300,7 +301,7 @@ static void finish(bst_study_view *v) {
     average(v, &v->cpu, true);
 }
 
-static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
+static bst_status allocate(bst_ctx *ctx, bst_report_study_view *v) {
     v->settings = bst_run_reader_int(v->tables, "SELECT count(*) FROM settings", 0, -1);
     v->runs = bst_run_reader_int(v->tables, "SELECT count(*) FROM runs", 0, -1);
     if (v->settings < 0 || v->runs < 0) {
@@ -314,21 +315,22 @@ static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
     v->setting_of_run = calloc(runs, sizeof *v->setting_of_run);
     v->run_numbers = calloc(runs, sizeof *v->run_numbers);
     v->done = calloc(runs, sizeof *v->done);
-    v->wall = (bst_study_metric_view){
+    v->wall = (bst_report_study_metric_view){
         .name = "wall_s", .unit = "s", .doc = "Wall time of a run.", .varies = true};
-    v->cpu = (bst_study_metric_view){.name = "cpu_s",
-                                     .unit = "s",
-                                     .doc = "Processor time of a run, on all threads.",
-                                     .varies = true};
+    v->cpu = (bst_report_study_metric_view){.name = "cpu_s",
+                                            .unit = "s",
+                                            .doc = "Processor time of a run, on all threads.",
+                                            .varies = true};
     return v->axes && v->metrics && v->setting_of_run && v->run_numbers && v->done &&
                    make_room(ctx, v, &v->wall) == BST_OK
                ? make_room(ctx, v, &v->cpu)
                : no_memory(ctx);
 }
 
-bst_status bst_study_view_read(bst_ctx *ctx, bst_run_reader *tables, bst_study_view *v) {
+bst_status bst_report_study_view_read(bst_ctx *ctx, bst_run_reader *tables,
+                                      bst_report_study_view *v) {
     char *sql = malloc(SQL_BYTES);
-    *v = (bst_study_view){.tables = tables, .replicates = 1};
+    *v = (bst_report_study_view){.tables = tables, .replicates = 1};
     bst_status status = sql ? allocate(ctx, v) : no_memory(ctx);
     if (status == BST_OK) {
         status = each_row(ctx, v, "SELECT key, value FROM about", take_about, v);
@@ -375,14 +377,14 @@ bst_status bst_study_view_read(bst_ctx *ctx, bst_run_reader *tables, bst_study_v
     return status;
 }
 
-static void free_metric(bst_study_metric_view *m) {
+static void free_metric(bst_report_study_metric_view *m) {
     free(m->of_run);
     free(m->mean);
     free(m->low);
     free(m->high);
 }
 
-void bst_study_view_free(bst_study_view *v) {
+void bst_report_study_view_free(bst_report_study_view *v) {
     for (int i = 0; i < v->axis_count; i++) {
         free(v->axes[i].of_setting);
         free(v->axes[i].of_run);
@@ -399,10 +401,11 @@ void bst_study_view_free(bst_study_view *v) {
     free(v->setting_of_run);
     free(v->run_numbers);
     free(v->done);
-    *v = (bst_study_view){.tables = NULL};
+    *v = (bst_report_study_view){.tables = NULL};
 }
 
-const char *bst_study_word(const bst_study_axis_view *axis, double value, char text[32]) {
+const char *bst_report_study_word(const bst_report_study_axis_view *axis, double value,
+                                  char text[32]) {
     if (axis->is_text && value >= 0.0 && value < axis->word_count) {
         snprintf(text, 32, "%.31s", axis->words[(int)value]);
     } else if (isnan(value)) {

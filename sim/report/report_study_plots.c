@@ -9,7 +9,7 @@
 /* Lines in a chart; metrics that are drawn. */
 enum { LINES = 6, KEY_METRICS = 6 };
 
-int bst_study_key_metrics(const bst_study_view *v, int *metrics, int room) {
+int bst_report_study_key_metrics(const bst_report_study_view *v, int *metrics, int room) {
     /* what a study is mostly made for; then the others in their order */
     static const char *const first[] = {"acquired",        "custody",           "time_to_confirm_s",
                                         "pointing_rms_px", "track_rms_px",      "snr_pd50",
@@ -35,7 +35,7 @@ int bst_study_key_metrics(const bst_study_view *v, int *metrics, int room) {
     return count;
 }
 
-const char *bst_study_label(const bst_study_metric_view *m, char text[128]) {
+const char *bst_report_study_label(const bst_report_study_metric_view *m, char text[128]) {
     size_t n = strlen(m->name), unit = strlen(m->unit);
     bool said = unit > 0 && n > unit + 1 && strcmp(m->name + n - unit, m->unit) == 0 &&
                 m->name[n - unit - 1] == '_';
@@ -54,9 +54,9 @@ typedef struct curve {
 } curve;
 
 /* `other`: axis whose value is `level`; NULL: all settings. */
-static void make_curve(const bst_study_view *v, const bst_study_metric_view *m,
-                       const bst_study_axis_view *axis, const bst_study_axis_view *other,
-                       double level, curve *out) {
+static void make_curve(const bst_report_study_view *v, const bst_report_study_metric_view *m,
+                       const bst_report_study_axis_view *axis,
+                       const bst_report_study_axis_view *other, double level, curve *out) {
     *out = (curve){.count = 0};
     for (int k = 0; k < axis->level_count; k++) {
         double sum = 0.0, low = INFINITY, high = -INFINITY, own[2] = {NAN, NAN};
@@ -84,11 +84,11 @@ static void make_curve(const bst_study_view *v, const bst_study_metric_view *m,
 }
 
 /* The axis that gets a line for each of its values: of the others the one with fewest. */
-static const bst_study_axis_view *choose_lines(const bst_study_view *v,
-                                               const bst_study_axis_view *axis) {
-    const bst_study_axis_view *best = NULL;
+static const bst_report_study_axis_view *choose_lines(const bst_report_study_view *v,
+                                                      const bst_report_study_axis_view *axis) {
+    const bst_report_study_axis_view *best = NULL;
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *a = &v->axes[i];
+        const bst_report_study_axis_view *a = &v->axes[i];
         if (a != axis && a->swept && a->level_count > 1 && a->level_count <= LINES &&
             (!best || a->level_count < best->level_count)) {
             best = a;
@@ -97,7 +97,7 @@ static const bst_study_axis_view *choose_lines(const bst_study_view *v,
     return best;
 }
 
-static bst_chart begin(FILE *out, const bst_study_axis_view *axis, const char *name,
+static bst_chart begin(FILE *out, const bst_report_study_axis_view *axis, const char *name,
                        const char *label, double low, double high) {
     bst_chart c = {.out = out,
                    .name = name,
@@ -125,16 +125,17 @@ static bst_chart begin(FILE *out, const bst_study_axis_view *axis, const char *n
     bst_chart_begin(&c);
     for (int k = 0; k < n && axis->is_text; k++) {
         char text[32], cut[16];
-        bst_study_word(axis, axis->levels[k], text);
+        bst_report_study_word(axis, axis->levels[k], text);
         snprintf(cut, sizeof cut, "%.15s", text);
         bst_chart_word(&c, k, c.y.low, 0.0, 16.0, "middle", cut);
     }
     return c;
 }
 
-static void put_curves(FILE *out, const bst_study_view *v, const bst_study_metric_view *m,
-                       const bst_study_axis_view *axis) {
-    const bst_study_axis_view *lines = choose_lines(v, axis);
+static void put_curves(FILE *out, const bst_report_study_view *v,
+                       const bst_report_study_metric_view *m,
+                       const bst_report_study_axis_view *axis) {
+    const bst_report_study_axis_view *lines = choose_lines(v, axis);
     int count = lines ? lines->level_count : 1;
     static const int colours[LINES] = {BST_CHART_BLUE,   BST_CHART_ORANGE, BST_CHART_GREEN,
                                        BST_CHART_VIOLET, BST_CHART_CYAN,   BST_CHART_BROWN};
@@ -154,9 +155,9 @@ static void put_curves(FILE *out, const bst_study_view *v, const bst_study_metri
         return;
     }
     char label[128], name[300], text[32], caption[500];
-    bst_study_label(m, label);
+    bst_report_study_label(m, label);
     snprintf(name, sizeof name, "%s against %s", m->name, axis->name);
-    bst_page_figure(out, BST_PAGE_HALF);
+    bst_report_page_figure(out, BST_PAGE_HALF);
     bst_chart c = begin(out, axis, name, label, low, high);
     for (int i = 0; i < count; i++) {
         size_t n = (size_t)list[i].count;
@@ -176,7 +177,7 @@ static void put_curves(FILE *out, const bst_study_view *v, const bst_study_metri
         for (int i = 0; i < count; i++) {
             char entry[120];
             snprintf(entry, sizeof entry, "%s %s", lines->name,
-                     bst_study_word(lines, lines->levels[i], text));
+                     bst_report_study_word(lines, lines->levels[i], text));
             bst_chart_legend(out, BST_KEY_LINE, colours[i], entry);
         }
         fputs("</ul>\n", out);
@@ -187,20 +188,21 @@ static void put_curves(FILE *out, const bst_study_view *v, const bst_study_metri
                    "greatest of them."
              : v->replicates > 1 ? "Means of the settings' runs with 95 % intervals."
                                  : "One run for each setting.");
-    bst_page_figure_end(out, caption);
+    bst_report_page_figure_end(out, caption);
     free(list);
 }
 
 /* Designs that are no grid: a dot for each setting. */
-static void put_dots(FILE *out, const bst_study_view *v, const bst_study_metric_view *m,
-                     const bst_study_axis_view *axis) {
+static void put_dots(FILE *out, const bst_report_study_view *v,
+                     const bst_report_study_metric_view *m,
+                     const bst_report_study_axis_view *axis) {
     double low = INFINITY, high = -INFINITY;
     bst_chart_widen(m->mean, (size_t)v->settings, false, &low, &high);
     if (!(low <= high)) {
         return;
     }
     char label[128], name[300];
-    bst_study_axis_view range = *axis;
+    bst_report_study_axis_view range = *axis;
     double ends[2] = {INFINITY, -INFINITY};
     bst_chart_widen(axis->of_setting, (size_t)v->settings, false, &ends[0], &ends[1]);
     if (axis->level_count > BST_STUDY_LEVELS) {
@@ -208,19 +210,20 @@ static void put_dots(FILE *out, const bst_study_view *v, const bst_study_metric_
         range.level_count = 2;
         range.logarithmic = ends[0] > 0.0 && ends[1] > 30.0 * ends[0];
     }
-    bst_study_label(m, label);
+    bst_report_study_label(m, label);
     snprintf(name, sizeof name, "%s against %s, a dot for each setting", m->name, axis->name);
-    bst_page_figure(out, BST_PAGE_THIRD);
+    bst_report_page_figure(out, BST_PAGE_THIRD);
     bst_chart c = begin(out, &range, name, label, low, high);
     bst_chart_dots(&c, axis->of_setting, m->mean, (size_t)v->settings, BST_CHART_BLUE);
     bst_chart_end(&c);
-    bst_page_figure_end(out, "A dot for each setting: the mean of its runs.");
+    bst_report_page_figure_end(out, "A dot for each setting: the mean of its runs.");
 }
 
-void bst_study_plot_axes(FILE *out, const bst_study_view *v) {
-    int metrics[KEY_METRICS], count = bst_study_key_metrics(v, metrics, KEY_METRICS), swept = 0;
+void bst_report_study_plot_axes(FILE *out, const bst_report_study_view *v) {
+    int metrics[KEY_METRICS], count = bst_report_study_key_metrics(v, metrics, KEY_METRICS),
+                              swept = 0;
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *a = &v->axes[i];
+        const bst_report_study_axis_view *a = &v->axes[i];
         /* the others are told by their effects */
         bool told = strcmp(a->design, "morris") != 0 && strcmp(a->design, "one_at_a_time") != 0;
         swept += a->swept && a->level_count > 1 && told;
@@ -228,14 +231,14 @@ void bst_study_plot_axes(FILE *out, const bst_study_view *v) {
     if (swept == 0 || v->settings < 2) {
         return;
     }
-    bst_page_section(out, 2, "Against what was swept");
+    bst_report_page_section(out, 2, "Against what was swept");
     for (int k = 0; k < count; k++) {
-        const bst_study_metric_view *m = &v->metrics[metrics[k]];
+        const bst_report_study_metric_view *m = &v->metrics[metrics[k]];
         char label[128];
-        bst_page_section(out, 3, bst_study_label(m, label));
-        bst_page_grid(out, BST_PAGE_HALF);
+        bst_report_page_section(out, 3, bst_report_study_label(m, label));
+        bst_report_page_grid(out, BST_PAGE_HALF);
         for (int i = 0; i < v->axis_count; i++) {
-            const bst_study_axis_view *a = &v->axes[i];
+            const bst_report_study_axis_view *a = &v->axes[i];
             bool grid = strcmp(a->design, "grid") == 0 || strcmp(a->design, "list") == 0;
             if (!a->swept || a->level_count < 2) {
                 continue;
@@ -246,10 +249,10 @@ void bst_study_plot_axes(FILE *out, const bst_study_view *v) {
                 put_dots(out, v, m, a);
             }
         }
-        bst_page_grid_end(out);
-        bst_page_section_end(out);
+        bst_report_page_grid_end(out);
+        bst_report_page_section_end(out);
     }
-    bst_page_section_end(out);
+    bst_report_page_section_end(out);
 }
 
 /* ------------------------------------------------------------------ histograms */
@@ -259,11 +262,11 @@ static int ascending(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-void bst_study_plot_histograms(FILE *out, const bst_study_view *v) {
-    int metrics[16], count = bst_study_key_metrics(v, metrics, 16), shown = 0;
+void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v) {
+    int metrics[16], count = bst_report_study_key_metrics(v, metrics, 16), shown = 0;
     double *values = malloc((size_t)(v->runs > 0 ? v->runs : 1) * sizeof *values);
     for (int k = 0; values && k < count && shown < 9; k++) {
-        const bst_study_metric_view *m = &v->metrics[metrics[k]];
+        const bst_report_study_metric_view *m = &v->metrics[metrics[k]];
         size_t n = 0;
         for (int64_t r = 0; r < v->runs; r++) {
             if (isfinite(m->of_run[r])) {
@@ -289,28 +292,28 @@ void bst_study_plot_histograms(FILE *out, const bst_study_view *v) {
             outside += values[i] < low || values[i] > high ? 1 : 0;
         }
         if (shown++ == 0) {
-            bst_page_section(out, 2, "Over all runs");
-            bst_page_grid(out, BST_PAGE_THIRD);
+            bst_report_page_section(out, 2, "Over all runs");
+            bst_report_page_grid(out, BST_PAGE_THIRD);
         }
         char label[128], name[160], caption[400];
         snprintf(name, sizeof name, "Histogram of %s", m->name);
-        bst_page_figure(out, BST_PAGE_THIRD);
+        bst_report_page_figure(out, BST_PAGE_THIRD);
         /* the greatest value is to lie inside the last bin */
-        bst_report_histogram(out, name, bst_study_label(m, label), "runs", values, n, low,
+        bst_report_histogram(out, name, bst_report_study_label(m, label), "runs", values, n, low,
                              high + 1e-9 * (high - low), 30, BST_CHART_BLUE, NULL, NULL);
         /* a meaning that refers to the metric before it says nothing here */
         bool refers = strncmp(m->doc, "The same", 8) == 0;
         int used = snprintf(
             caption, sizeof caption, "%s%s%s", refers ? "" : m->doc,
             refers || !m->doc[0] ? "" : " ",
-            bst_count_text((char[BST_COUNT_TEXT]){0}, (int64_t)(n - outside), "run", "runs"));
+            bst_text_of_count((char[BST_COUNT_TEXT]){0}, (int64_t)(n - outside), "run", "runs"));
         snprintf(caption + used, sizeof caption - (size_t)used,
                  outside > 0 ? "; %zu more lie outside." : ".", outside);
-        bst_page_figure_end(out, caption);
+        bst_report_page_figure_end(out, caption);
     }
     if (shown > 0) {
-        bst_page_grid_end(out);
-        bst_page_section_end(out);
+        bst_report_page_grid_end(out);
+        bst_report_page_section_end(out);
     }
     free(values);
 }

@@ -114,7 +114,7 @@ static void put_shares(const bst_report_drawing *d, const bst_chart *c, const la
         char title[160];
         snprintf(title, sizeof title, "%s: %.1f %% of %s from %.6g s to %.6g s", l->states[k].word,
                  100.0 * share,
-                 bst_count_text((char[BST_COUNT_TEXT]){0}, v->frames, "frame", "frames"),
+                 bst_text_of_count((char[BST_COUNT_TEXT]){0}, v->frames, "frame", "frames"),
                  from * d->unit_s, to * d->unit_s);
         bst_chart_bar(c, from, to, bottom, bottom + share * height, l->states[k].colour, title);
         bottom += share * height;
@@ -175,7 +175,7 @@ void bst_report_timeline(const bst_report_drawing *d) {
     if (s->mode_count == 0 && !shown[0] && !shown[3]) {
         return;
     }
-    bst_page_figure(d->out, BST_PAGE_WIDE);
+    bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c = {.out = d->out,
                    .name =
                        "Timeline of the mode of control, of the target's visibility, of the "
@@ -211,11 +211,11 @@ void bst_report_timeline(const bst_report_drawing *d) {
         }
     }
     fputs("</ul>\n", d->out);
-    bst_page_figure_end(d->out,
-                        s->count > EXACT
-                            ? "What control did, and what there was to see: the height of a bar is "
-                              "the share of the frames of its interval. The colours of the modes "
-                              "are the ground of the charts below."
-                            : "What control did, and what there was to see. The colours of the "
-                              "modes are the ground of the charts below.");
+    bst_report_page_figure_end(
+        d->out, s->count > EXACT
+                    ? "What control did, and what there was to see: the height of a bar is "
+                      "the share of the frames of its interval. The colours of the modes "
+                      "are the ground of the charts below."
+                    : "What control did, and what there was to see. The colours of the "
+                      "modes are the ground of the charts below.");
 }

@@ -14,7 +14,7 @@ typedef struct track {
 } track;
 
 typedef struct cursor {
-    bst_rows *rows; /* NULL: all are read, or there is no such table */
+    bst_io_rows *rows; /* NULL: all are read, or there is no such table */
     bool held;
 } cursor;
 
@@ -24,14 +24,14 @@ static bst_status advance(bst_ctx *ctx, cursor *c, int64_t id, bool *found) {
     while (c->rows) {
         if (!c->held) {
             bool more;
-            BST_TRY(bst_rows_next(ctx, c->rows, &more));
+            BST_TRY(bst_io_rows_next(ctx, c->rows, &more));
             if (!more) {
-                bst_rows_close(c->rows);
+                bst_io_rows_close(c->rows);
                 c->rows = NULL;
                 break;
             }
         }
-        int64_t key = bst_rows_int(c->rows, 0);
+        int64_t key = bst_io_rows_int(c->rows, 0);
         c->held = key > id;
         if (key >= id) {
             *found = !c->held;
@@ -41,20 +41,22 @@ static bst_status advance(bst_ctx *ctx, cursor *c, int64_t id, bool *found) {
     return BST_OK;
 }
 
-static track read_track(const bst_rows *rows) {
-    double ra = bst_rows_real(rows, 3) * BST_DEG_RAD, dec = bst_rows_real(rows, 4) * BST_DEG_RAD;
-    const char *status = bst_rows_text(rows, 2);
-    return (track){.there = true,
-                   .firm = strcmp(status, "confirmed") == 0 || strcmp(status, "coasting") == 0,
-                   .time_s = bst_rows_real(rows, 1),
-                   .snr = bst_rows_real(rows, 10),
-                   .fresh = bst_rows_int(rows, 11) == 1,
-                   .direction = bst_vec3_from_radec(ra, dec),
-                   .east = {-sin(ra), cos(ra), 0.0},
-                   .north = {-sin(dec) * cos(ra), -sin(dec) * sin(ra), cos(dec)},
-                   .rate_east_radps = bst_rows_real(rows, 5) * BST_ARCSEC_RAD,
-                   .rate_north_radps = bst_rows_real(rows, 6) * BST_ARCSEC_RAD,
-                   .cov = {bst_rows_real(rows, 7), bst_rows_real(rows, 8), bst_rows_real(rows, 9)}};
+static track read_track(const bst_io_rows *rows) {
+    double ra = bst_io_rows_real(rows, 3) * BST_DEG_RAD,
+           dec = bst_io_rows_real(rows, 4) * BST_DEG_RAD;
+    const char *status = bst_io_rows_text(rows, 2);
+    return (track){
+        .there = true,
+        .firm = strcmp(status, "confirmed") == 0 || strcmp(status, "coasting") == 0,
+        .time_s = bst_io_rows_real(rows, 1),
+        .snr = bst_io_rows_real(rows, 10),
+        .fresh = bst_io_rows_int(rows, 11) == 1,
+        .direction = bst_vec3_from_radec(ra, dec),
+        .east = {-sin(ra), cos(ra), 0.0},
+        .north = {-sin(dec) * cos(ra), -sin(dec) * sin(ra), cos(dec)},
+        .rate_east_radps = bst_io_rows_real(rows, 5) * BST_ARCSEC_RAD,
+        .rate_north_radps = bst_io_rows_real(rows, 6) * BST_ARCSEC_RAD,
+        .cov = {bst_io_rows_real(rows, 7), bst_io_rows_real(rows, 8), bst_io_rows_real(rows, 9)}};
 }
 
 /* The track carried to the frame's middle, against the truth. */
@@ -68,8 +70,8 @@ static void judge(const bst_report_sensor *s, bst_report_frame *f, const track *
     bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(t->direction, dt, rate));
     bst_vec3 truth =
         bst_vec3_from_radec(f->target_ra_deg * BST_DEG_RAD, f->target_dec_deg * BST_DEG_RAD);
-    f->in_track = t->firm && bst_track_is_on_target(t->direction, rate, dt, truth,
-                                                    s->pixel_scale_arcsec * BST_ARCSEC_RAD);
+    f->in_track = t->firm && bst_eval_track_is_on_target(t->direction, rate, dt, truth,
+                                                         s->pixel_scale_arcsec * BST_ARCSEC_RAD);
     if (!own) {
         return;
     }
@@ -92,8 +94,8 @@ static bst_status walk(bst_ctx *ctx, cursor *frames, cursor *tracks, bst_report_
         BST_TRY(advance(ctx, frames, f->exposure_id, &answered));
         if (answered) {
             s->has_tracks = true;
-            f->attitude = bst_rows_int(frames->rows, 1) == 1;
-            f->tracked_s = bst_rows_real(frames->rows, 2);
+            f->attitude = bst_io_rows_int(frames->rows, 1) == 1;
+            f->tracked_s = bst_io_rows_real(frames->rows, 2);
             latest.there = false;
         }
         for (;;) {
@@ -115,22 +117,23 @@ static bst_status walk(bst_ctx *ctx, cursor *frames, cursor *tracks, bst_report_
 bst_status bst_report_read_tracks(bst_ctx *ctx, const bst_run_reader *run, bst_report_sensor *s) {
     bst_ctx unheard = {0};
     cursor frames = {0}, tracks = {0};
-    if (bst_rows_open(&unheard, run,
-                      "SELECT exposure_id, attitude_valid, CAST(written_tick AS REAL) /"
-                      " (SELECT tick_rate_hz FROM run) FROM track_frames WHERE sensor = ?1",
-                      s->sensor.index, 0, &frames.rows) != BST_OK ||
-        bst_rows_open(&unheard, run,
-                      "SELECT exposure_id, time_s, status, ra_deg, dec_deg, rate_east_arcsec_per_s,"
-                      " rate_north_arcsec_per_s, cov_d1_d1_rad2, cov_d1_d2_rad2, cov_d2_d2_rad2,"
-                      " snr, last_update_tick = tick FROM tracks WHERE sensor = ?1 AND "
-                      "target_of_interest = 1",
-                      s->sensor.index, 0, &tracks.rows) != BST_OK) {
-        bst_rows_close(frames.rows);
+    if (bst_io_rows_open(&unheard, run,
+                         "SELECT exposure_id, attitude_valid, CAST(written_tick AS REAL) /"
+                         " (SELECT tick_rate_hz FROM run) FROM track_frames WHERE sensor = ?1",
+                         s->sensor.index, 0, &frames.rows) != BST_OK ||
+        bst_io_rows_open(
+            &unheard, run,
+            "SELECT exposure_id, time_s, status, ra_deg, dec_deg, rate_east_arcsec_per_s,"
+            " rate_north_arcsec_per_s, cov_d1_d1_rad2, cov_d1_d2_rad2, cov_d2_d2_rad2,"
+            " snr, last_update_tick = tick FROM tracks WHERE sensor = ?1 AND "
+            "target_of_interest = 1",
+            s->sensor.index, 0, &tracks.rows) != BST_OK) {
+        bst_io_rows_close(frames.rows);
         return BST_OK; /* not recorded */
     }
     bst_status status = walk(ctx, &frames, &tracks, s);
-    bst_rows_close(frames.rows);
-    bst_rows_close(tracks.rows);
+    bst_io_rows_close(frames.rows);
+    bst_io_rows_close(tracks.rows);
     if (status == BST_ERR_FORMAT) {
         s->damaged = true;
         return BST_OK;

@@ -20,7 +20,7 @@ static double number_of(const cJSON *node, const char *key) {
 
 /* ------------------------------------------------------------------ how it ended */
 
-static void add_end(const bst_run_reader *run, bst_warnings *w) {
+static void add_end(const bst_run_reader *run, bst_report_warnings *w) {
     const cJSON *manifest = bst_run_reader_manifest(run), *error = get(manifest, "error");
     static const char *const words[] = {
         [BST_RUN_INTERRUPTED] =
@@ -32,16 +32,17 @@ static void add_end(const bst_run_reader *run, bst_warnings *w) {
             "figures are those of what it had stored.",
     };
     if (bst_run_reader_state(run) != BST_RUN_COMPLETE) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", words[bst_run_reader_state(run)]);
+        bst_report_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", words[bst_run_reader_state(run)]);
     }
     if (cJSON_IsString(error)) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "The run failed: %s", error->valuestring);
+        bst_report_warnings_add(w, BST_SEVERITY_PROBLEM, "The run failed: %s", error->valuestring);
     }
     double logged = number_of(manifest, "warnings");
     if (logged > 0.0) {
         char text[64];
-        bst_warnings_add(w, BST_SEVERITY_WARNING, "%s on its standard error while it ran.",
-                         bst_count_text(text, (int64_t)fmin(logged, 1e15), "warning", "warnings"));
+        bst_report_warnings_add(
+            w, BST_SEVERITY_WARNING, "%s on its standard error while it ran.",
+            bst_text_of_count(text, (int64_t)fmin(logged, 1e15), "warning", "warnings"));
     }
 }
 
@@ -49,75 +50,77 @@ static void add_end(const bst_run_reader *run, bst_warnings *w) {
 
 typedef struct sensor_warnings {
     const char *name; /* NULL: of no sensor */
-    bst_warnings *warnings;
+    bst_report_warnings *warnings;
 } sensor_warnings;
 
-static void add_loss(void *user, bst_severity severity, const char *text) {
+static void add_loss(void *user, bst_run_severity severity, const char *text) {
     const sensor_warnings *s = user;
-    bst_warnings_add(s->warnings, severity, "%s%s%s.", s->name ? s->name : "", s->name ? ": " : "",
-                     text);
+    bst_report_warnings_add(s->warnings, severity, "%s%s%s.", s->name ? s->name : "",
+                            s->name ? ": " : "", text);
 }
 
 static void add_losses(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
-                       bst_warnings *w) {
+                       bst_report_warnings *w) {
     for (int i = 0; i < count; i++) {
         sensor_warnings s = {sensors[i].name, w};
         bst_run_losses losses;
-        bst_losses_read(run, sensors[i].name, sensors[i].sensor.index, &losses);
-        bst_losses_tell(&losses, add_loss, &s);
+        bst_run_losses_read(run, sensors[i].name, sensors[i].sensor.index, &losses);
+        bst_run_losses_report(&losses, add_loss, &s);
     }
     const cJSON *counters = get(bst_run_reader_manifest(run), "counters"), *item;
     cJSON_ArrayForEach(item, counters) {
         if (cJSON_IsNumber(item) && fabs(item->valuedouble) < 1e15 && item->string) {
-            bst_losses_tell_counter(item->string, (int64_t)item->valuedouble, add_loss,
-                                    &(sensor_warnings){NULL, w});
+            bst_run_losses_report_counter(item->string, (int64_t)item->valuedouble, add_loss,
+                                          &(sensor_warnings){NULL, w});
         }
     }
 }
 
 /* ------------------------------------------------------------------ summaries */
 
-static void judge_sensor(const bst_report_sensor *s, bool complete, bst_warnings *w) {
+static void judge_sensor(const bst_report_sensor *s, bool complete, bst_report_warnings *w) {
     const bst_loop_figures *f = &s->loop;
     bool acquired = isfinite(f->time_to_acquire_s);
     if (!acquired) {
-        bst_warnings_add(
+        bst_report_warnings_add(
             w, BST_SEVERITY_PROBLEM,
             "%s: the target was never acquired: no track of interest was the target's.", s->name);
     } else if (!isfinite(f->time_to_settle_s)) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM,
-                         "%s: the loop never settled on the target: there are no pointing figures.",
-                         s->name);
+        bst_report_warnings_add(
+            w, BST_SEVERITY_PROBLEM,
+            "%s: the loop never settled on the target: there are no pointing figures.", s->name);
     }
     if (acquired && f->track_fraction < 0.95) {
-        bst_warnings_add(
+        bst_report_warnings_add(
             w, f->track_fraction < 0.5 ? BST_SEVERITY_PROBLEM : BST_SEVERITY_WARNING,
             "%s: the target was in track in only %.1f %% of the frames in which it was "
             "visible from the acquisition on.",
             s->name, 100.0 * f->track_fraction);
     }
     if (f->wrong_target_frames > 0) {
-        bst_warnings_add(w, BST_SEVERITY_WARNING,
-                         "%s: in %" PRId64 " frame%s the track of interest was not the target's.",
-                         s->name, f->wrong_target_frames, f->wrong_target_frames == 1 ? "" : "s");
+        bst_report_warnings_add(
+            w, BST_SEVERITY_WARNING,
+            "%s: in %" PRId64 " frame%s the track of interest was not the target's.", s->name,
+            f->wrong_target_frames, f->wrong_target_frames == 1 ? "" : "s");
     }
     if (s->bad_pixels > 0) {
-        bst_warnings_add(w, BST_SEVERITY_NOTE,
-                         "%s: image processing learned that %" PRId64
-                         " pixel%s bad, and left %s out.",
-                         s->name, s->bad_pixels, s->bad_pixels == 1 ? " is" : "s are",
-                         s->bad_pixels == 1 ? "it" : "them");
+        bst_report_warnings_add(w, BST_SEVERITY_NOTE,
+                                "%s: image processing learned that %" PRId64
+                                " pixel%s bad, and left %s out.",
+                                s->name, s->bad_pixels, s->bad_pixels == 1 ? " is" : "s are",
+                                s->bad_pixels == 1 ? "it" : "them");
     }
     /* with tasks there is always a next target to slew to */
     if (complete && s->task_count < 2 && acquired && f->final_mode >= 0 &&
         f->final_mode != BST_MODE_TRACK) {
-        bst_warnings_add(w, BST_SEVERITY_WARNING, "%s: at the end the mode was %s, not track.",
-                         s->name, bst_mode_name(f->final_mode));
+        bst_report_warnings_add(w, BST_SEVERITY_WARNING,
+                                "%s: at the end the mode was %s, not track.", s->name,
+                                bst_mode_name(f->final_mode));
     }
 }
 
 static void add_summaries(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
-                          bst_warnings *w) {
+                          bst_report_warnings *w) {
     bool complete = bst_run_reader_state(run) == BST_RUN_COMPLETE;
     for (int i = 0; i < count; i++) {
         if (sensors[i].sensor.target[0] && sensors[i].has_tracks) {
@@ -130,7 +133,8 @@ static void add_summaries(const bst_run_reader *run, const bst_report_sensor *se
 
 /* Adds one warning where a query counts more than none on some sensors: "text: a/b 3, a/c 4". */
 static void count_rows(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
-                       const char *sql, bst_severity severity, const char *text, bst_warnings *w) {
+                       const char *sql, bst_run_severity severity, const char *text,
+                       bst_report_warnings *w) {
     char list[300] = "";
     size_t n = 0;
     for (int i = 0; i < count && n < sizeof list; i++) {
@@ -141,15 +145,16 @@ static void count_rows(const bst_run_reader *run, const bst_report_sensor *senso
         }
     }
     if (n > 0) {
-        bst_warnings_add(w, severity, "%s: %s%s", text, list, n < sizeof list ? "." : " ...");
+        bst_report_warnings_add(w, severity, "%s: %s%s", text, list,
+                                n < sizeof list ? "." : " ...");
     }
 }
 
 static void add_tables(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
-                       bst_warnings *w) {
+                       bst_report_warnings *w) {
     static const struct {
         const char *sql;
-        bst_severity severity;
+        bst_run_severity severity;
         const char *text;
     } checks[] = {
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
@@ -170,19 +175,19 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
     }
     for (int i = 0; i < count; i++) {
         if (sensors[i].every > 1) {
-            bst_warnings_add(w, BST_SEVERITY_NOTE,
-                             "%s: of %" PRId64 " exposures one in %" PRId64 " is drawn.",
-                             sensors[i].name, sensors[i].exposures, sensors[i].every);
+            bst_report_warnings_add(w, BST_SEVERITY_NOTE,
+                                    "%s: of %" PRId64 " exposures one in %" PRId64 " is drawn.",
+                                    sensors[i].name, sensors[i].exposures, sensors[i].every);
         }
     }
 }
 
 /* ------------------------------------------------------------------ events */
 
-static void add_events(const bst_run_reader *run, bst_warnings *w) {
+static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
     static const struct {
         const char *kind;
-        bst_severity severity;
+        bst_run_severity severity;
         const char *text;
     } known[] = {
         {"mode", -1, ""}, /* shown by the charts */
@@ -199,16 +204,16 @@ static void add_events(const bst_run_reader *run, bst_warnings *w) {
         {"brightness_change", BST_SEVERITY_NOTE, "the tracker noticed a change of brightness"},
     };
     bst_ctx unheard = {0};
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
-    if (bst_rows_open(&unheard, run,
-                      "SELECT kind, min(source), count(DISTINCT source), count(*), min(time_s)"
-                      " FROM events GROUP BY kind ORDER BY min(tick), kind",
-                      0, 0, &rows) != BST_OK) {
+    if (bst_io_rows_open(&unheard, run,
+                         "SELECT kind, min(source), count(DISTINCT source), count(*), min(time_s)"
+                         " FROM events GROUP BY kind ORDER BY min(tick), kind",
+                         0, 0, &rows) != BST_OK) {
         return;
     }
-    while (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
-        const char *kind = bst_rows_text(rows, 0), *text = kind;
+    while (bst_io_rows_next(&unheard, rows, &more) == BST_OK && more) {
+        const char *kind = bst_io_rows_text(rows, 0), *text = kind;
         int severity = BST_SEVERITY_NOTE;
         for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
             if (strcmp(known[k].kind, kind) == 0) {
@@ -220,22 +225,23 @@ static void add_events(const bst_run_reader *run, bst_warnings *w) {
             continue;
         }
         char who[120];
-        int64_t sources = bst_rows_int(rows, 2), times = bst_rows_int(rows, 3);
-        snprintf(who, sizeof who, "%s", bst_rows_text(rows, 1));
+        int64_t sources = bst_io_rows_int(rows, 2), times = bst_io_rows_int(rows, 3);
+        snprintf(who, sizeof who, "%s", bst_io_rows_text(rows, 1));
         if (sources > 1) {
             snprintf(who, sizeof who, "%" PRId64 " modules", sources);
         }
-        bst_warnings_add(w, (bst_severity)severity, "%s: %s: %" PRId64 " time%s, first at %.6g s.",
-                         who, text, times, times == 1 ? "" : "s", bst_rows_real(rows, 4));
+        bst_report_warnings_add(w, (bst_run_severity)severity,
+                                "%s: %s: %" PRId64 " time%s, first at %.6g s.", who, text, times,
+                                times == 1 ? "" : "s", bst_io_rows_real(rows, 4));
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
 }
 
 /* ------------------------------------------------------------------ margins */
 
 static void hear(void *user, bst_log_level level, const char *message) {
     (void)level;
-    bst_warnings_add(user, BST_SEVERITY_WARNING, "%s.", message);
+    bst_report_warnings_add(user, BST_SEVERITY_WARNING, "%s.", message);
 }
 
 const char *bst_report_folder(const bst_run_reader *run, char text[256]) {
@@ -254,11 +260,11 @@ const char *bst_report_local(const bst_run_reader *run, const char *message) {
 }
 
 void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *sensors, int count,
-                             const bst_scenario *scenario, bst_warnings *w) {
+                             const bst_scenario *scenario, bst_report_warnings *w) {
     add_end(run, w);
     const char *problem;
     for (int i = 0; (problem = bst_run_reader_problem(run, i)); i++) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", bst_report_local(run, problem));
+        bst_report_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", bst_report_local(run, problem));
     }
     add_summaries(run, sensors, count, w);
     add_losses(run, sensors, count, w);
@@ -266,9 +272,10 @@ void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *senso
     const cJSON *misfits = get(bst_run_reader_manifest(run), "wcs_misfit_px"), *item;
     cJSON_ArrayForEach(item, misfits) {
         if (cJSON_IsNumber(item) && item->valuedouble > 1e-3) {
-            bst_warnings_add(w, BST_SEVERITY_WARNING,
-                             "%s: the WCS of its frames misses the distortion by up to %.3g px.",
-                             item->string, item->valuedouble);
+            bst_report_warnings_add(
+                w, BST_SEVERITY_WARNING,
+                "%s: the WCS of its frames misses the distortion by up to %.3g px.", item->string,
+                item->valuedouble);
         }
     }
     if (scenario) {

@@ -26,7 +26,7 @@ typedef struct pending {
 
 struct bst_link_host {
     const bst_scenario *scenario;
-    const bst_module_config *module;
+    const bst_scenario_module_config *module;
     char instance[256], source_name[256];
     bst_simulation *sim;
     bst_module_desc source;
@@ -167,7 +167,7 @@ static void find_ports(bst_link_host *host) {
 static bst_status find_part(bst_ctx *ctx, bst_link_host *host, const char *part) {
     const bst_observer_config *observers = host->scenario->observers.items;
     for (int m = 0; m < host->scenario->module_count && !host->module; m++) {
-        const bst_module_config *module = &host->scenario->modules[m];
+        const bst_scenario_module_config *module = &host->scenario->modules[m];
         const bst_observer_config *observer = &observers[module->observer];
         const bst_sensor_config *sensors = observer->sensors.items;
         char scope[180];

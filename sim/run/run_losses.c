@@ -13,7 +13,7 @@
 typedef struct kind {
     const char *key, *frames_key;
     size_t amount, frames;
-    bst_severity severity;
+    bst_run_severity severity;
     const char *what, *one, *many;
     const char *sql; /* the sum of amounts and the number of frames */
 } kind;
@@ -59,7 +59,7 @@ static void set(bst_run_losses *losses, size_t at, int64_t value) {
     memcpy((char *)losses + at, &value, sizeof value);
 }
 
-void bst_losses_tell(const bst_run_losses *losses, bst_loss_fn fn, void *user) {
+void bst_run_losses_report(const bst_run_losses *losses, bst_run_loss_fn fn, void *user) {
     for (int k = 0; k < KINDS; k++) {
         const kind *loss = &kinds[k];
         int64_t frames = get(losses, loss->frames);
@@ -67,9 +67,9 @@ void bst_losses_tell(const bst_run_losses *losses, bst_loss_fn fn, void *user) {
         if (frames == 0) {
             continue;
         }
-        bst_count_text(of, losses->frames, "frame", "frames");
+        bst_text_of_count(of, losses->frames, "frame", "frames");
         if (loss->one) {
-            bst_count_text(amount, get(losses, loss->amount), loss->one, loss->many);
+            bst_text_of_count(amount, get(losses, loss->amount), loss->one, loss->many);
             snprintf(text, sizeof text, "%s: %s in %" PRId64 " of %s", loss->what, amount, frames,
                      of);
         } else {
@@ -79,13 +79,14 @@ void bst_losses_tell(const bst_run_losses *losses, bst_loss_fn fn, void *user) {
     }
 }
 
-void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, void *user) {
+void bst_run_losses_report_counter(const char *name, int64_t count, bst_run_loss_fn fn,
+                                   void *user) {
     static const char *const left_out[] = {"link_messages",       "detections_overflow",
                                            "tracker_overflow",    "truth_overflow",
                                            "tracker_no_attitude", "frame_without_stars"};
     static const struct {
         const char *name;
-        bst_severity severity;
+        bst_run_severity severity;
         const char *what, *one, *many;
     } known[] = {
         {"queue_overflow", BST_SEVERITY_PROBLEM, "overwritten before they were read", "message",
@@ -125,7 +126,7 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
     }
     for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
         if (strcmp(known[k].name, name) == 0) {
-            bst_count_text(amount, count, known[k].one, known[k].many);
+            bst_text_of_count(amount, count, known[k].one, known[k].many);
             snprintf(text, sizeof text, "%s: %s (%s)", known[k].what, amount, name);
             fn(user, known[k].severity, text);
             return;
@@ -133,13 +134,13 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
     }
     /* of a plug-in, or of the link */
     snprintf(text, sizeof text, "%.200s: counted %s", name,
-             bst_count_text(amount, count, "time", "times"));
+             bst_text_of_count(amount, count, "time", "times"));
     fn(user, BST_SEVERITY_WARNING, text);
 }
 
-void bst_losses_print(void *user, bst_severity severity, const char *text) {
+void bst_run_losses_print(void *user, bst_run_severity severity, const char *text) {
     static const char *const words[] = {"problem", "warning", "note"};
-    bst_losses_printer *p = user;
+    bst_run_losses_printer *p = user;
     if (!p->begun) {
         puts("losses");
         p->begun = true;
@@ -148,7 +149,7 @@ void bst_losses_print(void *user, bst_severity severity, const char *text) {
            text);
 }
 
-void bst_losses_add(cJSON *manifest, const char *sensor, const bst_run_losses *losses) {
+void bst_run_losses_add(cJSON *manifest, const char *sensor, const bst_run_losses *losses) {
     cJSON *all = cJSON_GetObjectItemCaseSensitive(manifest, "losses");
     if (!all) {
         all = cJSON_AddObjectToObject(manifest, "losses");
@@ -173,8 +174,8 @@ static int64_t count_of(const cJSON *node, const char *key) {
                : 0;
 }
 
-void bst_losses_read(const bst_run_reader *run, const char *sensor, int64_t index,
-                     bst_run_losses *out) {
+void bst_run_losses_read(const bst_run_reader *run, const char *sensor, int64_t index,
+                         bst_run_losses *out) {
     const cJSON *all = cJSON_GetObjectItemCaseSensitive(bst_run_reader_manifest(run), "losses");
     const cJSON *node = cJSON_GetObjectItemCaseSensitive(all, sensor);
     *out = (bst_run_losses){.frames = count_of(node, "frames")};
@@ -193,14 +194,14 @@ void bst_losses_read(const bst_run_reader *run, const char *sensor, int64_t inde
             frames = count_of(node, kinds[k].frames_key);
         } else {
             bst_ctx unheard = {0};
-            bst_rows *rows;
+            bst_io_rows *rows;
             bool more;
-            if (bst_rows_open(&unheard, run, kinds[k].sql, index, 0, &rows) == BST_OK) {
-                if (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
-                    amount = bst_rows_int(rows, 0);
-                    frames = bst_rows_int(rows, 1);
+            if (bst_io_rows_open(&unheard, run, kinds[k].sql, index, 0, &rows) == BST_OK) {
+                if (bst_io_rows_next(&unheard, rows, &more) == BST_OK && more) {
+                    amount = bst_io_rows_int(rows, 0);
+                    frames = bst_io_rows_int(rows, 1);
                 }
-                bst_rows_close(rows);
+                bst_io_rows_close(rows);
             }
         }
         if (kinds[k].key) {

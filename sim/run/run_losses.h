@@ -8,34 +8,34 @@
 
 struct cJSON;
 
-typedef enum bst_severity {
+typedef enum bst_run_severity {
     BST_SEVERITY_PROBLEM,
     BST_SEVERITY_WARNING,
     BST_SEVERITY_NOTE
-} bst_severity;
+} bst_run_severity;
 
-typedef void (*bst_loss_fn)(void *user, bst_severity severity, const char *text);
+typedef void (*bst_run_loss_fn)(void *user, bst_run_severity severity, const char *text);
 
 /* A line for each kind of loss of a sensor, such as "cut to imgproc's capacity: 5120 detections in
  * 12 of 300 frames". */
-void bst_losses_tell(const bst_run_losses *losses, bst_loss_fn fn, void *user);
+void bst_run_losses_report(const bst_run_losses *losses, bst_run_loss_fn fn, void *user);
 /* A line for a counter of the engine: none for a count of 0, for what is no loss, and for those
- * that bst_losses_tell has. */
-void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, void *user);
+ * that bst_run_losses_report has. */
+void bst_run_losses_report_counter(const char *name, int64_t count, bst_run_loss_fn fn, void *user);
 
 /* What prints such lines on the standard output, under a heading "losses" before the first. */
-typedef struct bst_losses_printer {
+typedef struct bst_run_losses_printer {
     const char *sensor; /* before each line; NULL: none */
     bool begun;
-} bst_losses_printer;
-/* A bst_loss_fn; `user` is a bst_losses_printer. */
-void bst_losses_print(void *user, bst_severity severity, const char *text);
+} bst_run_losses_printer;
+/* A bst_run_loss_fn; `user` is a bst_run_losses_printer. */
+void bst_run_losses_print(void *user, bst_run_severity severity, const char *text);
 
 /* Adds the losses above 0 to the object `losses` of a manifest under the sensor's name. */
-void bst_losses_add(struct cJSON *manifest, const char *sensor, const bst_run_losses *losses);
+void bst_run_losses_add(struct cJSON *manifest, const char *sensor, const bst_run_losses *losses);
 /* The sensor's losses as the manifest has them, else those of the run's tables; `index` is its row
  * of the table sensors. */
-void bst_losses_read(const bst_run_reader *run, const char *sensor, int64_t index,
-                     bst_run_losses *out);
+void bst_run_losses_read(const bst_run_reader *run, const char *sensor, int64_t index,
+                         bst_run_losses *out);
 
 #endif

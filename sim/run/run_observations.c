@@ -11,7 +11,7 @@
 #include "sim/onboard/knowledge.h"
 #include "tracker/mtt/tangent.h"
 
-void bst_creation_date(char text[32]) {
+void bst_run_creation_date(char text[32]) {
     time_t now = time(NULL);
     struct tm utc = {0};
     gmtime_r(&now, &utc);
@@ -31,11 +31,11 @@ bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run, bst_run_s
     out->tick_rate_hz = out->scenario.tick_rate_hz;
     BST_TRY(bst_world_create(ctx, out->scenario.file, &config, &out->scenario.observers,
                              out->scenario.base_dir, out->scenario.epoch, &out->world));
-    return bst_view_create(ctx, out->world, &out->view);
+    return bst_world_view_create(ctx, out->world, &out->view);
 }
 
 void bst_run_scene_close(bst_run_scene *scene) {
-    bst_view_free(scene->view);
+    bst_world_view_free(scene->view);
     bst_world_free(scene->world);
     if (scene->json) {
         bst_scenario_free(&scene->scenario);
@@ -44,7 +44,7 @@ void bst_run_scene_close(bst_run_scene *scene) {
 }
 
 bst_status bst_run_scene_find(bst_ctx *ctx, const bst_run_scene *scene,
-                              const bst_export_sensor *sensor, int *observer_index,
+                              const bst_run_sensor *sensor, int *observer_index,
                               int *sensor_index) {
     const bst_observer_config *observers = scene->scenario.observers.items;
     for (int i = 0; i < scene->scenario.observers.count; i++) {
@@ -111,26 +111,26 @@ typedef struct gathering {
 } gathering;
 
 /* The detection's place on the sky, and what its errors and the attitude's make of it. */
-static void measure(const gathering *g, const bst_rows *rows, const bst_light *light,
+static void measure(const gathering *g, const bst_io_rows *rows, const bst_astro_light *light,
                     bst_od_observation *out) {
-    double x = bst_rows_real(rows, X_PX), y = bst_rows_real(rows, Y_PX);
+    double x = bst_io_rows_real(rows, X_PX), y = bst_io_rows_real(rows, Y_PX);
     bst_quat back = bst_quat_conj(bst_quat_unit(
-        (bst_quat){bst_rows_real(rows, ATTITUDE), bst_rows_real(rows, ATTITUDE + 1),
-                   bst_rows_real(rows, ATTITUDE + 2), bst_rows_real(rows, ATTITUDE + 3)}));
+        (bst_quat){bst_io_rows_real(rows, ATTITUDE), bst_io_rows_real(rows, ATTITUDE + 1),
+                   bst_io_rows_real(rows, ATTITUDE + 2), bst_io_rows_real(rows, ATTITUDE + 3)}));
     bst_vec3 v = bst_camera_unproject(g->camera, x, y), columns[5];
     const bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     columns[0] = bst_vec3_sub(bst_camera_unproject(g->camera, x + 0.5, y),
                               bst_camera_unproject(g->camera, x - 0.5, y));
     columns[1] = bst_vec3_sub(bst_camera_unproject(g->camera, x, y + 0.5),
                               bst_camera_unproject(g->camera, x, y - 0.5));
-    double c[5][5] = {{bst_rows_real(rows, COV_PX), bst_rows_real(rows, COV_PX + 1)},
-                      {bst_rows_real(rows, COV_PX + 1), bst_rows_real(rows, COV_PX + 2)}};
+    double c[5][5] = {{bst_io_rows_real(rows, COV_PX), bst_io_rows_real(rows, COV_PX + 1)},
+                      {bst_io_rows_real(rows, COV_PX + 1), bst_io_rows_real(rows, COV_PX + 2)}};
     for (int i = 0; i < 3; i++) {
         columns[2 + i] = bst_vec3_cross(unit[i], v);
-        double sigma = bst_rows_real(rows, SIGMA + i) * BST_ARCSEC_RAD;
+        double sigma = bst_io_rows_real(rows, SIGMA + i) * BST_ARCSEC_RAD;
         c[2 + i][2 + i] = sigma * sigma;
     }
-    out->direction = bst_light_unaberrate(light, bst_quat_rotate(back, v));
+    out->direction = bst_astro_light_unaberrate(light, bst_quat_rotate(back, v));
     bst_tangent axes = bst_tangent_at(out->direction);
     double j[2][5];
     for (int i = 0; i < 5; i++) {
@@ -139,7 +139,7 @@ static void measure(const gathering *g, const bst_rows *rows, const bst_light *l
         j[1][i] = bst_vec3_dot(column, axes.e2);
     }
     for (int axis = 0; axis < 2; axis++) { /* about camera x and y; all of it: see set_shared */
-        double sigma = bst_rows_real(rows, SIGMA + axis) * BST_ARCSEC_RAD;
+        double sigma = bst_io_rows_real(rows, SIGMA + axis) * BST_ARCSEC_RAD;
         out->shared_rad[0][axis] = j[0][2 + axis] * sigma;
         out->shared_rad[1][axis] = j[1][2 + axis] * sigma;
     }
@@ -154,11 +154,11 @@ static void measure(const gathering *g, const bst_rows *rows, const bst_light *l
 
 /* Stars leave the field as the camera turns: of two fields that are d apart along a side s they
  * have the part 1 - d / s in common, of which the exponential has the same integral. */
-static double change_of_stars(gathering *g, const bst_rows *rows) {
+static double change_of_stars(gathering *g, const bst_io_rows *rows) {
     const bst_camera *c = g->camera;
     bst_vec3 before = g->boresight;
-    bst_quat q = {bst_rows_real(rows, ATTITUDE), bst_rows_real(rows, ATTITUDE + 1),
-                  bst_rows_real(rows, ATTITUDE + 2), bst_rows_real(rows, ATTITUDE + 3)};
+    bst_quat q = {bst_io_rows_real(rows, ATTITUDE), bst_io_rows_real(rows, ATTITUDE + 1),
+                  bst_io_rows_real(rows, ATTITUDE + 2), bst_io_rows_real(rows, ATTITUDE + 3)};
     g->boresight = bst_quat_rotate(bst_quat_conj(bst_quat_unit(q)), (bst_vec3){0.0, 0.0, 1.0});
     double side = 0.5 * (double)(c->width_px + c->height_px) * bst_camera_scale_rad(c);
     return g->track.count > 1 ? 2.0 * bst_vec3_angle(before, g->boresight) / side : 0.0;
@@ -174,8 +174,8 @@ static void set_shared(gathering *g) {
     }
 }
 
-static bst_status add(bst_ctx *ctx, gathering *g, const bst_rows *rows) {
-    if (!g->filtered && (bst_rows_int(rows, VALID) == 0 || bst_rows_is_null(rows, COV_PX))) {
+static bst_status add(bst_ctx *ctx, gathering *g, const bst_io_rows *rows) {
+    if (!g->filtered && (bst_io_rows_int(rows, VALID) == 0 || bst_io_rows_is_null(rows, COV_PX))) {
         g->track.skipped++;
         return BST_OK;
     }
@@ -188,38 +188,39 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_rows *rows) {
         g->items = items;
         g->capacity = capacity;
     }
-    int64_t tick = bst_rows_int(rows, TICK);
+    int64_t tick = bst_io_rows_int(rows, TICK);
     double seconds = (double)tick / (double)g->scene->tick_rate_hz;
-    bst_state eye;
+    bst_world_state eye;
     bst_bodies bodies;
-    BST_TRY(bst_view_believed(ctx, g->scene->view, g->observer, g->sensor_index, seconds, &eye,
-                              &bodies));
+    BST_TRY(bst_world_view_nav(ctx, g->scene->view, g->observer, g->sensor_index, seconds, &eye,
+                               &bodies));
     bst_run_observation *o = &g->items[g->track.count++];
     *o = (bst_run_observation){
         .time = bst_time_at_tick(g->scene->scenario.epoch, tick, g->scene->tick_rate_hz),
-        .v_mag = bst_rows_is_null(rows, V_MAG) ? NAN : bst_rows_real(rows, V_MAG),
-        .snr = bst_rows_is_null(rows, SNR) ? NAN : bst_rows_real(rows, SNR),
+        .v_mag = bst_io_rows_is_null(rows, V_MAG) ? NAN : bst_io_rows_real(rows, V_MAG),
+        .snr = bst_io_rows_is_null(rows, SNR) ? NAN : bst_io_rows_real(rows, SNR),
         .od.observer = {.time_s = seconds,
                         .position_m = eye.position_m,
                         .velocity_mps = eye.velocity_mps,
                         .earth_bary_mps = bodies.earth_bary_mps}};
     if (g->filtered) {
-        o->od.direction = bst_vec3_from_radec(bst_rows_real(rows, RA) * BST_DEG_RAD,
-                                              bst_rows_real(rows, DEC) * BST_DEG_RAD);
-        o->od.cov_11 = bst_rows_real(rows, COV_D);
-        o->od.cov_12 = bst_rows_real(rows, COV_D + 1);
-        o->od.cov_22 = bst_rows_real(rows, COV_D + 2);
+        o->od.direction = bst_vec3_from_radec(bst_io_rows_real(rows, RA) * BST_DEG_RAD,
+                                              bst_io_rows_real(rows, DEC) * BST_DEG_RAD);
+        o->od.cov_11 = bst_io_rows_real(rows, COV_D);
+        o->od.cov_12 = bst_io_rows_real(rows, COV_D + 1);
+        o->od.cov_22 = bst_io_rows_real(rows, COV_D + 2);
     } else {
-        bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+        bst_astro_light light = bst_astro_light_at(&bodies, eye.position_m, eye.velocity_mps);
         measure(g, rows, &light, &o->od);
         o->od.shared_change = change_of_stars(g, rows);
-        g->share = bst_rows_real(rows, SHARED);
+        g->share = bst_io_rows_real(rows, SHARED);
     }
-    g->track.target = g->track.target || bst_rows_int(rows, TARGET) != 0;
+    g->track.target = g->track.target || bst_io_rows_int(rows, TARGET) != 0;
     if (g->track.count == 1) {
-        g->track.exposure_s = bst_rows_is_null(rows, EXPOSURE)
-                                  ? NAN
-                                  : bst_rows_real(rows, EXPOSURE) / (double)g->scene->tick_rate_hz;
+        g->track.exposure_s =
+            bst_io_rows_is_null(rows, EXPOSURE)
+                ? NAN
+                : bst_io_rows_real(rows, EXPOSURE) / (double)g->scene->tick_rate_hz;
     }
     return BST_OK;
 }
@@ -232,26 +233,26 @@ static bst_status hand_over(bst_ctx *ctx, gathering *g, bst_run_track_fn take, v
     return status;
 }
 
-bst_status bst_run_observations(bst_ctx *ctx, bst_run_scene *scene, const bst_export_sensor *sensor,
+bst_status bst_run_observations(bst_ctx *ctx, bst_run_scene *scene, const bst_run_sensor *sensor,
                                 int64_t id, bool filtered, bst_run_track_fn take, void *user) {
     gathering g = {.scene = scene, .filtered = filtered, .track.sensor = sensor};
     bst_knowledge *knowledge = NULL;
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more;
     BST_TRY(bst_run_scene_find(ctx, scene, sensor, &g.observer, &g.sensor_index));
-    BST_TRY(bst_rows_open(ctx, scene->run, query, sensor->index, id, &rows));
+    BST_TRY(bst_io_rows_open(ctx, scene->run, query, sensor->index, id, &rows));
     bst_status status =
         bst_knowledge_create(ctx, scene->world, g.observer, g.sensor_index, &knowledge);
     g.camera = status == BST_OK ? bst_knowledge_camera(knowledge) : NULL;
-    while (status == BST_OK && (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        int64_t now = bst_rows_int(rows, ID);
+    while (status == BST_OK && (status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        int64_t now = bst_io_rows_int(rows, ID);
         if (now != g.track.id) {
             status = hand_over(ctx, &g, take, user);
             g.track.id = now;
         }
         status = status == BST_OK ? add(ctx, &g, rows) : status;
     }
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     status = status == BST_OK ? hand_over(ctx, &g, take, user) : status;
     free(g.items);
     bst_knowledge_free(knowledge);

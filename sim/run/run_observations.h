@@ -14,7 +14,7 @@ typedef struct bst_run_scene {
     struct bst_json *json;
     bst_scenario scenario;
     bst_world *world;
-    bst_view *view;
+    bst_world_view *view;
     int64_t tick_rate_hz;
 } bst_run_scene;
 
@@ -25,7 +25,7 @@ bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run,
 void bst_run_scene_close(bst_run_scene *scene);
 /* Indices of a sensor of the run's tables in the scenario. BST_ERR_FORMAT when it is not there. */
 bst_status bst_run_scene_find(bst_ctx *ctx, const bst_run_scene *scene,
-                              const bst_export_sensor *sensor, int *observer_index,
+                              const bst_run_sensor *sensor, int *observer_index,
                               int *sensor_index) BST_MUST_CHECK;
 
 typedef struct bst_run_observation {
@@ -36,7 +36,7 @@ typedef struct bst_run_observation {
 
 /* A track that was confirmed, or was the target of interest. */
 typedef struct bst_run_track {
-    const bst_export_sensor *sensor;
+    const bst_run_sensor *sensor;
     int64_t id;
     bool target;       /* the tracker took it for its target at some time */
     double exposure_s; /* of its first frame; NAN: not known */
@@ -54,11 +54,11 @@ typedef bst_status (*bst_run_track_fn)(void *user, bst_ctx *ctx, const bst_run_t
  * independent. Frames without such an attitude are left out. With `filtered` the tracker's own
  * state and its covariance, whose errors are correlated. BST_ERR_FORMAT when the run did not record
  * tracks or detections. */
-bst_status bst_run_observations(bst_ctx *ctx, bst_run_scene *scene, const bst_export_sensor *sensor,
+bst_status bst_run_observations(bst_ctx *ctx, bst_run_scene *scene, const bst_run_sensor *sensor,
                                 int64_t id, bool filtered, bst_run_track_fn take,
                                 void *user) BST_MUST_CHECK;
 
 /* "2022-06-16T22:10:00" of now, for CREATION_DATE. */
-void bst_creation_date(char text[32]);
+void bst_run_creation_date(char text[32]);
 
 #endif

@@ -17,7 +17,7 @@ typedef struct picture {
     int64_t mid_tick;
     bst_window window;
     double binning;
-    bst_mark *marks; /* of all detections */
+    bst_io_mark *marks; /* of all detections */
     int mark_count, mark_room;
     bool processed;
     bool has_target;
@@ -35,7 +35,7 @@ struct bst_run_pictures {
     int target;
     picture first, last, pending; /* pending: newest frame whose tracks have not come */
     int mode;
-    bst_pointing_point points[MAX_POINTS];
+    bst_io_pointing_point points[MAX_POINTS];
     int point_count;
     int64_t judged, stride;
 };
@@ -114,7 +114,7 @@ static void mark_truth(const bst_run_pictures *p, picture *pic, const bst_truth 
 
 static bst_status mark_detections(bst_ctx *ctx, picture *pic, const bst_detections *detections) {
     if (detections->count > pic->mark_room) {
-        bst_mark *more = realloc(pic->marks, (size_t)detections->count * sizeof *more);
+        bst_io_mark *more = realloc(pic->marks, (size_t)detections->count * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for pictures");
         }
@@ -123,12 +123,12 @@ static bst_status mark_detections(bst_ctx *ctx, picture *pic, const bst_detectio
     }
     for (int i = 0; i < detections->count; i++) {
         const bst_detection *d = &detections->items[i];
-        pic->marks[i] = (bst_mark){.x_px = pixel_of(pic, d->x_px, pic->window.x0),
-                                   .y_px = pixel_of(pic, d->y_px, pic->window.y0),
-                                   .importance = d->flux_e,
-                                   .kind = d->label != BST_LABEL_STAR ? BST_MARK_DETECTION
-                                           : d->star_id != 0          ? BST_MARK_STAR
-                                                                      : BST_MARK_REST};
+        pic->marks[i] = (bst_io_mark){.x_px = pixel_of(pic, d->x_px, pic->window.x0),
+                                      .y_px = pixel_of(pic, d->y_px, pic->window.y0),
+                                      .importance = d->flux_e,
+                                      .kind = d->label != BST_LABEL_STAR ? BST_MARK_DETECTION
+                                              : d->star_id != 0          ? BST_MARK_STAR
+                                                                         : BST_MARK_REST};
     }
     pic->mark_count = detections->count;
     return BST_OK;
@@ -137,13 +137,13 @@ static bst_status mark_detections(bst_ctx *ctx, picture *pic, const bst_detectio
 /* The target's own detections first, then the brightest. */
 static void sort_marks(const picture *pic) {
     for (int i = 0; i < pic->mark_count; i++) {
-        bst_mark *m = &pic->marks[i];
+        bst_io_mark *m = &pic->marks[i];
         if (pic->has_target && hypot(m->x_px - pic->target_x_px, m->y_px - pic->target_y_px) <=
                                    BST_RIGHT_TARGET_PX / pic->binning) {
             m->importance = INFINITY;
         }
     }
-    bst_mark_sort(pic->marks, pic->mark_count);
+    bst_io_mark_sort(pic->marks, pic->mark_count);
 }
 
 /* The newest frame has been through the whole chain: it becomes the last one, and the first if
@@ -221,13 +221,13 @@ void bst_run_pictures_judged(bst_run_pictures *p, const bst_loop_frame *f) {
         p->point_count = MAX_POINTS / 2;
         p->stride *= 2;
     }
-    p->points[p->point_count++] = (bst_pointing_point){.time_s = f->time_s,
-                                                       .dx_px = f->error_x_px,
-                                                       .dy_px = f->error_y_px,
-                                                       .mode = f->mode,
-                                                       .in_track = f->in_track,
-                                                       .counted = bst_loop_frame_is_pointing(f),
-                                                       .visible = f->visible};
+    p->points[p->point_count++] = (bst_io_pointing_point){.time_s = f->time_s,
+                                                          .dx_px = f->error_x_px,
+                                                          .dy_px = f->error_y_px,
+                                                          .mode = f->mode,
+                                                          .in_track = f->in_track,
+                                                          .counted = bst_loop_frame_is_pointing(f),
+                                                          .visible = f->visible};
 }
 
 /* Strings of a panel. */
@@ -292,7 +292,8 @@ bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *p, const
                      100.0 * figures->custody, figures->time_to_acquire_s);
         }
         snprintf(path, sizeof path, "%s/pointing.png", folder);
-        BST_TRY(bst_pointing_plot(ctx, path, title, label, p->points, p->point_count, 0.5, &made));
+        BST_TRY(
+            bst_io_pointing_plot(ctx, path, title, label, p->points, p->point_count, 0.5, &made));
     }
     return BST_OK;
 }

@@ -225,7 +225,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     char text[64];
     cJSON_AddStringToObject(root, "program", "boresight");
     cJSON_AddStringToObject(root, "version", bst_version());
-    cJSON_AddStringToObject(root, "git_revision", bst_git_revision());
+    cJSON_AddStringToObject(root, "git_revision", bst_version_git_revision());
     cJSON_AddStringToObject(root, "scenario", scenario->name);
     cJSON_AddStringToObject(root, "scenario_file", scenario->file);
     cJSON_AddStringToObject(root, "epoch_utc", scenario->epoch_utc);
@@ -244,7 +244,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     cJSON_AddStringToObject(root, "device", device ? bst_device_description(device) : "");
     cJSON *kernels = cJSON_AddObjectToObject(root, "kernels");
     for (int i = 0; device && bst_device_built(device, i); i++) {
-        const bst_kernel_source *kernel = bst_device_built(device, i);
+        const bst_device_kernel_source *kernel = bst_device_built(device, i);
         snprintf(text, sizeof text, "%08x%08x", kernel->hash_high, kernel->hash_low);
         cJSON_AddStringToObject(kernels, kernel->name, text);
     }
@@ -266,7 +266,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     for (int i = 0; i < run->sensor_count; i++) {
         bst_run_metric_figures figures;
         bst_run_metrics_figures(run->sensors[i].metrics, &figures);
-        bst_losses_add(root, run->sensors[i].scope, &figures.losses);
+        bst_run_losses_add(root, run->sensors[i].scope, &figures.losses);
     }
     double simulated =
         (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) / (double)scenario->tick_rate_hz;
@@ -281,25 +281,25 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     bst_run_sightings_add(run->sightings, root);
     bst_run_pacing_add(root, scenario, sim);
     cJSON_AddItemToObject(root, "summary", summary_of(&run->sensors[0], factor));
-    bst_status status = bst_run_write_json(run->ctx, store, "manifest.json", root);
+    bst_status status = bst_io_run_write_json(run->ctx, store, "manifest.json", root);
     cJSON_Delete(root);
     return status;
 }
 
 /* A line for all that was lost and counted. */
 static void print_losses(const run_state *run, bst_simulation *sim) {
-    bst_losses_printer printer = {.begun = false};
+    bst_run_losses_printer printer = {.begun = false};
     for (int i = 0; i < run->sensor_count; i++) {
         bst_run_sensor_figures figures;
         get_figures(&run->sensors[i], &figures);
         printer.sensor = run->sensor_count > 1 ? figures.scope : NULL;
-        bst_losses_tell(&figures.metrics.losses, bst_losses_print, &printer);
+        bst_run_losses_report(&figures.metrics.losses, bst_run_losses_print, &printer);
     }
     const char *name;
     int64_t count;
     printer.sensor = NULL;
     for (int i = 0; bst_engine_counter(bst_simulation_engine(sim), i, &name, &count); i++) {
-        bst_losses_tell_counter(name, count, bst_losses_print, &printer);
+        bst_run_losses_report_counter(name, count, bst_run_losses_print, &printer);
     }
 }
 
@@ -355,7 +355,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world,
 
 static bool has_module(const bst_scenario *scenario, int observer, int sensor, const char *role) {
     for (int i = 0; i < scenario->module_count; i++) {
-        const bst_module_config *m = &scenario->modules[i];
+        const bst_scenario_module_config *m = &scenario->modules[i];
         if (m->observer == observer && m->sensor == sensor && !m->off &&
             strcmp(m->desc->role, role) == 0) {
             return true;
@@ -489,7 +489,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     BST_TRY(bst_run_check_space(ctx, run->scenario, request->out, request->force));
     BST_TRY(bst_run_create(ctx, request->out, request->overwrite, &store));
     cJSON *echo = bst_scenario_echo(run->scenario);
-    bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)
+    bst_status status = echo ? bst_io_run_write_json(ctx, store, "scenario.json", echo)
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
     cJSON_Delete(echo);
     if (status == BST_OK) {

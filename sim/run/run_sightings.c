@@ -11,7 +11,7 @@
 struct bst_run_sightings {
     const bst_world *world;
     bst_sightings *sightings;
-    bst_table *passes, *sums;
+    bst_io_table *passes, *sums;
 };
 
 #define INT(name, unit, doc) \
@@ -28,7 +28,7 @@ struct bst_run_sightings {
         REAL("track_rms_arcsec", "arcsec", "confirmed tracks, from truth"),                  \
         REAL("track_most_arcsec", "arcsec", "the greatest")
 
-static const bst_column pass_columns[] = {
+static const bst_io_column pass_columns[] = {
     INT("sensor", "", "row of the table sensors"),
     OBJECT,
     REAL("start_s", "s", "first frame that it was in, middle, since the epoch"),
@@ -46,7 +46,7 @@ static const bst_column pass_columns[] = {
     ERRORS,
 };
 
-static const bst_column sum_columns[] = {
+static const bst_io_column sum_columns[] = {
     INT("sensor", "", "row of the table sensors; NULL: all of them together"),
     OBJECT,
     INT("passes", "", "times that it was in the field, parted by 60 s without it"),
@@ -69,22 +69,22 @@ static const bst_column sum_columns[] = {
 
 enum { ROW = 24 };
 typedef struct row {
-    bst_value values[ROW];
+    bst_io_value values[ROW];
     int count;
 } row;
 
 static void put_int(row *r, int64_t value) {
-    r->values[r->count++] = (bst_value){.type = BST_COLUMN_INT, .as.integer = value};
+    r->values[r->count++] = (bst_io_value){.type = BST_COLUMN_INT, .as.integer = value};
 }
 static void put_real(row *r, double value) {
     r->values[r->count++] =
-        (bst_value){.type = BST_COLUMN_REAL, .is_null = !isfinite(value), .as.real = value};
+        (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !isfinite(value), .as.real = value};
 }
 
 static void put_object(row *r, const bst_world *world, int object) {
-    const bst_object_info *info = bst_world_object(world, object);
+    const bst_world_object_info *info = bst_world_object(world, object);
     put_int(r, object);
-    r->values[r->count++] = (bst_value){.type = BST_COLUMN_TEXT, .as.text = info->name};
+    r->values[r->count++] = (bst_io_value){.type = BST_COLUMN_TEXT, .as.text = info->name};
     put_int(r, info->norad);
 }
 
@@ -95,7 +95,7 @@ static void put_errors(row *r, const bst_sighting_error *place, const bst_sighti
     put_real(r, track->count > 0 ? track->greatest : NAN);
 }
 
-static bst_status take_pass(void *user, bst_ctx *ctx, const bst_pass *p) {
+static bst_status take_pass(void *user, bst_ctx *ctx, const bst_eval_pass *p) {
     bst_run_sightings *s = user;
     row r = {.count = 0};
     if (!s->passes) {
@@ -116,7 +116,7 @@ static bst_status take_pass(void *user, bst_ctx *ctx, const bst_pass *p) {
     put_real(&r, p->v_mag);
     put_real(&r, p->range_m);
     put_errors(&r, &p->place, &p->track);
-    return bst_table_append(ctx, s->passes, r.values);
+    return bst_io_table_append(ctx, s->passes, r.values);
 }
 
 typedef struct summing {
@@ -146,11 +146,11 @@ static bst_status take_sum(void *user, bst_ctx *ctx, const bst_sighting *sum) {
     put_real(&r, sum->custody_s / u->end_s);
     put_real(&r, sum->snr);
     put_errors(&r, &sum->place, &sum->track);
-    return bst_table_append(ctx, u->sightings->sums, r.values);
+    return bst_io_table_append(ctx, u->sightings->sums, r.values);
 }
 
 bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
-                                    const bst_record_config *record, int64_t tick_rate_hz,
+                                    const bst_recorder_config *record, int64_t tick_rate_hz,
                                     bst_run *store, bst_run_sightings **out) {
     *out = NULL;
     if (!record->sightings || bst_world_object_count(world) == 0) {
@@ -164,14 +164,14 @@ bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
     bst_status status = bst_sightings_create(ctx, world, tick_rate_hz, record->custody_s, take_pass,
                                              s, &s->sightings);
     if (status == BST_OK && store) {
-        status =
-            bst_table_create(ctx, store, "passes", "Objects in the field of a sensor.",
-                             pass_columns, sizeof pass_columns / sizeof *pass_columns, &s->passes);
+        status = bst_io_table_create(ctx, store, "passes", "Objects in the field of a sensor.",
+                                     pass_columns, sizeof pass_columns / sizeof *pass_columns,
+                                     &s->passes);
     }
     if (status == BST_OK && store) {
-        status = bst_table_create(ctx, store, "sightings",
-                                  "Who saw what: by object, of each sensor and of all together.",
-                                  sum_columns, sizeof sum_columns / sizeof *sum_columns, &s->sums);
+        status = bst_io_table_create(
+            ctx, store, "sightings", "Who saw what: by object, of each sensor and of all together.",
+            sum_columns, sizeof sum_columns / sizeof *sum_columns, &s->sums);
     }
     if (status != BST_OK) {
         bst_run_sightings_free(s);

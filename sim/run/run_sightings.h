@@ -13,7 +13,7 @@ typedef struct bst_run_sightings bst_run_sightings;
 /* Makes the tables in `store`, which outlives it; NULL: the figures only. *out NULL when the record
  * is not to have them, or there are no objects. */
 bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
-                                    const bst_record_config *record, int64_t tick_rate_hz,
+                                    const bst_recorder_config *record, int64_t tick_rate_hz,
                                     bst_run *store, bst_run_sightings **out) BST_MUST_CHECK;
 void bst_run_sightings_free(bst_run_sightings *sightings); /* NULL allowed */
 

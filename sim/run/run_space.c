@@ -10,10 +10,10 @@
 /* Bytes of all frames and planes, before the tables. */
 static double frame_bytes(const bst_scenario *scenario) {
     const bst_observer_config *observers = scenario->observers.items;
-    const bst_record_config *record = &scenario->record;
+    const bst_recorder_config *record = &scenario->record;
     /* Rice takes noise of some DN to about half */
     double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
-                                    : bst_record_compresses(record)        ? 1.0
+                                    : bst_recorder_compresses(record)      ? 1.0
                                                                            : 2.0;
     for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
         per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;

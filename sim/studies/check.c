@@ -63,7 +63,7 @@ static bst_status check_metrics(bst_ctx *ctx, const bst_study *study, const bst_
 
 static bst_status check_run(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                             const bst_study_place *place, const bst_study_value *values,
-                            const bst_population_probe *probe, bool deep) {
+                            const bst_study_population_probe *probe, bool deep) {
     bst_study_run run = {.study = study, .place = *place};
     cJSON *settings;
     BST_TRY(bst_study_document_probed(ctx, study, place, values, probe, &run.scenario, &settings));
@@ -155,7 +155,7 @@ static bst_status try_axis(checker *c, const bst_study_place *place, int a) {
 
 /* What one of a population's dispersions may give an object. */
 static bst_status try_probe(checker *c, const bst_study_place *place, const bst_study_axis *axis,
-                            const bst_population_probe *probe) {
+                            const bst_study_population_probe *probe) {
     char value[200];
     bst_status status = check_run(c->ctx, c->study, c->kind, place, c->values, probe, false);
     if (status == BST_OK) {
@@ -166,11 +166,11 @@ static bst_status try_probe(checker *c, const bst_study_place *place, const bst_
 }
 
 static bst_status try_objects(checker *c, const bst_study_place *place,
-                              const bst_population *population, int index) {
+                              const bst_study_population *population, int index) {
     bst_status status = BST_OK;
     for (int d = 0; d < population->config.dispersions.count && status == BST_OK; d++) {
         const bst_study_axis *axis = &population->axes[d];
-        bst_population_probe probe = {.population = index, .dispersion = d};
+        bst_study_population_probe probe = {.population = index, .dispersion = d};
         double ends[2];
         const cJSON *item = axis->values ? axis->values->child : NULL;
         for (; item && status == BST_OK; item = item->next) {
@@ -189,13 +189,13 @@ static bst_status try_objects(checker *c, const bst_study_place *place,
 /* Least and greatest numbers of objects, and what the objects may have. */
 static bst_status try_populations(checker *c, const bst_study_place *place) {
     int count = c->study->populations.count, first = c->study->axis_count - count;
-    bst_population_list own;
-    const bst_population_list *list;
-    BST_TRY(bst_populations_of(c->ctx, c->study, c->values, &own, &list));
+    bst_study_population_list own;
+    const bst_study_population_list *list;
+    BST_TRY(bst_study_populations_of(c->ctx, c->study, c->values, &own, &list));
     bst_status status = BST_OK;
     for (int i = 0; i < count && status == BST_OK; i++) {
         double ends[2];
-        bst_population_reach(&list->items[i], ends);
+        bst_study_population_reach(&list->items[i], ends);
         status = try_objects(c, place, &list->items[i], i);
         for (int e = 0; e < 2 && status == BST_OK; e++) {
             c->values[first + i] = number_value(ends[e]);
@@ -207,7 +207,7 @@ static bst_status try_populations(checker *c, const bst_study_place *place) {
         }
         c->values[first + i] = (bst_study_value){.given = false};
     }
-    bst_populations_free(&own);
+    bst_study_populations_free(&own);
     return status;
 }
 

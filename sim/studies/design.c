@@ -32,7 +32,7 @@ static bst_study_value listed(const bst_study_axis *axis, int64_t index) {
 
 /* The value at `unit` of an axis: 0 its first, 1 its last. */
 static bst_study_value at_unit(const bst_study_axis *axis, double unit) {
-    const bst_axis_config *c = axis->axis;
+    const bst_study_axis_config *c = axis->axis;
     double value = unit <= 0.0                     ? c->from
                    : unit >= 1.0                   ? c->to
                    : c->spacing == BST_SPACING_LOG ? c->from * exp(unit * log(c->to / c->from))
@@ -91,10 +91,10 @@ void bst_study_swept_values(const bst_study *study, const int64_t *levels, bst_s
 
 bst_study_value bst_study_draw(const bst_study_axis *axis, bst_rng_key key, uint64_t a,
                                uint64_t b) {
-    const bst_dispersion_config *c = axis->dispersion;
+    const bst_study_dispersion_config *c = axis->dispersion;
     double u = bst_rng_uniform(key, a, b), z;
     bst_study_value value = {true, true, 0.0, NULL};
-    switch ((bst_distribution)c->distribution) {
+    switch ((bst_study_distribution)c->distribution) {
         case BST_DISTRIBUTION_UNIFORM:
             value.number = c->from + u * (c->to - c->from);
             break;
@@ -133,5 +133,5 @@ void bst_study_values(const bst_study *study, const bst_study_place *place, bst_
         bst_rng_key key = bst_rng_make_key(study->config.seed, 0, axis->path, "dispersion");
         out[a] = bst_study_draw(axis, key, place->run_number, 0);
     }
-    bst_population_numbers(study, place->run_number, out);
+    bst_study_population_numbers(study, place->run_number, out);
 }

@@ -130,11 +130,11 @@ bst_status bst_study_put_all(bst_ctx *ctx, const bst_study *study, const bst_stu
         if (!values[a].given) {
             continue;
         }
-        if (bst_population_pointer(axis->path) == populations) {
+        if (bst_study_population_pointer(axis->path) == populations) {
             BST_TRY(bst_study_put(ctx, study, axis, &values[a], axis->path, json));
         }
         for (const cJSON *also = axis->also ? axis->also->child : NULL; also; also = also->next) {
-            if (bst_population_pointer(also->valuestring) == populations) {
+            if (bst_study_population_pointer(also->valuestring) == populations) {
                 BST_TRY(bst_study_put(ctx, study, axis, &values[a], also->valuestring, json));
             }
         }
@@ -143,8 +143,8 @@ bst_status bst_study_put_all(bst_ctx *ctx, const bst_study *study, const bst_stu
 }
 
 static bst_status make_document(bst_ctx *ctx, const bst_study *study, const bst_study_place *place,
-                                const bst_study_value *values, const bst_population_probe *probe,
-                                bst_json *json) {
+                                const bst_study_value *values,
+                                const bst_study_population_probe *probe, bst_json *json) {
     const char *block = block_name(study);
     char seed[24];
     if (block) {
@@ -161,7 +161,7 @@ static bst_status make_document(bst_ctx *ctx, const bst_study *study, const bst_
         BST_TRY(bst_json_assign(ctx, json, "/record/frames", cJSON_CreateString("none")));
     }
     BST_TRY(bst_study_put_all(ctx, study, values, false, json));
-    return bst_populations_add(ctx, study, place, values, probe, json);
+    return bst_study_populations_add(ctx, study, place, values, probe, json);
 }
 
 bst_status bst_study_document(bst_ctx *ctx, const bst_study *study, const bst_study_place *place,
@@ -172,7 +172,7 @@ bst_status bst_study_document(bst_ctx *ctx, const bst_study *study, const bst_st
 
 bst_status bst_study_document_probed(bst_ctx *ctx, const bst_study *study,
                                      const bst_study_place *place, const bst_study_value *values,
-                                     const bst_population_probe *probe, bst_json **scenario,
+                                     const bst_study_population_probe *probe, bst_json **scenario,
                                      cJSON **settings) {
     const bst_study_base *base = &study->bases[place->base];
     const char *block = block_name(study);

@@ -14,7 +14,7 @@ enum { NEWS = 64, POLL_MS = 100, GRACE_S = 10, SMALL_SHARD = 16, MOST_RUNS_A_SHA
 enum { FAILURES_IN_A_ROW = 6 };
 
 typedef struct flight {
-    bst_shard_job job;
+    bst_study_shard_job job;
     int64_t done, failed; /* as told */
     double started;
 } flight;
@@ -56,13 +56,13 @@ static int64_t wanted_runs(const driver *d, int attempts) {
 }
 
 /* The next runs that nobody works on; count 0: none. */
-static bst_shard_job next_job(driver *d) {
+static bst_study_shard_job next_job(driver *d) {
     int64_t runs = d->results->study->runs, run = d->cursor;
     while (run < runs && !is_free(d, run)) {
         run++;
     }
     d->cursor = run;
-    bst_shard_job job = {.id = d->next_id, .first = run};
+    bst_study_shard_job job = {.id = d->next_id, .first = run};
     if (run == runs) {
         return job;
     }
@@ -76,7 +76,7 @@ static bst_shard_job next_job(driver *d) {
     return job;
 }
 
-static bst_status note_flight(bst_ctx *ctx, driver *d, const bst_shard_job *job) {
+static bst_status note_flight(bst_ctx *ctx, driver *d, const bst_study_shard_job *job) {
     if (d->flight_count == d->flight_room) {
         int64_t wanted = 2 * d->flight_room + 16;
         flight *grown = realloc(d->flights, (size_t)wanted * sizeof *grown);
@@ -94,7 +94,7 @@ static bst_status note_flight(bst_ctx *ctx, driver *d, const bst_shard_job *job)
 
 static bst_status start_shards(bst_ctx *ctx, driver *d) {
     enum { BATCH = 256 };
-    bst_shard_job jobs[BATCH];
+    bst_study_shard_job jobs[BATCH];
     int64_t room = d->executor->room(d->executor->self), n = 0;
     if (d->options->probe && d->options->shard_runs == 0 && d->run_s <= 0.0) {
         room = d->flight_count > 0 ? 0 : 1;
@@ -111,11 +111,11 @@ static bst_status start_shards(bst_ctx *ctx, driver *d) {
 }
 
 /* Takes the rows that a shard published: all of them, or a part under a name of its own. */
-static bst_status take_rows(bst_ctx *ctx, driver *d, const bst_shard_job *job, int64_t done) {
+static bst_status take_rows(bst_ctx *ctx, driver *d, const bst_study_shard_job *job, int64_t done) {
     char path[4096];
     bst_ctx quiet = {0};
     int64_t count = done > 0 && done <= job->count ? done : job->count;
-    BST_TRY(bst_shard_path(ctx, d->options->out, job->first, count, path, sizeof path));
+    BST_TRY(bst_study_shard_path(ctx, d->options->out, job->first, count, path, sizeof path));
     bst_status status = bst_results_load(&quiet, d->results, path);
     if (status == BST_ERR_NOT_FOUND && done != 0) {
         return bst_results_load_folder(ctx, d->results, d->options->out, job->first, job->count,
@@ -131,7 +131,7 @@ static bst_status take_rows(bst_ctx *ctx, driver *d, const bst_shard_job *job, i
 }
 
 /* What a shard did not do is to be done again, unless it was tried too often. */
-static void count_attempt(driver *d, const bst_shard_job *job, bool blame) {
+static void count_attempt(driver *d, const bst_study_shard_job *job, bool blame) {
     for (int64_t run = job->first; run < job->first + job->count; run++) {
         d->flying[run] = 0;
         if (d->results->state[run] == BST_ROW_MISSING && blame) {
@@ -143,7 +143,7 @@ static void count_attempt(driver *d, const bst_shard_job *job, bool blame) {
 }
 
 /* What the runs of a job took that have rows now; without what it took to start. */
-static double mean_wall_s(const driver *d, const bst_shard_job *job) {
+static double mean_wall_s(const driver *d, const bst_study_shard_job *job) {
     double sum = 0.0;
     int64_t n = 0;
     for (int64_t run = job->first; run < job->first + job->count; run++) {
@@ -155,7 +155,7 @@ static double mean_wall_s(const driver *d, const bst_shard_job *job) {
     return n > 0 ? fmax(sum / (double)n, 1e-6) : 0.0;
 }
 
-static bool has_missing(const driver *d, const bst_shard_job *job) {
+static bool has_missing(const driver *d, const bst_study_shard_job *job) {
     for (int64_t run = job->first; run < job->first + job->count; run++) {
         if (d->results->state[run] == BST_ROW_MISSING) {
             return true;
@@ -164,7 +164,8 @@ static bool has_missing(const driver *d, const bst_shard_job *job) {
     return false;
 }
 
-static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index, const bst_shard_news *news) {
+static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index,
+                            const bst_study_shard_news *news) {
     flight f = d->flights[index];
     int64_t before = d->results->done;
     d->flights[index] = d->flights[--d->flight_count];
@@ -192,7 +193,7 @@ static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index, const bst_sh
     return BST_OK;
 }
 
-static bst_status take_news(bst_ctx *ctx, driver *d, const bst_shard_news *news) {
+static bst_status take_news(bst_ctx *ctx, driver *d, const bst_study_shard_news *news) {
     for (int64_t i = 0; i < d->flight_count; i++) {
         flight *f = &d->flights[i];
         if (f->job.id != news->id) {
@@ -235,7 +236,7 @@ static void tell(const driver *d) {
 
 /* Waits for news. True while there is work. */
 static bst_status go_on(bst_ctx *ctx, driver *d, bool *more) {
-    bst_shard_news news[NEWS];
+    bst_study_shard_news news[NEWS];
     int count;
     BST_TRY(d->executor->poll(ctx, d->executor->self, POLL_MS, news, NEWS, &count));
     for (int i = 0; i < count; i++) {

@@ -6,18 +6,18 @@
 
 #include "sim/studies/study.h"
 
-typedef enum bst_metric_kind {
+typedef enum bst_study_metric_kind {
     BST_METRIC_VALUE,  /* a number; NAN: there is none */
     BST_METRIC_FLAG,   /* 1 or 0: over runs it is a rate */
     BST_METRIC_KEY,    /* of a series: rows of one key belong together over the runs of a setting */
     BST_METRIC_TRIALS, /* of a series: summed over runs */
     BST_METRIC_HITS,   /* of a series: of the trials before it; together a rate */
-} bst_metric_kind;
+} bst_study_metric_kind;
 
-typedef struct bst_metric {
+typedef struct bst_study_metric {
     const char *name, *unit, *doc;
-    int kind; /* bst_metric_kind */
-} bst_metric;
+    int kind; /* bst_study_metric_kind */
+} bst_study_metric;
 
 /* At most; each kind asserts that its own fit. */
 enum { BST_STUDY_METRICS = 48, BST_SERIES_COLUMNS = 40 };
@@ -45,25 +45,26 @@ typedef struct bst_study_result {
 } bst_study_result;
 
 /* Where a worker is to work. */
-typedef struct bst_worker_place {
+typedef struct bst_study_worker_place {
     int threads;        /* cores that are its own */
     const char *device; /* OpenCL device, as bst_device_open takes it; "": the default. Lent for the
                            worker's life */
-} bst_worker_place;
+} bst_study_worker_place;
 
 typedef struct bst_study_kind {
     const char *name; /* as in the study file */
-    const bst_metric *metrics;
+    const bst_study_metric *metrics;
     int metric_count;
     const char *series_name; /* "curve"; NULL: none */
-    const bst_metric *series;
+    const bst_study_metric *series;
     int series_count;
     void *user;
     /* Whether a run's documents are right, as far as that can be said without starting it. `deep`:
      * also open the files that they name. */
     bst_status (*check)(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep);
     /* What a worker keeps from run to run. */
-    bst_status (*open)(bst_ctx *ctx, void *user, const bst_worker_place *place, void **worker);
+    bst_status (*open)(bst_ctx *ctx, void *user, const bst_study_worker_place *place,
+                       void **worker);
     void (*close)(void *worker);
     /* Executes a run. BST_ERR_INTERRUPTED: it was asked to stop. BST_ERR_IO, BST_ERR_MEMORY and
      * BST_ERR_DEVICE say that it could not be executed here and now; all other errors are the run's

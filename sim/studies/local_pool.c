@@ -21,7 +21,7 @@ typedef struct pool_worker {
     pid_t pid;    /* 0: not started */
     int to, from; /* our ends of its pipes */
     bool busy;
-    bst_shard_job job;
+    bst_study_shard_job job;
 } pool_worker;
 
 typedef struct pool {
@@ -55,7 +55,7 @@ static bool send_bytes(int fd, const void *data, size_t bytes) {
 }
 
 /* Not for every run of many short ones. A driver that is gone is nobody to work for. */
-static void report(void *user, const bst_shard_news *news) {
+static void report(void *user, const bst_study_shard_news *news) {
     reporter *r = user;
     double now = bst_wall_seconds();
     if (now - r->told >= 0.1) {
@@ -90,9 +90,9 @@ static void work(const pool *p, int index, int in, int out) {
                   o->device_count > 0 ? o->devices[index % o->device_count] : ""}};
     reporter to = {out, 0.0};
     bst_ctx ctx = {0};
-    bst_shard_job job;
+    bst_study_shard_job job;
     while (!o->kind->stop_requested(o->kind->user) && receive(in, &job, sizeof job)) {
-        bst_shard_news news;
+        bst_study_shard_news news;
         bst_status status = bst_shard_execute(&ctx, &worker, &job, report, &to, &news);
         (void)status; /* told in the news */
         if (!send_bytes(out, &news, sizeof news)) {
@@ -175,7 +175,7 @@ static int64_t room(void *self) {
     return p->cancelled ? 0 : n;
 }
 
-static bst_status start_one(bst_ctx *ctx, pool *p, const bst_shard_job *job) {
+static bst_status start_one(bst_ctx *ctx, pool *p, const bst_study_shard_job *job) {
     for (int i = 0; i < p->count; i++) {
         pool_worker *w = &p->workers[i];
         if (w->busy) {
@@ -195,7 +195,7 @@ static bst_status start_one(bst_ctx *ctx, pool *p, const bst_shard_job *job) {
     return bst_fail(ctx, BST_ERR_STATE, "all workers are busy");
 }
 
-static bst_status start(bst_ctx *ctx, void *self, const bst_shard_job *jobs, int64_t count) {
+static bst_status start(bst_ctx *ctx, void *self, const bst_study_shard_job *jobs, int64_t count) {
     for (int64_t i = 0; i < count; i++) {
         BST_TRY(start_one(ctx, self, &jobs[i]));
     }
@@ -203,13 +203,13 @@ static bst_status start(bst_ctx *ctx, void *self, const bst_shard_job *jobs, int
 }
 
 /* A worker whose pipe ended; true when it had a job. */
-static bool bury(pool_worker *w, bst_shard_news *news) {
+static bool bury(pool_worker *w, bst_study_shard_news *news) {
     int ended = 0;
     bool busy = w->busy;
     close_ends(w);
     while (waitpid(w->pid, &ended, 0) < 0 && errno == EINTR) {
     }
-    *news = (bst_shard_news){.id = w->job.id, .kind = BST_SHARD_LOST};
+    *news = (bst_study_shard_news){.id = w->job.id, .kind = BST_SHARD_LOST};
     if (WIFSIGNALED(ended)) {
         snprintf(news->text, sizeof news->text, "killed by signal %d (%s)", WTERMSIG(ended),
                  strsignal(WTERMSIG(ended)));
@@ -220,7 +220,7 @@ static bool bury(pool_worker *w, bst_shard_news *news) {
     return busy;
 }
 
-static bst_status poll_workers(bst_ctx *ctx, void *self, int timeout_ms, bst_shard_news *news,
+static bst_status poll_workers(bst_ctx *ctx, void *self, int timeout_ms, bst_study_shard_news *news,
                                int capacity, int *count) {
     pool *p = self;
     *count = 0;

@@ -84,7 +84,7 @@ static bst_status check_size(bst_ctx *ctx, const bst_study *study, const bst_stu
 }
 
 bst_status bst_study_place_points(bst_ctx *ctx, const bst_study *study,
-                                  const bst_sweep_config *sweep, bst_study_factor *factor) {
+                                  const bst_study_sweep_config *sweep, bst_study_factor *factor) {
     bool morris = sweep->design == BST_SWEEP_MORRIS;
     int axes = factor->axis_count;
     if (morris && sweep->levels % 2 != 0) {

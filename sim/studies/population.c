@@ -16,14 +16,15 @@ enum { MOST_ATTEMPTS = 1 << 16 };
 /* Of the objects of a population: as of a document. */
 static const double MOST_VALUES = 8e6;
 
-bool bst_population_pointer(const char *pointer) {
+bool bst_study_population_pointer(const char *pointer) {
     return strncmp(pointer, "/populations/", strlen("/populations/")) == 0;
 }
 
 /* ------------------------------------------------------------------ reading */
 
-static bst_status check_number(bst_ctx *ctx, const bst_study *study, const bst_population *p) {
-    const bst_number_config *n = &p->config.number;
+static bst_status check_number(bst_ctx *ctx, const bst_study *study,
+                               const bst_study_population *p) {
+    const bst_study_number_config *n = &p->config.number;
     if (n->distribution == BST_NUMBER_UNIFORM && n->from > n->to) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "%s: %s/number: from %lld to %lld is no range (allowed: \"from\" at most "
@@ -46,7 +47,8 @@ static double count_values(const cJSON *node) {
     return count;
 }
 
-static bst_status check_object(bst_ctx *ctx, const bst_study *study, const bst_population *p) {
+static bst_status check_object(bst_ctx *ctx, const bst_study *study,
+                               const bst_study_population *p) {
     char path[64];
     snprintf(path, sizeof path, "%s/object", p->where);
     if (p->object && !cJSON_IsObject(p->object)) {
@@ -59,7 +61,7 @@ static bst_status check_object(bst_ctx *ctx, const bst_study *study, const bst_p
                         study->file, path, p->config.name, p->config.name);
     }
     double reach[2];
-    bst_population_reach(p, reach);
+    bst_study_population_reach(p, reach);
     if (reach[1] * count_values(p->object) > MOST_VALUES) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "%s: %s: %.0f objects of %.0f values each (allowed: %.0f values in all)",
@@ -76,13 +78,13 @@ static bst_status check_object(bst_ctx *ctx, const bst_study *study, const bst_p
 }
 
 static bst_status read_one(bst_ctx *ctx, const bst_study *study, const bst_json *json,
-                           const cJSON *node, bst_population *out) {
+                           const cJSON *node, bst_study_population *out) {
     BST_TRY(bst_config_read(ctx, json, node, out->where, bst_population_table, &out->config));
     out->object = cJSON_GetObjectItemCaseSensitive(node, "object");
     BST_TRY(check_number(ctx, study, out));
     BST_TRY(check_object(ctx, study, out));
     int count = out->config.dispersions.count;
-    const bst_dispersion_config *list = out->config.dispersions.items;
+    const bst_study_dispersion_config *list = out->config.dispersions.items;
     out->axes = calloc((size_t)count + 1, sizeof *out->axes);
     if (!out->axes) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study's populations");
@@ -104,10 +106,10 @@ static bst_status read_one(bst_ctx *ctx, const bst_study *study, const bst_json 
     return BST_OK;
 }
 
-bst_status bst_populations_read(bst_ctx *ctx, const bst_study *study, const bst_json *json,
-                                bst_population_list *out) {
+bst_status bst_study_populations_read(bst_ctx *ctx, const bst_study *study, const bst_json *json,
+                                      bst_study_population_list *out) {
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(bst_json_root(json), "populations");
-    *out = (bst_population_list){0};
+    *out = (bst_study_population_list){0};
     if (cJSON_GetArraySize(list) == 0) {
         return BST_OK;
     }
@@ -116,20 +118,20 @@ bst_status bst_populations_read(bst_ctx *ctx, const bst_study *study, const bst_
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study's populations");
     }
     for (const cJSON *node = list->child; node; node = node->next) {
-        bst_population *p = &out->items[out->count];
+        bst_study_population *p = &out->items[out->count];
         snprintf(p->where, sizeof p->where, "/populations/%d", out->count++);
         bst_status status = read_one(ctx, study, json, node, p);
         if (status != BST_OK) {
-            bst_populations_free(out);
+            bst_study_populations_free(out);
             return status;
         }
     }
     return BST_OK;
 }
 
-void bst_populations_free(bst_population_list *list) {
+void bst_study_populations_free(bst_study_population_list *list) {
     for (int i = 0; i < list->count; i++) {
-        bst_population *p = &list->items[i];
+        bst_study_population *p = &list->items[i];
         for (int d = 0; p->axes && d < p->config.dispersions.count; d++) {
             free(p->axes[d].cumulative);
         }
@@ -138,7 +140,7 @@ void bst_populations_free(bst_population_list *list) {
     }
     free(list->items);
     bst_json_free(list->json);
-    *list = (bst_population_list){0};
+    *list = (bst_study_population_list){0};
 }
 
 static int compare_numbers(const void *a, const void *b) {
@@ -148,7 +150,7 @@ static int compare_numbers(const void *a, const void *b) {
 
 /* The satellites of a population's file; a relative path starts from the folder of `study_file`. */
 static bst_status read_file(bst_ctx *ctx, const bst_study *study, const char *study_file,
-                            const bst_population *p, bst_population_file *out) {
+                            const bst_study_population *p, bst_study_population_file *out) {
     const char *given = p->config.elements_file, *slash = strrchr(study_file, '/');
     bst_elements *sets = NULL;
     int count = 0;
@@ -182,8 +184,8 @@ static bst_status read_file(bst_ctx *ctx, const bst_study *study, const char *st
     return BST_OK;
 }
 
-bst_status bst_populations_open(bst_ctx *ctx, bst_study *study, const char *study_file) {
-    BST_TRY(bst_populations_read(ctx, study, study->json, &study->populations));
+bst_status bst_study_populations_open(bst_ctx *ctx, bst_study *study, const char *study_file) {
+    BST_TRY(bst_study_populations_read(ctx, study, study->json, &study->populations));
     int count = study->populations.count;
     study->population_files = calloc((size_t)count + 1, sizeof *study->population_files);
     if (!study->population_files) {
@@ -195,28 +197,29 @@ bst_status bst_populations_open(bst_ctx *ctx, bst_study *study, const char *stud
     }
     for (int a = 0; a < study->axis_count; a++) {
         const bst_study_axis *axis = &study->axes[a];
-        bool varies = bst_population_pointer(axis->path);
+        bool varies = bst_study_population_pointer(axis->path);
         for (const cJSON *also = axis->also ? axis->also->child : NULL; also; also = also->next) {
-            varies = varies || bst_population_pointer(also->valuestring);
+            varies = varies || bst_study_population_pointer(also->valuestring);
         }
         study->populations_vary = study->populations_vary || varies;
     }
     return BST_OK;
 }
 
-void bst_populations_close(bst_study *study) {
+void bst_study_populations_close(bst_study *study) {
     for (int i = 0; study->population_files && i < study->populations.count; i++) {
         free(study->population_files[i].norad);
     }
     free(study->population_files);
-    bst_populations_free(&study->populations);
+    bst_study_populations_free(&study->populations);
 }
 
 /* ------------------------------------------------------------------ a run's populations */
 
-bst_status bst_populations_of(bst_ctx *ctx, const bst_study *study, const bst_study_value *values,
-                              bst_population_list *own, const bst_population_list **out) {
-    *own = (bst_population_list){0};
+bst_status bst_study_populations_of(bst_ctx *ctx, const bst_study *study,
+                                    const bst_study_value *values, bst_study_population_list *own,
+                                    const bst_study_population_list **out) {
+    *own = (bst_study_population_list){0};
     *out = &study->populations;
     if (!study->populations_vary) {
         return BST_OK;
@@ -225,7 +228,7 @@ bst_status bst_populations_of(bst_ctx *ctx, const bst_study *study, const bst_st
     BST_TRY(bst_json_copy(ctx, study->json, &json));
     bst_status status = bst_study_put_all(ctx, study, values, true, json);
     if (status == BST_OK) {
-        status = bst_populations_read(ctx, study, json, own);
+        status = bst_study_populations_read(ctx, study, json, own);
     }
     if (status != BST_OK) {
         bst_json_free(json);
@@ -234,7 +237,7 @@ bst_status bst_populations_of(bst_ctx *ctx, const bst_study *study, const bst_st
     own->json = json;
     *out = own;
     for (int i = 0; i < own->count && status == BST_OK; i++) {
-        const bst_population *was = &study->populations.items[i], *now = &own->items[i];
+        const bst_study_population *was = &study->populations.items[i], *now = &own->items[i];
         if (strcmp(now->config.elements_file, was->config.elements_file) != 0 ||
             strcmp(now->config.name, was->config.name) != 0) {
             status = bst_fail(ctx, BST_ERR_CONFIG,
@@ -244,7 +247,7 @@ bst_status bst_populations_of(bst_ctx *ctx, const bst_study *study, const bst_st
         }
     }
     if (status != BST_OK) {
-        bst_populations_free(own);
+        bst_study_populations_free(own);
     }
     return status;
 }
@@ -260,8 +263,9 @@ static int64_t poisson(double mean, double u) {
     return k;
 }
 
-static int64_t draw_number(const bst_study *study, const bst_population *p, uint64_t counter) {
-    const bst_number_config *n = &p->config.number;
+static int64_t draw_number(const bst_study *study, const bst_study_population *p,
+                           uint64_t counter) {
+    const bst_study_number_config *n = &p->config.number;
     bst_rng_key key = bst_rng_make_key(study->config.seed, 0, p->config.name, "population number");
     double u = bst_rng_uniform(key, counter, 0);
     if (n->distribution == BST_NUMBER_FIXED) {
@@ -278,12 +282,13 @@ static int64_t draw_number(const bst_study *study, const bst_population *p, uint
     return k;
 }
 
-void bst_population_numbers(const bst_study *study, uint64_t counter, bst_study_value *values) {
+void bst_study_population_numbers(const bst_study *study, uint64_t counter,
+                                  bst_study_value *values) {
     bst_ctx quiet = {0};
-    bst_population_list own;
-    const bst_population_list *list;
+    bst_study_population_list own;
+    const bst_study_population_list *list;
     int first = study->axis_count - study->populations.count;
-    bool read = bst_populations_of(&quiet, study, values, &own, &list) == BST_OK;
+    bool read = bst_study_populations_of(&quiet, study, values, &own, &list) == BST_OK;
     for (int i = 0; i < study->populations.count; i++) {
         /* what cannot be read is the document's to say */
         values[first + i] =
@@ -291,11 +296,11 @@ void bst_population_numbers(const bst_study *study, uint64_t counter, bst_study_
                                      (double)draw_number(study, &list->items[i], counter), NULL}
                  : (bst_study_value){.given = false};
     }
-    bst_populations_free(&own);
+    bst_study_populations_free(&own);
 }
 
-void bst_population_reach(const bst_population *p, double ends[2]) {
-    const bst_number_config *n = &p->config.number;
+void bst_study_population_reach(const bst_study_population *p, double ends[2]) {
+    const bst_study_number_config *n = &p->config.number;
     bool uniform = n->distribution == BST_NUMBER_UNIFORM;
     ends[0] = (double)(n->distribution == BST_NUMBER_FIXED ? n->count : uniform ? n->from : 0);
     ends[1] = (double)(n->distribution == BST_NUMBER_FIXED ? n->count : uniform ? n->to : n->most);
@@ -316,7 +321,8 @@ static int number_of(const cJSON *orbit) {
 }
 
 /* Marks the satellite of an object or observer; *left: how many are not marked. */
-static void mark(const cJSON *owner, const bst_population_file *file, bool *taken, int *left) {
+static void mark(const cJSON *owner, const bst_study_population_file *file, bool *taken,
+                 int *left) {
     int number = number_of(cJSON_GetObjectItemCaseSensitive(owner, "orbit"));
     const int *found =
         bsearch(&number, file->norad, (size_t)file->count, sizeof number, compare_numbers);
@@ -328,7 +334,7 @@ static void mark(const cJSON *owner, const bst_population_file *file, bool *take
 
 /* Which satellites of the file the scenario has already, the observers among them; the caller
  * frees it. */
-static bool *mark_all(const bst_json *json, const bst_population_file *file, int *left) {
+static bool *mark_all(const bst_json *json, const bst_study_population_file *file, int *left) {
     bool *taken = calloc((size_t)file->count + 1, sizeof *taken);
     const cJSON *lists[] = {bst_study_at(bst_json_root(json), "/world/objects"),
                             bst_study_at(bst_json_root(json), "/observers")};
@@ -341,8 +347,9 @@ static bool *mark_all(const bst_json *json, const bst_population_file *file, int
     return taken;
 }
 
-static int draw_satellite(const bst_study *study, const bst_population *p,
-                          const bst_population_file *file, uint64_t counter, int k, bool *taken) {
+static int draw_satellite(const bst_study *study, const bst_study_population *p,
+                          const bst_study_population_file *file, uint64_t counter, int k,
+                          bool *taken) {
     bst_rng_key key =
         bst_rng_make_key(study->config.seed, 0, p->config.name, "population satellite");
     double n = file->count;
@@ -360,7 +367,7 @@ static int draw_satellite(const bst_study *study, const bst_population *p,
     return file->norad[i];
 }
 
-static cJSON *satellite_orbit(const bst_population_file *file, int norad) {
+static cJSON *satellite_orbit(const bst_study_population_file *file, int norad) {
     cJSON *orbit = cJSON_CreateObject();
     cJSON_AddStringToObject(orbit, "source", "sgp4");
     cJSON_AddStringToObject(orbit, "elements_file", file->file);
@@ -371,8 +378,8 @@ static cJSON *satellite_orbit(const bst_population_file *file, int norad) {
 /* ------------------------------------------------------------------ objects of a run */
 
 /* What one of a population's dispersions gives object k. */
-static bst_study_value draw_of(const bst_study *study, const bst_population *p, int dispersion,
-                               uint64_t counter, int k) {
+static bst_study_value draw_of(const bst_study *study, const bst_study_population *p,
+                               int dispersion, uint64_t counter, int k) {
     const bst_study_axis *axis = &p->axes[dispersion];
     char stream[340];
     snprintf(stream, sizeof stream, "population %s", axis->path);
@@ -380,7 +387,7 @@ static bst_study_value draw_of(const bst_study *study, const bst_population *p, 
     return bst_study_draw(axis, key, counter, OBJECT_COUNTER(k));
 }
 
-static bst_status disperse(bst_ctx *ctx, const bst_study *study, const bst_population *p,
+static bst_status disperse(bst_ctx *ctx, const bst_study *study, const bst_study_population *p,
                            const bst_study_value *drawn, int dispersion, int index,
                            bst_json *json) {
     const bst_study_axis *axis = &p->axes[dispersion];
@@ -401,7 +408,7 @@ static bst_status disperse(bst_ctx *ctx, const bst_study *study, const bst_popul
 }
 
 /* The list that objects are added to; it is made where the scenario has none. */
-static bst_status find_objects(bst_ctx *ctx, const bst_study *study, const bst_population *p,
+static bst_status find_objects(bst_ctx *ctx, const bst_study *study, const bst_study_population *p,
                                bst_json *json, cJSON **out) {
     const cJSON *found = bst_study_at(bst_json_root(json), "/world/objects");
     if (!found) {
@@ -415,7 +422,7 @@ static bst_status find_objects(bst_ctx *ctx, const bst_study *study, const bst_p
                           study->file, p->where, bst_json_name(json));
 }
 
-static bst_status add_object(bst_ctx *ctx, const bst_population *p, const cJSON *orbit, int k,
+static bst_status add_object(bst_ctx *ctx, const bst_study_population *p, const cJSON *orbit, int k,
                              cJSON *objects) {
     char name[64];
     cJSON *object = p->object ? cJSON_Duplicate(p->object, 1) : cJSON_CreateObject();
@@ -429,9 +436,11 @@ static bst_status add_object(bst_ctx *ctx, const bst_population *p, const cJSON 
     return BST_OK;
 }
 
-static bst_status add_population(bst_ctx *ctx, const bst_study *study, const bst_population *p,
-                                 const bst_population_file *file, int number, uint64_t counter,
-                                 const bst_population_probe *probe, bst_json *json) {
+static bst_status add_population(bst_ctx *ctx, const bst_study *study,
+                                 const bst_study_population *p,
+                                 const bst_study_population_file *file, int number,
+                                 uint64_t counter, const bst_study_population_probe *probe,
+                                 bst_json *json) {
     cJSON *objects;
     int left = 0;
     BST_TRY(find_objects(ctx, study, p, json, &objects));
@@ -439,14 +448,14 @@ static bst_status add_population(bst_ctx *ctx, const bst_study *study, const bst
     int first = cJSON_GetArraySize(objects);
     bst_status status = BST_OK;
     if (*file->file && (!taken || left < number)) {
-        status =
-            taken ? bst_fail(ctx, BST_ERR_CONFIG,
-                             "%s: %s/number: %s of the %d satellites in %s, of which the "
-                             "scenario has %d already",
-                             study->file, p->where,
-                             bst_count_text((char[BST_COUNT_TEXT]){0}, number, "object", "objects"),
-                             file->count, file->file, file->count - left)
-                  : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the objects of a run");
+        status = taken ? bst_fail(ctx, BST_ERR_CONFIG,
+                                  "%s: %s/number: %s of the %d satellites in %s, of which the "
+                                  "scenario has %d already",
+                                  study->file, p->where,
+                                  bst_text_of_count((char[BST_COUNT_TEXT]){0}, number, "object",
+                                                    "objects"),
+                                  file->count, file->file, file->count - left)
+                       : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the objects of a run");
     }
     for (int k = 0; k < number && status == BST_OK; k++) {
         cJSON *orbit =
@@ -466,17 +475,18 @@ static bst_status add_population(bst_ctx *ctx, const bst_study *study, const bst
     return status;
 }
 
-bst_status bst_populations_add(bst_ctx *ctx, const bst_study *study, const bst_study_place *place,
-                               const bst_study_value *values, const bst_population_probe *probe,
-                               bst_json *json) {
-    bst_population_list own;
-    const bst_population_list *list;
+bst_status bst_study_populations_add(bst_ctx *ctx, const bst_study *study,
+                                     const bst_study_place *place, const bst_study_value *values,
+                                     const bst_study_population_probe *probe, bst_json *json) {
+    bst_study_population_list own;
+    const bst_study_population_list *list;
     int first = study->axis_count - study->populations.count;
-    BST_TRY(bst_populations_of(ctx, study, values, &own, &list));
+    BST_TRY(bst_study_populations_of(ctx, study, values, &own, &list));
     bst_status status = BST_OK;
     for (int i = 0; i < list->count && status == BST_OK; i++) {
         const bst_study_value *number = &values[first + i];
-        const bst_population_probe *own_probe = probe && probe->population == i ? probe : NULL;
+        const bst_study_population_probe *own_probe =
+            probe && probe->population == i ? probe : NULL;
         int count = number->given ? (int)number->number : 0;
         count = own_probe && count == 0 ? 1 : count;
         status = count > 0
@@ -484,6 +494,6 @@ bst_status bst_populations_add(bst_ctx *ctx, const bst_study *study, const bst_s
                                       count, place->run_number, own_probe, json)
                      : BST_OK;
     }
-    bst_populations_free(&own);
+    bst_study_populations_free(&own);
     return status;
 }

@@ -48,12 +48,12 @@ void bst_results_forget(bst_results *r, int64_t run) {
 }
 
 static int compare_errors(const void *a, const void *b) {
-    const bst_row_error *x = a, *y = b;
+    const bst_study_row_error *x = a, *y = b;
     return (x->run > y->run) - (x->run < y->run);
 }
 
 static int compare_parts(const void *a, const void *b) {
-    const bst_series_part *x = a, *y = b;
+    const bst_study_series_part *x = a, *y = b;
     return (x->run > y->run) - (x->run < y->run);
 }
 

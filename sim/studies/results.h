@@ -7,17 +7,17 @@
 typedef enum bst_row_state { BST_ROW_MISSING, BST_ROW_DONE, BST_ROW_FAILED } bst_row_state;
 
 /* Why a run failed. */
-typedef struct bst_row_error {
+typedef struct bst_study_row_error {
     int64_t run;
     char *text;
-} bst_row_error;
+} bst_study_row_error;
 
 /* Rows of a series of one run. */
-typedef struct bst_series_part {
+typedef struct bst_study_series_part {
     int64_t run;
     size_t first; /* row */
     int rows;
-} bst_series_part;
+} bst_study_series_part;
 
 typedef struct bst_results {
     const bst_study *study;
@@ -26,9 +26,9 @@ typedef struct bst_results {
     double *metrics; /* [runs][metric_count] */
     double *wall_s;  /* [runs] */
     double *cpu_s;   /* [runs], of all threads */
-    bst_row_error *errors;
+    bst_study_row_error *errors;
     int64_t error_count, error_room;
-    bst_series_part *parts;
+    bst_study_series_part *parts;
     int64_t part_count, part_room;
     double *series; /* [series_rows][series_count] */
     size_t series_rows, series_room;
@@ -52,27 +52,28 @@ void bst_results_sort(bst_results *results);
 /* ------------------------------------------------------------------ files of shards */
 
 /* A shard's rows on their way to its file. */
-typedef struct bst_shard_draft {
+typedef struct bst_study_shard_draft {
     FILE *stream;
     char *text;
     size_t bytes;
     int64_t first, count;
     const bst_study_kind *kind;
-} bst_shard_draft;
+} bst_study_shard_draft;
 
-bst_status bst_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
-                           int64_t first, bst_shard_draft *out) BST_MUST_CHECK;
+bst_status bst_study_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
+                                 int64_t first, bst_study_shard_draft *out) BST_MUST_CHECK;
 /* The next run's row. `error`: NULL when it did what it should. */
-void bst_shard_add(bst_shard_draft *draft, const bst_study_result *result, double wall_s,
-                   const char *error);
+void bst_study_shard_add(bst_study_shard_draft *draft, const bst_study_result *result,
+                         double wall_s, const char *error);
 /* Publishes the rows as OUT/shards/FIRST-LAST.rows: whole, on the disk, and only if no such file is
  * there yet (then what is there stands). Without rows: nothing. Frees the draft in every case. */
-bst_status bst_shard_publish(bst_ctx *ctx, bst_shard_draft *draft, const char *out) BST_MUST_CHECK;
-void bst_shard_drop(bst_shard_draft *draft);
+bst_status bst_study_shard_publish(bst_ctx *ctx, bst_study_shard_draft *draft,
+                                   const char *out) BST_MUST_CHECK;
+void bst_study_shard_drop(bst_study_shard_draft *draft);
 
 /* Path of the file of runs first .. first + count - 1. */
-bst_status bst_shard_path(bst_ctx *ctx, const char *out, int64_t first, int64_t count, char *path,
-                          size_t bytes) BST_MUST_CHECK;
+bst_status bst_study_shard_path(bst_ctx *ctx, const char *out, int64_t first, int64_t count,
+                                char *path, size_t bytes) BST_MUST_CHECK;
 /* Takes the rows of a file. Rows that are there already stay as they are. BST_ERR_NOT_FOUND: there
  * is no such file; BST_ERR_FORMAT: it is damaged, or its rows are not those of the runs of its
  * name; BST_ERR_STATE: it is another study's. */

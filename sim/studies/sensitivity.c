@@ -134,19 +134,19 @@ static bst_status put_figure(bst_ctx *ctx, const bst_results *r, int factor, int
     bst_sensitivity list[BST_STUDY_AXES];
     bst_sensitivity_of(r, factor, metric, list);
     for (int i = 0; i < f->axis_count; i++) {
-        const bst_value row[] = {
-            bst_int_value(f->sweep),
-            bst_text_value(f->design == BST_SWEEP_MORRIS ? "morris" : "one_at_a_time"),
-            bst_text_value(metric == BST_SPEED_WALL  ? "wall_s"
-                           : metric == BST_SPEED_CPU ? "cpu_s"
-                                                     : r->kind->metrics[metric].name),
-            bst_int_value(i + 1),
-            bst_text_value(r->study->axes[list[i].axis].name),
-            bst_real_value(list[i].effect),
-            bst_real_value(list[i].error),
-            bst_real_value(list[i].mean_effect),
-            bst_real_value(list[i].spread),
-            bst_int_value(list[i].count)};
+        const bst_io_value row[] = {
+            bst_io_int_value(f->sweep),
+            bst_io_text_value(f->design == BST_SWEEP_MORRIS ? "morris" : "one_at_a_time"),
+            bst_io_text_value(metric == BST_SPEED_WALL  ? "wall_s"
+                              : metric == BST_SPEED_CPU ? "cpu_s"
+                                                        : r->kind->metrics[metric].name),
+            bst_io_int_value(i + 1),
+            bst_io_text_value(r->study->axes[list[i].axis].name),
+            bst_io_real_value(list[i].effect),
+            bst_io_real_value(list[i].error),
+            bst_io_real_value(list[i].mean_effect),
+            bst_io_real_value(list[i].spread),
+            bst_io_int_value(list[i].count)};
         BST_TRY(bst_table_row(ctx, t, row));
     }
     return BST_OK;
@@ -158,7 +158,7 @@ static bool has_effects(const bst_study_factor *f) {
 
 static bst_status write_table(bst_ctx *ctx, const bst_tables_job *j, const char *name,
                               const char *doc, bool speed) {
-    static const bst_column columns[] = {
+    static const bst_io_column columns[] = {
         {"sweep", BST_COLUMN_INT, "", "Number of the sweep in the study."},
         {"design", BST_COLUMN_TEXT, "", "morris or one_at_a_time."},
         {"metric", BST_COLUMN_TEXT, "", "The figure."},

@@ -11,12 +11,12 @@ enum { MOST_KEYS = 4096 };
 static bst_status write_rows(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_results *r = j->results;
     const bst_study_kind *kind = r->kind;
-    bst_column columns[BST_SERIES_COLUMNS + 1] = {
+    bst_io_column columns[BST_SERIES_COLUMNS + 1] = {
         {"run", BST_COLUMN_INT, "", "Number of the run."}};
     bst_table_out t;
     for (int c = 0; c < kind->series_count; c++) {
-        const bst_metric *m = &kind->series[c];
-        columns[c + 1] = (bst_column){m->name, BST_COLUMN_REAL, m->unit, m->doc};
+        const bst_study_metric *m = &kind->series[c];
+        columns[c + 1] = (bst_io_column){m->name, BST_COLUMN_REAL, m->unit, m->doc};
     }
     BST_TRY(bst_table_begin(ctx, j->out, kind->series_name, "Rows of each run.", columns,
                             kind->series_count + 1, true, &t));
@@ -25,9 +25,9 @@ static bst_status write_rows(bst_ctx *ctx, const bst_tables_job *j) {
         for (int i = 0; i < r->parts[p].rows && status == BST_OK; i++) {
             const double *from =
                 r->series + (r->parts[p].first + (size_t)i) * (size_t)kind->series_count;
-            bst_value row[BST_SERIES_COLUMNS + 1] = {bst_int_value(r->parts[p].run)};
+            bst_io_value row[BST_SERIES_COLUMNS + 1] = {bst_io_int_value(r->parts[p].run)};
             for (int c = 0; c < kind->series_count; c++) {
-                row[c + 1] = bst_real_value(from[c]);
+                row[c + 1] = bst_io_real_value(from[c]);
             }
             status = bst_table_row(ctx, &t, row);
         }
@@ -69,18 +69,18 @@ static void add_row(const bst_study_kind *kind, const double *row, keyed *list, 
 }
 
 /* setting, runs, then each column of the series; for hits also their rate and its interval. */
-static int statistics_columns(const bst_study_kind *kind, bst_column *columns) {
+static int statistics_columns(const bst_study_kind *kind, bst_io_column *columns) {
     int n = 0;
-    columns[n++] = (bst_column){"setting", BST_COLUMN_INT, "", "Number of the setting."};
-    columns[n++] = (bst_column){"runs", BST_COLUMN_INT, "", "Runs that have such a row."};
+    columns[n++] = (bst_io_column){"setting", BST_COLUMN_INT, "", "Number of the setting."};
+    columns[n++] = (bst_io_column){"runs", BST_COLUMN_INT, "", "Runs that have such a row."};
     for (int c = 0; c < kind->series_count; c++) {
-        const bst_metric *m = &kind->series[c];
-        columns[n++] = (bst_column){m->name, BST_COLUMN_REAL, m->unit, m->doc};
+        const bst_study_metric *m = &kind->series[c];
+        columns[n++] = (bst_io_column){m->name, BST_COLUMN_REAL, m->unit, m->doc};
         if (m->kind == BST_METRIC_HITS) {
-            columns[n++] = (bst_column){"rate", BST_COLUMN_REAL, "", "Of all trials together."};
+            columns[n++] = (bst_io_column){"rate", BST_COLUMN_REAL, "", "Of all trials together."};
             columns[n++] =
-                (bst_column){"rate_low", BST_COLUMN_REAL, "", "Its 95 % interval (Wilson)."};
-            columns[n++] = (bst_column){"rate_high", BST_COLUMN_REAL, "", "Upper end."};
+                (bst_io_column){"rate_low", BST_COLUMN_REAL, "", "Its 95 % interval (Wilson)."};
+            columns[n++] = (bst_io_column){"rate_high", BST_COLUMN_REAL, "", "Upper end."};
         }
     }
     return n;
@@ -88,23 +88,23 @@ static int statistics_columns(const bst_study_kind *kind, bst_column *columns) {
 
 static bst_status put_keyed(bst_ctx *ctx, const bst_study_kind *kind, int64_t setting,
                             const keyed *k, bst_table_out *t) {
-    bst_value row[4 * BST_SERIES_COLUMNS];
+    bst_io_value row[4 * BST_SERIES_COLUMNS];
     int n = 0;
     double trials = 0.0;
-    row[n++] = bst_int_value(setting);
-    row[n++] = bst_int_value(k->runs);
+    row[n++] = bst_io_int_value(setting);
+    row[n++] = bst_io_int_value(k->runs);
     for (int c = 0; c < kind->series_count; c++) {
         int what = kind->series[c].kind;
         bool summed = what == BST_METRIC_TRIALS || what == BST_METRIC_HITS;
         double mean = k->counts[c] > 0 ? k->sums[c] / (double)k->counts[c] : NAN;
-        row[n++] = bst_real_value(what == BST_METRIC_KEY ? k->key : summed ? k->sums[c] : mean);
+        row[n++] = bst_io_real_value(what == BST_METRIC_KEY ? k->key : summed ? k->sums[c] : mean);
         trials = what == BST_METRIC_TRIALS ? k->sums[c] : trials;
         if (what == BST_METRIC_HITS) {
-            bst_interval wilson =
-                bst_wilson_interval((int64_t)k->sums[c], (int64_t)trials, BST_NORMAL_95);
-            row[n++] = bst_real_value(trials > 0.0 ? k->sums[c] / trials : NAN);
-            row[n++] = bst_real_value(wilson.low);
-            row[n++] = bst_real_value(wilson.high);
+            bst_eval_interval wilson =
+                bst_eval_wilson_interval((int64_t)k->sums[c], (int64_t)trials, BST_NORMAL_95);
+            row[n++] = bst_io_real_value(trials > 0.0 ? k->sums[c] / trials : NAN);
+            row[n++] = bst_io_real_value(wilson.low);
+            row[n++] = bst_io_real_value(wilson.high);
         }
     }
     return bst_table_row(ctx, t, row);
@@ -139,7 +139,7 @@ static bst_status put_settings(bst_ctx *ctx, const bst_tables_job *j, keyed *lis
 
 bst_status bst_study_write_series(bst_ctx *ctx, const bst_tables_job *j) {
     char name[80];
-    bst_column columns[4 * BST_SERIES_COLUMNS];
+    bst_io_column columns[4 * BST_SERIES_COLUMNS];
     bst_table_out t;
     BST_TRY(write_rows(ctx, j));
     snprintf(name, sizeof name, "%s_statistics", j->results->kind->series_name);

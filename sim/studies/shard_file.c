@@ -23,7 +23,7 @@ static uint64_t checksum(const char *text, size_t bytes) {
 
 /* ------------------------------------------------------------------ writing */
 
-static void print_names(FILE *stream, const char *what, const bst_metric *list, int count) {
+static void print_names(FILE *stream, const char *what, const bst_study_metric *list, int count) {
     fputs(what, stream);
     for (int i = 0; i < count; i++) {
         fprintf(stream, " %s", list[i].name);
@@ -44,9 +44,9 @@ static void print_numbers(FILE *stream, const double *values, int count) {
     fputc('\n', stream);
 }
 
-bst_status bst_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
-                           int64_t first, bst_shard_draft *out) {
-    *out = (bst_shard_draft){.first = first, .kind = kind};
+bst_status bst_study_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
+                                 int64_t first, bst_study_shard_draft *out) {
+    *out = (bst_study_shard_draft){.first = first, .kind = kind};
     out->stream = open_memstream(&out->text, &out->bytes);
     if (!out->stream) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of a shard");
@@ -57,8 +57,8 @@ bst_status bst_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study
     return BST_OK;
 }
 
-void bst_shard_add(bst_shard_draft *d, const bst_study_result *result, double wall_s,
-                   const char *error) {
+void bst_study_shard_add(bst_study_shard_draft *d, const bst_study_result *result, double wall_s,
+                         const char *error) {
     int64_t run = d->first + d->count++;
     if (error) {
         fprintf(d->stream, "F %" PRId64 " %.6f %.6f ", run, wall_s, result->cpu_s);
@@ -77,16 +77,16 @@ void bst_shard_add(bst_shard_draft *d, const bst_study_result *result, double wa
     }
 }
 
-void bst_shard_drop(bst_shard_draft *d) {
+void bst_study_shard_drop(bst_study_shard_draft *d) {
     if (d->stream) {
         fclose(d->stream);
     }
     free(d->text);
-    *d = (bst_shard_draft){.count = 0};
+    *d = (bst_study_shard_draft){.count = 0};
 }
 
-bst_status bst_shard_path(bst_ctx *ctx, const char *out, int64_t first, int64_t count, char *path,
-                          size_t bytes) {
+bst_status bst_study_shard_path(bst_ctx *ctx, const char *out, int64_t first, int64_t count,
+                                char *path, size_t bytes) {
     int n = snprintf(path, bytes, "%s/shards/%09" PRId64 "-%09" PRId64 ".rows", out, first,
                      first + count - 1);
     return n > 0 && (size_t)n < bytes
@@ -136,10 +136,10 @@ static bool take_name(const char *draft, const char *path) {
     return false;
 }
 
-static bst_status write_file(bst_ctx *ctx, const bst_shard_draft *d, const char *out) {
+static bst_status write_file(bst_ctx *ctx, const bst_study_shard_draft *d, const char *out) {
     char path[4096], draft[4200];
     int fd;
-    BST_TRY(bst_shard_path(ctx, out, d->first, d->count, path, sizeof path));
+    BST_TRY(bst_study_shard_path(ctx, out, d->first, d->count, path, sizeof path));
     BST_TRY(bst_draft_make(ctx, path, draft, sizeof draft, &fd));
     bool ok = write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
     int error = ok ? 0 : errno;
@@ -159,7 +159,7 @@ static bst_status write_file(bst_ctx *ctx, const bst_shard_draft *d, const char 
     return BST_OK;
 }
 
-bst_status bst_shard_publish(bst_ctx *ctx, bst_shard_draft *d, const char *out) {
+bst_status bst_study_shard_publish(bst_ctx *ctx, bst_study_shard_draft *d, const char *out) {
     bst_status status = BST_OK;
     if (d->count > 0) {
         fflush(d->stream);
@@ -169,7 +169,7 @@ bst_status bst_shard_publish(bst_ctx *ctx, bst_shard_draft *d, const char *out) 
         status = good ? write_file(ctx, d, out)
                       : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of a shard");
     }
-    bst_shard_drop(d);
+    bst_study_shard_drop(d);
     return status;
 }
 
@@ -278,10 +278,10 @@ static bst_status take_run(bst_ctx *ctx, bst_results *r, const shard_row *row) {
         for (char *c = text; *c; c++) {
             *c = *c == '\x1f' ? '\n' : *c;
         }
-        r->errors[r->error_count++] = (bst_row_error){row->run, text};
+        r->errors[r->error_count++] = (bst_study_row_error){row->run, text};
     } else if (r->kind->series_count > 0) {
         BST_TRY(grow(ctx, (void **)&r->parts, r->part_count, &r->part_room, sizeof *r->parts));
-        r->parts[r->part_count++] = (bst_series_part){row->run, r->series_rows, 0};
+        r->parts[r->part_count++] = (bst_study_series_part){row->run, r->series_rows, 0};
     }
     r->wall_s[row->run] = row->wall_s;
     r->cpu_s[row->run] = row->cpu_s;

@@ -82,11 +82,11 @@ bst_status bst_shard_run_one(bst_ctx *ctx, bst_shard_worker *w, int64_t index,
     return BST_OK;
 }
 
-bst_status bst_shard_execute(bst_ctx *ctx, bst_shard_worker *w, const bst_shard_job *job,
-                             bst_shard_report report, void *user, bst_shard_news *out) {
-    bst_shard_draft draft;
-    *out = (bst_shard_news){.id = job->id, .kind = BST_SHARD_AT_WORK};
-    bst_status status = bst_shard_begin(ctx, w->study, w->kind, job->first, &draft);
+bst_status bst_shard_execute(bst_ctx *ctx, bst_shard_worker *w, const bst_study_shard_job *job,
+                             bst_shard_report report, void *user, bst_study_shard_news *out) {
+    bst_study_shard_draft draft;
+    *out = (bst_study_shard_news){.id = job->id, .kind = BST_SHARD_AT_WORK};
+    bst_status status = bst_study_shard_begin(ctx, w->study, w->kind, job->first, &draft);
     for (int64_t i = 0; status == BST_OK && i < job->count; i++) {
         bst_study_result result;
         char error[BST_MESSAGE_BYTES];
@@ -97,7 +97,7 @@ bst_status bst_shard_execute(bst_ctx *ctx, bst_shard_worker *w, const bst_shard_
         }
         status = bst_shard_run_one(ctx, w, job->first + i, &result, error, &wall_s);
         if (status == BST_OK) {
-            bst_shard_add(&draft, &result, wall_s, *error ? error : NULL);
+            bst_study_shard_add(&draft, &result, wall_s, *error ? error : NULL);
             free(result.series);
             out->runs_done++;
             out->runs_failed += *error != '\0';
@@ -108,7 +108,7 @@ bst_status bst_shard_execute(bst_ctx *ctx, bst_shard_worker *w, const bst_shard_
     }
     char why[BST_MESSAGE_BYTES];
     memcpy(why, ctx->message, sizeof why);
-    bst_status published = draft.stream ? bst_shard_publish(ctx, &draft, w->out) : BST_OK;
+    bst_status published = draft.stream ? bst_study_shard_publish(ctx, &draft, w->out) : BST_OK;
     if (published != BST_OK) {
         out->runs_done = out->runs_failed = 0;
         status = status == BST_OK ? published : status;

@@ -170,8 +170,9 @@ static void add_log(const bst_slurm *s, const bst_slurm_task *t, char text[BST_S
 }
 
 /* What is to be told of a task now; false when nothing. */
-static bool tell(const bst_slurm *s, const bst_slurm_task *t, double now, bst_shard_news *news) {
-    *news = (bst_shard_news){.id = t->job.id, .runs_done = -1, .runs_failed = -1};
+static bool tell(const bst_slurm *s, const bst_slurm_task *t, double now,
+                 bst_study_shard_news *news) {
+    *news = (bst_study_shard_news){.id = t->job.id, .runs_done = -1, .runs_failed = -1};
     int code;
     char node[64];
     if (t->array == 0) {
@@ -209,7 +210,7 @@ static bool tell(const bst_slurm *s, const bst_slurm_task *t, double now, bst_sh
     return false;
 }
 
-static int tell_all(bst_slurm *s, bst_shard_news *news, int capacity) {
+static int tell_all(bst_slurm *s, bst_study_shard_news *news, int capacity) {
     double now = bst_wall_seconds();
     int told = 0;
     int64_t kept = 0;
@@ -231,7 +232,8 @@ static int64_t slurm_room(void *self) {
     return s->cancelled ? 0 : s->site.queue_size - s->count;
 }
 
-static bst_status slurm_start(bst_ctx *ctx, void *self, const bst_shard_job *jobs, int64_t count) {
+static bst_status slurm_start(bst_ctx *ctx, void *self, const bst_study_shard_job *jobs,
+                              int64_t count) {
     bst_slurm *s = self;
     if (s->count + count > s->capacity) {
         int64_t capacity = 2 * (s->count + count);
@@ -248,7 +250,7 @@ static bst_status slurm_start(bst_ctx *ctx, void *self, const bst_shard_job *job
     return BST_OK;
 }
 
-static bst_status slurm_poll(bst_ctx *ctx, void *self, int timeout_ms, bst_shard_news *news,
+static bst_status slurm_poll(bst_ctx *ctx, void *self, int timeout_ms, bst_study_shard_news *news,
                              int capacity, int *count) {
     bst_slurm *s = self;
     double until = bst_wall_seconds() + 1e-3 * timeout_ms;

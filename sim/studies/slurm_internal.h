@@ -9,7 +9,7 @@
 enum { BST_SLURM_NAME_BYTES = 32, BST_SLURM_TOKEN_BYTES = 32, BST_SLURM_PATH_BYTES = 4096 };
 
 typedef struct bst_slurm_task {
-    bst_shard_job job;
+    bst_study_shard_job job;
     int64_t array;   /* Slurm's number of the array; 0: not submitted yet */
     int64_t index;   /* in the array */
     int batch;       /* number of the array in this driver, for its file names */

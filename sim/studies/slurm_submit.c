@@ -52,15 +52,15 @@ bst_status bst_slurm_run(bst_ctx *ctx, const bst_slurm *s, const char *const arg
     char errors[BST_SLURM_PATH_BYTES], file[BST_SLURM_TOKEN_BYTES + 16];
     snprintf(file, sizeof file, "%s-errors", s->token);
     BST_TRY(bst_slurm_path(ctx, s, errors, file));
-    bst_child child;
-    BST_TRY(bst_child_start(ctx, argv, NULL, true, errors, &child));
+    bst_subprocess child;
+    BST_TRY(bst_subprocess_start(ctx, argv, NULL, true, errors, &child));
     char line[512];
     while (fgets(line, sizeof line, child.output)) {
         if (take) {
             take(user, line);
         }
     }
-    *code = bst_child_wait(&child);
+    *code = bst_subprocess_wait(&child);
     bst_slurm_read_tail(errors, said, BST_SHARD_TEXT_BYTES);
     unlink(errors);
     return BST_OK;

@@ -10,7 +10,7 @@ static int compare(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-double bst_quantile(const double *sorted, int64_t n, double q) {
+double bst_study_quantile(const double *sorted, int64_t n, double q) {
     if (n == 0) {
         return NAN;
     }
@@ -43,11 +43,11 @@ static void describe(const double *values, int64_t rows, int columns, int column
     qsort(scratch, (size_t)n, sizeof *scratch, compare);
     s->minimum = n > 0 ? scratch[0] : NAN;
     s->maximum = n > 0 ? scratch[n - 1] : NAN;
-    s->p05 = bst_quantile(scratch, n, 0.05);
-    s->p25 = bst_quantile(scratch, n, 0.25);
-    s->median = bst_quantile(scratch, n, 0.5);
-    s->p75 = bst_quantile(scratch, n, 0.75);
-    s->p95 = bst_quantile(scratch, n, 0.95);
+    s->p05 = bst_study_quantile(scratch, n, 0.05);
+    s->p25 = bst_study_quantile(scratch, n, 0.25);
+    s->median = bst_study_quantile(scratch, n, 0.5);
+    s->p75 = bst_study_quantile(scratch, n, 0.75);
+    s->p95 = bst_study_quantile(scratch, n, 0.95);
 }
 
 /* Means of one resample into means[columns]; NAN where none of its numbers was drawn. Values are
@@ -88,8 +88,8 @@ static void set_interval(double *means, int64_t n, bst_statistics *s) {
         }
     }
     qsort(means, (size_t)kept, sizeof *means, compare);
-    s->low = s->mean + bst_quantile(means, kept, 0.025);
-    s->high = s->mean + bst_quantile(means, kept, 0.975);
+    s->low = s->mean + bst_study_quantile(means, kept, 0.025);
+    s->high = s->mean + bst_study_quantile(means, kept, 0.975);
 }
 
 bst_status bst_statistics_of(bst_ctx *ctx, const double *values, int64_t rows, int columns,

@@ -15,7 +15,7 @@ typedef struct bst_statistics {
 
 /* The quantile q of n sorted values, linear between them (definition 7 of Hyndman and Fan 1996,
  * Am. Stat. 50, 361). NAN for none. */
-double bst_quantile(const double *sorted, int64_t n, double q);
+double bst_study_quantile(const double *sorted, int64_t n, double q);
 
 /* Beyond so many runs the interval of a mean is that of a normal distribution, mean +- 1.96 std /
  * sqrt(n), from which the bootstrap's differs by less than its own scatter. */

@@ -31,7 +31,7 @@ static bst_status read_raw_array(bst_ctx *ctx, const bst_study *study, const cJS
 static bst_status check_pointer(bst_ctx *ctx, const bst_study *study, const char *where,
                                 const cJSON *value) {
     const char *allowed =
-        bst_population_pointer(where)
+        bst_study_population_pointer(where)
             ? "a JSON pointer into the object, such as \"/brightness/standard_v_mag\""
             : "a JSON pointer into the scenario, such as "
               "\"/observers/0/sensors/0/camera/read_noise_e\"";
@@ -173,7 +173,8 @@ static bst_status check_range(bst_ctx *ctx, const bst_study *study, const char *
 }
 
 static bst_status add_swept_axis(bst_ctx *ctx, bst_study *study, const cJSON *node,
-                                 const char *where, const bst_axis_config *config, bool counted) {
+                                 const char *where, const bst_study_axis_config *config,
+                                 bool counted) {
     bst_study_axis *axis;
     BST_TRY(next_axis(ctx, study, where, &axis));
     BST_TRY(read_axis(ctx, study, node, axis));
@@ -221,7 +222,8 @@ static int64_t levels_of(const bst_study_axis *axis) {
 }
 
 static bst_status add_sweep(bst_ctx *ctx, bst_study *study, const cJSON *node, int index) {
-    const bst_sweep_config *sweep = (const bst_sweep_config *)study->config.sweeps.items + index;
+    const bst_study_sweep_config *sweep =
+        (const bst_study_sweep_config *)study->config.sweeps.items + index;
     const cJSON *axes = cJSON_GetObjectItemCaseSensitive(node, "axes");
     bool placed = sweep->design == BST_SWEEP_LATIN_HYPERCUBE || sweep->design == BST_SWEEP_MORRIS;
     bst_study_factor factor = {
@@ -237,7 +239,7 @@ static bst_status add_sweep(bst_ctx *ctx, bst_study *study, const cJSON *node, i
         char where[64];
         snprintf(where, sizeof where, "/sweeps/%d/axes/%d", index, a);
         BST_TRY(add_swept_axis(ctx, study, cJSON_GetArrayItem(axes, a), where,
-                               (const bst_axis_config *)sweep->axes.items + a, !placed));
+                               (const bst_study_axis_config *)sweep->axes.items + a, !placed));
         const bst_study_axis *axis = &study->axes[study->axis_count - 1];
         if (sweep->design == BST_SWEEP_GRID) {
             factor.first_axis = study->axis_count - 1;
@@ -303,7 +305,7 @@ static bst_status read_weights(bst_ctx *ctx, const bst_study *study, const cJSON
 }
 
 bst_status bst_study_read_dispersion(bst_ctx *ctx, const bst_study *study, const cJSON *node,
-                                     const bst_dispersion_config *c, bst_study_axis *axis) {
+                                     const bst_study_dispersion_config *c, bst_study_axis *axis) {
     BST_TRY(read_axis(ctx, study, node, axis));
     axis->dispersion = c;
     bool table = c->distribution == BST_DISTRIBUTION_TABLE;
@@ -332,8 +334,8 @@ bst_status bst_study_read_dispersion(bst_ctx *ctx, const bst_study *study, const
 }
 
 static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *node, int index) {
-    const bst_dispersion_config *c =
-        (const bst_dispersion_config *)study->config.dispersions.items + index;
+    const bst_study_dispersion_config *c =
+        (const bst_study_dispersion_config *)study->config.dispersions.items + index;
     static const char *const suffixes[] = {"", "_offset", "_factor"};
     bst_study_axis *axis;
     char where[64];
@@ -353,9 +355,9 @@ static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *no
 
 /* The number of objects of each is a value of a run. */
 static bst_status add_populations(bst_ctx *ctx, bst_study *study, const char *file) {
-    BST_TRY(bst_populations_open(ctx, study, file));
+    BST_TRY(bst_study_populations_open(ctx, study, file));
     for (int i = 0; i < study->populations.count; i++) {
-        const bst_population *p = &study->populations.items[i];
+        const bst_study_population *p = &study->populations.items[i];
         bst_study_axis *axis;
         BST_TRY(next_axis(ctx, study, p->where, &axis));
         if (!is_word(p->config.name)) {
@@ -434,7 +436,7 @@ static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
         h = hash_text(h, study->bases[i].text);
     }
     for (int i = 0; i < study->populations.count; i++) {
-        const bst_population_file *of = &study->population_files[i];
+        const bst_study_population_file *of = &study->population_files[i];
         h = bst_fnv(h, of->norad, (size_t)of->count * sizeof *of->norad);
     }
     snprintf(study->digest, sizeof study->digest, "%016" PRIx64, h);
@@ -476,7 +478,7 @@ void bst_study_close(bst_study *study) {
         free(study->bases[i].text);
     }
     free(study->bases);
-    bst_populations_close(study);
+    bst_study_populations_close(study);
     for (int i = 0; study->axes && i < BST_STUDY_AXES; i++) {
         free(study->axes[i].cumulative);
     }

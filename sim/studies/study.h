@@ -27,15 +27,15 @@ typedef struct bst_study_axis {
     const struct cJSON *also;   /* pointers that get the same value; NULL: none */
     const struct cJSON *values; /* NULL: a range */
     int value_count;
-    const bst_axis_config *axis;             /* NULL: not of a sweep */
-    const bst_dispersion_config *dispersion; /* NULL: no dispersion */
-    int population;                          /* 1, 2, ...: the number of its objects; 0: none */
+    const bst_study_axis_config *axis;             /* NULL: not of a sweep */
+    const bst_study_dispersion_config *dispersion; /* NULL: no dispersion */
+    int population;     /* 1, 2, ...: the number of its objects; 0: none */
     double *cumulative; /* [value_count] of a table's weights; NULL: all alike */
 } bst_study_axis;
 
 /* Axes that vary together; the settings are all combinations of the factors' levels. */
 typedef struct bst_study_factor {
-    int design; /* bst_sweep_design; -1: the scenarios themselves */
+    int design; /* bst_study_sweep_design; -1: the scenarios themselves */
     int sweep;  /* index of its sweep */
     int first_axis, axis_count;
     int64_t levels;
@@ -51,25 +51,25 @@ typedef struct bst_study_base {
 } bst_study_base;
 
 /* What is read of a population: its file has it, or a run's axes have changed it. */
-typedef struct bst_population {
-    bst_population_config config;
+typedef struct bst_study_population {
+    bst_study_population_config config;
     const struct cJSON *object; /* what each object has; NULL: nothing */
     bst_study_axis *axes;       /* [config.dispersions.count], with pointers into the object */
     char where[24];             /* "/populations/0" */
-} bst_population;
+} bst_study_population;
 
-typedef struct bst_population_list {
-    bst_population *items;
+typedef struct bst_study_population_list {
+    bst_study_population *items;
     int count;
     bst_json *json; /* what they were read from, where that is not the study's own; else NULL */
-} bst_population_list;
+} bst_study_population_list;
 
 /* Satellites of the file of element sets of a population. */
-typedef struct bst_population_file {
+typedef struct bst_study_population_file {
     char file[512]; /* full path; "": none */
     int *norad;     /* [count], rising, none twice */
     int count;
-} bst_population_file;
+} bst_study_population_file;
 
 typedef struct bst_study {
     bst_study_config config;
@@ -81,9 +81,9 @@ typedef struct bst_study {
     int axis_count, swept_count;
     bst_study_factor *factors; /* the last one varies fastest */
     int factor_count;
-    bst_population_list populations;       /* as the study's file has them */
-    bst_population_file *population_files; /* [populations.count] */
-    bool populations_vary;                 /* some axis or dispersion changes what is in them */
+    bst_study_population_list populations;       /* as the study's file has them */
+    bst_study_population_file *population_files; /* [populations.count] */
+    bool populations_vary; /* some axis or dispersion changes what is in them */
     int64_t settings, runs;
     char digest[20];                    /* of all that results follow from */
     const struct bst_study_note *notes; /* lent */

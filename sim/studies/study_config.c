@@ -29,95 +29,101 @@ static const bst_config_desc scenario_table[] = {
     BST_CONFIG_END};
 
 static const bst_config_desc axis_table[] = {
-    BST_STRING(bst_axis_config, path, NULL, PATH_DOC),
+    BST_STRING(bst_study_axis_config, path, NULL, PATH_DOC),
     RAW("also", "[]", ALSO_DOC),
-    BST_STRING(bst_axis_config, name, "\"\"", NAME_DOC),
+    BST_STRING(bst_study_axis_config, name, "\"\"", NAME_DOC),
     RAW("values", "[]",
         "The values one by one, of any type; else they are taken from the range from .. to."),
-    BST_REAL(bst_axis_config, from, "", -1e300, 1e300, "0", "First value of a range."),
-    BST_REAL(bst_axis_config, to, "", -1e300, 1e300, "0", "Last value of a range."),
-    BST_INT(bst_axis_config, count, "", 0, 1e6, "0",
+    BST_REAL(bst_study_axis_config, from, "", -1e300, 1e300, "0", "First value of a range."),
+    BST_REAL(bst_study_axis_config, to, "", -1e300, 1e300, "0", "Last value of a range."),
+    BST_INT(bst_study_axis_config, count, "", 0, 1e6, "0",
             "Values of a range, both ends among them (grid, list, one_at_a_time)."),
-    BST_ENUM(bst_axis_config, spacing, spacings, "\"linear\"",
+    BST_ENUM(bst_study_axis_config, spacing, spacings, "\"linear\"",
              "How the values of a range are spread."),
-    BST_BOOL(bst_axis_config, integer, "false", "Round the values of a range to whole numbers."),
+    BST_BOOL(bst_study_axis_config, integer, "false",
+             "Round the values of a range to whole numbers."),
     BST_CONFIG_END};
 
 static const bst_config_desc sweep_table[] = {
-    BST_ENUM(bst_sweep_config, design, designs, "\"grid\"",
+    BST_ENUM(bst_study_sweep_config, design, designs, "\"grid\"",
              "How the axes combine: every value of one with every value of the others (grid); side "
              "by side (list); at random, each axis cut into as many slices as there are points and "
              "each slice taken once (latin_hypercube); one axis after the other away from the "
              "scenario's own values (one_at_a_time); along random paths of single steps, of which "
              "elementary effects follow (morris). Sweeps combine as a grid."),
-    BST_INT(bst_sweep_config, points, "", 0, 1e6, "0", "Points of a latin_hypercube."),
-    BST_INT(bst_sweep_config, trajectories, "", 2, 1e5, "10", "Paths of a morris design."),
-    BST_INT(bst_sweep_config, levels, "", 2, 64, "4",
+    BST_INT(bst_study_sweep_config, points, "", 0, 1e6, "0", "Points of a latin_hypercube."),
+    BST_INT(bst_study_sweep_config, trajectories, "", 2, 1e5, "10", "Paths of a morris design."),
+    BST_INT(bst_study_sweep_config, levels, "", 2, 64, "4",
             "Values that a morris design takes on each axis, an even number."),
-    BST_LIST(bst_sweep_config, axes, bst_axis_config, axis_table, 1, 64, NULL, "What is varied."),
+    BST_LIST(bst_study_sweep_config, axes, bst_study_axis_config, axis_table, 1, 64, NULL,
+             "What is varied."),
     BST_CONFIG_END};
 
 /* What every dispersion has beside where its numbers go. */
-#define DISPERSION_LAW                                                                             \
-    BST_ENUM(                                                                                      \
-        bst_dispersion_config, distribution, distributions, "\"uniform\"",                         \
-        "What the numbers are drawn from: evenly or evenly in the logarithm between from and "     \
-        "to; a normal distribution; a table of values."),                                          \
-        BST_REAL(bst_dispersion_config, from, "", -1e300, 1e300, "0",                              \
-                 "Least value (uniform, log_uniform)."),                                           \
-        BST_REAL(bst_dispersion_config, to, "", -1e300, 1e300, "0",                                \
-                 "Greatest value (uniform, log_uniform)."),                                        \
-        BST_REAL(bst_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),           \
-        BST_REAL(bst_dispersion_config, sigma, "", 0, 1e100, "0", "Standard deviation (normal)."), \
-        BST_REAL(bst_dispersion_config, truncate_sigma, "", 0.1, 8, "4",                           \
-                 "Draws further than so many standard deviations from the mean are made again "    \
-                 "(normal)."),                                                                     \
-        RAW("values", "[]", "What is drawn from, of any type (table)."),                           \
-        RAW("weights", "[]",                                                                       \
-            "How often each value comes, relative to the others; []: all alike "                   \
-            "(table)."),                                                                           \
-        BST_ENUM(                                                                                  \
-            bst_dispersion_config, apply, applies, "\"set\"",                                      \
-            "What becomes of the number that is drawn: it takes the place of the scenario's, is "  \
-            "added to it, or multiplies it."),                                                     \
-        BST_BOOL(bst_dispersion_config, integer, "false", "Round the result to a whole number.")
+#define DISPERSION_LAW                                                                            \
+    BST_ENUM(                                                                                     \
+        bst_study_dispersion_config, distribution, distributions, "\"uniform\"",                  \
+        "What the numbers are drawn from: evenly or evenly in the logarithm between from and "    \
+        "to; a normal distribution; a table of values."),                                         \
+        BST_REAL(bst_study_dispersion_config, from, "", -1e300, 1e300, "0",                       \
+                 "Least value (uniform, log_uniform)."),                                          \
+        BST_REAL(bst_study_dispersion_config, to, "", -1e300, 1e300, "0",                         \
+                 "Greatest value (uniform, log_uniform)."),                                       \
+        BST_REAL(bst_study_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),    \
+        BST_REAL(bst_study_dispersion_config, sigma, "", 0, 1e100, "0",                           \
+                 "Standard deviation (normal)."),                                                 \
+        BST_REAL(bst_study_dispersion_config, truncate_sigma, "", 0.1, 8, "4",                    \
+                 "Draws further than so many standard deviations from the mean are made again "   \
+                 "(normal)."),                                                                    \
+        RAW("values", "[]", "What is drawn from, of any type (table)."),                          \
+        RAW("weights", "[]",                                                                      \
+            "How often each value comes, relative to the others; []: all alike "                  \
+            "(table)."),                                                                          \
+        BST_ENUM(                                                                                 \
+            bst_study_dispersion_config, apply, applies, "\"set\"",                               \
+            "What becomes of the number that is drawn: it takes the place of the scenario's, is " \
+            "added to it, or multiplies it."),                                                    \
+        BST_BOOL(bst_study_dispersion_config, integer, "false",                                   \
+                 "Round the result to a whole number.")
 
 static const bst_config_desc dispersion_table[] = {
-    BST_STRING(bst_dispersion_config, path, NULL, PATH_DOC), RAW("also", "[]", ALSO_DOC),
-    BST_STRING(bst_dispersion_config, name, "\"\"", NAME_DOC), DISPERSION_LAW, BST_CONFIG_END};
+    BST_STRING(bst_study_dispersion_config, path, NULL, PATH_DOC), RAW("also", "[]", ALSO_DOC),
+    BST_STRING(bst_study_dispersion_config, name, "\"\"", NAME_DOC), DISPERSION_LAW,
+    BST_CONFIG_END};
 
 static const bst_config_desc object_dispersion_table[] = {
-    BST_STRING(bst_dispersion_config, path, NULL,
+    BST_STRING(bst_study_dispersion_config, path, NULL,
                "What is varied: a JSON pointer into the object, such as \"/orbit/offset_rtn_m/0\" "
                "or \"/brightness/standard_v_mag\"."),
     RAW("also", "[]", ALSO_DOC), DISPERSION_LAW, BST_CONFIG_END};
 
 static const bst_config_desc number_table[] = {
-    BST_ENUM(bst_number_config, distribution, number_laws, "\"fixed\"",
+    BST_ENUM(bst_study_number_config, distribution, number_laws, "\"fixed\"",
              "The number is count in every run (fixed), any whole number between from and to with "
              "the same probability (uniform), or of a Poisson distribution (poisson)."),
-    BST_INT(bst_number_config, count, "", 0, 10000, "1", "Number of objects (fixed)."),
-    BST_INT(bst_number_config, from, "", 0, 10000, "0", "Least number (uniform)."),
-    BST_INT(bst_number_config, to, "", 0, 10000, "0", "Greatest number (uniform)."),
-    BST_REAL(bst_number_config, mean, "", 0, 500, "1", "Mean (poisson)."),
-    BST_INT(bst_number_config, most, "", 0, 10000, "1000",
+    BST_INT(bst_study_number_config, count, "", 0, 10000, "1", "Number of objects (fixed)."),
+    BST_INT(bst_study_number_config, from, "", 0, 10000, "0", "Least number (uniform)."),
+    BST_INT(bst_study_number_config, to, "", 0, 10000, "0", "Greatest number (uniform)."),
+    BST_REAL(bst_study_number_config, mean, "", 0, 500, "1", "Mean (poisson)."),
+    BST_INT(bst_study_number_config, most, "", 0, 10000, "1000",
             "Greater numbers are drawn again; at least the mean (poisson)."),
     BST_CONFIG_END};
 
 const bst_config_desc bst_population_table[] = {
-    BST_STRING(bst_population_config, name, NULL,
+    BST_STRING(bst_study_population_config, name, NULL,
                "Its objects are called NAME_1, NAME_2 and so on, and the column of their number in "
                "tables NAME: letters, digits and underscores."),
-    BST_OBJECT(bst_population_config, number, number_table, "{}",
+    BST_OBJECT(bst_study_population_config, number, number_table, "{}",
                "How many objects there are; drawn anew for every run."),
     RAW("object", "{}",
         "What each object has, with the keys of /world/objects[] of a scenario but for the name."),
-    BST_STRING(bst_population_config, elements_file, "\"\"",
+    BST_STRING(bst_study_population_config, elements_file, "\"\"",
                "File of element sets, relative to the study's folder. Each object then has the "
                "orbit of a satellite of it, drawn with equal probability, none twice and none that "
                "the scenario lists. \"\": the orbit is that of \"object\"."),
-    BST_LIST(bst_population_config, dispersions, bst_dispersion_config, object_dispersion_table, 0,
-             64, "[]", "Numbers that are drawn anew for each object of each run."),
+    BST_LIST(bst_study_population_config, dispersions, bst_study_dispersion_config,
+             object_dispersion_table, 0, 64, "[]",
+             "Numbers that are drawn anew for each object of each run."),
     BST_CONFIG_END};
 
 const bst_config_desc bst_study_pd_table[] = {
@@ -178,12 +184,12 @@ const bst_config_desc bst_study_table[] = {
     BST_LIST(bst_study_config, scenarios, bst_study_scenario, scenario_table, 1, 1000, NULL,
              "What is varied; of several each is taken in turn."),
     RAW("set", "{}", "Values by JSON pointer that replace those of every scenario."),
-    BST_LIST(bst_study_config, sweeps, bst_sweep_config, sweep_table, 0, 64, "[]",
+    BST_LIST(bst_study_config, sweeps, bst_study_sweep_config, sweep_table, 0, 64, "[]",
              "Values that are gone through: each combination is a setting of the study."),
-    BST_LIST(bst_study_config, dispersions, bst_dispersion_config, dispersion_table, 0, 256, "[]",
-             "Numbers that are drawn anew for every run."),
-    BST_LIST(bst_study_config, populations, bst_population_config, bst_population_table, 0, 32,
-             "[]",
+    BST_LIST(bst_study_config, dispersions, bst_study_dispersion_config, dispersion_table, 0, 256,
+             "[]", "Numbers that are drawn anew for every run."),
+    BST_LIST(bst_study_config, populations, bst_study_population_config, bst_population_table, 0,
+             32, "[]",
              "Objects whose number, orbits and brightnesses are drawn anew for every run; they "
              "come after those in the scenario's /world/objects. Axes and dispersions may vary "
              "what stands here: \"/populations/0/number/mean\"."),

@@ -10,22 +10,22 @@ typedef enum bst_study_keep { BST_KEEP_SUMMARY, BST_KEEP_TABLES, BST_KEEP_RUN } 
 
 typedef enum bst_study_random { BST_RANDOM_EACH, BST_RANDOM_COMMON } bst_study_random;
 
-typedef enum bst_sweep_design {
+typedef enum bst_study_sweep_design {
     BST_SWEEP_GRID,
     BST_SWEEP_LIST,
     BST_SWEEP_LATIN_HYPERCUBE,
     BST_SWEEP_ONE_AT_A_TIME,
     BST_SWEEP_MORRIS
-} bst_sweep_design;
+} bst_study_sweep_design;
 
 typedef enum bst_spacing { BST_SPACING_LINEAR, BST_SPACING_LOG } bst_spacing;
 
-typedef enum bst_distribution {
+typedef enum bst_study_distribution {
     BST_DISTRIBUTION_UNIFORM,
     BST_DISTRIBUTION_LOG_UNIFORM,
     BST_DISTRIBUTION_NORMAL,
     BST_DISTRIBUTION_TABLE
-} bst_distribution;
+} bst_study_distribution;
 
 typedef enum bst_apply { BST_APPLY_SET, BST_APPLY_ADD, BST_APPLY_MULTIPLY } bst_apply;
 
@@ -34,54 +34,54 @@ typedef struct bst_study_scenario {
     char name[64];
 } bst_study_scenario;
 
-typedef enum bst_number_law {
+typedef enum bst_study_number_law {
     BST_NUMBER_FIXED,
     BST_NUMBER_UNIFORM,
     BST_NUMBER_POISSON
-} bst_number_law;
+} bst_study_number_law;
 
 /* The keys "also" and "values" are read where axes are made. */
-typedef struct bst_axis_config {
+typedef struct bst_study_axis_config {
     char path[256];
     char name[64];
     double from, to;
     int64_t count;
     int32_t spacing; /* bst_spacing */
     bool integer;
-} bst_axis_config;
+} bst_study_axis_config;
 
-typedef struct bst_sweep_config {
-    int32_t design; /* bst_sweep_design */
+typedef struct bst_study_sweep_config {
+    int32_t design; /* bst_study_sweep_design */
     int64_t points, trajectories, levels;
-    bst_config_list axes; /* bst_axis_config */
-} bst_sweep_config;
+    bst_config_list axes; /* bst_study_axis_config */
+} bst_study_sweep_config;
 
 /* The keys "also", "values" and "weights" are read where axes are made. */
-typedef struct bst_dispersion_config {
+typedef struct bst_study_dispersion_config {
     char path[256];
     char name[64];
-    int32_t distribution; /* bst_distribution */
+    int32_t distribution; /* bst_study_distribution */
     double from, to, mean, sigma, truncate_sigma;
     int32_t apply; /* bst_apply */
     bool integer;
-} bst_dispersion_config;
+} bst_study_dispersion_config;
 
 /* How many objects a population has in a run. */
-typedef struct bst_number_config {
-    int32_t distribution; /* bst_number_law */
+typedef struct bst_study_number_config {
+    int32_t distribution; /* bst_study_number_law */
     int64_t count;        /* fixed */
     int64_t from, to;     /* uniform */
     double mean;          /* poisson */
     int64_t most;         /* poisson */
-} bst_number_config;
+} bst_study_number_config;
 
 /* Objects that are drawn for each run. The key "object" is read where populations are. */
-typedef struct bst_population_config {
+typedef struct bst_study_population_config {
     char name[40];
-    bst_number_config number;
+    bst_study_number_config number;
     char elements_file[512];
-    bst_config_list dispersions; /* bst_dispersion_config, with paths in the object */
-} bst_population_config;
+    bst_config_list dispersions; /* bst_study_dispersion_config, with paths in the object */
+} bst_study_population_config;
 
 /* How a run of kind "pd" measures: as the options of boresight pd. */
 typedef struct bst_study_pd_config {
@@ -105,9 +105,9 @@ typedef struct bst_study_config {
     char name[64];
     int32_t kind;              /* bst_study_kind_id */
     bst_config_list scenarios; /* bst_study_scenario */
-    bst_config_list sweeps;    /* bst_sweep_config */
+    bst_config_list sweeps;    /* bst_study_sweep_config */
     bst_config_list dispersions;
-    bst_config_list populations; /* bst_population_config */
+    bst_config_list populations; /* bst_study_population_config */
     int64_t replicates;
     uint64_t seed;
     int32_t random; /* bst_study_random */

@@ -9,13 +9,13 @@
 bst_status bst_study_read_bases(bst_ctx *ctx, bst_study *study, const char *file) BST_MUST_CHECK;
 /* Places the points of a latin_hypercube or morris design: factor->unit, levels and steps. */
 bst_status bst_study_place_points(bst_ctx *ctx, const bst_study *study,
-                                  const bst_sweep_config *sweep,
+                                  const bst_study_sweep_config *sweep,
                                   bst_study_factor *factor) BST_MUST_CHECK;
 
 /* Reads what a dispersion is beside its table: axis->where is given, the rest of it is filled in.
  * The axis has axis->cumulative to be freed, after an error too. */
 bst_status bst_study_read_dispersion(bst_ctx *ctx, const bst_study *study, const struct cJSON *node,
-                                     const bst_dispersion_config *config,
+                                     const bst_study_dispersion_config *config,
                                      bst_study_axis *axis) BST_MUST_CHECK;
 /* What a dispersion draws at the counters (a, b), (a, b + 1), ... */
 bst_study_value bst_study_draw(const bst_study_axis *axis, bst_rng_key key, uint64_t a, uint64_t b);
@@ -29,38 +29,40 @@ bst_status bst_study_put_all(bst_ctx *ctx, const bst_study *study, const bst_stu
                              bool populations, bst_json *json) BST_MUST_CHECK;
 
 /* A value that one dispersion of one population's first object has instead of its own. */
-typedef struct bst_population_probe {
+typedef struct bst_study_population_probe {
     int population, dispersion;
     bst_study_value value;
-} bst_population_probe;
+} bst_study_population_probe;
 
 /* Whether a pointer leads into the study's populations. */
-bool bst_population_pointer(const char *pointer);
-/* Reads the populations of a document; free with bst_populations_free. */
-bst_status bst_populations_read(bst_ctx *ctx, const bst_study *study, const bst_json *json,
-                                bst_population_list *out) BST_MUST_CHECK;
-void bst_populations_free(bst_population_list *list);
+bool bst_study_population_pointer(const char *pointer);
+/* Reads the populations of a document; free with bst_study_populations_free. */
+bst_status bst_study_populations_read(bst_ctx *ctx, const bst_study *study, const bst_json *json,
+                                      bst_study_population_list *out) BST_MUST_CHECK;
+void bst_study_populations_free(bst_study_population_list *list);
 /* Reads the study's own, after its axes; `study_file`: its full path. */
-bst_status bst_populations_open(bst_ctx *ctx, bst_study *study,
-                                const char *study_file) BST_MUST_CHECK;
-void bst_populations_close(bst_study *study);
+bst_status bst_study_populations_open(bst_ctx *ctx, bst_study *study,
+                                      const char *study_file) BST_MUST_CHECK;
+void bst_study_populations_close(bst_study *study);
 /* The populations as the values of a run make them: *out, the study's own or *own, which the caller
- * frees with bst_populations_free in both cases. */
-bst_status bst_populations_of(bst_ctx *ctx, const bst_study *study, const bst_study_value *values,
-                              bst_population_list *own,
-                              const bst_population_list **out) BST_MUST_CHECK;
+ * frees with bst_study_populations_free in both cases. */
+bst_status bst_study_populations_of(bst_ctx *ctx, const bst_study *study,
+                                    const bst_study_value *values, bst_study_population_list *own,
+                                    const bst_study_population_list **out) BST_MUST_CHECK;
 /* Draws their numbers into the last of a run's values; counter: the run's number. */
-void bst_population_numbers(const bst_study *study, uint64_t counter, bst_study_value *values);
+void bst_study_population_numbers(const bst_study *study, uint64_t counter,
+                                  bst_study_value *values);
 /* Least and greatest number. */
-void bst_population_reach(const bst_population *population, double ends[2]);
+void bst_study_population_reach(const bst_study_population *population, double ends[2]);
 /* Adds a run's objects to its scenario. probe NULL: none. */
-bst_status bst_populations_add(bst_ctx *ctx, const bst_study *study, const bst_study_place *place,
-                               const bst_study_value *values, const bst_population_probe *probe,
-                               bst_json *json) BST_MUST_CHECK;
+bst_status bst_study_populations_add(bst_ctx *ctx, const bst_study *study,
+                                     const bst_study_place *place, const bst_study_value *values,
+                                     const bst_study_population_probe *probe,
+                                     bst_json *json) BST_MUST_CHECK;
 /* bst_study_document with a probe. */
 bst_status bst_study_document_probed(bst_ctx *ctx, const bst_study *study,
                                      const bst_study_place *place, const bst_study_value *values,
-                                     const bst_population_probe *probe, bst_json **scenario,
+                                     const bst_study_population_probe *probe, bst_json **scenario,
                                      struct cJSON **settings) BST_MUST_CHECK;
 
 /* The shortest text that reads back as the same bits. */

@@ -81,7 +81,7 @@ bst_status bst_tables_end(bst_ctx *ctx, bst_tables_out *t, bst_status status) {
 static const char *const type_names[] = {"INTEGER", "REAL", "TEXT"};
 
 static bst_status note_columns(bst_ctx *ctx, bst_tables_out *t, const char *name, const char *doc,
-                               const bst_column *columns, int count) {
+                               const bst_io_column *columns, int count) {
     char *sql = sqlite3_mprintf("INSERT INTO tables VALUES(%Q, %Q)", name, doc);
     bst_status status =
         sql ? execute(ctx, t, sql) : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for tables");
@@ -96,7 +96,7 @@ static bst_status note_columns(bst_ctx *ctx, bst_tables_out *t, const char *name
     return status;
 }
 
-static bst_status create_table(bst_ctx *ctx, bst_table_out *out, const bst_column *columns) {
+static bst_status create_table(bst_ctx *ctx, bst_table_out *out, const bst_io_column *columns) {
     sqlite3_str *create = sqlite3_str_new(NULL), *insert = sqlite3_str_new(NULL);
     sqlite3_str_appendf(create, "CREATE TABLE \"%w\"(", out->name);
     sqlite3_str_appendf(insert, "INSERT INTO \"%w\" VALUES(", out->name);
@@ -120,7 +120,7 @@ static bst_status create_table(bst_ctx *ctx, bst_table_out *out, const bst_colum
 }
 
 bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *name, const char *doc,
-                           const bst_column *columns, int count, bool csv, bst_table_out *out) {
+                           const bst_io_column *columns, int count, bool csv, bst_table_out *out) {
     char path[2200];
     *out = (bst_table_out){.tables = tables, .columns = count};
     snprintf(out->name, sizeof out->name, "%s", name);
@@ -142,7 +142,7 @@ bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *nam
     return BST_OK;
 }
 
-static void put_cell(FILE *file, const bst_value *v) {
+static void put_cell(FILE *file, const bst_io_value *v) {
     if (v->is_null) {
         return;
     }
@@ -159,9 +159,9 @@ static void put_cell(FILE *file, const bst_value *v) {
     }
 }
 
-bst_status bst_table_row(bst_ctx *ctx, bst_table_out *table, const bst_value *values) {
+bst_status bst_table_row(bst_ctx *ctx, bst_table_out *table, const bst_io_value *values) {
     for (int i = 0; i < table->columns; i++) {
-        const bst_value *v = &values[i];
+        const bst_io_value *v = &values[i];
         int code = v->is_null ? sqlite3_bind_null(table->insert, i + 1)
                    : v->type == BST_COLUMN_INT
                        ? sqlite3_bind_int64(table->insert, i + 1, v->as.integer)

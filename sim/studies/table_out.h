@@ -32,10 +32,10 @@ bst_status bst_tables_end(bst_ctx *ctx, bst_tables_out *tables, bst_status statu
 /* A table of `count` columns, and FOLDER/<name>.csv if `csv`; columns are noted in the table
  * "columns", with unit and meaning. */
 bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *name, const char *doc,
-                           const bst_column *columns, int count, bool csv,
+                           const bst_io_column *columns, int count, bool csv,
                            bst_table_out *out) BST_MUST_CHECK;
 bst_status bst_table_row(bst_ctx *ctx, bst_table_out *table,
-                         const bst_value *values) BST_MUST_CHECK;
+                         const bst_io_value *values) BST_MUST_CHECK;
 bst_status bst_table_end(bst_ctx *ctx, bst_table_out *table, bst_status status) BST_MUST_CHECK;
 
 #endif

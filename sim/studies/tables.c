@@ -14,21 +14,22 @@
 static const char *const metric_kinds[] = {"value", "rate", "key", "trials", "hits"};
 static const char *const designs[] = {"grid", "list", "latin_hypercube", "one_at_a_time", "morris"};
 
-static bst_column text_column(const char *name, const char *doc) {
-    return (bst_column){name, BST_COLUMN_TEXT, "", doc};
+static bst_io_column text_column(const char *name, const char *doc) {
+    return (bst_io_column){name, BST_COLUMN_TEXT, "", doc};
 }
-static bst_column int_column(const char *name, const char *doc) {
-    return (bst_column){name, BST_COLUMN_INT, "", doc};
+static bst_io_column int_column(const char *name, const char *doc) {
+    return (bst_io_column){name, BST_COLUMN_INT, "", doc};
 }
-static bst_column real_column(const char *name, const char *unit, const char *doc) {
-    return (bst_column){name, BST_COLUMN_REAL, unit, doc};
+static bst_io_column real_column(const char *name, const char *unit, const char *doc) {
+    return (bst_io_column){name, BST_COLUMN_REAL, unit, doc};
 }
 
 /* ------------------------------------------------------------------ what was varied */
 
 static bst_status write_about(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_study *s = j->results->study;
-    const bst_column columns[] = {text_column("key", "What."), text_column("value", "Its value.")};
+    const bst_io_column columns[] = {text_column("key", "What."),
+                                     text_column("value", "Its value.")};
     char numbers[6][32];
     snprintf(numbers[0], 32, "%" PRId64, s->settings);
     snprintf(numbers[1], 32, "%" PRId64, s->config.replicates);
@@ -45,12 +46,12 @@ static bst_status write_about(bst_ctx *ctx, const bst_tables_job *j) {
     BST_TRY(bst_table_begin(ctx, j->out, "about", "The study.", columns, 2, false, &t));
     bst_status status = BST_OK;
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs && status == BST_OK; i++) {
-        const bst_value row[] = {bst_text_value(pairs[i][0]), bst_text_value(pairs[i][1])};
+        const bst_io_value row[] = {bst_io_text_value(pairs[i][0]), bst_io_text_value(pairs[i][1])};
         status = bst_table_row(ctx, &t, row);
     }
     for (int i = 0; i < s->note_count && status == BST_OK; i++) {
-        const bst_value row[] = {bst_text_value(s->notes[i].key),
-                                 bst_text_value(s->notes[i].value)};
+        const bst_io_value row[] = {bst_io_text_value(s->notes[i].key),
+                                    bst_io_text_value(s->notes[i].value)};
         status = bst_table_row(ctx, &t, row);
     }
     return bst_table_end(ctx, &t, status);
@@ -58,14 +59,14 @@ static bst_status write_about(bst_ctx *ctx, const bst_tables_job *j) {
 
 static bst_status write_scenarios(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_study *s = j->results->study;
-    const bst_column columns[] = {int_column("scenario", "Its number."),
-                                  text_column("name", "Its name.")};
+    const bst_io_column columns[] = {int_column("scenario", "Its number."),
+                                     text_column("name", "Its name.")};
     bst_table_out t;
     BST_TRY(bst_table_begin(ctx, j->out, "scenarios", "The scenarios that are varied.", columns, 2,
                             false, &t));
     bst_status status = BST_OK;
     for (int i = 0; i < s->base_count && status == BST_OK; i++) {
-        const bst_value row[] = {bst_int_value(i), bst_text_value(s->bases[i].name)};
+        const bst_io_value row[] = {bst_io_int_value(i), bst_io_text_value(s->bases[i].name)};
         status = bst_table_row(ctx, &t, row);
     }
     return bst_table_end(ctx, &t, status);
@@ -83,7 +84,7 @@ static const bst_study_factor *factor_of(const bst_study *s, int axis) {
 
 static bst_status write_axes(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_study *s = j->results->study;
-    const bst_column columns[] = {
+    const bst_io_column columns[] = {
         int_column("axis", "Its number."),
         text_column("name", "Its column in other tables."),
         text_column("path", "JSON pointer of what is varied."),
@@ -95,21 +96,22 @@ static bst_status write_axes(bst_ctx *ctx, const bst_tables_job *j) {
     bst_status status = BST_OK;
     for (int a = 0; a < s->axis_count && status == BST_OK; a++) {
         const bst_study_factor *f = factor_of(s, a);
-        const bst_value row[] = {bst_int_value(a),
-                                 bst_text_value(s->axes[a].name),
-                                 bst_text_value(s->axes[a].path),
-                                 bst_text_value(f                       ? "sweep"
-                                                : s->axes[a].population ? "population"
-                                                                        : "dispersion"),
-                                 bst_text_value(f ? designs[f->design] : NULL),
-                                 f ? bst_int_value(f->sweep) : bst_null_value(BST_COLUMN_INT)};
+        const bst_io_value row[] = {
+            bst_io_int_value(a),
+            bst_io_text_value(s->axes[a].name),
+            bst_io_text_value(s->axes[a].path),
+            bst_io_text_value(f                       ? "sweep"
+                              : s->axes[a].population ? "population"
+                                                      : "dispersion"),
+            bst_io_text_value(f ? designs[f->design] : NULL),
+            f ? bst_io_int_value(f->sweep) : bst_io_null_value(BST_COLUMN_INT)};
         status = bst_table_row(ctx, &t, row);
     }
     return bst_table_end(ctx, &t, status);
 }
 
 static bst_status write_metrics(bst_ctx *ctx, const bst_tables_job *j) {
-    const bst_column columns[] = {
+    const bst_io_column columns[] = {
         text_column("metric", "Name."), text_column("unit", "Unit."),
         text_column("doc", "Meaning."),
         text_column("kind", "value, or rate: 1 or 0 in each run, a rate over runs.")};
@@ -117,9 +119,10 @@ static bst_status write_metrics(bst_ctx *ctx, const bst_tables_job *j) {
     BST_TRY(bst_table_begin(ctx, j->out, "metrics", "Figures of a run.", columns, 4, false, &t));
     bst_status status = BST_OK;
     for (int i = 0; i < j->metric_count && status == BST_OK; i++) {
-        const bst_metric *m = &j->results->kind->metrics[j->metrics[i]];
-        const bst_value row[] = {bst_text_value(m->name), bst_text_value(m->unit),
-                                 bst_text_value(m->doc), bst_text_value(metric_kinds[m->kind])};
+        const bst_study_metric *m = &j->results->kind->metrics[j->metrics[i]];
+        const bst_io_value row[] = {bst_io_text_value(m->name), bst_io_text_value(m->unit),
+                                    bst_io_text_value(m->doc),
+                                    bst_io_text_value(metric_kinds[m->kind])};
         status = bst_table_row(ctx, &t, row);
     }
     return bst_table_end(ctx, &t, status);
@@ -137,9 +140,9 @@ static bool is_numeric(const bst_study_axis *axis) {
     return true;
 }
 
-bst_column bst_axis_column(const bst_study_axis *axis) {
-    return (bst_column){axis->name, is_numeric(axis) ? BST_COLUMN_REAL : BST_COLUMN_TEXT, "",
-                        axis->path};
+bst_io_column bst_study_axis_column(const bst_study_axis *axis) {
+    return (bst_io_column){axis->name, is_numeric(axis) ? BST_COLUMN_REAL : BST_COLUMN_TEXT, "",
+                           axis->path};
 }
 
 /* The scenario's own value, where an axis leaves it. */
@@ -148,28 +151,28 @@ static const cJSON *own_value(const bst_study *s, const bst_study_axis *axis, in
     return own ? own : bst_study_at(bst_json_root(s->json), axis->path);
 }
 
-bst_value bst_axis_value(const bst_study *s, int a, const bst_study_value *v, int base,
-                         char **text) {
+bst_io_value bst_study_axis_value(const bst_study *s, int a, const bst_study_value *v, int base,
+                                  char **text) {
     const bst_study_axis *axis = &s->axes[a];
     const cJSON *json = v->given ? v->json : own_value(s, axis, base);
     *text = NULL;
     if (is_numeric(axis)) {
-        return v->given && v->is_number ? bst_real_value(v->number)
-               : cJSON_IsNumber(json)   ? bst_real_value(json->valuedouble)
-                                        : bst_null_value(BST_COLUMN_REAL);
+        return v->given && v->is_number ? bst_io_real_value(v->number)
+               : cJSON_IsNumber(json)   ? bst_io_real_value(json->valuedouble)
+                                        : bst_io_null_value(BST_COLUMN_REAL);
     }
     if (cJSON_IsString(json)) {
-        return bst_text_value(json->valuestring);
+        return bst_io_text_value(json->valuestring);
     }
     *text = json ? cJSON_PrintUnformatted(json) : NULL;
-    return bst_text_value(*text);
+    return bst_io_text_value(*text);
 }
 
 /* Values of the first `count` axes into row; texts[count] are freed by the caller. */
 static void axis_values(const bst_study *s, int count, const bst_study_value *values, int base,
-                        bst_value *row, char **texts) {
+                        bst_io_value *row, char **texts) {
     for (int a = 0; a < count; a++) {
-        row[a] = bst_axis_value(s, a, &values[a], base, &texts[a]);
+        row[a] = bst_study_axis_value(s, a, &values[a], base, &texts[a]);
     }
 }
 
@@ -186,7 +189,7 @@ static bst_status write_settings(bst_ctx *ctx, const bst_tables_job *j) {
     j->columns[0] = int_column("setting", "Its number: of its runs run / replicates.");
     j->columns[1] = int_column("scenario", "Number of the scenario that is varied.");
     for (int a = 0; a < s->swept_count; a++) {
-        j->columns[fixed + a] = bst_axis_column(&s->axes[a]);
+        j->columns[fixed + a] = bst_study_axis_column(&s->axes[a]);
     }
     bst_table_out t;
     BST_TRY(bst_table_begin(ctx, j->out, "settings", "Values of the settings.", j->columns, n, true,
@@ -195,8 +198,8 @@ static bst_status write_settings(bst_ctx *ctx, const bst_tables_job *j) {
     for (int64_t i = 0; i < s->settings && status == BST_OK; i++) {
         bst_study_place place = bst_study_place_of(s, i * s->config.replicates);
         bst_study_values(s, &place, j->values);
-        j->row[0] = bst_int_value(i);
-        j->row[1] = bst_int_value(place.base);
+        j->row[0] = bst_io_int_value(i);
+        j->row[1] = bst_io_int_value(place.base);
         axis_values(s, s->swept_count, j->values, place.base, j->row + fixed, j->texts);
         status = bst_table_row(ctx, &t, j->row);
         free_texts(j->texts, s->swept_count);
@@ -208,7 +211,7 @@ static bst_status write_settings(bst_ctx *ctx, const bst_tables_job *j) {
 
 static void run_columns(const bst_tables_job *j) {
     const bst_study *s = j->results->study;
-    bst_column *c = j->columns;
+    bst_io_column *c = j->columns;
     *c++ = int_column("run", "Its number: boresight study STUDY --emit RUN writes its scenario.");
     *c++ = int_column("setting", "Number of its setting.");
     *c++ = int_column("replicate", "Number among the runs of the setting.");
@@ -217,10 +220,10 @@ static void run_columns(const bst_tables_job *j) {
     *c++ = text_column("status", "done or failed.");
     *c++ = text_column("error", "Why it failed.");
     for (int a = 0; a < s->axis_count; a++) {
-        *c++ = bst_axis_column(&s->axes[a]);
+        *c++ = bst_study_axis_column(&s->axes[a]);
     }
     for (int i = 0; i < j->metric_count; i++) {
-        const bst_metric *m = &j->results->kind->metrics[j->metrics[i]];
+        const bst_study_metric *m = &j->results->kind->metrics[j->metrics[i]];
         *c++ = real_column(m->name, m->unit, m->doc);
     }
 }
@@ -244,17 +247,17 @@ static bst_status write_runs(bst_ctx *ctx, const bst_tables_job *j) {
         }
         bst_study_place place = bst_study_place_of(s, i);
         bst_study_values(s, &place, j->values);
-        j->row[0] = bst_int_value(i);
-        j->row[1] = bst_int_value(place.setting);
-        j->row[2] = bst_int_value(place.replicate);
-        j->row[3] = bst_int_value((int64_t)place.run_number);
-        j->row[4] = bst_int_value(place.base);
-        j->row[5] = bst_text_value(failed ? "failed" : "done");
-        j->row[6] = bst_text_value(failed ? r->errors[error].text : NULL);
+        j->row[0] = bst_io_int_value(i);
+        j->row[1] = bst_io_int_value(place.setting);
+        j->row[2] = bst_io_int_value(place.replicate);
+        j->row[3] = bst_io_int_value((int64_t)place.run_number);
+        j->row[4] = bst_io_int_value(place.base);
+        j->row[5] = bst_io_text_value(failed ? "failed" : "done");
+        j->row[6] = bst_io_text_value(failed ? r->errors[error].text : NULL);
         axis_values(s, s->axis_count, j->values, place.base, j->row + fixed, j->texts);
         for (int m = 0; m < j->metric_count; m++) {
             j->row[fixed + s->axis_count + m] =
-                bst_real_value(r->metrics[i * r->kind->metric_count + j->metrics[m]]);
+                bst_io_real_value(r->metrics[i * r->kind->metric_count + j->metrics[m]]);
         }
         status = bst_table_row(ctx, &t, j->row);
         free_texts(j->texts, s->axis_count);
@@ -264,7 +267,7 @@ static bst_status write_runs(bst_ctx *ctx, const bst_tables_job *j) {
 
 static bst_status write_speed(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_results *r = j->results;
-    const bst_column columns[] = {
+    const bst_io_column columns[] = {
         int_column("run", "Its number."), real_column("wall_s", "s", "Wall time of the run."),
         real_column("cpu_s", "s", "Processor time of the run, on all threads.")};
     bst_table_out t;
@@ -274,8 +277,8 @@ static bst_status write_speed(bst_ctx *ctx, const bst_tables_job *j) {
     bst_status status = BST_OK;
     for (int64_t i = 0; i < r->study->runs && status == BST_OK; i++) {
         if (r->state[i] != BST_ROW_MISSING) {
-            const bst_value row[] = {bst_int_value(i), bst_real_value(r->wall_s[i]),
-                                     bst_real_value(r->cpu_s[i])};
+            const bst_io_value row[] = {bst_io_int_value(i), bst_io_real_value(r->wall_s[i]),
+                                        bst_io_real_value(r->cpu_s[i])};
             status = bst_table_row(ctx, &t, row);
         }
     }
@@ -286,7 +289,7 @@ static bst_status write_speed(bst_ctx *ctx, const bst_tables_job *j) {
 
 enum { STATISTICS_COLUMNS = 17 };
 
-static void statistics_columns(bst_column *c) {
+static void statistics_columns(bst_io_column *c) {
     *c++ = int_column("setting", "Number of the setting; NULL: all runs of the study.");
     *c++ = text_column("metric", "Name of the metric.");
     *c++ = text_column("method",
@@ -316,33 +319,33 @@ static bst_status put_statistics(bst_ctx *ctx, const bst_tables_job *j, bst_tabl
     BST_TRY(bst_statistics_of(ctx, r->metrics + first * columns, count, columns,
                               r->study->config.resamples, key, list));
     for (int i = 0; i < j->metric_count; i++) {
-        const bst_metric *m = &r->kind->metrics[j->metrics[i]];
+        const bst_study_metric *m = &r->kind->metrics[j->metrics[i]];
         bst_statistics *s = &list[j->metrics[i]];
         if (m->kind == BST_METRIC_FLAG && s->count > 0) {
             int64_t hits = llround(s->mean * (double)s->count);
-            bst_interval wilson = bst_wilson_interval(hits, s->count, BST_NORMAL_95);
+            bst_eval_interval wilson = bst_eval_wilson_interval(hits, s->count, BST_NORMAL_95);
             s->low = wilson.low;
             s->high = wilson.high;
         }
-        const bst_value row[] = {
-            setting < 0 ? bst_null_value(BST_COLUMN_INT) : bst_int_value(setting),
-            bst_text_value(m->name),
-            bst_text_value(m->kind == BST_METRIC_FLAG   ? "wilson"
-                           : count > BST_BOOTSTRAP_RUNS ? "normal"
-                                                        : "bootstrap"),
-            bst_int_value(s->count),
-            bst_int_value(s->missing),
-            bst_real_value(s->mean),
-            bst_real_value(s->low),
-            bst_real_value(s->high),
-            bst_real_value(s->std),
-            bst_real_value(s->minimum),
-            bst_real_value(s->p05),
-            bst_real_value(s->p25),
-            bst_real_value(s->median),
-            bst_real_value(s->p75),
-            bst_real_value(s->p95),
-            bst_real_value(s->maximum)};
+        const bst_io_value row[] = {
+            setting < 0 ? bst_io_null_value(BST_COLUMN_INT) : bst_io_int_value(setting),
+            bst_io_text_value(m->name),
+            bst_io_text_value(m->kind == BST_METRIC_FLAG   ? "wilson"
+                              : count > BST_BOOTSTRAP_RUNS ? "normal"
+                                                           : "bootstrap"),
+            bst_io_int_value(s->count),
+            bst_io_int_value(s->missing),
+            bst_io_real_value(s->mean),
+            bst_io_real_value(s->low),
+            bst_io_real_value(s->high),
+            bst_io_real_value(s->std),
+            bst_io_real_value(s->minimum),
+            bst_io_real_value(s->p05),
+            bst_io_real_value(s->p25),
+            bst_io_real_value(s->median),
+            bst_io_real_value(s->p75),
+            bst_io_real_value(s->p95),
+            bst_io_real_value(s->maximum)};
         BST_TRY(bst_table_row(ctx, t, row));
     }
     return BST_OK;
@@ -350,7 +353,7 @@ static bst_status put_statistics(bst_ctx *ctx, const bst_tables_job *j, bst_tabl
 
 static bst_status write_statistics(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_study *s = j->results->study;
-    bst_column columns[STATISTICS_COLUMNS];
+    bst_io_column columns[STATISTICS_COLUMNS];
     bst_table_out t;
     statistics_columns(columns);
     BST_TRY(bst_table_begin(ctx, j->out, "statistics", "Metrics over the runs of each setting.",

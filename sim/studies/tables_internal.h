@@ -11,16 +11,16 @@ typedef struct bst_tables_job {
     bst_tables_out *out;
     int metrics[BST_STUDY_METRICS]; /* that are told, of the kind's */
     int metric_count;
-    bst_column *columns; /* scratch for one table */
-    bst_value *row;
+    bst_io_column *columns; /* scratch for one table */
+    bst_io_value *row;
     bst_study_value *values;
     char **texts;
 } bst_tables_job;
 
 /* The column of an axis, and its value there: *text is to be freed after use. */
-bst_column bst_axis_column(const bst_study_axis *axis);
-bst_value bst_axis_value(const bst_study *study, int axis, const bst_study_value *value, int base,
-                         char **text);
+bst_io_column bst_study_axis_column(const bst_study_axis *axis);
+bst_io_value bst_study_axis_value(const bst_study *study, int axis, const bst_study_value *value,
+                                  int base, char **text);
 
 /* Ranked tables of designs that tell which axes matter, where the study has any. */
 bst_status bst_study_write_sensitivity(bst_ctx *ctx, const bst_tables_job *job) BST_MUST_CHECK;

@@ -37,7 +37,7 @@ enum {
 
 _Static_assert((int)METRICS <= (int)BST_STUDY_METRICS,
                "results of a run have room for the figures");
-static const bst_metric metrics[METRICS] = {
+static const bst_study_metric metrics[METRICS] = {
     [FRAMES] = {"frames", "", "Frames.", 0},
     [SATELLITES] = {"satellite_labels", "", "Labels of satellites in all frames.", 0},
     [STARS] = {"star_labels", "", "Labels of stars in all frames.", 0},
@@ -62,7 +62,7 @@ typedef struct cube {
     bst_fits *fits;
     bst_fits *masks;           /* NULL: none */
     bst_fits_frame mask_frame; /* the newest frame, without what its truth adds */
-    bst_labels labels;
+    bst_study_labels labels;
     double background;
     bst_frame_message waiting; /* the frame whose truth has not come */
     bool waits;
@@ -103,7 +103,7 @@ static int find_sensor(const bst_scenario *scenario, const char *wanted, int *ob
 
 static bool renders(const bst_scenario *scenario, int observer, int sensor) {
     for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         if (module->observer == observer && module->sensor == sensor && !module->off &&
             strcmp(module->desc->role, "scenegen") == 0) {
             return true;
@@ -152,9 +152,9 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
         .observer_gcrf_m = truth->observer_gcrf_m,
         .observer_gcrf_mps = truth->observer_gcrf_mps,
         .body_fraction = {truth->earth_fraction, truth->moon_fraction, truth->sun_fraction}};
-    const bst_light light = {.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
+    const bst_astro_light light = {.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
     if (truth->pixel_scale_arcsec > 0.0 && truth->pixel_scale_arcsec != camera.pixel_scale_arcsec) {
-        BST_TRY(bst_camera_at_scale(ctx, c->camera, truth->pixel_scale_arcsec, &camera));
+        BST_TRY(bst_world_camera_at_scale(ctx, c->camera, truth->pixel_scale_arcsec, &camera));
     }
     frame.pixel_scale_arcsec = camera.pixel_scale_arcsec;
     frame.has_wcs =
@@ -166,7 +166,7 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
     bst_frame_unmap(m->frame);
     BST_TRY(status);
     bst_time_to_utc(frame.start, 6, utc, sizeof utc);
-    bst_labels_frame(&c->labels, m, utc, frame.exposure_s, truth);
+    bst_study_labels_frame(&c->labels, m, utc, frame.exposure_s, truth);
     c->background += truth->background_e + truth->dark_e;
     return BST_OK;
 }
@@ -354,7 +354,7 @@ int bst_study_part(const bst_study_cubes_config *c, uint64_t seed, int64_t run) 
 
 static void fill(const cube *c, const char *fits, const char *labels, const char *masks,
                  const bst_study_run *run, double *m) {
-    const bst_labels *l = &c->labels;
+    const bst_study_labels *l = &c->labels;
     m[FRAMES] = (double)l->frames;
     m[SATELLITES] = (double)l->satellites;
     m[STARS] = (double)l->stars;
@@ -431,10 +431,10 @@ static bst_status run_cubes(bst_ctx *ctx, void *worker, const bst_study_run *run
         const bst_observer_config *observers = scenario.observers.items;
         const bst_sensor_config *sensors = observers[observer].sensors.items;
         c.target = *sensors[sensor].cue.object ? sensors[sensor].cue.object : NULL;
-        c.labels = (bst_labels){.world = world,
-                                .box_px = config.box_px,
-                                .star_limit_v_mag = config.star_limit_v_mag,
-                                .mask = config.masks};
+        c.labels = (bst_study_labels){.world = world,
+                                      .box_px = config.box_px,
+                                      .star_limit_v_mag = config.star_limit_v_mag,
+                                      .mask = config.masks};
         status = make_cube(ctx, &c, sim, run, out);
     }
     if (c.waits) {
@@ -485,18 +485,18 @@ static bool intact(void *user, const bst_study_run *run, const double *m) {
 static bst_status finish(bst_ctx *ctx, void *user, const struct bst_results *results,
                          const char *out) {
     (void)user;
-    const bst_card_metrics columns = {FRAMES, SATELLITES, STARS, BYTES, PART};
+    const bst_study_card_metrics columns = {FRAMES, SATELLITES, STARS, BYTES, PART};
     return bst_study_write_card(ctx, results, &columns, out);
 }
 
-const bst_study_kind bst_app_study_cubes = {.name = "cubes",
-                                            .metrics = metrics,
-                                            .metric_count = METRICS,
-                                            .check = check_cubes,
-                                            .open = bst_study_warm_open,
-                                            .close = bst_study_warm_close,
-                                            .run = run_cubes,
-                                            .emit = emit_cubes,
-                                            .intact = intact,
-                                            .finish = finish,
-                                            .stop_requested = bst_study_stop_requested};
+const bst_study_kind bst_study_cubes_kind = {.name = "cubes",
+                                             .metrics = metrics,
+                                             .metric_count = METRICS,
+                                             .check = check_cubes,
+                                             .open = bst_study_warm_open,
+                                             .close = bst_study_warm_close,
+                                             .run = run_cubes,
+                                             .emit = emit_cubes,
+                                             .intact = intact,
+                                             .finish = finish,
+                                             .stop_requested = bst_study_stop_requested};

@@ -33,7 +33,7 @@ bst_status bst_study_check_scenario(bst_ctx *ctx, void *user, const bst_study_ru
     return status;
 }
 
-bst_status bst_study_warm_open(bst_ctx *ctx, void *user, const bst_worker_place *place,
+bst_status bst_study_warm_open(bst_ctx *ctx, void *user, const bst_study_worker_place *place,
                                void **worker) {
     (void)user;
     bst_study_warm *warm = calloc(1, sizeof *warm);
@@ -211,7 +211,7 @@ _Static_assert((int)ALL_METRICS <= (int)BST_STUDY_METRICS &&
     [OBJECTS_TRACKED] = {"objects_tracked", "", "Of them: those with a confirmed track.",         \
                          BST_METRIC_VALUE}
 
-static const bst_metric metrics[ALL_METRICS] = {
+static const bst_study_metric metrics[ALL_METRICS] = {
     METRIC_LIST,
     [TASKS] = {"tasks", "", "Tasks given, of all sensors.", BST_METRIC_VALUE},
     [TASKS_DONE] = {"tasks_done", "", "Of them: those done.", BST_METRIC_VALUE},
@@ -239,7 +239,7 @@ static const bst_metric metrics[ALL_METRICS] = {
                            "Confirmed tracks of all objects against the truth, RMS.",
                            BST_METRIC_VALUE}};
 /* of each sensor where there are several */
-static const bst_metric series[METRICS + 1] = {
+static const bst_study_metric series[METRICS + 1] = {
     METRIC_LIST, [METRICS] = {"sensor", "", "Number of the sensor.", BST_METRIC_KEY}};
 
 static void fill(const bst_run_sensor_figures *f, double *out) {
@@ -343,15 +343,15 @@ static bst_status emit_loop(bst_ctx *ctx, void *user, const bst_study_run *run, 
     return status;
 }
 
-const bst_study_kind bst_app_study_loop = {.name = "loop",
-                                           .metrics = metrics,
-                                           .metric_count = ALL_METRICS,
-                                           .series_name = "sensors",
-                                           .series = series,
-                                           .series_count = METRICS + 1,
-                                           .check = bst_study_check_scenario,
-                                           .open = bst_study_warm_open,
-                                           .close = bst_study_warm_close,
-                                           .run = run_loop,
-                                           .emit = emit_loop,
-                                           .stop_requested = bst_study_stop_requested};
+const bst_study_kind bst_study_loop_kind = {.name = "loop",
+                                            .metrics = metrics,
+                                            .metric_count = ALL_METRICS,
+                                            .series_name = "sensors",
+                                            .series = series,
+                                            .series_count = METRICS + 1,
+                                            .check = bst_study_check_scenario,
+                                            .open = bst_study_warm_open,
+                                            .close = bst_study_warm_close,
+                                            .run = run_loop,
+                                            .emit = emit_loop,
+                                            .stop_requested = bst_study_stop_requested};

@@ -37,7 +37,7 @@ enum {
     " of known place and shape. Below 0: noise of the trials (loss_db_sigma), or the gain of a " \
     "detector that takes the highest of several places where the ideal one tests one."
 
-static const bst_metric metrics[METRICS] = {
+static const bst_study_metric metrics[METRICS] = {
     [SNR_PD50] = {"snr_pd50", "", "SNR at which half of the targets are detected.", 0},
     [SNR_PD90] = {"snr_pd90", "", "SNR at which 90 % of the targets are detected.", 0},
     [V_PD50] = {"v_mag_pd50", "mag", "V magnitude of targets of snr_pd50.", 0},
@@ -63,7 +63,7 @@ enum { SNR, V_MAG, TRIALS, DETECTED, PD, PD_LOW, PD_HIGH, IDEAL_PD, ERROR_PX, SE
 
 _Static_assert((int)METRICS <= (int)BST_STUDY_METRICS && (int)SERIES <= (int)BST_SERIES_COLUMNS,
                "results of a run have room for the figures");
-static const bst_metric series[SERIES] = {
+static const bst_study_metric series[SERIES] = {
     [SNR] = {"snr", "", "SNR of the targets.", BST_METRIC_KEY},
     [V_MAG] = {"v_mag", "mag", "Their V magnitude.", 0},
     [TRIALS] = {"trials", "", "Targets.", BST_METRIC_TRIALS},
@@ -181,7 +181,7 @@ static bst_status fill(bst_ctx *ctx, const bst_pd_scene *s, const bst_pd_result 
     for (int i = 0; i < s->points; i++) {
         const bst_pd_tally *t = &r->tallies[i];
         double *row = out->series + (size_t)i * SERIES, n = (double)t->matched;
-        bst_interval w = bst_wilson_interval(t->matched, t->trials, BST_NORMAL_95);
+        bst_eval_interval w = bst_eval_wilson_interval(t->matched, t->trials, BST_NORMAL_95);
         row[SNR] = s->snr[i];
         row[V_MAG] = s->v_mag[i];
         row[TRIALS] = (double)t->trials;
@@ -189,7 +189,7 @@ static bst_status fill(bst_ctx *ctx, const bst_pd_scene *s, const bst_pd_result 
         row[PD] = t->trials > 0 ? bst_pd_without_chance(n / (double)t->trials, f.chance) : NAN;
         row[PD_LOW] = bst_pd_without_chance(w.low, f.chance);
         row[PD_HIGH] = bst_pd_without_chance(w.high, f.chance);
-        row[IDEAL_PD] = f.pfa > 0.0 ? bst_ideal_pd(f.pfa, s->snr[i]) : NAN;
+        row[IDEAL_PD] = f.pfa > 0.0 ? bst_eval_ideal_pd(f.pfa, s->snr[i]) : NAN;
         row[ERROR_PX] = n > 0.0 ? sqrt((t->error_square[0] + t->error_square[1]) / (2.0 * n)) : NAN;
     }
     return BST_OK;
@@ -272,15 +272,15 @@ static bst_status emit_pd(bst_ctx *ctx, void *user, const bst_study_run *run, FI
     return BST_OK;
 }
 
-const bst_study_kind bst_app_study_pd = {.name = "pd",
-                                         .metrics = metrics,
-                                         .metric_count = METRICS,
-                                         .series_name = "curve",
-                                         .series = series,
-                                         .series_count = SERIES,
-                                         .check = check_pd,
-                                         .open = bst_study_warm_open,
-                                         .close = bst_study_warm_close,
-                                         .run = run_pd,
-                                         .emit = emit_pd,
-                                         .stop_requested = bst_study_stop_requested};
+const bst_study_kind bst_study_pd_kind = {.name = "pd",
+                                          .metrics = metrics,
+                                          .metric_count = METRICS,
+                                          .series_name = "curve",
+                                          .series = series,
+                                          .series_count = SERIES,
+                                          .check = check_pd,
+                                          .open = bst_study_warm_open,
+                                          .close = bst_study_warm_close,
+                                          .run = run_pd,
+                                          .emit = emit_pd,
+                                          .stop_requested = bst_study_stop_requested};

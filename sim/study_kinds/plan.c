@@ -159,12 +159,13 @@ static void print_axes(const bst_study *study) {
 void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, int workers,
                           const char *device, const char *out) {
     double bytes = 0.0, row_bytes = 60.0 * (kind->metric_count + study->axis_count + 8);
-    printf("%s, kind %s: %s, %s x %s, of %s\n", study->config.name, kind->name,
-           bst_count_text((char[BST_COUNT_TEXT]){0}, study->runs, "run", "runs"),
-           bst_count_text((char[BST_COUNT_TEXT]){0}, study->settings, "setting", "settings"),
-           bst_count_text((char[BST_COUNT_TEXT]){0}, study->config.replicates, "replicate",
+    printf(
+        "%s, kind %s: %s, %s x %s, of %s\n", study->config.name, kind->name,
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, study->runs, "run", "runs"),
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, study->settings, "setting", "settings"),
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, study->config.replicates, "replicate",
                           "replicates"),
-           bst_count_text((char[BST_COUNT_TEXT]){0}, study->base_count, "scenario", "scenarios"));
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, study->base_count, "scenario", "scenarios"));
     print_axes(study);
     trial t = attempt(study, kind, workers, device, &bytes);
     if (*t.error) {

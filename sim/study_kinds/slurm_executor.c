@@ -15,8 +15,8 @@ static const char *own_site(char *path, size_t bytes) {
     return n > 0 && (size_t)n < bytes && access(path, F_OK) == 0 ? path : NULL;
 }
 
-bst_status bst_app_study_slurm(bst_ctx *ctx, const char *site_file, const char *device,
-                               const char *out, bst_executor *executor) {
+bst_status bst_study_slurm(bst_ctx *ctx, const char *site_file, const char *device, const char *out,
+                           bst_executor *executor) {
     char path[4096], program[4096];
     bst_slurm_site site;
     BST_TRY(bst_slurm_site_load(ctx, site_file ? site_file : own_site(path, sizeof path), &site));

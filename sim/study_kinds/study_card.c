@@ -20,7 +20,7 @@ static double metric(const bst_results *r, int64_t run, int which) {
     return r->metrics[run * r->kind->metric_count + which];
 }
 
-static bst_status write_part(bst_ctx *ctx, const bst_results *r, const bst_card_metrics *m,
+static bst_status write_part(bst_ctx *ctx, const bst_results *r, const bst_study_card_metrics *m,
                              const char *out, int part) {
     char path[4200];
     bst_draft draft;
@@ -35,7 +35,7 @@ static bst_status write_part(bst_ctx *ctx, const bst_results *r, const bst_card_
     return bst_draft_close(ctx, &draft, BST_OK);
 }
 
-static void add_counts(const bst_results *r, const bst_card_metrics *m, cJSON *card) {
+static void add_counts(const bst_results *r, const bst_study_card_metrics *m, cJSON *card) {
     double sums[4] = {0.0}, parts[PARTS] = {0.0};
     const int which[4] = {m->frames, m->satellites, m->stars, m->bytes};
     for (int64_t i = 0; i < r->study->runs; i++) {
@@ -113,7 +113,7 @@ static bst_status add_axes(bst_ctx *ctx, const bst_results *r, cJSON *card) {
     return good ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the data card");
 }
 
-bst_status bst_study_write_card(bst_ctx *ctx, const bst_results *r, const bst_card_metrics *m,
+bst_status bst_study_write_card(bst_ctx *ctx, const bst_results *r, const bst_study_card_metrics *m,
                                 const char *out) {
     const bst_study *s = r->study;
     char path[4200], seed[24];
@@ -124,7 +124,7 @@ bst_status bst_study_write_card(bst_ctx *ctx, const bst_results *r, const bst_ca
     cJSON_AddStringToObject(card, "name", s->config.name);
     cJSON_AddStringToObject(card, "program", "boresight");
     cJSON_AddStringToObject(card, "version", bst_version());
-    cJSON_AddStringToObject(card, "git_revision", bst_git_revision());
+    cJSON_AddStringToObject(card, "git_revision", bst_version_git_revision());
     snprintf(seed, sizeof seed, "0x%" PRIX64, s->config.seed);
     cJSON_AddStringToObject(card, "seed", seed);
     cJSON_AddStringToObject(card, "digest", s->digest);
@@ -146,7 +146,7 @@ bst_status bst_study_write_card(bst_ctx *ctx, const bst_results *r, const bst_ca
     char *text = cJSON_Print(card);
     snprintf(path, sizeof path, "%.4000s/card.json", out);
     if (status == BST_OK) {
-        status = text ? bst_write_file_atomic(ctx, path, text, strlen(text))
+        status = text ? bst_io_write_file_atomic(ctx, path, text, strlen(text))
                       : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the data card");
     }
     free(text);

@@ -5,9 +5,9 @@
 #include "sim/studies/results.h"
 
 /* Which metrics of the kind are what the card tells. */
-typedef struct bst_card_metrics {
+typedef struct bst_study_card_metrics {
     int frames, satellites, stars, bytes, part;
-} bst_card_metrics;
+} bst_study_card_metrics;
 
 /* 0 training, 1 validation, 2 test: by the run's number, whatever else is in the study, so that a
  * scene is in one part alone. */
@@ -16,6 +16,7 @@ int bst_study_part(const bst_study_cubes_config *config, uint64_t seed, int64_t 
 /* Writes OUT/train.txt, val.txt and test.txt (a line a sequence: its frames, its labels) and
  * OUT/card.json: what was varied and between which values, counts, seeds, how it was made. */
 bst_status bst_study_write_card(bst_ctx *ctx, const bst_results *results,
-                                const bst_card_metrics *metrics, const char *out) BST_MUST_CHECK;
+                                const bst_study_card_metrics *metrics,
+                                const char *out) BST_MUST_CHECK;
 
 #endif

@@ -7,9 +7,9 @@
 #include "sim/studies/executor.h"
 #include "sim/studies/kind.h"
 
-extern const bst_study_kind bst_app_study_loop, bst_app_study_pd, bst_app_study_cubes;
+extern const bst_study_kind bst_study_loop_kind, bst_study_pd_kind, bst_study_cubes_kind;
 /* The kind of a bst_study_kind_id. */
-const bst_study_kind *bst_app_study_kind(int kind);
+const bst_study_kind *bst_study_kind_of(int kind);
 
 /* What a worker keeps from run to run: the device, once a run needed one, and the latest star
  * catalogue, whose checksum takes as long to verify as some runs do. */
@@ -29,7 +29,7 @@ void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, in
 /* As `check` of bst_study_kind, of the scenario. `user`: a bst_study_plugins that takes what the
  * scenario uses, or NULL. */
 bst_status bst_study_check_scenario(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep);
-bst_status bst_study_warm_open(bst_ctx *ctx, void *user, const bst_worker_place *place,
+bst_status bst_study_warm_open(bst_ctx *ctx, void *user, const bst_study_worker_place *place,
                                void **worker);
 void bst_study_warm_close(void *worker);
 bool bst_study_stop_requested(void *user);
@@ -46,7 +46,7 @@ bst_status bst_study_print_scenario(bst_ctx *ctx, const bst_scenario *scenario,
 
 /* Slurm as executor of the study in the folder `out`; `site_file` NULL: the user's own, if any;
  * `device`: for its tasks, "" for the default. */
-bst_status bst_app_study_slurm(bst_ctx *ctx, const char *site_file, const char *device,
-                               const char *out, bst_executor *executor) BST_MUST_CHECK;
+bst_status bst_study_slurm(bst_ctx *ctx, const char *site_file, const char *device, const char *out,
+                           bst_executor *executor) BST_MUST_CHECK;
 
 #endif

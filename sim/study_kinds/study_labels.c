@@ -45,7 +45,7 @@ static void put_axis(FILE *stream, char axis, const double v[3], double box) {
                box > 0.0 ? box : maximum(v) - minimum(v));
 }
 
-static bool put_object(bst_labels *l, const bst_frame_message *f, double exposure_s,
+static bool put_object(bst_study_labels *l, const bst_frame_message *f, double exposure_s,
                        const bst_truth_item *item, int number, bool first) {
     bool star = item->kind == BST_SOURCE_STAR;
     double binning = f->binning > 1 ? f->binning : 1;
@@ -96,8 +96,8 @@ static bool put_object(bst_labels *l, const bst_frame_message *f, double exposur
     return true;
 }
 
-void bst_labels_frame(bst_labels *l, const bst_frame_message *frame, const char *start_utc,
-                      double exposure_s, const bst_truth *truth) {
+void bst_study_labels_frame(bst_study_labels *l, const bst_frame_message *frame,
+                            const char *start_utc, double exposure_s, const bst_truth *truth) {
     fprintf(l->stream, "%s\n{\"sequence_id\":%" PRId64 ",\"plane\":%" PRId64, l->frames ? "," : "",
             frame->exposure_id, l->frames);
     put_text(l->stream, "start_utc", start_utc);

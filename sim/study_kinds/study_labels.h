@@ -7,7 +7,7 @@
 #include "sim/messages/messages.h"
 #include "sim/world/world.h"
 
-typedef struct bst_labels {
+typedef struct bst_study_labels {
     FILE *stream;
     const bst_world *world;
     double box_px, star_limit_v_mag;
@@ -15,12 +15,12 @@ typedef struct bst_labels {
     int64_t frames, satellites, stars; /* labels so far */
     double snr_sum;                    /* of the satellites */
     double longest_px;                 /* way of a satellite through a frame */
-} bst_labels;
+} bst_study_labels;
 
 /* The frame's part of the list "frames": its time and the objects whose light is in it, as
  * boresight export --satnet has them. Coordinates are fractions of the image between pixel edges.
  */
-void bst_labels_frame(bst_labels *labels, const bst_frame_message *frame, const char *start_utc,
-                      double exposure_s, const bst_truth *truth);
+void bst_study_labels_frame(bst_study_labels *labels, const bst_frame_message *frame,
+                            const char *start_utc, double exposure_s, const bst_truth *truth);
 
 #endif

@@ -13,7 +13,7 @@
 bst_status bst_study_plugins_take(bst_ctx *ctx, bst_study_plugins *p,
                                   const bst_scenario *scenario) {
     for (int i = 0; i < scenario->plugin_count; i++) {
-        const bst_plugin_use *use = &scenario->plugins[i];
+        const bst_scenario_plugin_use *use = &scenario->plugins[i];
         bool known = false;
         for (int k = 0; k < p->count; k++) {
             known = known || strcmp(p->items[k].file, use->file) == 0;
@@ -21,7 +21,7 @@ bst_status bst_study_plugins_take(bst_ctx *ctx, bst_study_plugins *p,
         if (known) {
             continue;
         }
-        bst_plugin_use *items = realloc(p->items, ((size_t)p->count + 1) * sizeof *items);
+        bst_scenario_plugin_use *items = realloc(p->items, ((size_t)p->count + 1) * sizeof *items);
         p->items = items ? items : p->items;
         bst_study_note *notes = realloc(p->notes, ((size_t)p->count + 1) * sizeof *notes);
         p->notes = notes ? notes : p->notes;
@@ -59,8 +59,8 @@ static const char *recorded(const cJSON *list, const char *file) {
     return NULL;
 }
 
-static bst_status compare(bst_ctx *ctx, const char *path, const bst_plugin_use *uses, int count,
-                          bst_status differing) {
+static bst_status compare(bst_ctx *ctx, const char *path, const bst_scenario_plugin_use *uses,
+                          int count, bst_status differing) {
     bst_json *json;
     BST_TRY(bst_json_load(ctx, path, &json));
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(bst_json_root(json), "plugins");
@@ -99,7 +99,7 @@ bst_status bst_study_plugins_settle(bst_ctx *ctx, const bst_study_plugins *p, co
     }
     char *text = cJSON_Print(root);
     cJSON_Delete(root);
-    bst_status status = text ? bst_write_file_atomic(ctx, path, text, strlen(text))
+    bst_status status = text ? bst_io_write_file_atomic(ctx, path, text, strlen(text))
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the plug-ins");
     free(text);
     return status;

@@ -8,7 +8,7 @@
 
 /* Libraries, each once. Zero-initialised it is empty. */
 typedef struct bst_study_plugins {
-    bst_plugin_use *items;
+    bst_scenario_plugin_use *items;
     bst_study_note *notes; /* "plugin", "FILE sha256 DIGEST" */
     int count;
 } bst_study_plugins;

@@ -1,32 +1,35 @@
 #include "sim/astro/belt.h"
 #include "sim/world/world_internal.h"
 
-bst_status bst_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,
-                                   bst_sky_clock *clock, double seconds, const bst_state *eye,
-                                   bst_vec3 *line_m) {
-    bst_sky sky;
+bst_status bst_world_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,
+                                         bst_sky_clock *clock, double seconds,
+                                         const bst_world_state *eye, bst_vec3 *line_m) {
+    bst_sky_rotation sky;
     BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
-    bst_state target;
+    bst_world_state target;
     double emission_s;
-    return bst_orbit_line_of_sight(ctx, &world->objects[object].orbit, eye, clock, world->epoch,
-                                   &sky.bodies, seconds, false, line_m, &target, &emission_s);
+    return bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, eye, clock,
+                                         world->epoch, &sky.bodies, seconds, false, line_m, &target,
+                                         &emission_s);
 }
 
-bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                bst_sky_clock *clock, double seconds, const bst_state *eye,
-                                bst_vec3 *line_m) {
+bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer,
+                                      int sensor, bst_sky_clock *clock, double seconds,
+                                      const bst_world_state *eye, bst_vec3 *line_m) {
     int object = world->observers[observer].sensors[sensor].cue_object;
     *line_m = (bst_vec3){0, 0, 0};
-    return object < 0 ? BST_OK
-                      : bst_object_nominal_line(ctx, world, object, clock, seconds, eye, line_m);
+    return object < 0
+               ? BST_OK
+               : bst_world_object_nominal_line(ctx, world, object, clock, seconds, eye, line_m);
 }
 
-bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                     bst_sky_clock *clock, double seconds, const bst_state *eye,
-                                     bst_vec3 *out) {
+bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer,
+                                           int sensor, bst_sky_clock *clock, double seconds,
+                                           const bst_world_state *eye, bst_vec3 *out) {
     const world_sensor *s = &world->observers[observer].sensors[sensor];
     if (s->config.cue.region.kind != BST_REGION_NONE) {
-        return bst_region_place(ctx, world, observer, sensor, clock, seconds, eye, 0.0, 0.0, out);
+        return bst_world_region_place(ctx, world, observer, sensor, clock, seconds, eye, 0.0, 0.0,
+                                      out);
     }
     if (s->cue_object < 0) {
         const double *radec = s->config.cue.direction_radec_deg;
@@ -34,12 +37,12 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
         return BST_OK;
     }
     bst_vec3 line;
-    BST_TRY(bst_cue_nominal_line(ctx, world, observer, sensor, clock, seconds, eye, &line));
+    BST_TRY(bst_world_cue_nominal_line(ctx, world, observer, sensor, clock, seconds, eye, &line));
     *out = bst_vec3_unit(line);
     return BST_OK;
 }
 
-double bst_region_half_length_rad(const bst_region_config *region) {
+double bst_world_region_half_length_rad(const bst_region_config *region) {
     const double *ends = region->arc_radec_deg;
     switch (region->kind) {
         case BST_REGION_ARC:
@@ -65,15 +68,15 @@ static bst_vec3 on_arc(const double ends_deg[4], double along_rad, double across
     return bst_vec3_axpy(bst_vec3_scale(on, cos(across_rad)), sin(across_rad), pole);
 }
 
-bst_status bst_region_place(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                            bst_sky_clock *clock, double seconds, const bst_state *eye,
-                            double along_rad, double across_rad, bst_vec3 *out) {
+bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                  bst_sky_clock *clock, double seconds, const bst_world_state *eye,
+                                  double along_rad, double across_rad, bst_vec3 *out) {
     const bst_region_config *region = &world->observers[observer].sensors[sensor].config.cue.region;
     if (region->kind == BST_REGION_ARC) {
         *out = on_arc(region->arc_radec_deg, along_rad, across_rad);
         return BST_OK;
     }
-    bst_sky sky;
+    bst_sky_rotation sky;
     BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
     double middle = 0.5 * (region->longitude_deg[0] + region->longitude_deg[1]) * BST_DEG_RAD;
     bst_vec3 place = bst_belt_place(middle + along_rad, across_rad, &sky.frames.itrf_from_gcrf);
@@ -84,7 +87,7 @@ bst_status bst_region_place(bst_ctx *ctx, const bst_world *world, int observer, 
 /* Regions that have no length, or no middle. */
 static bst_status check_region(bst_ctx *ctx, const char *scenario, int observer, int sensor,
                                const bst_region_config *region) {
-    double half = bst_region_half_length_rad(region);
+    double half = bst_world_region_half_length_rad(region);
     if (region->kind == BST_REGION_NONE || (half > 0.0 && half < 0.49 * BST_PI)) {
         return BST_OK;
     }
@@ -96,8 +99,8 @@ static bst_status check_region(bst_ctx *ctx, const char *scenario, int observer,
                     2.0 * half / BST_DEG_RAD);
 }
 
-bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
-                           int sensor, bst_sky_clock *clock) {
+bst_status bst_world_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
+                                 int sensor, bst_sky_clock *clock) {
     world_sensor *s = &world->observers[observer].sensors[sensor];
     const bst_cue_config *cue = &s->config.cue;
     s->cue_object = *cue->object ? bst_world_find_object(world, cue->object) : -1;
@@ -110,14 +113,14 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
     BST_TRY(check_region(ctx, scenario, observer, sensor, &cue->region));
     /* as the onboard side reckons it: with its clock, from where it believes to be */
     bst_vec3 nominal;
-    bst_state eye;
-    double now_s = bst_believed_seconds(world, observer, sensor, 0.0);
-    bst_status status = bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch,
-                                        now_s, true, &eye);
+    bst_world_state eye;
+    double now_s = bst_world_nav_seconds(world, observer, sensor, 0.0);
+    bst_status status = bst_world_orbit_state(ctx, &world->observers[observer].orbit, clock,
+                                              world->epoch, now_s, true, &eye);
     if (status == BST_OK) {
-        bst_believe(world, observer, sensor, now_s, &eye);
-        status =
-            bst_cue_nominal_direction(ctx, world, observer, sensor, clock, now_s, &eye, &nominal);
+        bst_world_nav_estimate(world, observer, sensor, now_s, &eye);
+        status = bst_world_cue_nominal_direction(ctx, world, observer, sensor, clock, now_s, &eye,
+                                                 &nominal);
     }
     if (status != BST_OK) {
         return bst_fail_prefix(ctx, status == BST_ERR_NUMERIC ? BST_ERR_CONFIG : status,

@@ -10,16 +10,16 @@ enum { KEPT = 4096 };
 
 typedef struct kept_state {
     double seconds;
-    bst_state state;
+    bst_world_state state;
 } kept_state;
 
-struct bst_steering {
+struct bst_external_states {
     pthread_mutex_t lock;
     kept_state states[KEPT]; /* a ring: number n is states[n % KEPT] */
     int64_t count;
 };
 
-bst_status bst_steering_create(bst_ctx *ctx, bst_steering **out) {
+bst_status bst_external_states_create(bst_ctx *ctx, bst_external_states **out) {
     *out = calloc(1, sizeof **out);
     if (!*out) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for states that come by message");
@@ -28,14 +28,15 @@ bst_status bst_steering_create(bst_ctx *ctx, bst_steering **out) {
     return BST_OK;
 }
 
-void bst_steering_free(bst_steering *s) {
+void bst_external_states_free(bst_external_states *s) {
     if (s) {
         pthread_mutex_destroy(&s->lock);
         free(s);
     }
 }
 
-bst_status bst_steering_add(bst_ctx *ctx, bst_steering *s, double seconds, const bst_state *state) {
+bst_status bst_external_states_add(bst_ctx *ctx, bst_external_states *s, double seconds,
+                                   const bst_world_state *state) {
     pthread_mutex_lock(&s->lock);
     double last = s->count > 0 ? s->states[(s->count - 1) % KEPT].seconds : -INFINITY;
     bool later = seconds > last;
@@ -49,8 +50,8 @@ bst_status bst_steering_add(bst_ctx *ctx, bst_steering *s, double seconds, const
                             seconds, last);
 }
 
-bst_status bst_steering_state(bst_ctx *ctx, bst_steering *s, double seconds, bool *steered,
-                              bst_state *out) {
+bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *s, double seconds,
+                                     bool *steered, bst_world_state *out) {
     pthread_mutex_lock(&s->lock);
     int64_t low = s->count > KEPT ? s->count - KEPT : 0, high = s->count;
     /* the last one that is not later, or of those that are still known the first */
@@ -72,12 +73,12 @@ bst_status bst_steering_state(bst_ctx *ctx, bst_steering *s, double seconds, boo
 }
 
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
-                           const bst_state *state) {
+                           const bst_world_state *state) {
     int object = bst_world_find_object(world, name);
-    bst_steering *steering = object >= 0 ? world->objects[object].orbit.steering : NULL;
+    bst_external_states *steering = object >= 0 ? world->objects[object].orbit.steering : NULL;
     if (!steering) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "no object \"%.64s\" whose key \"steered\" is true",
                         name);
     }
-    return bst_steering_add(ctx, steering, seconds, state);
+    return bst_external_states_add(ctx, steering, seconds, state);
 }

@@ -18,7 +18,7 @@ struct bst_frame_updates {
     char *name;
     bst_frame_update *items;
     int count;
-    bst_pointing_node *nodes;
+    bst_world_pointing_node *nodes;
     int64_t node_count, node_capacity;
     bst_frame_object *objects;
     int64_t object_count, object_capacity;
@@ -134,13 +134,14 @@ static bst_status add_node(reader *r, const char *key, double time_s, const doub
         return fail_key(r, key, "not a unit quaternion",
                         "[x, y, z, w] with the scalar w last and a norm of 1 to 1e-5");
     }
-    bst_pointing_node *nodes = grow(u->nodes, u->node_count, &u->node_capacity, sizeof *u->nodes);
+    bst_world_pointing_node *nodes =
+        grow(u->nodes, u->node_count, &u->node_capacity, sizeof *u->nodes);
     if (!nodes) {
         return bst_fail(r->ctx, BST_ERR_MEMORY, "%s: no memory for its attitudes", u->name);
     }
     u->nodes = nodes;
     u->nodes[u->node_count++] =
-        (bst_pointing_node){time_s, {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm}};
+        (bst_world_pointing_node){time_s, {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm}};
     return BST_OK;
 }
 
@@ -263,7 +264,8 @@ static bst_status take_frame(reader *r, const frame_config *c, bst_frame_update 
     if (has(r, "pixel_scale_arcsec")) {
         bst_camera camera;
         update->pixel_scale_arcsec = c->pixel_scale_arcsec;
-        if (bst_camera_at_scale(r->ctx, r->camera, c->pixel_scale_arcsec, &camera) != BST_OK) {
+        if (bst_world_camera_at_scale(r->ctx, r->camera, c->pixel_scale_arcsec, &camera) !=
+            BST_OK) {
             return bst_fail_prefix(r->ctx, BST_ERR_CONFIG, "%s: %s/pixel_scale_arcsec",
                                    bst_json_name(r->json), r->path);
         }
@@ -327,7 +329,7 @@ static bst_status read_json(reader *r) {
         u->count++;
     }
     /* the arrays have their last place now */
-    const bst_pointing_node *node = u->nodes;
+    const bst_world_pointing_node *node = u->nodes;
     const bst_frame_object *object = u->objects;
     for (int i = 0; i < count; i++) {
         u->items[i].nodes = node;
@@ -468,8 +470,8 @@ void bst_frame_updates_limits(const bst_frame_updates *updates, const bst_camera
     *longest_exposure_s += 2.0 * bst_detector_lead_s(&camera->detector, (int)camera->height_px);
 }
 
-bst_status bst_camera_at_scale(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
-                               bst_camera *out) {
+bst_status bst_world_camera_at_scale(bst_ctx *ctx, const bst_camera *camera,
+                                     double pixel_scale_arcsec, bst_camera *out) {
     *out = *camera;
     out->pixel_scale_arcsec = pixel_scale_arcsec;
     return bst_camera_prepare(ctx, out);

@@ -11,10 +11,10 @@
 typedef struct bst_frame_updates bst_frame_updates;
 
 /* Attitude at a time after the exposure's start. */
-typedef struct bst_pointing_node {
+typedef struct bst_world_pointing_node {
     double time_s;
     bst_quat q_cam_from_gcrf; /* unit */
-} bst_pointing_node;
+} bst_world_pointing_node;
 
 /* States of an object at the start and at the end of one exposure, geocentric, m and m/s, in the
  * axes that the object's orbit names (states_frame). */
@@ -25,15 +25,15 @@ typedef struct bst_frame_object {
 
 /* What the file says of one frame. */
 typedef struct bst_frame_update {
-    int64_t frame;                  /* number of the exposure */
-    double exposure_s;              /* < 0: as before */
-    double period_s;                /* <= 0: as before */
-    double pixel_scale_arcsec;      /* 0: as before */
-    bst_window window;              /* width 0: as before */
-    int binning;                    /* 0: as before */
-    const bst_pointing_node *nodes; /* [node_count], times ascending: the first 0, the last the
-                                       exposure */
-    int node_count;                 /* 0: the file gives no pointing for this frame */
+    int64_t frame;                        /* number of the exposure */
+    double exposure_s;                    /* < 0: as before */
+    double period_s;                      /* <= 0: as before */
+    double pixel_scale_arcsec;            /* 0: as before */
+    bst_window window;                    /* width 0: as before */
+    int binning;                          /* 0: as before */
+    const bst_world_pointing_node *nodes; /* [node_count], times ascending: the first 0, the last
+                                       the exposure */
+    int node_count;                       /* 0: the file gives no pointing for this frame */
     const bst_frame_object *objects;
     int object_count;
 } bst_frame_update;
@@ -85,7 +85,7 @@ void bst_frame_updates_limits(const bst_frame_updates *updates, const bst_camera
                               double *shortest_cycle_s);
 
 /* A camera at another pixel scale. BST_ERR_CONFIG as bst_camera_prepare. */
-bst_status bst_camera_at_scale(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
-                               bst_camera *out) BST_MUST_CHECK;
+bst_status bst_world_camera_at_scale(bst_ctx *ctx, const bst_camera *camera,
+                                     double pixel_scale_arcsec, bst_camera *out) BST_MUST_CHECK;
 
 #endif

@@ -5,12 +5,12 @@ static const bst_knowledge_config *knowledge_of(const bst_world *world, int obse
     return &world->observers[observer].sensors[sensor].config.knowledge;
 }
 
-double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds) {
+double bst_world_nav_seconds(const bst_world *world, int observer, int sensor, double seconds) {
     return seconds + knowledge_of(world, observer, sensor)->clock_offset_s;
 }
 
-void bst_believe(const bst_world *world, int observer, int sensor, double believed_s,
-                 bst_state *state) {
+void bst_world_nav_estimate(const bst_world *world, int observer, int sensor, double believed_s,
+                            bst_world_state *state) {
     const bst_orbit_error_config *error = &knowledge_of(world, observer, sensor)->orbit;
     const double *p = error->position_rtn_m, *v = error->velocity_rtn_mps;
     double along = p[1] + error->along_track_mps * believed_s;

@@ -79,10 +79,10 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         char path[64];
         snprintf(path, sizeof path, "/world/objects/%d/orbit", i);
         world->object_count = i + 1;
-        BST_TRY(bst_orbit_build(b, &config->orbit, &config->burns, path, object->info.name,
-                                &object->orbit, &object->info.norad));
+        BST_TRY(bst_world_orbit_build(b, &config->orbit, &config->burns, path, object->info.name,
+                                      &object->orbit, &object->info.norad));
         if (config->steered) {
-            BST_TRY(bst_steering_create(b->ctx, &object->orbit.steering));
+            BST_TRY(bst_external_states_create(b->ctx, &object->orbit.steering));
         }
         bst_name_index_add(world->object_names, object->info.name, i);
     }
@@ -90,7 +90,8 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
 }
 
 /* The name in the file, with the number where it is empty or taken. */
-static void name_object(const bst_world *world, const bst_elements *set, bst_object_info *info) {
+static void name_object(const bst_world *world, const bst_elements *set,
+                        bst_world_object_info *info) {
     snprintf(info->name, sizeof info->name, "%s", set->name);
     if (!*info->name || bst_world_find_object(world, info->name) >= 0) {
         snprintf(info->name, sizeof info->name, "%s %d", *set->name ? set->name : "NORAD",
@@ -111,7 +112,8 @@ static bst_status build_candidates(const bst_world_builder *b, const candidate *
                             "%s: /world/catalogues/%d: \"%s\" is the name of another object",
                             b->scenario, list[i].catalogue_index, object->info.name);
         }
-        bst_status status = bst_orbit_build_sgp4(b, list[i].set, object->info.name, &object->orbit);
+        bst_status status =
+            bst_world_orbit_build_sgp4(b, list[i].set, object->info.name, &object->orbit);
         if (status == BST_ERR_NUMERIC || status == BST_ERR_ARGUMENT) {
             example = unusable++ ? example : list[i].set->norad;
             memset(object, 0, sizeof *object);
@@ -217,7 +219,7 @@ static bst_status build_member(const bst_world_builder *b, const bst_constellati
     object->info.area_m2 = config->area_m2;
     object->info.albedo = config->albedo;
     object->info.brightness = brightness;
-    BST_TRY(bst_orbit_build_sgp4(b, &set, object->info.name, &object->orbit));
+    BST_TRY(bst_world_orbit_build_sgp4(b, &set, object->info.name, &object->orbit));
     bst_name_index_add(world->object_names, object->info.name, world->object_count - 1);
     return BST_OK;
 }
@@ -288,12 +290,12 @@ bst_status bst_world_build_objects(const bst_world_builder *b, const bst_world_c
     return status;
 }
 
-bst_object_motion bst_world_object_motion(const bst_world *world, int object) {
-    const bst_orbit *orbit = &world->objects[object].orbit;
+bst_world_motion_law bst_world_object_motion(const bst_world *world, int object) {
+    const bst_world_orbit *orbit = &world->objects[object].orbit;
     while (orbit->source == BST_ORBIT_RELATIVE) {
         orbit = orbit->reference;
     }
-    return (bst_object_motion){
+    return (bst_world_motion_law){
         .sgp4 = orbit->source == BST_ORBIT_SGP4,
         .bstar = orbit->bstar,
         .forces = orbit->source == BST_ORBIT_NUMERICAL ? &orbit->forces : NULL};

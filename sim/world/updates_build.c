@@ -62,7 +62,7 @@ const bst_frame_updates *bst_world_frame_updates(const bst_world *world, int obs
 }
 
 bst_status bst_world_updates_injected(const bst_world_builder *b, const char *path,
-                                      bst_injected **out) {
+                                      bst_state_table **out) {
     const world_updates *from = NULL;
     for (int i = 0; i < b->world->updates_count && !from; i++) {
         if (strcmp(bst_frame_updates_name(b->world->updates[i].file), path) == 0) {
@@ -79,7 +79,7 @@ bst_status bst_world_updates_injected(const bst_world_builder *b, const char *pa
     for (int i = 0; i < bst_frame_updates_count(from->file); i++) {
         total += bst_frame_updates_item(from->file, i)->object_count;
     }
-    bst_injected_frame *frames = calloc((size_t)total + 1, sizeof *frames);
+    bst_state_table_frame *frames = calloc((size_t)total + 1, sizeof *frames);
     if (!frames) {
         return bst_fail(b->ctx, BST_ERR_MEMORY, "%s: no memory for its states", path);
     }
@@ -87,17 +87,17 @@ bst_status bst_world_updates_injected(const bst_world_builder *b, const char *pa
     for (; n < total; bst_frame_cursor_next(&c)) {
         for (int k = 0; c.update && k < c.update->object_count; k++) {
             const bst_frame_object *o = &c.update->objects[k];
-            frames[n++] = (bst_injected_frame){.object = o->name,
-                                               .number = c.frame,
-                                               .start_s = c.start_s,
-                                               .end_s = c.start_s + c.exposure_s,
-                                               .start_position_m = o->start_position_m,
-                                               .start_velocity_mps = o->start_velocity_mps,
-                                               .end_position_m = o->end_position_m,
-                                               .end_velocity_mps = o->end_velocity_mps};
+            frames[n++] = (bst_state_table_frame){.object = o->name,
+                                                  .number = c.frame,
+                                                  .start_s = c.start_s,
+                                                  .end_s = c.start_s + c.exposure_s,
+                                                  .start_position_m = o->start_position_m,
+                                                  .start_velocity_mps = o->start_velocity_mps,
+                                                  .end_position_m = o->end_position_m,
+                                                  .end_velocity_mps = o->end_velocity_mps};
         }
     }
-    bst_status status = bst_injected_create(b->ctx, path, frames, total, out);
+    bst_status status = bst_state_table_create(b->ctx, path, frames, total, out);
     free(frames);
     return status;
 }

@@ -75,10 +75,11 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
 
 static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int observer,
                            int sensor) {
-    bst_pst *pst;
+    bst_scene_pst *pst;
     double own_um = camera->pixel_um > 0.0 ? camera->pixel_um : 0.0; /* NAN: not known */
     double pixel_um = camera->optics.pixel_um > 0.0 ? camera->optics.pixel_um : own_um;
-    bst_status status = bst_pst_create(b->ctx, &camera->background, pixel_um, b->base_dir, &pst);
+    bst_status status =
+        bst_scene_pst_create(b->ctx, &camera->background, pixel_um, b->base_dir, &pst);
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
                                "%s: /observers/%d/sensors/%d/camera/background", b->scenario,
@@ -117,8 +118,8 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
         char path[64];
         snprintf(path, sizeof path, "/observers/%d/orbit", i);
         memcpy(observer->name, config->name, sizeof observer->name);
-        BST_TRY(bst_orbit_build(b, &config->orbit, &config->burns, path, observer->name,
-                                &observer->orbit, &observer->norad));
+        BST_TRY(bst_world_orbit_build(b, &config->orbit, &config->burns, path, observer->name,
+                                      &observer->orbit, &observer->norad));
         observer->own_object = own_object(b, &config->orbit);
         observer->sensor_count = config->sensors.count;
         observer->sensors = calloc((size_t)config->sensors.count + 1, sizeof *observer->sensors);
@@ -162,13 +163,13 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
     bst_world *world = b->world;
     bool builtin = strcmp(config->earth_orientation, "builtin") == 0;
     bst_world_path eop_file = bst_world_path_join(b, config->earth_orientation);
-    bst_status status = builtin ? bst_eop_builtin(b->ctx, &world->eop)
-                                : bst_eop_load(b->ctx, eop_file.text, &world->eop);
+    bst_status status = builtin ? bst_astro_eop_builtin(b->ctx, &world->eop)
+                                : bst_astro_eop_load(b->ctx, eop_file.text, &world->eop);
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, status, "%s: /world/earth_orientation", b->scenario);
     }
-    bst_eop_values values;
-    status = bst_eop_at(b->ctx, world->eop, world->epoch, &values);
+    bst_astro_eop_values values;
+    status = bst_astro_eop_at(b->ctx, world->eop, world->epoch, &values);
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, status, "%s: /epoch_utc", b->scenario);
     }
@@ -183,14 +184,14 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
     if (config->faint_stars == BST_FAINT_STATISTICAL || needs_starlight(observers)) {
         BST_TRY(bst_faint_sky_create(b->ctx, world->stars, config->faint_seed, &world->faint));
     }
-    BST_TRY(bst_sky_grid_create(b->ctx, world->eop, &world->sky_grid));
+    BST_TRY(bst_sky_clock_grid_create(b->ctx, world->eop, &world->sky_grid));
     BST_TRY(bst_sky_clock_create_on(b->ctx, world->sky_grid, &b->clock));
     BST_TRY(bst_world_load_updates(b, observers));
     BST_TRY(bst_world_build_objects(b, config));
     BST_TRY(make_observers(b, observers));
     for (int i = 0; i < world->observer_count; i++) {
         for (int k = 0; k < world->observers[i].sensor_count; k++) {
-            BST_TRY(bst_cue_resolve(b->ctx, b->scenario, world, i, k, b->clock));
+            BST_TRY(bst_world_cue_resolve(b->ctx, b->scenario, world, i, k, b->clock));
         }
     }
     return bst_ephemeris_create(b->ctx, world, &world->ephemeris);
@@ -222,16 +223,16 @@ void bst_world_free(bst_world *world) {
     }
     bst_ephemeris_free(world->ephemeris);
     for (int i = 0; world->objects && i < world->object_count; i++) {
-        bst_orbit_free(&world->objects[i].orbit);
+        bst_world_orbit_free(&world->objects[i].orbit);
     }
     for (int i = 0; world->observers && i < world->observer_count; i++) {
         world_observer *observer = &world->observers[i];
-        bst_orbit_free(&observer->orbit);
+        bst_world_orbit_free(&observer->orbit);
         for (int k = 0; observer->sensors && k < observer->sensor_count; k++) {
             bst_camera *camera = &observer->sensors[k].config.camera;
             bst_psf_free((bst_psf *)camera->psf);
             bst_band_free((bst_band *)camera->spectrum);
-            bst_pst_free((bst_pst *)camera->pst);
+            bst_scene_pst_free((bst_scene_pst *)camera->pst);
             free(camera->optics.field.items);
         }
         free(observer->sensors);
@@ -247,8 +248,8 @@ void bst_world_free(bst_world *world) {
     free(world->observers);
     bst_faint_sky_free(world->faint);
     bst_stars_close(world->stars);
-    bst_sky_grid_free(world->sky_grid);
-    bst_eop_free(world->eop);
+    bst_sky_clock_grid_free(world->sky_grid);
+    bst_astro_eop_free(world->eop);
     free(world);
 }
 
@@ -265,7 +266,7 @@ const bst_stars *bst_world_stars(const bst_world *world) {
 int bst_world_object_count(const bst_world *world) {
     return world->object_count;
 }
-const bst_object_info *bst_world_object(const bst_world *world, int object) {
+const bst_world_object_info *bst_world_object(const bst_world *world, int object) {
     return &world->objects[object].info;
 }
 int bst_world_observer_count(const bst_world *world) {
@@ -279,9 +280,9 @@ const char *bst_world_observer_name(const bst_world *world, int observer) {
 }
 
 bool bst_world_element_age(const bst_world *world, int body, double *seconds) {
-    const bst_orbit *orbit = body < world->object_count
-                                 ? &world->objects[body].orbit
-                                 : &world->observers[body - world->object_count].orbit;
+    const bst_world_orbit *orbit = body < world->object_count
+                                       ? &world->objects[body].orbit
+                                       : &world->observers[body - world->object_count].orbit;
     *seconds = orbit->epoch_offset_s;
     return orbit->source == BST_ORBIT_SGP4;
 }
@@ -302,7 +303,7 @@ bst_quat bst_world_body_attitude(const bst_world *world, int observer, int senso
     return world->observers[observer].sensors[sensor].body_attitude;
 }
 
-const bst_eop *bst_world_earth_orientation(const bst_world *world) {
+const bst_astro_eop *bst_world_earth_orientation(const bst_world *world) {
     return world->eop;
 }
 
@@ -310,5 +311,5 @@ void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const 
                                       double duration_s) {
     char where[600];
     snprintf(where, sizeof where, "%.500s: /world/earth_orientation: ", scenario);
-    bst_eop_warn(ctx, world->eop, bst_world_time(world, duration_s), where);
+    bst_astro_eop_warn(ctx, world->eop, bst_world_time(world, duration_s), where);
 }

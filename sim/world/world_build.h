@@ -23,18 +23,18 @@ bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path)
 /* Makes an orbit of any source. `path` is its place in the scenario ("/observers/0/orbit"), `name`
  * (borrowed by the orbit) and `burns` belong to the object; a relative orbit may refer to the
  * world's objects so far. *norad: catalogue number, 0 when there is none. On error the orbit holds
- * what was made of it, for bst_orbit_free. */
-bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *config,
-                           const bst_config_list *burns, const char *path, const char *name,
-                           bst_orbit *orbit, int *norad) BST_MUST_CHECK;
+ * what was made of it, for bst_world_orbit_free. */
+bst_status bst_world_orbit_build(const bst_world_builder *b, const bst_orbit_config *config,
+                                 const bst_config_list *burns, const char *path, const char *name,
+                                 bst_world_orbit *orbit, int *norad) BST_MUST_CHECK;
 
 /* Makes an sgp4 orbit from an element set. */
-bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *set,
-                                const char *name, bst_orbit *orbit) BST_MUST_CHECK;
+bst_status bst_world_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *set,
+                                      const char *name, bst_world_orbit *orbit) BST_MUST_CHECK;
 
-/* Makes an orbit of source oem or injected; called by bst_orbit_build. */
-bst_status bst_orbit_build_file(const bst_world_builder *b, const bst_orbit_config *config,
-                                const char *path, bst_orbit *orbit) BST_MUST_CHECK;
+/* Makes an orbit of source oem or injected; called by bst_world_orbit_build. */
+bst_status bst_world_orbit_build_file(const bst_world_builder *b, const bst_orbit_config *config,
+                                      const char *path, bst_world_orbit *orbit) BST_MUST_CHECK;
 
 /* Reads the files that drive sensors frame by frame. */
 bst_status bst_world_load_updates(const bst_world_builder *b,
@@ -43,16 +43,18 @@ void bst_world_updates_free(bst_world *world);
 /* The objects of a frame_updates_file as injected states, at the times of the frames of the first
  * sensor that the file drives. */
 bst_status bst_world_updates_injected(const bst_world_builder *b, const char *path,
-                                      bst_injected **out) BST_MUST_CHECK;
+                                      bst_state_table **out) BST_MUST_CHECK;
 
 /* Closes the files that orbits came from. */
 void bst_world_files_free(bst_world *world);
-/* Makes a numerical orbit; called by bst_orbit_build, arguments as there. */
-bst_status bst_orbit_build_numerical(const bst_world_builder *b, const bst_orbit_config *config,
-                                     const bst_config_list *burns, const char *path,
-                                     const char *name, bst_orbit *orbit, int *norad) BST_MUST_CHECK;
+/* Makes a numerical orbit; called by bst_world_orbit_build, arguments as there. */
+bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
+                                           const bst_orbit_config *config,
+                                           const bst_config_list *burns, const char *path,
+                                           const char *name, bst_world_orbit *orbit,
+                                           int *norad) BST_MUST_CHECK;
 
-void bst_orbit_free(bst_orbit *orbit);
+void bst_world_orbit_free(bst_world_orbit *orbit);
 
 /* Fills world->objects from the list of objects and then from the catalogues. */
 bst_status bst_world_build_objects(const bst_world_builder *b,

@@ -51,7 +51,7 @@ static const bst_config_desc orbit_table[] = {
     BST_OBJECT(bst_orbit_config, state, bst_initial_state_table, "{}",
                "numerical: what it starts from."),
     BST_OBJECT(bst_orbit_config, forces, bst_force_table, "{}", "numerical: what acts on it."),
-    BST_OBJECT(bst_orbit_config, spacecraft, bst_spacecraft_table, "{}",
+    BST_OBJECT(bst_orbit_config, spacecraft, bst_orbit_spacecraft_table, "{}",
                "numerical: what drag and solar pressure act on."),
     BST_CONFIG_END,
 };

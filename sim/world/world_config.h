@@ -49,9 +49,9 @@ typedef struct bst_force_config {
     double tolerance;
 } bst_force_config;
 
-typedef struct bst_spacecraft_config {
+typedef struct bst_orbit_spacecraft_config {
     double mass_kg, drag_area_m2, cd, srp_area_m2, cr;
-} bst_spacecraft_config;
+} bst_orbit_spacecraft_config;
 
 typedef struct bst_orbit_config {
     int32_t source;          /* BST_ORBIT_... */
@@ -74,7 +74,7 @@ typedef struct bst_orbit_config {
     /* numerical */
     bst_initial_state_config state;
     bst_force_config forces;
-    bst_spacecraft_config spacecraft;
+    bst_orbit_spacecraft_config spacecraft;
 } bst_orbit_config;
 
 typedef struct bst_burn_config {
@@ -165,12 +165,12 @@ bst_status bst_exposure_window(bst_ctx *ctx, const bst_exposure_config *config, 
 typedef struct bst_camera_errors_config {
     double scale_error_ppm;
     double rotation_error_deg;
-    bool own_distortion;       /* false: the camera's own coefficients are known */
-    bst_distortion distortion; /* with own_distortion: what is known instead */
-    double throughput_error;   /* believed over true, minus 1 */
-    double psf_fwhm_px;        /* 0: the camera's */
-    char psf_file[512];        /* "": none */
-    double psf_oversampling;   /* of psf_file; 0: its keyword OVERSAMP */
+    bool own_distortion;              /* false: the camera's own coefficients are known */
+    bst_camera_distortion distortion; /* with own_distortion: what is known instead */
+    double throughput_error;          /* believed over true, minus 1 */
+    double psf_fwhm_px;               /* 0: the camera's */
+    char psf_file[512];               /* "": none */
+    double psf_oversampling;          /* of psf_file; 0: its keyword OVERSAMP */
 } bst_camera_errors_config;
 
 typedef struct bst_orbit_error_config {
@@ -210,7 +210,7 @@ typedef struct bst_observer_config {
 
 extern const bst_config_desc bst_initial_state_table[];
 extern const bst_config_desc bst_force_table[];
-extern const bst_config_desc bst_spacecraft_table[];
+extern const bst_config_desc bst_orbit_spacecraft_table[];
 extern const bst_config_desc bst_world_config_table[];
 extern const bst_config_desc bst_observer_config_table[];
 extern const bst_config_desc bst_sensor_config_table[];

@@ -14,26 +14,26 @@
 #include "sim/world/world_config.h"
 
 /* A burn with what it has made of the orbit; worked out once. */
-typedef struct bst_burn {
+typedef struct bst_world_burn {
     double time_s;
-    bst_state base;      /* the catalogued orbit at that time */
-    bst_state deviation; /* from it, right after this burn, of all burns so far */
-} bst_burn;
+    bst_world_state base;      /* the catalogued orbit at that time */
+    bst_world_state deviation; /* from it, right after this burn, of all burns so far */
+} bst_world_burn;
 
 /* An orbit ready to be evaluated; immutable. */
-typedef struct bst_orbit {
+typedef struct bst_world_orbit {
     int32_t source; /* BST_ORBIT_... */
     /* sgp4 */
     bst_sgp4 *sgp4;
     double epoch_offset_s; /* scenario epoch minus element epoch */
     double bstar;          /* 1 / Earth radii */
     /* relative */
-    const struct bst_orbit *reference;
+    const struct bst_world_orbit *reference;
     double at_s;
     bst_vec3 offset_rtn_m, rate_rtn_mps;
     /* oem, injected: borrowed from the world's files */
     const bst_oem *oem;
-    const bst_injected *injected;
+    const bst_state_table *injected;
     int file_object;
     bool in_teme;        /* injected */
     double from_s, to_s; /* span of the states, after the epoch */
@@ -42,15 +42,15 @@ typedef struct bst_orbit {
     bst_force_model forces;
     bst_trajectory *unburnt, *burnt; /* burnt NULL: there are no burns */
 
-    bst_burn *burns;
+    bst_world_burn *burns;
     int burn_count;
-    struct bst_steering *steering; /* owned; NULL: its states do not come by message */
-    const char *name;              /* for messages; borrowed */
-} bst_orbit;
+    struct bst_external_states *steering; /* owned; NULL: its states do not come by message */
+    const char *name;                     /* for messages; borrowed */
+} bst_world_orbit;
 
 typedef struct world_object {
-    bst_object_info info;
-    bst_orbit orbit;
+    bst_world_object_info info;
+    bst_world_orbit orbit;
     bool catalogued; /* from a catalogue, not from the list */
 } world_object;
 
@@ -65,7 +65,7 @@ typedef struct world_observer {
     char name[64];
     int norad;      /* 0: none */
     int own_object; /* that this observer is, of a constellation; -1: none */
-    bst_orbit orbit;
+    bst_world_orbit orbit;
     world_sensor *sensors;
     int sensor_count;
 } world_observer;
@@ -74,7 +74,7 @@ typedef struct world_observer {
 typedef struct bst_world_file {
     char *key;
     bst_oem *oem;
-    bst_injected *injected;
+    bst_state_table *injected;
 } bst_world_file;
 
 struct bst_frame_updates;
@@ -89,9 +89,9 @@ typedef struct world_updates {
 
 struct bst_world {
     bst_time epoch;
-    bst_eop *eop;
-    bst_sky_grid *sky_grid; /* of all clocks of the world */
-    bool shadow_atmosphere; /* the air at the edge of the Earth's shadow counts for light */
+    bst_astro_eop *eop;
+    bst_sky_clock_grid *sky_grid; /* of all clocks of the world */
+    bool shadow_atmosphere;       /* the air at the edge of the Earth's shadow counts for light */
     bst_stars *stars;
     bst_faint_sky *faint;     /* NULL: neither statistical stars nor their light */
     double faint_limit_v_mag; /* single statistical stars down to this; -INFINITY: none */
@@ -111,76 +111,84 @@ struct bst_world {
 
 /* State at `seconds` after the scenario's epoch; `with_burns` false gives the orbit as catalogued.
  */
-bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                           bst_time epoch, double seconds, bool with_burns,
-                           bst_state *out) BST_MUST_CHECK;
+bst_status bst_world_orbit_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
+                                 bst_time epoch, double seconds, bool with_burns,
+                                 bst_world_state *out) BST_MUST_CHECK;
 
 /* The same of an orbit from a file, without burns. */
-bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                                bst_time epoch, double seconds, bst_state *out) BST_MUST_CHECK;
+bst_status bst_world_orbit_file_state(bst_ctx *ctx, const bst_world_orbit *orbit,
+                                      bst_sky_clock *clock, bst_time epoch, double seconds,
+                                      bst_world_state *out) BST_MUST_CHECK;
 
 /* Fills orbit->burns (by time, freed by the caller's owner) once the orbit itself is made.
  * BST_ERR_NUMERIC when the orbit has no state at a burn. */
-bst_status bst_orbit_set_burns(bst_ctx *ctx, bst_orbit *orbit, bst_sky_clock *clock, bst_time epoch,
-                               const bst_burn_config *burns, int count) BST_MUST_CHECK;
+bst_status bst_world_orbit_set_burns(bst_ctx *ctx, bst_world_orbit *orbit, bst_sky_clock *clock,
+                                     bst_time epoch, const bst_burn_config *burns,
+                                     int count) BST_MUST_CHECK;
 
 /* Light-time solution: where the object was when the light left that reaches the observer at
  * `seconds`. *geometric_m: from the observer at reception to the object at emission in barycentric
  * axes (its direction is what stars are compared with); *emission_s: the time of emission. */
-bst_status bst_orbit_line_of_sight(bst_ctx *ctx, const bst_orbit *object, const bst_state *observer,
-                                   bst_sky_clock *clock, bst_time epoch, const bst_bodies *bodies,
-                                   double seconds, bool with_burns, bst_vec3 *geometric_m,
-                                   bst_state *object_state, double *emission_s) BST_MUST_CHECK;
+bst_status bst_world_orbit_line_of_sight(bst_ctx *ctx, const bst_world_orbit *object,
+                                         const bst_world_state *observer, bst_sky_clock *clock,
+                                         bst_time epoch, const bst_bodies *bodies, double seconds,
+                                         bool with_burns, bst_vec3 *geometric_m,
+                                         bst_world_state *object_state,
+                                         double *emission_s) BST_MUST_CHECK;
 
-struct bst_source_path;
-struct bst_path_light;
+struct bst_scene_source_path;
+struct bst_scene_path_light;
 /* The path of an object as an observer sees it from start_s to end_s, the sight at the middle, and
  * what its light follows from.
  * BST_ERR_NUMERIC when either has no orbit at some time of it. */
-bst_status bst_view_path(bst_ctx *ctx, bst_view *view, int observer, int object, double start_s,
-                         double end_s, struct bst_source_path *path, struct bst_path_light *light,
-                         bst_sight *mid) BST_MUST_CHECK;
+bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, int observer, int object,
+                               double start_s, double end_s, struct bst_scene_source_path *path,
+                               struct bst_scene_path_light *light,
+                               bst_world_sight *mid) BST_MUST_CHECK;
 
 /* Indices (ascending) of the objects that may be seen in a cone of apparent directions at any time
  * from start_s to end_s, and few others; room for all. */
-bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double start_s, double end_s,
-                         bst_vec3 axis, double half_angle_rad, int *indices,
-                         int *count) BST_MUST_CHECK;
+bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, int observer, double start_s,
+                               double end_s, bst_vec3 axis, double half_angle_rad, int *indices,
+                               int *count) BST_MUST_CHECK;
 
 /* Works out a sensor's cue: object index, error rotation, body attitude. `scenario` names the file
  * in messages. */
-bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
-                           int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
+bst_status bst_world_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
+                                 int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
 
 /* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit as
  * seen from an observer in state `eye`, light time in. */
-bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                     bst_sky_clock *clock, double seconds, const bst_state *eye,
-                                     bst_vec3 *out) BST_MUST_CHECK;
+bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer,
+                                           int sensor, bst_sky_clock *clock, double seconds,
+                                           const bst_world_state *eye,
+                                           bst_vec3 *out) BST_MUST_CHECK;
 
 /* The vector (m, GCRF, geometric) of which that is the direction; 0 where the cue is a direction
  * only. */
 /* A place of the cue's region (kind other than none) by its angles from the middle, as
  * bst_knowledge_region_direction_at. */
-bst_status bst_region_place(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                            bst_sky_clock *clock, double seconds, const bst_state *eye,
-                            double along_rad, double across_rad, bst_vec3 *out) BST_MUST_CHECK;
-double bst_region_half_length_rad(const bst_region_config *region);
-bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                bst_sky_clock *clock, double seconds, const bst_state *eye,
-                                bst_vec3 *line_m) BST_MUST_CHECK;
+bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                  bst_sky_clock *clock, double seconds, const bst_world_state *eye,
+                                  double along_rad, double across_rad,
+                                  bst_vec3 *out) BST_MUST_CHECK;
+double bst_world_region_half_length_rad(const bst_region_config *region);
+bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer,
+                                      int sensor, bst_sky_clock *clock, double seconds,
+                                      const bst_world_state *eye, bst_vec3 *line_m) BST_MUST_CHECK;
 
 /* The same of any object. */
-bst_status bst_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,
-                                   bst_sky_clock *clock, double seconds, const bst_state *eye,
-                                   bst_vec3 *line_m) BST_MUST_CHECK;
+bst_status bst_world_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,
+                                         bst_sky_clock *clock, double seconds,
+                                         const bst_world_state *eye,
+                                         bst_vec3 *line_m) BST_MUST_CHECK;
 
 /* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
-double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
+double bst_world_nav_seconds(const bst_world *world, int observer, int sensor, double seconds);
 
 /* Adds to an observer's state, that of when the onboard clock shows believed_s, the error with
  * which the onboard side of a sensor knows it. */
-void bst_believe(const bst_world *world, int observer, int sensor, double believed_s,
-                 bst_state *state);
+void bst_world_nav_estimate(const bst_world *world, int observer, int sensor, double believed_s,
+                            bst_world_state *state);
 
 #endif

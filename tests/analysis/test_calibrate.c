@@ -22,7 +22,7 @@ static const bst_camera camera = {.width_px = SIDE,
 static const double SIGMA = 2.0 / 2.3548200450309493;
 
 /* Points of SNR 3 to 9, a few brighter, on a grid with random places in the pixel. */
-static void fill(bst_truth *truth, const bst_bound *bound, int64_t exposure) {
+static void fill(bst_truth *truth, const bst_crlb_table *bound, int64_t exposure) {
     bst_rng_key key = bst_rng_make_key(5, 0, "sky", "places");
     double noise = sqrt(truth->background_e + 64.0);
     truth->exposure_id = exposure;
@@ -35,25 +35,26 @@ static void fill(bst_truth *truth, const bst_bound *bound, int64_t exposure) {
         }
         double x = 25.0 + 36.0 * (i % 27) + u[0], y = 25.0 + 36.0 * (double)(i / 27) + u[1];
         double snr = i % 10 == 0 ? 30.0 : 3.0 + 6.0 * u[2];
-        truth->items[i] = (bst_truth_item){.kind = BST_SOURCE_STAR,
-                                           .id = (uint32_t)(i + 1),
-                                           .flags = BST_TRUTH_IN_FIELD,
-                                           .x_start_px = x,
-                                           .x_centroid_px = x,
-                                           .x_end_px = x,
-                                           .y_start_px = y,
-                                           .y_centroid_px = y,
-                                           .y_end_px = y,
-                                           .snr = snr,
-                                           .electrons = snr * noise / bst_bound_norm(bound, 0.0)};
+        truth->items[i] =
+            (bst_truth_item){.kind = BST_SOURCE_STAR,
+                             .id = (uint32_t)(i + 1),
+                             .flags = BST_TRUTH_IN_FIELD,
+                             .x_start_px = x,
+                             .x_centroid_px = x,
+                             .x_end_px = x,
+                             .y_start_px = y,
+                             .y_centroid_px = y,
+                             .y_end_px = y,
+                             .snr = snr,
+                             .electrons = snr * noise / bst_crlb_table_norm(bound, 0.0)};
     }
 }
 
 static void known_factors_are_found(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_bound bound;
-    bst_bound_init(&bound, SIGMA);
+    bst_crlb_table bound;
+    bst_crlb_table_init(&bound, SIGMA);
     bst_obsgen_calibration made, found;
     bst_obsgen_calibration_theory(&made);
     made.gain[0] = 0.95;
@@ -74,13 +75,13 @@ static void known_factors_are_found(void **state) {
     bst_assert_ok(&ctx,
                   bst_generator_create(&ctx, &camera, &camera, &settings, &made,
                                        bst_rng_make_key(3, 0, "x", "observations"), &generator));
-    bst_calibrator *calibrator;
-    bst_assert_ok(&ctx, bst_calibrator_create(&ctx, &calibrator));
-    const bst_calibrated_path path = {.camera = &camera,
-                                      .false_alarms_per_frame = 8.0,
-                                      .streak_min_px = 1.5,
-                                      .streak_max_px = 64.0};
-    bst_assert_ok(&ctx, bst_calibrator_begin(&ctx, calibrator, &path));
+    bst_calibration_fitter *calibrator;
+    bst_assert_ok(&ctx, bst_calibration_fitter_create(&ctx, &calibrator));
+    const bst_calibration_path path = {.camera = &camera,
+                                       .false_alarms_per_frame = 8.0,
+                                       .streak_min_px = 1.5,
+                                       .streak_max_px = 64.0};
+    bst_assert_ok(&ctx, bst_calibration_fitter_begin(&ctx, calibrator, &path));
     bst_truth *truth = calloc(1, sizeof *truth + SOURCES * sizeof truth->items[0]);
     bst_detections *detections = calloc(1, sizeof *detections + 2048 * sizeof(bst_detection));
     assert_true(truth && detections);
@@ -102,10 +103,10 @@ static void known_factors_are_found(void **state) {
         for (int i = 0; i < r.count; i++) {
             detections->items[i] = r.items[i].detection;
         }
-        bst_assert_ok(&ctx, bst_calibrator_add(&ctx, calibrator, truth, detections, 0.5));
+        bst_assert_ok(&ctx, bst_calibration_fitter_add(&ctx, calibrator, truth, detections, 0.5));
     }
     bst_calibration_counts counts;
-    bst_assert_ok(&ctx, bst_calibrator_fit(&ctx, calibrator, &found, &counts));
+    bst_assert_ok(&ctx, bst_calibration_fitter_fit(&ctx, calibrator, &found, &counts));
     assert_int_equal(counts.frames, FRAMES);
     /* exact but for rounding: both are what was told with each frame */
     bst_assert_close(found.threshold_offset, 0.1, 1e-9);
@@ -122,20 +123,20 @@ static void known_factors_are_found(void **state) {
     bst_assert_close(found.phase_bias_px, 0.0, 0.005);
     free(truth);
     free(detections);
-    bst_calibrator_free(calibrator);
+    bst_calibration_fitter_free(calibrator);
     bst_generator_free(generator);
 }
 
 static void too_little_is_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_calibrator *calibrator;
+    bst_calibration_fitter *calibrator;
     bst_obsgen_calibration found;
     bst_calibration_counts counts;
-    bst_assert_ok(&ctx, bst_calibrator_create(&ctx, &calibrator));
-    assert_int_equal(bst_calibrator_fit(&ctx, calibrator, &found, &counts), BST_ERR_STATE);
+    bst_assert_ok(&ctx, bst_calibration_fitter_create(&ctx, &calibrator));
+    assert_int_equal(bst_calibration_fitter_fit(&ctx, calibrator, &found, &counts), BST_ERR_STATE);
     assert_non_null(strstr(ctx.message, "--seeds"));
-    bst_calibrator_free(calibrator);
+    bst_calibration_fitter_free(calibrator);
 }
 
 int main(void) {

@@ -34,17 +34,17 @@ static void test_slew(void **state) {
     (void)state;
     /* 2 sqrt(angle / a) below the rate limit, angle / v + v / a beyond: rounding */
     bst_mount_status m = mount_of(1.0, 0.5);
-    bst_assert_close(bst_mount_slew_s(&m, 0.5 * BST_DEG_RAD), 2.0, 1e-9);
-    bst_assert_close(bst_mount_slew_s(&m, 90 * BST_DEG_RAD), 92.0, 1e-9);
+    bst_assert_close(bst_check_mount_slew_s(&m, 0.5 * BST_DEG_RAD), 2.0, 1e-9);
+    bst_assert_close(bst_check_mount_slew_s(&m, 90 * BST_DEG_RAD), 92.0, 1e-9);
     m = mount_of(0.0, 0.5);
-    bst_assert_close(bst_mount_slew_s(&m, 50 * BST_DEG_RAD), 20.0, 1e-9);
+    bst_assert_close(bst_check_mount_slew_s(&m, 50 * BST_DEG_RAD), 20.0, 1e-9);
     m = mount_of(2.0, 0.0);
-    bst_assert_close(bst_mount_slew_s(&m, 50 * BST_DEG_RAD), 25.0, 1e-9);
+    bst_assert_close(bst_check_mount_slew_s(&m, 50 * BST_DEG_RAD), 25.0, 1e-9);
     m = mount_of(0.0, 0.0);
     m.axis[2].accel_limit_radps2 = 0.0;
-    assert_true(bst_mount_slew_s(&m, 1.0) == 0.0);
+    assert_true(bst_check_mount_slew_s(&m, 1.0) == 0.0);
     m = (bst_mount_status){.axes = 0};
-    assert_true(bst_mount_slew_s(&m, 1.0) == 0.0);
+    assert_true(bst_check_mount_slew_s(&m, 1.0) == 0.0);
 }
 
 static bst_control_config config(void) {
@@ -66,18 +66,18 @@ static void test_search(void **state) {
     /* a step of 0.8 deg, 4 frames and an exposure of half a second: 10.5 s are left for it, which
      * takes 0.8 / 2.625^2 * 4 = 0.0290 deg/s^2 */
     bst_mount_status m;
-    bst_mount_moves moves = {.control = &c,
-                             .mount = &m,
-                             .period_s = 1.0,
-                             .exposure_s = 0.5,
-                             .width_rad = BST_DEG_RAD,
-                             .height_rad = 0.5 * BST_DEG_RAD,
-                             .cue_sigma_rad = 0.4 * BST_DEG_RAD,
-                             .duration_s = 100.0};
+    bst_check_mount_moves moves = {.control = &c,
+                                   .mount = &m,
+                                   .period_s = 1.0,
+                                   .exposure_s = 0.5,
+                                   .width_rad = BST_DEG_RAD,
+                                   .height_rad = 0.5 * BST_DEG_RAD,
+                                   .cue_sigma_rad = 0.4 * BST_DEG_RAD,
+                                   .duration_s = 100.0};
     double needed = 4.0 * 0.8 / (10.5 * 10.5);
     m = mount_of(2.0, 1.001 * needed);
     assert_int_equal(bst_check_moves(&ctx, "a/b", &moves), 0);
-    bst_assert_close(bst_search_place_s(&moves), 15.0, 0.01); /* half of 0.1 % of 10.5 s */
+    bst_assert_close(bst_check_search_place_s(&moves), 15.0, 0.01); /* half of 0.1 % of 10.5 s */
     m = mount_of(2.0, 0.999 * needed);
     assert_int_equal(bst_check_moves(&ctx, "a/b", &moves), 1);
     assert_int_equal(said.count, 1);
@@ -100,7 +100,7 @@ static void test_scan(void **state) {
     c.strategy = BST_CONTROL_SCAN;
     c.scan_rate_arcsec_per_s = -3600;
     bst_mount_status m;
-    bst_mount_moves moves = {.control = &c, .mount = &m, .period_s = 1.0};
+    bst_check_mount_moves moves = {.control = &c, .mount = &m, .period_s = 1.0};
     moves.region.kind = BST_REGION_ARC;
     moves.region.half_length_rad = 5.0 * BST_DEG_RAD;
     m = mount_of(0.9, 1.0);
@@ -121,7 +121,7 @@ static void test_first_slew(void **state) {
     bst_ctx_init(&ctx, take, &said, BST_LOG_WARNING);
     bst_control_config c = config();
     bst_mount_status m = mount_of(2.0, 0.01);
-    bst_mount_moves moves = {.control = &c, .mount = &m, .duration_s = 100.0};
+    bst_check_mount_moves moves = {.control = &c, .mount = &m, .duration_s = 100.0};
     /* 2 sqrt(25 / 0.01) = 100 s */
     assert_int_equal(bst_check_first_slew(&ctx, "a/b", &moves, 24.9 * BST_DEG_RAD), 0);
     assert_int_equal(bst_check_first_slew(&ctx, "a/b", &moves, 25.1 * BST_DEG_RAD), 1);

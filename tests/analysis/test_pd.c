@@ -116,14 +116,14 @@ static const bst_pd_options options = {.low = 2,
                                        .cell_px = 40};
 
 static void open_bench(bench *b, const char *imgproc) {
-    const bst_registry *own = bst_app_registry();
+    const bst_scenario_registry *own = bst_registry_shipped();
     const bst_module_desc *modules[32];
     for (int i = 0; i < own->count; i++) {
         modules[i] = own->modules[i];
     }
     modules[own->count] = &sum_module;
     modules[own->count + 1] = &needy_module;
-    const bst_registry registry = {.modules = modules, .count = own->count + 2};
+    const bst_scenario_registry registry = {.modules = modules, .count = own->count + 2};
     char set[160];
     snprintf(set, sizeof set, "/observers/0/sensors/0/modules/imgproc=%s", imgproc);
     *b = (bench){.json = NULL};

@@ -10,19 +10,19 @@ static void close3(bst_vec3 a, bst_vec3 b, double tolerance) {
     assert_true(bst_vec3_norm(bst_vec3_sub(a, b)) <= tolerance);
 }
 
-static void earth_at(bst_earth_frames *out) {
+static void earth_at(bst_astro_earth_frames *out) {
     bst_ctx ctx = {0};
-    bst_eop *eop;
+    bst_astro_eop *eop;
     bst_time t;
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
     bst_assert_ok(&ctx, bst_time_from_utc(&ctx, "2022-06-16T22:10:00Z", &t));
-    bst_assert_ok(&ctx, bst_earth_frames_at(&ctx, eop, t, out));
-    bst_eop_free(eop);
+    bst_assert_ok(&ctx, bst_astro_earth_frames_at(&ctx, eop, t, out));
+    bst_astro_eop_free(eop);
 }
 
 static void a_place_is_where_astropy_has_it(void **state) {
     (void)state;
-    bst_earth_frames earth;
+    bst_astro_earth_frames earth;
     earth_at(&earth);
     /* 0.2 ms of UT1 between two tables of it are 0.6 m at the belt; the pole's offsets 0.1 m */
     close3(bst_belt_place(27.0 * BST_DEG_RAD, 1.5 * BST_DEG_RAD, &earth.itrf_from_gcrf), place,
@@ -31,11 +31,11 @@ static void a_place_is_where_astropy_has_it(void **state) {
 
 static void what_stands_still_over_the_earth_moves_so(void **state) {
     (void)state;
-    bst_earth_frames earth;
+    bst_astro_earth_frames earth;
     earth_at(&earth);
     bst_belt_eye eye = {.position_m = {1.2e6, -6.9e6, 8e5},
                         .velocity_mps = {-1000.0, 200.0, 7400.0},
-                        .earth_radps = bst_earth_rate_gcrf(&earth)};
+                        .earth_radps = bst_astro_earth_rate_gcrf(&earth)};
     bst_vec3 direction = bst_vec3_unit(bst_vec3_sub(place, eye.position_m)), rate;
     double range_m, range_rate_mps;
     assert_true(bst_belt_motion(&eye, direction, &rate, &range_m, &range_rate_mps));

@@ -57,7 +57,7 @@ static double power(double t, int degree, double *slope) {
 /* Interpolants of a degree give polynomials of that degree back; of the next degree they do not. */
 static void polynomials_are_exact(void **state) {
     (void)state;
-    bst_table_state rows[24];
+    bst_astro_table_state rows[24];
     for (int degree = 1; degree <= 13; degree++) {
         for (int i = 0; i < 24; i++) {
             /* uneven steps */
@@ -97,9 +97,9 @@ static void polynomials_are_exact(void **state) {
  * doubles of the table (Lagrange degree 3 and 5, Hermite degree 3), and the same of its slope. */
 static void known_values(void **state) {
     (void)state;
-    bst_table_state rows[6];
+    bst_astro_table_state rows[6];
     for (int i = 0; i < 6; i++) {
-        rows[i] = (bst_table_state){i, {sin(i), 0, 0}, {cos(i), 0, 0}};
+        rows[i] = (bst_astro_table_state){i, {sin(i), 0, 0}, {cos(i), 0, 0}};
     }
     static const struct {
         int points, hermite;
@@ -117,9 +117,9 @@ static void known_values(void **state) {
 
 static void path_is_continuous(void **state) {
     (void)state;
-    bst_table_state rows[12];
+    bst_astro_table_state rows[12];
     for (int i = 0; i < 12; i++) {
-        rows[i] = (bst_table_state){i, {sin(0.9 * i), 0, 0}, {0.9 * cos(0.9 * i), 0, 0}};
+        rows[i] = (bst_astro_table_state){i, {sin(0.9 * i), 0, 0}, {0.9 * cos(0.9 * i), 0, 0}};
     }
     for (int points = 1; points <= 9; points++) {
         for (int hermite = 0; hermite < 2; hermite++) {
@@ -228,9 +228,9 @@ static void frames_and_time_systems(void **state) {
 static void turning_frames(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     bst_sky_clock *clock = NULL;
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &clock));
     /* a place at rest on the Earth, and one at rest in TEME */
     static const char *const frames[] = {"ITRF2014", "ITRF-97", "itrf", "TEME"};
@@ -242,8 +242,8 @@ static void turning_frames(void **state) {
                  VERSION, NAMES, frames[i], UTC, SPAN);
         bst_oem *oem = read_good(text);
         bst_time t = utc("2022-06-16T00:01:10Z");
-        bst_earth_frames exact;
-        bst_assert_ok(&ctx, bst_earth_frames_at(&ctx, eop, t, &exact));
+        bst_astro_earth_frames exact;
+        bst_assert_ok(&ctx, bst_astro_earth_frames_at(&ctx, eop, t, &exact));
         const bst_vec3 place = {6378137.0, 100e3, 200e3};
         bst_vec3 r, v, later, earlier, expected = bst_mat3_mul_vec(&exact.gcrf_from_teme, place);
         if (i < 3) {
@@ -260,7 +260,7 @@ static void turning_frames(void **state) {
         bst_oem_free(oem);
     }
     bst_sky_clock_free(clock);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
 }
 
 /* Two segments of one object, with a jump in velocity where they meet, and another object. */

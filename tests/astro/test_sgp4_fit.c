@@ -114,9 +114,9 @@ static void what_is_no_ellipse_is_refused(void **state) {
 /* Vallado, Fundamentals of Astrodynamics and Applications, example 2-5. */
 static void osculating_elements(void **state) {
     (void)state;
-    bst_kepler_elements k =
-        bst_kepler_elements_of(3.986004418e14, (bst_vec3){6524.834e3, 6862.875e3, 6448.296e3},
-                               (bst_vec3){4901.327, 5533.756, -1976.341});
+    bst_astro_kepler_elements k =
+        bst_astro_kepler_elements_of(3.986004418e14, (bst_vec3){6524.834e3, 6862.875e3, 6448.296e3},
+                                     (bst_vec3){4901.327, 5533.756, -1976.341});
     bst_assert_close(k.semi_major_axis_m, 36127.343e3, 20.0); /* from places to 1 m */
     bst_assert_close(k.eccentricity, 0.832853, 1e-6);         /* printed so */
     bst_assert_close(k.inclination_rad / BST_DEG_RAD, 87.870, 1e-3);
@@ -124,7 +124,7 @@ static void osculating_elements(void **state) {
     bst_assert_close(k.arg_perigee_rad / BST_DEG_RAD, 53.38, 1e-2);
     /* true anomaly 92.335: tan(E/2) = sqrt((1-e)/(1+e)) tan(nu/2), M = E - e sin E */
     bst_assert_close(k.mean_anomaly_rad / BST_DEG_RAD, 7.605, 2e-3);
-    k = bst_kepler_elements_of(3.986004418e14, (bst_vec3){7e6, 0, 0}, (bst_vec3){0, 12e3, 0});
+    k = bst_astro_kepler_elements_of(3.986004418e14, (bst_vec3){7e6, 0, 0}, (bst_vec3){0, 12e3, 0});
     assert_true(k.semi_major_axis_m < 0.0 && k.eccentricity > 1.0);
     bst_assert_close(k.mean_anomaly_rad, 0.0, 1e-15); /* at the pericentre */
 }

@@ -62,7 +62,7 @@ static void penumbra_is_monotonic_and_meets_its_ends(void **state) {
 }
 
 static double sun_at(bst_vec3 position, bst_vec3 sun) {
-    return bst_sun_fraction(position, sun, bst_vec3_make(0, 0, 1));
+    return bst_astro_sun_fraction(position, sun, bst_vec3_make(0, 0, 1));
 }
 
 static void places_around_the_earth(void **state) {
@@ -121,8 +121,8 @@ static void grazing_lines(void **state) {
                 bst_vec3 b = bst_vec3_axpy(middle, reach_m[k], tangent);
                 bst_vec3 a_gcrf = bst_mat3_transpose_mul_vec(&turned, a);
                 bst_vec3 b_gcrf = bst_mat3_transpose_mul_vec(&turned, b);
-                assert_true(bst_earth_occults(a_gcrf, b_gcrf, pole) == (up < 0));
-                assert_true(bst_earth_occults(b_gcrf, a_gcrf, pole) == (up < 0));
+                assert_true(bst_astro_earth_occults(a_gcrf, b_gcrf, pole) == (up < 0));
+                assert_true(bst_astro_earth_occults(b_gcrf, a_gcrf, pole) == (up < 0));
             }
         }
     }
@@ -133,27 +133,27 @@ static void ends_of_the_line(void **state) {
     bst_vec3 high = {0, 0, 4.2e7}, low = {0, 0, -4.2e7}, centre = {0, 0, 0}, inside = {0, 1e6, 2e6};
     bst_vec3 normal, ground = surface(0.8, 1.2, &normal);
     bst_vec3 tangent = bst_vec3_perpendicular(normal);
-    assert_true(bst_earth_occults(high, low, north));
-    assert_false(bst_earth_occults(high, high, north)); /* one and the same point */
-    assert_true(bst_earth_occults(centre, centre, north));
-    assert_true(bst_earth_occults(inside, inside, north));
-    assert_true(bst_earth_occults(high, centre, north));
-    assert_true(bst_earth_occults(inside, high, north));
-    assert_false(bst_earth_occults(ground, ground, north));
+    assert_true(bst_astro_earth_occults(high, low, north));
+    assert_false(bst_astro_earth_occults(high, high, north)); /* one and the same point */
+    assert_true(bst_astro_earth_occults(centre, centre, north));
+    assert_true(bst_astro_earth_occults(inside, inside, north));
+    assert_true(bst_astro_earth_occults(high, centre, north));
+    assert_true(bst_astro_earth_occults(inside, high, north));
+    assert_false(bst_astro_earth_occults(ground, ground, north));
     /* from the surface: up, along the horizon, below it */
     bst_vec3 along = bst_vec3_axpy(ground, 1e7, tangent);
-    assert_false(bst_earth_occults(ground, bst_vec3_axpy(ground, 1e7, normal), north));
-    assert_false(bst_earth_occults(ground, bst_vec3_axpy(along, 1e4, normal), north));
-    assert_true(bst_earth_occults(ground, bst_vec3_axpy(along, -1e4, normal), north));
-    assert_true(bst_earth_occults(ground, bst_vec3_scale(ground, -1.0), north));
-    assert_true(bst_earth_occults(bst_vec3_axpy(ground, -1.0, normal), high, north));
+    assert_false(bst_astro_earth_occults(ground, bst_vec3_axpy(ground, 1e7, normal), north));
+    assert_false(bst_astro_earth_occults(ground, bst_vec3_axpy(along, 1e4, normal), north));
+    assert_true(bst_astro_earth_occults(ground, bst_vec3_axpy(along, -1e4, normal), north));
+    assert_true(bst_astro_earth_occults(ground, bst_vec3_scale(ground, -1.0), north));
+    assert_true(bst_astro_earth_occults(bst_vec3_axpy(ground, -1.0, normal), high, north));
     /* the line would meet the Earth only beyond its ends */
-    assert_false(bst_earth_occults(high, bst_vec3_scale(high, 0.5), north));
+    assert_false(bst_astro_earth_occults(high, bst_vec3_scale(high, 0.5), north));
     /* over the pole, where a sphere of the equator's radius would hide it */
     bst_vec3 over_a = {-1e7, 0, 6.36e6}, over_b = {1e7, 0, 6.36e6};
-    assert_false(bst_earth_occults(over_a, over_b, north));
+    assert_false(bst_astro_earth_occults(over_a, over_b, north));
     bst_vec3 side_a = {-1e7, 6.36e6, 0}, side_b = {1e7, 6.36e6, 0};
-    assert_true(bst_earth_occults(side_a, side_b, north));
+    assert_true(bst_astro_earth_occults(side_a, side_b, north));
 }
 
 int main(void) {

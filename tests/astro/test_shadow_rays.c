@@ -98,7 +98,7 @@ static bool darker(const scene *s, double seconds, int contact, bool rays) {
     bst_vec3 from = place_at(s, seconds);
     double fraction = rays && contact != HALF ? 0.0
                       : rays                  ? free_part(s, from)
-                                              : bst_sun_fraction(from, s->sun, s->pole);
+                                              : bst_astro_sun_fraction(from, s->sun, s->pole);
     if (contact == FIRST) {
         return rays ? hidden_rim(s, from) > 0 : fraction < 1.0;
     }
@@ -188,13 +188,13 @@ static void fractions_of_random_places(void **state) {
             double middle = 0.5 * (low + high);
             bst_vec3 p = bst_vec3_axpy(bst_vec3_scale(edge, middle), way, down);
             /* of a Sun at the place itself all is seen, but from inside of the Earth */
-            bool inside = bst_sun_fraction(p, p, s.pole) == 0.0;
+            bool inside = bst_astro_sun_fraction(p, p, s.pole) == 0.0;
             *(inside || hidden(&s, p, bst_vec3_sub(s.sun, p)) ? &low : &high) = middle;
         }
         double shift = 0.0045 * way * sin(2.7 * i);
         shift = way < 3e5 ? fabs(shift) + 1.0 : shift; /* not into the ground */
         bst_vec3 p = bst_vec3_axpy(bst_vec3_scale(edge, high + shift), way, down);
-        double expected = free_part(&s, p), found = bst_sun_fraction(p, s.sun, s.pole);
+        double expected = free_part(&s, p), found = bst_astro_sun_fraction(p, s.sun, s.pole);
         /* chords: 1e-5; the circle for the ellipse: flattening times the limb's radius */
         bst_assert_close(found, expected, 3e-5 + 4e-4 * way / 3e8);
         partial += expected > 0.05 && expected < 0.95;
@@ -221,8 +221,8 @@ static void limb_darkening(void **state) {
                 light[1] += radius * bright;
             }
         }
-        bst_sunlight found;
-        bst_sunlight_at(p, s.sun, s.pole, false, &found);
+        bst_astro_sunlight found;
+        bst_astro_sunlight_at(p, s.sun, s.pole, false, &found);
         /* grid: 1e-3; four rings for the darkening: 1e-3 */
         bst_assert_close(found.light[BST_SUNLIGHT_V], light[0] / light[1], 2e-3);
     }

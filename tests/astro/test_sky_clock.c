@@ -13,13 +13,13 @@ static void assert_near(bst_vec3 a, bst_vec3 b, double tolerance) {
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(a, b)), 0.0, tolerance);
 }
 
-static void assert_like_exact(const bst_eop *eop, bst_sky_clock *clock, bst_time t) {
+static void assert_like_exact(const bst_astro_eop *eop, bst_sky_clock *clock, bst_time t) {
     bst_ctx ctx = {0};
-    bst_sky sky;
-    bst_earth_frames frames;
+    bst_sky_rotation sky;
+    bst_astro_earth_frames frames;
     bst_bodies bodies;
     bst_assert_ok(&ctx, bst_sky_clock_at(&ctx, clock, t, &sky));
-    bst_assert_ok(&ctx, bst_earth_frames_at(&ctx, eop, t, &frames));
+    bst_assert_ok(&ctx, bst_astro_earth_frames_at(&ctx, eop, t, &frames));
     bst_bodies_at(t, &bodies);
     const bst_vec3 geo[2] = {{42164e3, 0, 0}, {0, 29.8e6, 29.8e6}};
     for (int i = 0; i < 2; i++) {
@@ -44,9 +44,9 @@ static void assert_like_exact(const bst_eop *eop, bst_sky_clock *clock, bst_time
 static void keeps_to_the_exact_values(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     bst_sky_clock *clock = NULL;
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &clock));
     bst_time start = utc("2022-06-16T00:00:00Z");
     for (int i = 0; i < 150; i++) {
@@ -57,34 +57,34 @@ static void keeps_to_the_exact_values(void **state) {
         assert_like_exact(eop, clock, bst_time_add(start, 86400.0 * 200 - 120.0 + 3.7 * i));
     }
     bst_sky_clock_free(clock);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
 }
 
 static void passes_a_leap_second(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     bst_sky_clock *clock = NULL;
-    bst_assert_ok(&ctx, bst_eop_load(&ctx, "tests/astro/data/eopc04_14_2016-12.txt", &eop));
+    bst_assert_ok(&ctx, bst_astro_eop_load(&ctx, "tests/astro/data/eopc04_14_2016-12.txt", &eop));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &clock));
     bst_time start = utc("2016-12-31T23:58:00Z");
     for (int i = 0; i < 60; i++) {
         assert_like_exact(eop, clock, bst_time_add(start, 4.1 * i));
     }
     bst_sky_clock_free(clock);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
 }
 
 static void order_of_calls_does_not_matter(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     bst_sky_clock *clock = NULL, *other = NULL;
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &clock));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &other));
     bst_time start = utc("2024-05-04T03:02:01Z");
-    bst_sky forward[40], sky;
+    bst_sky_rotation forward[40], sky;
     for (int i = 0; i < 40; i++) {
         bst_assert_ok(&ctx,
                       bst_sky_clock_at(&ctx, clock, bst_time_add(start, 47.0 * i), &forward[i]));
@@ -97,7 +97,7 @@ static void order_of_calls_does_not_matter(void **state) {
     bst_sky_clock_free(other);
     bst_sky_clock_free(clock);
     bst_sky_clock_free(NULL);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
 }
 
 /* Clocks on one grid give what a clock of its own gives, however far apart they are, and when the
@@ -105,17 +105,17 @@ static void order_of_calls_does_not_matter(void **state) {
 static void clocks_share_a_grid(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_eop *eop = NULL;
-    bst_sky_grid *grid = NULL;
+    bst_astro_eop *eop = NULL;
+    bst_sky_clock_grid *grid = NULL;
     bst_sky_clock *own = NULL, *first = NULL, *second = NULL;
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
-    bst_assert_ok(&ctx, bst_sky_grid_create(&ctx, eop, &grid));
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_sky_clock_grid_create(&ctx, eop, &grid));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &own));
     bst_assert_ok(&ctx, bst_sky_clock_create_on(&ctx, grid, &first));
     bst_assert_ok(&ctx, bst_sky_clock_create_on(&ctx, grid, &second));
     bst_time start = utc("2024-05-04T03:02:01Z");
     for (int i = 0; i < 60; i++) {
-        bst_sky a, b, c;
+        bst_sky_rotation a, b, c;
         bst_time t = bst_time_add(start, 5731.7 * i), later = bst_time_add(t, 86400.0 * 3);
         bst_assert_ok(&ctx, bst_sky_clock_at(&ctx, own, t, &a));
         bst_assert_ok(&ctx, bst_sky_clock_at(&ctx, second, later, &c));
@@ -127,18 +127,18 @@ static void clocks_share_a_grid(void **state) {
     bst_sky_clock_free(own);
     bst_sky_clock_free(first);
     bst_sky_clock_free(second);
-    bst_sky_grid_free(grid);
-    bst_sky_grid_free(NULL);
-    bst_eop_free(eop);
+    bst_sky_clock_grid_free(grid);
+    bst_sky_clock_grid_free(NULL);
+    bst_astro_eop_free(eop);
 }
 
 static void ends_with_the_table(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     bst_sky_clock *clock = NULL;
-    bst_sky sky;
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_sky_rotation sky;
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &clock));
     assert_int_equal(bst_sky_clock_at(&ctx, clock, utc("2056-01-01T12:10:00Z"), &sky),
                      BST_ERR_RANGE);
@@ -158,8 +158,8 @@ static void ends_with_the_table(void **state) {
         bst_status status = bst_sky_clock_at(&ctx, clock, t, &sky);
         assert_int_equal(status, ends[i].covered ? BST_OK : BST_ERR_RANGE);
         if (ends[i].covered) {
-            bst_earth_frames exact;
-            bst_assert_ok(&ctx, bst_earth_frames_at(&ctx, eop, t, &exact));
+            bst_astro_earth_frames exact;
+            bst_assert_ok(&ctx, bst_astro_earth_frames_at(&ctx, eop, t, &exact));
             for (int k = 0; k < 9; k++) {
                 /* 84 s of the table's drift, 3 ms a day of UT1: 2e-10 rad; the grid's own 1e-10 */
                 bst_assert_close((&sky.frames.itrf_from_gcrf.m[0][0])[k],
@@ -173,7 +173,7 @@ static void ends_with_the_table(void **state) {
     assert_int_equal(bst_sky_clock_at(&ctx, clock, (bst_time){2459746.5, 1.0}, &sky),
                      BST_ERR_ARGUMENT);
     bst_sky_clock_free(clock);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
 }
 
 int main(void) {

@@ -13,8 +13,8 @@
 
 static const bst_time epoch = {2459746.5, 0.25};
 
-static bst_status read_text(bst_ctx *ctx, const char *text, bst_injected **out) {
-    return bst_injected_read_buffer(ctx, "x.csv", text, strlen(text), epoch, out);
+static bst_status read_text(bst_ctx *ctx, const char *text, bst_state_table **out) {
+    return bst_state_table_read_buffer(ctx, "x.csv", text, strlen(text), epoch, out);
 }
 
 /* The frame of a circle of radius 7,000 km at 1.1e-3 rad/s. */
@@ -46,69 +46,69 @@ static void a_cubic_within_and_between_frames(void **state) {
         used += print_frame(text + used, 65536 - used, "A", 4.0 * i + 0.1, 4.0 * i + 0.6);
     }
     bst_ctx ctx = {0};
-    bst_injected *injected;
+    bst_state_table *injected;
     int object;
     double from_s, to_s;
     bst_assert_ok(&ctx, read_text(&ctx, text, &injected));
-    assert_int_equal(bst_injected_object_count(injected), 2);
-    bst_assert_ok(&ctx, bst_injected_find(&ctx, injected, "B", &object));
-    assert_string_equal(bst_injected_object_name(injected, object), "B");
-    bst_injected_span(injected, object, &from_s, &to_s);
+    assert_int_equal(bst_state_table_object_count(injected), 2);
+    bst_assert_ok(&ctx, bst_state_table_find(&ctx, injected, "B", &object));
+    assert_string_equal(bst_state_table_object_name(injected, object), "B");
+    bst_state_table_span(injected, object, &from_s, &to_s);
     assert_true(from_s == 0.0 && to_s == 4.0 * (FRAMES - 1) + 0.5);
     bst_vec3 r, v, true_r, true_v;
     for (double t = 0.0; t <= to_s; t += 0.017) {
-        bst_assert_ok(&ctx, bst_injected_state(&ctx, injected, object, t, &r, &v));
+        bst_assert_ok(&ctx, bst_state_table_state(&ctx, injected, object, t, &r, &v));
         circle(t, &true_r, &true_v);
         /* a w^4 h^4 / 384 over the 3.5 s between frames is 4.0e-6 m; its slope's bound is
          * sqrt(3) / 216 a w^4 h^3 = 3.5e-6 m/s */
         bst_assert_close(bst_vec3_norm(bst_vec3_sub(r, true_r)), 0.0, 4.1e-6);
         bst_assert_close(bst_vec3_norm(bst_vec3_sub(v, true_v)), 0.0, 3.6e-6);
     }
-    assert_int_equal(bst_injected_state(&ctx, injected, object, -0.25, &r, &v), BST_ERR_NUMERIC);
+    assert_int_equal(bst_state_table_state(&ctx, injected, object, -0.25, &r, &v), BST_ERR_NUMERIC);
     assert_string_equal(ctx.message,
                         "x.csv: no state of \"B\" -0.250000 s after the epoch: the "
                         "file covers 0.000000 s to 116.500000 s");
-    assert_int_equal(bst_injected_state(&ctx, injected, object, NAN, &r, &v), BST_ERR_NUMERIC);
-    assert_int_equal(bst_injected_find(&ctx, injected, "", &object), BST_ERR_NOT_FOUND);
+    assert_int_equal(bst_state_table_state(&ctx, injected, object, NAN, &r, &v), BST_ERR_NUMERIC);
+    assert_int_equal(bst_state_table_find(&ctx, injected, "", &object), BST_ERR_NOT_FOUND);
     assert_string_equal(ctx.message, "x.csv: no object \"\" among 2 (the first: \"A\")");
-    bst_injected_free(injected);
+    bst_state_table_free(injected);
     free(text);
 }
 
 static void frames_that_meet_may_jump(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_injected *injected;
+    bst_state_table *injected;
     bst_assert_ok(&ctx, read_text(&ctx,
                                   HEADER "X,0,1,0,0,0,1,0,0,1,0,0,1,0,0\r\n"
                                          "\"X\",1,2,5,0,0,2,0,0,7,0,0,2,0,0",
                                   &injected));
     int object;
     bst_vec3 r, v;
-    bst_assert_ok(&ctx, bst_injected_find(&ctx, injected, "", &object));
+    bst_assert_ok(&ctx, bst_state_table_find(&ctx, injected, "", &object));
     static const double cases[][3] = {{0.5, 0.5, 1}, {1.0, 5.0, 2}, {1.5, 6.0, 2}, {2.0, 7.0, 2}};
     for (size_t i = 0; i < 4; i++) {
-        bst_assert_ok(&ctx, bst_injected_state(&ctx, injected, object, cases[i][0], &r, &v));
+        bst_assert_ok(&ctx, bst_state_table_state(&ctx, injected, object, cases[i][0], &r, &v));
         bst_assert_close(r.x, cases[i][1], 1e-14); /* rounding */
         bst_assert_close(v.x, cases[i][2], 1e-14);
     }
-    bst_injected_free(injected);
+    bst_state_table_free(injected);
 }
 
 static void times_may_be_utc(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_injected *injected;
+    bst_state_table *injected;
     /* the epoch is 2022-06-16T05:59:23 UTC: TAI - UTC is 37 s */
     bst_assert_ok(&ctx, read_text(&ctx,
                                   "start_utc,end_utc,object," COLUMNS "\n2022-06-16T05:59:23.5,"
                                   "2022-167T05:59:24.75Z,X,1,2,3,4,5,6,7,8,9,10,11,12\n",
                                   &injected));
     double from_s, to_s;
-    bst_injected_span(injected, 0, &from_s, &to_s);
+    bst_state_table_span(injected, 0, &from_s, &to_s);
     bst_assert_close(from_s, 0.5, 1e-10); /* resolution of bst_time */
     bst_assert_close(to_s, 1.75, 1e-10);
-    bst_injected_free(injected);
+    bst_state_table_free(injected);
 }
 
 static void errors_say_where_and_what(void **state) {
@@ -159,34 +159,34 @@ static void errors_say_where_and_what(void **state) {
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         bst_ctx ctx = {0};
-        bst_injected *injected = (bst_injected *)&ctx;
+        bst_state_table *injected = (bst_state_table *)&ctx;
         bst_status status = read_text(&ctx, cases[i].text, &injected);
         assert_string_equal(ctx.message, cases[i].message);
         assert_int_equal(status, BST_ERR_FORMAT);
         assert_null(injected);
     }
     bst_ctx ctx = {0};
-    bst_injected *injected;
-    assert_int_equal(bst_injected_load(&ctx, "no/such", epoch, &injected), BST_ERR_NOT_FOUND);
-    assert_int_equal(bst_injected_load(&ctx, "tests", epoch, &injected), BST_ERR_IO);
+    bst_state_table *injected;
+    assert_int_equal(bst_state_table_load(&ctx, "no/such", epoch, &injected), BST_ERR_NOT_FOUND);
+    assert_int_equal(bst_state_table_load(&ctx, "tests", epoch, &injected), BST_ERR_IO);
     assert_string_equal(ctx.message, "tests: is a folder; give a file of states per frame (CSV)");
 }
 
 /* What is accepted must evaluate. */
 static void read_damaged(const char *data, size_t size) {
     bst_ctx ctx = {0};
-    bst_injected *injected;
-    bst_status status = bst_injected_read_buffer(&ctx, "x", data, size, epoch, &injected);
+    bst_state_table *injected;
+    bst_status status = bst_state_table_read_buffer(&ctx, "x", data, size, epoch, &injected);
     assert_true((status == BST_OK) == (injected != NULL) &&
                 (status == BST_OK) == (ctx.message[0] == '\0'));
-    for (int o = 0; injected && o < bst_injected_object_count(injected); o++) {
+    for (int o = 0; injected && o < bst_state_table_object_count(injected); o++) {
         double from_s, to_s;
         bst_vec3 r, v;
-        bst_injected_span(injected, o, &from_s, &to_s);
-        bst_assert_ok(&ctx, bst_injected_state(&ctx, injected, o, from_s, &r, &v));
-        bst_assert_ok(&ctx, bst_injected_state(&ctx, injected, o, to_s, &r, &v));
+        bst_state_table_span(injected, o, &from_s, &to_s);
+        bst_assert_ok(&ctx, bst_state_table_state(&ctx, injected, o, from_s, &r, &v));
+        bst_assert_ok(&ctx, bst_state_table_state(&ctx, injected, o, to_s, &r, &v));
     }
-    bst_injected_free(injected);
+    bst_state_table_free(injected);
 }
 
 static void survives_damaged_files(void **state) {

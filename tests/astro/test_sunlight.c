@@ -28,12 +28,12 @@ static const struct {
 };
 
 /* The Sun `off` beyond the equator's limb, both in the plane of the equator. */
-static bst_sunlight light_at(double distance_m, double off, bool atmosphere) {
+static bst_astro_sunlight light_at(double distance_m, double off, bool atmosphere) {
     bst_vec3 p = {distance_m, 0, 0}, pole = {0, 0, 1};
     double c = asin(BST_EARTH_RADIUS_M / distance_m) + off;
     bst_vec3 sun = bst_vec3_axpy(p, BST_AU_M, bst_vec3_make(-cos(c), sin(c), 0));
-    bst_sunlight s;
-    bst_sunlight_at(p, sun, pole, atmosphere, &s);
+    bst_astro_sunlight s;
+    bst_astro_sunlight_at(p, sun, pole, atmosphere, &s);
     return s;
 }
 
@@ -41,7 +41,7 @@ static void agrees_with_rays_through_the_air(void **state) {
     (void)state;
     static const int colour[3] = {0, 1, 3};
     for (size_t k = 0; k < sizeof rays / sizeof *rays; k++) {
-        bst_sunlight s = light_at(rays[k].distance_m, rays[k].off, true);
+        bst_astro_sunlight s = light_at(rays[k].distance_m, rays[k].off, true);
         for (int i = 0; i < 3; i++) {
             /* rows of the air 2 km apart, one radius of the Earth: 0.7 % of full light */
             bst_assert_close(s.light[colour[i]], rays[k].light[i], 0.008);
@@ -53,10 +53,10 @@ static void light_reddens_and_never_jumps(void **state) {
     (void)state;
     static const double distances[] = {6.478e6, 6.7e6, 7.5e6, 2e7, 4.2e7, 3.8e8};
     for (size_t d = 0; d < sizeof distances / sizeof *distances; d++) {
-        bst_sunlight last = light_at(distances[d], -0.03, true);
+        bst_astro_sunlight last = light_at(distances[d], -0.03, true);
         for (int i = 1; i <= 3000; i++) {
             double off = -0.03 + 0.25 * i / 3000;
-            bst_sunlight s = light_at(distances[d], off, true);
+            bst_astro_sunlight s = light_at(distances[d], off, true);
             for (int c = 0; c < BST_SUNLIGHT_COLOURS; c++) {
                 assert_true(s.light[c] >= 0.0 && s.light[c] <= 1.0 + 1e-12);
                 assert_true(fabs(s.light[c] - last.light[c]) < 0.03);
@@ -75,7 +75,7 @@ static void without_air_the_ends_are_those_of_the_geometry(void **state) {
     (void)state;
     for (int i = 0; i <= 40; i++) {
         double off = -0.006 + 0.0003 * i;
-        bst_sunlight s = light_at(4.2164e7, off, false);
+        bst_astro_sunlight s = light_at(4.2164e7, off, false);
         for (int c = 0; c < BST_SUNLIGHT_COLOURS; c++) {
             assert_true((s.light[c] == 0.0) == (s.disc == 0.0));
             assert_true((s.light[c] == 1.0) == (s.disc == 1.0));

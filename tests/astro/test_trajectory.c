@@ -16,7 +16,7 @@ typedef struct orbit_state {
 typedef struct fixture {
     bst_ctx ctx;
     bst_gravity *point, *zonal, *field;
-    bst_eop *eop;
+    bst_astro_eop *eop;
     bst_time epoch;
 } fixture;
 
@@ -27,7 +27,7 @@ static int set_up(void **state) {
     bst_assert_ok(&fx.ctx, bst_gravity_point(&fx.ctx, BST_EARTH_MU_M3PS2, &fx.point));
     bst_assert_ok(&fx.ctx, bst_gravity_builtin(&fx.ctx, 6, 0, &fx.zonal));
     bst_assert_ok(&fx.ctx, bst_gravity_builtin(&fx.ctx, 20, 20, &fx.field));
-    bst_assert_ok(&fx.ctx, bst_eop_builtin(&fx.ctx, &fx.eop));
+    bst_assert_ok(&fx.ctx, bst_astro_eop_builtin(&fx.ctx, &fx.eop));
     bst_assert_ok(&fx.ctx, bst_time_from_utc(&fx.ctx, "2022-06-16T22:10:00Z", &fx.epoch));
     return 0;
 }
@@ -37,7 +37,7 @@ static int tear_down(void **state) {
     bst_gravity_free(fx.point);
     bst_gravity_free(fx.zonal);
     bst_gravity_free(fx.field);
-    bst_eop_free(fx.eop);
+    bst_astro_eop_free(fx.eop);
     return 0;
 }
 
@@ -60,7 +60,7 @@ static bst_force_model everything(void) {
 }
 
 static bst_trajectory *make(bst_force_model forces, double at_s, orbit_state s,
-                            const bst_thrust *burns, int count) {
+                            const bst_astro_thrust *burns, int count) {
     bst_trajectory_options o = {.forces = forces,
                                 .epoch = fx.epoch,
                                 .at_s = at_s,
@@ -73,7 +73,8 @@ static bst_trajectory *make(bst_force_model forces, double at_s, orbit_state s,
     return t;
 }
 
-static bst_trajectory *two_body(double at_s, orbit_state s, const bst_thrust *burns, int count) {
+static bst_trajectory *two_body(double at_s, orbit_state s, const bst_astro_thrust *burns,
+                                int count) {
     return make((bst_force_model){.gravity = fx.point}, at_s, s, burns, count);
 }
 
@@ -208,7 +209,7 @@ static void all_forces_and_a_long_burn_agree_with_runge_kutta(void **state) {
     bst_force_model model = everything();
     rocket k = {NULL, {0.01, -0.02, 0.03}, 1000, 1600};
     bst_assert_ok(&fx.ctx, bst_forces_create(&fx.ctx, &model, fx.epoch, &k.forces));
-    bst_thrust burn = {1000, 600, {6, -12, 18}};
+    bst_astro_thrust burn = {1000, 600, {6, -12, 18}};
     bst_trajectory *t = make(model, 0, start, &burn, 1);
     /* an hour and a half, through the shadow: steps of 1 s leave (n h)^4 of it, 1e-5 m */
     orbit_state expected = runge_kutta(&k, start, 0, 5400, 5400);
@@ -248,7 +249,7 @@ static void a_finer_tolerance_changes_little(void **state) {
 static void impulses_act_right_when_they_are_due(void **state) {
     (void)state;
     orbit_state start = conic(7e6, 0.01, 0.9, 0.3);
-    const bst_thrust burns[2] = {{500, 0, {1, 2, 3}}, {500, 0, {0, 10, 0}}};
+    const bst_astro_thrust burns[2] = {{500, 0, {1, 2, 3}}, {500, 0, {0, 10, 0}}};
     bst_trajectory *plain = two_body(0, start, NULL, 0), *burnt = two_body(0, start, burns, 2);
     orbit_state before = at(plain, 500), after = at(burnt, 500);
     /* rounding */
@@ -262,7 +263,7 @@ static void impulses_act_right_when_they_are_due(void **state) {
     double just_before = nextafter(500, 0);
     bst_assert_close(distance(at(burnt, just_before).v, at(plain, just_before).v), 0, 1e-9);
     /* one at the very time of the initial state comes after it */
-    const bst_thrust now = {0, 0, {0, 5, 0}};
+    const bst_astro_thrust now = {0, 0, {0, 5, 0}};
     bst_trajectory *t0 = two_body(0, start, &now, 1);
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(at(t0, 0).v, start.v)), 5, 1e-9);
     bst_assert_close(distance(at(t0, -100).r, at(plain, -100).r), 0, 1e-7);
@@ -275,10 +276,10 @@ static void a_short_burn_is_an_impulse_in_the_limit(void **state) {
     (void)state;
     orbit_state start = conic(7e6, 0.01, 0.9, 0.3);
     /* in the plane, whose axes it does not turn */
-    const bst_thrust impulse = {500, 0, {1, 2, 0}};
+    const bst_astro_thrust impulse = {500, 0, {1, 2, 0}};
     bst_trajectory *expected = two_body(0, start, &impulse, 1);
     for (double duration = 1e-12; duration < 10; duration *= 1e3) {
-        const bst_thrust burn = {500 - duration / 2, duration, {1, 2, 0}};
+        const bst_astro_thrust burn = {500 - duration / 2, duration, {1, 2, 0}};
         bst_trajectory *t = two_body(0, start, &burn, 1);
         /* a centred burn differs in the second order: n^2 d^2 of 4 m/s over 1000 s, and by the
          * rounding of its place in time */
@@ -287,11 +288,11 @@ static void a_short_burn_is_an_impulse_in_the_limit(void **state) {
         bst_trajectory_free(t);
     }
     /* a burn without effect, and one in two halves with another across them */
-    const bst_thrust nothing[2] = {{500, 100, {0, 0, 0}}, {700, 0, {0, 0, 0}}};
+    const bst_astro_thrust nothing[2] = {{500, 100, {0, 0, 0}}, {700, 0, {0, 0, 0}}};
     bst_trajectory *same = two_body(0, start, nothing, 2), *plain = two_body(0, start, NULL, 0);
     bst_assert_close(distance(at(same, 3000).r, at(plain, 3000).r), 0, 1e-7);
-    const bst_thrust whole[2] = {{500, 200, {2, 4, 6}}, {550, 100, {1, 0, 0}}};
-    const bst_thrust halves[3] = {
+    const bst_astro_thrust whole[2] = {{500, 200, {2, 4, 6}}, {550, 100, {1, 0, 0}}};
+    const bst_astro_thrust halves[3] = {
         {550, 100, {1, 0, 0}}, {600, 100, {1, 2, 3}}, {500, 100, {1, 2, 3}}};
     bst_trajectory *a = two_body(0, start, whole, 2), *b = two_body(0, start, halves, 3);
     bst_assert_close(distance(at(a, 3000).r, at(b, 3000).r), 0, 1e-6);
@@ -305,10 +306,10 @@ static void a_short_burn_is_an_impulse_in_the_limit(void **state) {
 static void burns_are_undone_on_the_way_back(void **state) {
     (void)state;
     orbit_state start = conic(7e6, 0.01, 0.9, 0.3);
-    const bst_thrust burns[4] = {{500, 0, {10, -20, 30}},
-                                 {1000, 300, {5, 6, -7}},
-                                 {2000, 0, {0, -16000, 50}}, /* turns the orbit round */
-                                 {2500, 0, {-3, 2, 1}}};
+    const bst_astro_thrust burns[4] = {{500, 0, {10, -20, 30}},
+                                       {1000, 300, {5, 6, -7}},
+                                       {2000, 0, {0, -16000, 50}}, /* turns the orbit round */
+                                       {2500, 0, {-3, 2, 1}}};
     bst_trajectory *t = two_body(0, start, burns, 4);
     for (double from = 450; from < 3000; from += 800) {
         bst_trajectory *back = two_body(from, at(t, from), burns, 4);
@@ -333,7 +334,7 @@ static double query(int i) { /* all over 40 days, both ways of the start */
 static void states_do_not_depend_on_the_order_of_questions(void **state) {
     (void)state;
     orbit_state start = conic(2e7, 0.2, 0.9, 0.3);
-    const bst_thrust burns[3] = {
+    const bst_astro_thrust burns[3] = {
         {-86400, 0, {1, 0, 0}}, {86400, 3600, {0, 1, 0}}, {2e6, 0, {0, 0, 1}}};
     bst_trajectory *jumps = two_body(0, start, burns, 3), *run = two_body(0, start, burns, 3);
     orbit_state *ordered = calloc(1009, sizeof *ordered);
@@ -415,7 +416,7 @@ static void an_orbit_that_decays_ends(void **state) {
     bst_assert_close(low, end_s, 0.06); /* as printed */
     s = at(t, low);
     /* found to 1e-4 s of a fall of 100 m/s and more */
-    bst_assert_close(bst_height_m(s.r), 80e3, 1);
+    bst_assert_close(bst_astro_height_m(s.r), 80e3, 1);
     /* what was before is still there, in any order */
     orbit_state first = at(t, 1000);
     assert_int_equal(bst_trajectory_state(&fx.ctx, t, 1e7, &s.r, &s.v), BST_ERR_NUMERIC);
@@ -462,7 +463,7 @@ static void wrong_arguments_are_refused(void **state) {
     assert_int_equal(bst_trajectory_create(&fx.ctx, &o, &t), BST_ERR_ARGUMENT);
     assert_string_equal(fx.ctx.message, "tolerance 1e-12 of an orbit (allowed: 1e-11 to 1e-3)");
     o = good;
-    const bst_thrust burn = {0, -1, {0, 0, 0}};
+    const bst_astro_thrust burn = {0, -1, {0, 0, 0}};
     o.burns = &burn;
     o.burn_count = 1;
     assert_int_equal(bst_trajectory_create(&fx.ctx, &o, &t), BST_ERR_ARGUMENT);

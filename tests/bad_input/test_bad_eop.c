@@ -3,10 +3,10 @@
 #include "tests/bad_input/faults.h"
 
 static bst_status read_eop(bst_ctx *ctx, const char *path) {
-    bst_eop *eop = NULL;
-    bst_status status = bst_eop_load(ctx, path, &eop);
+    bst_astro_eop *eop = NULL;
+    bst_status status = bst_astro_eop_load(ctx, path, &eop);
     assert_true((status == BST_OK) == (eop != NULL));
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
     return status;
 }
 
@@ -94,10 +94,10 @@ static void every_truncation(void **state) {
         assert_non_null(copy);
         memcpy(copy, text, n);
         bst_ctx ctx = {0};
-        bst_eop *eop = NULL;
-        bst_status status = bst_eop_read_buffer(&ctx, "x", copy, n, &eop);
+        bst_astro_eop *eop = NULL;
+        bst_status status = bst_astro_eop_read_buffer(&ctx, "x", copy, n, &eop);
         assert_int_equal(status, n > last_column - 1 ? BST_OK : BST_ERR_FORMAT);
-        bst_eop_free(eop);
+        bst_astro_eop_free(eop);
         free(copy);
     }
 }

@@ -24,11 +24,11 @@ static bst_status read_oem(bst_ctx *ctx, const char *path) {
 
 static bst_status read_injected(bst_ctx *ctx, const char *path) {
     bst_time epoch;
-    bst_injected *states = NULL;
+    bst_state_table *states = NULL;
     bst_assert_ok(ctx, bst_time_from_utc(ctx, "2022-06-16T22:10:00Z", &epoch));
-    bst_status status = bst_injected_load(ctx, path, epoch, &states);
+    bst_status status = bst_state_table_load(ctx, path, epoch, &states);
     assert_true((status == BST_OK) == (states != NULL));
-    bst_injected_free(states);
+    bst_state_table_free(states);
     return status;
 }
 
@@ -108,10 +108,10 @@ static bst_status cut_oem(bst_ctx *ctx, const char *data, size_t bytes) {
 
 static bst_status cut_injected(bst_ctx *ctx, const char *data, size_t bytes) {
     bst_time epoch;
-    bst_injected *file = NULL;
+    bst_state_table *file = NULL;
     bst_assert_ok(ctx, bst_time_from_utc(ctx, "2022-06-16T22:10:00Z", &epoch));
-    bst_status status = bst_injected_read_buffer(ctx, "x", data, bytes, epoch, &file);
-    bst_injected_free(file);
+    bst_status status = bst_state_table_read_buffer(ctx, "x", data, bytes, epoch, &file);
+    bst_state_table_free(file);
     return status;
 }
 

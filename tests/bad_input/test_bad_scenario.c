@@ -8,7 +8,7 @@
 
 static bst_status read_json(bst_ctx *ctx, const bst_json *json) {
     bst_scenario scenario;
-    bst_status status = bst_scenario_read(ctx, json, bst_app_registry(), &scenario);
+    bst_status status = bst_scenario_read(ctx, json, bst_registry_shipped(), &scenario);
     bst_scenario_free(&scenario);
     return status;
 }
@@ -311,9 +311,9 @@ static void every_key(void **state) {
     bst_json *json = NULL;
     bst_scenario scenario;
     bst_assert_ok(&ctx, bst_json_load(&ctx, SHIPPED, &json));
-    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_app_registry(), &scenario));
+    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_registry_shipped(), &scenario));
     cJSON *instance = bst_scenario_echo(&scenario);
-    cJSON *schema = bst_scenario_schema(bst_app_registry());
+    cJSON *schema = bst_scenario_schema(bst_registry_shipped());
     bst_scenario_free(&scenario);
     bst_json_free(json);
     walk w = {cJSON_PrintUnformatted(instance), 0};

@@ -26,9 +26,9 @@ static bst_status read_tle(bst_ctx *ctx, const char *path) {
 }
 
 static bst_status read_eop(bst_ctx *ctx, const char *path) {
-    bst_eop *eop = NULL;
-    bst_status status = bst_eop_load(ctx, path, &eop);
-    bst_eop_free(eop);
+    bst_astro_eop *eop = NULL;
+    bst_status status = bst_astro_eop_load(ctx, path, &eop);
+    bst_astro_eop_free(eop);
     return status;
 }
 
@@ -64,10 +64,10 @@ static bst_status read_oem(bst_ctx *ctx, const char *path) {
 
 static bst_status read_injected(bst_ctx *ctx, const char *path) {
     bst_time epoch;
-    bst_injected *states = NULL;
+    bst_state_table *states = NULL;
     bst_assert_ok(ctx, bst_time_from_utc(ctx, "2022-06-16T22:10:00Z", &epoch));
-    bst_status status = bst_injected_load(ctx, path, epoch, &states);
-    bst_injected_free(states);
+    bst_status status = bst_state_table_load(ctx, path, epoch, &states);
+    bst_state_table_free(states);
     return status;
 }
 

@@ -24,7 +24,8 @@ static const double allen[LATITUDES][MAGNITUDES] = {
 };
 
 static bst_vec3 galactic(double l_deg, double b_deg) {
-    return bst_icrs_from_galactic(bst_vec3_from_radec(l_deg * BST_DEG_RAD, b_deg * BST_DEG_RAD));
+    return bst_catalogue_icrs_from_galactic(
+        bst_vec3_from_radec(l_deg * BST_DEG_RAD, b_deg * BST_DEG_RAD));
 }
 
 /* Stars per square degree brighter than v on the whole circle of latitude b. */
@@ -85,7 +86,7 @@ static void count_in(drawn *s, bst_vec3 centre, double radius, const double sin_
         }
         assert_true(count <= s->capacity);
         for (int i = 0; i < count; i++) {
-            bst_vec3 g = bst_galactic_from_icrs(s->stars[i].icrs);
+            bst_vec3 g = bst_catalogue_galactic_from_icrs(s->stars[i].icrs);
             double off = remainder(atan2(g.y, g.x) / BST_DEG_RAD - l_deg, 360.0);
             if (g.z >= sin_b[0] && g.z < sin_b[1] && off >= -width_deg / 2 && off < width_deg / 2) {
                 counted[0] += (double)s->stars[i].v_mag <= 15.0;

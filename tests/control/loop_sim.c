@@ -35,12 +35,12 @@ static bst_vec3 target_direction(const scene *s, double t, bool as_cue) {
     return bst_vec3_unit(bst_vec3_sub(p, observer(t, NULL)));
 }
 
-static bst_status cue_at(void *user, bst_ctx *ctx, double t, bst_cue *out) {
+static bst_status cue_at(void *user, bst_ctx *ctx, double t, bst_onboard_cue *out) {
     (void)ctx;
     const scene *s = user;
     bst_quat wrong = bst_quat_from_rotvec(s->cue_error);
     bst_vec3 a = target_direction(s, t - 0.5, true), b = target_direction(s, t + 0.5, true);
-    *out = (bst_cue){
+    *out = (bst_onboard_cue){
         .valid = true,
         .direction_gcrf = bst_quat_rotate(wrong, target_direction(s, t, true)),
         .rate_gcrf_radps = bst_quat_rotate(wrong, bst_vec3_sub(b, a)),
@@ -53,7 +53,7 @@ static bst_status cue_at(void *user, bst_ctx *ctx, double t, bst_cue *out) {
 
 static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, bool *valid,
                                    bst_vec3 *direction) {
-    bst_cue cue;
+    bst_onboard_cue cue;
     BST_TRY(cue_at(user, ctx, seconds, &cue));
     *valid = cue.valid;
     *direction = cue.direction_gcrf;
@@ -67,8 +67,8 @@ static bst_nav_telemetry nav_at(double t, int64_t tick) {
     return nav;
 }
 
-static bst_light light_of(const bst_nav_telemetry *nav) {
-    return (bst_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m};
+static bst_astro_light light_of(const bst_nav_telemetry *nav) {
+    return (bst_astro_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m};
 }
 
 /* ---- a tracker of one target ---- */
@@ -173,8 +173,8 @@ bst_quat sim_body_with_pole_at(double t_s) {
     sim_options o = sim_defaults();
     scene s = {.o = &o};
     bst_nav_telemetry nav = nav_at(t_s, 0);
-    bst_light light = light_of(&nav);
-    bst_vec3 y = bst_light_aberrate(&light, target_direction(&s, t_s, false));
+    bst_astro_light light = light_of(&nav);
+    bst_vec3 y = bst_astro_light_aberrate(&light, target_direction(&s, t_s, false));
     bst_vec3 z = bst_vec3_perpendicular(y), x = bst_vec3_cross(y, z);
     bst_mat3 rows = {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, {z.x, z.y, z.z}}};
     return bst_quat_from_mat3(&rows);
@@ -228,8 +228,8 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
     out->attitude.q_cam_from_gcrf = bst_quat_mul(bst_quat_from_rotvec(noisy), x->q_tel_mid);
 
     bst_nav_telemetry nav = nav_at(t, x->mid_tick);
-    bst_light light = light_of(&nav);
-    bst_vec3 apparent = bst_light_aberrate(&light, target_direction(s, t, false));
+    bst_astro_light light = light_of(&nav);
+    bst_vec3 apparent = bst_astro_light_aberrate(&light, target_direction(s, t, false));
     bst_vec3 v = bst_quat_rotate(bst_quat_mul(bst_quat_from_rotvec(e), x->q_tel_mid), apparent);
     double px = v.x / v.z / SIM_PIXEL_RAD, py = v.y / v.z / SIM_PIXEL_RAD;
     bool in_field = v.z > 0.0 && fabs(px) < 511.5 && fabs(py) < 511.5;
@@ -245,11 +245,11 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
         bst_rng_normal2(noise_key, (uint64_t)frame, 2, a);
         bst_vec3 w = bst_vec3_unit(
             (bst_vec3){px * SIM_PIXEL_RAD + c * a[0], py * SIM_PIXEL_RAD + c * a[1], 1.0});
-        seen = bst_light_unaberrate(
+        seen = bst_astro_light_unaberrate(
             &light, bst_quat_rotate(bst_quat_conj(out->attitude.q_cam_from_gcrf), w));
     }
     bst_ctx ctx = {0};
-    bst_cue cue;
+    bst_onboard_cue cue;
     bst_assert_ok(&ctx, cue_at((void *)(uintptr_t)s, &ctx, t, &cue));
     tracker_frame(k, x->mid_tick, detected ? &seen : NULL, cue.rate_gcrf_radps, hypot(c, f));
     out->tick = x->mid_tick;
@@ -268,7 +268,7 @@ enum { WAY = 256, PENDING = 8 }; /* commands and messages on their way */
 
 void sim_run(const sim_options *o, sim_result *r) {
     bst_ctx ctx = {0};
-    bst_two_axis_config gimbal_config;
+    bst_mount_two_axis_config gimbal_config;
     bst_control_config control_config;
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_two_axis_config_table, &gimbal_config));
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_control_config_table, &control_config));
@@ -293,15 +293,15 @@ void sim_run(const sim_options *o, sim_result *r) {
         bst_quat_conj(bst_quat_look(d0, (bst_vec3){0, 1, 0.3})),
         bst_vec3_scale((bst_vec3){-o->cue_error_y_deg, o->cue_error_x_deg, 0.0}, BST_DEG_RAD));
 
-    static bst_two_axis plant;
+    static bst_mount_two_axis plant;
     static bst_control control;
-    bst_two_axis_keys keys = {bst_rng_make_key(o->seed, 0, "loop", "jitter"),
-                              bst_rng_make_key(o->seed, 0, "loop", "attitude"),
-                              bst_rng_make_key(o->seed, 0, "loop", "encoder")};
+    bst_mount_two_axis_keys keys = {bst_rng_make_key(o->seed, 0, "loop", "jitter"),
+                                    bst_rng_make_key(o->seed, 0, "loop", "attitude"),
+                                    bst_rng_make_key(o->seed, 0, "loop", "encoder")};
     bst_rng_key noise_key = bst_rng_make_key(o->seed, 0, "loop", "measurement");
     double dt = (double)SIM_STEP_TICKS / SIM_TICKS_PER_S;
-    bst_assert_ok(&ctx,
-                  bst_two_axis_init(&ctx, &plant, &gimbal_config, body, SIM_PIXEL_RAD, dt, &keys));
+    bst_assert_ok(&ctx, bst_mount_two_axis_init(&ctx, &plant, &gimbal_config, body, SIM_PIXEL_RAD,
+                                                dt, &keys));
     bst_control_env env = {.tick_rate_hz = SIM_TICKS_PER_S,
                            .pixel_rad = SIM_PIXEL_RAD,
                            .width_px = 1024,
@@ -346,8 +346,8 @@ void sim_run(const sim_options *o, sim_result *r) {
             current = way[arrived++ % WAY].command;
             has_command = true;
         }
-        bst_two_axis_step(&plant, has_command ? &current : NULL,
-                          (double)(tick - current.tick) / SIM_TICKS_PER_S, true);
+        bst_mount_two_axis_step(&plant, has_command ? &current : NULL,
+                                (double)(tick - current.tick) / SIM_TICKS_PER_S, true);
         for (int a = 0; a < 2; a++) {
             double rate = plant.axis[a].rate_radps;
             r->rate_worst_radps = fmax(r->rate_worst_radps, fabs(rate));
@@ -356,11 +356,12 @@ void sim_run(const sim_options *o, sim_result *r) {
         }
         bst_nav_telemetry nav = nav_at(t, tick);
         if (n % 10 == 0) { /* the true apparent place, linear over 10 ms */
-            bst_light light = light_of(&nav);
+            bst_astro_light light = light_of(&nav);
             bst_nav_telemetry nav2 = nav_at(t + 0.01, tick + 60);
-            bst_light light2 = light_of(&nav2);
-            apparent = bst_light_aberrate(&light, target_direction(&s, t, false));
-            bst_vec3 next = bst_light_aberrate(&light2, target_direction(&s, t + 0.01, false));
+            bst_astro_light light2 = light_of(&nav2);
+            apparent = bst_astro_light_aberrate(&light, target_direction(&s, t, false));
+            bst_vec3 next =
+                bst_astro_light_aberrate(&light2, target_direction(&s, t + 0.01, false));
             apparent_step = bst_vec3_scale(bst_vec3_sub(next, apparent), 0.1);
         }
         bst_vec3 place = bst_vec3_axpy(apparent, (double)(n % 10), apparent_step);

@@ -13,7 +13,7 @@
 typedef struct bench {
     bst_ctx ctx;
     bst_guidance guidance;
-    bst_two_axis plant;
+    bst_mount_two_axis plant;
     bst_nav_telemetry nav;
     bst_vec3 from, rate; /* the aim moves along a great circle: direction and rate at tick 0 */
     bst_vec3 jump_to;    /* and is elsewhere from jump_tick on */
@@ -59,12 +59,12 @@ static void open_bench(bench *b, bst_vec3 from, bst_vec3 rate) {
     const bst_guidance_env env = {
         .tick_rate_hz = TICKS, .pixel_rad = 1e-4, .aim = aim, .range = range, .user = b};
     bst_guidance_init(&b->guidance, &config, &env);
-    bst_two_axis_config mount;
+    bst_mount_two_axis_config mount;
     bst_assert_ok(&b->ctx, bst_config_defaults(&b->ctx, bst_two_axis_config_table, &mount));
     mount.encoder_noise_arcsec = 0;
-    bst_two_axis_keys keys = {0};
-    bst_assert_ok(&b->ctx, bst_two_axis_init(&b->ctx, &b->plant, &mount, BST_QUAT_IDENTITY, 1e-5,
-                                             1e-3, &keys));
+    bst_mount_two_axis_keys keys = {0};
+    bst_assert_ok(&b->ctx, bst_mount_two_axis_init(&b->ctx, &b->plant, &mount, BST_QUAT_IDENTITY,
+                                                   1e-5, 1e-3, &keys));
     b->nav = (bst_nav_telemetry){.position_gcrf_m = {0, 0, 7000e3}, .sun_m = {0, 0, -1.5e11}};
     b->nearest_rad = INFINITY;
     b->arrival_s = INFINITY;
@@ -101,11 +101,11 @@ static void run(bench *b, double seconds) {
             b->guidance.event_count = 0;
         }
         bool measure = n % 10 == 0;
-        bst_two_axis_step(&b->plant, has ? &active : NULL, (double)(n - active.tick) / TICKS,
-                          measure);
+        bst_mount_two_axis_step(&b->plant, has ? &active : NULL, (double)(n - active.tick) / TICKS,
+                                measure);
         if (measure) {
             bst_mount_status status = {0};
-            bst_two_axis_status(&b->plant, n, &status);
+            bst_mount_two_axis_status(&b->plant, n, &status);
             bst_guidance_telemetry(&b->guidance, &status);
         }
         bst_vec3 d = bst_quat_rotate(bst_quat_conj(b->plant.q_cam_from_gcrf), (bst_vec3){0, 0, 1});

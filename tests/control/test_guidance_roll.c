@@ -79,14 +79,16 @@ typedef struct pass {
     double miss_deg;
 } pass;
 
-static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+static bst_status look(void *user, bst_ctx *ctx, double seconds,
+                       bst_pointing_feasibility_look *out) {
     const pass *p = user;
     (void)ctx;
     double m = p->miss_deg * DEG, a = 2.0 * DEG * (seconds - 40.0);
     bst_vec3 d = {cos(a) * sin(m), cos(a) * cos(m), -sin(a)};
-    *out = (bst_reach_look){.valid = true,
-                            .direction_gcrf = turned(d, (bst_vec3){0, 0, 1}, -p->g->roll_rad),
-                            .q_body_from_gcrf = BST_QUAT_IDENTITY};
+    *out = (bst_pointing_feasibility_look){
+        .valid = true,
+        .direction_gcrf = turned(d, (bst_vec3){0, 0, 1}, -p->g->roll_rad),
+        .q_body_from_gcrf = BST_QUAT_IDENTITY};
     return BST_OK;
 }
 
@@ -124,7 +126,7 @@ static void the_least_roll_that_is_enough_is_taken(void **state) {
         bst_ctx ctx = {0};
         make_mount(&g, 5.0);
         pass p = {&g, cases[i].miss_deg};
-        const bst_reach_problem problem = {
+        const bst_pointing_feasibility_problem problem = {
             .look = look, .user = &p, .mount = &g.mount, .limits_share = cases[i].share};
         g.mount.roll.angle_rad = cases[i].from_deg * DEG;
         g.roll_given = !isnan(cases[i].given_deg);
@@ -141,7 +143,8 @@ static void without_a_way_the_roll_stays(void **state) {
     static bst_guidance g;
     bst_ctx ctx = {0};
     pass p = {&g, 12.0};
-    bst_reach_problem problem = {.look = look, .user = &p, .mount = &g.mount, .limits_share = 1.0};
+    bst_pointing_feasibility_problem problem = {
+        .look = look, .user = &p, .mount = &g.mount, .limits_share = 1.0};
     for (int given = 0; given < 2; given++) {
         make_mount(&g, 2.0); /* slower than the target, whatever the roll */
         g.roll_given = given == 1;
@@ -177,11 +180,12 @@ static void without_a_way_the_roll_stays(void **state) {
 /* Every direction can be reached and no axis is too slow, but the outer one comes to the end of its
  * travel and has to go round by a turn: that is a loss, and a roll about the outer axis moves it
  * out of the pass. */
-static bst_status look_round(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+static bst_status look_round(void *user, bst_ctx *ctx, double seconds,
+                             bst_pointing_feasibility_look *out) {
     const pass *p = user;
     (void)ctx;
     double o = (150.0 + 0.4 * seconds) * DEG; /* 150 to 198 degrees in 120 s */
-    *out = (bst_reach_look){
+    *out = (bst_pointing_feasibility_look){
         .valid = true,
         .direction_gcrf = turned((bst_vec3){cos(0.2) * sin(o), -sin(0.2), cos(0.2) * cos(o)},
                                  (bst_vec3){0, 1, 0}, -p->g->roll_rad),
@@ -198,7 +202,7 @@ static void a_turn_of_the_outer_axis_is_a_loss(void **state) {
     g.mount.axis[0].min_rad = -180 * DEG;
     g.mount.axis[0].max_rad = 180 * DEG;
     pass p = {&g, 0.0};
-    const bst_reach_problem problem = {
+    const bst_pointing_feasibility_problem problem = {
         .look = look_round, .user = &p, .mount = &g.mount, .limits_share = 1.0};
     bool found;
     bst_assert_ok(&ctx, bst_guidance_choose_roll(&ctx, &g, &problem, 120.0, &found));

@@ -8,13 +8,14 @@
 static bst_vec3 at(double lon_deg, double lat_deg) {
     return bst_vec3_from_radec(lon_deg * DEG, lat_deg * DEG);
 }
-static bst_zone cone(double lon_deg, double lat_deg, double half_deg) {
-    return (bst_zone){BST_ZONE_SUN, at(lon_deg, lat_deg), half_deg * DEG};
+static bst_keep_out_zone cone(double lon_deg, double lat_deg, double half_deg) {
+    return (bst_keep_out_zone){BST_ZONE_SUN, at(lon_deg, lat_deg), half_deg * DEG};
 }
 
 /* Greatest depth in a zone along a path (after the way out of one that it starts in), and that the
  * pieces join and their slopes are right. */
-static double walk(const bst_path *path, const bst_zone *zones, int count, bst_vec3 to) {
+static double walk(const bst_keep_out_route *path, const bst_keep_out_zone *zones, int count,
+                   bst_vec3 to) {
     enum { STEPS = 4000 };
     double worst = 0.0, first = 0.0;
     bst_vec3 before = path->arcs[0].from, tangent, bend, t2, b2;
@@ -23,19 +24,19 @@ static double walk(const bst_path *path, const bst_zone *zones, int count, bst_v
     }
     for (int k = 0; k <= STEPS; k++) {
         double s = path->length_rad * k / STEPS, depth;
-        bst_vec3 d = bst_path_at(path, s, &tangent, &bend);
+        bst_vec3 d = bst_keep_out_route_at(path, s, &tangent, &bend);
         bst_assert_close(bst_vec3_norm(d), 1.0, 1e-14);
         /* the way between two samples is no longer than s: nothing jumps */
         assert_true(bst_vec3_angle(d, before) <= path->length_rad / STEPS * (1.0 + 1e-9) + 1e-12);
         if (s > first) {
-            bst_exclusion_inside(zones, count, d, &depth);
+            bst_keep_out_inside(zones, count, d, &depth);
             worst = fmax(worst, depth);
         }
         /* difference quotient over 2e-6: 1e-12 of truncation, 1e-10 of rounding; not over a joint
          */
         if (path->count == 1 && s > 1e-5 && s < path->length_rad - 1e-5) {
-            bst_vec3 up = bst_path_at(path, s + 1e-6, &t2, &b2);
-            bst_vec3 down = bst_path_at(path, s - 1e-6, &t2, &b2);
+            bst_vec3 up = bst_keep_out_route_at(path, s + 1e-6, &t2, &b2);
+            bst_vec3 down = bst_keep_out_route_at(path, s - 1e-6, &t2, &b2);
             bst_vec3 slope = bst_vec3_scale(bst_vec3_sub(up, down), 1.0 / 2e-6);
             assert_true(bst_vec3_norm(bst_vec3_sub(slope, tangent)) < 1e-9);
         }
@@ -49,15 +50,15 @@ static double walk(const bst_path *path, const bst_zone *zones, int count, bst_v
 
 static void zones_of_navigation(void **state) {
     (void)state;
-    bst_zone zones[BST_ZONE_KINDS];
+    bst_keep_out_zone zones[BST_ZONE_KINDS];
     double r = 7078137.0;
-    bst_exclusion e = {.sun_rad = 30 * DEG,
-                       .moon_rad = 10 * DEG,
-                       .earth = true,
-                       .earth_limb_rad = 5 * DEG,
-                       .limb_altitude_m = 100e3};
-    int n = bst_exclusion_zones(&e, (bst_vec3){0, 0, r}, (bst_vec3){1.5e11, 0, 0},
-                                (bst_vec3){0, 3.8e8, 0}, zones);
+    bst_keep_out e = {.sun_rad = 30 * DEG,
+                      .moon_rad = 10 * DEG,
+                      .earth = true,
+                      .earth_limb_rad = 5 * DEG,
+                      .limb_altitude_m = 100e3};
+    int n = bst_keep_out_zones(&e, (bst_vec3){0, 0, r}, (bst_vec3){1.5e11, 0, 0},
+                               (bst_vec3){0, 3.8e8, 0}, zones);
     assert_int_equal(n, 3);
     bst_assert_close(bst_vec3_angle(zones[0].axis, (bst_vec3){1, 0, 0}), 0.0, 1e-15);
     bst_assert_close(zones[1].half_angle_rad, 10 * DEG, 1e-15);
@@ -65,12 +66,12 @@ static void zones_of_navigation(void **state) {
     bst_assert_close(zones[2].axis.z, -1.0, 1e-15);
     /* limb of a sphere of 6478.137 km from 7078.137 km: 66.24 degrees from the nadir */
     bst_assert_close(zones[2].half_angle_rad, asin(6478137.0 / r) + 5 * DEG, 1e-14);
-    e = (bst_exclusion){.earth = true, .limb_altitude_m = 800e3};
-    n = bst_exclusion_zones(&e, (bst_vec3){0, 0, r}, (bst_vec3){0}, (bst_vec3){0}, zones);
+    e = (bst_keep_out){.earth = true, .limb_altitude_m = 800e3};
+    n = bst_keep_out_zones(&e, (bst_vec3){0, 0, r}, (bst_vec3){0}, (bst_vec3){0}, zones);
     assert_int_equal(n, 1);
     bst_assert_close(zones[0].half_angle_rad, BST_PI / 2, 1e-15); /* inside the air */
-    assert_int_equal(bst_exclusion_zones(&(bst_exclusion){0}, (bst_vec3){0, 0, r},
-                                         (bst_vec3){1, 0, 0}, (bst_vec3){1, 0, 0}, zones),
+    assert_int_equal(bst_keep_out_zones(&(bst_keep_out){0}, (bst_vec3){0, 0, r},
+                                        (bst_vec3){1, 0, 0}, (bst_vec3){1, 0, 0}, zones),
                      0);
 }
 
@@ -79,7 +80,7 @@ static void zones_of_navigation(void **state) {
  * right-angled triangle start - foot - axis has cos(its angle at the axis) = tan 25 / tan 60. */
 static void round_one_cone(void **state) {
     (void)state;
-    bst_zone zone = cone(0, 0, 25);
+    bst_keep_out_zone zone = cone(0, 0, 25);
     for (int k = 0; k < 12; k++) {
         double turn = 30.0 * k;
         bst_vec3 axis = zone.axis;
@@ -92,8 +93,8 @@ static void round_one_cone(void **state) {
             bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(axis, 170 * DEG)), side);
         bst_vec3 to =
             bst_vec3_add(bst_vec3_scale(axis, cos(60 * DEG)), bst_vec3_scale(other, sin(60 * DEG)));
-        bst_path path;
-        assert_true(bst_exclusion_path(&zone, 1, from, to, &path));
+        bst_keep_out_route path;
+        assert_true(bst_keep_out_path(&zone, 1, from, to, &path));
         double tangent = acos(cos(60 * DEG) / cos(25 * DEG));
         double at_axis = acos(tan(25 * DEG) / tan(60 * DEG));
         double edge = (170 * DEG - 2 * at_axis) * sin(25 * DEG);
@@ -105,65 +106,66 @@ static void round_one_cone(void **state) {
 
 static void nothing_in_the_way(void **state) {
     (void)state;
-    bst_path path;
-    bst_zone zone = cone(0, 60, 20);
-    assert_true(bst_exclusion_path(&zone, 1, at(-70, 0), at(70, 0), &path));
+    bst_keep_out_route path;
+    bst_keep_out_zone zone = cone(0, 60, 20);
+    assert_true(bst_keep_out_path(&zone, 1, at(-70, 0), at(70, 0), &path));
     bst_assert_close(path.length_rad, 140 * DEG, 1e-14);
     assert_int_equal(path.count, 1);
-    assert_true(bst_exclusion_path(&zone, 1, at(20, 5), at(20, 5), &path)); /* zero length */
+    assert_true(bst_keep_out_path(&zone, 1, at(20, 5), at(20, 5), &path)); /* zero length */
     assert_int_equal(path.count, 0);
     bst_vec3 t, b;
-    assert_true(bst_vec3_angle(bst_path_at(&path, 0.3, &t, &b), at(20, 5)) < 1e-15);
+    assert_true(bst_vec3_angle(bst_keep_out_route_at(&path, 0.3, &t, &b), at(20, 5)) < 1e-15);
     /* 180 degrees, exactly, with the Sun on one way and the Earth on the other */
-    bst_zone two[2] = {cone(0, 0, 50), cone(180, 0, 70)};
-    assert_true(bst_exclusion_path(two, 2, at(0, 90), at(0, -90), &path));
+    bst_keep_out_zone two[2] = {cone(0, 0, 50), cone(180, 0, 70)};
+    assert_true(bst_keep_out_path(two, 2, at(0, 90), at(0, -90), &path));
     bst_assert_close(path.length_rad, BST_PI, 1e-9);
     assert_true(walk(&path, two, 2, at(0, -90)) < 1e-8);
     /* a cone of more than half the sky: the rest is convex */
-    bst_zone wide = cone(180, 0, 110);
-    assert_true(bst_exclusion_path(&wide, 1, at(-69, 0), at(0, 69), &path));
+    bst_keep_out_zone wide = cone(180, 0, 110);
+    assert_true(bst_keep_out_path(&wide, 1, at(-69, 0), at(0, 69), &path));
     assert_int_equal(path.count, 1);
     assert_true(walk(&path, &wide, 1, at(0, 69)) < 1e-8);
 }
 
 static void inside_of_cones(void **state) {
     (void)state;
-    bst_path path;
+    bst_keep_out_route path;
     bst_vec3 out;
     double depth;
-    bst_zone zone = cone(0, 0, 30);
-    assert_int_equal(bst_exclusion_inside(&zone, 1, at(20, 0), &depth), 0);
+    bst_keep_out_zone zone = cone(0, 0, 30);
+    assert_int_equal(bst_keep_out_inside(&zone, 1, at(20, 0), &depth), 0);
     bst_assert_close(depth, 10 * DEG, 1e-12);
     /* out by the shortest way, then on */
-    assert_true(bst_exclusion_path(&zone, 1, at(20, 0), at(90, 0), &path));
+    assert_true(bst_keep_out_path(&zone, 1, at(20, 0), at(90, 0), &path));
     assert_int_equal(path.left_zone, 0);
     bst_assert_close(path.length_rad, 70 * DEG, 1e-9);
-    assert_true(bst_exclusion_path(&zone, 1, at(20, 0), at(-90, 0), &path));
+    assert_true(bst_keep_out_path(&zone, 1, at(20, 0), at(-90, 0), &path));
     /* 10 degrees out, along the edge (a half turn less what the tangent from 90 degrees leaves:
      * cos 90 / cos 30 = 0, a quarter of the sky long, foot 90 degrees round the axis), and on */
     bst_assert_close(path.length_rad, 10 * DEG + 90 * DEG * sin(30 * DEG) + 90 * DEG, 1e-9);
     assert_true(walk(&path, &zone, 1, at(-90, 0)) < 1e-8);
     /* two that overlap, deep in both: by the corner where their edges cross */
-    bst_zone two[2] = {cone(-10, 0, 30), cone(10, 0, 30)};
+    bst_keep_out_zone two[2] = {cone(-10, 0, 30), cone(10, 0, 30)};
     double corner = acos(cos(30 * DEG) / cos(10 * DEG));
-    assert_true(bst_exclusion_nearest(two, 2, at(0, 1), at(0, 0), &out));
+    assert_true(bst_keep_out_nearest(two, 2, at(0, 1), at(0, 0), &out));
     bst_assert_close(bst_vec3_angle(out, at(0, corner / DEG)), 0.0, 1e-9);
     /* the target is inside: as near to it as can be, and said */
-    assert_true(bst_exclusion_path(&zone, 1, at(90, 0), at(10, 0), &path));
+    assert_true(bst_keep_out_path(&zone, 1, at(90, 0), at(10, 0), &path));
     assert_int_equal(path.target_zone, 0);
     bst_assert_close(path.length_rad, 60 * DEG, 1e-9);
     /* cue and Sun parallel: any way out is the shortest, that towards the start is taken */
-    assert_true(bst_exclusion_path(&zone, 1, at(0, 80), at(0, 0), &path));
+    assert_true(bst_keep_out_path(&zone, 1, at(0, 80), at(0, 0), &path));
     bst_assert_close(path.length_rad, 50 * DEG, 1e-9);
-    assert_true(bst_exclusion_path(&zone, 1, at(0, 0), at(0, 80), &path)); /* start on the Sun */
+    assert_true(bst_keep_out_path(&zone, 1, at(0, 0), at(0, 80), &path)); /* start on the Sun */
     bst_assert_close(path.length_rad, 80 * DEG, 1e-9);
     /* nowhere to go */
-    bst_zone all[2] = {cone(0, 0, 100), cone(180, 0, 100)};
-    assert_false(bst_exclusion_path(all, 2, at(0, 0), at(90, 0), &path));
+    bst_keep_out_zone all[2] = {cone(0, 0, 100), cone(180, 0, 100)};
+    assert_false(bst_keep_out_path(all, 2, at(0, 0), at(90, 0), &path));
     assert_int_equal(path.count, 0);
     /* a wall: two cones close a ring between start and goal */
-    bst_zone ring[4] = {cone(0, 0, 46), cone(90, 0, 46), cone(180, 0, 46), cone(270, 0, 46)};
-    assert_false(bst_exclusion_path(ring, 4, at(0, 90), at(0, -90), &path));
+    bst_keep_out_zone ring[4] = {cone(0, 0, 46), cone(90, 0, 46), cone(180, 0, 46),
+                                 cone(270, 0, 46)};
+    assert_false(bst_keep_out_path(ring, 4, at(0, 90), at(0, -90), &path));
 }
 
 /* Random cones and ends, against the shortest way over a grid of 2 degrees with moves of up to 3
@@ -222,13 +224,13 @@ static void draw(bst_rng_key key, uint64_t n, uint64_t what, double out[4]) {
     }
 }
 
-static double brute_force(const bst_zone *zones, int count, int from, int to) {
+static double brute_force(const bst_keep_out_zone *zones, int count, int from, int to) {
     double depth;
     for (int y = 0; y < GY; y++) {
         for (int x = 0; x < GX; x++) {
             grid_place[y * GX + x] = cell_place(y * GX + x);
             grid_free[y * GX + x] =
-                bst_exclusion_inside(zones, count, grid_place[y * GX + x], &depth) < 0;
+                bst_keep_out_inside(zones, count, grid_place[y * GX + x], &depth) < 0;
             grid_cost[y * GX + x] = INFINITY;
         }
     }
@@ -269,7 +271,7 @@ static void against_brute_force(void **state) {
     double worst = 0.0, least = INFINITY;
     for (uint64_t n = 0; compared < 12; n++) {
         double u[4], v[4];
-        bst_zone zones[3];
+        bst_keep_out_zone zones[3];
         int count = 1 + (int)(n % 3);
         for (int i = 0; i < count; i++) {
             draw(key, n, (uint64_t)i, u);
@@ -281,12 +283,12 @@ static void against_brute_force(void **state) {
         int to = (int)(20 + 50 * v[2]) * GX + (int)(GX * v[3]);
         bst_vec3 a = cell_place(from), b = cell_place(to);
         double depth;
-        bst_path path;
-        if (bst_exclusion_inside(zones, count, a, &depth) >= 0 ||
-            bst_exclusion_inside(zones, count, b, &depth) >= 0 || bst_vec3_angle(a, b) < 0.7) {
+        bst_keep_out_route path;
+        if (bst_keep_out_inside(zones, count, a, &depth) >= 0 ||
+            bst_keep_out_inside(zones, count, b, &depth) >= 0 || bst_vec3_angle(a, b) < 0.7) {
             continue;
         }
-        bool found = bst_exclusion_path(zones, count, a, b, &path);
+        bool found = bst_keep_out_path(zones, count, a, b, &path);
         if (found && path.count == 1) {
             continue; /* straight */
         }

@@ -21,8 +21,8 @@ static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, boo
     return BST_OK;
 }
 
-static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out) {
-    *out = (bst_cue){.sigma_rad = 1e-3};
+static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_onboard_cue *out) {
+    *out = (bst_onboard_cue){.sigma_rad = 1e-3};
     out->rate_gcrf_radps =
         bst_vec3_scale(bst_vec3_sub(sight(seconds + 0.01), sight(seconds - 0.01)), 0.5 / 0.01);
     return cue_direction_at(user, ctx, seconds, &out->valid, &out->direction_gcrf);

@@ -9,20 +9,20 @@
 #define PX (3.0 * BST_ARCSEC_RAD)
 
 /* A cue that moves along a great circle at 50 arcsec/s. */
-static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out) {
+static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_onboard_cue *out) {
     (void)ctx;
     double rate = 50.0 * BST_ARCSEC_RAD, a = rate * seconds;
-    *out = (bst_cue){.valid = *(bool *)user,
-                     .direction_gcrf = {cos(a), sin(a), 0.0},
-                     .rate_gcrf_radps = {-rate * sin(a), rate * cos(a), 0.0},
-                     .sigma_rad = 0.3 * BST_DEG_RAD,
-                     .rate_sigma_radps = 0.3 * BST_ARCSEC_RAD};
+    *out = (bst_onboard_cue){.valid = *(bool *)user,
+                             .direction_gcrf = {cos(a), sin(a), 0.0},
+                             .rate_gcrf_radps = {-rate * sin(a), rate * cos(a), 0.0},
+                             .sigma_rad = 0.3 * BST_DEG_RAD,
+                             .rate_sigma_radps = 0.3 * BST_ARCSEC_RAD};
     return BST_OK;
 }
 
 static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, bool *valid,
                                    bst_vec3 *direction) {
-    bst_cue cue;
+    bst_onboard_cue cue;
     BST_TRY(cue_at(user, ctx, seconds, &cue));
     *valid = cue.valid;
     *direction = cue.direction_gcrf;
@@ -93,7 +93,7 @@ static void step(rig *r, int64_t tick, bool frame) {
 
 static void put_track(rig *r, int64_t id, int hits, double off_px, double rate_off_arcsec,
                       int64_t mid_tick) {
-    bst_cue cue;
+    bst_onboard_cue cue;
     bst_assert_ok(&r->ctx, cue_at(&(bool){true}, &r->ctx, (double)mid_tick / TICKS, &cue));
     bst_track *t = &r->tracks->items[r->tracks->count++];
     *t = (bst_track){.id = id, .hits = hits, .score = 20.0};
@@ -256,7 +256,7 @@ static void open_loop_strategies(void **state) {
     config.strategy = BST_CONTROL_STARE;
     config.stare_time_s = 100.0;
     rig_open(&r, &config, true);
-    bst_cue cue;
+    bst_onboard_cue cue;
     bst_assert_ok(&ctx, cue_at(&r.cue_valid, &ctx, 100.0, &cue));
     for (int64_t t = 0; t < 5000; t += 500) {
         step(&r, t, false);

@@ -111,36 +111,36 @@ static void wrap_that_serves(void **state) {
     bst_vec3 pass[N];
     bst_mount_status m = azimuth_elevation();
     m.axis[1].max_rad = 90 * DEG; /* not over the top */
-    bst_wrap_choice c;
+    bst_mount_turn_choice c;
     /* a pass from azimuth 170 through 180 to 400, with the mount at 175: on, without unwinding */
     for (int k = 0; k < N; k++) {
         pass[k] = azel(170 + 230.0 * k / (N - 1), 30);
     }
     m.axis[0].angle_rad = 175 * DEG;
-    assert_true(bst_wrap_choose(&m, pass, N, &c));
+    assert_true(bst_mount_choose_turn(&m, pass, N, &c));
     assert_int_equal(c.serves, N);
     bst_assert_close(c.angle_rad[0], 170 * DEG, 1e-12);
     /* at 500 the nearest turn, 530, would end at 760: beyond the cable's 540. 170 serves all */
     m.axis[0].angle_rad = 500 * DEG;
-    assert_true(bst_wrap_choose(&m, pass, N, &c));
+    assert_true(bst_mount_choose_turn(&m, pass, N, &c));
     assert_int_equal(c.serves, N);
     bst_assert_close(c.angle_rad[0], 170 * DEG, 1e-12);
     bst_assert_close(c.slew_s, 330.0 / 2.0, 1e-9);
     /* nothing to come: the nearest turn */
-    assert_true(bst_wrap_choose(&m, pass, 1, &c));
+    assert_true(bst_mount_choose_turn(&m, pass, 1, &c));
     bst_assert_close(c.angle_rad[0], 530 * DEG, 1e-12);
     /* travel of less than the pass: the turn that holds out longest, and for how long is said */
     m.axis[0].min_rad = -100 * DEG;
     m.axis[0].max_rad = 200 * DEG;
     m.axis[0].angle_rad = 0.0;
-    assert_true(bst_wrap_choose(&m, pass, N, &c));
+    assert_true(bst_mount_choose_turn(&m, pass, N, &c));
     assert_true(c.serves < N && c.serves > 30);
     bst_assert_close(c.angle_rad[0], 170 * DEG, 1e-12);
     /* outside of travel for good */
     for (int k = 0; k < N; k++) {
         pass[k] = azel(k, -60);
     }
-    assert_false(bst_wrap_choose(&m, pass, N, &c));
+    assert_false(bst_mount_choose_turn(&m, pass, N, &c));
     /* endless outer axis: one turn, and its encoder's wrap changes nothing */
     m = cross_elevation();
     for (int k = 0; k < N; k++) {
@@ -148,7 +148,7 @@ static void wrap_that_serves(void **state) {
         pass[k] = (bst_vec3){sin(o), 0, cos(o)};
     }
     m.axis[0].angle_rad = -179 * DEG;
-    assert_true(bst_wrap_choose(&m, pass, N, &c));
+    assert_true(bst_mount_choose_turn(&m, pass, N, &c));
     assert_int_equal(c.serves, N);
     bst_assert_close(c.angle_rad[0], -190 * DEG, 1e-12);
     bst_assert_close(c.slew_s, 5.5, 1e-9);
@@ -165,8 +165,8 @@ static void over_the_zenith(void **state) {
         pass[k] = (bst_vec3){cos(e), 0, sin(e)};
     }
     bst_mount_status m = azimuth_elevation();
-    bst_wrap_choice c;
-    assert_true(bst_wrap_choose(&m, pass, N, &c));
+    bst_mount_turn_choice c;
+    assert_true(bst_mount_choose_turn(&m, pass, N, &c));
     assert_int_equal(c.serves, N);
     double near[BST_MOUNT_AXES], a[2][BST_MOUNT_AXES];
     for (int i = 0; i < BST_MOUNT_AXES; i++) {

@@ -21,7 +21,7 @@ static const bst_axis_spec spec = {.rate_limit_radps = 2 * BST_DEG_RAD,
 
 static double step_of[RESPONSE], lag_of[RESPONSE];
 
-static bst_servo_response default_servo(void) {
+static bst_control_servo_response default_servo(void) {
     bst_axis axis;
     bst_axis_init(&axis, &spec);
     for (int n = 0; n < RESPONSE; n++) {
@@ -33,7 +33,8 @@ static bst_servo_response default_servo(void) {
         bst_axis_step(&axis, TINY * n * DT, TINY, 0.0);
         lag_of[n] = n * DT - axis.angle_rad / TINY;
     }
-    return (bst_servo_response){.dt_s = DT, .count = RESPONSE, .step = step_of, .ramp_lag = lag_of};
+    return (bst_control_servo_response){
+        .dt_s = DT, .count = RESPONSE, .step = step_of, .ramp_lag = lag_of};
 }
 
 /* As a scenario leaves them. */
@@ -45,7 +46,8 @@ static bst_control_config defaults(void) {
 }
 
 static bst_loop_margins margins_of(const bst_control_config *config, double period, double exposure,
-                                   double latency, const bst_servo_response *servo, bool *lowered) {
+                                   double latency, const bst_control_servo_response *servo,
+                                   bool *lowered) {
     bst_ctx ctx = {0};
     const bst_image_loop_env env = {.tick_rate_hz = 1000.0,
                                     .frame_period_s = period,
@@ -77,7 +79,7 @@ static bst_loop_margins margins_of(const bst_control_config *config, double peri
 
 static void test_default_margins(void **state) {
     (void)state;
-    const bst_servo_response servo = default_servo();
+    const bst_control_servo_response servo = default_servo();
     const bst_control_config config = defaults();
     static const double periods[] = {0.2, 1.0, 5.0};
     static const double latencies[] = {0.1, 0.5, 0.8, 1.3, 10.0};
@@ -105,7 +107,7 @@ static void test_default_margins(void **state) {
 
 static void test_as_asked(void **state) {
     (void)state;
-    const bst_servo_response servo = default_servo();
+    const bst_control_servo_response servo = default_servo();
     bst_control_config config = defaults();
     config.robust_observer = false;
     bool lowered;

@@ -36,18 +36,18 @@ static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, boo
     return BST_OK;
 }
 
-static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out) {
+static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_onboard_cue *out) {
     bool valid;
     bst_vec3 d;
     BST_TRY(cue_direction_at(user, ctx, seconds, &valid, &d));
     double rate = 50.0 * BST_ARCSEC_RAD;
-    *out = (bst_cue){.valid = valid,
-                     .direction_gcrf = d,
-                     .rate_gcrf_radps = {-rate * d.y, rate * d.x, 0.0},
-                     .sigma_rad = 0.3 * BST_DEG_RAD,
-                     .rate_sigma_radps = 0.3 * BST_ARCSEC_RAD,
-                     .v_mag = 13.0,
-                     .v_mag_sigma = 0.5};
+    *out = (bst_onboard_cue){.valid = valid,
+                             .direction_gcrf = d,
+                             .rate_gcrf_radps = {-rate * d.y, rate * d.x, 0.0},
+                             .sigma_rad = 0.3 * BST_DEG_RAD,
+                             .rate_sigma_radps = 0.3 * BST_ARCSEC_RAD,
+                             .v_mag = 13.0,
+                             .v_mag_sigma = 0.5};
     return BST_OK;
 }
 
@@ -346,7 +346,7 @@ static void coasting_follows_the_prediction(void **state) {
         bst_control_config config = defaults();
         rig_open(&r, &config, BST_REGION_NONE);
         int64_t t = 0;
-        bst_cue cue;
+        bst_onboard_cue cue;
         for (; t < 3000; t += 50) {
             step(&r, t, false);
         }
@@ -407,7 +407,7 @@ static void a_cue_that_jumps_is_followed(void **state) {
     step(&r, 5000, false);
     assert_int_equal(r.status.mode, BST_MODE_SLEW);
     assert_int_equal(r.control.transition_count, 1);
-    bst_cue cue;
+    bst_onboard_cue cue;
     bst_assert_ok(&r.ctx, cue_at(&r, &r.ctx, 5.0, &cue));
     assert_true(bst_vec3_angle(r.command.direction_gcrf, cue.direction_gcrf) < 1e-9);
     for (int64_t t = 5050; t < 6000; t += 50) {

@@ -21,15 +21,16 @@ static bst_vec3 direction_at(const pass *p, double seconds) {
     return bst_vec3_unit(bst_vec3_axpy(near, RATE * (seconds - CLOSEST_S), (bst_vec3){0, 0, -1}));
 }
 
-static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+static bst_status look(void *user, bst_ctx *ctx, double seconds,
+                       bst_pointing_feasibility_look *out) {
     pass *p = user;
     (void)ctx;
     p->calls++;
-    *out = (bst_reach_look){.valid = seconds < 1000.0,
-                            .direction_gcrf = direction_at(p, seconds),
-                            .range_m = 1e6,
-                            .position_m = {0, 0, 7000e3},
-                            .q_body_from_gcrf = BST_QUAT_IDENTITY};
+    *out = (bst_pointing_feasibility_look){.valid = seconds < 1000.0,
+                                           .direction_gcrf = direction_at(p, seconds),
+                                           .range_m = 1e6,
+                                           .position_m = {0, 0, 7000e3},
+                                           .q_body_from_gcrf = BST_QUAT_IDENTITY};
     if (p->height_m > 0.0) {
         /* a body that goes round behind the Earth: down at 1 deg/s from the zenith */
         double a = 1 * DEG * seconds;
@@ -37,7 +38,7 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look 
         out->range_m = p->height_m;
     }
     if (p->sun_rad > 0.0) {
-        out->zones[out->zone_count++] = (bst_zone){BST_ZONE_SUN, p->sun, p->sun_rad};
+        out->zones[out->zone_count++] = (bst_keep_out_zone){BST_ZONE_SUN, p->sun, p->sun_rad};
     }
     return BST_OK;
 }
@@ -58,74 +59,76 @@ static bst_mount_status mount_of(double rate_degps, double accel_degps2) {
 static void reasons_and_times(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_reach reach, why;
+    bst_pointing_feasibility reach, why;
     bool found;
     double when;
     /* in the Sun's cone of 20 degrees, its axis on the pass: out where the pass is 20 degrees on */
     pass p = {.miss_rad = 60 * DEG, .sun_rad = 20 * DEG};
     p.sun = direction_at(&p, CLOSEST_S);
-    bst_reach_problem problem = {.look = look, .user = &p, .limits_share = 1.0};
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, CLOSEST_S, &reach));
+    bst_pointing_feasibility_problem problem = {.look = look, .user = &p, .limits_share = 1.0};
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_SUN); /* cue and Sun parallel */
-    bst_assert_ok(&ctx,
-                  bst_reach_next(&ctx, &problem, CLOSEST_S, 100.0, 1.0, true, &found, &when, &why));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, CLOSEST_S, 100.0, 1.0, true,
+                                                      &found, &when, &why));
     assert_true(found);
     bst_assert_close(when, CLOSEST_S + tan(20 * DEG) / RATE, 0.01); /* what it is found to */
-    bst_assert_ok(&ctx,
-                  bst_reach_next(&ctx, &problem, 0.0, 200.0, 1.0, false, &found, &when, &why));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, 0.0, 200.0, 1.0, false,
+                                                      &found, &when, &why));
     assert_true(found && why == BST_REACH_SUN);
     bst_assert_close(when, CLOSEST_S - tan(20 * DEG) / RATE, 0.01);
     /* and never, within a horizon that ends before */
-    bst_assert_ok(&ctx,
-                  bst_reach_next(&ctx, &problem, CLOSEST_S, 9.0, 1.0, true, &found, &when, NULL));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, CLOSEST_S, 9.0, 1.0, true,
+                                                      &found, &when, NULL));
     assert_false(found);
     /* the cue ends */
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, 1000.0, &reach));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, 1000.0, &reach));
     assert_int_equal(reach, BST_REACH_NO_CUE);
     /* behind the Earth: nadir angle below asin(6378.137 / 7000), from 180 - 65.7 degrees on, when
      * farther than the limb; in front of it when nearer */
     p = (pass){.height_m = 1e7};
-    bst_assert_ok(&ctx,
-                  bst_reach_next(&ctx, &problem, 0.0, 300.0, 5.0, false, &found, &when, &why));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, 0.0, 300.0, 5.0, false,
+                                                      &found, &when, &why));
     assert_true(found && why == BST_REACH_BEHIND_EARTH);
     bst_assert_close(when, 180.0 - asin(BST_EARTH_RADIUS_M / 7000e3) / DEG, 0.01);
-    bst_assert_ok(&ctx,
-                  bst_reach_next(&ctx, &problem, when, 300.0, 5.0, true, &found, &when, &why));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, when, 300.0, 5.0, true,
+                                                      &found, &when, &why));
     assert_true(found);
     bst_assert_close(when, 180.0 + asin(BST_EARTH_RADIUS_M / 7000e3) / DEG, 0.01);
     p.height_m = 300e3;
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, 180.0, &reach));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, 180.0, &reach));
     assert_int_equal(reach, BST_REACH_OK);
-    assert_string_equal(bst_reach_reason(BST_REACH_SUN), "in the keep-out cone of the Sun");
-    assert_string_equal(bst_reach_reason(99), "unknown");
+    assert_string_equal(bst_pointing_feasibility_reason(BST_REACH_SUN),
+                        "in the keep-out cone of the Sun");
+    assert_string_equal(bst_pointing_feasibility_reason(99), "unknown");
 }
 
 static void limits_of_the_mount(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_reach reach;
+    bst_pointing_feasibility reach;
     bst_mount_status mount = mount_of(5, 5);
     pass p = {.miss_rad = 60 * DEG};
-    bst_reach_problem problem = {.look = look, .user = &p, .mount = &mount, .limits_share = 1.0};
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, CLOSEST_S, &reach));
+    bst_pointing_feasibility_problem problem = {
+        .look = look, .user = &p, .mount = &mount, .limits_share = 1.0};
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_OK);
     mount = mount_of(1.5, 5);
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, CLOSEST_S, &reach));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_RATE);
     mount = mount_of(5, 0.01);
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, CLOSEST_S + 10, &reach));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S + 10, &reach));
     assert_int_equal(reach, BST_REACH_ACCEL);
     mount = mount_of(5, 5);
     p.miss_rad = 10 * DEG; /* outer rate 2 / sin 10 = 11.5 deg/s */
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, CLOSEST_S, &reach));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_KEYHOLE);
     mount.axis[1].min_rad = -70 * DEG;
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, CLOSEST_S, &reach));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_TRAVEL);
     /* exactly zero rate */
     p.height_m = 1e-300;
     mount = mount_of(5, 5);
-    bst_assert_ok(&ctx, bst_reach_at(&ctx, &problem, 0.0, &reach));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, 0.0, &reach));
     assert_int_equal(reach, BST_REACH_OK);
 }
 
@@ -139,23 +142,23 @@ static void keyholes_as_simulated(void **state) {
         bst_ctx ctx = {0};
         bst_mount_status mount = mount_of(5, 5);
         pass p = {.miss_rad = misses_deg[k] * DEG};
-        bst_reach_problem problem = {
+        bst_pointing_feasibility_problem problem = {
             .look = look, .user = &p, .mount = &mount, .limits_share = 0.95};
-        bst_reach_loss losses[4];
+        bst_pointing_feasibility_loss losses[4];
         int count;
-        bst_assert_ok(&ctx,
-                      bst_reach_chase(&ctx, &problem, 40.0, 160.0, tolerance, losses, 4, &count));
+        bst_assert_ok(&ctx, bst_pointing_feasibility_chase(&ctx, &problem, 40.0, 160.0, tolerance,
+                                                           losses, 4, &count));
         assert_int_equal(count, 1);
 
-        bst_two_axis_config config;
+        bst_mount_two_axis_config config;
         bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_two_axis_config_table, &config));
         config.rate_limit_degps = 5;
         config.accel_limit_degps2 = 5;
         config.encoder_noise_arcsec = 0;
-        bst_two_axis plant;
-        bst_two_axis_keys keys = {0};
-        bst_assert_ok(
-            &ctx, bst_two_axis_init(&ctx, &plant, &config, BST_QUAT_IDENTITY, 1e-5, 1e-3, &keys));
+        bst_mount_two_axis plant;
+        bst_mount_two_axis_keys keys = {0};
+        bst_assert_ok(&ctx, bst_mount_two_axis_init(&ctx, &plant, &config, BST_QUAT_IDENTITY, 1e-5,
+                                                    1e-3, &keys));
         double from = INFINITY, until = -INFINITY;
         bst_los_command command = {0};
         for (int64_t n = 0; n < 160000; n++) {
@@ -167,7 +170,7 @@ static void keyholes_as_simulated(void **state) {
                 command.accel_gcrf_radps2 = bst_vec3_scale(
                     bst_vec3_axpy(bst_vec3_add(up, down), -2.0, command.direction_gcrf), 1e6);
             }
-            bst_two_axis_step(&plant, &command, (double)(n % 50) * 1e-3, false);
+            bst_mount_two_axis_step(&plant, &command, (double)(n % 50) * 1e-3, false);
             bst_vec3 boresight =
                 bst_quat_rotate(bst_quat_conj(plant.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
             /* the slew to the start is over by then */
@@ -190,10 +193,12 @@ static void keyholes_as_simulated(void **state) {
     bst_ctx ctx = {0};
     bst_mount_status mount = mount_of(5, 5);
     pass p = {.miss_rad = 40 * DEG};
-    bst_reach_problem problem = {.look = look, .user = &p, .mount = &mount, .limits_share = 0.95};
-    bst_reach_loss losses[4];
+    bst_pointing_feasibility_problem problem = {
+        .look = look, .user = &p, .mount = &mount, .limits_share = 0.95};
+    bst_pointing_feasibility_loss losses[4];
     int count;
-    bst_assert_ok(&ctx, bst_reach_chase(&ctx, &problem, 40.0, 160.0, tolerance, losses, 4, &count));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_chase(&ctx, &problem, 40.0, 160.0, tolerance,
+                                                       losses, 4, &count));
     assert_int_equal(count, 0);
 }
 

@@ -58,7 +58,7 @@ static void start(fixture *f, const char *config) {
 
 /* Tells a sensor where it is. */
 static void tell_place(fixture *f, int sensor, double seconds) {
-    bst_state eye;
+    bst_world_state eye;
     bst_bodies bodies;
     bst_assert_ok(&f->ctx, bst_knowledge_eye_at(&f->ctx, f->tasking.sensors[sensor].view, seconds,
                                                 &eye, &bodies));
@@ -93,22 +93,22 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
           "{\"targets\": [{}], \"min_snr\": 0, \"max_rate_arcsec_per_s\": 1e6, "
           "\"sun_keep_out_deg\": 90, \"moon_keep_out_deg\": 0, "
           "\"earth_limb_keep_out_deg\": 8, \"earth_limb_altitude_km\": 100}");
-    bst_view *view;
-    bst_assert_ok(&f.ctx, bst_view_create(&f.ctx, f.world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&f.ctx, bst_world_view_create(&f.ctx, f.world, &view));
     int seen[BST_WHY_COUNT] = {0};
     for (double t = 0.0; t < 12000.0; t += 60.0) {
         for (int object = GX5; object <= GPS; object++) {
             bst_tasking_why why = BST_WHY_COUNT, expected = BST_WHY_NOT;
-            bst_sight sight;
+            bst_world_sight sight;
             double snr;
             bst_assert_ok(&f.ctx,
                           bst_tasking_look(&f.ctx, &f.tasking, 0, object, t, &why, &sight, &snr));
             seen[why]++;
-            bst_state eye, target;
+            bst_world_state eye, target;
             bst_bodies bodies;
-            bst_assert_ok(&f.ctx, bst_view_observer_state(&f.ctx, view, 0, t, &eye));
-            bst_assert_ok(&f.ctx, bst_view_object_state(&f.ctx, view, object, t, &target));
-            bst_assert_ok(&f.ctx, bst_view_bodies(&f.ctx, view, t, &bodies));
+            bst_assert_ok(&f.ctx, bst_world_view_observer_state(&f.ctx, view, 0, t, &eye));
+            bst_assert_ok(&f.ctx, bst_world_view_object_state(&f.ctx, view, object, t, &target));
+            bst_assert_ok(&f.ctx, bst_world_view_bodies(&f.ctx, view, t, &bodies));
             bst_vec3 to = bst_vec3_sub(target.position_m, eye.position_m);
             double limb = asin((6378137.0 + 1e5) / bst_vec3_norm(eye.position_m));
             double nadir = bst_vec3_angle(to, bst_vec3_scale(eye.position_m, -1.0));
@@ -122,7 +122,7 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
             if (expected == BST_WHY_NOT) {
                 assert_true(why == BST_WHY_NOT || why == BST_WHY_SHADOW);
                 double lit =
-                    bst_sun_fraction(target.position_m, bodies.sun_m, BST_EARTH_POLE_J2000);
+                    bst_astro_sun_fraction(target.position_m, bodies.sun_m, BST_EARTH_POLE_J2000);
                 assert_true(why == BST_WHY_SHADOW ? lit < 0.6 : lit > 0.4);
             } else {
                 assert_int_equal(why, expected);
@@ -135,7 +135,7 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
     bst_assert_ok(&f.ctx,
                   bst_tasking_look(&f.ctx, &f.tasking, 0, NEOSSAT_OBJECT, 0.0, &why, NULL, &snr));
     assert_int_equal(why, BST_WHY_ITSELF);
-    bst_view_free(view);
+    bst_world_view_free(view);
     tear_down(&f);
 }
 
@@ -174,7 +174,7 @@ static void noise_and_snr_are_the_cameras(void **state) {
     bst_assert_close(f.tasking.sensors[0].noise_e, sqrt(noise2), 1e-9); /* rounding */
     bst_assert_close(f.tasking.sensors[0].pixels, pixels, 1e-9);
     bst_tasking_why why;
-    bst_sight sight;
+    bst_world_sight sight;
     double snr;
     bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, &sight, &snr));
     assert_int_equal(why, BST_WHY_NOT);
@@ -191,13 +191,13 @@ static void the_rate_is_that_of_the_line_of_sight(void **state) {
     start(&f,
           "{\"targets\": [{}], \"min_snr\": 0, \"sun_keep_out_deg\": 0, \"moon_keep_out_deg\": 0, "
           "\"earth_limb_keep_out_deg\": 0}");
-    bst_view *view;
-    bst_assert_ok(&f.ctx, bst_view_create(&f.ctx, f.world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&f.ctx, bst_world_view_create(&f.ctx, f.world, &view));
     bst_vec3 to[2];
     for (int k = 0; k < 2; k++) {
-        bst_state eye, target;
-        bst_assert_ok(&f.ctx, bst_view_observer_state(&f.ctx, view, 0, k, &eye));
-        bst_assert_ok(&f.ctx, bst_view_object_state(&f.ctx, view, GX5, k, &target));
+        bst_world_state eye, target;
+        bst_assert_ok(&f.ctx, bst_world_view_observer_state(&f.ctx, view, 0, k, &eye));
+        bst_assert_ok(&f.ctx, bst_world_view_object_state(&f.ctx, view, GX5, k, &target));
         to[k] = bst_vec3_sub(target.position_m, eye.position_m);
     }
     double rate = bst_vec3_angle(to[0], to[1]) / BST_ARCSEC_RAD, snr;
@@ -209,7 +209,7 @@ static void the_rate_is_that_of_the_line_of_sight(void **state) {
         bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
         assert_int_equal(why, slower ? BST_WHY_RATE : BST_WHY_NOT);
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     tear_down(&f);
 }
 
@@ -224,7 +224,7 @@ static void the_body_turns_on_after_its_telemetry(void **state) {
     const bst_vec3 rates[3] = {{0.02, 0, 0}, {0, 0.02, 0}, {-0.01, 0.02, 0.01}};
     for (int k = 0; k < 3; k++) {
         bst_tasking_why why;
-        bst_sight sight;
+        bst_world_sight sight;
         double snr;
         f.tasking.sensors[0].mount_known = false;
         bst_assert_ok(&f.ctx,
@@ -260,7 +260,7 @@ static void the_body_turns_on_after_its_telemetry(void **state) {
     /* nine tenths of an axis' rate may be used: the camera's x along the target's motion, so that
      * one axis makes all of it, the body at rest */
     bst_tasking_why why;
-    bst_sight now, later;
+    bst_world_sight now, later;
     double snr;
     bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, &now, &snr));
     bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 1.0, &why, &later, &snr));

@@ -56,7 +56,7 @@ static const bst_module_desc watcher_module = {.abi = BST_MODULE_ABI,
                                                .destroy = watcher_destroy};
 static const bst_module_desc *const modules[] = {&bst_gimbal_ideal_module, &watcher_module,
                                                  &bst_tasking_priority_module};
-static const bst_registry registry = {.modules = modules, .count = 3};
+static const bst_scenario_registry registry = {.modules = modules, .count = 3};
 
 enum { KEPT = 16 };
 

@@ -23,7 +23,7 @@ typedef struct responses {
     double step[RESPONSE], lag[RESPONSE];
 } responses;
 
-static bst_servo_response servo_of(responses *r) {
+static bst_control_servo_response servo_of(responses *r) {
     bst_axis axis;
     bst_axis_init(&axis, &spec);
     for (int n = 0; n < RESPONSE; n++) {
@@ -35,10 +35,11 @@ static bst_servo_response servo_of(responses *r) {
         bst_axis_step(&axis, TINY * n * DT, TINY, 0.0);
         r->lag[n] = n * DT - axis.angle_rad / TINY;
     }
-    return (bst_servo_response){.dt_s = DT, .count = RESPONSE, .step = r->step, .ramp_lag = r->lag};
+    return (bst_control_servo_response){
+        .dt_s = DT, .count = RESPONSE, .step = r->step, .ramp_lag = r->lag};
 }
 
-static bst_compensator pi_with(double crossover_hz, const bst_servo_response *servo,
+static bst_compensator pi_with(double crossover_hz, const bst_control_servo_response *servo,
                                double gain_scale, double delay_s) {
     bst_ctx ctx = {0};
     bst_tracking_loop *plant;
@@ -152,7 +153,7 @@ static void test_rejection(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     responses r;
-    bst_servo_response servo = servo_of(&r);
+    bst_control_servo_response servo = servo_of(&r);
     bst_compensator c = pi_with(0.4, &servo, 1.0, 0.0);
     const bst_tracking_observer gains = {0.5, 0.2, 1.0, 0.0};
     bst_tracking_loop *image, *observer;
@@ -178,7 +179,7 @@ static void test_margins(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     responses r;
-    bst_servo_response servo = servo_of(&r);
+    bst_control_servo_response servo = servo_of(&r);
     bst_compensator c = pi_with(0.4, &servo, 1.0, 0.0);
     bst_tracking_loop *loop;
     bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, &c, NULL, &loop));
@@ -216,7 +217,7 @@ static void test_observer_margins(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     responses r;
-    bst_servo_response servo = servo_of(&r);
+    bst_control_servo_response servo = servo_of(&r);
     static const double latency_periods[] = {0.1, 0.4, 0.7, 1.0, 1.3, 2.5, 5.0, 10.0};
     for (size_t i = 0; i < sizeof latency_periods / sizeof *latency_periods; i++) {
         double arrival = 0.03 + 0.1 * latency_periods[i];
@@ -254,7 +255,7 @@ static void test_observer_margins(void **state) {
 static void test_variance(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_servo_response exact = {.delay_s = 0.0};
+    bst_control_servo_response exact = {.delay_s = 0.0};
     /* alpha = 1, beta = 0 holds the latest fix: the error is d at the middle less the mean of the
      * exposure n frames before, n = 3 for an effect 0.25 to 0.35 s after the middle */
     const bst_tracking_observer hold = {1.0, 0.0, 1.0, 0.0};

@@ -113,7 +113,7 @@ static void test_stage(void **state) {
         bst_assert_ok(&ctx,
                       bst_json_parse(&ctx, "f.json", cases[i].text, strlen(cases[i].text), &json));
         bst_status status =
-            bst_config_read_stages(&ctx, json, bst_json_root(json), "", staged_table, &loader, &s);
+            bst_stage_read_config(&ctx, json, bst_json_root(json), "", staged_table, &loader, &s);
         if (cases[i].message) {
             assert_int_equal(status, BST_ERR_CONFIG);
             assert_string_equal(ctx.message, cases[i].message);
@@ -140,8 +140,8 @@ static void test_stage(void **state) {
                                 "f.json: /plugin: no plug-in is loaded here (found "
                                 "\"x.so\"; allowed: one in a scenario's modules)");
             there = false;
-            bst_assert_ok(&ctx, bst_config_read_stages(&ctx, json, bst_json_root(json), "",
-                                                       staged_table, &loader, &s));
+            bst_assert_ok(&ctx, bst_stage_read_config(&ctx, json, bst_json_root(json), "",
+                                                      staged_table, &loader, &s));
             assert_null(s.plug.desc);
             there = true;
         }

@@ -51,9 +51,9 @@ static void build_errors_name_the_file(void **state) {
     bst_ctx ctx = {0};
     bst_device *device;
     bst_assert_ok(&ctx, bst_device_open(&ctx, "", 1, &device));
-    bst_kernel_source bad = {"bad_kernel.cl",
-                             "kernel void f(global int *a) {\n a[0] = nonsense;\n}\n", 0, 0};
-    const bst_kernel_source *sources[] = {&bst_kernel_philox_shared, &bad};
+    bst_device_kernel_source bad = {"bad_kernel.cl",
+                                    "kernel void f(global int *a) {\n a[0] = nonsense;\n}\n", 0, 0};
+    const bst_device_kernel_source *sources[] = {&bst_kernel_philox_shared, &bad};
     cl_program program;
     assert_int_equal(bst_device_build(&ctx, device, sources, 2, "", &program), BST_ERR_DEVICE);
     assert_null(program);
@@ -69,14 +69,15 @@ static void philox_is_the_same_on_the_device(void **state) {
     bst_ctx ctx = {0};
     bst_device *device;
     bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
-    bst_kernel_source text = {"words.cl",
-                              "kernel void words(global uint *out, uint k0, uint k1, uint a) {\n"
-                              "    uint i = (uint)get_global_id(0);\n"
-                              "    bst_philox_words r = bst_philox4x32(k0, k1, i, 0, a, 0);\n"
-                              "    for (int w = 0; w < 4; w++) out[4 * i + w] = r.w[w];\n"
-                              "}\n",
-                              0, 0};
-    const bst_kernel_source *sources[] = {&bst_kernel_philox_shared, &text};
+    bst_device_kernel_source text = {
+        "words.cl",
+        "kernel void words(global uint *out, uint k0, uint k1, uint a) {\n"
+        "    uint i = (uint)get_global_id(0);\n"
+        "    bst_philox_words r = bst_philox4x32(k0, k1, i, 0, a, 0);\n"
+        "    for (int w = 0; w < 4; w++) out[4 * i + w] = r.w[w];\n"
+        "}\n",
+        0, 0};
+    const bst_device_kernel_source *sources[] = {&bst_kernel_philox_shared, &text};
     cl_program program;
     bst_assert_ok(&ctx, bst_device_build(&ctx, device, sources, 2, "", &program));
     cl_int code;

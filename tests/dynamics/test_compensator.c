@@ -25,26 +25,27 @@ static void test_tustin(void **state) {
     (void)state;
     /* 1 / (1 + s T): b0 = b1 = h / (2 T + h), a1 = (h - 2 T) / (h + 2 T) */
     double t = 0.3, h = 0.01;
-    bst_biquad q = bst_biquad_tustin((double[]){1.0, 0.0, 0.0}, (double[]){1.0, t, 0.0}, h, 0.0);
+    bst_dynamics_biquad q =
+        bst_dynamics_biquad_tustin((double[]){1.0, 0.0, 0.0}, (double[]){1.0, t, 0.0}, h, 0.0);
     bst_assert_close(q.b0, h / (2 * t + h), ROUNDING);
     bst_assert_close(q.b1, h / (2 * t + h), ROUNDING);
     bst_assert_close(q.a1, (h - 2 * t) / (h + 2 * t), ROUNDING);
     assert_true(q.b2 == 0.0 && q.a2 == 0.0); /* no pole and zero at -1 that cancel */
-    q = bst_biquad_tustin((double[]){3.0, 0.0, 0.0}, (double[]){2.0, 0.0, 0.0}, h, 1.0);
+    q = bst_dynamics_biquad_tustin((double[]){3.0, 0.0, 0.0}, (double[]){2.0, 0.0, 0.0}, h, 1.0);
     bst_assert_close(q.b0, 1.5, ROUNDING);
     assert_true(q.b1 == 0.0 && q.a1 == 0.0);
     /* at every frequency the discrete response is the continuous one at k tan(w h / 2) */
     const double num[3] = {2.0, 0.3, 0.01}, den[3] = {5.0, 0.2, 0.04};
-    q = bst_biquad_tustin(num, den, h, 12.0);
+    q = bst_dynamics_biquad_tustin(num, den, h, 12.0);
     double k = 2 * BST_PI * 12.0 / tan(BST_PI * 12.0 * h);
     for (double hz = 0.1; hz < 50.0; hz *= 1.7) {
         double complex s = I * k * tan(BST_PI * hz * h);
         double complex continuous =
             (num[0] + s * (num[1] + s * num[2])) / (den[0] + s * (den[1] + s * den[2]));
-        assert_close(bst_biquad_response(&q, 2 * BST_PI * hz * h), continuous, ROUNDING);
+        assert_close(bst_dynamics_biquad_response(&q, 2 * BST_PI * hz * h), continuous, ROUNDING);
     }
     double complex s = I * 2 * BST_PI * 12.0; /* and exact where it was prewarped */
-    assert_close(bst_biquad_response(&q, 2 * BST_PI * 12.0 * h),
+    assert_close(bst_dynamics_biquad_response(&q, 2 * BST_PI * 12.0 * h),
                  (num[0] + s * (num[1] + s * num[2])) / (den[0] + s * (den[1] + s * den[2])),
                  ROUNDING);
 }
@@ -98,7 +99,7 @@ static double complex measured(bst_compensator *c, int period, int settle) {
 
 static void test_response(void **state) {
     (void)state;
-    bst_notch_config notches[2] = {{40.0, 0.0, 30.0}, {100.0, 20.0, 60.0}};
+    bst_dynamics_notch_config notches[2] = {{40.0, 0.0, 30.0}, {100.0, 20.0, 60.0}};
     bst_compensator_config config = plain(BST_COMPENSATOR_LEAD_LAG);
     config.gain = 3.0;
     config.lead_zero_hz = 4.0;
@@ -218,7 +219,7 @@ static void test_rate_limit(void **state) {
 
 static void test_bumpless(void **state) {
     (void)state;
-    bst_notch_config notch = {20.0, 0.0, 30.0};
+    bst_dynamics_notch_config notch = {20.0, 0.0, 30.0};
     bst_compensator_config config = plain(BST_COMPENSATOR_PID);
     config.proportional = 2.0;
     config.integral_per_s = 5.0;
@@ -271,7 +272,7 @@ static void test_limits(void **state) {
     assert_non_null(strstr(ctx.message, "not finite"));
 
     config = plain(BST_COMPENSATOR_PI);
-    bst_notch_config notch = {50.0, 0.0, 30.0};
+    bst_dynamics_notch_config notch = {50.0, 0.0, 30.0};
     config.notches = (bst_config_list){&notch, 1};
     assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.01, NULL, NULL), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "half of the compensator's rate of 100 Hz"));
@@ -406,7 +407,7 @@ static void test_refusals(void **state) {
             bst_ctx ctx = {0};
             bst_compensator c;
             double hz = beyond ? 50.0 : 49.9;
-            bst_notch_config notch = {hz, 1.0, 30.0};
+            bst_dynamics_notch_config notch = {hz, 1.0, 30.0};
             bst_compensator_config config =
                 plain(key == 5 ? BST_COMPENSATOR_LEAD_LAG : BST_COMPENSATOR_PI);
             config.proportional = config.gain = 1.0;

@@ -32,7 +32,7 @@ static double complex integrator(const void *user, double w) {
     return cexp(-I * w * ((const plant *)user)->delay_s) / (I * w);
 }
 
-static double complex loop_at(const bst_compensator *c, bst_response_fn fn, const plant *p,
+static double complex loop_at(const bst_compensator *c, bst_dynamics_response_fn fn, const plant *p,
                               double hz) {
     return bst_compensator_response(c, 2 * BST_PI * hz) * fn(p, 2 * BST_PI * hz);
 }
@@ -43,8 +43,8 @@ static double phase_margin_deg(double complex l) {
 }
 
 /* Scans for where the closed loop last leaves -3 dB, to 1e-5. */
-static double bandwidth(const bst_compensator *c, bst_response_fn fn, const plant *p, double from,
-                        double to) {
+static double bandwidth(const bst_compensator *c, bst_dynamics_response_fn fn, const plant *p,
+                        double from, double to) {
     double last = 0.0;
     for (double hz = from; hz < to; hz *= 1.00001) {
         double complex l = loop_at(c, fn, p, hz);
@@ -57,8 +57,8 @@ static double bandwidth(const bst_compensator *c, bst_response_fn fn, const plan
     return last;
 }
 
-static void check(int type, bst_response_fn fn, plant p, double crossover_hz, double margin_deg,
-                  bst_config_list notches) {
+static void check(int type, bst_dynamics_response_fn fn, plant p, double crossover_hz,
+                  double margin_deg, bst_config_list notches) {
     bst_ctx ctx = {0};
     bst_compensator_config config = {.type = type,
                                      .crossover_hz = crossover_hz,
@@ -94,7 +94,7 @@ static void test_meets(void **state) {
     check(BST_COMPENSATOR_PID, body, rigid, 25.0, 35.0, none);
     check(BST_COMPENSATOR_LEAD_LAG, body, rigid, 10.0, 50.0, none);
     check(BST_COMPENSATOR_LEAD_LAG, body, rigid, 0.1, 60.0, none);
-    bst_notch_config notch = {60.0, 40.0, 30.0};
+    bst_dynamics_notch_config notch = {60.0, 40.0, 30.0};
     plant flexible = rigid;
     flexible.mode_hz = 60.0;
     flexible.mode_damping = 0.005;

@@ -15,7 +15,7 @@ static void test_rk4_order(void **state) {
         int steps = 200 << k;
         double y[2] = {1.0, 0.0};
         for (int n = 0; n < steps; n++) {
-            bst_rk4_step(oscillator, &w, 2, 4.0 / steps, y);
+            bst_dynamics_rk4_step(oscillator, &w, 2, 4.0 / steps, y);
         }
         error[k] = hypot(y[0] - cos(12.0), y[1] / w + sin(12.0));
     }
@@ -33,7 +33,7 @@ static void test_matrix_exp_is_exact(void **state) {
         double t = steps[i];
         const double a[9] = {0, t, 0, -w * w * t, -2 * z * w * t, t, 0, 0, 0};
         double e[9];
-        bst_matrix_exp(3, a, e);
+        bst_dynamics_matrix_exp(3, a, e);
         double rest = force / (w * w), s = sin(damped * t), c = cos(damped * t),
                d = exp(-z * w * t);
         double x0 = 0.3, v0 = -1.0, x = x0 - rest;
@@ -56,7 +56,7 @@ static void test_eigen(void **state) {
             a[i * N + i - 1] = a[(i - 1) * N + i] = 1.0;
         }
     }
-    bst_symmetric_eigen(N, a, value, vector);
+    bst_dynamics_symmetric_eigen(N, a, value, vector);
     for (int k = 0; k < N; k++) {
         bst_assert_close(value[k], -2.0 + 2.0 * cos((N - k) * BST_PI / (N + 1)), 1e-14);
         for (int i = 0; i < N; i++) { /* A v = value v */
@@ -69,7 +69,7 @@ static void test_eigen(void **state) {
     }
     const double diagonal[9] = {3, 0, 0, 0, 1, 0, 0, 0, 2};
     double v3[9], e3[3];
-    bst_symmetric_eigen(3, diagonal, e3, v3);
+    bst_dynamics_symmetric_eigen(3, diagonal, e3, v3);
     bst_assert_close(e3[0], 1.0, 0.0);
     bst_vec3 x = {v3[0], v3[3], v3[6]}, y = {v3[1], v3[4], v3[7]}, z = {v3[2], v3[5], v3[8]};
     bst_assert_close(bst_vec3_dot(bst_vec3_cross(x, y), z), 1.0, 1e-15); /* right-handed */
@@ -78,15 +78,15 @@ static void test_eigen(void **state) {
 /* The splitting run back in time comes back: it is symmetric, to rounding of 2000 steps. */
 static void test_symmetric_in_time(void **state) {
     (void)state;
-    bst_free_body body = {{1.0, 0.5, 0.4}, {0.1, -0.2, 0.05}};
+    bst_dynamics_free_body body = {{1.0, 0.5, 0.4}, {0.1, -0.2, 0.05}};
     bst_quat q = bst_quat_unit((bst_quat){0.3, 0.1, -0.2, 0.9}), start = q;
     double pi[3] = {0.5, -0.3, 0.8};
     for (int n = 0; n < 1000; n++) {
-        bst_turn_free_body(&body, 0.05, &q, pi);
+        bst_dynamics_turn_free_body(&body, 0.05, &q, pi);
     }
     assert_true(fabs(q.w - start.w) > 0.01);
     for (int n = 0; n < 1000; n++) {
-        bst_turn_free_body(&body, -0.05, &q, pi);
+        bst_dynamics_turn_free_body(&body, -0.05, &q, pi);
     }
     bst_assert_close(q.w, start.w, 1e-12);
     bst_assert_close(q.x, start.x, 1e-12);
@@ -113,7 +113,7 @@ static void principal_axes_are_right_handed(void **state) {
                 a[i] += inertia[(k + turn) % 3] * e[i / 3] * e[i % 3];
             }
         }
-        bst_symmetric_eigen(3, a, value, v);
+        bst_dynamics_symmetric_eigen(3, a, value, v);
         bst_vec3 x = {v[0], v[3], v[6]}, y = {v[1], v[4], v[7]}, z = {v[2], v[5], v[8]};
         const bst_vec3 found[3] = {x, y, z};
         bst_assert_close(bst_vec3_dot(bst_vec3_cross(x, y), z), 1.0, 1e-14); /* rounding */

@@ -97,7 +97,7 @@ static void test_long_run(void **state) {
         snprintf(set, sizeof set, "/record/telemetry_hz=%s", length->telemetry_hz);
         bst_assert_ok(&ctx, bst_json_set(&ctx, json, set));
     }
-    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_app_registry(), &scenario));
+    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_registry_shipped(), &scenario));
     const bst_simulation_options options = {.threads = 1};
     bst_simulation *sim = NULL;
     bst_assert_ok(&ctx, bst_simulation_create(&ctx, &scenario, &options, &sim));

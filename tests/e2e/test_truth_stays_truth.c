@@ -168,12 +168,12 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
 static record run_with(const char *saboteur) {
     enum { MOST = 64 };
     const bst_module_desc *modules[MOST];
-    const bst_registry *shipped = bst_app_registry();
+    const bst_scenario_registry *shipped = bst_registry_shipped();
     assert_true(shipped->count + 2 <= MOST);
     memcpy(modules, shipped->modules, (size_t)shipped->count * sizeof *modules);
     modules[shipped->count] = &spoils_truth;
     modules[shipped->count + 1] = &spoils_detections;
-    const bst_registry registry = {.modules = modules, .count = shipped->count + 2};
+    const bst_scenario_registry registry = {.modules = modules, .count = shipped->count + 2};
 
     record r = {0};
     for (int i = 0; i < WATCHED; i++) {

@@ -66,7 +66,7 @@ static const bst_module_desc commander_module = {.abi = BST_MODULE_ABI,
                                                  .step = commander_step,
                                                  .destroy = commander_destroy};
 static const bst_module_desc *const modules[] = {&commander_module};
-static const bst_registry registry = {.modules = modules, .count = 1};
+static const bst_scenario_registry registry = {.modules = modules, .count = 1};
 
 typedef struct train {
     bst_exposure items[400];

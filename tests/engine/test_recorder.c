@@ -46,7 +46,7 @@ static const bst_camera camera = {.width_px = WIDTH,
                                   .gain_e_per_dn = 2.0,
                                   .bits = 16};
 
-static bst_recorder *make(bst_ctx *ctx, bst_run *run, const bst_record_config *config,
+static bst_recorder *make(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config,
                           int sensors) {
     const bst_recorder_sensor two[2] = {
         {.observer = "alpha", .sensor = "wide", .camera = &camera, .has_truth = true},
@@ -210,7 +210,7 @@ static void test_detections_of(void **state) {
     d->items[1] = (bst_detection){.label = BST_LABEL_OBJECT, .x_px = 2.0};
     d->items[2] = (bst_detection){.label = BST_LABEL_HOT_PIXEL};
     for (int choice = 0; choice <= BST_RECORD_OBJECTS; choice++) {
-        bst_record_config config;
+        bst_recorder_config config;
         bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_record_config_table, &config));
         assert_int_equal(config.detections_of, BST_RECORD_ALL_DETECTIONS);
         config.detections_of = choice;
@@ -237,7 +237,7 @@ static void test_tables(void **state) {
     scratch_make(&s);
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_record_config config;
+    bst_recorder_config config;
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_record_config_table, &config));
     assert_int_equal(config.frames, BST_RECORD_EXTENSIONS);
     bst_assert_close(config.telemetry_hz, 1.0, 0.0);
@@ -311,7 +311,7 @@ static void test_decimation(void **state) {
     scratch_make(&s);
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_record_config config;
+    bst_recorder_config config;
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_record_config_table, &config));
     config.telemetry_hz = 4.0;
     char out[600], db[640];
@@ -386,7 +386,7 @@ static void test_frames_meet_truth(void **state) {
     int warnings = 0;
     bst_ctx ctx;
     bst_ctx_init(&ctx, count_log, &warnings, BST_LOG_INFO);
-    bst_record_config config;
+    bst_recorder_config config;
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_record_config_table, &config));
     config.truth_stars = false;
     char out[600], db[640], file[640], text[80];
@@ -447,7 +447,7 @@ static void test_choices(void **state) {
     scratch_make(&s);
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_record_config config = {.frames = BST_RECORD_CUBE};
+    bst_recorder_config config = {.frames = BST_RECORD_CUBE};
     char out[600], db[640];
     snprintf(out, sizeof out, "%s/run", s.folder);
     snprintf(db, sizeof db, "%s/run.sqlite", out);

@@ -60,7 +60,7 @@ static const bst_module_desc gimbal_b = {
 static const bst_module_desc tracker = {
     .abi = BST_MODULE_ABI, .role = "tracker", .type = "ekf", .doc = "Tracker."};
 static const bst_module_desc *const modules[] = {&gimbal_a, &gimbal_b, &tracker};
-static const bst_registry registry = {.modules = modules, .count = 3};
+static const bst_scenario_registry registry = {.modules = modules, .count = 3};
 
 #define HEAD "\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300"
 #define ORBIT "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}"
@@ -193,7 +193,7 @@ static void modules_are_read(void **state) {
     assert_int_equal(s.duration_ticks, 1800000);
     assert_int_equal(s.seed, 1);
     assert_int_equal(s.module_count, 2);
-    const bst_module_config *t = &s.modules[0], *g = &s.modules[1];
+    const bst_scenario_module_config *t = &s.modules[0], *g = &s.modules[1];
     assert_string_equal(t->name, "tracker");
     assert_ptr_equal(t->desc, &tracker);
     assert_int_equal(t->period_ticks, 0);
@@ -309,7 +309,7 @@ static void plugins_can_be_left_out(void **state) {
     const char *text = SCENARIO(
         "\"gimbal\": {\"plugin\": \"none.so\", \"gain\": 3}, "
         "\"tracker\": {\"type\": \"ekf\"}");
-    bst_registry without = registry;
+    bst_scenario_registry without = registry;
     bst_json *json = NULL;
     bst_scenario s;
     bst_ctx ctx = {0};

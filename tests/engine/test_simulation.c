@@ -139,7 +139,7 @@ static const bst_module_desc camera_desc = MODULE("scenegen", camera_table, size
                                                .stands_for = stands_for};
 static const bst_module_desc *const modules[] = {&camera_desc,  &finder_desc, &tracker_desc,
                                                  &control_desc, &gimbal_desc, &generator_desc};
-static const bst_registry registry = {.modules = modules, .count = 6};
+static const bst_scenario_registry registry = {.modules = modules, .count = 6};
 
 #define ORBIT "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}"
 #define CAMERA(width, more)             \
@@ -171,7 +171,7 @@ static const char scenario_text[] =
     "\"period_s\": 1, \"first_s\": 0.1}, \"modules\": {" IMAGES LOOP(
         "", ", \"rate_hz\": 20, \"offset_s\": 0.01") "}}]}]}";
 
-static bst_status read_text(bst_ctx *ctx, const bst_registry *known, const char *text,
+static bst_status read_text(bst_ctx *ctx, const bst_scenario_registry *known, const char *text,
                             bst_scenario *scenario, bst_json **json) {
     bst_assert_ok(ctx, bst_json_parse(ctx, "scenarios/x.json", text, strlen(text), json));
     return bst_scenario_read(ctx, *json, known, scenario);
@@ -238,20 +238,20 @@ static void every_sensor_s_modules_know_their_own(void **state) {
     assert_string_equal(taken->word, "fifteen");
     bst_simulation_free(sim);
     for (int m = 0; m < scenario.module_count; m++) {
-        const bst_module_config *module = &scenario.modules[m];
+        const bst_scenario_module_config *module = &scenario.modules[m];
         if (strcmp(module->name, "obsgen") == 0 && module->sensor == 1) {
             /* what processing waits for the frame, it waits for the exposure */
             assert_int_equal(module->delay_count, 1);
             assert_int_equal(module->delays[0].port, 0);
             assert_int_equal(module->delays[0].ticks, 360);
-            assert_true(bst_stand_in_delayed(&scenario, module));
-            assert_true(bst_stand_in_taken(&scenario, module, "sigma"));
-            assert_true(bst_stand_in_taken(&scenario, module, "threshold"));
-            assert_false(bst_stand_in_taken(&scenario, module, "own"));
-            assert_false(bst_stand_in_taken(&scenario, module, "size"));
-            assert_false(bst_stand_in_taken(&scenario, module, "nothing"));
+            assert_true(bst_module_substitution_delayed(&scenario, module));
+            assert_true(bst_module_substitution_taken(&scenario, module, "sigma"));
+            assert_true(bst_module_substitution_taken(&scenario, module, "threshold"));
+            assert_false(bst_module_substitution_taken(&scenario, module, "own"));
+            assert_false(bst_module_substitution_taken(&scenario, module, "size"));
+            assert_false(bst_module_substitution_taken(&scenario, module, "nothing"));
         } else if (strcmp(module->name, "tracker") == 0) {
-            assert_false(bst_stand_in_delayed(&scenario, module));
+            assert_false(bst_module_substitution_delayed(&scenario, module));
         }
     }
     bst_scenario_free(&scenario);
@@ -310,7 +310,7 @@ static void what_is_said_twice(void **state) {
          5},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        const bst_registry known = {.modules = modules, .count = cases[i].known};
+        const bst_scenario_registry known = {.modules = modules, .count = cases[i].known};
         bst_ctx ctx = {0};
         bst_json *json;
         bst_scenario scenario;

@@ -31,10 +31,10 @@ static void tail_is_right_to_the_last_places(void **state) {
         {37, 5.72557122252457682e-300},
     };
     for (size_t i = 0; i < sizeof truth / sizeof *truth; i++) {
-        bst_assert_close(bst_normal_tail(truth[i].in) / truth[i].out, 1.0,
+        bst_assert_close(bst_eval_normal_tail(truth[i].in) / truth[i].out, 1.0,
                          (fabs(truth[i].in) > 30 ? 1e-13 : 12 * DBL_EPSILON));
     }
-    assert_true(bst_normal_tail(INFINITY) == 0.0 && bst_normal_tail(-INFINITY) == 1.0);
+    assert_true(bst_eval_normal_tail(INFINITY) == 0.0 && bst_eval_normal_tail(-INFINITY) == 1.0);
 }
 
 static void inverse_is_right_to_the_last_places(void **state) {
@@ -49,50 +49,54 @@ static void inverse_is_right_to_the_last_places(void **state) {
     };
     for (size_t i = 0; i < sizeof truth / sizeof *truth; i++) {
         /* beside the method's own rounding, that of 0.499999 as a double */
-        bst_assert_close(bst_normal_tail_inverse(truth[i].in) / truth[i].out, 1.0,
+        bst_assert_close(bst_eval_normal_tail_inverse(truth[i].in) / truth[i].out, 1.0,
                          truth[i].in > 0.49 ? 1e-11 : 6 * DBL_EPSILON);
         if (truth[i].in > 1e-3) {
             /* 1 - p rounds, by at most half a unit of 1 */
-            bst_assert_close(bst_normal_tail_inverse(1.0 - truth[i].in), -truth[i].out, 1e-13);
+            bst_assert_close(bst_eval_normal_tail_inverse(1.0 - truth[i].in), -truth[i].out, 1e-13);
         }
     }
-    assert_true(bst_normal_tail_inverse(0.5) == 0.0);
-    assert_true(isinf(bst_normal_tail_inverse(0.0)) && bst_normal_tail_inverse(0.0) > 0);
-    assert_true(isinf(bst_normal_tail_inverse(1.0)) && bst_normal_tail_inverse(1.0) < 0);
-    assert_true(isnan(bst_normal_tail_inverse(-0.1)) && isnan(bst_normal_tail_inverse(1.1)) &&
-                isnan(bst_normal_tail_inverse(NAN)));
-    assert_true(bst_normal_tail_inverse(DBL_TRUE_MIN) > 38.4 &&
-                bst_normal_tail_inverse(DBL_TRUE_MIN) < 38.5);
+    assert_true(bst_eval_normal_tail_inverse(0.5) == 0.0);
+    assert_true(isinf(bst_eval_normal_tail_inverse(0.0)) && bst_eval_normal_tail_inverse(0.0) > 0);
+    assert_true(isinf(bst_eval_normal_tail_inverse(1.0)) && bst_eval_normal_tail_inverse(1.0) < 0);
+    assert_true(isnan(bst_eval_normal_tail_inverse(-0.1)) &&
+                isnan(bst_eval_normal_tail_inverse(1.1)) &&
+                isnan(bst_eval_normal_tail_inverse(NAN)));
+    assert_true(bst_eval_normal_tail_inverse(DBL_TRUE_MIN) > 38.4 &&
+                bst_eval_normal_tail_inverse(DBL_TRUE_MIN) < 38.5);
     for (double tail = 0.9; tail > 1e-200; tail *= 0.93) {
-        double x = bst_normal_tail_inverse(tail);
+        double x = bst_eval_normal_tail_inverse(tail);
         /* Q has the condition number x^2 */
-        bst_assert_close(bst_normal_tail(x) / tail, 1.0, 4 * DBL_EPSILON * (4 + x * x));
+        bst_assert_close(bst_eval_normal_tail(x) / tail, 1.0, 4 * DBL_EPSILON * (4 + x * x));
     }
 }
 
 static void ideal_detector_is_neyman_pearsons(void **state) {
     (void)state;
     /* without a signal it is the false-alarm probability, at Q^-1(pfa) it is a half */
-    bst_assert_close(bst_ideal_pd(1e-6, 0.0) / 1e-6, 1.0, 1e-13); /* condition number 23 */
-    bst_assert_close(bst_ideal_pd(1e-3, 3.0902323061678135), 0.5, 1e-15);
-    bst_assert_close(bst_ideal_snr(0x1p-22, 0.5), 5.03540596946392715, 1e-14);
-    bst_assert_close(bst_ideal_snr(0x1p-22, 0.9), 5.03540596946392715 + 1.28155156554460044, 1e-14);
-    bst_assert_close(bst_ideal_pd(1e-5, bst_ideal_snr(1e-5, 0.73)), 0.73, 1e-14);
+    bst_assert_close(bst_eval_ideal_pd(1e-6, 0.0) / 1e-6, 1.0, 1e-13); /* condition number 23 */
+    bst_assert_close(bst_eval_ideal_pd(1e-3, 3.0902323061678135), 0.5, 1e-15);
+    bst_assert_close(bst_eval_ideal_snr(0x1p-22, 0.5), 5.03540596946392715, 1e-14);
+    bst_assert_close(bst_eval_ideal_snr(0x1p-22, 0.9), 5.03540596946392715 + 1.28155156554460044,
+                     1e-14);
+    bst_assert_close(bst_eval_ideal_pd(1e-5, bst_eval_ideal_snr(1e-5, 0.73)), 0.73, 1e-14);
 }
 
 /* Without own light it is the ideal detector; with it the two functions are inverses, and at a half
  * nothing changes. */
 static void own_light_flattens_the_curve(void **state) {
     (void)state;
-    bst_assert_close(bst_matched_filter_pd(1e-6, 6.0, 0.0), bst_ideal_pd(1e-6, 6.0), 1e-15);
-    bst_assert_close(bst_matched_filter_snr(1e-6, 0.5, 0.05), bst_ideal_snr(1e-6, 0.5), 1e-14);
+    bst_assert_close(bst_eval_matched_filter_pd(1e-6, 6.0, 0.0), bst_eval_ideal_pd(1e-6, 6.0),
+                     1e-15);
+    bst_assert_close(bst_eval_matched_filter_snr(1e-6, 0.5, 0.05), bst_eval_ideal_snr(1e-6, 0.5),
+                     1e-14);
     /* (6.5 - 5) / sqrt(1 + 0.2 * 6.5) = 0.98907 */
-    bst_assert_close(bst_matched_filter_pd(bst_normal_tail(5.0), 6.5, 0.2),
-                     bst_normal_tail(-1.5 / sqrt(2.3)), 1e-14);
+    bst_assert_close(bst_eval_matched_filter_pd(bst_eval_normal_tail(5.0), 6.5, 0.2),
+                     bst_eval_normal_tail(-1.5 / sqrt(2.3)), 1e-14);
     for (double pd = 0.05; pd < 1.0; pd += 0.1) {
         for (double own = 0.0; own < 2.0; own += 0.3) {
-            double snr = bst_matched_filter_snr(1e-7, pd, own);
-            bst_assert_close(bst_matched_filter_pd(1e-7, snr, own), pd, 1e-13);
+            double snr = bst_eval_matched_filter_snr(1e-7, pd, own);
+            bst_assert_close(bst_eval_matched_filter_pd(1e-7, snr, own), pd, 1e-13);
         }
     }
 }
@@ -108,14 +112,15 @@ static void wilson_interval_is_the_published_one(void **state) {
                  {0, 20, 0.0, 0.1611},
                  {1, 29, 0.0061, 0.1718}};
     for (int i = 0; i < 4; i++) {
-        bst_interval w = bst_wilson_interval(truth[i].hits, truth[i].trials, BST_NORMAL_95);
+        bst_eval_interval w =
+            bst_eval_wilson_interval(truth[i].hits, truth[i].trials, BST_NORMAL_95);
         bst_assert_close(w.low, truth[i].low, 0.5e-4);
         bst_assert_close(w.high, truth[i].high, 0.5e-4);
     }
-    bst_interval all = bst_wilson_interval(20, 20, BST_NORMAL_95);
+    bst_eval_interval all = bst_eval_wilson_interval(20, 20, BST_NORMAL_95);
     assert_true(all.high == 1.0);
     bst_assert_close(all.low, 1 - 0.1611, 0.5e-4);
-    bst_interval none = bst_wilson_interval(0, 0, BST_NORMAL_95);
+    bst_eval_interval none = bst_eval_wilson_interval(0, 0, BST_NORMAL_95);
     assert_true(none.low == 0.0 && none.high == 1.0);
 }
 
@@ -138,13 +143,13 @@ static void poisson_interval_is_exact(void **state) {
                  {3, 0.01, 0.3378633887277333, 10.977477495329766},
                  {40, 0.01, 25.585965945222584, 59.363067206817074}};
     for (size_t i = 0; i < sizeof truth / sizeof *truth; i++) {
-        bst_interval p = bst_poisson_interval(truth[i].count, truth[i].alpha);
+        bst_eval_interval p = bst_eval_poisson_interval(truth[i].count, truth[i].alpha);
         bst_assert_close(p.low, truth[i].low, 1e-12 * (1 + truth[i].low));
         bst_assert_close(p.high, truth[i].high, 1e-12 * (1 + truth[i].high));
     }
     /* many events: the normal limit with its first corrections, (z^2 + 2) / 3 resp. (z^2 - 1) / 3
      * and the step of one; what follows is of the order 1 / sqrt(count) */
-    bst_interval many = bst_poisson_interval(1000000, 0.05);
+    bst_eval_interval many = bst_eval_poisson_interval(1000000, 0.05);
     double z = BST_NORMAL_95;
     bst_assert_close(many.low, 1e6 - z * 1e3 + (z * z - 1) / 3, 2e-3);
     bst_assert_close(many.high, 1e6 + z * sqrt(1e6 + 1) + (z * z - 1) / 3 + 1, 2e-3);

@@ -4,11 +4,11 @@
 #include "sim/core/vec.h"
 #include "tests/test_support.h"
 
-static bst_location_bound bound_of(const bst_bound_source *source, double noise, bool shot,
+static bst_location_bound bound_of(const bst_eval_bound_source *source, double noise, bool shot,
                                    double margin) {
     bst_ctx ctx = {0};
     bst_location_bound bound;
-    bst_bound_noise n = {noise, shot};
+    bst_eval_bound_noise n = {noise, shot};
     bst_assert_ok(&ctx, bst_location_bound_gaussian(&ctx, source, &n, margin, &bound));
     return bound;
 }
@@ -21,7 +21,7 @@ static bst_location_bound bound_of(const bst_bound_source *source, double noise,
 static void white_noise_limit(void **state) {
     (void)state;
     for (double sigma = 3.0; sigma <= 6.0; sigma *= 2.0) {
-        bst_bound_source s = {.x_px = 0.3, .y_px = -0.2, .sigma_px = sigma, .flux_e = 1000};
+        bst_eval_bound_source s = {.x_px = 0.3, .y_px = -0.2, .sigma_px = sigma, .flux_e = 1000};
         bst_location_bound b = bound_of(&s, 5.0, false, 7 * sigma);
         double width2 = sigma * sigma + 1.0 / 12, tolerance = 1.0 / (960 * pow(sigma, 4));
         bst_assert_close(b.snr * 5.0 * sqrt(4 * BST_PI * width2) / 1000, 1, tolerance);
@@ -35,7 +35,7 @@ static void white_noise_limit(void **state) {
  * small, not zero. Tolerances: that noise, and the unknown background under few pixels. */
 static void photon_limit(void **state) {
     (void)state;
-    bst_bound_source s = {.x_px = 0.1, .y_px = 0.4, .sigma_px = 3, .flux_e = 1e6};
+    bst_eval_bound_source s = {.x_px = 0.1, .y_px = 0.4, .sigma_px = 3, .flux_e = 1e6};
     bst_location_bound b = bound_of(&s, 1e-3, true, 24);
     bst_assert_close(b.covariance[0][0] * 1e6 / (9 + 1.0 / 12), 1, 2e-3);
     bst_assert_close(b.covariance[BST_BOUND_FLUX][BST_BOUND_FLUX] / 1e6, 1, 2e-3);
@@ -46,10 +46,10 @@ static void photon_limit(void **state) {
 static void flux_bound_is_the_linear_one(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_bound_source s = {.x_px = 7, .y_px = 3, .sigma_px = 0.85, .flux_e = 400};
+    bst_eval_bound_source s = {.x_px = 7, .y_px = 3, .sigma_px = 0.85, .flux_e = 400};
     for (double margin = 3; margin <= 30; margin += 9) {
         double powers[2], side = 2 * margin + 1;
-        bst_assert_ok(&ctx, bst_gaussian_powers(&ctx, &s, powers));
+        bst_assert_ok(&ctx, bst_eval_gaussian_powers(&ctx, &s, powers));
         double sum2 = powers[0];
         bst_location_bound b = bound_of(&s, 8.0, false, margin);
         double want = 64 / (sum2 - 1 / (side * side));
@@ -71,7 +71,7 @@ static void streak_limit(void **state) {
     for (double length = 5; length < 100; length *= 3) {
         for (double angle = 0; angle < 1.6; angle += BST_PI / 4) {
             double dx = length * cos(angle), dy = length * sin(angle), out[2];
-            bst_bound_source s = {0.2, 0.7, dx, dy, sigma, 1000};
+            bst_eval_bound_source s = {0.2, 0.7, dx, dy, sigma, 1000};
             bst_location_bound b = bound_of(&s, 5.0, false, 7 * sigma);
             bst_location_bound_along(&b, dx, dy, out);
             double e = exp(-length * length / (4 * width2));
@@ -89,7 +89,7 @@ static void streak_limit(void **state) {
 static void undersampled_images_agree_with_many_digits(void **state) {
     (void)state;
     const struct {
-        bst_bound_source source;
+        bst_eval_bound_source source;
         bool shot;
         double margin, snr, lower[10];
     } truth[] = {
@@ -130,10 +130,10 @@ static void bounds_that_cannot_be_are_errors(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_location_bound b;
-    bst_bound_noise noise = {8, true}, none = {0, true};
-    bst_bound_source s = {.sigma_px = 0.85, .flux_e = 100}, dark = {.sigma_px = 0.85},
-                     wide = {.sigma_px = 2000, .flux_e = 1},
-                     vast = {.dx_px = 1e6, .sigma_px = 1, .flux_e = 1};
+    bst_eval_bound_noise noise = {8, true}, none = {0, true};
+    bst_eval_bound_source s = {.sigma_px = 0.85, .flux_e = 100}, dark = {.sigma_px = 0.85},
+                          wide = {.sigma_px = 2000, .flux_e = 1},
+                          vast = {.dx_px = 1e6, .sigma_px = 1, .flux_e = 1};
     /* one pixel, four numbers */
     assert_int_equal(bst_location_bound_gaussian(&ctx, &s, &noise, 0.4, &b), BST_ERR_NUMERIC);
     assert_int_equal(bst_location_bound_gaussian(&ctx, &s, &none, 5, &b), BST_ERR_ARGUMENT);

@@ -31,7 +31,7 @@ static void pointing_error_on_the_sphere(void **state) {
             for (int way_deg = -170; way_deg < 180; way_deg += 20) {
                 double angle = angle_deg * BST_DEG_RAD, way = way_deg * BST_DEG_RAD, x, y;
                 bst_vec3 cam = {sin(angle) * cos(way), sin(angle) * sin(way), cos(angle)};
-                double size = bst_pointing_error_px(
+                double size = bst_eval_pointing_error_px(
                     &c, 0, q, bst_vec3_scale(bst_quat_rotate(back, cam), 3.0), &x, &y);
                 /* the focal plane's columns lie rotation_deg from camera x towards camera y */
                 double in_plane = way - rotation_deg * BST_DEG_RAD, px = angle / px_rad;
@@ -53,13 +53,14 @@ static void pointing_error_near_the_boresight(void **state) {
         for (int i = 0; i < 4; i++) {
             double cx = bst_camera_centre_x(&c), cy = bst_camera_centre_y(&c), x, y;
             bst_vec3 cam = bst_camera_unproject(&c, cx + places[i][0], cy + places[i][1]);
-            bst_pointing_error_px(&c, 0, (bst_quat){0, 0, 0, 1}, cam, &x, &y);
+            bst_eval_pointing_error_px(&c, 0, (bst_quat){0, 0, 0, 1}, cam, &x, &y);
             /* 3 px are 3.6e-5 rad: tangent, angle and distortion differ by 1e-9 of it; rounding of
              * directions 1e-11 px */
             bst_assert_close(x, places[i][0], 3e-9);
             bst_assert_close(y, places[i][1], 3e-9);
             /* an exposure of half the scale has twice the pixels */
-            double twice = bst_pointing_error_px(&c, 1.25, (bst_quat){0, 0, 0, 1}, cam, &x, &y);
+            double twice =
+                bst_eval_pointing_error_px(&c, 1.25, (bst_quat){0, 0, 0, 1}, cam, &x, &y);
             bst_assert_close(twice, 2 * hypot(places[i][0], places[i][1]), 6e-9);
         }
     }
@@ -76,7 +77,7 @@ static void a_track_is_on_target_within_5_px(void **state) {
                  {-5.01, 0, false}, {3.5, -3.5, true}, {3.6, 3.6, false}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         bst_vec3 then = {1, (cases[i].y_px - 8) * px_rad, cases[i].z_px * px_rad};
-        assert_int_equal(bst_track_is_on_target(bst_vec3_unit(then), rate, 2.0, truth, px_rad),
+        assert_int_equal(bst_eval_track_is_on_target(bst_vec3_unit(then), rate, 2.0, truth, px_rad),
                          cases[i].on);
     }
     assert_true(bst_loop_settles(true, BST_MODE_TRACK, 2.999));

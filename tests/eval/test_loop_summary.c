@@ -10,7 +10,7 @@ enum { RATE = 6000 };
 typedef struct scene {
     bst_ctx ctx;
     bst_world *world;
-    bst_view *view;
+    bst_world_view *view;
     bst_loop_summary *summary;
     bst_tracks *tracks;
     bst_loop_frame judged[3000];
@@ -33,7 +33,7 @@ static scene *open_scene(const char *object, int target) {
     scene *s = calloc(1, sizeof *s);
     assert_non_null(s);
     s->world = test_world_with(object, "");
-    bst_assert_ok(&s->ctx, bst_view_create(&s->ctx, s->world, &s->view));
+    bst_assert_ok(&s->ctx, bst_world_view_create(&s->ctx, s->world, &s->view));
     bst_assert_ok(&s->ctx,
                   bst_loop_summary_create(&s->ctx, s->world, 0, 0, RATE, target, &s->summary));
     bst_loop_summary_on_frame(s->summary, on_frame, s);
@@ -44,7 +44,7 @@ static scene *open_scene(const char *object, int target) {
 
 static void close_scene(scene *s) {
     bst_loop_summary_free(s->summary);
-    bst_view_free(s->view);
+    bst_world_view_free(s->view);
     bst_world_free(s->world);
     free(s->tracks);
     free(s);
@@ -52,9 +52,9 @@ static void close_scene(scene *s) {
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
 
-static bst_sight sight_at(scene *s, double t) {
-    bst_sight sight;
-    bst_assert_ok(&s->ctx, bst_view_sight(&s->ctx, s->view, 0, 0, t, &sight));
+static bst_world_sight sight_at(scene *s, double t) {
+    bst_world_sight sight;
+    bst_assert_ok(&s->ctx, bst_world_view_sight(&s->ctx, s->view, 0, 0, t, &sight));
     return sight;
 }
 
@@ -67,7 +67,7 @@ static double mid_of(int64_t id) {
  */
 static void truth_with(scene *s, int64_t id, double x, double y, double scale_arcsec,
                        const bst_truth_item *items, int count) {
-    bst_sight sight = sight_at(s, mid_of(id));
+    bst_world_sight sight = sight_at(s, mid_of(id));
     const double scale = 3.0 * BST_ARCSEC_RAD;
     bst_quat q = bst_quat_look(sight.apparent, (bst_vec3){0, 0, 1});
     /* the attitude in which that apparent direction has these tangent-plane coordinates */
@@ -100,8 +100,8 @@ static void truth_at(scene *s, int64_t id, double x, double y) {
  * the target (out along the pole's direction) and moves as the target does. status < 0: no track.
  */
 static void tracks_at(scene *s, int64_t id, int status, double off_px) {
-    bst_sight a = sight_at(s, mid_of(id) - 0.5), b = sight_at(s, mid_of(id) + 0.5),
-              m = sight_at(s, mid_of(id));
+    bst_world_sight a = sight_at(s, mid_of(id) - 0.5), b = sight_at(s, mid_of(id) + 0.5),
+                    m = sight_at(s, mid_of(id));
     bst_vec3 rate = bst_vec3_sub(b.geometric, a.geometric);
     bst_vec3 aside = bst_vec3_unit(
         bst_vec3_cross(bst_vec3_cross(m.geometric, (bst_vec3){0, 0, 1}), m.geometric));

@@ -16,7 +16,7 @@ static int ideal_counts(double pfa, double gain, double chance, int64_t trials, 
                         uint64_t *state, bst_pd_point out[MOST]) {
     int count = 0;
     for (double snr = 2.0; snr <= 12.0 + 1e-9; snr += step) {
-        double pd = bst_ideal_pd(pfa, gain * snr), raw = pd + (1.0 - pd) * chance;
+        double pd = bst_eval_ideal_pd(pfa, gain * snr), raw = pd + (1.0 - pd) * chance;
         int64_t hits = (int64_t)llround(raw * (double)trials);
         if (state) {
             hits = 0;
@@ -53,9 +53,9 @@ static void chance_is_taken_off(void **state) {
     bst_pd_point points[MOST];
     const double pfa = 1e-4, chance = 0.07;
     int n = ideal_counts(pfa, 1.0, chance, 1000000000, 0.5, NULL, points);
-    bst_assert_close(bst_pd_snr_at(points, n, chance, 0.5).snr, bst_ideal_snr(pfa, 0.5), 1e-6);
+    bst_assert_close(bst_pd_snr_at(points, n, chance, 0.5).snr, bst_eval_ideal_snr(pfa, 0.5), 1e-6);
     /* not taken off: found too soon by 2 % of the trials over the slope of 0.4 */
-    assert_true(bst_pd_snr_at(points, n, 0.0, 0.5).snr < bst_ideal_snr(pfa, 0.5) - 0.05);
+    assert_true(bst_pd_snr_at(points, n, 0.0, 0.5).snr < bst_eval_ideal_snr(pfa, 0.5) - 0.05);
     bst_assert_close(bst_pd_without_chance(0.07, chance), 0.0, 1e-15);
     bst_assert_close(bst_pd_without_chance(0.5 + 0.5 * 0.07, chance), 0.5, 1e-15);
     assert_true(bst_pd_without_chance(0.01, chance) == 0.0);
@@ -66,7 +66,7 @@ static void the_deviation_is_as_told(void **state) {
     (void)state;
     enum { RUNS = 400 };
     bst_pd_point points[MOST];
-    const double pfa = 2e-7, truth = bst_ideal_snr(pfa, 0.9);
+    const double pfa = 2e-7, truth = bst_eval_ideal_snr(pfa, 0.9);
     uint64_t seed = 7;
     double sum = 0.0, square = 0.0, told = 0.0;
     for (int r = 0; r < RUNS; r++) {

@@ -16,13 +16,13 @@ typedef struct fixture {
     bst_ctx ctx;
     bst_world *world;
     bst_sightings *sightings;
-    bst_pass passes[16];
+    bst_eval_pass passes[16];
     int pass_count;
     bst_sighting sums[16];
     int sum_count;
 } fixture;
 
-static bst_status keep_pass(void *user, bst_ctx *ctx, const bst_pass *pass) {
+static bst_status keep_pass(void *user, bst_ctx *ctx, const bst_eval_pass *pass) {
     fixture *f = user;
     (void)ctx;
     assert_true(f->pass_count < 16);
@@ -186,7 +186,7 @@ static void errors_are_angles_to_the_truth(void **state) {
     take(&f, (shot){.object = 1, .seconds = 4.0, .tracked = true, .track_off_arcsec = 20.0});
     bst_assert_ok(&f.ctx, bst_sightings_finish(&f.ctx, f.sightings, 10.0));
     assert_int_equal(f.pass_count, 1);
-    const bst_pass *pass = &f.passes[0];
+    const bst_eval_pass *pass = &f.passes[0];
     assert_int_equal(pass->detected, 2);
     assert_int_equal(pass->tracked, 2);
     assert_int_equal(pass->target, 2);
@@ -315,7 +315,7 @@ static void errors_on_both_axes_of_a_moving_camera(void **state) {
     }
     bst_assert_ok(&f.ctx, bst_sightings_finish(&f.ctx, f.sightings, 100.0));
     assert_int_equal(f.pass_count, 1);
-    const bst_pass *pass = &f.passes[0];
+    const bst_eval_pass *pass = &f.passes[0];
     assert_int_equal(pass->object, 1);
     assert_int_equal(pass->place.count, 3);
     /* the Sun bends light by 5 mas, and pixels 250 px out span 1e-5 less */

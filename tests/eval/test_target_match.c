@@ -7,7 +7,7 @@ enum { MOST = 8 };
 
 static int of_target[MOST], of_detection[MOST];
 
-static int match(const bst_match_target *targets, int count, double reach, int n,
+static int match(const bst_eval_match_target *targets, int count, double reach, int n,
                  const double (*places)[2]) {
     bst_detections *d = calloc(1, sizeof *d + MOST * sizeof d->items[0]);
     assert_non_null(d);
@@ -16,14 +16,14 @@ static int match(const bst_match_target *targets, int count, double reach, int n
         d->items[i].x_px = places[i][0];
         d->items[i].y_px = places[i][1];
     }
-    int matched = bst_match_targets(targets, count, reach, d, of_target, of_detection);
+    int matched = bst_eval_match_targets(targets, count, reach, d, of_target, of_detection);
     free(d);
     return matched;
 }
 
 static void a_point_is_matched_within_one_width(void **state) {
     (void)state;
-    const bst_match_target t[] = {{100, 50, 0, 0}};
+    const bst_eval_match_target t[] = {{100, 50, 0, 0}};
     const double inside[][2] = {{101.4, 51.4}}, outside[][2] = {{101.5, 51.5}};
     assert_int_equal(match(t, 1, 2.0, 1, inside), 1);
     assert_int_equal(of_target[0], 0);
@@ -38,7 +38,7 @@ static void a_point_is_matched_within_one_width(void **state) {
 static void a_streak_is_matched_within_its_half_length(void **state) {
     (void)state;
     /* 30 px along (0.6, 0.8) */
-    const bst_match_target t[] = {{100, 100, 18, 24}};
+    const bst_eval_match_target t[] = {{100, 100, 18, 24}};
     const double along[][2] = {{100 + 0.6 * 14.9, 100 + 0.8 * 14.9}},
                  beyond[][2] = {{100 + 0.6 * 15.1, 100 + 0.8 * 15.1}},
                  across[][2] = {{100 + 0.8 * 1.9, 100 - 0.6 * 1.9}},
@@ -48,14 +48,14 @@ static void a_streak_is_matched_within_its_half_length(void **state) {
     assert_int_equal(match(t, 1, 2.0, 1, across), 1);
     assert_int_equal(match(t, 1, 2.0, 1, off), 0);
     /* shorter than the PSF: as a point */
-    const bst_match_target brief[] = {{100, 100, 1, 0}};
+    const bst_eval_match_target brief[] = {{100, 100, 1, 0}};
     const double near[][2] = {{101.5, 101}};
     assert_int_equal(match(brief, 1, 2.0, 1, near), 1);
 }
 
 static void one_detection_counts_once(void **state) {
     (void)state;
-    const bst_match_target t[] = {{10, 10, 0, 0}, {13, 10, 0, 0}};
+    const bst_eval_match_target t[] = {{10, 10, 0, 0}, {13, 10, 0, 0}};
     const double between[][2] = {{11.4, 10}};
     assert_int_equal(match(t, 2, 2.0, 1, between), 1);
     assert_int_equal(of_target[0], 0);

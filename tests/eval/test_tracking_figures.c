@@ -14,16 +14,16 @@ static void quantiles_of_the_tables(void **state) {
                                {0.95, 100, 124.342},  {0.025, 50, 32.3574}, {0.975, 50, 71.4202},
                                {0.001, 3, 0.0242976}, {0.999, 20, 45.3147}};
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
-        double q = bst_chi2_quantile(table[i][0], table[i][1]);
+        double q = bst_eval_chi2_quantile(table[i][0], table[i][1]);
         bst_assert_close(q / table[i][2], 1.0, 5e-6); /* six digits are printed */
-        bst_assert_close(bst_chi2_cdf(q, table[i][1]), table[i][0], 1e-12);
+        bst_assert_close(bst_eval_chi2_cdf(q, table[i][1]), table[i][0], 1e-12);
     }
     /* two degrees of freedom: exp(-x/2) */
-    bst_assert_close(bst_chi2_cdf(7.0, 2.0), 1.0 - exp(-3.5), 1e-15);
-    bst_assert_close(bst_chi2_cdf(1e4, 1e4), 0.50188, 1e-5); /* 1/2 + 2 / (3 sqrt(4 pi 1e4)) */
-    assert_true(isnan(bst_chi2_quantile(0.0, 2.0)));
-    assert_true(isnan(bst_chi2_quantile(1.0, 2.0)));
-    assert_true(isnan(bst_chi2_quantile(0.5, 0.0)));
+    bst_assert_close(bst_eval_chi2_cdf(7.0, 2.0), 1.0 - exp(-3.5), 1e-15);
+    bst_assert_close(bst_eval_chi2_cdf(1e4, 1e4), 0.50188, 1e-5); /* 1/2 + 2 / (3 sqrt(4 pi 1e4)) */
+    assert_true(isnan(bst_eval_chi2_quantile(0.0, 2.0)));
+    assert_true(isnan(bst_eval_chi2_quantile(1.0, 2.0)));
+    assert_true(isnan(bst_eval_chi2_quantile(0.5, 0.0)));
 }
 
 static void true_covariances_are_inside(void **state) {
@@ -132,12 +132,12 @@ static double factor_by_curvature(double pd, double density) {
 
 static void information_left_in_clutter(void **state) {
     (void)state;
-    bst_assert_close(bst_information_factor(1.0, 0.0), 1.0, 0.0);
-    bst_assert_close(bst_information_factor(0.7, 0.0), 0.7, 0.0);
-    bst_assert_close(bst_information_factor(0.9, 1e-9), 0.9, 0.01); /* 3 sigma of 2e5 draws */
+    bst_assert_close(bst_eval_information_factor(1.0, 0.0), 1.0, 0.0);
+    bst_assert_close(bst_eval_information_factor(0.7, 0.0), 0.7, 0.0);
+    bst_assert_close(bst_eval_information_factor(0.9, 1e-9), 0.9, 0.01); /* 3 sigma of 2e5 draws */
     const double cases[][2] = {{0.9, 0.003}, {0.9, 0.02}, {1.0, 0.05}, {0.6, 0.01}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        double a = bst_information_factor(cases[i][0], cases[i][1]);
+        double a = bst_eval_information_factor(cases[i][0], cases[i][1]);
         double b = factor_by_curvature(cases[i][0], cases[i][1]);
         print_message("Pd %.1f, %.3f false alarms per sigma^2: factor %.4f, by curvature %.4f\n",
                       cases[i][0], cases[i][1], a, b);
@@ -146,7 +146,7 @@ static void information_left_in_clutter(void **state) {
     }
     double last = 0.9;
     for (double density = 0.01; density < 0.5; density *= 4) {
-        double f = bst_information_factor(0.9, density);
+        double f = bst_eval_information_factor(0.9, density);
         assert_true(f < last);
         last = f;
     }

@@ -18,22 +18,22 @@ static const char scenario[] = "{\"epoch_utc\": \"2022-06-16T22:10:00Z\"}";
 
 static void read_rows(const bst_run_reader *reader, const char *sql) {
     bst_ctx ctx;
-    bst_rows *rows = NULL;
+    bst_io_rows *rows = NULL;
     bool more = true;
     size_t letters = 0;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
-    bst_status status = bst_rows_open(&ctx, reader, sql, 0, 1, &rows);
+    bst_status status = bst_io_rows_open(&ctx, reader, sql, 0, 1, &rows);
     for (int i = 0; status == BST_OK && more && i < MOST_ROWS; i++) {
-        status = bst_rows_next(&ctx, rows, &more);
-        for (int c = 0; status == BST_OK && more && c < bst_rows_columns(rows); c++) {
-            letters += strlen(bst_rows_column_name(rows, c)) + strlen(bst_rows_text(rows, c));
-            if (bst_rows_is_null(rows, c) && bst_rows_int(rows, c) != 0) {
+        status = bst_io_rows_next(&ctx, rows, &more);
+        for (int c = 0; status == BST_OK && more && c < bst_io_rows_columns(rows); c++) {
+            letters += strlen(bst_io_rows_column_name(rows, c)) + strlen(bst_io_rows_text(rows, c));
+            if (bst_io_rows_is_null(rows, c) && bst_io_rows_int(rows, c) != 0) {
                 abort();
             }
         }
     }
     FUZZ_CHECK_REASON(ctx, status);
-    bst_rows_close(rows);
+    bst_io_rows_close(rows);
     if (letters > SIZE_MAX / 2) {
         abort();
     }

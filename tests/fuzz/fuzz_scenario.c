@@ -16,7 +16,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
         return 0;
     }
     bst_scenario scenario;
-    bst_registry registry = *bst_app_registry();
+    bst_scenario_registry registry = *bst_registry_shipped();
     registry.policy = BST_PLUGINS_REFUSE;
     bst_status status = bst_scenario_read(&ctx, json, &registry, &scenario);
     if ((status == BST_OK) != (ctx.message[0] == '\0')) {

@@ -12,10 +12,10 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 
-static const bst_metric metrics[] = {{"a", "s", "A.", BST_METRIC_VALUE},
-                                     {"b", "", "B.", BST_METRIC_FLAG}};
-static const bst_metric series[] = {{"key", "", "Key.", BST_METRIC_KEY},
-                                    {"hits", "", "Hits.", BST_METRIC_HITS}};
+static const bst_study_metric metrics[] = {{"a", "s", "A.", BST_METRIC_VALUE},
+                                           {"b", "", "B.", BST_METRIC_FLAG}};
+static const bst_study_metric series[] = {{"key", "", "Key.", BST_METRIC_KEY},
+                                          {"hits", "", "Hits.", BST_METRIC_HITS}};
 static const bst_study study = {.runs = 6, .digest = "0123456789abcdef"};
 
 static void check(const bst_results *r) {
@@ -29,7 +29,7 @@ static void check(const bst_results *r) {
         }
     }
     for (int64_t i = 0; i < r->part_count; i++) {
-        const bst_series_part *part = &r->parts[i];
+        const bst_study_series_part *part = &r->parts[i];
         if (part->rows < 0 || part->first + (size_t)part->rows > r->series_rows ||
             r->state[part->run] != BST_ROW_DONE) {
             abort();

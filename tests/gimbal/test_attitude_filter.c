@@ -7,19 +7,19 @@
 
 static bst_ctx ctx;
 
-static bst_gyro_config gyro_config(double arw, double rrw) {
-    bst_gyro_config c;
+static bst_spacecraft_gyro_config gyro_config(double arw, double rrw) {
+    bst_spacecraft_gyro_config c;
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_gyro_config_table, &c));
     c.angle_random_walk_deg_rth = arw;
     c.rate_random_walk_deg_rth3 = rrw;
     return c;
 }
 
-static bst_star_tracker_config tracker_config(double across, double about) {
-    bst_star_tracker_config c = {.axis = {0.3, -0.5, 0.8},
-                                 .noise_arcsec = across,
-                                 .noise_about_axis_arcsec = about,
-                                 .rate_limit_degps = 10.0};
+static bst_spacecraft_star_tracker_config tracker_config(double across, double about) {
+    bst_spacecraft_star_tracker_config c = {.axis = {0.3, -0.5, 0.8},
+                                            .noise_arcsec = across,
+                                            .noise_about_axis_arcsec = about,
+                                            .rate_limit_degps = 10.0};
     return c;
 }
 
@@ -33,14 +33,14 @@ static void test_allan_deviation(void **state) {
     (void)state;
     enum { SAMPLES = 1 << 17 };
     double dt = 0.1;
-    bst_gyro_config c = gyro_config(0.02, 3.0);
-    bst_gyro gyro;
-    bst_gyro_init(&gyro, &c, dt, bst_rng_make_key(1, 0, "a", "gyro"));
+    bst_spacecraft_gyro_config c = gyro_config(0.02, 3.0);
+    bst_spacecraft_gyro gyro;
+    bst_spacecraft_gyro_init(&gyro, &c, dt, bst_rng_make_key(1, 0, "a", "gyro"));
     double *angle = malloc((SAMPLES + 1) * sizeof *angle);
     assert_non_null(angle);
     angle[0] = 0.0;
     for (int n = 0; n < SAMPLES; n++) {
-        angle[n + 1] = angle[n] + bst_gyro_measure(&gyro, (bst_vec3){0, 0, 0}).y;
+        angle[n + 1] = angle[n] + bst_spacecraft_gyro_measure(&gyro, (bst_vec3){0, 0, 0}).y;
     }
     for (int m = 1; m <= 4096; m *= 4) {
         double sum = 0.0, t = m * dt;
@@ -61,14 +61,15 @@ static void test_allan_deviation(void **state) {
 
 static void test_tracker_noise(void **state) {
     (void)state;
-    bst_star_tracker_config c = tracker_config(5.0, 40.0);
-    bst_star_tracker tracker;
-    bst_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
+    bst_spacecraft_star_tracker_config c = tracker_config(5.0, 40.0);
+    bst_spacecraft_star_tracker tracker;
+    bst_spacecraft_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
     bst_quat q = bst_quat_unit((bst_quat){0.4, 0.2, -0.7, 0.5});
     enum { N = 20000 };
     double sum[3][3] = {{0}};
     for (int n = 0; n < N; n++) {
-        bst_vec3 e = bst_attitude_error(bst_star_tracker_measure(&tracker, n, q), q);
+        bst_vec3 e =
+            bst_attitude_filter_error(bst_spacecraft_star_tracker_measure(&tracker, n, q), q);
         double v[3] = {e.x, e.y, e.z};
         for (int i = 0; i < 3; i++) {
             for (int j = 0; j < 3; j++) {
@@ -76,7 +77,7 @@ static void test_tracker_noise(void **state) {
             }
         }
     }
-    bst_mat3 expected = bst_star_tracker_covariance(&tracker);
+    bst_mat3 expected = bst_spacecraft_star_tracker_covariance(&tracker);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) { /* 4 sigma of a covariance of N draws */
             double size = sqrt(expected.m[i][i] * expected.m[j][j]);
@@ -86,39 +87,43 @@ static void test_tracker_noise(void **state) {
     /* the alignment error turns what is measured by just that */
     c.alignment_arcsec[1] = 100.0;
     c.noise_arcsec = c.noise_about_axis_arcsec = 1e-6;
-    bst_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
-    bst_vec3 e = bst_attitude_error(bst_star_tracker_measure(&tracker, 0, q), q);
+    bst_spacecraft_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
+    bst_vec3 e = bst_attitude_filter_error(bst_spacecraft_star_tracker_measure(&tracker, 0, q), q);
     bst_assert_close(e.y / BST_ARCSEC_RAD, 100.0, 1e-5);
     bst_assert_close(e.x / BST_ARCSEC_RAD, 0.0, 1e-5);
 }
 
 static void test_tracker_blind(void **state) {
     (void)state;
-    bst_star_tracker_config c = tracker_config(1, 1);
+    bst_spacecraft_star_tracker_config c = tracker_config(1, 1);
     c.axis[0] = c.axis[1] = 0.0;
     c.sun_exclusion_deg = 30.0;
     c.earth_exclusion_deg = 20.0;
     c.outage_s[0] = 100.0;
     c.outage_s[1] = 200.0;
-    bst_star_tracker tracker;
-    bst_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
+    bst_spacecraft_star_tracker tracker;
+    bst_spacecraft_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
     bst_vec3 zero = {0, 0, 0}, place = {-7e6, 0, 0}, sun = {0, -1.5e11, 0};
     bst_quat q = BST_QUAT_IDENTITY; /* looks along z */
-    assert_true(bst_star_tracker_sees(&tracker, 0, q, zero, place, sun));
-    assert_false(bst_star_tracker_sees(&tracker, 100.0, q, zero, place, sun));
-    assert_true(bst_star_tracker_sees(&tracker, 200.0, q, zero, place, sun));
-    assert_false(bst_star_tracker_sees(&tracker, 0, q, (bst_vec3){0.2, 0, 0}, place, sun));
+    assert_true(bst_spacecraft_star_tracker_sees(&tracker, 0, q, zero, place, sun));
+    assert_false(bst_spacecraft_star_tracker_sees(&tracker, 100.0, q, zero, place, sun));
+    assert_true(bst_spacecraft_star_tracker_sees(&tracker, 200.0, q, zero, place, sun));
+    assert_false(
+        bst_spacecraft_star_tracker_sees(&tracker, 0, q, (bst_vec3){0.2, 0, 0}, place, sun));
     bst_vec3 near = {0, sin(29.9 * BST_DEG_RAD), cos(29.9 * BST_DEG_RAD)};
     bst_vec3 far = {0, sin(30.1 * BST_DEG_RAD), cos(30.1 * BST_DEG_RAD)};
-    assert_false(bst_star_tracker_sees(&tracker, 0, q, zero, place, bst_vec3_scale(near, 1.5e11)));
-    assert_true(bst_star_tracker_sees(&tracker, 0, q, zero, place, bst_vec3_scale(far, 1.5e11)));
+    assert_false(bst_spacecraft_star_tracker_sees(&tracker, 0, q, zero, place,
+                                                  bst_vec3_scale(near, 1.5e11)));
+    assert_true(
+        bst_spacecraft_star_tracker_sees(&tracker, 0, q, zero, place, bst_vec3_scale(far, 1.5e11)));
     /* from 7000 km the limb is 65.66 deg from the centre: the axis must be 85.66 deg off it */
     double angle = asin(6378.137 / 7000.0) + 20.0 * BST_DEG_RAD;
     for (int i = 0; i < 2; i++) {
         double a = angle + (i ? 1e-6 : -1e-6);
         bst_vec3 down = {sin(a), 0, cos(a)};
         assert_int_equal(
-            bst_star_tracker_sees(&tracker, 0, q, zero, bst_vec3_scale(down, -7e6), sun), i);
+            bst_spacecraft_star_tracker_sees(&tracker, 0, q, zero, bst_vec3_scale(down, -7e6), sun),
+            i);
     }
 }
 
@@ -153,10 +158,10 @@ static void test_a_million_updates(void **state) {
     (void)state;
     bst_attitude_filter f;
     bst_attitude_filter_init(&f, BST_QUAT_IDENTITY, 1.0, 1e-4, 1e-8, 1e-12);
-    bst_star_tracker_config c = tracker_config(0.01, 1000.0);
-    bst_star_tracker tracker;
-    bst_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
-    bst_mat3 noise = bst_star_tracker_covariance(&tracker);
+    bst_spacecraft_star_tracker_config c = tracker_config(0.01, 1000.0);
+    bst_spacecraft_star_tracker tracker;
+    bst_spacecraft_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
+    bst_mat3 noise = bst_spacecraft_star_tracker_covariance(&tracker);
     bst_vec3 turn = {0.003, -0.002, 0.001};
     bst_quat late = bst_quat_from_rotvec(bst_vec3_scale(turn, -2.0));
     for (int n = 0; n < 1000000; n++) {
@@ -177,7 +182,7 @@ static void test_a_million_updates(void **state) {
 
 /* e' P^-1 e of a filter that runs on the sensors' own models: 6 on average. */
 static double nees(const bst_attitude_filter *f, bst_quat truth, bst_vec3 bias) {
-    bst_vec3 e = bst_attitude_error(truth, f->q_body_from_gcrf),
+    bst_vec3 e = bst_attitude_filter_error(truth, f->q_body_from_gcrf),
              b = bst_vec3_sub(bias, f->bias_radps);
     double x[6] = {e.x, e.y, e.z, b.x, b.y, b.z}, inverse[36], sum = 0.0;
     assert_true(bst_symmetric_invert(6, &f->covariance[0][0], inverse));
@@ -193,15 +198,16 @@ static void test_consistency(void **state) {
     (void)state;
     enum { RUNS = 100, SAMPLES = 3000, EVERY = 5, TIMES = 3 };
     double dt = 0.05, total[TIMES] = {0};
-    bst_gyro_config gc = gyro_config(0.02, 0.5);
+    bst_spacecraft_gyro_config gc = gyro_config(0.02, 0.5);
     gc.bias_sigma_degph = 5.0;
-    bst_star_tracker_config tc = tracker_config(6.0, 45.0);
+    bst_spacecraft_star_tracker_config tc = tracker_config(6.0, 45.0);
     for (int run = 0; run < RUNS; run++) {
-        bst_gyro gyro;
-        bst_star_tracker tracker;
-        bst_gyro_init(&gyro, &gc, dt, bst_rng_make_key(3, (uint64_t)run, "a", "gyro"));
-        bst_star_tracker_init(&tracker, &tc, bst_rng_make_key(3, (uint64_t)run, "a", "tracker"));
-        bst_mat3 noise = bst_star_tracker_covariance(&tracker);
+        bst_spacecraft_gyro gyro;
+        bst_spacecraft_star_tracker tracker;
+        bst_spacecraft_gyro_init(&gyro, &gc, dt, bst_rng_make_key(3, (uint64_t)run, "a", "gyro"));
+        bst_spacecraft_star_tracker_init(&tracker, &tc,
+                                         bst_rng_make_key(3, (uint64_t)run, "a", "tracker"));
+        bst_mat3 noise = bst_spacecraft_star_tracker_covariance(&tracker);
         double a[2], b[2], sigma = 60.0 * BST_ARCSEC_RAD;
         bst_rng_key key = bst_rng_make_key(3, (uint64_t)run, "a", "start");
         bst_rng_normal2(key, 0, 0, a);
@@ -217,11 +223,11 @@ static void test_consistency(void **state) {
             bst_vec3 turn = bst_vec3_scale((bst_vec3){cos(0.01 * t), sin(0.013 * t), 0.5},
                                            0.5 * BST_DEG_RAD * dt);
             q = turned(q, turn);
-            bst_attitude_filter_propagate(&f, bst_gyro_measure(&gyro, turn), dt);
+            bst_attitude_filter_propagate(&f, bst_spacecraft_gyro_measure(&gyro, turn), dt);
             if (n % EVERY == 0) {
-                bst_quat seen = bst_star_tracker_measure(&tracker, n, q);
-                bst_attitude_filter_update(&f, bst_attitude_error(seen, f.q_body_from_gcrf), 0.0,
-                                           BST_QUAT_IDENTITY, &noise, NULL);
+                bst_quat seen = bst_spacecraft_star_tracker_measure(&tracker, n, q);
+                bst_attitude_filter_update(&f, bst_attitude_filter_error(seen, f.q_body_from_gcrf),
+                                           0.0, BST_QUAT_IDENTITY, &noise, NULL);
             }
             for (int k = 0; k < TIMES; k++) {
                 if (n == (k == 0 ? 20 : k == 1 ? 400 : SAMPLES)) {

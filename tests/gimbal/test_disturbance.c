@@ -27,7 +27,7 @@ static void test_gravity_gradient(void **state) {
             expected,
             bst_vec3_cross(lever, bst_vec3_scale(there, -BST_EARTH_MU_M3PS2 / (r * r * r))));
     }
-    bst_vec3 torque = bst_gravity_gradient_torque(&inertia, q, place);
+    bst_vec3 torque = bst_spacecraft_gravity_gradient_torque(&inertia, q, place);
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(torque, expected)) / bst_vec3_norm(expected), 0.0,
                      1e-8); /* cancellation in Newton's forces: 1e-16 r / d */
     /* none about the way to the Earth */
@@ -40,7 +40,7 @@ static void test_sunlight(void **state) {
     bst_disturbance_config c = {
         .solar_area_m2 = 3.0, .solar_coefficient = 1.5, .solar_lever_m = {0.0, 0.0, 0.2}};
     bst_vec3 sun = {2.0 * BST_AU_M, 0, 0};
-    bst_vec3 t = bst_solar_torque(&c, BST_QUAT_IDENTITY, sun, 1.0);
+    bst_vec3 t = bst_spacecraft_solar_torque(&c, BST_QUAT_IDENTITY, sun, 1.0);
     /* force along -x at +z: about -y; a quarter of it at 2 au */
     double expected = BST_SUNLIGHT_PRESSURE_PA * 3.0 * 1.5 * 0.2 / 4.0;
     bst_assert_close(t.y, -expected, 1e-20);
@@ -56,18 +56,18 @@ static void test_sunlight(void **state) {
 static void test_magnetic(void **state) {
     (void)state;
     double r = 6371.2e3;
-    bst_vec3 equator = bst_dipole_field_t((bst_vec3){r, 0, 0});
+    bst_vec3 equator = bst_spacecraft_dipole_field_t((bst_vec3){r, 0, 0});
     bst_assert_close(equator.z, 29404.8e-9, 1e-18); /* northwards */
-    bst_vec3 pole = bst_dipole_field_t((bst_vec3){0, 0, 2.0 * r});
+    bst_vec3 pole = bst_spacecraft_dipole_field_t((bst_vec3){0, 0, 2.0 * r});
     bst_assert_close(pole.z, -2.0 * 29404.8e-9 / 8.0, 1e-18); /* downwards, r^-3 */
     /* unloading never adds momentum: torque . h <= 0, and takes 1 / 600 s of what is across */
     bst_vec3 h = {0.1, -0.2, 0.05}, b = {1e-5, 2e-5, -2e-5};
-    bst_vec3 m = bst_unload_dipole(h, b, 1e9), t = bst_vec3_cross(m, b);
+    bst_vec3 m = bst_spacecraft_unload_dipole(h, b, 1e9), t = bst_vec3_cross(m, b);
     bst_vec3 along = bst_vec3_unit(b);
     bst_vec3 across = bst_vec3_axpy(h, -bst_vec3_dot(h, along), along);
     bst_assert_close(bst_vec3_norm(bst_vec3_add(t, bst_vec3_scale(across, 1.0 / BST_UNLOAD_S))),
                      0.0, 1e-18);
-    m = bst_unload_dipole(h, b, 1.0);
+    m = bst_spacecraft_unload_dipole(h, b, 1.0);
     assert_true(fmax(fabs(m.x), fmax(fabs(m.y), fabs(m.z))) <= 1.0);
 }
 
@@ -89,7 +89,7 @@ static void test_sum_of_all(void **state) {
                                  -6.240785414080395e+03}; /* dipole times 600 s */
     const double field[3] = {-2.633616200412180e-05, 1.943859576494705e-05,
                              -7.529064889054064e-06}; /* GCRF */
-    bst_vec3 b = bst_dipole_field_t(place);
+    bst_vec3 b = bst_spacecraft_dipole_field_t(place);
     bst_assert_close(b.x, field[0], 1e-17);
     bst_assert_close(b.y, field[1], 1e-17);
     bst_assert_close(b.z, field[2], 1e-17);
@@ -106,7 +106,7 @@ static void test_sum_of_all(void **state) {
     bst_assert_close(t.y, -2e-5 + gradient[1] + force * per_newton[1] + magnetic[1], 1e-15);
     bst_assert_close(t.z, 3e-5 + gradient[2] + force * per_newton[2] + magnetic[2], 1e-15);
     /* torquers alone, each clipped by itself */
-    bst_vec3 body = bst_quat_rotate(q, b), m = bst_unload_dipole(momentum, body, 12.0);
+    bst_vec3 body = bst_quat_rotate(q, b), m = bst_spacecraft_unload_dipole(momentum, body, 12.0);
     bst_assert_close(m.x, unloading[0] / 600.0, 1e-12);
     bst_assert_close(m.y, -12.0, 0.0);
     bst_assert_close(m.z, unloading[2] / 600.0, 1e-12);
@@ -120,17 +120,17 @@ static void test_sum_of_all(void **state) {
 /* Axis and second axis go where each law says; the roll turns about the axis alone. */
 static void test_laws(void **state) {
     (void)state;
-    bst_law_inputs in = {.position_m = {7e6, 1e6, -2e6},
-                         .velocity_mps = {-1e3, 7e3, 1e3},
-                         .sun_m = {1e11, -5e10, 3e10},
-                         .target = {0.1, 0.2, 0.97}};
+    bst_spacecraft_law_inputs in = {.position_m = {7e6, 1e6, -2e6},
+                                    .velocity_mps = {-1e3, 7e3, 1e3},
+                                    .sun_m = {1e11, -5e10, 3e10},
+                                    .target = {0.1, 0.2, 0.97}};
     bst_pointing_law law = {.q_nominal = bst_quat_unit((bst_quat){0.2, 0.4, -0.1, 0.8}),
                             .axis = bst_vec3_unit((bst_vec3){1, 2, 3}),
                             .second_axis = bst_vec3_unit((bst_vec3){0, 1, -1})};
     bst_vec3 nominal_second = bst_quat_rotate(bst_quat_conj(law.q_nominal), law.second_axis);
     for (int k = 0; k < 2; k++) {
         law.roll_rad = k * 0.4;
-        static const bst_law laws[3] = {BST_LAW_NADIR, BST_LAW_SUN, BST_LAW_TARGET};
+        static const bst_spacecraft_law laws[3] = {BST_LAW_NADIR, BST_LAW_SUN, BST_LAW_TARGET};
         for (int i = 0; i < 3; i++) {
             law.law = laws[i];
             bst_quat back = bst_quat_conj(bst_pointing_law_attitude(&law, &in));
@@ -172,9 +172,12 @@ static void test_reference(void **state) {
     }
     for (int i = 0; i < 3; i++) {
         double place = 1.2 + 0.3 * i, h = 1e-3;
-        bst_attitude_reference a = bst_attitude_reference_at(node, step, place - h / step),
-                               b = bst_attitude_reference_at(node, step, place),
-                               c = bst_attitude_reference_at(node, step, place + h / step);
+        bst_spacecraft_attitude_reference a = bst_spacecraft_attitude_reference_at(
+                                              node, step, place - h / step),
+                                          b = bst_spacecraft_attitude_reference_at(node, step,
+                                                                                   place),
+                                          c = bst_spacecraft_attitude_reference_at(
+                                              node, step, place + h / step);
         bst_vec3 turn =
             bst_quat_to_rotvec(bst_quat_mul(c.q_body_from_gcrf, bst_quat_conj(a.q_body_from_gcrf)));
         bst_vec3 rate = bst_vec3_scale(turn, -0.5 / h);
@@ -185,9 +188,12 @@ static void test_reference(void **state) {
         /* rolled about z at a rate: the same test of the rolled motion */
         bst_vec3 z = {0, 0, 1};
         double roll = 0.3, spin = 0.02;
-        bst_attitude_reference ra = bst_attitude_reference_rolled(&a, z, roll - spin * h, spin),
-                               rb = bst_attitude_reference_rolled(&b, z, roll, spin),
-                               rc = bst_attitude_reference_rolled(&c, z, roll + spin * h, spin);
+        bst_spacecraft_attitude_reference ra = bst_spacecraft_attitude_reference_rolled(
+                                              &a, z, roll - spin * h, spin),
+                                          rb = bst_spacecraft_attitude_reference_rolled(&b, z, roll,
+                                                                                        spin),
+                                          rc = bst_spacecraft_attitude_reference_rolled(
+                                              &c, z, roll + spin * h, spin);
         turn = bst_quat_to_rotvec(
             bst_quat_mul(rc.q_body_from_gcrf, bst_quat_conj(ra.q_body_from_gcrf)));
         rate = bst_vec3_scale(turn, -0.5 / h);
@@ -197,7 +203,7 @@ static void test_reference(void **state) {
     }
     /* a jump is no motion */
     node[2] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){1.0, 0, 0}), node[2]);
-    bst_attitude_reference r = bst_attitude_reference_at(node, step, 1.9);
+    bst_spacecraft_attitude_reference r = bst_spacecraft_attitude_reference_at(node, step, 1.9);
     bst_assert_close(bst_vec3_norm(r.rate_radps), 0.0, 0.0);
     bst_assert_close(r.q_body_from_gcrf.w, node[2].w, 0.0);
 }

@@ -9,7 +9,7 @@
 #include "tests/test_support.h"
 
 static const bst_module_desc *const modules[] = {&bst_gimbal_ideal_module};
-static const bst_registry registry = {.modules = modules, .count = 1};
+static const bst_scenario_registry registry = {.modules = modules, .count = 1};
 
 #define SCENARIO(gimbal_)                                                                          \
     "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 2, "              \
@@ -23,7 +23,7 @@ typedef struct fixture {
     bst_scenario scenario;
     bst_simulation *simulation;
     const bst_world *world;
-    bst_view *view;
+    bst_world_view *view;
     bst_vec3 icrs; /* where it shall look; astrometric */
     int samples;
     double worst_rad;
@@ -39,21 +39,21 @@ static bst_status open_simulation(fixture *f, const char *text) {
     bst_status status = bst_simulation_create(&f->ctx, &f->scenario, &options, &f->simulation);
     if (status == BST_OK) {
         f->world = bst_simulation_world(f->simulation);
-        bst_assert_ok(&f->ctx, bst_view_create(&f->ctx, f->world, &f->view));
+        bst_assert_ok(&f->ctx, bst_world_view_create(&f->ctx, f->world, &f->view));
     }
     return status;
 }
 
 static void end(fixture *f) {
-    bst_view_free(f->view);
+    bst_world_view_free(f->view);
     bst_simulation_free(f->simulation);
     bst_scenario_free(&f->scenario);
 }
 
 /* Apparent direction by ERFA alone; only the observer's orbit is the world's. TT serves as TDB. */
 static void apparent(const fixture *f, bst_ctx *ctx, double seconds, double out[3]) {
-    bst_state s;
-    bst_assert_ok(ctx, bst_view_observer_state(ctx, f->view, 0, seconds, &s));
+    bst_world_state s;
+    bst_assert_ok(ctx, bst_world_view_observer_state(ctx, f->view, 0, seconds, &s));
     double tai1, tai2, tt1, tt2, heliocentric[2][3], barycentric[2][3];
     assert_int_equal(eraDtf2d("UTC", 2022, 6, 16, 22, 10, 0.0, &tai1, &tai2), 0);
     assert_int_equal(eraUtctai(tai1, tai2, &tai1, &tai2), 0);

@@ -11,46 +11,49 @@
 
 #define DT 1e-3
 
-static const bst_density_point steep_points[] = {{4.0, 2e-2}, {20.0, 8e-4}, {200.0, 8e-6}};
-static const bst_density steep = {steep_points, 3}; /* f^-2 */
-static const bst_density_point bent_points[] = {{5, 1e-3}, {40, 1e-3}, {80, 2e-2}, {150, 1e-4}};
-static const bst_density bent = {bent_points, 4};
-static const bst_density_point slow_points[] = {{0.02, 4.0}, {0.1, 4.0}, {1.0, 0.04}};
-static const bst_density slow = {slow_points, 3};
+static const bst_jitter_density_point steep_points[] = {{4.0, 2e-2}, {20.0, 8e-4}, {200.0, 8e-6}};
+static const bst_jitter_density steep = {steep_points, 3}; /* f^-2 */
+static const bst_jitter_density_point bent_points[] = {
+    {5, 1e-3}, {40, 1e-3}, {80, 2e-2}, {150, 1e-4}};
+static const bst_jitter_density bent = {bent_points, 4};
+static const bst_jitter_density_point slow_points[] = {{0.02, 4.0}, {0.1, 4.0}, {1.0, 0.04}};
+static const bst_jitter_density slow = {slow_points, 3};
 
 static void integrals_are_closed_forms(void **state) {
     (void)state;
     /* a f^-2 from 4 to 200 Hz: a (1/4 - 1/200), a = 0.32; rounding of pow and log */
-    bst_assert_close(bst_density_integral(&steep, 0.0, 1e9), 0.32 * (0.25 - 0.005), 1e-15);
-    bst_assert_close(bst_density_integral(&steep, 10.0, 30.0), 0.32 * (0.1 - 1.0 / 30.0), 1e-15);
-    bst_assert_close(bst_density_at(&steep, 100.0), 0.32e-4, 1e-18);
-    assert_true(bst_density_at(&steep, 3.999) == 0.0 && bst_density_at(&steep, 200.1) == 0.0);
+    bst_assert_close(bst_jitter_density_integral(&steep, 0.0, 1e9), 0.32 * (0.25 - 0.005), 1e-15);
+    bst_assert_close(bst_jitter_density_integral(&steep, 10.0, 30.0), 0.32 * (0.1 - 1.0 / 30.0),
+                     1e-15);
+    bst_assert_close(bst_jitter_density_at(&steep, 100.0), 0.32e-4, 1e-18);
+    assert_true(bst_jitter_density_at(&steep, 3.999) == 0.0 &&
+                bst_jitter_density_at(&steep, 200.1) == 0.0);
     /* 1/f, whose power is no power */
-    const bst_density_point pink[] = {{1.0, 3.0}, {10.0, 0.3}};
-    bst_density p = {pink, 2};
-    bst_assert_close(bst_density_integral(&p, 2.0, 8.0), 3.0 * log(4.0), 1e-14);
+    const bst_jitter_density_point pink[] = {{1.0, 3.0}, {10.0, 0.3}};
+    bst_jitter_density p = {pink, 2};
+    bst_assert_close(bst_jitter_density_integral(&p, 2.0, 8.0), 3.0 * log(4.0), 1e-14);
     /* straight from zero */
-    const bst_density_point ramp[] = {{0.0, 0.0}, {10.0, 2.0}, {12.0, 0.0}};
-    bst_density r = {ramp, 3};
-    bst_assert_close(bst_density_integral(&r, 0.0, 20.0), 12.0, 1e-14);
-    bst_assert_close(bst_density_at(&r, 5.0), 1.0, 1e-15);
+    const bst_jitter_density_point ramp[] = {{0.0, 0.0}, {10.0, 2.0}, {12.0, 0.0}};
+    bst_jitter_density r = {ramp, 3};
+    bst_assert_close(bst_jitter_density_integral(&r, 0.0, 20.0), 12.0, 1e-14);
+    bst_assert_close(bst_jitter_density_at(&r, 5.0), 1.0, 1e-15);
 }
 
 enum { COUNT = 1024, SEGMENTS = 120, PLACES = 24 };
 
 /* Averages of periodograms over both axes and SEGMENTS stretches far apart, over the density: chi
  * squared with 4 * SEGMENTS degrees of freedom, over their number. */
-static void judge(const bst_density *density, int64_t hop, double from_hz, double to_hz,
+static void judge(const bst_jitter_density *density, int64_t hop, double from_hz, double to_hz,
                   double slack) {
-    static bst_noise noise;
-    bst_noise_init(&noise, density, 400.0, DT, bst_rng_make_key(3, 0, "a", "psd"));
+    static bst_jitter_noise noise;
+    bst_jitter_noise_init(&noise, density, 400.0, DT, bst_rng_make_key(3, 0, "a", "psd"));
     static double x[2][COUNT];
     double sum[PLACES] = {0.0};
     double step_s = DT * (double)hop;
     for (int s = 0; s < SEGMENTS; s++) {
         for (int n = 0; n < COUNT; n++) {
             double v[2];
-            bst_noise_at(&noise, ((int64_t)s * 2 * COUNT + n) * hop, v);
+            bst_jitter_noise_at(&noise, ((int64_t)s * 2 * COUNT + n) * hop, v);
             x[0][n] = v[0];
             x[1][n] = v[1];
         }
@@ -62,7 +65,7 @@ static void judge(const bst_density *density, int64_t hop, double from_hz, doubl
     double freedom = 4.0 * SEGMENTS, sigma = sqrt(2.0 / freedom), chi2 = 0.0;
     for (int p = 0; p < PLACES; p++) {
         double f = from_hz * pow(to_hz / from_hz, p / (PLACES - 1.0));
-        double ratio = sum[p] / (2.0 * SEGMENTS) / bst_density_at(density, f);
+        double ratio = sum[p] / (2.0 * SEGMENTS) / bst_jitter_density_at(density, f);
         chi2 += pow((ratio - 1.0) / sigma, 2.0);
         /* 4 sigma of 24 values (1 in 600), and what the windows smooth */
         bst_assert_close(ratio, 1.0, 4.0 * sigma + slack);
@@ -80,18 +83,18 @@ static void spectrum_is_the_table(void **state) {
 
 static void variance_is_the_integral_at_every_step(void **state) {
     (void)state;
-    static bst_noise noise;
-    bst_noise_init(&noise, &bent, 400.0, DT, bst_rng_make_key(4, 0, "a", "psd"));
+    static bst_jitter_noise noise;
+    bst_jitter_noise_init(&noise, &bent, 400.0, DT, bst_rng_make_key(4, 0, "a", "psd"));
     double square[8] = {0.0}, fourth = 0.0, cross = 0.0;
     const int blocks = 400;
     for (int n = 0; n < blocks * 1024; n++) {
         double v[2];
-        bst_noise_at(&noise, n, v);
+        bst_jitter_noise_at(&noise, n, v);
         square[(n + 2) % 1024 / 128] += v[0] * v[0] + v[1] * v[1];
         fourth += pow(v[0], 4) + pow(v[1], 4);
         cross += v[0] * v[1];
     }
-    double variance = bst_density_integral(&bent, 0.0, 1e9), count = blocks * 1024.0;
+    double variance = bst_jitter_density_integral(&bent, 0.0, 1e9), count = blocks * 1024.0;
     double total = 0.0;
     for (int i = 0; i < 8; i++) {
         double mean = square[i] / (2.0 * count / 8.0);
@@ -108,13 +111,13 @@ static void variance_is_the_integral_at_every_step(void **state) {
 
 static void slow_noise_is_smooth_between_its_nodes(void **state) {
     (void)state;
-    static bst_noise noise;
-    bst_noise_init(&noise, &slow, 400.0, DT, bst_rng_make_key(5, 0, "a", "psd"));
+    static bst_jitter_noise noise;
+    bst_jitter_noise_init(&noise, &slow, 400.0, DT, bst_rng_make_key(5, 0, "a", "psd"));
     assert_int_equal(noise.stride, 32); /* 20 nodes in a second, 50 steps apart at the most */
     static double x[8192];
     for (int n = 0; n < 8192; n++) {
         double v[2];
-        bst_noise_at(&noise, 100000 + n, v);
+        bst_jitter_noise_at(&noise, 100000 + n, v);
         x[n] = v[0];
     }
     double above = 0.0;
@@ -134,20 +137,20 @@ static void slow_noise_is_smooth_between_its_nodes(void **state) {
 
 static void value_depends_on_the_step_alone(void **state) {
     (void)state;
-    const bst_density *tables[] = {&bent, &slow};
+    const bst_jitter_density *tables[] = {&bent, &slow};
     for (int t = 0; t < 2; t++) {
-        static bst_noise forward, jumping;
+        static bst_jitter_noise forward, jumping;
         bst_rng_key key = bst_rng_make_key(6, 0, "a", "psd");
-        bst_noise_init(&forward, tables[t], 400.0, DT, key);
-        bst_noise_init(&jumping, tables[t], 400.0, DT, key);
+        bst_jitter_noise_init(&forward, tables[t], 400.0, DT, key);
+        bst_jitter_noise_init(&jumping, tables[t], 400.0, DT, key);
         static double at[5000][2];
         for (int n = 0; n < 5000; n++) {
-            bst_noise_at(&forward, n, at[n]);
+            bst_jitter_noise_at(&forward, n, at[n]);
         }
         for (int i = 0; i < 300; i++) {
             int n = (i * 1237) % 5000;
             double v[2];
-            bst_noise_at(&jumping, n, v);
+            bst_jitter_noise_at(&jumping, n, v);
             assert_memory_equal(v, at[n], sizeof v);
         }
     }
@@ -197,7 +200,8 @@ static void samples_and_what_they_lack_are_all_of_it(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_jitter_psd_config c = empty_config();
-    bst_density_point low[] = {{0.5, 0.02}, {5.0, 0.02}}, high[] = {{20.0, 2e-4}, {900.0, 2e-4}};
+    bst_jitter_density_point low[] = {{0.5, 0.02}, {5.0, 0.02}},
+                             high[] = {{20.0, 2e-4}, {900.0, 2e-4}};
     bst_jitter_line_config lines[] = {{90.0, 0.1, 2, true, 0.0}, {700.0, 0.1, 0, true, 0.0}};
     c.low = (bst_config_list){low, 2};
     c.high = (bst_config_list){high, 2};
@@ -255,7 +259,7 @@ static void tables_come_from_files_and_bad_ones_are_refused(void **state) {
     assert_int_equal(s.low.count, 3);
     bst_assert_close(s.low.points[1].psd, 4.0 * 2e-3, 1e-18);
     bst_jitter_spectrum_free(&s);
-    bst_density_point one[] = {{1.0, 1.0}}, back[] = {{2.0, 1.0}, {1.0, 1.0}};
+    bst_jitter_density_point one[] = {{1.0, 1.0}}, back[] = {{2.0, 1.0}, {1.0, 1.0}};
     c.low = (bst_config_list){back, 2};
     assert_int_equal(bst_jitter_spectrum_create(&ctx, &no_bands, &c, 2.0, &s), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "both a table and low_file"));

@@ -449,7 +449,8 @@ static void a_slew_turns_a_free_body_back(void **state) {
                 recoil = fmax(recoil, bst_vec3_norm(bst_vec3_sub(rate, before)));
             }
             mount_before = bst_mount_swap(
-                type, bst_chain_momentum(&m.joints.chain, &m.joints.state, m.base_rate_radps));
+                type,
+                bst_mount_chain_momentum(&m.joints.chain, &m.joints.state, m.base_rate_radps));
             q_before = q;
             bst_vec3 old = rate, mid = rate;
             for (int i = 0; i < 4; i++) { /* midpoint rule of J dw/dt = torque - w x J w */

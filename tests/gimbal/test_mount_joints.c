@@ -7,20 +7,21 @@
 static const bst_vec3 still = {0, 0, 0};
 
 /* Three stages with products of inertia, nothing else. */
-static bst_joints bare(int stages) {
-    bst_joints j = {.chain = {.stages = stages,
-                              .inertia = {{0.6, 0.5, 0.45, 0.02, -0.03, 0.01},
-                                          {0.3, 0.28, 0.2, -0.01, 0.02, 0.015},
-                                          {0.1, 0.09, 0.06, 0.004, 0.003, -0.005}}}};
+static bst_mount_joints bare(int stages) {
+    bst_mount_joints j = {.chain = {.stages = stages,
+                                    .inertia = {{0.6, 0.5, 0.45, 0.02, -0.03, 0.01},
+                                                {0.3, 0.28, 0.2, -0.01, 0.02, 0.015},
+                                                {0.1, 0.09, 0.06, 0.004, 0.003, -0.005}}}};
     for (int k = 0; k < 3; k++) {
-        j.joint[k] = (bst_joint){.stribeck_radps = 1e-3, .min_rad = -INFINITY, .max_rad = INFINITY};
+        j.joint[k] =
+            (bst_mount_joint){.stribeck_radps = 1e-3, .min_rad = -INFINITY, .max_rad = INFINITY};
     }
-    bst_joints_init(&j, (double[3]){0.0, 0.0, 0.0});
+    bst_mount_joints_init(&j, (double[3]){0.0, 0.0, 0.0});
     return j;
 }
 
-static void put(bst_joints *j, const double angle[3], const double rate[3]) {
-    bst_joints_init(j, angle);
+static void put(bst_mount_joints *j, const double angle[3], const double rate[3]) {
+    bst_mount_joints_init(j, angle);
     for (int k = 0; k < j->chain.stages; k++) {
         j->state.rate_radps[k] = rate[k];
     }
@@ -28,14 +29,14 @@ static void put(bst_joints *j, const double angle[3], const double rate[3]) {
 
 static void mass_matrix_is_that_of_the_kinetic_energy(void **state) {
     (void)state;
-    bst_joints j = bare(3);
+    bst_mount_joints j = bare(3);
     const double angle[3] = {0.7, -1.1, 0.4};
     double s[3], c[3];
     for (int k = 0; k < 3; k++) {
         s[k] = sin(angle[k]);
         c[k] = cos(angle[k]);
     }
-    bst_chain_equations eq;
+    bst_mount_chain_equations eq;
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
             double one[3] = {0.0}, two[3] = {0.0}, both[3] = {0.0};
@@ -44,13 +45,13 @@ static void mass_matrix_is_that_of_the_kinetic_energy(void **state) {
             both[i] += 1.0;
             both[k] += 1.0;
             put(&j, angle, both);
-            double energy = bst_chain_energy(&j.chain, &j.state, still);
+            double energy = bst_mount_chain_energy(&j.chain, &j.state, still);
             put(&j, angle, one);
-            energy -= bst_chain_energy(&j.chain, &j.state, still);
+            energy -= bst_mount_chain_energy(&j.chain, &j.state, still);
             put(&j, angle, two);
-            energy -= bst_chain_energy(&j.chain, &j.state, still);
-            bst_chain_base base = {still, still};
-            bst_chain_equations_at(&j.chain, &j.state, s, c, &base, &eq);
+            energy -= bst_mount_chain_energy(&j.chain, &j.state, still);
+            bst_mount_chain_base base = {still, still};
+            bst_mount_chain_equations_at(&j.chain, &j.state, s, c, &base, &eq);
             bst_assert_close(eq.mass[i][k], energy, 1e-15); /* a dozen roundings of values near 1 */
         }
     }
@@ -62,14 +63,14 @@ static void energy_is_kept_without_torque(void **state) {
     (void)state;
     const double angle[3] = {0.3, 0.8, -0.5}, rate[3] = {1.0, -0.7, 1.3}, none[3] = {0.0};
     for (int stages = 2; stages <= 3; stages++) {
-        bst_joints j = bare(stages);
+        bst_mount_joints j = bare(stages);
         put(&j, angle, rate);
-        double before = bst_joints_energy(&j, still);
+        double before = bst_mount_joints_energy(&j, still);
         for (int n = 0; n < 20000; n++) {
-            bst_joints_step(&j, DT, none, still, still);
+            bst_mount_joints_step(&j, DT, none, still, still);
         }
         /* order 4: per second (w dt)^5 / 120 of a motion of w = 2 rad/s is some 1e-13 */
-        bst_assert_close(bst_joints_energy(&j, still) / before, 1.0, 1e-10);
+        bst_assert_close(bst_mount_joints_energy(&j, still) / before, 1.0, 1e-10);
     }
 }
 
@@ -77,19 +78,19 @@ static void energy_is_kept_without_torque(void **state) {
  * reaction reaches the body a step later, as in the simulation. */
 static void momentum_of_body_and_mount_is_kept(void **state) {
     (void)state;
-    bst_joints j = bare(3);
+    bst_mount_joints j = bare(3);
     j.chain.flex_inertia[1] = 0.05;
     j.chain.flex_stiffness[1] = 0.05 * 200.0 * 200.0;
     j.chain.flex_damping[1] = 0.05 * 2.0;
     j.joint[0].coulomb_nm = j.joint[0].breakaway_nm = 0.05;
-    bst_joints_init(&j, (double[3]){0.1, 0.2, -0.3});
+    bst_mount_joints_init(&j, (double[3]){0.1, 0.2, -0.3});
     const double body[3] = {12.0, 15.0, 10.0};
     bst_vec3 rate = {0.01, -0.02, 0.015}, torque = {0, 0, 0};
     bst_quat q = BST_QUAT_IDENTITY; /* base from inertial */
     bst_vec3 first = {0, 0, 0};
     double worst = 0.0, mount_most = 0.0;
     for (int n = 0; n < 20000; n++) {
-        bst_vec3 mount = bst_chain_momentum(&j.chain, &j.state, rate);
+        bst_vec3 mount = bst_mount_chain_momentum(&j.chain, &j.state, rate);
         bst_vec3 before = rate;
         /* body: J dw/dt = torque - w x J w, midpoint rule */
         bst_vec3 mid = rate;
@@ -103,8 +104,8 @@ static void momentum_of_body_and_mount_is_kept(void **state) {
         q = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(mid, -DT)), q));
         double t = n * DT;
         double motor[3] = {0.5 * sin(2.0 * t), 0.3 * cos(3.0 * t), -0.2 * sin(5.0 * t)};
-        bst_joints_step(&j, DT, motor, before, rate);
-        bst_vec3 after = bst_chain_momentum(&j.chain, &j.state, rate);
+        bst_mount_joints_step(&j, DT, motor, before, rate);
+        bst_vec3 after = bst_mount_chain_momentum(&j.chain, &j.state, rate);
         bst_vec3 gain = bst_vec3_scale(bst_vec3_sub(after, mount), 1.0 / DT);
         gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(before, mount));
         gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(rate, after));
@@ -131,17 +132,17 @@ static void momentum_of_body_and_mount_is_kept(void **state) {
 static void cable_swings_at_its_frequency(void **state) {
     (void)state;
     for (int method = 0; method < 2; method++) {
-        bst_joints j = bare(2);
+        bst_mount_joints j = bare(2);
         j.method = method;
         j.joint[1].spring_nm = 40.0;
         j.joint[1].spring_zero_rad = 0.2;
         j.joint[0].stuck = true;
-        bst_joints_init(&j, (double[3]){0.0, 0.3, 0.0});
+        bst_mount_joints_init(&j, (double[3]){0.0, 0.3, 0.0});
         double inertia = 0.28, expected = sqrt(40.0 / inertia);
         int turns = 0;
         double last = 0.1, first_time = 0.0, last_time = 0.0;
         for (int n = 1; n <= 20000; n++) {
-            bst_joints_step(&j, DT, (double[3]){0.0}, still, still);
+            bst_mount_joints_step(&j, DT, (double[3]){0.0}, still, still);
             double x = j.state.angle_rad[1] - 0.2;
             if (last > 0.0 && x <= 0.0) {
                 last_time = (n - 1 + last / (last - x)) * DT;
@@ -153,7 +154,7 @@ static void cable_swings_at_its_frequency(void **state) {
         /* rk4: (w dt)^4 / 120; leapfrog: (w dt)^2 / 24 with w dt = 0.012; crossings to 1e-9 s */
         bst_assert_close(measured / expected, 1.0, method == 0 ? 1e-8 : 1e-5);
         /* and it neither dies nor grows */
-        bst_assert_close(bst_joints_energy(&j, still) / (0.5 * 40.0 * 0.01), 1.0,
+        bst_assert_close(bst_mount_joints_energy(&j, still) / (0.5 * 40.0 * 0.01), 1.0,
                          method == 0 ? 1e-5 : 1e-4);
     }
 }
@@ -162,18 +163,18 @@ static void cable_swings_at_its_frequency(void **state) {
 static void flexible_mode_swings_at_its_frequencies(void **state) {
     (void)state;
     for (int held = 0; held < 2; held++) {
-        bst_joints j = bare(2);
+        bst_mount_joints j = bare(2);
         double all = 0.28, share = 0.3, w = 2.0 * BST_PI * 30.0;
         j.chain.flex_inertia[1] = share * all;
         j.chain.flex_stiffness[1] = share * all * w * w;
         j.joint[0].stuck = true;
         j.joint[1].stuck = held == 1;
-        bst_joints_init(&j, (double[3]){0.0});
+        bst_mount_joints_init(&j, (double[3]){0.0});
         j.state.flex_rad[1] = 1e-3;
         int turns = 0;
         double last = 1e-3, first_time = 0.0, last_time = 0.0;
         for (int n = 1; n <= 40000; n++) {
-            bst_joints_step(&j, 0.5 * DT, (double[3]){0.0}, still, still);
+            bst_mount_joints_step(&j, 0.5 * DT, (double[3]){0.0}, still, still);
             double x = j.state.flex_rad[1];
             if (last > 0.0 && x <= 0.0) {
                 last_time = (n - 1 + last / (last - x)) * 0.5 * DT;
@@ -190,7 +191,7 @@ static void flexible_mode_swings_at_its_frequencies(void **state) {
 static void coulomb_friction_stops_in_time_and_place(void **state) {
     (void)state;
     for (int direction = -1; direction <= 1; direction += 2) {
-        bst_joints j = bare(2);
+        bst_mount_joints j = bare(2);
         double friction = 0.035, inertia = 0.28, v = 0.2 * direction;
         j.joint[1].coulomb_nm = j.joint[1].breakaway_nm = friction;
         j.joint[0].stuck = true;
@@ -198,7 +199,7 @@ static void coulomb_friction_stops_in_time_and_place(void **state) {
         double decel = friction / inertia, time = fabs(v) / decel;
         int n = 0;
         while (j.state.rate_radps[1] != 0.0 && n < 100000) {
-            bst_joints_step(&j, DT, (double[3]){0.0}, still, still);
+            bst_mount_joints_step(&j, DT, (double[3]){0.0}, still, still);
             n++;
         }
         /* it stops inside of the step, which is found exactly for a constant torque */
@@ -206,7 +207,7 @@ static void coulomb_friction_stops_in_time_and_place(void **state) {
         bst_assert_close(j.state.angle_rad[1], direction * 0.5 * v * v / decel, 1e-12);
         double rest = j.state.angle_rad[1];
         for (int i = 0; i < 1000; i++) {
-            bst_joints_step(&j, DT, (double[3]){0.0}, still, still);
+            bst_mount_joints_step(&j, DT, (double[3]){0.0}, still, still);
             assert_true(j.state.rate_radps[1] == 0.0 && j.state.angle_rad[1] == rest);
         }
     }
@@ -214,20 +215,20 @@ static void coulomb_friction_stops_in_time_and_place(void **state) {
 
 static void stiction_holds_and_lets_go(void **state) {
     (void)state;
-    bst_joints j = bare(2);
+    bst_mount_joints j = bare(2);
     j.joint[0].stuck = true;
     j.joint[1].coulomb_nm = 0.02;
     j.joint[1].breakaway_nm = 0.05;
-    bst_joints_init(&j, (double[3]){0.0});
+    bst_mount_joints_init(&j, (double[3]){0.0});
     for (int n = 0; n < 5000; n++) { /* to and fro below the breakaway: not one bit moves */
         double push[3] = {0.0, 0.0499 * sin(0.01 * n), 0.0};
-        bst_joints_step(&j, DT, push, still, still);
+        bst_mount_joints_step(&j, DT, push, still, still);
         assert_true(j.state.rate_radps[1] == 0.0 && j.state.angle_rad[1] == 0.0);
     }
     assert_int_equal(j.events, 0);
     double push[3] = {0.0, 0.06, 0.0};
     for (int n = 0; n < 1000; n++) {
-        bst_joints_step(&j, DT, push, still, still);
+        bst_mount_joints_step(&j, DT, push, still, still);
     }
     /* J dv/dt = a - b / (1 + (v / s)^2), a = 0.06 - 0.02, b = 0.05 - 0.02, has the integral
      * a t / J = v + s r / sqrt(1 - r) atan(v / s / sqrt(1 - r)), r = b / a; the step is a hundredth
@@ -238,25 +239,25 @@ static void stiction_holds_and_lets_go(void **state) {
 
 static void no_and_huge_friction(void **state) {
     (void)state;
-    bst_joints j = bare(2);
+    bst_mount_joints j = bare(2);
     j.joint[0].stuck = true;
     put(&j, (double[3]){0.0}, (double[3]){0.0, 1e-9, 0.0});
     for (int n = 0; n < 1000; n++) { /* free: the slowest motion goes on, and through zero */
-        bst_joints_step(&j, DT, (double[3]){0.0, -1e-9, 0.0}, still, still);
+        bst_mount_joints_step(&j, DT, (double[3]){0.0, -1e-9, 0.0}, still, still);
     }
     bst_assert_close(j.state.rate_radps[1], 1e-9 - 1e-9 / 0.28, 1e-20);
 
     j = bare(2);
     j.joint[1].coulomb_nm = j.joint[1].breakaway_nm = 1e9;
     put(&j, (double[3]){0.0}, (double[3]){0.0, 1.0, 0.0});
-    bst_joints_step(&j, DT, (double[3]){0.0, 1e6, 0.0}, still, still);
+    bst_mount_joints_step(&j, DT, (double[3]){0.0, 1e6, 0.0}, still, still);
     assert_true(j.state.rate_radps[1] == 0.0);
     bst_assert_close(j.state.angle_rad[1], 0.5 * 0.28 / 1e9, 1e-12); /* 0.1 % of torque */
     /* it holds against the other axis' motion and against the body's */
     double push[3] = {5.0, 1e6, 0.0};
     for (int n = 0; n < 1000; n++) {
         bst_vec3 a = {0.0, 0.3 * sin(0.1 * n), 0.1}, b = {0.0, 0.3 * sin(0.1 * (n + 1)), 0.1};
-        bst_joints_step(&j, DT, push, a, b);
+        bst_mount_joints_step(&j, DT, push, a, b);
         assert_true(j.state.rate_radps[1] == 0.0);
     }
     assert_true(j.state.rate_radps[0] > 1.0);
@@ -265,16 +266,16 @@ static void no_and_huge_friction(void **state) {
 /* Slow to and fro through zero rate at 1 kHz: each reversal is one stop and one break-away. */
 static void reversals_do_not_chatter(void **state) {
     (void)state;
-    bst_joints j = bare(2);
+    bst_mount_joints j = bare(2);
     j.joint[0].stuck = true;
     j.joint[1].coulomb_nm = 0.02;
     j.joint[1].breakaway_nm = 0.03;
-    bst_joints_init(&j, (double[3]){0.0});
+    bst_mount_joints_init(&j, (double[3]){0.0});
     double last = 0.0;
     int changes = 0;
     for (int n = 0; n < 20000; n++) {
         double push[3] = {0.0, 0.1 * sin(2.0 * BST_PI * 0.5 * n * DT), 0.0};
-        bst_joints_step(&j, DT, push, still, still);
+        bst_mount_joints_step(&j, DT, push, still, still);
         double v = j.state.rate_radps[1];
         changes += (v == 0.0) != (last == 0.0) || v * last < 0.0;
         last = v;
@@ -288,15 +289,15 @@ static void stops_take_energy_and_never_give(void **state) {
     (void)state;
     const double restitution[] = {0.0, 0.5, 1.0};
     for (int r = 0; r < 3; r++) {
-        bst_joints j = bare(3);
+        bst_mount_joints j = bare(3);
         j.joint[1].min_rad = -0.5;
         j.joint[1].max_rad = 0.4;
         j.joint[1].restitution = restitution[r];
         put(&j, (double[3]){0.0}, (double[3]){0.3, 3.0, -0.5});
-        double energy = bst_joints_energy(&j, still);
+        double energy = bst_mount_joints_energy(&j, still);
         for (int n = 0; n < 5000; n++) {
-            bst_joints_step(&j, DT, (double[3]){0.0}, still, still);
-            double now = bst_joints_energy(&j, still);
+            bst_mount_joints_step(&j, DT, (double[3]){0.0}, still, still);
+            double now = bst_mount_joints_energy(&j, still);
             assert_true(now <= energy * (1.0 + 1e-9)); /* the coupling's error of a step */
             energy = now;
             assert_true(j.state.angle_rad[1] <= 0.4 && j.state.angle_rad[1] >= -0.5);
@@ -305,13 +306,13 @@ static void stops_take_energy_and_never_give(void **state) {
         assert_true(j.events > 0 && j.events < 100000);
     }
     /* the closed form of one bounce: in a step of 1 ms there and back */
-    bst_joints j = bare(2);
+    bst_mount_joints j = bare(2);
     j.joint[0].stuck = true;
     j.joint[1].max_rad = 0.1;
     j.joint[1].restitution = 0.5;
     put(&j, (double[3]){0.0}, (double[3]){0.0, 2.0, 0.0});
     for (int n = 0; n < 60; n++) {
-        bst_joints_step(&j, DT, (double[3]){0.0}, still, still);
+        bst_mount_joints_step(&j, DT, (double[3]){0.0}, still, still);
     }
     bst_assert_close(j.state.rate_radps[1], -1.0, 1e-12);
     bst_assert_close(j.state.angle_rad[1], 0.1 - (0.06 - 0.05), 1e-12);
@@ -320,21 +321,21 @@ static void stops_take_energy_and_never_give(void **state) {
 /* Pushed against its stop it comes to rest there, and leaves it when pulled. */
 static void a_stop_holds_what_pushes_and_lets_go_what_pulls(void **state) {
     (void)state;
-    bst_joints j = bare(2);
+    bst_mount_joints j = bare(2);
     j.joint[0].stuck = true;
     j.joint[1].max_rad = 0.05;
     j.joint[1].restitution = 0.5;
-    bst_joints_init(&j, (double[3]){0.0});
+    bst_mount_joints_init(&j, (double[3]){0.0});
     for (int n = 0; n < 3000; n++) {
-        bst_joints_step(&j, DT, (double[3]){0.0, 1.0, 0.0}, still, still);
+        bst_mount_joints_step(&j, DT, (double[3]){0.0, 1.0, 0.0}, still, still);
     }
     assert_true(j.state.angle_rad[1] == 0.05 && j.state.rate_radps[1] == 0.0 && j.at_stop[1]);
     int64_t events = j.events;
     for (int n = 0; n < 100; n++) {
-        bst_joints_step(&j, DT, (double[3]){0.0, 1.0, 0.0}, still, still);
+        bst_mount_joints_step(&j, DT, (double[3]){0.0, 1.0, 0.0}, still, still);
     }
     assert_int_equal(j.events, events);
-    bst_joints_step(&j, DT, (double[3]){0.0, -1.0, 0.0}, still, still);
+    bst_mount_joints_step(&j, DT, (double[3]){0.0, -1.0, 0.0}, still, still);
     bst_assert_close(j.state.rate_radps[1], -DT / 0.28, 1e-12);
 }
 

@@ -51,7 +51,7 @@ static const bst_module_desc commander_module = {.abi = BST_MODULE_ABI,
                                                  .destroy = commander_destroy};
 static const bst_module_desc *const modules[] = {
     &bst_gimbal_azimuth_elevation_module, &bst_gimbal_cross_elevation_module, &commander_module};
-static const bst_registry registry = {.modules = modules, .count = 3};
+static const bst_scenario_registry registry = {.modules = modules, .count = 3};
 
 typedef struct fixture {
     bst_ctx ctx;

@@ -8,25 +8,25 @@
  * torques are constant over 8 ms and rates of the body straight, so that every step size sees the
  * same. */
 static void run(int method, bool friction, double dt, double angle[3], double *seconds) {
-    bst_joints j = {.chain = {.stages = 3,
-                              .inertia = {{0.6, 0.5, 0.45, 0.02, -0.03, 0.01},
-                                          {0.3, 0.28, 0.2, -0.01, 0.02, 0.015},
-                                          {0.1, 0.09, 0.06, 0.004, 0.003, -0.005}}},
-                    .method = method};
+    bst_mount_joints j = {.chain = {.stages = 3,
+                                    .inertia = {{0.6, 0.5, 0.45, 0.02, -0.03, 0.01},
+                                                {0.3, 0.28, 0.2, -0.01, 0.02, 0.015},
+                                                {0.1, 0.09, 0.06, 0.004, 0.003, -0.005}}},
+                          .method = method};
     double w = 2.0 * BST_PI * 30.0, swings = 0.05;
     j.chain.flex_inertia[1] = swings;
     j.chain.flex_stiffness[1] = swings * w * w;
     j.chain.flex_damping[1] = 2.0 * 0.01 * w * swings;
     for (int k = 0; k < 3; k++) {
-        j.joint[k] = (bst_joint){.coulomb_nm = friction ? 0.05 : 0.0,
-                                 .breakaway_nm = friction ? 0.06 : 0.0,
-                                 .stribeck_radps = 0.02,
-                                 .viscous_nms = 0.05,
-                                 .spring_nm = 2.0,
-                                 .min_rad = -INFINITY,
-                                 .max_rad = INFINITY};
+        j.joint[k] = (bst_mount_joint){.coulomb_nm = friction ? 0.05 : 0.0,
+                                       .breakaway_nm = friction ? 0.06 : 0.0,
+                                       .stribeck_radps = 0.02,
+                                       .viscous_nms = 0.05,
+                                       .spring_nm = 2.0,
+                                       .min_rad = -INFINITY,
+                                       .max_rad = INFINITY};
     }
-    bst_joints_init(&j, (double[3]){0.1, 0.2, -0.1});
+    bst_mount_joints_init(&j, (double[3]){0.1, 0.2, -0.1});
     clock_t start = clock();
     int64_t steps = (int64_t)llround(4.096 / dt);
     bst_vec3 before = {0, 0, 0};
@@ -37,7 +37,7 @@ static void run(int method, bool friction, double dt, double angle[3], double *s
         bst_vec3 after = {0.02 * ((1.0 - part) * sin(t) + part * sin(u)),
                           0.01 * ((1.0 - part) * sin(2.0 * t) + part * sin(2.0 * u)),
                           0.01 * (t + part * 0.008)};
-        bst_joints_step(&j, dt, torque, before, after);
+        bst_mount_joints_step(&j, dt, torque, before, after);
         before = after;
     }
     *seconds = (double)(clock() - start) / CLOCKS_PER_SEC / (double)steps;

@@ -8,7 +8,7 @@
 #include "tests/io/scratch.h"
 
 static const bst_module_desc *const modules[] = {&bst_gimbal_scripted_module};
-static const bst_registry registry = {.modules = modules, .count = 1};
+static const bst_scenario_registry registry = {.modules = modules, .count = 1};
 
 #define SCENARIO                                                                                  \
     "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 3, "             \
@@ -244,18 +244,18 @@ static void states(void **state) {
                                 "\"injected\", \"states_file\": \"u.json\", \"states_object\": "
                                 "\"A\"}}]",
                                 "", updates));
-    bst_view *view;
-    bst_assert_ok(&f.ctx, bst_view_create(&f.ctx, bst_simulation_world(f.sim), &view));
+    bst_world_view *view;
+    bst_assert_ok(&f.ctx, bst_world_view_create(&f.ctx, bst_simulation_world(f.sim), &view));
     static const double expected[4][4] = {
         {0.0, 7e6, 0, 0}, {0.0335, 7e6, 251.25, 1}, {0.5, 7.1e6, 0, 0}, {0.6, 7.1e6, 750, 1}};
     for (int k = 0; k < 4; k++) {
-        bst_state s;
-        bst_assert_ok(&f.ctx, bst_view_object_state(&f.ctx, view, 0, expected[k][0], &s));
+        bst_world_state s;
+        bst_assert_ok(&f.ctx, bst_world_view_object_state(&f.ctx, view, 0, expected[k][0], &s));
         bst_assert_close(s.position_m.x, expected[k][1], 1e-8); /* rounding of 7e6 m */
         bst_assert_close(s.position_m.y, expected[k][2], 1e-8);
         bst_assert_close(s.velocity_mps.z, expected[k][3], 1e-6); /* a derivative over 0.03 s */
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     finish(&f);
 }
 

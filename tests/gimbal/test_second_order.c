@@ -4,20 +4,21 @@
 
 #define DT 1e-3
 
-static bst_two_axis_config default_config(void) {
+static bst_mount_two_axis_config default_config(void) {
     bst_ctx ctx = {0};
-    bst_two_axis_config c;
+    bst_mount_two_axis_config c;
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_two_axis_config_table, &c));
     c.encoder_noise_arcsec = 0.0;
     return c;
 }
 
-static const bst_two_axis_keys keys = {{{1, 2}}, {{3, 4}}, {{5, 6}}};
+static const bst_mount_two_axis_keys keys = {{{1, 2}}, {{3, 4}}, {{5, 6}}};
 
-static void make(bst_two_axis *plant, const bst_two_axis_config *config, bst_quat nominal) {
+static void make(bst_mount_two_axis *plant, const bst_mount_two_axis_config *config,
+                 bst_quat nominal) {
     bst_ctx ctx = {0};
-    bst_assert_ok(&ctx,
-                  bst_two_axis_init(&ctx, plant, config, nominal, 3.0 * BST_ARCSEC_RAD, DT, &keys));
+    bst_assert_ok(&ctx, bst_mount_two_axis_init(&ctx, plant, config, nominal, 3.0 * BST_ARCSEC_RAD,
+                                                DT, &keys));
 }
 
 static bst_vec3 boresight(bst_quat q_cam_from_gcrf) {
@@ -32,14 +33,14 @@ static void solve_and_attitude_agree(void **state) {
     for (int i = 0; i < 200; i++) {
         double o = -3.1 + 0.031 * i, in = -1.55 + 0.0155 * i;
         double angle[2] = {o, in}, solved[2], rate[2];
-        bst_vec3 b = boresight(bst_two_axis_attitude(angle));
+        bst_vec3 b = boresight(bst_mount_two_axis_attitude(angle));
         /* the header's closed form */
         bst_assert_close(b.x, cos(in) * sin(o), 1e-15);
         bst_assert_close(b.y, -sin(in), 1e-15);
         bst_assert_close(b.z, cos(in) * cos(o), 1e-15);
         bst_vec3 db = {cos(in) * cos(o) * 0.3 - sin(in) * sin(o) * -0.2, -cos(in) * -0.2,
                        -cos(in) * sin(o) * 0.3 - sin(in) * cos(o) * -0.2};
-        bst_two_axis_solve(b, db, 0.0, solved, rate);
+        bst_mount_two_axis_solve(b, db, 0.0, solved, rate);
         double pole = 1.0 / cos(in); /* how the outer angle amplifies rounding */
         bst_assert_close(solved[0], o, 4e-16 * 4 * pole);
         bst_assert_close(solved[1], in, 1e-14 * pole);
@@ -49,10 +50,11 @@ static void solve_and_attitude_agree(void **state) {
 }
 
 /* Steps to t_end with a command; checks the axis limits at each step. */
-static void run(bst_two_axis *plant, const bst_los_command *command, double *t, double t_end) {
+static void run(bst_mount_two_axis *plant, const bst_los_command *command, double *t,
+                double t_end) {
     double before[2] = {plant->axis[0].rate_radps, plant->axis[1].rate_radps};
     for (; *t < t_end - 0.5 * DT; *t += DT) {
-        bst_two_axis_step(plant, command, *t, true);
+        bst_mount_two_axis_step(plant, command, *t, true);
         for (int a = 0; a < 2; a++) {
             const bst_axis *axis = &plant->axis[a];
             assert_true(isfinite(axis->angle_rad) && isfinite(axis->rate_radps));
@@ -73,11 +75,11 @@ static bst_los_command command_from(bst_quat q_body, bst_vec3 body, bst_vec3 rat
 
 static void boresight_lands_on_the_commanded_direction(void **state) {
     (void)state;
-    bst_two_axis_config config = default_config();
+    bst_mount_two_axis_config config = default_config();
     bst_vec3 rate = {200.0 * BST_ARCSEC_RAD, 100.0 * BST_ARCSEC_RAD, 0.0};
     bst_los_command c = command_from(some_attitude, (bst_vec3){0.02, -0.01, 1.0}, rate);
     bst_quat minus = {-some_attitude.x, -some_attitude.y, -some_attitude.z, -some_attitude.w};
-    bst_two_axis plant, antipodal;
+    bst_mount_two_axis plant, antipodal;
     make(&plant, &config, some_attitude);
     make(&antipodal, &config, minus);
     double t = 0.0, t2 = 0.0;
@@ -95,8 +97,8 @@ static void boresight_lands_on_the_commanded_direction(void **state) {
 
 static void no_command_holds_still(void **state) {
     (void)state;
-    bst_two_axis_config config = default_config();
-    bst_two_axis plant;
+    bst_mount_two_axis_config config = default_config();
+    bst_mount_two_axis plant;
     make(&plant, &config, some_attitude);
     double t = 0.0;
     run(&plant, NULL, &t, 1.0);
@@ -108,10 +110,10 @@ static void no_command_holds_still(void **state) {
 
 static void drift_is_real_and_unknown(void **state) {
     (void)state;
-    bst_two_axis_config config = default_config();
+    bst_mount_two_axis_config config = default_config();
     config.platform.drift_arcsec_per_s[0] = 3.0;
     config.platform.drift_arcsec_per_s[1] = -4.0;
-    bst_two_axis plant;
+    bst_mount_two_axis plant;
     make(&plant, &config, some_attitude);
     bst_los_command c = command_from(some_attitude, (bst_vec3){0, 0, 1}, (bst_vec3){0, 0, 0});
     double t = 0.0;
@@ -130,10 +132,10 @@ static void drift_is_real_and_unknown(void **state) {
 
 static void bias_and_noise_are_errors_of_knowledge(void **state) {
     (void)state;
-    bst_two_axis_config config = default_config();
+    bst_mount_two_axis_config config = default_config();
     config.platform.attitude_bias_arcsec[0] = 30.0;
     config.platform.attitude_noise_arcsec = 2.0;
-    bst_two_axis plant;
+    bst_mount_two_axis plant;
     make(&plant, &config, some_attitude);
     bst_los_command c = command_from(some_attitude, (bst_vec3){0.01, 0, 1}, (bst_vec3){0, 0, 0});
     double t = 0.0;
@@ -144,7 +146,7 @@ static void bias_and_noise_are_errors_of_knowledge(void **state) {
     double sum = 0.0;
     int count = 4000;
     for (int i = 0; i < count; i++) {
-        bst_two_axis_step(&plant, &c, 3.0, true);
+        bst_mount_two_axis_step(&plant, &c, 3.0, true);
         double e = bst_vec3_angle(boresight(plant.q_measured_from_gcrf), c.direction_gcrf);
         sum += e * e;
     }
@@ -156,8 +158,8 @@ static void keyhole_stays_finite_and_recovers(void **state) {
     (void)state;
     const double offset[] = {0.0, 1e-12, 1e-6, 1e-3};
     for (int i = 0; i < 4; i++) {
-        bst_two_axis_config config = default_config();
-        bst_two_axis plant;
+        bst_mount_two_axis_config config = default_config();
+        bst_mount_two_axis plant;
         make(&plant, &config, some_attitude);
         /* along the meridian over the pole at body -y: 0.5 deg/s, passing it at t = 60 s */
         double rate = 0.5 * BST_DEG_RAD;
@@ -168,7 +170,7 @@ static void keyhole_stays_finite_and_recovers(void **state) {
             bst_vec3 r = {0.0, -sin(a) * rate, -cos(a) * rate};
             bst_los_command c = command_from(some_attitude, b, r);
             for (int k = 0; k < 10; k++) {
-                bst_two_axis_step(&plant, &c, k * DT, false);
+                bst_mount_two_axis_step(&plant, &c, k * DT, false);
                 assert_true(isfinite(plant.q_cam_from_gcrf.w));
                 assert_true(fabs(plant.axis[0].rate_radps) <=
                             plant.axis[0].spec.rate_limit_radps * (1 + 1e-9));
@@ -186,8 +188,8 @@ static void keyhole_stays_finite_and_recovers(void **state) {
 
 static void outer_axis_goes_round_and_the_encoder_wraps(void **state) {
     (void)state;
-    bst_two_axis_config config = default_config();
-    bst_two_axis plant;
+    bst_mount_two_axis_config config = default_config();
+    bst_mount_two_axis plant;
     make(&plant, &config, some_attitude);
     double rate = 1.5 * BST_DEG_RAD, worst = 0.0;
     int wraps = 0;
@@ -197,7 +199,7 @@ static void outer_axis_goes_round_and_the_encoder_wraps(void **state) {
         bst_los_command c =
             command_from(some_attitude, (bst_vec3){0.6 * sin(a), -0.8, 0.6 * cos(a)},
                          (bst_vec3){0.6 * cos(a) * rate, 0, -0.6 * sin(a) * rate});
-        bst_two_axis_step(&plant, &c, 0.0, true);
+        bst_mount_two_axis_step(&plant, &c, 0.0, true);
         assert_true(fabs(plant.encoder_rad[0]) <= BST_PI + 1e-9);
         wraps += fabs(plant.encoder_rad[0] - last) > BST_PI;
         last = plant.encoder_rad[0];
@@ -212,9 +214,9 @@ static void outer_axis_goes_round_and_the_encoder_wraps(void **state) {
 
 static void inner_stop_holds(void **state) {
     (void)state;
-    bst_two_axis_config config = default_config();
+    bst_mount_two_axis_config config = default_config();
     config.inner_travel_deg = 5.0;
-    bst_two_axis plant;
+    bst_mount_two_axis plant;
     make(&plant, &config, some_attitude);
     bst_los_command c =
         command_from(some_attitude, (bst_vec3){0, -sin(0.2), cos(0.2)}, (bst_vec3){0, 0, 0});
@@ -226,13 +228,14 @@ static void inner_stop_holds(void **state) {
 
 static void wrong_configurations_are_refused_with_what_to_do(void **state) {
     (void)state;
-    bst_two_axis_config config = default_config();
+    bst_mount_two_axis_config config = default_config();
     bst_ctx ctx = {0};
-    bst_two_axis plant;
+    bst_mount_two_axis plant;
     config.platform.jitter_high_px_rms = 0.2;
     config.platform.jitter_high_band_hz[0] = config.platform.jitter_high_band_hz[1];
-    assert_int_equal(bst_two_axis_init(&ctx, &plant, &config, some_attitude, 1e-5, 0.01, &keys),
-                     BST_ERR_CONFIG);
+    assert_int_equal(
+        bst_mount_two_axis_init(&ctx, &plant, &config, some_attitude, 1e-5, 0.01, &keys),
+        BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "give the lower frequency first"));
     int64_t steps = 0;
     assert_int_equal(bst_platform_divider(&ctx, "nav_rate_hz", 1000.0, 300.0, &steps),

@@ -78,12 +78,13 @@ static bst_ctx ctx;
 static const double no_torque[BST_WHEELS_MOST];
 static const double moments[3] = {1.0, 2.0, 2.5};
 
-static bst_craft_body free_body(bst_integrator integrator, double dt_s, bst_quat q, bst_vec3 rate) {
-    bst_craft_spec spec = {.inertia_kgm2 = {moments[0], moments[1], moments[2], 0, 0, 0},
-                           .integrator = integrator,
-                           .dt_s = dt_s};
-    bst_craft_body body;
-    bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, q, rate, no_torque));
+static bst_spacecraft_body free_body(bst_integrator integrator, double dt_s, bst_quat q,
+                                     bst_vec3 rate) {
+    bst_spacecraft_spec spec = {.inertia_kgm2 = {moments[0], moments[1], moments[2], 0, 0, 0},
+                                .integrator = integrator,
+                                .dt_s = dt_s};
+    bst_spacecraft_body body;
+    bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, q, rate, no_torque));
     return body;
 }
 
@@ -93,21 +94,23 @@ typedef struct errors {
 
 static errors run_jacobi(bst_integrator integrator, double dt_s, int64_t steps) {
     jacobi j = jacobi_make(moments, 0.4, 0.7);
-    bst_craft_body body =
+    bst_spacecraft_body body =
         free_body(integrator, dt_s, jacobi_attitude(&j, 0.0, 2), jacobi_rate(&j, 0.0));
-    bst_vec3 l0 = bst_craft_body_momentum(&body);
-    double e0 = bst_craft_body_energy(&body);
+    bst_vec3 l0 = bst_spacecraft_body_momentum(&body);
+    double e0 = bst_spacecraft_body_energy(&body);
     errors out = {0};
     for (int64_t n = 1; n <= steps; n++) {
-        bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
-        out.energy = fmax(out.energy, fabs(bst_craft_body_energy(&body) / e0 - 1.0));
+        bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
+        out.energy = fmax(out.energy, fabs(bst_spacecraft_body_energy(&body) / e0 - 1.0));
     }
     double t = dt_s * (double)steps;
-    bst_quat q = bst_craft_body_attitude(&body);
+    bst_quat q = bst_spacecraft_body_attitude(&body);
     bst_vec3 rate = jacobi_rate(&j, t);
     out.attitude_rad = between(q, jacobi_attitude(&j, t, 40000));
-    out.rate = bst_vec3_norm(bst_vec3_sub(bst_craft_body_rate(&body), rate)) / bst_vec3_norm(rate);
-    out.momentum = bst_vec3_norm(bst_vec3_sub(bst_craft_body_momentum(&body), l0)) / j.momentum;
+    out.rate =
+        bst_vec3_norm(bst_vec3_sub(bst_spacecraft_body_rate(&body), rate)) / bst_vec3_norm(rate);
+    out.momentum =
+        bst_vec3_norm(bst_vec3_sub(bst_spacecraft_body_momentum(&body), l0)) / j.momentum;
     out.norm = fabs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0);
     return out;
 }
@@ -149,17 +152,17 @@ static void test_jacobi(void **state) {
 static void test_axisymmetric(void **state) {
     (void)state;
     double a = 3.0, c = 4.5, wx = 0.2, wz = 0.5, dt = 1e-3;
-    bst_craft_spec spec = {
+    bst_spacecraft_spec spec = {
         .inertia_kgm2 = {a, a, c, 0, 0, 0}, .integrator = BST_INTEGRATE_SYMPLECTIC, .dt_s = dt};
-    bst_craft_body body;
-    bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                            (bst_vec3){wx, 0, wz}, no_torque));
+    bst_spacecraft_body body;
+    bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                 (bst_vec3){wx, 0, wz}, no_torque));
     int64_t steps = 200000;
     for (int64_t n = 0; n < steps; n++) {
-        bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
+        bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
     }
     double t = dt * (double)steps, spin = (c - a) / a * wz;
-    bst_vec3 rate = bst_craft_body_rate(&body);
+    bst_vec3 rate = bst_spacecraft_body_rate(&body);
     /* second order: the phases are off by (w dt)^2 / 24 of themselves, 100 rad; 1e-6 */
     bst_assert_close(rate.x, wx * cos(spin * t), 1e-6);
     bst_assert_close(rate.y, wx * sin(spin * t), 1e-6);
@@ -169,7 +172,7 @@ static void test_axisymmetric(void **state) {
     bst_quat self = bst_quat_from_rotvec((bst_vec3){0, 0, spin * t});
     /* R(t) of the body's axes: exp(L t / A) about L, then back by the spin about the axis */
     bst_quat expected = bst_quat_mul(self, precession);
-    bst_assert_close(between(bst_craft_body_attitude(&body), expected), 0.0, 5e-6);
+    bst_assert_close(between(bst_spacecraft_body_attitude(&body), expected), 0.0, 5e-6);
 }
 
 /* Turned about its intermediate axis a body flips over and over (Dzhanibekov): the time between
@@ -188,13 +191,13 @@ static void test_intermediate_axis(void **state) {
         x = mean;
     }
     double flip_s = BST_PI / x / p;
-    bst_craft_body body =
+    bst_spacecraft_body body =
         free_body(BST_INTEGRATE_SYMPLECTIC4, 2e-3, BST_QUAT_IDENTITY, (bst_vec3){0, wy, wz});
-    double l = bst_vec3_norm(bst_craft_body_momentum(&body)), last_s = 0.0, before = wy;
+    double l = bst_vec3_norm(bst_spacecraft_body_momentum(&body)), last_s = 0.0, before = wy;
     int flips = 0;
     for (int64_t n = 1; flips < 10 && n < 1000000; n++) {
-        bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
-        double now = bst_craft_body_rate(&body).y;
+        bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
+        double now = bst_spacecraft_body_rate(&body).y;
         if (now * before < 0.0) {
             double t = 2e-3 * ((double)n - now / (now - before));
             if (flips > 0) { /* crossings by straight lines, 1e-3 s; the first comes at half */
@@ -206,12 +209,12 @@ static void test_intermediate_axis(void **state) {
         before = now;
     }
     assert_int_equal(flips, 10);
-    bst_assert_close(bst_vec3_norm(bst_craft_body_momentum(&body)) / l, 1.0, 1e-14);
+    bst_assert_close(bst_vec3_norm(bst_spacecraft_body_momentum(&body)) / l, 1.0, 1e-14);
 }
 
-static bst_craft_spec full_spec(bst_integrator integrator, double dt_s) {
+static bst_spacecraft_spec full_spec(bst_integrator integrator, double dt_s) {
     double r = sqrt(1.0 / 3.0);
-    bst_craft_spec spec = {
+    bst_spacecraft_spec spec = {
         .inertia_kgm2 = {12.0, 14.0, 10.0, 0.3, -0.2, 0.1},
         .wheels = 4,
         .modes = 2,
@@ -228,28 +231,29 @@ static bst_craft_spec full_spec(bst_integrator integrator, double dt_s) {
 static void test_everything_free(void **state) {
     (void)state;
     for (int i = 0; i < 2; i++) {
-        bst_craft_spec spec = full_spec(i ? BST_INTEGRATE_RK4 : BST_INTEGRATE_SYMPLECTIC, 1e-3);
+        bst_spacecraft_spec spec =
+            full_spec(i ? BST_INTEGRATE_RK4 : BST_INTEGRATE_SYMPLECTIC, 1e-3);
         double spin[BST_WHEELS_MOST] = {300.0, -200.0, 100.0, 500.0};
-        bst_craft_body body;
-        bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                                (bst_vec3){0.02, -0.03, 0.05}, spin));
+        bst_spacecraft_body body;
+        bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                     (bst_vec3){0.02, -0.03, 0.05}, spin));
         /* a kick by the wheels' motors sets the modes swinging; the momentum does not notice */
-        bst_vec3 l0 = bst_craft_body_momentum(&body);
+        bst_vec3 l0 = bst_spacecraft_body_momentum(&body);
         double motor[BST_WHEELS_MOST] = {0.05, -0.05, 0.02, 0.0};
         for (int n = 0; n < 300; n++) {
-            bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, motor);
+            bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, motor);
         }
-        double e0 = bst_craft_body_energy(&body), worst = 0.0;
+        double e0 = bst_spacecraft_body_energy(&body), worst = 0.0;
         double moving = e0;
         for (int k = 0; k < 4; k++) { /* the wheels' own energy is no measure */
             double g = body.wheel_momentum[k];
             moving -= 0.5 * g * g / spec.wheel[k].inertia_kgm2;
         }
         for (int n = 0; n < 20000; n++) {
-            bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
-            worst = fmax(worst, fabs(bst_craft_body_energy(&body) - e0));
+            bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
+            worst = fmax(worst, fabs(bst_spacecraft_body_energy(&body) - e0));
         }
-        bst_vec3 l = bst_craft_body_momentum(&body);
+        bst_vec3 l = bst_spacecraft_body_momentum(&body);
         bst_assert_close(bst_vec3_norm(bst_vec3_sub(l, l0)) / bst_vec3_norm(l0), 0.0, 1e-13);
         print_message("%s: energy off by %.1e of %.1e J\n", bst_integrator_names[spec.integrator],
                       worst, moving);
@@ -266,15 +270,15 @@ static void test_mode_frequency(void **state) {
     double free = f / sqrt(1.0 - d * d / inertia);
     const double steps_s[2] = {1e-3, BST_MODE_STEP_CYCLES / (free / (2.0 * BST_PI))};
     for (int i = 0; i < 2; i++) {
-        bst_craft_spec spec = {.inertia_kgm2 = {inertia, 12, 11, 0, 0, 0},
-                               .modes = 1,
-                               .mode = {{f, 0.01, {d, 0, 0}}},
-                               .dt_s = steps_s[i]};
-        bst_craft_body body;
-        bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                                (bst_vec3){0, 0, 0}, no_torque));
+        bst_spacecraft_spec spec = {.inertia_kgm2 = {inertia, 12, 11, 0, 0, 0},
+                                    .modes = 1,
+                                    .mode = {{f, 0.01, {d, 0, 0}}},
+                                    .dt_s = steps_s[i]};
+        bst_spacecraft_body body;
+        bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                     (bst_vec3){0, 0, 0}, no_torque));
         bst_assert_close(body.free_radps[0], free, 1e-12 * free);
-        bst_craft_body_step(&body, (bst_vec3){1e-3 / steps_s[i], 0, 0}, no_torque);
+        bst_spacecraft_body_step(&body, (bst_vec3){1e-3 / steps_s[i], 0, 0}, no_torque);
         /* zeros of the mode's swing, twice a cycle; damping z f^2 -> (n'' + 2 z f k n' + f^2 k n =
          * 0, k = 1 / (1 - d^2 / I)): the damped frequency */
         double k = 1.0 / (1.0 - d * d / inertia), decay = 0.01 * f * k;
@@ -282,7 +286,7 @@ static void test_mode_frequency(void **state) {
         double first = 0.0, last = 0.0, before = 0.0;
         int zeros = 0;
         for (int n = 1; zeros < 21; n++) {
-            bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
+            bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
             double now = body.mode_place[0];
             if (now * before < 0.0) {
                 /* a straight line misses a crossing of a sine by (w dt)^2 / 8 dt at most */
@@ -300,30 +304,30 @@ static void test_mode_frequency(void **state) {
 
 static void test_step_too_large_for_a_mode(void **state) {
     (void)state;
-    bst_craft_spec spec = full_spec(BST_INTEGRATE_SYMPLECTIC, 1e-3);
-    bst_craft_body body;
-    bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                            (bst_vec3){0, 0, 0}, no_torque));
+    bst_spacecraft_spec spec = full_spec(BST_INTEGRATE_SYMPLECTIC, 1e-3);
+    bst_spacecraft_body body;
+    bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                 (bst_vec3){0, 0, 0}, no_torque));
     double longest = BST_MODE_STEP_CYCLES / (body.free_radps[1] / (2.0 * BST_PI));
     spec.dt_s = longest * 0.999;
-    bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                            (bst_vec3){0, 0, 0}, no_torque));
+    bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                 (bst_vec3){0, 0, 0}, no_torque));
     spec.dt_s = 10.0 * longest;
-    assert_int_equal(
-        bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY, (bst_vec3){0, 0, 0}, no_torque),
-        BST_ERR_CONFIG);
+    assert_int_equal(bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                              (bst_vec3){0, 0, 0}, no_torque),
+                     BST_ERR_CONFIG);
     char said[64];
     snprintf(said, sizeof said, "longest step allowed is %.4g s", longest);
     assert_non_null(strstr(ctx.message, said));
 }
 
 static void refused(const double inertia[6], const char *why) {
-    bst_craft_spec spec = {.dt_s = 1e-3};
+    bst_spacecraft_spec spec = {.dt_s = 1e-3};
     memcpy(spec.inertia_kgm2, inertia, sizeof spec.inertia_kgm2);
-    bst_craft_body body;
-    assert_int_equal(
-        bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY, (bst_vec3){0, 0, 0}, no_torque),
-        BST_ERR_CONFIG);
+    bst_spacecraft_body body;
+    assert_int_equal(bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                              (bst_vec3){0, 0, 0}, no_torque),
+                     BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, why));
 }
 
@@ -333,12 +337,12 @@ static void test_inertia_refused(void **state) {
     refused((const double[6]){1, 1, 1, 1.5, 0, 0}, "not positive definite");
     refused((const double[6]){1, 2, 4, 0, 0, 0}, "sum of the two others");
     refused((const double[6]){1, 1, 1, 0.9, 0, 0.0}, "sum of the two others");
-    bst_craft_spec spec = full_spec(BST_INTEGRATE_SYMPLECTIC, 1e-3);
+    bst_spacecraft_spec spec = full_spec(BST_INTEGRATE_SYMPLECTIC, 1e-3);
     spec.mode[0].coupling = (bst_vec3){4.0, 0, 0}; /* 16 kg m^2 of 12 */
-    bst_craft_body body;
-    assert_int_equal(
-        bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY, (bst_vec3){0, 0, 0}, no_torque),
-        BST_ERR_CONFIG);
+    bst_spacecraft_body body;
+    assert_int_equal(bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                              (bst_vec3){0, 0, 0}, no_torque),
+                     BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "coupling"));
 }
 
@@ -349,21 +353,21 @@ static void test_nearly_singular(void **state) {
     static const double shapes[3][6] = {
         {10, 10, 1e-5, 0, 0, 0}, {5, 5, 10, 0, 0, 0}, {10, 10, 10, 4.99, 0, 0}};
     for (int i = 0; i < 3; i++) {
-        bst_craft_spec spec = {.dt_s = 1e-3};
+        bst_spacecraft_spec spec = {.dt_s = 1e-3};
         memcpy(spec.inertia_kgm2, shapes[i], sizeof spec.inertia_kgm2);
-        bst_craft_body body;
-        bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                                (bst_vec3){0, 0, 0}, no_torque));
+        bst_spacecraft_body body;
+        bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                     (bst_vec3){0, 0, 0}, no_torque));
         for (int n = 0; n < 2000; n++) {
             double t = (n < 1000 ? 1.0 : -1.0) * shapes[i][2] * 0.5;
-            bst_craft_body_step(&body, (bst_vec3){0, 0, t}, no_torque);
+            bst_spacecraft_body_step(&body, (bst_vec3){0, 0, t}, no_torque);
         }
         /* the torque is about a principal axis: half a radian of turn each second, to rounding */
-        bst_vec3 turn = bst_quat_to_rotvec(bst_craft_body_attitude(&body));
+        bst_vec3 turn = bst_quat_to_rotvec(bst_spacecraft_body_attitude(&body));
         bst_assert_close(turn.x, 0.0, 1e-9);
         bst_assert_close(turn.y, 0.0, 1e-9);
         bst_assert_close(turn.z, -0.5, 1e-9);
-        bst_assert_close(bst_vec3_norm(bst_craft_body_rate(&body)), 0.0, 1e-9);
+        bst_assert_close(bst_vec3_norm(bst_spacecraft_body_rate(&body)), 0.0, 1e-9);
     }
 }
 
@@ -371,36 +375,38 @@ static void test_nearly_singular(void **state) {
  * is u t / load. */
 static void test_wheel_against_body(void **state) {
     (void)state;
-    bst_craft_spec spec = {.inertia_kgm2 = {12, 14, 10, 0, 0, 0},
-                           .wheels = 1,
-                           .wheel = {{{0, 0, 1}, 0.01}},
-                           .dt_s = 1e-3};
-    bst_craft_body body;
-    bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                            (bst_vec3){0, 0, 0}, no_torque));
+    bst_spacecraft_spec spec = {.inertia_kgm2 = {12, 14, 10, 0, 0, 0},
+                                .wheels = 1,
+                                .wheel = {{{0, 0, 1}, 0.01}},
+                                .dt_s = 1e-3};
+    bst_spacecraft_body body;
+    bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                 (bst_vec3){0, 0, 0}, no_torque));
     double motor[BST_WHEELS_MOST] = {0.1};
     for (int n = 0; n < 5000; n++) {
-        bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, motor);
+        bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, motor);
     }
     double impulse = 0.5, rest = 10.0 - 0.01;
-    bst_assert_close(bst_craft_body_rate(&body).z, -impulse / rest, 1e-12);
-    bst_assert_close(bst_craft_body_wheel_radps(&body, 0), impulse / 0.01 + impulse / rest, 1e-9);
-    bst_assert_close(bst_craft_body_wheel_radps(&body, 0),
-                     impulse / bst_craft_body_wheel_load_kgm2(&body, 0), 1e-9);
-    bst_assert_close(bst_vec3_norm(bst_craft_body_momentum(&body)), 0.0, 1e-13);
+    bst_assert_close(bst_spacecraft_body_rate(&body).z, -impulse / rest, 1e-12);
+    bst_assert_close(bst_spacecraft_body_wheel_radps(&body, 0), impulse / 0.01 + impulse / rest,
+                     1e-9);
+    bst_assert_close(bst_spacecraft_body_wheel_radps(&body, 0),
+                     impulse / bst_spacecraft_body_wheel_load_kgm2(&body, 0), 1e-9);
+    bst_assert_close(bst_vec3_norm(bst_spacecraft_body_momentum(&body)), 0.0, 1e-13);
 }
 
 static void test_zero_rate(void **state) {
     (void)state;
-    bst_craft_spec spec = full_spec(BST_INTEGRATE_SYMPLECTIC, 1e-3);
+    bst_spacecraft_spec spec = full_spec(BST_INTEGRATE_SYMPLECTIC, 1e-3);
     bst_quat q = bst_quat_unit((bst_quat){0.1, -0.2, 0.3, 0.9});
-    bst_craft_body body;
-    bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, q, (bst_vec3){0, 0, 0}, no_torque));
+    bst_spacecraft_body body;
+    bst_assert_ok(&ctx,
+                  bst_spacecraft_body_init(&ctx, &body, &spec, q, (bst_vec3){0, 0, 0}, no_torque));
     for (int n = 0; n < 10000; n++) {
-        bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
+        bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, no_torque);
     }
-    bst_assert_close(bst_vec3_norm(bst_craft_body_rate(&body)), 0.0, 0.0); /* exactly */
-    bst_assert_close(between(bst_craft_body_attitude(&body), q), 0.0, 1e-15);
+    bst_assert_close(bst_vec3_norm(bst_spacecraft_body_rate(&body)), 0.0, 0.0); /* exactly */
+    bst_assert_close(between(bst_spacecraft_body_attitude(&body), q), 0.0, 1e-15);
 }
 
 int main(void) {

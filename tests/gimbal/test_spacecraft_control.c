@@ -6,8 +6,8 @@
 
 /* natural 0.3 rad/s, damping 0.8: the slope is 0.1875 per s; 70 % of 0.004 rad/s^2 give a straight
  * part up to 0.0028 / 0.1875^2 = 0.07964 rad */
-static bst_attitude_control control_of(double rate_limit_radps) {
-    const bst_attitude_control_spec spec = {
+static bst_spacecraft_attitude_control control_of(double rate_limit_radps) {
+    const bst_spacecraft_attitude_control_spec spec = {
         .natural_radps = 0.3,
         .damping = 0.8,
         .integral_radps = 0.05,
@@ -15,23 +15,25 @@ static bst_attitude_control control_of(double rate_limit_radps) {
         .accel_limit_radps2 = 0.004,
         .dt_s = 0.1,
         .inertia_kgm2 = {{{120, -3, 5}, {-3, 90, 2}, {5, 2, 150}}}};
-    bst_attitude_control control;
-    bst_attitude_control_init(&control, &spec);
+    bst_spacecraft_attitude_control control;
+    bst_spacecraft_attitude_control_init(&control, &spec);
     return control;
 }
 
 static const bst_quat wanted_attitude = {0.1, -0.2, 0.3, 0.9}; /* to be normalised */
 
 /* The body is turned from the wanted attitude by `angle` about (2, -1, 3) / sqrt(14). */
-static bst_vec3 step(bst_attitude_control *control, double angle, bst_vec3 rate, bool saturated) {
-    const bst_attitude_reference wanted = {.q_body_from_gcrf = bst_quat_unit(wanted_attitude),
-                                           .rate_radps = {0.001, -0.002, 0.0015},
-                                           .accel_radps2 = {1e-4, 2e-4, -3e-4}};
+static bst_vec3 step(bst_spacecraft_attitude_control *control, double angle, bst_vec3 rate,
+                     bool saturated) {
+    const bst_spacecraft_attitude_reference wanted = {
+        .q_body_from_gcrf = bst_quat_unit(wanted_attitude),
+        .rate_radps = {0.001, -0.002, 0.0015},
+        .accel_radps2 = {1e-4, 2e-4, -3e-4}};
     double s = sin(0.5 * angle) / sqrt(14.0);
     bst_quat turned = {-2.0 * s, 1.0 * s, -3.0 * s, cos(0.5 * angle)};
-    return bst_attitude_control_step(control, &wanted,
-                                     bst_quat_mul(turned, wanted.q_body_from_gcrf), rate,
-                                     (bst_vec3){3, -2, 1}, saturated);
+    return bst_spacecraft_attitude_control_step(control, &wanted,
+                                                bst_quat_mul(turned, wanted.q_body_from_gcrf), rate,
+                                                (bst_vec3){3, -2, 1}, saturated);
 }
 
 /* Rounding: torques of some 0.1 N m out of products with moments of 100 kg m^2. */
@@ -45,7 +47,7 @@ static void near_the_end_the_law_is_linear(void **state) {
     (void)state;
     const double linear = 0.0028 / (0.1875 * 0.1875);
     /* with an integral that moves */
-    bst_attitude_control c = control_of(0.02);
+    bst_spacecraft_attitude_control c = control_of(0.02);
     bst_vec3 t = step(&c, 0.02 * linear, (bst_vec3){0.0012, -0.0021, 0.0013}, false);
     expect(t, -0.010976754578446638, 0.028001987738402775, -0.04366318320174488, 1e-14);
     expect(c.integral_radps2, 3.8314571640565187e-07, -1.9157285820282594e-07,
@@ -71,11 +73,12 @@ static void near_the_end_the_law_is_linear(void **state) {
            1e-17);
     /* on the spot: the reference's torque and the gyroscopic one alone */
     const bst_vec3 rate = {0.001, -0.002, 0.0015};
-    const bst_attitude_reference there = {.q_body_from_gcrf = BST_QUAT_IDENTITY,
-                                          .rate_radps = rate,
-                                          .accel_radps2 = {1e-4, 2e-4, -3e-4}};
+    const bst_spacecraft_attitude_reference there = {.q_body_from_gcrf = BST_QUAT_IDENTITY,
+                                                     .rate_radps = rate,
+                                                     .accel_radps2 = {1e-4, 2e-4, -3e-4}};
     c = control_of(0.02);
-    t = bst_attitude_control_step(&c, &there, BST_QUAT_IDENTITY, rate, (bst_vec3){3, -2, 1}, false);
+    t = bst_spacecraft_attitude_control_step(&c, &there, BST_QUAT_IDENTITY, rate,
+                                             (bst_vec3){3, -2, 1}, false);
     /* I a = (0.0099, 0.0171, -0.0441); I w + h = (3.1335, -2.18, 1.226) */
     expect(t, 0.0099 - 0.002 * 1.226 + 0.0015 * 2.18, 0.0171 + 0.0015 * 3.1335 - 0.001 * 1.226,
            -0.0441 - 0.001 * 2.18 + 0.002 * 3.1335, 1e-14);
@@ -84,7 +87,7 @@ static void near_the_end_the_law_is_linear(void **state) {
 static void a_slew_brakes_along_its_curve(void **state) {
     (void)state;
     const double linear = 0.0028 / (0.1875 * 0.1875);
-    bst_attitude_control c = control_of(0.02);
+    bst_spacecraft_attitude_control c = control_of(0.02);
     bst_vec3 t =
         step(&c, 1.05 * linear,
              (bst_vec3){-0.00727151423646519, 0.002090769844996865, -0.010689611133837961}, false);
@@ -117,7 +120,7 @@ static void the_way_round_is_kept(void **state) {
         {0.85 * BST_PI, -1.05 * BST_PI, 0.85 * BST_PI},  /* clearly the shorter */
     };
     for (int i = 0; i < 4; i++) {
-        bst_attitude_control c = control_of(0.02);
+        bst_spacecraft_attitude_control c = control_of(0.02);
         c.error_rad = bst_vec3_scale(u, cases[i].before);
         (void)step(&c, cases[i].angle, (bst_vec3){0, 0, 0}, false);
         bst_vec3 e = bst_vec3_scale(u, cases[i].after);

@@ -12,24 +12,24 @@ static const double nothing[BST_WHEELS_MOST];
 static void test_momentum_over_a_day(void **state) {
     (void)state;
     for (int full = 0; full < 2; full++) {
-        bst_craft_spec spec = {.inertia_kgm2 = {10.0, 12.0, 14.0, 0.3, -0.2, 0.1},
-                               .wheels = full ? 4 : 0,
-                               .modes = full ? 2 : 0,
-                               .wheel = {{{0.6, 0, 0.8}, 1e-3},
-                                         {{-0.6, 0, 0.8}, 1e-3},
-                                         {{0, 0.6, 0.8}, 1e-3},
-                                         {{0, -0.6, 0.8}, 1e-3}},
-                               .mode = {{2.0 * BST_PI * 1.1, 0.0, {1.2, 0.0, 0.3}},
-                                        {2.0 * BST_PI * 3.4, 0.0, {0.0, 0.8, 0.1}}},
-                               .integrator = BST_INTEGRATE_SYMPLECTIC,
-                               .dt_s = 1e-3};
+        bst_spacecraft_spec spec = {.inertia_kgm2 = {10.0, 12.0, 14.0, 0.3, -0.2, 0.1},
+                                    .wheels = full ? 4 : 0,
+                                    .modes = full ? 2 : 0,
+                                    .wheel = {{{0.6, 0, 0.8}, 1e-3},
+                                              {{-0.6, 0, 0.8}, 1e-3},
+                                              {{0, 0.6, 0.8}, 1e-3},
+                                              {{0, -0.6, 0.8}, 1e-3}},
+                                    .mode = {{2.0 * BST_PI * 1.1, 0.0, {1.2, 0.0, 0.3}},
+                                             {2.0 * BST_PI * 3.4, 0.0, {0.0, 0.8, 0.1}}},
+                                    .integrator = BST_INTEGRATE_SYMPLECTIC,
+                                    .dt_s = 1e-3};
         double spin[BST_WHEELS_MOST] = {300.0, -200.0, 100.0, 500.0};
-        bst_craft_body body;
-        bst_assert_ok(&ctx, bst_craft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
-                                                (bst_vec3){0.02, 0.1, 0.03}, spin));
+        bst_spacecraft_body body;
+        bst_assert_ok(&ctx, bst_spacecraft_body_init(&ctx, &body, &spec, BST_QUAT_IDENTITY,
+                                                     (bst_vec3){0.02, 0.1, 0.03}, spin));
         body.mode_place[0] = full ? 0.01 : 0.0;
-        bst_vec3 l0 = bst_craft_body_momentum(&body);
-        double e0 = bst_craft_body_energy(&body), moving = e0;
+        bst_vec3 l0 = bst_spacecraft_body_momentum(&body);
+        double e0 = bst_spacecraft_body_energy(&body), moving = e0;
         for (int i = 0; i < spec.wheels; i++) {
             double g = body.wheel_momentum[i];
             moving -= 0.5 * g * g / spec.wheel[i].inertia_kgm2;
@@ -37,14 +37,14 @@ static void test_momentum_over_a_day(void **state) {
         double momentum = 0.0, energy[2] = {0, 0}, norm = 0.0;
         int64_t steps = (int64_t)(day_s * 1000.0);
         for (int64_t n = 1; n <= steps; n++) {
-            bst_craft_body_step(&body, (bst_vec3){0, 0, 0}, nothing);
+            bst_spacecraft_body_step(&body, (bst_vec3){0, 0, 0}, nothing);
             if (n % 997 == 0) {
-                bst_vec3 off = bst_vec3_sub(bst_craft_body_momentum(&body), l0);
-                bst_quat q = bst_craft_body_attitude(&body);
+                bst_vec3 off = bst_vec3_sub(bst_spacecraft_body_momentum(&body), l0);
+                bst_quat q = bst_spacecraft_body_attitude(&body);
                 momentum = fmax(momentum, bst_vec3_norm(off) / bst_vec3_norm(l0));
                 norm = fmax(norm, fabs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0));
                 double *e = &energy[n > steps / 2];
-                *e = fmax(*e, fabs(bst_craft_body_energy(&body) - e0) / moving);
+                *e = fmax(*e, fabs(bst_spacecraft_body_energy(&body) - e0) / moving);
             }
         }
         print_message(
@@ -61,16 +61,16 @@ static void test_momentum_over_a_day(void **state) {
 }
 
 /* Low orbit, inclined; the Sun in the orbit's plane, so that there are eclipses. */
-static bst_status sky_at(void *user, bst_ctx *c, double seconds, bst_craft_sky *out) {
+static bst_status sky_at(void *user, bst_ctx *c, double seconds, bst_spacecraft_sky *out) {
     (void)user;
     (void)c;
     double r = 7e6, n = sqrt(BST_EARTH_MU_M3PS2 / (r * r * r)), phase = n * seconds;
     bst_vec3 u = {cos(phase), 0.5 * sin(phase), 0.8660254037844386 * sin(phase)};
     bst_vec3 v = {-sin(phase), 0.5 * cos(phase), 0.8660254037844386 * cos(phase)};
     bst_vec3 sun = {BST_AU_M, 0, 0};
-    *out = (bst_craft_sky){.position_m = bst_vec3_scale(u, r), .sun_m = sun};
-    out->sunlit = bst_sun_fraction(out->position_m, sun, BST_EARTH_POLE_J2000);
-    out->known = (bst_law_inputs){
+    *out = (bst_spacecraft_sky){.position_m = bst_vec3_scale(u, r), .sun_m = sun};
+    out->sunlit = bst_astro_sun_fraction(out->position_m, sun, BST_EARTH_POLE_J2000);
+    out->known = (bst_spacecraft_law_inputs){
         .position_m = out->position_m, .velocity_mps = bst_vec3_scale(v, n * r), .sun_m = sun};
     return BST_OK;
 }
@@ -79,16 +79,16 @@ static bst_status sky_at(void *user, bst_ctx *c, double seconds, bst_craft_sky *
  * trackers with their exclusions and alignment errors, unloading. It holds nadir all day. */
 static void test_a_day_with_everything(void **state) {
     (void)state;
-    bst_craft_config c;
-    bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_craft_config_table, &c));
+    bst_spacecraft_config c;
+    bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_spacecraft_config_table, &c));
     c.type = BST_CRAFT_RIGID_BODY;
     c.attitude.law = BST_LAW_NADIR;
     c.initial_turn_deg[0] = 40.0;
     static bst_wheel_config wheels[4];
-    static bst_star_tracker_config trackers[2];
+    static bst_spacecraft_star_tracker_config trackers[2];
     int count;
-    memcpy(wheels, bst_craft_wheels(&c, &count), sizeof wheels);
-    memcpy(trackers, bst_craft_trackers(&c, &count), sizeof trackers);
+    memcpy(wheels, bst_spacecraft_wheels(&c, &count), sizeof wheels);
+    memcpy(trackers, bst_spacecraft_trackers(&c, &count), sizeof trackers);
     c.wheels = (bst_config_list){wheels, 4};
     c.star_trackers = (bst_config_list){trackers, 2};
     for (int i = 0; i < 4; i++) {
@@ -99,7 +99,8 @@ static void test_a_day_with_everything(void **state) {
         wheels[i].dynamic_imbalance_kgm2 = 1e-8;
         wheels[i].position_m[0] = 0.2;
     }
-    static bst_mode_config modes[2] = {{1.1, 0.005, {1.2, 0.0, 0.3}}, {3.4, 0.005, {0, 0.8, 0.1}}};
+    static bst_spacecraft_mode_config modes[2] = {{1.1, 0.005, {1.2, 0.0, 0.3}},
+                                                  {3.4, 0.005, {0, 0.8, 0.1}}};
     c.modes = (bst_config_list){modes, 2};
     trackers[0].alignment_arcsec[0] = 10.0;
     c.gyro.scale_factor_ppm[1] = 100.0;
@@ -111,29 +112,31 @@ static void test_a_day_with_everything(void **state) {
                                               .residual_dipole_am2 = {0.1, -0.1, 0.05},
                                               .constant_torque_nm = {1e-6, 0, -1e-6},
                                               .unload_dipole_am2 = 5.0};
-    bst_craft_setup setup = {.dt_s = 1e-3,
-                             .q_nominal = BST_QUAT_IDENTITY,
-                             .sky_at = sky_at,
-                             .seed = 5,
-                             .instance = "craft"};
-    bst_craft *craft = NULL;
-    bst_assert_ok(&ctx, bst_craft_create(&ctx, &c, &setup, &craft));
-    const bst_craft_now *now = bst_craft_at(craft);
+    bst_spacecraft_setup setup = {.dt_s = 1e-3,
+                                  .q_nominal = BST_QUAT_IDENTITY,
+                                  .sky_at = sky_at,
+                                  .seed = 5,
+                                  .instance = "craft"};
+    bst_spacecraft *craft = NULL;
+    bst_assert_ok(&ctx, bst_spacecraft_create(&ctx, &c, &setup, &craft));
+    const bst_spacecraft_now *now = bst_spacecraft_at(craft);
     double pointing = 0.0, knowledge = 0.0, fastest = 0.0;
     int64_t steps = (int64_t)(day_s * 1000.0) + 1;
     for (int64_t n = 0; n < steps; n++) {
-        bst_assert_ok(&ctx, bst_craft_step(&ctx, craft, n, 1e-3 * (double)n, (bst_vec3){0, 0, 0}));
+        bst_assert_ok(&ctx,
+                      bst_spacecraft_step(&ctx, craft, n, 1e-3 * (double)n, (bst_vec3){0, 0, 0}));
         if (n % 1000 != 0) {
             continue;
         }
         bst_vec3 p =
-            bst_attitude_error(now->body.q_body_from_gcrf, now->reference.q_body_from_gcrf);
+            bst_attitude_filter_error(now->body.q_body_from_gcrf, now->reference.q_body_from_gcrf);
         assert_true(isfinite(p.x + p.y + p.z));
         for (int i = 0; i < 4; i++) {
             fastest = fmax(fastest, fabs(now->wheel_radps[i]));
         }
         if (n > 600000) {
-            bst_vec3 k = bst_attitude_error(now->body.q_body_from_gcrf, now->q_believed_from_gcrf);
+            bst_vec3 k =
+                bst_attitude_filter_error(now->body.q_body_from_gcrf, now->q_believed_from_gcrf);
             pointing = fmax(pointing, bst_vec3_norm(p));
             knowledge = fmax(knowledge, bst_vec3_norm(k));
             assert_int_equal(now->wheel_flags, 0);
@@ -145,7 +148,7 @@ static void test_a_day_with_everything(void **state) {
     assert_true(knowledge < 60.0 * BST_ARCSEC_RAD);
     assert_true(pointing < 300.0 * BST_ARCSEC_RAD);
     assert_true(fastest < 5900.0 * BST_PI / 30.0);
-    bst_craft_free(craft);
+    bst_spacecraft_free(craft);
 }
 
 int main(int argc, char **argv) {

@@ -3,10 +3,10 @@
 #include "tests/gimbal/craft_flight.h"
 
 /* The gain of the loop raised until it diverges: at the response's gain margin. */
-static double margin(const bst_craft_config *c, int axis) {
+static double margin(const bst_spacecraft_config *c, int axis) {
     double last = 0.0;
     for (double f = 1e-2; f < 40.0; f *= 1.0005) { /* phase passes -180 deg upwards in f */
-        bst_craft_response r = bst_craft_response_at(c, axis, f);
+        bst_spacecraft_response r = bst_spacecraft_response_at(c, axis, f);
         double re = r.plant[0] * r.controller[0] - r.plant[1] * r.controller[1];
         double im = r.plant[0] * r.controller[1] + r.plant[1] * r.controller[0];
         if (f > 0.1 && last < 0.0 && im >= 0.0 && re < 0.0) {
@@ -22,7 +22,7 @@ static void test_margin_in_the_loop(void **state) {
     /* rigid, about z alone, sensors nearly perfect; the damping gain carries the high frequencies,
      * so a bandwidth k times higher is a loop gain k times higher there */
     double found[2];
-    bst_craft_config c = config_make(BST_LAW_INERTIAL);
+    bst_spacecraft_config c = config_make(BST_LAW_INERTIAL);
     c.disturbances.gravity_gradient = false;
     c.gyro.angle_random_walk_deg_rth = 1e-6;
     c.star_trackers.count = 1;
@@ -31,9 +31,9 @@ static void test_margin_in_the_loop(void **state) {
     c.attitude.integral_hz = 0.0;
     c.attitude.rate_limit_degps = 100.0;
     c.attitude.accel_limit_degps2 = 100.0;
-    ((bst_star_tracker_config *)c.star_trackers.items)->rate_hz = 0.01;
-    ((bst_star_tracker_config *)c.star_trackers.items)->noise_arcsec = 0.01;
-    ((bst_star_tracker_config *)c.star_trackers.items)->noise_about_axis_arcsec = 0.01;
+    ((bst_spacecraft_star_tracker_config *)c.star_trackers.items)->rate_hz = 0.01;
+    ((bst_spacecraft_star_tracker_config *)c.star_trackers.items)->noise_arcsec = 0.01;
+    ((bst_spacecraft_star_tracker_config *)c.star_trackers.items)->noise_about_axis_arcsec = 0.01;
     c.initial_knowledge_arcsec = 0.01;
     c.gyro.bias_sigma_degph = 1e-3;
     for (int i = 0; i < 4; i++) {
@@ -60,7 +60,7 @@ static void test_margin_in_the_loop(void **state) {
         }
         /* it starts with some 1e-4 rad/s; the sensors' noise leaves 1e-8 */
         *(most < 1e-6 ? &low : &high) = c.attitude.bandwidth_hz;
-        bst_craft_free(f.craft);
+        bst_spacecraft_free(f.craft);
     }
     found[1] = low;
     print_message("unstable from a bandwidth of %.4f Hz, predicted %.4f Hz\n", found[1], found[0]);
@@ -72,14 +72,15 @@ static void test_margin_in_the_loop(void **state) {
  * real and negative it is below 0.5. */
 static void test_default_margins(void **state) {
     (void)state;
-    bst_craft_config c = config_make(BST_LAW_NADIR);
-    bst_mode_config modes[2] = {{1.1, 0.005, {1.2, 0.0, 0.3}}, {3.4, 0.005, {0.0, 0.8, 0.1}}};
+    bst_spacecraft_config c = config_make(BST_LAW_NADIR);
+    bst_spacecraft_mode_config modes[2] = {{1.1, 0.005, {1.2, 0.0, 0.3}},
+                                           {3.4, 0.005, {0.0, 0.8, 0.1}}};
     for (int flexible = 0; flexible < 2; flexible++) {
         c.modes = (bst_config_list){modes, flexible ? 2 : 0};
         for (int axis = 0; axis < 3; axis++) {
             double nearest = INFINITY, crossing = 0.0, last = 0.0;
             for (double f = 1e-4; f < 25.0; f *= 1.0002) {
-                bst_craft_response r = bst_craft_response_at(&c, axis, f);
+                bst_spacecraft_response r = bst_spacecraft_response_at(&c, axis, f);
                 double re = r.plant[0] * r.controller[0] - r.plant[1] * r.controller[1];
                 double im = r.plant[0] * r.controller[1] + r.plant[1] * r.controller[0];
                 nearest = fmin(nearest, hypot(1.0 + re, im));
@@ -99,9 +100,9 @@ static void test_default_margins(void **state) {
 /* RMS of pointing and knowledge against the integral of their spectra. */
 static void test_predicted_rms(void **state) {
     (void)state;
-    bst_craft_config c = config_make(BST_LAW_INERTIAL);
+    bst_spacecraft_config c = config_make(BST_LAW_INERTIAL);
     c.disturbances.gravity_gradient = false;
-    bst_star_tracker_config *tracker = c.star_trackers.items;
+    bst_spacecraft_star_tracker_config *tracker = c.star_trackers.items;
     tracker->noise_about_axis_arcsec = tracker->noise_arcsec = 20.0;
     tracker->sun_exclusion_deg = tracker->earth_exclusion_deg = 0.0;
     c.star_trackers.count = 1;
@@ -111,7 +112,7 @@ static void test_predicted_rms(void **state) {
     c.gyro.rate_random_walk_deg_rth3 = 5.0;
     double predicted[2] = {0, 0};
     for (double f = 1e-5; f < 25.0; f *= 1.01) {
-        bst_craft_noise n = bst_craft_noise_at(&c, 0, f);
+        bst_spacecraft_noise n = bst_spacecraft_noise_at(&c, 0, f);
         predicted[0] += n.knowledge * 0.00995 * f;
         predicted[1] += n.pointing * 0.00995 * f;
     }
@@ -120,10 +121,11 @@ static void test_predicted_rms(void **state) {
     double sum[2] = {0, 0};
     int count = 0;
     for (; count < 6000; count++) {
-        const bst_craft_now *now = fly(&f, 1.0);
-        bst_vec3 k = bst_attitude_error(now->body.q_body_from_gcrf, now->q_believed_from_gcrf);
+        const bst_spacecraft_now *now = fly(&f, 1.0);
+        bst_vec3 k =
+            bst_attitude_filter_error(now->body.q_body_from_gcrf, now->q_believed_from_gcrf);
         bst_vec3 p =
-            bst_attitude_error(now->body.q_body_from_gcrf, now->reference.q_body_from_gcrf);
+            bst_attitude_filter_error(now->body.q_body_from_gcrf, now->reference.q_body_from_gcrf);
         sum[0] += bst_vec3_dot(k, k) / 3.0;
         sum[1] += bst_vec3_dot(p, p) / 3.0;
     }
@@ -135,13 +137,13 @@ static void test_predicted_rms(void **state) {
          * measurements: 2 % */
         bst_assert_close(sqrt(sum[i] / count / predicted[i]), 1.0, 0.06);
     }
-    bst_craft_free(f.craft);
+    bst_spacecraft_free(f.craft);
 }
 
 /* Imbalance turns the body as the response says; beyond what the steps follow it is blur. */
 static void test_imbalance(void **state) {
     (void)state;
-    bst_craft_config c = config_make(BST_LAW_FREE);
+    bst_spacecraft_config c = config_make(BST_LAW_FREE);
     c.disturbances.gravity_gradient = false;
     bst_wheel_config *wheels = c.wheels.items;
     c.wheels.count = 1;
@@ -158,7 +160,7 @@ static void test_imbalance(void **state) {
         flight f = {.dt_s = 1e-3};
         bst_assert_ok(&ctx, create(&c, f.dt_s, 0, &f.craft));
         double expected, hz, least = INFINITY, most = -INFINITY;
-        bst_craft_imbalance_line(&c, 0, 0, &hz, &expected);
+        bst_spacecraft_imbalance_line(&c, 0, 0, &hz, &expected);
         bst_assert_close(hz, fast ? 500.0 : 20.0, 1e-9);
         fly(&f, 0.9);
         for (int n = 0; n < 100; n++) { /* two cycles; over many, nutation moves the middle */
@@ -169,18 +171,18 @@ static void test_imbalance(void **state) {
         if (fast) {
             bst_assert_close(most - least, 0.0, 1e-12); /* none of it in the motion */
             double about_y, other;
-            bst_craft_imbalance_line(&c, 0, 1, &other, &about_y);
+            bst_spacecraft_imbalance_line(&c, 0, 1, &other, &about_y);
             double about_z;
-            bst_craft_imbalance_line(&c, 0, 2, &other, &about_z);
+            bst_spacecraft_imbalance_line(&c, 0, 2, &other, &about_z);
             double sum = expected * expected + about_y * about_y + about_z * about_z;
             /* the wheel's inertia is in the response's plant and not in the blur: 1e-3 of 10 */
-            bst_assert_close(bst_craft_at(f.craft)->unresolved_rad2 / (sum / 6.0), 1.0, 1e-3);
+            bst_assert_close(bst_spacecraft_at(f.craft)->unresolved_rad2 / (sum / 6.0), 1.0, 1e-3);
         } else {
             double turn = 0.5 * (most - least) / (2.0 * BST_PI * hz);
             /* 50 steps a cycle: the peak is missed by (w dt)^2 / 8 at most */
             bst_assert_close(turn / expected, 1.0, 3e-3);
         }
-        bst_craft_free(f.craft);
+        bst_spacecraft_free(f.craft);
     }
 }
 

@@ -187,11 +187,11 @@ void synthetic_bound(const synthetic *s, double x, double y, double flux_e, doub
     cov[2] = a / det;
 }
 
-bst_motion synthetic_motion(const synthetic *s, double dx, double dy) {
+bst_camera_motion synthetic_motion(const synthetic *s, double dx, double dy) {
     /* a turn r moves the boresight direction by r x z = (r_y, -r_x) */
     double scale = bst_camera_scale_rad(&s->camera);
-    return (bst_motion){.q_cam_from_gcrf = BST_QUAT_IDENTITY,
-                        .turn_cam_rad = {-dy * scale, dx * scale, 0.0}};
+    return (bst_camera_motion){.q_cam_from_gcrf = BST_QUAT_IDENTITY,
+                               .turn_cam_rad = {-dy * scale, dx * scale, 0.0}};
 }
 
 bst_imgproc_frame synthetic_frame(const synthetic *s) {

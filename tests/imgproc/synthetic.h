@@ -36,7 +36,7 @@ void synthetic_bound(const synthetic *s, double x, double y, double flux_e, doub
                      double cov[3]);
 
 /* The motion that draws stars along (dx, dy) on the sensor's middle. */
-bst_motion synthetic_motion(const synthetic *s, double dx, double dy);
+bst_camera_motion synthetic_motion(const synthetic *s, double dx, double dy);
 bst_imgproc_frame synthetic_frame(const synthetic *s);
 bst_imgproc *synthetic_processor(bst_ctx *ctx, const synthetic *s);
 /* Room for n detections. */

@@ -20,7 +20,7 @@ static fixture begin(int width, int height) {
 }
 
 /* Processes the frame as it is in pixels; motion NULL: at rest. */
-static void process(fixture *f, const bst_motion *motion) {
+static void process(fixture *f, const bst_camera_motion *motion) {
     if (!f->ip) {
         f->ip = synthetic_processor(&f->ctx, &f->s);
     }
@@ -29,7 +29,7 @@ static void process(fixture *f, const bst_motion *motion) {
     assert_true(synthetic_sound(f->d));
 }
 
-static void expose(fixture *f, const bst_motion *motion) {
+static void expose(fixture *f, const bst_camera_motion *motion) {
     synthetic_expose(&f->s, f->key, 1);
     process(f, motion);
 }
@@ -59,7 +59,7 @@ static void neighbours_are_told_apart(void **state) {
         synthetic_add(&f.s, 44.2, 50.4, flux, 0, 0);
         synthetic_add(&f.s, 80.7, 90.1, flux, 0, 0);
         synthetic_add(&f.s, 83.5, 92.9, flux, 0, 0);
-        bst_motion motion = synthetic_motion(&f.s, 0, 8.3);
+        bst_camera_motion motion = synthetic_motion(&f.s, 0, 8.3);
         expose(&f, streaks ? &motion : NULL);
         static const double places[][2] = {{40.2, 50.4}, {44.2, 50.4}, {80.7, 90.1}, {83.5, 92.9}};
         for (int i = 0; i < 4; i++) {
@@ -83,7 +83,7 @@ static void target_beside_a_streaking_star(void **state) {
     double target = 20 * noise / synthetic_norm(&f.s, 50, 50, 0, 0);
     synthetic_add(&f.s, 60.3, 60.6, star, 8.3, 0);
     synthetic_add(&f.s, 61.0, 65.6, target, 0, 0);
-    bst_motion motion = synthetic_motion(&f.s, 8.3, 0);
+    bst_camera_motion motion = synthetic_motion(&f.s, 8.3, 0);
     expose(&f, &motion);
     const bst_detection *s = near_to(&f, 60.3, 60.6, 1.0), *t = near_to(&f, 61.0, 65.6, 1.0);
     assert_true(s->flags & BST_DETECTION_STREAK);
@@ -103,7 +103,7 @@ static void extents_and_magnitude(void **state) {
     fixture f = begin(160, 128);
     synthetic_add(&f.s, 40.3, 40.8, 2e4, 0, 0);
     synthetic_add(&f.s, 100.2, 80.4, 2e4, 6, 6);
-    bst_motion motion = synthetic_motion(&f.s, 6, 6);
+    bst_camera_motion motion = synthetic_motion(&f.s, 6, 6);
     expose(&f, &motion);
     const bst_detection *p = near_to(&f, 40.3, 40.8, 1.0), *s = near_to(&f, 100.2, 80.4, 1.0);
     bst_assert_close(p->length_px, 2.0, 0.1);
@@ -160,7 +160,7 @@ static void bent_path_keeps_its_mean(void **state) {
         synthetic_add(&f.s, 60.3 - 8.0 / 3.0 + 0.5 * (from + to), 62.8, 200 * noise / PIECES,
                       to - from, 0);
     }
-    bst_motion motion = synthetic_motion(&f.s, 8, 0);
+    bst_camera_motion motion = synthetic_motion(&f.s, 8, 0);
     /* 8 t^2 = 8/3 + 8 (u/2) + (8/6) P2(u) with t = (u + 1) / 2 */
     motion.bend_cam_rad = (bst_vec3){0, 8.0 / 6.0 * bst_camera_scale_rad(&f.s.camera), 0};
     expose(&f, &motion);
@@ -184,7 +184,7 @@ static void bend_widens_what_does_not_follow_it(void **state) {
         fixture f = begin(128, 128);
         double noise = synthetic_noise(&f.s);
         synthetic_add(&f.s, 60.3, 62.8, 20 * noise / synthetic_norm(&f.s, 60, 62, 0, 0), 0, 0);
-        bst_motion motion = synthetic_motion(&f.s, 8, 0);
+        bst_camera_motion motion = synthetic_motion(&f.s, 8, 0);
         motion.bend_cam_rad = (bst_vec3){0, bent * 1.4 * bst_camera_scale_rad(&f.s.camera), 0};
         expose(&f, &motion);
         const bst_detection *d = near_to(&f, 60.3, 62.8, 1.0);
@@ -250,7 +250,7 @@ static void dull_images(void **state) {
     (void)state;
     for (int kind = 0; kind < 4; kind++) {
         fixture f = begin(200, 150);
-        bst_motion motion = synthetic_motion(&f.s, 5, 5);
+        bst_camera_motion motion = synthetic_motion(&f.s, 5, 5);
         fill(&f, kind);
         process(&f, kind % 2 ? &motion : NULL);
         if (kind < 3) {
@@ -280,7 +280,7 @@ static void tiny_frames(void **state) {
     static const int sides[] = {1, 2, 8};
     for (int i = 0; i < 3; i++) {
         fixture f = begin(sides[i], sides[i]);
-        bst_motion motion = synthetic_motion(&f.s, 4, 1);
+        bst_camera_motion motion = synthetic_motion(&f.s, 4, 1);
         synthetic_add(&f.s, 3.6, 4.3, 3000, 0, 0);
         expose(&f, &motion);
         assert_true(f.d->count <= 4);
@@ -362,7 +362,7 @@ static void crowded_field(void **state) {
 static void same_input_same_bytes(void **state) {
     (void)state;
     fixture a = begin(300, 200), b = begin(300, 200);
-    bst_motion motion = synthetic_motion(&a.s, 6, -3);
+    bst_camera_motion motion = synthetic_motion(&a.s, 6, -3);
     for (int i = 0; i < 60; i++) {
         double x = 300 * bst_rng_uniform(a.key, 2, (uint64_t)i);
         double y = 200 * bst_rng_uniform(a.key, 3, (uint64_t)i);
@@ -382,7 +382,7 @@ static void same_input_same_bytes(void **state) {
 static void hot_and_bad_pixels(void **state) {
     (void)state;
     fixture f = begin(128, 128);
-    bst_bad_pixel bad[] = {{30, 40}, {81, 80}};
+    bst_imgproc_bad_pixel bad[] = {{30, 40}, {81, 80}};
     f.s.config.bad_pixels = (bst_config_list){bad, 2};
     synthetic_add(&f.s, 80.3, 80.2, 6000, 0, 0);
     synthetic_expose(&f.s, f.key, 1);
@@ -397,7 +397,7 @@ static void hot_and_bad_pixels(void **state) {
     /* five sigma */
     bst_assert_close(d->x_px, 80.3, 5 * sqrt(d->cov_xx));
     bst_assert_close(d->y_px, 80.2, 5 * sqrt(d->cov_yy));
-    bst_bad_pixel outside[] = {{128, 0}};
+    bst_imgproc_bad_pixel outside[] = {{128, 0}};
     f.s.config.bad_pixels = (bst_config_list){outside, 1};
     bst_imgproc *ip;
     assert_int_equal(bst_imgproc_create(&f.ctx, &f.s.camera, 1e8, &f.s.config, NULL, &ip),

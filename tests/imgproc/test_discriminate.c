@@ -11,9 +11,9 @@ enum { SIDE = 512, ROOM = 2048 };
 typedef struct scene {
     bst_ctx ctx;
     synthetic s;
-    bst_discriminator *d;
+    bst_imgproc_discriminator *d;
     bst_detections *out;
-    bst_frame_knowledge frame;
+    bst_imgproc_frame_knowledge frame;
     bst_rng_key key;
     int number;
 } scene;
@@ -22,16 +22,16 @@ static scene make(void) {
     scene s = {.out = synthetic_detections(ROOM), .key = bst_rng_make_key(2, 0, "test", "labels")};
     synthetic_init(&s.s, SIDE, SIDE);
     s.s.camera.psf_fwhm_px = 2;
-    bst_assert_ok(&s.ctx, bst_discriminator_create(&s.ctx, &s.s.camera, ROOM, &s.d));
-    s.frame = (bst_frame_knowledge){.oriented = true,
-                                    .light = {.sun_m = {1.5e11, 0, 0}},
-                                    .q_cam_from_gcrf = BST_QUAT_IDENTITY,
-                                    .window = {0, 0, SIDE, SIDE}};
+    bst_assert_ok(&s.ctx, bst_imgproc_discriminator_create(&s.ctx, &s.s.camera, ROOM, &s.d));
+    s.frame = (bst_imgproc_frame_knowledge){.oriented = true,
+                                            .light = {.sun_m = {1.5e11, 0, 0}},
+                                            .q_cam_from_gcrf = BST_QUAT_IDENTITY,
+                                            .window = {0, 0, SIDE, SIDE}};
     return s;
 }
 
 static void end(scene *s) {
-    bst_discriminator_free(s->d);
+    bst_imgproc_discriminator_free(s->d);
     synthetic_free(&s->s);
     free(s->out);
 }
@@ -70,7 +70,7 @@ static bst_detection *add_sky(scene *s, double x, double y, double v_mag) {
 }
 
 static void label(scene *s) {
-    bst_discriminator_label(s->d, &s->frame, s->out);
+    bst_imgproc_discriminator_label(s->d, &s->frame, s->out);
     for (int i = 0; i < s->out->count; i++) {
         double p = s->out->items[i].label_probability;
         assert_true(p >= 0 && p <= 1);

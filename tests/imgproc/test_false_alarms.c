@@ -80,7 +80,7 @@ typedef struct bench {
     sky sky;
     bst_imgproc *ip;
     bst_detections *d;
-    bst_motion motion;
+    bst_camera_motion motion;
     bst_imgproc_frame frame;
     uint64_t state;
 } bench;

@@ -71,8 +71,8 @@ static void low_rank_finds_the_products_of_an_image(void **state) {
 }
 
 typedef struct rendered {
-    bst_gauss psf;
-    bst_profiles profiles;
+    bst_imgproc_gauss psf;
+    bst_source_profiles profiles;
     float *scratch;
     float planes[BST_IMAGE_MOTION_PLANES * SIDE * SIDE];
 } rendered;
@@ -81,15 +81,15 @@ static rendered *open_rendered(const bst_known_psf *known) {
     bst_ctx ctx = {0};
     rendered *r = calloc(1, sizeof *r);
     assert_non_null(r);
-    bst_gauss_init(&r->psf);
-    bst_assert_ok(&ctx, bst_profiles_create(&ctx, known, &r->profiles));
-    r->scratch = calloc(bst_image_scratch(SIDE), sizeof(float));
+    bst_imgproc_gauss_init(&r->psf);
+    bst_assert_ok(&ctx, bst_source_profiles_create(&ctx, known, &r->profiles));
+    r->scratch = calloc(bst_source_profile_scratch(SIDE), sizeof(float));
     assert_non_null(r->scratch);
     return r;
 }
 
 static void close_rendered(rendered *r) {
-    bst_profiles_free(&r->profiles);
+    bst_source_profiles_free(&r->profiles);
     free(r->scratch);
     free(r);
 }
@@ -107,21 +107,22 @@ static void a_known_gaussian_has_a_gaussians_images(void **state) {
     assert_int_equal(known->terms, 1);
     bst_assert_close(known->sigma_px, sigma, 0.02); /* the search's last interval is 1 % */
     rendered *got = open_rendered(known);
-    const bst_shape shapes[3] = {
+    const bst_imgproc_shape shapes[3] = {
         {.x_px = 30.31, .y_px = 20.77},
         {.x_px = 31.0, .y_px = 22.4, .dx_px = 9.0, .dy_px = -4.0},
         {.x_px = 29.5, .y_px = 24.5, .dx_px = 3.0, .dy_px = 7.0, .bend_x_px = 0.4}};
     double want[4][SIDE * SIDE];
     for (int binning = 1; binning <= 2; binning++) {
         for (int k = 0; k < 3; k++) {
-            bst_stamp stamp = {16, 8, 29, 32};
-            bst_shape shape = shapes[k];
+            bst_imgproc_stamp stamp = {16, 8, 29, 32};
+            bst_imgproc_shape shape = shapes[k];
             shape.sigma_px = sigma / binning;
-            bst_profiles_on(&got->profiles, 0.0, 0.0, binning);
-            bst_profiles_set(&got->profiles, &got->psf, shape.sigma_px);
-            bst_image_render(&got->profiles, &got->psf, &shape, &stamp, got->scratch, got->planes);
-            bst_gauss_render(&got->psf, &shape, &stamp, want[0], want[1], want[2], want[3]);
-            int stride = bst_lanes_up(stamp.width);
+            bst_source_profiles_on(&got->profiles, 0.0, 0.0, binning);
+            bst_source_profiles_set(&got->profiles, &got->psf, shape.sigma_px);
+            bst_source_profile_render(&got->profiles, &got->psf, &shape, &stamp, got->scratch,
+                                      got->planes);
+            bst_imgproc_gauss_render(&got->psf, &shape, &stamp, want[0], want[1], want[2], want[3]);
+            int stride = bst_simd_layout_round_up(stamp.width);
             for (int part = 0; part < 4; part++) {
                 double peak = 0.0, worst = 0.0;
                 for (int i = 0; i < stamp.width * stamp.height; i++) {
@@ -161,14 +162,16 @@ static void images_are_those_of_the_place_in_the_field(void **state) {
                                           image + (size_t)n * IMAGE * IMAGE));
     }
     rendered *got = open_rendered(known);
-    bst_profiles_on(&got->profiles, 0.0, 0.0, 1);
-    bst_profiles_set(&got->profiles, &got->psf, known->sigma_px);
+    bst_source_profiles_on(&got->profiles, 0.0, 0.0, 1);
+    bst_source_profiles_set(&got->profiles, &got->psf, known->sigma_px);
     /* places on the grid of the samples; the middle's are half a sample from equal shares */
     const double place[2][2] = {{2.25, 1.5}, {127.5, 127.5}};
     for (int k = 0; k < 2; k++) {
-        bst_shape shape = {.x_px = place[k][0], .y_px = place[k][1], .sigma_px = known->sigma_px};
-        bst_stamp stamp = {(int)shape.x_px - 6, (int)shape.y_px - 6, 13, 13};
-        bst_image_render(&got->profiles, &got->psf, &shape, &stamp, got->scratch, got->planes);
+        bst_imgproc_shape shape = {
+            .x_px = place[k][0], .y_px = place[k][1], .sigma_px = known->sigma_px};
+        bst_imgproc_stamp stamp = {(int)shape.x_px - 6, (int)shape.y_px - 6, 13, 13};
+        bst_source_profile_render(&got->profiles, &got->psf, &shape, &stamp, got->scratch,
+                                  got->planes);
         int node[4],
             n = bst_psf_weights(psf, shape.x_px, shape.y_px, node, (double[4]){0.0, 0.0, 0.0, 0.0});
         double weight[4], missed = 0.0, all = 0.0;
@@ -181,7 +184,7 @@ static void images_are_those_of_the_place_in_the_field(void **state) {
                 want +=
                     weight[m] * image[((size_t)node[m] * IMAGE + (size_t)v) * IMAGE + (size_t)u];
             }
-            double g = (double)got->planes[i / 13 * bst_lanes_up(13) + i % 13];
+            double g = (double)got->planes[i / 13 * bst_simd_layout_round_up(13) + i % 13];
             missed += (g - want) * (g - want);
             all += want * want;
         }

@@ -19,7 +19,7 @@ static fixture begin(int width, int height) {
     return f;
 }
 
-static void expose(fixture *f, const bst_motion *motion) {
+static void expose(fixture *f, const bst_camera_motion *motion) {
     synthetic_expose(&f->s, bst_rng_make_key(12, 0, "test", "locate"), 1);
     if (!f->ip) {
         f->ip = synthetic_processor(&f->ctx, &f->s);
@@ -65,7 +65,7 @@ static void edges_in_x_and_y(void **state) {
                 }
                 fixture f = begin(100, 80);
                 synthetic_add(&f.s, x, y, 4e4, paths[p][0], paths[p][1]);
-                bst_motion motion = synthetic_motion(&f.s, paths[p][0], paths[p][1]);
+                bst_camera_motion motion = synthetic_motion(&f.s, paths[p][0], paths[p][1]);
                 expose(&f, p ? &motion : NULL);
                 const bst_detection *d = near_to(&f, x, y, 0.3);
                 assert_int_equal((d->flags & BST_DETECTION_EDGE) != 0, !inside);
@@ -88,7 +88,7 @@ static void snr_of_points_and_streaks(void **state) {
             synthetic_add(&f.s, 32.0 + 64.0 * (i % 4), 32.0 + 64.0 * (i / 4), 40.0 * noise / norm,
                           dx, dy);
         }
-        bst_motion motion = synthetic_motion(&f.s, dx, dy);
+        bst_camera_motion motion = synthetic_motion(&f.s, dx, dy);
         expose(&f, p ? &motion : NULL);
         double ratio = 0.0;
         for (int i = 0; i < 12; i++) {
@@ -154,7 +154,7 @@ static void binned_window_of_streaks(void **state) {
         frame.pixels = binned;
         frame.window = (bst_window){X0, Y0, 2 * NX, 2 * NY};
         frame.binning = 2;
-        bst_motion motion = synthetic_motion(&f.s, dx, dy);
+        bst_camera_motion motion = synthetic_motion(&f.s, dx, dy);
         bst_assert_ok(&f.ctx, bst_imgproc_detect(&f.ctx, f.ip, &frame, &motion, f.d, 64));
         for (int i = 0; i < 3; i++) {
             const bst_detection *d = near_to(&f, stars[i][0], stars[i][1], 1.0);

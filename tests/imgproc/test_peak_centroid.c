@@ -5,7 +5,7 @@
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
-static const bst_zero_point no_zero_point = {.stars = 0};
+static const bst_optics_zero_point no_zero_point = {.stars = 0};
 
 enum { SIDE = 6, PER_FRAME = SIDE * SIDE, SPACING = 30, FRAMES = 10 };
 
@@ -15,7 +15,7 @@ typedef struct scene {
     bst_imgproc *ip;
     bst_detections *d;
     bst_rng_key key;
-    bst_motion motion;
+    bst_camera_motion motion;
     double dx, dy, flux;
     double x[PER_FRAME], y[PER_FRAME];
 } scene;

@@ -9,38 +9,40 @@ static void check(bst_camera camera) {
     bst_stars *stars = NULL;
     bst_assert_ok(&ctx, bst_stars_open(&ctx, "embedded", &stars));
     bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &camera));
-    bst_light light = {{29000.0, -7000.0, 3000.0}, {1e11, 1.1e11, 0.2e11}};
+    bst_astro_light light = {{29000.0, -7000.0, 3000.0}, {1e11, 1.1e11, 0.2e11}};
     bst_vec3 direction = bst_vec3_from_radec(1.4, -0.1);
     bst_quat q = bst_quat_look(direction, (bst_vec3){0.1, 0.3, 0.9});
     bst_window window = {1000, 200, 2000, 1500};
-    bst_sky sky;
-    bst_assert_ok(&ctx, bst_sky_create(&ctx, &camera, stars, 2022.46, 4096, &sky));
+    bst_predicted_stars sky;
+    bst_assert_ok(&ctx, bst_predicted_stars_create(&ctx, &camera, stars, 2022.46, 4096, &sky));
     int count = 0;
-    bst_assert_ok(&ctx, bst_sky_expect(&ctx, &sky, q, &light, window, 50.0, 7.0, &count));
+    bst_assert_ok(&ctx,
+                  bst_predicted_stars_expect(&ctx, &sky, q, &light, window, 50.0, 7.0, &count));
     assert_true(count > 10);
     for (int i = 0; i < count; i++) {
-        const bst_expected_star *e = &sky.expected[i];
+        const bst_imgproc_expected_star *e = &sky.expected[i];
         assert_true(e->x_px >= 950 && e->x_px <= 3049 && e->y_px >= 150 && e->y_px <= 1749);
         bst_star star;
         bst_assert_ok(&ctx, bst_stars_find(&ctx, stars, e->id, 2022.46, &star));
         bst_vec3 apparent =
             bst_quat_rotate(bst_quat_conj(q), bst_camera_unproject(&camera, e->x_px, e->y_px));
-        bst_vec3 place = bst_light_catalogue_star(&light, apparent);
+        bst_vec3 place = bst_astro_light_catalogue_star(&light, apparent);
         bst_assert_close(bst_vec3_angle(place, star.icrs), 0.0, 1e-9);
         /* aberration is there: v/c sin(angle), up to 20 arcsec */
         assert_true(bst_vec3_angle(apparent, star.icrs) > 1e-5);
         assert_true(e->v_mag <= 7.0);
     }
-    bst_sky_free(&sky);
+    bst_predicted_stars_free(&sky);
 
     /* No star of the window is missed: a whole-sky query finds no other inside it. Room for fewer
      * stars than there are brings the brightest. */
-    bst_sky small;
-    bst_assert_ok(&ctx, bst_sky_create(&ctx, &camera, stars, 2022.46, 40, &small));
+    bst_predicted_stars small;
+    bst_assert_ok(&ctx, bst_predicted_stars_create(&ctx, &camera, stars, 2022.46, 40, &small));
     int fewer = 0;
-    bst_assert_ok(&ctx, bst_sky_expect(&ctx, &small, q, &light, window, 50.0, 9.0, &fewer));
+    bst_assert_ok(&ctx,
+                  bst_predicted_stars_expect(&ctx, &small, q, &light, window, 50.0, 9.0, &fewer));
     assert_true(fewer > 0 && fewer <= 40);
-    bst_sky_free(&small);
+    bst_predicted_stars_free(&small);
     static bst_star all[60000];
     int total = 0, inside = 0;
     bst_assert_ok(
@@ -48,7 +50,7 @@ static void check(bst_camera camera) {
     assert_true(total > 10000 && total <= 60000);
     for (int i = 0; i < total; i++) {
         double x = 0, y = 0;
-        bst_vec3 v = bst_quat_rotate(q, bst_light_apparent_star(&light, all[i].icrs));
+        bst_vec3 v = bst_quat_rotate(q, bst_astro_light_apparent_star(&light, all[i].icrs));
         inside += bst_camera_project(&camera, v, &x, &y) && x >= 950 && x <= 3049 && y >= 150 &&
                   y <= 1749;
     }

@@ -11,17 +11,17 @@ static double share_of(double pixel, double centre, double sigma) {
 }
 
 typedef struct fixture {
-    bst_gauss psf;
+    bst_imgproc_gauss psf;
     double share[PIXELS], by_x[PIXELS], by_y[PIXELS], by_variance[PIXELS];
     double other[PIXELS], unused[3][PIXELS];
 } fixture;
 
-static const bst_stamp stamp = {10, 20, SIDE, SIDE};
+static const bst_imgproc_stamp stamp = {10, 20, SIDE, SIDE};
 
 static int setup(void **state) {
     fixture *f = calloc(1, sizeof *f);
     assert_non_null(f);
-    bst_gauss_init(&f->psf);
+    bst_imgproc_gauss_init(&f->psf);
     *state = f;
     return 0;
 }
@@ -54,8 +54,8 @@ static void rules_integrate_polynomials(void **state) {
 static void point_is_product_of_erfs(void **state) {
     fixture *f = *state;
     for (int k = 0; k < 20; k++) {
-        bst_shape s = {33.0 + 0.05 * k, 43.0 + 0.037 * k, 0, 0, 0, 0, 0.6 + 0.1 * k};
-        bst_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
+        bst_imgproc_shape s = {33.0 + 0.05 * k, 43.0 + 0.037 * k, 0, 0, 0, 0, 0.6 + 0.1 * k};
+        bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
         for (int i = 0; i < PIXELS; i++) {
             double px = share_of(stamp.x0 + i % SIDE, s.x_px, s.sigma_px);
             double py = share_of(stamp.y0 + i / SIDE, s.y_px, s.sigma_px);
@@ -70,8 +70,9 @@ static void streak_is_the_line_integral(void **state) {
     static const double paths[][4] = {{1.5, 0, 0, 0},   {8.3, 0, 0, 0}, {-6, 5, 0, 0},
                                       {0.2, -20, 0, 0}, {22, 13, 0, 0}, {8, 0, 1.3, 0.4}};
     for (size_t c = 0; c < sizeof paths / sizeof *paths; c++) {
-        bst_shape s = {33.3, 44.1, paths[c][0], paths[c][1], paths[c][2], paths[c][3], 0.85};
-        bst_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
+        bst_imgproc_shape s = {33.3,        44.1,        paths[c][0], paths[c][1],
+                               paths[c][2], paths[c][3], 0.85};
+        bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
         memset(f->other, 0, sizeof f->other);
         enum { STEPS = 20000 };
         for (int k = 0; k < STEPS; k++) {
@@ -105,11 +106,11 @@ static void streak_is_the_line_integral(void **state) {
 /* Derivatives against central differences: h^2 f''' / 6 is below 1e-6 at h = 1e-3. */
 static void derivatives_are_slopes(void **state) {
     fixture *f = *state;
-    bst_shape s = {33.3, 44.1, 4.0, -3.0, 0.5, 0.2, 0.85};
-    bst_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
+    bst_imgproc_shape s = {33.3, 44.1, 4.0, -3.0, 0.5, 0.2, 0.85};
+    bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
     const double h = 1e-3;
     for (int which = 0; which < 3; which++) {
-        bst_shape lo = s, hi = s;
+        bst_imgproc_shape lo = s, hi = s;
         double variance = s.sigma_px * s.sigma_px;
         if (which == 0) {
             lo.x_px -= h;
@@ -124,8 +125,8 @@ static void derivatives_are_slopes(void **state) {
         const double *slope = which == 0 ? f->by_x : which == 1 ? f->by_y : f->by_variance;
         double *a = f->other, *b = f->unused[0];
         double *scratch = f->unused[1], *scratch2 = f->unused[2];
-        bst_gauss_render(&f->psf, &lo, &stamp, a, scratch, scratch2, f->share);
-        bst_gauss_render(&f->psf, &hi, &stamp, b, scratch, scratch2, f->share);
+        bst_imgproc_gauss_render(&f->psf, &lo, &stamp, a, scratch, scratch2, f->share);
+        bst_imgproc_gauss_render(&f->psf, &hi, &stamp, b, scratch, scratch2, f->share);
         for (int i = 0; i < PIXELS; i++) {
             bst_assert_close(slope[i], (b[i] - a[i]) / (2 * h), 3e-6);
         }
@@ -138,8 +139,8 @@ static void stamps_may_cut_the_source(void **state) {
     static const double centres[][2] = {
         {-500, 30}, {9.6, 19.6}, {57.9, 68.2}, {1e6, -1e6}, {30, 90}};
     for (size_t c = 0; c < sizeof centres / sizeof *centres; c++) {
-        bst_shape s = {centres[c][0], centres[c][1], 30, 40, 1, -2, 1.3};
-        bst_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
+        bst_imgproc_shape s = {centres[c][0], centres[c][1], 30, 40, 1, -2, 1.3};
+        bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
         double sum = 0.0;
         for (int i = 0; i < PIXELS; i++) {
             assert_true(isfinite(f->share[i]) && f->share[i] >= 0.0);

@@ -21,7 +21,7 @@ static void windows_are_apart_and_hold_all(void **state) {
         uint64_t u = 0;
         int binning = 1 + (int)(3.0 * bst_rng_uniform(key, 0, u++));
         bst_window frame = {17, 40, 900 + (int)(100 * bst_rng_uniform(key, 0, u++)), 700};
-        bst_windows w = {0};
+        bst_region_of_interest w = {0};
         double place[40][2];
         int count = 0;
         for (int i = 0; i < 40; i++) {
@@ -31,14 +31,14 @@ static void windows_are_apart_and_hold_all(void **state) {
                           y <= frame.y0 + frame.height - binning;
             double half_x = 5 + 30 * bst_rng_uniform(key, 0, u++);
             double half_y = 5 + 30 * bst_rng_uniform(key, 0, u++);
-            bool added = bst_windows_add(&w, &frame, x, y, half_x, half_y);
+            bool added = bst_region_of_interest_add(&w, &frame, x, y, half_x, half_y);
             assert_true(added || !inside);
             if (inside) {
                 place[count][0] = x;
                 place[count++][1] = y;
             }
         }
-        assert_true(bst_windows_settle(&w, &frame, binning, 1.0));
+        assert_true(bst_region_of_interest_settle(&w, &frame, binning, 1.0));
         double area = 0.0;
         for (int i = 0; i < w.count; i++) {
             const bst_window *a = &w.items[i];
@@ -55,15 +55,15 @@ static void windows_are_apart_and_hold_all(void **state) {
             }
         }
         for (int i = 0; i < count; i++) {
-            assert_true(bst_windows_hold(&w, place[i][0], place[i][1], 0.5));
+            assert_true(bst_region_of_interest_hold(&w, place[i][0], place[i][1], 0.5));
         }
         double share = area / ((double)frame.width * frame.height);
-        assert_false(bst_windows_settle(&w, &frame, binning, 0.9 * share));
+        assert_false(bst_region_of_interest_settle(&w, &frame, binning, 0.9 * share));
     }
-    bst_windows none = {0};
+    bst_region_of_interest none = {0};
     bst_window frame = {0, 0, 100, 100};
-    assert_false(bst_windows_add(&none, &frame, 150, 50, 20, 20));
-    assert_false(bst_windows_settle(&none, &frame, 1, 1.0));
+    assert_false(bst_region_of_interest_add(&none, &frame, 150, 50, 20, 20));
+    assert_false(bst_region_of_interest_settle(&none, &frame, 1, 1.0));
 }
 
 /* Streaks and points in windows of 64 px: found where and as the whole frame shows them. */
@@ -88,7 +88,7 @@ static void windows_show_what_the_frame_shows(void **state) {
         /* what nobody looks at */
         synthetic_add(&s, 160.0, 160.0, 3e4, dx, dy);
         synthetic_expose(&s, key, 1);
-        bst_motion motion = synthetic_motion(&s, dx, dy);
+        bst_camera_motion motion = synthetic_motion(&s, dx, dy);
         bst_imgproc *ip = synthetic_processor(&ctx, &s);
         bst_detections *all = synthetic_detections(500), *some = synthetic_detections(500);
         bst_imgproc_frame frame = synthetic_frame(&s);

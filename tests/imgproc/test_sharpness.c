@@ -34,7 +34,7 @@ static double place(const field *f, int frame, int k, int axis) {
     return 18 + cell * SPACING + bst_rng_uniform(f->key, (uint64_t)frame, (uint64_t)(2 * k + axis));
 }
 
-static void detect(field *f, const bst_motion *motion) {
+static void detect(field *f, const bst_camera_motion *motion) {
     bst_imgproc_frame frame = synthetic_frame(&f->s);
     bst_assert_ok(&f->ctx, bst_imgproc_detect(&f->ctx, f->ip, &frame, motion, f->d, 2048));
     assert_true(synthetic_sound(f->d));
@@ -57,7 +57,7 @@ static void light_is_not_charge(void **state) {
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         const double *p = cases[c];
         field f = make(p[0]);
-        bst_motion motion = synthetic_motion(&f.s, p[1], p[2]);
+        bst_camera_motion motion = synthetic_motion(&f.s, p[1], p[2]);
         double flux = p[4] * synthetic_noise(&f.s) / synthetic_norm(&f.s, 100.2, 100.4, p[1], p[2]);
         for (int i = 0; i < 4; i++) {
             synthetic_clear(&f.s);
@@ -158,9 +158,9 @@ static void star_under_charge(void **state) {
  */
 static void without_neighbours(void **state) {
     (void)state;
-    bst_gauss *psf = malloc(sizeof *psf);
+    bst_imgproc_gauss *psf = malloc(sizeof *psf);
     assert_non_null(psf);
-    bst_gauss_init(psf);
+    bst_imgproc_gauss_init(psf);
     bst_sharpness s = {0};
     bst_sharpness_set(&s, psf, NULL, 1, 0.85);
     float signal[9] = {100, 0, 0, 0, 100, 0, 0, 0, 0};

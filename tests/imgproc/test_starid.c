@@ -10,7 +10,7 @@ typedef struct scene {
     bst_ctx ctx;
     bst_starid *id;
     bst_rng_key key;
-    bst_expected_star stars[MOST];
+    bst_imgproc_expected_star stars[MOST];
     int star_count;
     bst_detection items[MOST];
     int truth[MOST]; /* star of each detection, -1: none */
@@ -45,9 +45,9 @@ static void make_stars(scene *s, uint64_t seed, int count) {
     s->count = 0;
     for (int i = 0; i < count; i++) {
         double v = 13.0 + log10(fmax(uniform(s, seed, 3 * i), 0.01)) / 0.4;
-        s->stars[i] = (bst_expected_star){-60.0 + 1144.0 * uniform(s, seed, 3 * i + 1),
-                                          -60.0 + 1144.0 * uniform(s, seed, 3 * i + 2), v,
-                                          (uint32_t)(1000 + i)};
+        s->stars[i] = (bst_imgproc_expected_star){-60.0 + 1144.0 * uniform(s, seed, 3 * i + 1),
+                                                  -60.0 + 1144.0 * uniform(s, seed, 3 * i + 2), v,
+                                                  (uint32_t)(1000 + i)};
     }
 }
 
@@ -293,7 +293,7 @@ static void the_fit_weighs_by_the_errors(void **state) {
     s->count = 0;
     for (int i = 0; i < 6; i++) {
         double v = 9.0 + 0.2 * i;
-        s->stars[i] = (bst_expected_star){at[i][0], at[i][1], v, (uint32_t)(1000 + i)};
+        s->stars[i] = (bst_imgproc_expected_star){at[i][0], at[i][1], v, (uint32_t)(1000 + i)};
         detect(s, seen[i][0], seen[i][1], v, i);
         s->items[i].cov_xx = seen[i][2];
         s->items[i].cov_yy = seen[i][3];

@@ -19,7 +19,7 @@ static tally measure_apart(double dx, double dy, double snr, int frames, int spa
     synthetic_init(&s, 6 * spacing + 28, 6 * spacing + 28);
     bst_imgproc *ip = synthetic_processor(&ctx, &s);
     bst_detections *d = synthetic_detections(2048);
-    bst_motion motion = synthetic_motion(&s, dx, dy);
+    bst_camera_motion motion = synthetic_motion(&s, dx, dy);
     bst_imgproc_frame frame = synthetic_frame(&s);
     bst_rng_key key = bst_rng_make_key(9, 0, "test", "sources");
     double flux = snr * synthetic_noise(&s) / synthetic_norm(&s, 100.3, 100.7, dx, dy);
@@ -157,7 +157,7 @@ static void no_bias_over_pixel_phase(void **state) {
         s.camera.gain_e_per_dn = 1.0;
         bst_imgproc *ip = synthetic_processor(&ctx, &s);
         bst_detections *d = synthetic_detections(64);
-        bst_motion motion = synthetic_motion(&s, paths[c][0], paths[c][1]);
+        bst_camera_motion motion = synthetic_motion(&s, paths[c][0], paths[c][1]);
         bst_imgproc_frame frame = synthetic_frame(&s);
         bst_rng_key key = bst_rng_make_key(3, 0, "test", "phase");
         for (int k = 0; k < 49; k++) {
@@ -195,7 +195,7 @@ static void false_alarms_are_as_requested(void **state) {
         synthetic_clear(&s);
         bst_imgproc *ip = synthetic_processor(&ctx, &s);
         bst_detections *d = synthetic_detections(2048);
-        bst_motion motion = synthetic_motion(&s, paths[c][0], paths[c][1]);
+        bst_camera_motion motion = synthetic_motion(&s, paths[c][0], paths[c][1]);
         bst_imgproc_frame frame = synthetic_frame(&s);
         bst_rng_key key = bst_rng_make_key(7, 0, "test", "noise");
         int alarms = 0, frames = 240;
@@ -222,7 +222,7 @@ static void hard_case(double fwhm, double x, double y, double snr, double dx, do
     s.camera.psf_fwhm_px = fwhm;
     bst_imgproc *ip = synthetic_processor(&ctx, &s);
     bst_detections *d = synthetic_detections(64);
-    bst_motion motion = synthetic_motion(&s, dx, dy);
+    bst_camera_motion motion = synthetic_motion(&s, dx, dy);
     bst_imgproc_frame frame = synthetic_frame(&s);
     bst_rng_key key = bst_rng_make_key(11, 0, "test", "hard");
     double flux = snr * synthetic_noise(&s) / synthetic_norm(&s, 60.3, 60.7, dx, dy), sum = 0;

@@ -20,7 +20,7 @@ static figures measure(double dx, double dy, double said_x, double said_y, doubl
     synthetic_init(&s, SIDE, SIDE);
     bst_imgproc *ip = synthetic_processor(&ctx, &s);
     bst_detections *d = synthetic_detections(200);
-    bst_motion motion = synthetic_motion(&s, said_x, said_y);
+    bst_camera_motion motion = synthetic_motion(&s, said_x, said_y);
     motion.bend_sigma_rad = bend_px * bst_camera_scale_rad(&s.camera);
     double length = hypot(dx, dy), ex = dx / length, ey = dy / length;
     int n = 0;

@@ -23,7 +23,8 @@ static void draw(synthetic *s, bst_rng_key key, double dx, double dy) {
     }
 }
 
-static void detect(const synthetic *s, const bst_motion *motion, int width, bst_detections *out) {
+static void detect(const synthetic *s, const bst_camera_motion *motion, int width,
+                   bst_detections *out) {
     bst_ctx ctx = {0};
     bst_simd_limit(width);
     bst_imgproc *ip = synthetic_processor(&ctx, s);
@@ -39,8 +40,8 @@ static void all_widths_agree(double dx, double dy) {
     bst_rng_key key = bst_rng_make_key(3, 0, "test", "widths");
     draw(&s, key, dx, dy);
     synthetic_expose(&s, key, 1);
-    bst_motion moving = synthetic_motion(&s, dx, dy);
-    const bst_motion *motion = dx != 0.0 || dy != 0.0 ? &moving : NULL;
+    bst_camera_motion moving = synthetic_motion(&s, dx, dy);
+    const bst_camera_motion *motion = dx != 0.0 || dy != 0.0 ? &moving : NULL;
     bst_detections *first = synthetic_detections(MOST), *other = synthetic_detections(MOST);
     detect(&s, motion, 4, first);
     assert_true(first->count > 40);

@@ -62,12 +62,12 @@ static void links_are_not_followed(void **state) {
     bst_assert_ok(&ctx, bst_draft_close(&ctx, &draft, BST_OK));
     expect(path, "rows");
     expect(victim, "mine");
-    bst_assert_ok(&ctx, bst_write_file_atomic(&ctx, path, "more", 4));
+    bst_assert_ok(&ctx, bst_io_write_file_atomic(&ctx, path, "more", 4));
     expect(path, "more");
     expect(victim, "mine");
     assert_int_equal(unlink(path), 0);
     assert_int_equal(symlink(victim, path), 0);
-    bst_assert_ok(&ctx, bst_write_file_atomic(&ctx, path, "more", 4));
+    bst_assert_ok(&ctx, bst_io_write_file_atomic(&ctx, path, "more", 4));
     expect(path, "more");
     expect(victim, "mine");
     int fd;
@@ -86,12 +86,12 @@ static void what_is_no_file_is_not_replaced(void **state) {
     struct stat info;
     path_of("pipe", path);
     assert_int_equal(mkfifo(path, 0600), 0);
-    assert_int_equal(bst_write_file_atomic(&ctx, path, "x", 1), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_io_write_file_atomic(&ctx, path, "x", 1), BST_ERR_ARGUMENT);
     assert_non_null(strstr(ctx.message, "is not a regular file; give another path"));
     assert_int_equal(stat(path, &info), 0);
     assert_true(S_ISFIFO(info.st_mode));
     path_of("none/x", path);
-    assert_int_equal(bst_write_file_atomic(&ctx, path, "x", 1), BST_ERR_IO);
+    assert_int_equal(bst_io_write_file_atomic(&ctx, path, "x", 1), BST_ERR_IO);
     assert_non_null(strstr(ctx.message, "none/x: cannot be made: No such file or directory"));
 }
 

@@ -40,7 +40,7 @@ static void keep(const char *path, const char *name) {
 
 /* A sky of streaked stars and a target, so that the picture can be judged by eye. */
 static void draw_sky(uint16_t *pixels, double target_x, double target_y, uint64_t frame,
-                     bst_mark *marks, int stars) {
+                     bst_io_mark *marks, int stars) {
     bst_rng_key key = bst_rng_make_key(1, 0, "test", "sky");
     float *sky = calloc((size_t)SIZE * SIZE, sizeof *sky);
     assert_non_null(sky);
@@ -51,8 +51,8 @@ static void draw_sky(uint16_t *pixels, double target_x, double target_y, uint64_
         double flux =
             target ? 1200.0 : 150.0 * pow(bst_rng_uniform(key, frame, 3 * (uint64_t)s + 2), -1.2);
         int steps = target ? 1 : 9;
-        marks[s] =
-            (bst_mark){.x_px = x, .y_px = y, .kind = target ? BST_MARK_DETECTION : BST_MARK_STAR};
+        marks[s] = (bst_io_mark){
+            .x_px = x, .y_px = y, .kind = target ? BST_MARK_DETECTION : BST_MARK_STAR};
         for (int k = 0; k < steps; k++) {
             double cx = x + (target ? 0.0 : 1.2 * (k - 4)), cy = y + (target ? 0.0 : 0.5 * (k - 4));
             for (int j = (int)cy - 6; j <= (int)cy + 6; j++) {
@@ -81,7 +81,7 @@ static void test_quicklook(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
     uint16_t *pixels[2];
-    bst_mark marks[2][61];
+    bst_io_mark marks[2][61];
     for (int i = 0; i < 2; i++) {
         pixels[i] = malloc(sizeof(uint16_t) * SIZE * SIZE);
         assert_non_null(pixels[i]);
@@ -155,12 +155,12 @@ static void test_quicklook(void **state) {
 /* Sorted by importance; equal ones and places that are not numbers do no harm. */
 static void test_mark_sort(void **state) {
     (void)state;
-    bst_mark marks[5] = {{.importance = 3.0, .x_px = NAN},
-                         {.importance = INFINITY, .x_px = 1},
-                         {.importance = 0.0},
-                         {.importance = 7.5},
-                         {.importance = 3.0}};
-    bst_mark_sort(marks, 5);
+    bst_io_mark marks[5] = {{.importance = 3.0, .x_px = NAN},
+                            {.importance = INFINITY, .x_px = 1},
+                            {.importance = 0.0},
+                            {.importance = 7.5},
+                            {.importance = 3.0}};
+    bst_io_mark_sort(marks, 5);
     const double expected[5] = {INFINITY, 7.5, 3.0, 3.0, 0.0};
     for (int i = 0; i < 5; i++) {
         assert_true(marks[i].importance == expected[i]);
@@ -178,13 +178,13 @@ static void test_stretch(void **state) {
     for (uint64_t i = 0; i < N * N; i++) {
         pixels[i] = (uint16_t)lround(1000.0 + 20.0 * bst_rng_normal(key, 0, i));
     }
-    bst_stretch s = bst_stretch_of(pixels, N, N);
+    bst_io_stretch s = bst_io_stretch_of(pixels, N, N);
     /* whole DN: 1 DN of the median, 1.5 DN of 1.4826 times the quartile */
     bst_assert_close(s.black, 1000.0 - 20.0, 3.0);
     bst_assert_close(s.softening, 30.0, 3.5);
     assert_true(s.white > s.black);
     memset(pixels, 0, sizeof(uint16_t) * N * N);
-    s = bst_stretch_of(pixels, N, N);
+    s = bst_io_stretch_of(pixels, N, N);
     assert_true(s.white > s.black && s.softening > 0.0);
     free(pixels);
 }
@@ -196,17 +196,18 @@ static void test_picture_errors(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
     bst_picture *p;
-    assert_int_equal(bst_picture_create(&ctx, 0, 5, (bst_colour){0, 0, 0}, &p), BST_ERR_ARGUMENT);
-    bst_assert_ok(&ctx, bst_picture_create(&ctx, 40, 30, (bst_colour){0, 0, 0}, &p));
+    assert_int_equal(bst_picture_create(&ctx, 0, 5, (bst_io_colour){0, 0, 0}, &p),
+                     BST_ERR_ARGUMENT);
+    bst_assert_ok(&ctx, bst_picture_create(&ctx, 40, 30, (bst_io_colour){0, 0, 0}, &p));
     const uint16_t dot = 5;
-    const bst_stretch stretch = {0, 10, 1};
+    const bst_io_stretch stretch = {0, 10, 1};
     assert_int_equal(
-        bst_picture_frame(&ctx, p, (bst_box){30, 0, 20, 20}, &dot, 1, 1, 0, 0, 1, 1, stretch),
+        bst_picture_frame(&ctx, p, (bst_io_box){30, 0, 20, 20}, &dot, 1, 1, 0, 0, 1, 1, stretch),
         BST_ERR_ARGUMENT);
     /* a part that lies outside the frame is black, not a crash */
-    bst_assert_ok(&ctx, bst_picture_frame(&ctx, p, (bst_box){0, 0, 20, 20}, &dot, 1, 1, -50, 80, 4,
-                                          4, stretch));
-    double narrow = bst_picture_text(p, 1, 20, 8, (bst_colour){255, 255, 255}, false, "I");
+    bst_assert_ok(&ctx, bst_picture_frame(&ctx, p, (bst_io_box){0, 0, 20, 20}, &dot, 1, 1, -50, 80,
+                                          4, 4, stretch));
+    double narrow = bst_picture_text(p, 1, 20, 8, (bst_io_colour){255, 255, 255}, false, "I");
     assert_true(bst_picture_text_width(8, false, "III") > 2.5 * narrow);
     assert_int_equal(bst_picture_save(&ctx, p, scratch_path(&s, "no/a.png")), BST_ERR_IO);
     bst_assert_ok(&ctx, bst_picture_save(&ctx, p, scratch_path(&s, "a.png")));
@@ -230,29 +231,30 @@ static void test_pointing_plot(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, count_log, &warnings, BST_LOG_INFO);
     enum { N = 300 };
-    bst_pointing_point points[N];
+    bst_io_pointing_point points[N];
     bst_rng_key key = bst_rng_make_key(3, 0, "test", "plot");
     for (int i = 0; i < N; i++) {
         double n[2];
         bst_rng_normal2(key, 0, (uint64_t)i, n);
         double lead = i < 4 ? 720.0 : i < 22 ? 600.0 - 25.0 * i : 40.0 * exp(-(i - 22) / 3.0);
-        points[i] = (bst_pointing_point){.time_s = i + 0.25,
-                                         .dx_px = lead + 0.25 * n[0],
-                                         .dy_px = 0.3 * lead + 0.25 * n[1],
-                                         .mode = i < 4    ? BST_MODE_SLEW
-                                                 : i < 22 ? BST_MODE_SEARCH
-                                                 : i < 30 ? BST_MODE_ACQUIRE
-                                                          : BST_MODE_TRACK,
-                                         .in_track = i >= 34,
-                                         .counted = i >= 36,
-                                         .visible = i != 100};
+        points[i] = (bst_io_pointing_point){.time_s = i + 0.25,
+                                            .dx_px = lead + 0.25 * n[0],
+                                            .dy_px = 0.3 * lead + 0.25 * n[1],
+                                            .mode = i < 4    ? BST_MODE_SLEW
+                                                    : i < 22 ? BST_MODE_SEARCH
+                                                    : i < 30 ? BST_MODE_ACQUIRE
+                                                             : BST_MODE_TRACK,
+                                            .in_track = i >= 34,
+                                            .counted = i >= 36,
+                                            .visible = i != 100};
     }
     char path[700];
     /* a name that needs quoting */
     snprintf(path, sizeof path, "%s/it's \"pointing\".png", s.folder);
     bool made = false;
-    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, "neossat_geo_track: boresight to true target",
-                                          "pointing RMS 0.2 px", points, N, 0.5, &made));
+    bst_assert_ok(&ctx,
+                  bst_io_pointing_plot(&ctx, path, "neossat_geo_track: boresight to true target",
+                                       "pointing RMS 0.2 px", points, N, 0.5, &made));
     if (!made && system("command -v gnuplot > /dev/null") != 0) {
         /* gnuplot is an optional program: without it a warning, and no file */
         assert_int_equal(warnings, 1);
@@ -269,15 +271,15 @@ static void test_pointing_plot(void **state) {
 
     /* never in track, all points at one place */
     for (int i = 0; i < N; i++) {
-        points[i] = (bst_pointing_point){.time_s = i, .visible = true, .mode = BST_MODE_STARE};
+        points[i] = (bst_io_pointing_point){.time_s = i, .visible = true, .mode = BST_MODE_STARE};
     }
-    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made));
+    bst_assert_ok(&ctx, bst_io_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made));
     assert_true(made);
-    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, NULL, points, 1, 0.0, &made),
+    assert_int_equal(bst_io_pointing_plot(&ctx, path, NULL, NULL, points, 1, 0.0, &made),
                      BST_ERR_ARGUMENT);
     assert_false(made);
     assert_int_equal(
-        bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, NULL, points, N, 0.0, &made),
+        bst_io_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, NULL, points, N, 0.0, &made),
         BST_ERR_IO);
     /* without gnuplot: a warning, success, and nothing left behind */
     unlink(path);
@@ -285,7 +287,7 @@ static void test_pointing_plot(void **state) {
     assert_non_null(search);
     setenv("PATH", s.folder, 1);
     warnings = 0;
-    bst_status status = bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made);
+    bst_status status = bst_io_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made);
     setenv("PATH", search, 1);
     free(search);
     assert_int_equal(status, BST_OK);

@@ -9,31 +9,32 @@
 #include "sim/io/run_store.h"
 #include "tests/io/scratch.h"
 
-static const bst_column columns[] = {
+static const bst_io_column columns[] = {
     {"tick", BST_COLUMN_INT, "tick", "when"},
     {"x_px", BST_COLUMN_REAL, "px", "column"},
     {"label", BST_COLUMN_TEXT, "", "what"},
 };
-static const bst_column epochs[] = {{"epoch_utc", BST_COLUMN_TEXT, "", "epoch"}};
+static const bst_io_column epochs[] = {{"epoch_utc", BST_COLUMN_TEXT, "", "epoch"}};
 
 /* Begins a run with a table of 50 rows, one of them without values. */
 static bst_run *begin(bst_ctx *ctx, const char *out, const char *epoch) {
     bst_run *run;
-    bst_table *table;
+    bst_io_table *table;
     bst_assert_ok(ctx, bst_run_create(ctx, out, false, &run));
-    bst_assert_ok(ctx, bst_table_create(ctx, run, "spots", "Spots.", columns, 3, &table));
+    bst_assert_ok(ctx, bst_io_table_create(ctx, run, "spots", "Spots.", columns, 3, &table));
     for (int i = 0; i < 49; i++) {
-        const bst_value row[] = {bst_int_value(1000000000000LL + i), bst_real_value(0.25 * i),
-                                 bst_text_value(i % 2 ? "odd" : "even")};
-        bst_assert_ok(ctx, bst_table_append(ctx, table, row));
+        const bst_io_value row[] = {bst_io_int_value(1000000000000LL + i),
+                                    bst_io_real_value(0.25 * i),
+                                    bst_io_text_value(i % 2 ? "odd" : "even")};
+        bst_assert_ok(ctx, bst_io_table_append(ctx, table, row));
     }
-    const bst_value nulls[] = {bst_null_value(BST_COLUMN_INT), bst_real_value(NAN),
-                               bst_text_value(NULL)};
-    bst_assert_ok(ctx, bst_table_append(ctx, table, nulls));
+    const bst_io_value nulls[] = {bst_io_null_value(BST_COLUMN_INT), bst_io_real_value(NAN),
+                                  bst_io_text_value(NULL)};
+    bst_assert_ok(ctx, bst_io_table_append(ctx, table, nulls));
     if (epoch) {
-        const bst_value row[] = {bst_text_value(epoch)};
-        bst_assert_ok(ctx, bst_table_create(ctx, run, "run", "Run.", epochs, 1, &table));
-        bst_assert_ok(ctx, bst_table_append(ctx, table, row));
+        const bst_io_value row[] = {bst_io_text_value(epoch)};
+        bst_assert_ok(ctx, bst_io_table_create(ctx, run, "run", "Run.", epochs, 1, &table));
+        bst_assert_ok(ctx, bst_io_table_append(ctx, table, row));
     }
     return run;
 }
@@ -41,7 +42,7 @@ static bst_run *begin(bst_ctx *ctx, const char *out, const char *epoch) {
 static void write_json(bst_ctx *ctx, bst_run *run, const char *name, const char *text) {
     cJSON *json = cJSON_Parse(text);
     assert_non_null(json);
-    bst_assert_ok(ctx, bst_run_write_json(ctx, run, name, json));
+    bst_assert_ok(ctx, bst_io_run_write_json(ctx, run, name, json));
     cJSON_Delete(json);
 }
 
@@ -98,44 +99,46 @@ static void a_whole_run(void **state) {
     assert_true(bst_run_reader_epoch(r, &epoch));
     bst_time_to_utc(epoch, 3, text, sizeof text);
     assert_string_equal(text, "2022-06-16T22:10:00.500Z");
-    bst_rows *rows;
+    bst_io_rows *rows;
     bool more = false;
-    bst_assert_ok(&ctx, bst_rows_open(&ctx, r,
-                                      "SELECT tick, x_px, label, utc(x_px) AS t FROM spots WHERE "
-                                      "tick >= ?1 AND tick <= ?2 ORDER BY tick",
-                                      1000000000010LL, 1000000000012LL, &rows));
-    assert_int_equal(bst_rows_columns(rows), 4);
-    assert_string_equal(bst_rows_column_name(rows, 0), "tick");
-    assert_string_equal(bst_rows_column_name(rows, 3), "t");
+    bst_assert_ok(&ctx,
+                  bst_io_rows_open(&ctx, r,
+                                   "SELECT tick, x_px, label, utc(x_px) AS t FROM spots WHERE "
+                                   "tick >= ?1 AND tick <= ?2 ORDER BY tick",
+                                   1000000000010LL, 1000000000012LL, &rows));
+    assert_int_equal(bst_io_rows_columns(rows), 4);
+    assert_string_equal(bst_io_rows_column_name(rows, 0), "tick");
+    assert_string_equal(bst_io_rows_column_name(rows, 3), "t");
     static const char *const when[] = {"2022-06-16T22:10:03.000000Z", "2022-06-16T22:10:03.250000Z",
                                        "2022-06-16T22:10:03.500000Z"};
     for (int i = 0; i < 3; i++) {
-        bst_assert_ok(&ctx, bst_rows_next(&ctx, rows, &more));
+        bst_assert_ok(&ctx, bst_io_rows_next(&ctx, rows, &more));
         assert_true(more);
-        assert_int_equal(bst_rows_kind(rows, 0), BST_CELL_INT);
-        assert_int_equal(bst_rows_kind(rows, 1), BST_CELL_REAL);
-        assert_int_equal(bst_rows_kind(rows, 2), BST_CELL_TEXT);
-        assert_int_equal(bst_rows_int(rows, 0), 1000000000010LL + i);
-        assert_true(bst_rows_real(rows, 1) == 0.25 * (10 + i));
-        assert_string_equal(bst_rows_text(rows, 2), i == 1 ? "odd" : "even");
-        assert_string_equal(bst_rows_text(rows, 3), when[i]);
+        assert_int_equal(bst_io_rows_kind(rows, 0), BST_CELL_INT);
+        assert_int_equal(bst_io_rows_kind(rows, 1), BST_CELL_REAL);
+        assert_int_equal(bst_io_rows_kind(rows, 2), BST_CELL_TEXT);
+        assert_int_equal(bst_io_rows_int(rows, 0), 1000000000010LL + i);
+        assert_true(bst_io_rows_real(rows, 1) == 0.25 * (10 + i));
+        assert_string_equal(bst_io_rows_text(rows, 2), i == 1 ? "odd" : "even");
+        assert_string_equal(bst_io_rows_text(rows, 3), when[i]);
     }
-    bst_assert_ok(&ctx, bst_rows_next(&ctx, rows, &more));
+    bst_assert_ok(&ctx, bst_io_rows_next(&ctx, rows, &more));
     assert_false(more);
-    bst_rows_close(rows);
-    bst_assert_ok(&ctx, bst_rows_open(&ctx, r, "SELECT *, utc(tick) FROM spots WHERE tick IS NULL",
-                                      0, 0, &rows));
-    bst_assert_ok(&ctx, bst_rows_next(&ctx, rows, &more));
+    bst_io_rows_close(rows);
+    bst_assert_ok(
+        &ctx, bst_io_rows_open(&ctx, r, "SELECT *, utc(tick) FROM spots WHERE tick IS NULL", 0, 0,
+                               &rows));
+    bst_assert_ok(&ctx, bst_io_rows_next(&ctx, rows, &more));
     assert_true(more);
     for (int c = 0; c < 4; c++) {
-        assert_int_equal(bst_rows_kind(rows, c), BST_CELL_NULL);
-        assert_true(bst_rows_is_null(rows, c));
+        assert_int_equal(bst_io_rows_kind(rows, c), BST_CELL_NULL);
+        assert_true(bst_io_rows_is_null(rows, c));
     }
-    assert_int_equal(bst_rows_int(rows, 0), 0);
-    assert_true(isnan(bst_rows_real(rows, 1)));
-    assert_string_equal(bst_rows_text(rows, 2), "");
-    bst_rows_close(rows);
-    bst_rows_close(NULL);
+    assert_int_equal(bst_io_rows_int(rows, 0), 0);
+    assert_true(isnan(bst_io_rows_real(rows, 1)));
+    assert_string_equal(bst_io_rows_text(rows, 2), "");
+    bst_io_rows_close(rows);
+    bst_io_rows_close(NULL);
     assert_int_equal(
         bst_run_reader_int(r, "SELECT count(*) FROM spots WHERE tick > ?1", 1000000000009LL, -5),
         39);
@@ -143,13 +146,14 @@ static void a_whole_run(void **state) {
     assert_int_equal(bst_run_reader_int(r, "SELECT max(x_px) FROM spots WHERE tick = ?1", 3, -6),
                      -6);
     assert_int_equal(bst_run_reader_int(r, "SELECT x FROM nowhere", 3, -7), -7);
-    assert_int_equal(bst_rows_open(&ctx, r, "SELECT x FROM nowhere", 0, 0, &rows), BST_ERR_FORMAT);
+    assert_int_equal(bst_io_rows_open(&ctx, r, "SELECT x FROM nowhere", 0, 0, &rows),
+                     BST_ERR_FORMAT);
     assert_null(rows);
     assert_non_null(strstr(ctx.message, "run.sqlite: no such table: nowhere"));
     /* reading changes nothing */
-    assert_int_equal(bst_rows_open(&ctx, r, "DELETE FROM spots", 0, 0, &rows), BST_OK);
-    assert_int_equal(bst_rows_next(&ctx, rows, &more), BST_ERR_FORMAT);
-    bst_rows_close(rows);
+    assert_int_equal(bst_io_rows_open(&ctx, r, "DELETE FROM spots", 0, 0, &rows), BST_OK);
+    assert_int_equal(bst_io_rows_next(&ctx, rows, &more), BST_ERR_FORMAT);
+    bst_io_rows_close(rows);
     char file[700], small[20];
     bst_assert_ok(&ctx, bst_run_reader_file(&ctx, r, "frames.fits", file, sizeof file));
     assert_string_equal(file + strlen(out), "/frames.fits");
@@ -230,7 +234,7 @@ static void folders_that_are_damaged(void **state) {
     bst_ctx ctx = {0};
     bst_run_reader *r;
     char path[700];
-    bst_rows *rows;
+    bst_io_rows *rows;
     assert_int_equal(bst_run_reader_open(&ctx, "", &r), BST_ERR_ARGUMENT);
     assert_int_equal(bst_run_reader_open(&ctx, s.folder, &r), BST_ERR_FORMAT);
     assert_non_null(strstr(ctx.message, "holds neither manifest.json nor run.sqlite"));
@@ -252,7 +256,7 @@ static void folders_that_are_damaged(void **state) {
     assert_false(bst_run_reader_has_tables(r));
     assert_null(bst_run_reader_manifest(r));
     assert_null(bst_run_reader_scenario(r));
-    assert_int_equal(bst_rows_open(&ctx, r, "SELECT 1", 0, 0, &rows), BST_ERR_NOT_FOUND);
+    assert_int_equal(bst_io_rows_open(&ctx, r, "SELECT 1", 0, 0, &rows), BST_ERR_NOT_FOUND);
     bst_run_reader_close(r);
     snprintf(path, sizeof path, "%s/run.sqlite", s.folder);
     assert_int_equal(remove(path), 0);

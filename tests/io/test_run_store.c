@@ -12,7 +12,7 @@
 #include "sim/io/manifest.h"
 #include "tests/io/scratch.h"
 
-static const bst_column columns[] = {
+static const bst_io_column columns[] = {
     {"tick", BST_COLUMN_INT, "tick", "when"},
     {"x_px", BST_COLUMN_REAL, "px", "column"},
     {"label", BST_COLUMN_TEXT, "", "what"},
@@ -39,11 +39,11 @@ static void query(const char *path, const char *sql, char *out, size_t bytes) {
     sqlite3_close(db);
 }
 
-static void add_rows(bst_ctx *ctx, bst_table *table, int count) {
+static void add_rows(bst_ctx *ctx, bst_io_table *table, int count) {
     for (int i = 0; i < count; i++) {
-        const bst_value row[] = {bst_int_value(i), bst_real_value(0.1 * i),
-                                 bst_text_value("a 'b'")};
-        bst_assert_ok(ctx, bst_table_append(ctx, table, row));
+        const bst_io_value row[] = {bst_io_int_value(i), bst_io_real_value(0.1 * i),
+                                    bst_io_text_value("a 'b'")};
+        bst_assert_ok(ctx, bst_io_table_append(ctx, table, row));
     }
 }
 
@@ -61,19 +61,19 @@ static void test_finished_run(void **state) {
     assert_true(scratch_has(partial));
     assert_false(scratch_has(out));
     assert_string_equal(bst_run_folder(run), partial);
-    bst_table *table;
-    bst_assert_ok(&ctx, bst_table_create(&ctx, run, "spots", "Spots.", columns, 3, &table));
+    bst_io_table *table;
+    bst_assert_ok(&ctx, bst_io_table_create(&ctx, run, "spots", "Spots.", columns, 3, &table));
     add_rows(&ctx, table, 1000);
-    const bst_value nulls[] = {bst_null_value(BST_COLUMN_INT), bst_real_value(NAN),
-                               bst_text_value(NULL)};
-    bst_assert_ok(&ctx, bst_table_append(&ctx, table, nulls));
-    const bst_value infinite[] = {bst_null_value(BST_COLUMN_INT), bst_real_value(-INFINITY),
-                                  bst_text_value(NULL)};
-    bst_assert_ok(&ctx, bst_table_append(&ctx, table, infinite));
+    const bst_io_value nulls[] = {bst_io_null_value(BST_COLUMN_INT), bst_io_real_value(NAN),
+                                  bst_io_text_value(NULL)};
+    bst_assert_ok(&ctx, bst_io_table_append(&ctx, table, nulls));
+    const bst_io_value infinite[] = {bst_io_null_value(BST_COLUMN_INT),
+                                     bst_io_real_value(-INFINITY), bst_io_text_value(NULL)};
+    bst_assert_ok(&ctx, bst_io_table_append(&ctx, table, infinite));
     cJSON *json = cJSON_CreateObject();
     cJSON_AddNumberToObject(json, "tenth", 0.1);
     cJSON_AddNumberToObject(json, "third", 1.0 / 3.0);
-    bst_assert_ok(&ctx, bst_run_write_json(&ctx, run, "manifest.json", json));
+    bst_assert_ok(&ctx, bst_io_run_write_json(&ctx, run, "manifest.json", json));
     cJSON_Delete(json);
     bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
     assert_false(scratch_has(partial));
@@ -217,9 +217,9 @@ static void test_killed_run(void **state) {
     pid_t child = fork();
     if (child == 0) {
         bst_run *run;
-        bst_table *table;
+        bst_io_table *table;
         if (bst_run_create(&ctx, out, false, &run) != BST_OK ||
-            bst_table_create(&ctx, run, "spots", "Spots.", columns, 3, &table) != BST_OK) {
+            bst_io_table_create(&ctx, run, "spots", "Spots.", columns, 3, &table) != BST_OK) {
             _exit(1);
         }
         add_rows(&ctx, table, 60000); /* one full batch of 50,000 and a part of the next */
@@ -252,17 +252,19 @@ static void test_table_arguments(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
     bst_run *run;
-    bst_table *table;
+    bst_io_table *table;
     bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&s, "run"), false, &run));
-    assert_int_equal(bst_table_create(&ctx, run, "a\"b", "", columns, 3, &table), BST_ERR_ARGUMENT);
-    assert_int_equal(bst_table_create(&ctx, run, "a", "", columns, 0, &table), BST_ERR_ARGUMENT);
-    const bst_column quoted = {"x\"", BST_COLUMN_INT, "", ""};
-    assert_int_equal(bst_table_create(&ctx, run, "a", "", &quoted, 1, &table), BST_ERR_ARGUMENT);
-    bst_assert_ok(&ctx, bst_table_create(&ctx, run, "spots", "", columns, 3, &table));
-    const bst_value wrong[] = {bst_real_value(1.0), bst_real_value(1.0), bst_text_value("a")};
-    assert_int_equal(bst_table_append(&ctx, table, wrong), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_io_table_create(&ctx, run, "a\"b", "", columns, 3, &table),
+                     BST_ERR_ARGUMENT);
+    assert_int_equal(bst_io_table_create(&ctx, run, "a", "", columns, 0, &table), BST_ERR_ARGUMENT);
+    const bst_io_column quoted = {"x\"", BST_COLUMN_INT, "", ""};
+    assert_int_equal(bst_io_table_create(&ctx, run, "a", "", &quoted, 1, &table), BST_ERR_ARGUMENT);
+    bst_assert_ok(&ctx, bst_io_table_create(&ctx, run, "spots", "", columns, 3, &table));
+    const bst_io_value wrong[] = {bst_io_real_value(1.0), bst_io_real_value(1.0),
+                                  bst_io_text_value("a")};
+    assert_int_equal(bst_io_table_append(&ctx, table, wrong), BST_ERR_ARGUMENT);
     assert_non_null(strstr(ctx.message, "spots"));
-    assert_int_equal(bst_table_create(&ctx, run, "spots", "", columns, 3, &table), BST_ERR_IO);
+    assert_int_equal(bst_io_table_create(&ctx, run, "spots", "", columns, 3, &table), BST_ERR_IO);
     bst_run_abandon(run);
     scratch_remove(&s);
 }
@@ -279,22 +281,24 @@ static void test_full_disk(void **state) {
         signal(SIGXFSZ, SIG_IGN);
         const struct rlimit limit = {200000, 200000};
         bst_run *run;
-        bst_table *table;
+        bst_io_table *table;
         if (bst_run_create(&ctx, scratch_path(&s, "run"), false, &run) != BST_OK ||
-            bst_table_create(&ctx, run, "spots", "Spots.", columns, 3, &table) != BST_OK ||
+            bst_io_table_create(&ctx, run, "spots", "Spots.", columns, 3, &table) != BST_OK ||
             bst_run_commit(&ctx, run) != BST_OK || setrlimit(RLIMIT_FSIZE, &limit) != 0) {
             _exit(1);
         }
         bst_status status = BST_OK;
         for (int i = 0; i < 400000 && status == BST_OK; i++) {
-            const bst_value row[] = {bst_int_value(i), bst_real_value(i), bst_text_value("text")};
-            status = bst_table_append(&ctx, table, row);
+            const bst_io_value row[] = {bst_io_int_value(i), bst_io_real_value(i),
+                                        bst_io_text_value("text")};
+            status = bst_io_table_append(&ctx, table, row);
         }
         if (status != BST_ERR_IO || !strstr(ctx.message, "run.sqlite")) {
             _exit(2);
         }
         char *big = calloc(1, 300000);
-        status = big ? bst_write_file_atomic(&ctx, scratch_path(&s, "big"), big, 300000) : BST_OK;
+        status =
+            big ? bst_io_write_file_atomic(&ctx, scratch_path(&s, "big"), big, 300000) : BST_OK;
         free(big);
         if (status != BST_ERR_IO || !strstr(ctx.message, "big") ||
             !strstr(ctx.message, strerror(EFBIG))) {
@@ -317,14 +321,14 @@ static void test_atomic_file(void **state) {
     scratch_make(&s);
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_assert_ok(&ctx, bst_write_file_atomic(&ctx, scratch_path(&s, "a"), "one", 3));
-    bst_assert_ok(&ctx, bst_write_file_atomic(&ctx, scratch_path(&s, "a"), "four", 4));
+    bst_assert_ok(&ctx, bst_io_write_file_atomic(&ctx, scratch_path(&s, "a"), "one", 3));
+    bst_assert_ok(&ctx, bst_io_write_file_atomic(&ctx, scratch_path(&s, "a"), "four", 4));
     char text[8] = "";
     FILE *f = fopen(scratch_path(&s, "a"), "r");
     assert_int_equal(fread(text, 1, sizeof text, f), 4);
     fclose(f);
     assert_memory_equal(text, "four", 4);
-    assert_int_equal(bst_write_file_atomic(&ctx, scratch_path(&s, "no/a"), "x", 1), BST_ERR_IO);
+    assert_int_equal(bst_io_write_file_atomic(&ctx, scratch_path(&s, "no/a"), "x", 1), BST_ERR_IO);
     assert_non_null(strstr(ctx.message, "no/a"));
     assert_int_equal(scratch_count(s.folder), 1);
     scratch_remove(&s);

@@ -26,7 +26,7 @@ typedef struct orbit {
 
 static bst_status orbit_at(bst_ctx *ctx, const orbit *o, bst_time t, bst_vec3 *r, bst_vec3 *v) {
     double p[3], w[3];
-    bst_sky sky;
+    bst_sky_rotation sky;
     assert_int_equal(bst_sgp4_propagate(o->sgp4, bst_time_diff(t, o->epoch) / 60.0, p, w),
                      BST_SGP4_OK);
     BST_TRY(bst_sky_clock_at(ctx, o->clock, t, &sky));
@@ -55,9 +55,9 @@ static void an_oem_of_our_own_comes_back(void **state) {
     (void)state;
     static const int numbers[] = {39089, 44801};
     bst_ctx ctx = {0};
-    bst_eop *eop;
+    bst_astro_eop *eop;
     orbit o = {.start = utc("2022-06-16T22:10:00.123456789Z"), .step_s = 60.0};
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, eop, &o.clock));
     char *buffer = NULL;
     size_t bytes = 0;
@@ -114,7 +114,7 @@ static void an_oem_of_our_own_comes_back(void **state) {
                            "INTERPOLATION = LAGRANGE\nINTERPOLATION_DEGREE = 9\nMETA_STOP\n"));
     free(text);
     bst_sky_clock_free(o.clock);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
 }
 
 /* A straight line at 1 Hz, from the second before a leap second on. */

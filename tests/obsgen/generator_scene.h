@@ -62,12 +62,12 @@ static inline void close_scene(scene *s) {
 
 /* Electrons of a point source of this SNR. */
 static inline double electrons_of(const scene *s, double snr) {
-    static bst_bound bound;
-    bst_bound_init(&bound, s->frame.sigma_px);
+    static bst_crlb_table bound;
+    bst_crlb_table_init(&bound, s->frame.sigma_px);
     const bst_camera *c = &s->camera;
     double noise = sqrt(s->truth->background_e + c->read_noise_e * c->read_noise_e +
                         c->gain_e_per_dn * c->gain_e_per_dn / 12.0);
-    return snr * noise / bst_bound_norm(&bound, 0.0);
+    return snr * noise / bst_crlb_table_norm(&bound, 0.0);
 }
 
 static inline bst_truth_item *add_source(scene *s, uint32_t id, double x, double y,

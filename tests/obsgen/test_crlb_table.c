@@ -8,18 +8,18 @@ static const double PI = 3.14159265358979323846;
  * (Winick 1986, J. Opt. Soc. Am. A 3, 1809); where shot noise is all: sigma^2 / F and F. */
 static void closed_forms_of_a_point(void **state) {
     (void)state;
-    bst_bound b;
+    bst_crlb_table b;
     const double sigma = 2.0, noise = 10.0;
-    bst_bound_init(&b, sigma);
+    bst_crlb_table_init(&b, sigma);
     double s2 = sigma * sigma + 1.0 / 12.0, faint = 20.0, bright = 1e9;
-    bst_bound_at at = bst_bound_of(&b, faint, noise, 0.0);
+    bst_crlb_table_at at = bst_crlb_table_of(&b, faint, noise, 0.0);
     /* pixels of half a sigma, and shot noise at r = 0.2: 1 % */
     bst_assert_close(at.var_along_px2, 8 * PI * s2 * s2 * 100.0 / (faint * faint),
                      0.02 * at.var_along_px2);
     bst_assert_close(at.var_across_px2, at.var_along_px2, 1e-6 * at.var_along_px2);
     bst_assert_close(at.flux_variance, 4 * PI * s2 * 100.0, 0.02 * at.flux_variance);
     bst_assert_close(at.norm, 1.0 / sqrt(4 * PI * s2), 0.005 * at.norm);
-    at = bst_bound_of(&b, bright, noise, 0.0);
+    at = bst_crlb_table_of(&b, bright, noise, 0.0);
     /* the table ends at r = 1e5, where the wings are still dark: 3 % */
     bst_assert_close(at.var_along_px2, s2 / bright, 0.03 * s2 / bright);
     bst_assert_close(at.flux_variance, bright, 0.02 * bright);
@@ -63,15 +63,15 @@ static void sums(double sigma, double length, double flux, double v, double out[
 
 static void streaks_are_those_of_a_sum(void **state) {
     (void)state;
-    bst_bound b;
+    bst_crlb_table b;
     const double sigma = 0.85, noise = 8.0;
-    bst_bound_init(&b, sigma);
+    bst_crlb_table_init(&b, sigma);
     const double lengths[] = {0.0, 3.0, 11.0}, fluxes[] = {150.0, 20000.0};
     for (int l = 0; l < 3; l++) {
         for (int f = 0; f < 2; f++) {
             double info[3];
             sums(sigma, lengths[l], fluxes[f], noise * noise, info);
-            bst_bound_at at = bst_bound_of(&b, fluxes[f], noise, lengths[l]);
+            bst_crlb_table_at at = bst_crlb_table_of(&b, fluxes[f], noise, lengths[l]);
             /* straight lines between lengths a factor of two apart: 5 % of a variance, 2.5 % of an
              * error */
             bst_assert_close(at.var_along_px2 * info[0], 1.0, 0.06);
@@ -85,15 +85,15 @@ static void streaks_are_those_of_a_sum(void **state) {
  * alone errors grow with the width, on white noise with its square. */
 static void a_wider_image_has_its_own_bound(void **state) {
     (void)state;
-    bst_bound narrow, wide;
+    bst_crlb_table narrow, wide;
     const double sigma = 0.9, wider = 1.5, pixel = 1.0 / 12.0;
-    bst_bound_init(&narrow, sigma);
-    bst_bound_init(&wide, sqrt(wider * wider * (sigma * sigma + pixel) - pixel));
+    bst_crlb_table_init(&narrow, sigma);
+    bst_crlb_table_init(&wide, sqrt(wider * wider * (sigma * sigma + pixel) - pixel));
     const double lengths[] = {0.0, 4.0}, fluxes[] = {150.0, 3000.0, 1e6};
     for (int l = 0; l < 2; l++) {
         for (int f = 0; f < 3; f++) {
-            bst_bound_at a = bst_bound_wider(&narrow, fluxes[f], 8.0, lengths[l], wider);
-            bst_bound_at b = bst_bound_of(&wide, fluxes[f], 8.0, lengths[l]);
+            bst_crlb_table_at a = bst_crlb_table_wider(&narrow, fluxes[f], 8.0, lengths[l], wider);
+            bst_crlb_table_at b = bst_crlb_table_of(&wide, fluxes[f], 8.0, lengths[l]);
             /* pixels are as wide as the narrow image and lengths stand a factor of two apart */
             bst_assert_close(a.var_along_px2 / b.var_along_px2, 1.0, 0.06);
             bst_assert_close(a.var_across_px2 / b.var_across_px2, 1.0, 0.06);
@@ -105,13 +105,13 @@ static void a_wider_image_has_its_own_bound(void **state) {
 
 static void long_streaks_and_wide_psfs_stay_finite(void **state) {
     (void)state;
-    bst_bound b;
+    bst_crlb_table b;
     const double widths[] = {0.2, 0.85, 7.0};
     for (int k = 0; k < 3; k++) {
-        bst_bound_init(&b, widths[k]);
+        bst_crlb_table_init(&b, widths[k]);
         double before = INFINITY;
         for (double length = 0.0; length < 3000.0; length = 1.3 * length + 0.2) {
-            bst_bound_at at = bst_bound_of(&b, 1000.0, 5.0, length);
+            bst_crlb_table_at at = bst_crlb_table_of(&b, 1000.0, 5.0, length);
             assert_true(at.norm > 0.0 && at.norm < before);
             assert_true(isfinite(at.var_along_px2) && at.var_along_px2 > 0.0);
             assert_true(isfinite(at.var_across_px2) && at.var_across_px2 > 0.0);

@@ -93,8 +93,8 @@ static void places_scatter_by_the_bound(void **state) {
         s.calibration.across_factor[i] = 1.2;
     }
     start(&s);
-    bst_bound bound;
-    bst_bound_init(&bound, s.frame.sigma_px);
+    bst_crlb_table bound;
+    bst_crlb_table_init(&bound, s.frame.sigma_px);
     fill(&s, 25.0);
     double sum2 = 0.0, told = 0.0, flux = 0.0, flux2 = 0.0, cross = 0.0;
     long n = 0;
@@ -114,7 +114,7 @@ static void places_scatter_by_the_bound(void **state) {
     }
     assert_true(n == 900 * 12);
     bst_generator_result r = run(&s, 0);
-    bst_bound_at at = bst_bound_of(&bound, electrons_of(&s, 25.0), r.noise_e, 0.0);
+    bst_crlb_table_at at = bst_crlb_table_of(&bound, electrons_of(&s, 25.0), r.noise_e, 0.0);
     double variance = sum2 / (2.0 * (double)n);
     /* four standard deviations of a variance of 21,600 normal deviates: 4 sqrt(2 / n) */
     bst_assert_close(variance / (1.44 * at.var_along_px2), 1.0, 4.0 * sqrt(1.0 / (double)n));
@@ -163,11 +163,11 @@ static void errors_and_statements_have_their_own_width(void **state) {
             sum += 0.5 * (dx * dx + dy * dy) / r.count;
             stated += r.items[i].detection.cov_xx / r.count;
         }
-        bst_bound image, onboard;
-        bst_bound_init(&image, sqrt(sigma * sigma + jitter * jitter));
-        bst_bound_init(&onboard, hypot(sigma, s.settings.jitter_px));
-        double error = bst_bound_of(&image, electrons, noise, 0.0).var_along_px2;
-        double told = bst_bound_of(&onboard, electrons, noise, 0.0).var_along_px2;
+        bst_crlb_table image, onboard;
+        bst_crlb_table_init(&image, sqrt(sigma * sigma + jitter * jitter));
+        bst_crlb_table_init(&onboard, hypot(sigma, s.settings.jitter_px));
+        double error = bst_crlb_table_of(&image, electrons, noise, 0.0).var_along_px2;
+        double told = bst_crlb_table_of(&onboard, electrons, noise, 0.0).var_along_px2;
         /* the gradient of the narrow PSF on the wide image */
         double model2 = plain2 + s.settings.jitter_px * s.settings.jitter_px;
         double misfit = pow(0.5 * (model2 + wide2), 4.0) / (model2 * model2 * wide2 * wide2);
@@ -233,14 +233,14 @@ static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
     close_scene(&s);
 }
 
-static bool same(const bst_generated *a, const bst_generated *b) {
+static bool same(const bst_obsgen_generated *a, const bst_obsgen_generated *b) {
     const bst_detection *p = &a->detection, *q = &b->detection;
     const double x[] = {p->x_px, p->y_px, p->cov_xx, p->cov_xy, p->cov_yy, p->flux_e, p->snr},
                  y[] = {q->x_px, q->y_px, q->cov_xx, q->cov_xy, q->cov_yy, q->flux_e, q->snr};
     return memcmp(x, y, sizeof x) == 0 && p->flags == q->flags && p->label == q->label;
 }
 
-static int same_until(const bst_generated *a, const bst_generated *b, int count) {
+static int same_until(const bst_obsgen_generated *a, const bst_obsgen_generated *b, int count) {
     int n = 0;
     while (n < count && same(&a[n], &b[n])) {
         n++;
@@ -258,7 +258,7 @@ static void draws_depend_on_names_alone(void **state) {
     fill(&s, 8.0);
     bst_generator_result r = run(&s, 11);
     int count = r.count;
-    bst_generated *first = malloc((size_t)count * sizeof *first);
+    bst_obsgen_generated *first = malloc((size_t)count * sizeof *first);
     assert_non_null(first);
     memcpy(first, r.items, (size_t)count * sizeof *first);
     r = run(&s, 12);
@@ -271,7 +271,7 @@ static void draws_depend_on_names_alone(void **state) {
     start(&s);
     r = run(&s, 11);
     count = r.count;
-    bst_generated *all = realloc(first, (size_t)count * sizeof *all);
+    bst_obsgen_generated *all = realloc(first, (size_t)count * sizeof *all);
     assert_non_null(all);
     memcpy(all, r.items, (size_t)count * sizeof *all);
     static bst_truth_item kept[MOST];
@@ -313,7 +313,7 @@ static void close_sources_are_one(void **state) {
             add_source(&s, 2, 300.0 + distance[k], 400.0, faint);
             bst_generator_result r = run(&s, f);
             assert_int_equal(r.count, 1 + k);
-            const bst_generated *seen = &r.items[r.items[0].item == 0 ? 0 : r.count - 1];
+            const bst_obsgen_generated *seen = &r.items[r.items[0].item == 0 ? 0 : r.count - 1];
             assert_int_equal((seen->detection.flags & BST_DETECTION_BLEND) != 0, k);
             x += seen->detection.x_px / FRAMES;
             y += seen->detection.y_px / FRAMES;
@@ -435,11 +435,11 @@ static void hits_come_at_the_detectors_rate(void **state) {
     (void)state;
     scene s;
     open_scene(&s);
-    s.camera.detector.hits = (bst_hits_config){.rate_per_cm2_s = 5.0,
-                                               .pixel_pitch_um = 13.0,
-                                               .depth_um = 15.0,
-                                               .e_per_um = 80.0,
-                                               .straggling = 0.12};
+    s.camera.detector.hits = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 5.0,
+                                                              .pixel_pitch_um = 13.0,
+                                                              .depth_um = 15.0,
+                                                              .e_per_um = 80.0,
+                                                              .straggling = 0.12};
     start(&s);
     double seen = 0.0, told = 0.0;
     enum { FRAMES = 400 };

@@ -3,7 +3,7 @@
 #include "tests/test_support.h"
 
 /* Sum over a fine grid of the product of two drawn streaks, 1/px^2. */
-static double product_by_sum(bst_path_px p, bst_path_px q, double sigma) {
+static double product_by_sum(bst_obsgen_path_px p, bst_obsgen_path_px q, double sigma) {
     const double step = 0.25, reach = 20.0;
     enum { PARTS = 100 };
     const double pi = 3.14159265358979323846;
@@ -11,7 +11,7 @@ static double product_by_sum(bst_path_px p, bst_path_px q, double sigma) {
     for (double y = -reach; y <= reach; y += step) {
         for (double x = -reach; x <= reach; x += step) {
             double value[2];
-            const bst_path_px both[2] = {p, q};
+            const bst_obsgen_path_px both[2] = {p, q};
             for (int k = 0; k < 2; k++) {
                 value[k] = 0.0;
                 for (int i = 0; i < PARTS; i++) {
@@ -31,11 +31,11 @@ static double product_by_sum(bst_path_px p, bst_path_px q, double sigma) {
 static void products_are_those_of_sums(void **state) {
     (void)state;
     const double sigma = 1.2;
-    const bst_path_px paths[][2] = {{{0, 0}, {0, 0}},
-                                    {{6, 0}, {0, 0}},
-                                    {{8, 3}, {8, 3}},
-                                    {{10, -4}, {3, 7}},
-                                    {{0, 20}, {1, 0}}};
+    const bst_obsgen_path_px paths[][2] = {{{0, 0}, {0, 0}},
+                                           {{6, 0}, {0, 0}},
+                                           {{8, 3}, {8, 3}},
+                                           {{10, -4}, {3, 7}},
+                                           {{0, 20}, {1, 0}}};
     for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
         double expected = product_by_sum(paths[i][0], paths[i][1], sigma);
         /* what the header states; the sum itself is right to 1e-4 */
@@ -48,15 +48,15 @@ static void products_are_those_of_sums(void **state) {
 
 static void efficiency_is_one_for_its_own_filter_and_less_else(void **state) {
     (void)state;
-    const bst_path_px point = {0, 0}, streak = {12, 5}, other = {-5, 12};
+    const bst_obsgen_path_px point = {0, 0}, streak = {12, 5}, other = {-5, 12};
     /* rounding, and the 1 % of products of crossed streaks */
     bst_assert_close(bst_matched_efficiency(point, point, 0.9), 1.0, 1e-12);
     bst_assert_close(bst_matched_efficiency(streak, streak, 0.9), 1.0, 1e-12);
     double far = bst_matched_efficiency(streak, other, 0.9),
-           near = bst_matched_efficiency(streak, (bst_path_px){12, 6}, 0.9);
+           near = bst_matched_efficiency(streak, (bst_obsgen_path_px){12, 6}, 0.9);
     assert_true(far < near && near < 1.0 && far > 0.0);
     /* a long streak of length L through a point filter: SNR falls as sqrt(2 sqrt(pi) sigma / L) */
-    bst_path_px longest = {200, 0};
+    bst_obsgen_path_px longest = {200, 0};
     double expected = sqrt(2.0 * sqrt(3.14159265358979323846) * 0.9 / 200.0);
     bst_assert_close(bst_matched_efficiency(longest, point, 0.9), expected, 0.01 * expected);
 }

@@ -9,14 +9,14 @@ static void a_gaussian_has_its_own_bound(void **state) {
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
     const double sigma = 0.9;
     const bst_response_side side = {NULL, sigma};
-    bst_bound made, gaussian;
-    bst_bound_init(&gaussian, sigma);
+    bst_crlb_table made, gaussian;
+    bst_crlb_table_init(&gaussian, sigma);
     bst_assert_ok(&ctx, bst_psf_bound_init(&ctx, &side, 1, 0.0, 0.0, sigma, &made));
     const double lengths[] = {0.0, 0.5, 2.0, 7.0, 30.0, 200.0}, fluxes[] = {100.0, 5e3, 1e6};
     for (int l = 0; l < 6; l++) {
         for (int f = 0; f < 3; f++) {
-            bst_bound_at a = bst_bound_of(&made, fluxes[f], 8.0, lengths[l]);
-            bst_bound_at b = bst_bound_of(&gaussian, fluxes[f], 8.0, lengths[l]);
+            bst_crlb_table_at a = bst_crlb_table_of(&made, fluxes[f], 8.0, lengths[l]);
+            bst_crlb_table_at b = bst_crlb_table_of(&gaussian, fluxes[f], 8.0, lengths[l]);
             /* the other one takes 3 x 3 places in the pixel, this one all of them; the wings of
              * bright ones end at 11 px */
             bst_assert_close(a.var_along_px2 / b.var_along_px2, 1.0, 0.03);
@@ -28,7 +28,8 @@ static void a_gaussian_has_its_own_bound(void **state) {
     /* binned by two with twice the width it is the same but for the pixel's part */
     const bst_response_side twice = {NULL, 2.0 * sigma};
     bst_assert_ok(&ctx, bst_psf_bound_init(&ctx, &twice, 2, 0.0, 0.0, sigma, &made));
-    bst_assert_close(bst_bound_norm(&made, 0.0) / bst_bound_norm(&gaussian, 0.0), 1.0, 0.01);
+    bst_assert_close(bst_crlb_table_norm(&made, 0.0) / bst_crlb_table_norm(&gaussian, 0.0), 1.0,
+                     0.01);
 }
 
 /* On white noise the information is a sum over frequencies (Parseval): (2 pi f)^2 |OTF|^2 sinc^2.
@@ -49,7 +50,7 @@ static void a_diffraction_pattern_has_that_of_its_otf(void **state) {
     bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
     const bst_response_side side = {psf, 0.0};
     double sigma = bst_psf_equivalent_fwhm_px(psf, 255.5, 255.5) / 2.3548200450309493;
-    bst_bound made;
+    bst_crlb_table made;
     bst_assert_ok(&ctx, bst_psf_bound_init(&ctx, &side, 1, 255.5, 255.5, sigma, &made));
     double share[3];
     const double flux = 10.0, noise = 20.0; /* light of 0.003 of the noise's variance */
@@ -68,7 +69,7 @@ static void a_diffraction_pattern_has_that_of_its_otf(void **state) {
                 square += power;
             }
         }
-        bst_bound_at at = bst_bound_of(&made, flux, noise, length);
+        bst_crlb_table_at at = bst_crlb_table_of(&made, flux, noise, length);
         double scale = flux * flux / (noise * noise);
         /* the table begins at light of 0.1 of the variance; light beyond 11 px */
         bst_assert_close(at.var_along_px2 * along * scale, 1.0, 0.03);
@@ -76,9 +77,9 @@ static void a_diffraction_pattern_has_that_of_its_otf(void **state) {
         bst_assert_close(at.norm / sqrt(square), 1.0, 0.01);
         /* a factor on the Gaussian of its area would do for no two lengths: a place at rest is in
          * the steep flank of the disc, one along a streak in its ends */
-        bst_bound gaussian;
-        bst_bound_init(&gaussian, sigma);
-        bst_bound_at g = bst_bound_of(&gaussian, flux, noise, length);
+        bst_crlb_table gaussian;
+        bst_crlb_table_init(&gaussian, sigma);
+        bst_crlb_table_at g = bst_crlb_table_of(&gaussian, flux, noise, length);
         share[k] = at.var_along_px2 / g.var_along_px2;
     }
     assert_true(share[2] > 1.3 * share[0]);

@@ -25,7 +25,7 @@ static double product_of(double p, double q) {
 static void gaussians_of_other_widths_lose_by_their_product(void **state) {
     (void)state;
     const double filter = 0.85, sources[] = {0.85, 1.0, 1.31, 2.0};
-    const bst_path_px rest = {0.0, 0.0};
+    const bst_obsgen_path_px rest = {0.0, 0.0};
     for (int i = 0; i < 4; i++) {
         bst_response r;
         const bst_response_side s = {NULL, sources[i]}, f = {NULL, filter};
@@ -106,7 +106,7 @@ static void a_psf_goes_by_its_own_image(void **state) {
     bst_response r;
     const bst_response_side side = {psf, 0.0};
     bst_response_set(&r, &side, &side, 1, 255.5, 255.5);
-    const bst_path_px rest = {0.0, 0.0};
+    const bst_obsgen_path_px rest = {0.0, 0.0};
     /* King's area; the sum over frequencies is right to 0.3 % */
     double area = 4.0 * BST_PI * r.source.across_px * r.source.along_px;
     bst_assert_close(area, bst_psf_noise_area_px2(psf, 0), 0.003 * area);
@@ -125,7 +125,7 @@ static void a_psf_goes_by_its_own_image(void **state) {
     for (double length = 3.0; length < 13.0; length += 3.0) {
         squares_of(&m, length, squares);
         double sigma = sqrt(r.source.across_px * r.source.along_px);
-        bst_path_px path = {length, 0.0};
+        bst_obsgen_path_px path = {length, 0.0};
         double plain = sqrt(bst_matched_product(path, path, sigma));
         /* two widths in the place of an Airy pattern: 1.5 %; one width is 3 to 5 % off */
         bst_assert_close(plain * bst_response_norm_ratio(&r, length), sqrt(squares[0]),

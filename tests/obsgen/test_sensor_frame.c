@@ -35,7 +35,7 @@ static void places_are_those_of_the_sensor(void **state) {
                 add_source(&s, 2, 100.0, 207.8, 4e4); /* beside the second window */
                 bst_generator_result r = run(&s, f);
                 assert_int_equal(r.count, 2 - w);
-                const bst_generated *seen = &r.items[r.items[0].item == 0 ? 0 : r.count - 1];
+                const bst_obsgen_generated *seen = &r.items[r.items[0].item == 0 ? 0 : r.count - 1];
                 const bst_detection *d = &seen->detection;
                 sum[0] += d->x_px / FRAMES;
                 sum[1] += d->y_px / FRAMES;

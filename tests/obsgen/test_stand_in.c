@@ -16,10 +16,10 @@ static bst_status read_with(bst_ctx *ctx, const char *const *sets, int count, bs
     for (int i = 0; i < count; i++) {
         BST_TRY(bst_json_set(ctx, *json, sets[i]));
     }
-    return bst_scenario_read(ctx, *json, bst_app_registry(), scenario);
+    return bst_scenario_read(ctx, *json, bst_registry_shipped(), scenario);
 }
 
-static const bst_module_config *module_of(const bst_scenario *s, const char *role) {
+static const bst_scenario_module_config *module_of(const bst_scenario *s, const char *role) {
     for (int m = 0; m < s->module_count; m++) {
         if (strcmp(s->modules[m].desc->role, role) == 0) {
             return &s->modules[m];
@@ -28,7 +28,7 @@ static const bst_module_config *module_of(const bst_scenario *s, const char *rol
     return NULL;
 }
 
-static double real_of(const bst_module_config *module, const char *key) {
+static double real_of(const bst_scenario_module_config *module, const char *key) {
     for (const bst_config_desc *d = module->desc->config; d->key; d++) {
         if (strcmp(d->key, key) == 0) {
             double value;
@@ -55,7 +55,7 @@ static void one_key_chooses(void **state) {
                                 SENSOR "/modules/imgproc/false_alarms_per_frame=3",
                                 SENSOR "/modules/scenegen/v_limit=12"};
     bst_assert_ok(&ctx, read_with(&ctx, sets, 3, &json, &s));
-    const bst_module_config *generator = module_of(&s, "obsgen");
+    const bst_scenario_module_config *generator = module_of(&s, "obsgen");
     assert_non_null(generator);
     assert_false(generator->off);
     assert_true(module_of(&s, "scenegen")->off && module_of(&s, "imgproc")->off);
@@ -75,7 +75,7 @@ static void one_key_chooses(void **state) {
     bst_json_free(json);
     /* the echo says every setting once, and reads back as itself */
     bst_assert_ok(&ctx, bst_json_parse(&ctx, "echo", first, strlen(first), &json));
-    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_app_registry(), &s));
+    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_registry_shipped(), &s));
     bst_assert_close(real_of(module_of(&s, "obsgen"), "v_limit"), 12.0, 0.0);
     assert_int_equal(module_of(&s, "obsgen")->delays[0].ticks, 900);
     echo = bst_scenario_echo(&s);

@@ -9,8 +9,8 @@ typedef struct path {
     double x[STEPS], y[STEPS];
 } path;
 
-static bst_route_path route_of(const path *p) {
-    return (bst_route_path){p->x, p->y, STEPS};
+static bst_star_trail_path route_of(const path *p) {
+    return (bst_star_trail_path){p->x, p->y, STEPS};
 }
 
 /* Places less their mean, ends with half the weight. */
@@ -74,19 +74,19 @@ static void fits_land_where_the_light_overlaps_most(void **state) {
     centre(&trembling);
     centre(&bent);
     double bias[2], best[2];
-    bst_route_path p = route_of(&even);
-    bst_route_bias(&p, 8.0, -6.0, 0.0, 0.0, sigma, bias);
+    bst_star_trail_path p = route_of(&even);
+    bst_star_trail_bias(&p, 8.0, -6.0, 0.0, 0.0, sigma, bias);
     bst_assert_close(hypot(bias[0], bias[1]), 0.0, 1e-6); /* even: by symmetry */
     /* to first order in the trembling, 0.4 of 1.3 px: a fifth of it; the grid of the trial */
     p = route_of(&trembling);
-    bst_route_bias(&p, 10.0, 0.0, 0.0, 0.0, sigma, bias);
+    bst_star_trail_bias(&p, 10.0, 0.0, 0.0, 0.0, sigma, bias);
     best_shift(&trembling, 10.0, 0.0, 0.0, sigma, best);
     assert_true(fabs(best[0]) > 0.05);
     bst_assert_close(bias[0], best[0], 0.2 * fabs(best[0]) + 0.01);
     bst_assert_close(bias[1], best[1], 0.2 * fabs(best[1]) + 0.01);
     /* a known bend is found in several rounds */
     p = route_of(&bent);
-    bst_route_bias(&p, 12.0, 0.0, 0.0, 2.0, sigma, bias);
+    bst_star_trail_bias(&p, 12.0, 0.0, 0.0, 2.0, sigma, bias);
     best_shift(&bent, 12.0, 0.0, 2.0, sigma, best);
     bst_assert_close(bias[0], best[0], 0.02);
     bst_assert_close(bias[1], best[1], 0.02);
@@ -136,12 +136,12 @@ static void bright_points_land_nearer_to_the_centroid(void **state) {
         p.y[k] = end * fmax((double)k / (STEPS - 1) - rest, 0.0) / (1.0 - rest);
     }
     centre(&p);
-    bst_route_path route = route_of(&p);
+    bst_star_trail_path route = route_of(&p);
     double before = -INFINITY;
     /* light on the brightest pixel of 0.02, 2, 200 times the noise's variance */
     for (double noise = 10.0; noise > 1e-4; noise *= 0.01) {
         double bias[2] = {0.0, 0.0}, light = 1.0 / (2.0 * BST_PI * sigma * sigma) / noise;
-        bst_route_point_bias(&route, &weights, light, sigma, bias);
+        bst_star_trail_point_bias(&route, &weights, light, sigma, bias);
         double fit = fitted_bias(sigma, rest, end, noise);
         bst_assert_close(bias[0], 0.0, 1e-4);
         /* the table's distances are half a sigma apart; 41 steps of the fit's light: 0.01 px */
@@ -153,7 +153,7 @@ static void bright_points_land_nearer_to_the_centroid(void **state) {
 
 static void the_way_has_the_light_of_the_path(void **state) {
     (void)state;
-    static bst_route_node nodes[BST_ROUTE_NODES];
+    static bst_star_trail_node nodes[BST_ROUTE_NODES];
     const double sigma = 0.9, s = sigma * sqrt(2.0);
     path p;
     /* at rest for a half, then 100 px */
@@ -162,8 +162,8 @@ static void the_way_has_the_light_of_the_path(void **state) {
         p.x[k] = u < 0.5 ? 0.0 : 200.0 * (u - 0.5);
         p.y[k] = 0.0;
     }
-    bst_route_path route = route_of(&p);
-    int count = bst_route_lay(&route, sigma, nodes);
+    bst_star_trail_path route = route_of(&p);
+    int count = bst_star_trail_lay(&route, sigma, nodes);
     assert_true(count > 80 && count < 130);
     double rest = 0.0, on = 0.0;
     for (int i = 0; i < count; i++) {

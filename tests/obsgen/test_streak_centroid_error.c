@@ -17,13 +17,15 @@ static bst_rng_key key_of(int number) {
     return key;
 }
 
-static spread draw_many(const bst_wander_source *sources, int count, double threshold, int trials) {
-    bst_wander w = {0};
-    bst_wander_set(&w, LENGTH, SIGMA);
+static spread draw_many(const bst_streak_centroid_error_source *sources, int count,
+                        double threshold, int trials) {
+    bst_streak_centroid_error w = {0};
+    bst_streak_centroid_error_set(&w, LENGTH, SIGMA);
     assert_true(w.steps > 0);
     spread out = {0};
     for (int i = 0; i < trials; i++) {
-        bst_wander_top top = bst_wander_draw(&w, key_of(i), sources, count, 1.0, threshold);
+        bst_streak_centroid_error_peak top =
+            bst_streak_centroid_error_draw(&w, key_of(i), sources, count, 1.0, threshold);
         if (!(top.snr > threshold)) {
             continue;
         }
@@ -45,9 +47,9 @@ static spread draw_many(const bst_wander_source *sources, int count, double thre
 static void bright_streaks_scatter_as_the_bound_says(void **state) {
     (void)state;
     const double snr = 30.0;
-    bst_wander w = {0};
-    bst_wander_set(&w, LENGTH, SIGMA);
-    const bst_wander_source alone = {0.0, 0.0, snr};
+    bst_streak_centroid_error w = {0};
+    bst_streak_centroid_error_set(&w, LENGTH, SIGMA);
+    const bst_streak_centroid_error_source alone = {0.0, 0.0, snr};
     spread s = draw_many(&alone, 1, 5.0, 3000);
     /* steps and rows are coarse: 4 % besides the 1.3 % that 3,000 trials tell */
     bst_assert_close(s.along * snr * sqrt(w.curvature), 1.0, 0.06);
@@ -131,7 +133,7 @@ static spread filter_many(double snr, double threshold) {
 static void faint_streaks_scatter_as_filtered_pixels_do(void **state) {
     (void)state;
     const double snr = 5.5, threshold = 5.0;
-    const bst_wander_source alone = {0.0, 0.0, snr};
+    const bst_streak_centroid_error_source alone = {0.0, 0.0, snr};
     spread drawn = draw_many(&alone, 1, threshold, 4000), pixels = filter_many(snr, threshold);
     /* 1,100 or so pass in pixels: 2.2 % and more of an RMS with tails, 0.6 % of a share */
     bst_assert_close(drawn.along / pixels.along, 1.0, 0.1);
@@ -139,20 +141,21 @@ static void faint_streaks_scatter_as_filtered_pixels_do(void **state) {
     bst_assert_close(drawn.points, pixels.points, 0.02);
     bst_assert_close(drawn.far / (double)drawn.seen, pixels.far / (double)pixels.seen, 0.02);
     /* more than the bound */
-    bst_wander w = {0};
-    bst_wander_set(&w, LENGTH, SIGMA);
+    bst_streak_centroid_error w = {0};
+    bst_streak_centroid_error_set(&w, LENGTH, SIGMA);
     assert_true(drawn.along * snr * sqrt(w.curvature) > 1.1);
 }
 
 /* Two streaks on one line, further apart than the bound: found about either, or between. */
 static void two_on_one_line_are_found_anywhere_on_it(void **state) {
     (void)state;
-    const bst_wander_source two[2] = {{0.0, 0.0, 9.0}, {LENGTH, 0.0, 9.0}};
-    bst_wander w = {0};
-    bst_wander_set(&w, LENGTH, SIGMA);
+    const bst_streak_centroid_error_source two[2] = {{0.0, 0.0, 9.0}, {LENGTH, 0.0, 9.0}};
+    bst_streak_centroid_error w = {0};
+    bst_streak_centroid_error_set(&w, LENGTH, SIGMA);
     int own = 0, between = 0;
     for (int i = 0; i < 2000; i++) {
-        bst_wander_top top = bst_wander_draw(&w, key_of(i), two, 2, 1.0, 5.0);
+        bst_streak_centroid_error_peak top =
+            bst_streak_centroid_error_draw(&w, key_of(i), two, 2, 1.0, 5.0);
         own += fabs(top.along_px) < 1.0;
         between += top.along_px > 2.0;
     }
@@ -162,15 +165,18 @@ static void two_on_one_line_are_found_anywhere_on_it(void **state) {
 
 static void draws_are_the_keys_alone(void **state) {
     (void)state;
-    bst_wander w = {0};
-    bst_wander_set(&w, LENGTH, SIGMA);
-    const bst_wander_source alone = {0.0, 0.0, 6.0};
-    bst_wander_top first = bst_wander_draw(&w, key_of(1), &alone, 1, 1.0, 5.0);
-    bst_wander_top other = bst_wander_draw(&w, key_of(2), &alone, 1, 1.0, 5.0);
-    bst_wander_top again = bst_wander_draw(&w, key_of(1), &alone, 1, 1.0, 5.0);
+    bst_streak_centroid_error w = {0};
+    bst_streak_centroid_error_set(&w, LENGTH, SIGMA);
+    const bst_streak_centroid_error_source alone = {0.0, 0.0, 6.0};
+    bst_streak_centroid_error_peak first =
+        bst_streak_centroid_error_draw(&w, key_of(1), &alone, 1, 1.0, 5.0);
+    bst_streak_centroid_error_peak other =
+        bst_streak_centroid_error_draw(&w, key_of(2), &alone, 1, 1.0, 5.0);
+    bst_streak_centroid_error_peak again =
+        bst_streak_centroid_error_draw(&w, key_of(1), &alone, 1, 1.0, 5.0);
     assert_true(first.along_px == again.along_px && first.snr == again.snr);
     assert_true(first.along_px != other.along_px);
-    bst_wander_set(&w, 4000.0, SIGMA); /* too long: there is nothing to draw from */
+    bst_streak_centroid_error_set(&w, 4000.0, SIGMA); /* too long: there is nothing to draw from */
     assert_int_equal(w.steps, 0);
 }
 

@@ -45,8 +45,8 @@ static void constant_rate(void **state) {
                  {200, 100, 3100}, {40, 1000, 1000}, {40, 1050, 1051}};
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         bst_pointing_telemetry *t = telemetry(cases[c].samples, 100, rate);
-        bst_motion m;
-        assert_true(bst_motion_from_telemetry(t, cases[c].start, cases[c].end, &m));
+        bst_camera_motion m;
+        assert_true(bst_camera_motion_from_telemetry(t, cases[c].start, cases[c].end, &m));
         double span = (double)(cases[c].end - cases[c].start) / 6000.0;
         double middle = 0.5 * (double)(cases[c].start + cases[c].end) / 6000.0;
         bst_assert_close(difference(m.q_cam_from_gcrf, turning(middle, rate)), 0.0, 1e-12);
@@ -68,8 +68,8 @@ static void accelerated(void **state) {
         double s = n / 60.0;
         t->items[n].q_cam_from_gcrf = bst_quat_from_rotvec((bst_vec3){0.5 * a * s * s, 0, 0});
     }
-    bst_motion m;
-    assert_true(bst_motion_from_telemetry(t, 0, 3000, &m));
+    bst_camera_motion m;
+    assert_true(bst_camera_motion_from_telemetry(t, 0, 3000, &m));
     bst_vec3 mean = bst_quat_to_rotvec(m.q_cam_from_gcrf);
     double limit = a / (60.0 * 60.0) / 6.0;
     bst_assert_close(mean.x, a * 0.25 / 6.0, limit);
@@ -81,12 +81,12 @@ static void accelerated(void **state) {
 static void few_samples(void **state) {
     (void)state;
     bst_pointing_telemetry *t = telemetry(0, 100, (bst_vec3){0, 0, 0});
-    bst_motion m = {.turn_cam_rad = {9, 9, 9}};
-    assert_false(bst_motion_from_telemetry(t, 0, 100, &m));
+    bst_camera_motion m = {.turn_cam_rad = {9, 9, 9}};
+    assert_false(bst_camera_motion_from_telemetry(t, 0, 100, &m));
     assert_true(m.turn_cam_rad.x == 9.0);
     free(t);
     t = telemetry(1, 100, (bst_vec3){1, 0, 0});
-    assert_true(bst_motion_from_telemetry(t, 50, 150, &m));
+    assert_true(bst_camera_motion_from_telemetry(t, 50, 150, &m));
     bst_assert_close(difference(m.q_cam_from_gcrf, t->items[0].q_cam_from_gcrf), 0.0, 1e-15);
     bst_assert_close(bst_vec3_norm(m.turn_cam_rad), 0.0, 0.0);
     free(t);
@@ -94,8 +94,8 @@ static void few_samples(void **state) {
 
 /* The path against projecting a fixed direction at both ends. */
 static void check_streak(bst_camera c) {
-    bst_motion m = {.q_cam_from_gcrf = bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}),
-                    .turn_cam_rad = {1e-4, -5e-5, 2e-3}};
+    bst_camera_motion m = {.q_cam_from_gcrf = bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}),
+                           .turn_cam_rad = {1e-4, -5e-5, 2e-3}};
     bst_quat end =
         bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)), m.q_cam_from_gcrf);
     bst_quat start =
@@ -105,7 +105,7 @@ static void check_streak(bst_camera c) {
     double x0 = 0, y0 = 0, x1 = 0, y1 = 0, dx, dy;
     assert_true(bst_camera_project(&c, bst_quat_rotate(start, star), &x0, &y0));
     assert_true(bst_camera_project(&c, bst_quat_rotate(end, star), &x1, &y1));
-    bst_motion_streak(&m, &c, 900.0, 100.0, &dx, &dy);
+    bst_camera_motion_streak(&m, &c, 900.0, 100.0, &dx, &dy);
     /* rounding of rotations at 1e5 px per radian */
     bst_assert_close(dx, x1 - x0, 1e-8);
     bst_assert_close(dy, y1 - y0, 1e-8);
@@ -123,19 +123,19 @@ static void streak_is_the_stars_path(void **state) {
     check_streak(c);
     /* the bend at the boresight: tilted by a small rotation vector, the boresight's own direction
      * moves as projecting it says */
-    bst_motion m = {.q_cam_from_gcrf = BST_QUAT_IDENTITY, .bend_cam_rad = {3e-5, -7e-5, 0}};
+    bst_camera_motion m = {.q_cam_from_gcrf = BST_QUAT_IDENTITY, .bend_cam_rad = {3e-5, -7e-5, 0}};
     double bx, by, x = 0, y = 0;
-    bst_motion_bend(&m, &c, &bx, &by);
+    bst_camera_motion_bend(&m, &c, &bx, &by);
     bst_vec3 v = bst_quat_rotate(bst_quat_from_rotvec(m.bend_cam_rad), (bst_vec3){0, 0, 1});
     assert_true(bst_camera_project(&c, v, &x, &y));
     bst_assert_close(bx, x - 511.5, 1e-4); /* third order: 300 (7e-5)^2 of 5 px */
     bst_assert_close(by, y - 511.5, 1e-4);
     /* what is added in pixels is there in pixels: both are linear but for the same third order */
     double x0, y0, x1, y1, cx, cy;
-    bst_motion_streak(&m, &c, 511.5, 511.5, &x0, &y0);
-    bst_motion_add(&m, &c, 0.7, -0.4, 0.3, 0.2);
-    bst_motion_streak(&m, &c, 511.5, 511.5, &x1, &y1);
-    bst_motion_bend(&m, &c, &cx, &cy);
+    bst_camera_motion_streak(&m, &c, 511.5, 511.5, &x0, &y0);
+    bst_camera_motion_add(&m, &c, 0.7, -0.4, 0.3, 0.2);
+    bst_camera_motion_streak(&m, &c, 511.5, 511.5, &x1, &y1);
+    bst_camera_motion_bend(&m, &c, &cx, &cy);
     bst_assert_close(x1 - x0, 0.7, 1e-6);
     bst_assert_close(y1 - y0, -0.4, 1e-6);
     bst_assert_close(cx - bx, 0.3, 1e-9);
@@ -161,8 +161,8 @@ static void noise_is_no_bend(void **state) {
                 t->items[n].q_cam_from_gcrf =
                     bst_quat_mul(bst_quat_from_rotvec(off), t->items[n].q_cam_from_gcrf);
             }
-            bst_motion m;
-            assert_true(bst_motion_from_telemetry(t, 300, 3300, &m));
+            bst_camera_motion m;
+            assert_true(bst_camera_motion_from_telemetry(t, 300, 3300, &m));
             error2 += pow(m.bend_cam_rad.x - true_bend, 2) + pow(m.bend_cam_rad.y, 2);
             stated2 += 2.0 * m.bend_sigma_rad * m.bend_sigma_rad;
             free(t);
@@ -185,12 +185,12 @@ static void noise_is_no_bend(void **state) {
 static void places_are_as_wrong_as_the_bend(void **state) {
     (void)state;
     bst_detection d = {.cov_xx = 1.0, .cov_yy = 2.0};
-    bst_motion_widen(8.0, -6.0, 0.0, 0.0, &d);
+    bst_camera_motion_widen(8.0, -6.0, 0.0, 0.0, &d);
     bst_assert_close(d.cov_xx, 17.0, 1e-14); /* rounding */
     bst_assert_close(d.cov_xy, -12.0, 1e-14);
     bst_assert_close(d.cov_yy, 11.0, 1e-14);
     d = (bst_detection){.cov_xx = 1.0, .cov_yy = 2.0};
-    bst_motion_widen(8.0, -6.0, 8.0, -6.0, &d);
+    bst_camera_motion_widen(8.0, -6.0, 8.0, -6.0, &d);
     bst_assert_close(d.cov_xx, 1.16, 1e-14);
     bst_assert_close(d.cov_xy, -0.12, 1e-14);
     bst_assert_close(d.cov_yy, 2.09, 1e-14);

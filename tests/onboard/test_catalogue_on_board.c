@@ -19,7 +19,7 @@ enum { OBJECT_GX5, ELLIPSE, HYPERBOLA, BURNING, BESIDE_GX5, SELF, OBJECTS };
 typedef struct scene {
     bst_ctx ctx;
     bst_world *world;
-    bst_view *view;
+    bst_world_view *view;
     bst_knowledge *knowledge;
     bst_knowledge_view *onboard;
 } scene;
@@ -33,7 +33,7 @@ static scene make(const char *sensor) {
                                        "0]}]") ", " BESIDE ", {\"name\": \"self\", " TEST_NEOSSAT
                                                "}",
                    sensor)};
-    bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &s.view));
+    bst_assert_ok(&s.ctx, bst_world_view_create(&s.ctx, s.world, &s.view));
     bst_assert_ok(&s.ctx, bst_knowledge_create(&s.ctx, s.world, 0, 0, &s.knowledge));
     bst_assert_ok(&s.ctx, bst_knowledge_view_create(&s.ctx, s.knowledge, &s.onboard));
     return s;
@@ -42,7 +42,7 @@ static scene make(const char *sensor) {
 static void drop(scene *s) {
     bst_knowledge_view_free(s->onboard);
     bst_knowledge_free(s->knowledge);
-    bst_view_free(s->view);
+    bst_world_view_free(s->view);
     bst_world_free(s->world);
 }
 
@@ -79,8 +79,8 @@ static void first_places_of_all(void **state) {
         double at = bst_knowledge_places(s.knowledge, t, x, y, z);
         bst_assert_close(at, 8 * round(t / 8), 0);
         for (int i = 0; i < OBJECTS; i++) {
-            bst_state true_state;
-            bst_assert_ok(&s.ctx, bst_view_object_state(&s.ctx, s.view, i, at, &true_state));
+            bst_world_state true_state;
+            bst_assert_ok(&s.ctx, bst_world_view_object_state(&s.ctx, s.view, i, at, &true_state));
             if (i == BURNING) { /* its burn is not to be known */
                 assert_true(isnan(x[i]) && isnan(y[i]) && isnan(z[i]));
             } else if (!isnan(x[i])) {
@@ -93,7 +93,7 @@ static void first_places_of_all(void **state) {
     drop(&s);
 }
 
-static void expect_same(const bst_sight *a, const bst_sight *b) {
+static void expect_same(const bst_world_sight *a, const bst_world_sight *b) {
     /* the truth's ephemeris is right to millimetres, of thousands of kilometres */
     bst_assert_close(test_distance(a->geometric, b->geometric), 0, 2e-9);
     bst_assert_close(test_distance(a->apparent, b->apparent), 0, 2e-9);
@@ -116,18 +116,18 @@ static void sights_by_a_fast_clock(void **state) {
     int hidden = 0, seen = 0;
     for (double t = 0; t < 9000; t += 300) {
         for (int i = OBJECT_GX5; i <= ELLIPSE; i++) {
-            bst_sight truth, believed;
-            bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, s.view, 0, i, t + 50, &truth));
+            bst_world_sight truth, believed;
+            bst_assert_ok(&s.ctx, bst_world_view_sight(&s.ctx, s.view, 0, i, t + 50, &truth));
             bst_assert_ok(&s.ctx, bst_knowledge_sight_at(&s.ctx, s.onboard, i, t, &believed));
             expect_same(&believed, &truth);
             hidden += believed.occulted;
             seen += !believed.occulted;
         }
-        bst_state eye, own;
+        bst_world_state eye, own;
         bst_bodies bodies, now;
         bst_assert_ok(&s.ctx, bst_knowledge_eye_at(&s.ctx, s.onboard, t, &eye, &bodies));
-        bst_assert_ok(&s.ctx, bst_view_observer_state(&s.ctx, s.view, 0, t + 50, &own));
-        bst_assert_ok(&s.ctx, bst_view_bodies(&s.ctx, s.view, t + 50, &now));
+        bst_assert_ok(&s.ctx, bst_world_view_observer_state(&s.ctx, s.view, 0, t + 50, &own));
+        bst_assert_ok(&s.ctx, bst_world_view_bodies(&s.ctx, s.view, t + 50, &now));
         bst_assert_close(test_distance(eye.position_m, own.position_m), 0, 0.01);
         bst_assert_close(test_distance(eye.velocity_mps, own.velocity_mps), 0, 1e-5);
         bst_assert_close(test_distance(bodies.sun_m, now.sun_m), 0, 1);
@@ -145,9 +145,9 @@ static void sights_from_where_it_believes_to_be(void **state) {
               ", \"knowledge\": {\"orbit\": {\"position_rtn_m\": [300, -200, 500], "
               "\"velocity_rtn_mps\": [0.5, 0.2, -0.4], \"along_track_mps\": 2}}");
     const double t = 40;
-    bst_state truth, eye;
+    bst_world_state truth, eye;
     bst_bodies bodies;
-    bst_assert_ok(&right.ctx, bst_view_observer_state(&right.ctx, right.view, 0, t, &truth));
+    bst_assert_ok(&right.ctx, bst_world_view_observer_state(&right.ctx, right.view, 0, t, &truth));
     bst_assert_ok(&wrong.ctx, bst_knowledge_eye_at(&wrong.ctx, wrong.onboard, t, &eye, &bodies));
     bst_vec3 r = bst_vec3_unit(truth.position_m);
     bst_vec3 n = bst_vec3_unit(bst_vec3_cross(truth.position_m, truth.velocity_mps));
@@ -160,8 +160,8 @@ static void sights_from_where_it_believes_to_be(void **state) {
     bst_assert_close(bst_vec3_dot(drift, r), 0.5, 1e-5);
     bst_assert_close(bst_vec3_dot(drift, along), 0.2, 1e-5);
     bst_assert_close(bst_vec3_dot(drift, n), -0.4, 1e-5);
-    bst_sight a, b;
-    bst_assert_ok(&right.ctx, bst_view_sight(&right.ctx, right.view, 0, ELLIPSE, t, &a));
+    bst_world_sight a, b;
+    bst_assert_ok(&right.ctx, bst_world_view_sight(&right.ctx, right.view, 0, ELLIPSE, t, &a));
     bst_assert_ok(&wrong.ctx, bst_knowledge_sight_at(&wrong.ctx, wrong.onboard, ELLIPSE, t, &b));
     bst_vec3 line = bst_vec3_axpy(bst_vec3_scale(off, -1), a.range_m, a.geometric);
     /* light time of 600 m, and the Earth's motion in it: 1e-4 of them */
@@ -182,7 +182,7 @@ static void what_a_world_says_of_orbits(void **state) {
     assert_true(bst_world_element_age(s.world, OBJECTS, &age));        /* the observer */
     bst_assert_close(age, (167 - 166.78481540) * 86400 + 79800, 0.01);
     assert_false(bst_world_element_age(s.world, ELLIPSE, &age));
-    bst_object_motion m = bst_world_object_motion(s.world, SELF);
+    bst_world_motion_law m = bst_world_object_motion(s.world, SELF);
     assert_true(m.sgp4 && !m.forces);
     bst_assert_close(m.bstar, 6.8433e-5, 1e-12);
     m = bst_world_object_motion(s.world, ELLIPSE);
@@ -208,14 +208,14 @@ static void each_observer_is_itself(void **state) {
         "}]}, {\"name\": \"b\", \"orbit\": {\"elements_file\": "
         "\"scenarios/catalogue_2022-06.tle\", \"norad\": 25544}, \"sensors\": [{\"knowledge\": "
         "{\"clock_offset_s\": 7}, " TEST_CAMERA "}]}]}");
-    bst_view *view;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     for (int o = 0; o < 2; o++) {
         for (double t = 100.2; t < 101; t += 0.1) { /* often within a second */
-            bst_state own, believed;
+            bst_world_state own, believed;
             bst_bodies bodies;
-            bst_assert_ok(&ctx, bst_view_observer_state(&ctx, view, o, t + 7 * o, &own));
-            bst_assert_ok(&ctx, bst_view_believed(&ctx, view, o, 0, t, &believed, &bodies));
+            bst_assert_ok(&ctx, bst_world_view_observer_state(&ctx, view, o, t + 7 * o, &own));
+            bst_assert_ok(&ctx, bst_world_view_nav(&ctx, view, o, 0, t, &believed, &bodies));
             bst_assert_close(test_distance(believed.position_m, own.position_m), 0, 1e-3);
             bst_assert_close(test_distance(believed.velocity_mps, own.velocity_mps), 0, 1e-6);
         }
@@ -225,7 +225,7 @@ static void each_observer_is_itself(void **state) {
     assert_true(bst_world_element_age(world, 2, &ages[1]));
     assert_true(fabs(ages[0] - ages[1]) > 1);
     assert_string_equal(bst_world_observer_name(world, 1), "b");
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 

@@ -12,7 +12,7 @@ typedef struct scene {
     bst_world *world;
     bst_knowledge *knowledge;
     bst_knowledge_view *kview;
-    bst_view *view;
+    bst_world_view *view;
 } scene;
 
 /* knowledge: what stands in the block. */
@@ -22,33 +22,33 @@ static scene make(const char *knowledge) {
     scene s = {.world = test_world_with(GX5, sensor)};
     bst_assert_ok(&s.ctx, bst_knowledge_create(&s.ctx, s.world, 0, 0, &s.knowledge));
     bst_assert_ok(&s.ctx, bst_knowledge_view_create(&s.ctx, s.knowledge, &s.kview));
-    bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &s.view));
+    bst_assert_ok(&s.ctx, bst_world_view_create(&s.ctx, s.world, &s.view));
     return s;
 }
 
 static void drop(scene *s) {
-    bst_view_free(s->view);
+    bst_world_view_free(s->view);
     bst_knowledge_view_free(s->kview);
     bst_knowledge_free(s->knowledge);
     bst_world_free(s->world);
 }
 
-static bst_cue cue_at(scene *s, double seconds) {
-    bst_cue cue;
+static bst_onboard_cue cue_at(scene *s, double seconds) {
+    bst_onboard_cue cue;
     bst_assert_ok(&s->ctx, bst_knowledge_cue_at(&s->ctx, s->kview, seconds, &cue));
     return cue;
 }
 
-static bst_state believed(scene *s, double seconds) {
-    bst_state state;
+static bst_world_state believed(scene *s, double seconds) {
+    bst_world_state state;
     bst_bodies bodies;
-    bst_assert_ok(&s->ctx, bst_view_believed(&s->ctx, s->view, 0, 0, seconds, &state, &bodies));
+    bst_assert_ok(&s->ctx, bst_world_view_nav(&s->ctx, s->view, 0, 0, seconds, &state, &bodies));
     return state;
 }
 
-static bst_state truth(scene *s, double seconds) {
-    bst_state state;
-    bst_assert_ok(&s->ctx, bst_view_observer_state(&s->ctx, s->view, 0, seconds, &state));
+static bst_world_state truth(scene *s, double seconds) {
+    bst_world_state state;
+    bst_assert_ok(&s->ctx, bst_world_view_observer_state(&s->ctx, s->view, 0, seconds, &state));
     return state;
 }
 
@@ -58,7 +58,7 @@ static void the_truth_by_default(void **state) {
     assert_ptr_equal(bst_knowledge_stars(s.knowledge), bst_world_stars(s.world));
     assert_memory_equal(bst_knowledge_camera(s.knowledge), bst_world_camera(s.world, 0, 0),
                         sizeof(bst_camera));
-    bst_state a = believed(&s, 77), b = truth(&s, 77);
+    bst_world_state a = believed(&s, 77), b = truth(&s, 77);
     assert_memory_equal(&a, &b, sizeof a);
     double oversampling;
     assert_string_equal(bst_knowledge_psf_file(s.knowledge, &oversampling), "");
@@ -75,7 +75,7 @@ static void an_orbit_error_moves_the_cue_by_the_parallax(void **state) {
                                           "\"orbit\": {\"position_rtn_m\": [0, 0, 10000]}"};
     for (int i = 0; i < 3; i++) {
         scene s = make(blocks[i]);
-        bst_state eye = truth(&s, 60), own = believed(&s, 60);
+        bst_world_state eye = truth(&s, 60), own = believed(&s, 60);
         bst_vec3 off = bst_vec3_sub(own.position_m, eye.position_m);
         bst_assert_close(bst_vec3_norm(off), 10000, 1e-6); /* rounding of 7e6 m */
         bst_vec3 r = bst_vec3_unit(eye.position_m);
@@ -83,8 +83,8 @@ static void an_orbit_error_moves_the_cue_by_the_parallax(void **state) {
         const bst_vec3 axis[3] = {r, bst_vec3_cross(n, r), n};
         bst_assert_close(bst_vec3_dot(off, axis[i]), 10000, 1e-6);
         bst_assert_close(test_distance(own.velocity_mps, eye.velocity_mps), 0, 1e-9);
-        bst_sight sight;
-        bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, s.view, 0, 0, 60, &sight));
+        bst_world_sight sight;
+        bst_assert_ok(&s.ctx, bst_world_view_sight(&s.ctx, s.view, 0, 0, 60, &sight));
         bst_vec3 d = sight.geometric;
         double across = bst_vec3_norm(bst_vec3_axpy(off, -bst_vec3_dot(off, d), d));
         double angle =
@@ -107,13 +107,13 @@ static void an_orbit_error_moves_the_cue_by_the_parallax(void **state) {
 static void a_clock_offset_shifts_the_cue_by_its_rate(void **state) {
     (void)state;
     scene right = make(""), s = make("\"clock_offset_s\": 1");
-    bst_cue now = cue_at(&right, 60), later = cue_at(&right, 61), wrong = cue_at(&s, 60);
+    bst_onboard_cue now = cue_at(&right, 60), later = cue_at(&right, 61), wrong = cue_at(&s, 60);
     bst_assert_close(test_distance(wrong.direction_gcrf, later.direction_gcrf), 0, 1e-15);
     double angle = bst_vec3_angle(wrong.direction_gcrf, now.direction_gcrf);
     /* the rate changes by 1e-7 rad/s^2: half of it in a second */
     bst_assert_close(angle, bst_vec3_norm(now.rate_gcrf_radps), 2e-7);
     assert_true(angle > 1e-5);
-    bst_state a = believed(&s, 60), b = truth(&s, 61);
+    bst_world_state a = believed(&s, 60), b = truth(&s, 61);
     assert_memory_equal(&a, &b, sizeof a);
     drop(&s);
     drop(&right);
@@ -143,16 +143,16 @@ static void the_start_follows_what_is_believed(void **state) {
 static void a_velocity_error_is_aberration(void **state) {
     (void)state;
     scene s = make("\"orbit\": {\"velocity_rtn_mps\": [0, 0, 1000]}");
-    bst_state own, eye = truth(&s, 60);
+    bst_world_state own, eye = truth(&s, 60);
     bst_bodies bodies;
-    bst_assert_ok(&s.ctx, bst_view_believed(&s.ctx, s.view, 0, 0, 60, &own, &bodies));
+    bst_assert_ok(&s.ctx, bst_world_view_nav(&s.ctx, s.view, 0, 0, 60, &own, &bodies));
     bst_assert_close(test_distance(own.velocity_mps, eye.velocity_mps), 1000, 1e-9);
     bst_assert_close(test_distance(own.position_m, eye.position_m), 0, 1e-9);
-    bst_light wrong = bst_light_at(&bodies, own.position_m, own.velocity_mps);
-    bst_light right = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+    bst_astro_light wrong = bst_astro_light_at(&bodies, own.position_m, own.velocity_mps);
+    bst_astro_light right = bst_astro_light_at(&bodies, eye.position_m, eye.velocity_mps);
     bst_vec3 across = bst_vec3_unit(eye.position_m); /* at right angles to N */
-    double angle =
-        bst_vec3_angle(bst_light_aberrate(&wrong, across), bst_light_aberrate(&right, across));
+    double angle = bst_vec3_angle(bst_astro_light_aberrate(&wrong, across),
+                                  bst_astro_light_aberrate(&right, across));
     /* v/c of 1e-4 of it, from the velocity that both have */
     bst_assert_close(angle / BST_ARCSEC_RAD, 0.688, 1e-3);
     drop(&s);

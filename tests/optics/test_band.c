@@ -16,7 +16,7 @@ static bst_band *band_of(int preset) {
     return band;
 }
 
-static bst_band *band_from(const bst_response_point *points, int count) {
+static bst_band *band_from(const bst_optics_response_point *points, int count) {
     bst_ctx ctx = {0};
     bst_band *band;
     bst_band_config config = {.preset = BST_BAND_LWIR, .response = {(void *)points, count}};
@@ -41,7 +41,7 @@ static void the_integral_of_planck_is_the_series(void **state) {
     (void)state;
     const double pairs[][2] = {{0.2, 30}, {3.5, 5}, {8, 12}, {0.9, 1.7}};
     for (int i = 0; i < 4; i++) {
-        bst_response_point box[2] = {{pairs[i][0], 1}, {pairs[i][1], 1}};
+        bst_optics_response_point box[2] = {{pairs[i][0], 1}, {pairs[i][1], 1}};
         bst_band *band = band_from(box, 2);
         for (double t = 60; t < 30000; t *= 1.7) {
             double all = 1.5204608594e+15 / BST_PI * t * t * t;
@@ -59,12 +59,13 @@ static void planck_at_its_ends(void **state) {
     (void)state;
     /* 10 um, 300 K by hand: h c / (lambda k T) = 1.43877688e-2 / 3e-3 = 4.79592; exp - 1 =
      * 120.0166; 2 c / lambda^4 = 5.99584916e8 / 1e-20 = 5.99584916e28; 4.99585e26 */
-    bst_assert_close(bst_planck_photons(1e-5, 300) / 4.99585e26, 1, 2e-5); /* digits above */
-    bst_assert_close(bst_planck_photons(1e-5, 0), 0, 0);
-    bst_assert_close(bst_planck_photons(5e-7, 3), 0, 0); /* exp(9592) overflows to no light */
+    bst_assert_close(bst_optics_planck_photons(1e-5, 300) / 4.99585e26, 1, 2e-5); /* digits above */
+    bst_assert_close(bst_optics_planck_photons(1e-5, 0), 0, 0);
+    bst_assert_close(bst_optics_planck_photons(5e-7, 3), 0,
+                     0); /* exp(9592) overflows to no light */
     /* Rayleigh and Jeans: 2 k T / (h lambda^3), x = 0.00048: off by x / 2 */
     double jeans = 2 * 1.380649e-23 * 1e6 / (6.62607015e-34 * 2.7e-14);
-    bst_assert_close(bst_planck_photons(3e-5, 1e6) / jeans, 1, 3e-4);
+    bst_assert_close(bst_optics_planck_photons(3e-5, 1e6) / jeans, 1, 3e-4);
 }
 
 /* The table's source: 1347.93 W/m2 between 0.28 and 4 um by the trapezium rule on its 2002 rows.
@@ -75,16 +76,17 @@ static void the_sun_has_its_constant(void **state) {
     (void)state;
     double sum = 0, beyond = 0;
     for (double um = 0.2; um < 4; um += 1e-4) {
-        sum += bst_sun_irradiance((um + 5e-5) * 1e-6) * 1e-10;
+        sum += bst_optics_sun_irradiance((um + 5e-5) * 1e-6) * 1e-10;
     }
     for (double um = 4; um < 1000; um *= 1.001) {
-        beyond += bst_sun_irradiance(um * 1.0005e-6) * um * 0.001e-6;
+        beyond += bst_optics_sun_irradiance(um * 1.0005e-6) * um * 0.001e-6;
     }
     bst_assert_close(sum, 1347.93, 0.5); /* the coarse nodes, two of them halved at the ends */
     bst_assert_close(sum + beyond, 1366.1 * 0.995, 0.005 * 1366.1); /* what is below 0.28 um */
     /* its brightness temperature at 4 um joins smoothly */
-    bst_assert_close(bst_sun_irradiance(4.0001e-6) / bst_sun_irradiance(3.9999e-6), 1, 1e-3);
-    bst_assert_close(bst_sun_irradiance(0.27e-6), 0, 0);
+    bst_assert_close(bst_optics_sun_irradiance(4.0001e-6) / bst_optics_sun_irradiance(3.9999e-6), 1,
+                     1e-3);
+    bst_assert_close(bst_optics_sun_irradiance(0.27e-6), 0, 0);
 }
 
 /* Through Bessell's V the table's Sun is as bright as Willmer (ApJS 236, 47, 2018) has it: -26.76;
@@ -93,7 +95,7 @@ static void the_sun_and_a_star_through_v(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_band *band;
-    bst_response_point clear[2] = {{0.3, 1}, {1.0, 1}};
+    bst_optics_response_point clear[2] = {{0.3, 1}, {1.0, 1}};
     bst_band_config config = {.preset = BST_BAND_V, .transmission = {clear, 2}};
     bst_assert_ok(&ctx, bst_band_create(&ctx, &config, "", &band));
     double sun = bst_band_sun(band), star = bst_band_star(band, 0.65);
@@ -108,9 +110,9 @@ static void the_sun_and_a_star_through_v(void **state) {
 /* Ballesteros 2012: 5772 K at the Sun's colour, 10125 K at 0. */
 static void temperatures_of_stars(void **state) {
     (void)state;
-    bst_assert_close(bst_star_temperature_k(0), 4600 * (1 / 1.7 + 1 / 0.62),
-                     1e-9);                                   /* closed form */
-    bst_assert_close(bst_star_temperature_k(0.65), 5772, 60); /* the paper's own agreement */
+    bst_assert_close(bst_optics_star_temperature_k(0), 4600 * (1 / 1.7 + 1 / 0.62),
+                     1e-9);                                          /* closed form */
+    bst_assert_close(bst_optics_star_temperature_k(0.65), 5772, 60); /* the paper's own agreement */
 }
 
 /* Gaia's G (Evans et al. 2018) every 20 nm from 0.32 um, and the published G - V of B - V of the
@@ -123,9 +125,9 @@ static void colours_against_published_photometry(void **state) {
                                0.701, 0.692, 0.680, 0.663, 0.641, 0.613, 0.579, 0.540,
                                0.497, 0.448, 0.398, 0.345, 0.293, 0.244, 0.196, 0.152,
                                0.114, 0.081, 0.055, 0.035, 0.021, 0.011, 0.005, 0.000};
-    bst_response_point points[40];
+    bst_optics_response_point points[40];
     for (int i = 0; i < 40; i++) {
-        points[i] = (bst_response_point){0.32 + 0.02 * i, g[i]};
+        points[i] = (bst_optics_response_point){0.32 + 0.02 * i, g[i]};
     }
     bst_band *band = band_from(points, 40);
     double zero = bst_band_star(band, 0);
@@ -229,8 +231,8 @@ static void tables_are_multiplied(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_band *band;
-    bst_response_point detector[3] = {{0.4, 0.2}, {0.6, 1}, {0.9, 0}};
-    bst_response_point optics[3] = {{0.5, 0.5}, {0.55, 1}, {0.8, 0.5}};
+    bst_optics_response_point detector[3] = {{0.4, 0.2}, {0.6, 1}, {0.9, 0}};
+    bst_optics_response_point optics[3] = {{0.5, 0.5}, {0.55, 1}, {0.8, 0.5}};
     bst_band_config config = {
         .preset = BST_BAND_SILICON, .response = {detector, 3}, .transmission = {optics, 3}};
     bst_assert_ok(&ctx, bst_band_create(&ctx, &config, "", &band));
@@ -253,8 +255,8 @@ static void expect_refused(const bst_band_config *config, const char *words) {
 
 static void wrong_tables_are_refused(void **state) {
     (void)state;
-    bst_response_point back[2] = {{0.6, 1}, {0.5, 1}}, one[1] = {{0.5, 1}},
-                       dark[2] = {{0.5, 0}, {0.6, 0}}, far[2] = {{5, 1}, {6, 1}};
+    bst_optics_response_point back[2] = {{0.6, 1}, {0.5, 1}}, one[1] = {{0.5, 1}},
+                              dark[2] = {{0.5, 0}, {0.6, 0}}, far[2] = {{5, 1}, {6, 1}};
     expect_refused(&(bst_band_config){.response = {back, 2}}, "response/1/wavelength_um");
     expect_refused(&(bst_band_config){.transmission = {one, 1}}, "transmission: one wavelength");
     expect_refused(&(bst_band_config){.response = {dark, 2}}, "zero at all wavelengths");

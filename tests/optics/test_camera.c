@@ -87,19 +87,20 @@ static void electrons_of_a_star_and_of_the_sky(void **state) {
  * 2.982463; 2 x 2.982463 / (29.60881 x 1.6e15) = 1.259106e-16; -26.74 + 39.74985 = 13.00985. */
 static void a_sphere_at_a_geostationary_distance(void **state) {
     (void)state;
-    double v = bst_lambert_sphere_v_mag(4, 0.25, 19 * BST_DEG_RAD, 4e7, BST_AU_M);
+    double v = bst_world_lambert_sphere_v_mag(4, 0.25, 19 * BST_DEG_RAD, 4e7, BST_AU_M);
     bst_assert_close(v, 13.00985, 2e-5); /* seven digits above */
-    bst_assert_close(bst_lambert_sphere_v_mag(4, 0.25, -19 * BST_DEG_RAD, 4e7, BST_AU_M), v, 1e-13);
+    bst_assert_close(bst_world_lambert_sphere_v_mag(4, 0.25, -19 * BST_DEG_RAD, 4e7, BST_AU_M), v,
+                     1e-13);
     /* ten times the range is five magnitudes, twice the Sun's distance 1.505 */
-    bst_assert_close(bst_lambert_sphere_v_mag(4, 0.25, 19 * BST_DEG_RAD, 4e8, BST_AU_M), v + 5,
-                     1e-12);
-    bst_assert_close(bst_lambert_sphere_v_mag(4, 0.25, 19 * BST_DEG_RAD, 4e7, 2 * BST_AU_M),
+    bst_assert_close(bst_world_lambert_sphere_v_mag(4, 0.25, 19 * BST_DEG_RAD, 4e8, BST_AU_M),
+                     v + 5, 1e-12);
+    bst_assert_close(bst_world_lambert_sphere_v_mag(4, 0.25, 19 * BST_DEG_RAD, 4e7, 2 * BST_AU_M),
                      v + 5 * log10(2.0), 1e-12);
     /* full phase: geometric albedo of a Lambert sphere is 2/3 of its albedo (Lambert 1760) */
-    bst_assert_close(bst_lambert_sphere_v_mag(4, 0.25, 0, 4e7, BST_AU_M),
+    bst_assert_close(bst_world_lambert_sphere_v_mag(4, 0.25, 0, 4e7, BST_AU_M),
                      -26.74 - 2.5 * log10(2.0 / 3.0 * 0.25 * 4 / BST_PI / 1.6e15), 1e-12);
     /* half phase: 1 / pi of full phase */
-    bst_assert_close(bst_lambert_sphere_v_mag(4, 0.25, 0.5 * BST_PI, 4e7, BST_AU_M),
+    bst_assert_close(bst_world_lambert_sphere_v_mag(4, 0.25, 0.5 * BST_PI, 4e7, BST_AU_M),
                      -26.74 - 2.5 * log10(2.0 / 3.0 / BST_PI * 0.25 * 4 / BST_PI / 1.6e15), 1e-12);
 }
 
@@ -110,7 +111,7 @@ static void a_sphere_keeps_the_energy(void **state) {
     double sum = 0;
     for (int i = 0; i < n; i++) {
         double phase = BST_PI * (i + 0.5) / n;
-        double v = bst_lambert_sphere_v_mag(4, 0.25, phase, 1e7, BST_AU_M);
+        double v = bst_world_lambert_sphere_v_mag(4, 0.25, phase, 1e7, BST_AU_M);
         sum += pow(10, -0.4 * (v + 26.74)) * 1e14 * 2 * BST_PI * sin(phase) * BST_PI / n;
     }
     bst_assert_close(sum, 4 * 0.25, 1e-6); /* midpoint rule, step 1.6e-3: error of 1e-6 / 4 */
@@ -119,14 +120,14 @@ static void a_sphere_keeps_the_energy(void **state) {
 static void no_light_is_infinitely_faint(void **state) {
     (void)state;
     const double nan = (double)NAN;
-    assert_true(isinf(bst_lambert_sphere_v_mag(4, 0.25, BST_PI, 4e7, BST_AU_M)));
-    assert_true(isinf(bst_lambert_sphere_v_mag(4, 0.25, 4.0, 4e7, BST_AU_M)));
-    assert_true(isinf(bst_lambert_sphere_v_mag(4, 0.25, nan, 4e7, BST_AU_M)));
-    assert_true(isinf(bst_lambert_sphere_v_mag(4, 0.25, 1, nan, BST_AU_M)));
-    assert_true(isinf(bst_lambert_sphere_v_mag(4, 0, 1, 4e7, BST_AU_M)));
-    assert_true(isinf(bst_lambert_sphere_v_mag(0, 0.25, 1, 4e7, BST_AU_M)));
+    assert_true(isinf(bst_world_lambert_sphere_v_mag(4, 0.25, BST_PI, 4e7, BST_AU_M)));
+    assert_true(isinf(bst_world_lambert_sphere_v_mag(4, 0.25, 4.0, 4e7, BST_AU_M)));
+    assert_true(isinf(bst_world_lambert_sphere_v_mag(4, 0.25, nan, 4e7, BST_AU_M)));
+    assert_true(isinf(bst_world_lambert_sphere_v_mag(4, 0.25, 1, nan, BST_AU_M)));
+    assert_true(isinf(bst_world_lambert_sphere_v_mag(4, 0, 1, 4e7, BST_AU_M)));
+    assert_true(isinf(bst_world_lambert_sphere_v_mag(0, 0.25, 1, 4e7, BST_AU_M)));
     /* just short of new phase it still shines, faintly */
-    double v = bst_lambert_sphere_v_mag(4, 0.25, BST_PI - 1e-3, 4e7, BST_AU_M);
+    double v = bst_world_lambert_sphere_v_mag(4, 0.25, BST_PI - 1e-3, 4e7, BST_AU_M);
     assert_true(v > 30 && v < 45);
 }
 

@@ -3,7 +3,7 @@
 #include "sim/optics/camera.h"
 #include "tests/test_support.h"
 
-static bst_camera make(double scale_arcsec, double rotation_deg, bst_distortion d) {
+static bst_camera make(double scale_arcsec, double rotation_deg, bst_camera_distortion d) {
     bst_camera c = {.width_px = 1024,
                     .height_px = 768,
                     .pixel_scale_arcsec = scale_arcsec,
@@ -20,7 +20,7 @@ static bst_camera make(double scale_arcsec, double rotation_deg, bst_distortion 
  * y' = -0.2 L + 0.01 (0.13 + 0.08) + 2 * 0.02 * 0.3 * -0.2 = -0.19531294. */
 static void convention_is_brown_s_as_opencv_writes_it(void **state) {
     (void)state;
-    bst_camera c = make(100, 0, (bst_distortion){-0.2, 0.05, 0.1, 0.01, 0.02});
+    bst_camera c = make(100, 0, (bst_camera_distortion){-0.2, 0.05, 0.1, 0.01, 0.02});
     double x, y, scale = bst_camera_scale_rad(&c);
     assert_true(bst_camera_project(&c, (bst_vec3){0.6, -0.4, 2.0}, &x, &y));
     /* 1e-8 of digits above over 4.8e-4 rad per pixel */
@@ -34,7 +34,7 @@ static void rotation_turns_the_focal_plane(void **state) {
     (void)state;
     const double angles[] = {0, 90, 180, -37, 30, -90};
     for (int i = 0; i < 6; i++) {
-        bst_camera c = make(3, angles[i], (bst_distortion){0});
+        bst_camera c = make(3, angles[i], (bst_camera_distortion){0});
         double scale = bst_camera_scale_rad(&c), x, y, a = angles[i] * BST_DEG_RAD;
         const double t = 100 * scale;
         assert_true(bst_camera_project(&c, (bst_vec3){t * cos(a), t * sin(a), 1}, &x, &y));
@@ -68,21 +68,21 @@ static void unproject_inverts_project(void **state) {
     const double angles[] = {0, 90, 180, -37};
     for (int i = 0; i < 4; i++) {
         const bst_camera cameras[] = {
-            make(3, angles[i], (bst_distortion){.k1 = 230}),   /* +2 % in the corner */
-            make(3, angles[i], (bst_distortion){.k1 = -230}),  /* -2 % */
-            make(3, angles[i], (bst_distortion){.k1 = 11000}), /* +95 % */
-            make(3, angles[i], (bst_distortion){.k1 = -1500}), /* -17 % */
-            make(3, angles[i], (bst_distortion){200, -1e6, 3e10, 0.1, -0.2}),
-            make(200, angles[i], (bst_distortion){-0.2, 0.05, 0.1, 0.01, 0.02}),
-            make(200, angles[i], (bst_distortion){5, 20, 100, 0, 0}),
-            make(0.001, angles[i], (bst_distortion){.k1 = 2e9}),
+            make(3, angles[i], (bst_camera_distortion){.k1 = 230}),   /* +2 % in the corner */
+            make(3, angles[i], (bst_camera_distortion){.k1 = -230}),  /* -2 % */
+            make(3, angles[i], (bst_camera_distortion){.k1 = 11000}), /* +95 % */
+            make(3, angles[i], (bst_camera_distortion){.k1 = -1500}), /* -17 % */
+            make(3, angles[i], (bst_camera_distortion){200, -1e6, 3e10, 0.1, -0.2}),
+            make(200, angles[i], (bst_camera_distortion){-0.2, 0.05, 0.1, 0.01, 0.02}),
+            make(200, angles[i], (bst_camera_distortion){5, 20, 100, 0, 0}),
+            make(0.001, angles[i], (bst_camera_distortion){.k1 = 2e9}),
         };
         for (size_t k = 0; k < sizeof cameras / sizeof *cameras; k++) {
             /* rounding of 500 px is 1e-13 */
             expect_round_trip(&cameras[k], 1e-9);
         }
     }
-    bst_camera c = make(3, 12, (bst_distortion){.k1 = 230});
+    bst_camera c = make(3, 12, (bst_camera_distortion){.k1 = 230});
     c.boresight_offset_px[0] = 40.25;
     c.boresight_offset_px[1] = -17;
     bst_ctx ctx = {0};
@@ -105,7 +105,7 @@ static void folds_are_refused_inside_the_sensor_only(void **state) {
     (void)state;
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_camera c = make(3, -37, (bst_distortion){0});
+    bst_camera c = make(3, -37, (bst_camera_distortion){0});
     const double near[] = {1.5, 1.01, 1.0001, 1.000001, 1 + 1e-9};
     for (int i = 0; i < 5; i++) {
         c.distortion.k1 = k1_that_folds_at(&c, near[i]);
@@ -134,7 +134,7 @@ static void folds_are_refused_inside_the_sensor_only(void **state) {
     bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &c));
     expect_round_trip(&c, 1e-9);
     /* tangential terms fold too: 1 = 6 p2 r on one side */
-    c.distortion = (bst_distortion){.p2 = 1 / (6 * 0.5 * 640 * bst_camera_scale_rad(&c))};
+    c.distortion = (bst_camera_distortion){.p2 = 1 / (6 * 0.5 * 640 * bst_camera_scale_rad(&c))};
     assert_int_equal(bst_camera_prepare(&ctx, &c), BST_ERR_CONFIG);
     c.distortion.p2 = 1 / (6 * 2.1 * 640 * bst_camera_scale_rad(&c));
     bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &c));
@@ -145,7 +145,7 @@ static void folds_are_refused_inside_the_sensor_only(void **state) {
  * sensor has one direction. */
 static void no_ghosts_from_beyond_the_fold(void **state) {
     (void)state;
-    bst_camera c = make(3, 20, (bst_distortion){0});
+    bst_camera c = make(3, 20, (bst_camera_distortion){0});
     c.distortion.k1 = k1_that_folds_at(&c, 1.1);
     bst_ctx ctx = {0};
     bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &c));
@@ -171,7 +171,7 @@ static void no_ghosts_from_beyond_the_fold(void **state) {
 
 static void jacobian_is_the_derivative(void **state) {
     (void)state;
-    const bst_camera c = make(200, -37, (bst_distortion){-0.2, 0.05, 0.1, 0.01, 0.02});
+    const bst_camera c = make(200, -37, (bst_camera_distortion){-0.2, 0.05, 0.1, 0.01, 0.02});
     double scale = bst_camera_scale_rad(&c);
     for (double a = -0.4; a <= 0.4; a += 0.1) {
         for (double b = -0.3; b <= 0.3; b += 0.1) {
@@ -206,7 +206,7 @@ static void jacobian_is_the_derivative(void **state) {
 /* Barrel distortion sees more of the sky than the pixels at the boresight would say. */
 static void reach_holds_the_field(void **state) {
     (void)state;
-    const bst_distortion cases[] = {{.k1 = -1500}, {.k1 = 1500}, {.k1 = 230, .p1 = 0.3}};
+    const bst_camera_distortion cases[] = {{.k1 = -1500}, {.k1 = 1500}, {.k1 = 230, .p1 = 0.3}};
     for (int i = 0; i < 3; i++) {
         const bst_camera c = make(3, 33, cases[i]);
         const double windows[][4] = {{-5, -5, 1028, 772}, {700, 20, 900, 120}};

@@ -409,7 +409,7 @@ static void an_aberrated_spidered_aperture_is_its_autocorrelation(void **state) 
     bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
     camera.obscuration = 0.09;
     camera.optics.zernike_nm = 551.0;
-    camera.optics.spiders = (bst_spiders){.count = 3, .width_m = 0.002, .angle_deg = 17.0};
+    camera.optics.spiders = (bst_optics_spiders){.count = 3, .width_m = 0.002, .angle_deg = 17.0};
     double amounts[38] = {0};
     amounts[4] = 0.12, amounts[6] = -0.08, amounts[7] = 0.1, amounts[9] = 0.05, amounts[11] = 0.04;
     for (int j = 2; j <= 37; j++) {

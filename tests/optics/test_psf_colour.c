@@ -50,7 +50,7 @@ static bst_psf *exact_psf(bst_camera camera, double temperature_k, int count, do
         weight[k] = wavelength_m[k] = 0.0;
         for (int p = 0; p < PARTS; p++) {
             double at = from + (to - from) * (PARTS * k + p + 0.5) / (count * PARTS);
-            double photons = bst_planck_photons(at, temperature_k);
+            double photons = bst_optics_planck_photons(at, temperature_k);
             weight[k] += photons;
             wavelength_m[k] += photons * at;
         }
@@ -163,7 +163,8 @@ static void aberrations_mix_too(void **state) {
             float colour[BST_PSF_COLOURS];
             for (int k = 0; k < WAVELENGTHS; k++) {
                 place[k] = 1e-9 * (650.0 + 250.0 * legendre_16[k]);
-                weight[k] = legendre_16_weight[k] * bst_planck_photons(place[k], temperature_k[t]);
+                weight[k] =
+                    legendre_16_weight[k] * bst_optics_planck_photons(place[k], temperature_k[t]);
             }
             const bst_psf_spectrum spectrum = {place, weight, WAVELENGTHS};
             const bst_psf_inputs inputs = {.spectrum = &spectrum};
@@ -215,10 +216,10 @@ static void wings_go_as_the_mean_wavelength(void **state) {
         float colour[BST_PSF_COLOURS];
         double h[2], f = 1e-3, pixel = 1.0 - BST_PI * BST_PI * f * f / 6.0;
         double b_minus_v = k == 0 ? 1.6 : -0.2;
-        bst_psf_colour(psf, bst_star_spectrum_k(b_minus_v), colour);
+        bst_psf_colour(psf, bst_optics_star_spectrum_k(b_minus_v), colour);
         mixed_otf(psf, colour, f, 0.0, h);
         lack[k] = 1.0 - h[0] / pixel;
-        bst_psf_free(exact_psf(camera, bst_star_temperature_k(b_minus_v), 64, &mean_m[k]));
+        bst_psf_free(exact_psf(camera, bst_optics_star_temperature_k(b_minus_v), 64, &mean_m[k]));
     }
     assert_true(mean_m[0] / mean_m[1] > 1.15); /* they do differ */
     /* colours are floats between 1024 entries (3e-6); the next power of s: 1e-6 */

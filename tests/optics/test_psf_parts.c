@@ -88,7 +88,7 @@ static void what_cannot_be_is_said(void **state) {
     cases[4].message = "waves per aperture diameter";
     cases[5].camera.optics.central_obstruction = 1.0;
     cases[5].message = "optics/central_obstruction must be below 1";
-    cases[6].camera.optics.spiders = (bst_spiders){.count = 4, .width_m = 0.05};
+    cases[6].camera.optics.spiders = (bst_optics_spiders){.count = 4, .width_m = 0.05};
     cases[6].message = "optics/spiders of 4 vanes and 0.05 m cover an aperture of 0.1 m";
     cases[7].camera.optics.band_nm[1] = 500.0;
     cases[7].camera.optics.band_nm[0] = 600.0;
@@ -144,7 +144,7 @@ static void the_cameras_band_is_the_psfs(void **state) {
     bst_ctx ctx = {0};
     bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
     camera.optics.q = 0.0;
-    bst_response_point points[4] = {{0.7, 0.0}, {0.701, 1.0}, {0.799, 1.0}, {0.8, 0.0}};
+    bst_optics_response_point points[4] = {{0.7, 0.0}, {0.701, 1.0}, {0.799, 1.0}, {0.8, 0.0}};
     camera.band.response = (bst_config_list){points, 4};
     bst_band *band;
     bst_assert_ok(&ctx, bst_band_create(&ctx, &camera.band, "", &band));
@@ -279,7 +279,7 @@ static void no_light_is_lost(void **state) {
     for (int32_t model = BST_PSF_GAUSSIAN; model <= BST_PSF_DIFFRACTION; model++) {
         bst_camera camera = camera_of(model);
         camera.optics.zernike_waves.waves[5] = 0.3;
-        camera.optics.spiders = (bst_spiders){.count = 4, .width_m = 0.003};
+        camera.optics.spiders = (bst_optics_spiders){.count = 4, .width_m = 0.003};
         camera.optics.diffusion_px = 0.2;
         camera.optics.pixel_fill[0] = 0.7;
         bst_ctx ctx = {0};
@@ -305,7 +305,7 @@ static void jitter_widens_any_psf(void **state) {
         camera.optics.diffusion_px = 0.3;
         bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
         camera.psf = psf;
-        bst_assert_ok(&ctx, bst_camera_blurred(&ctx, &camera, 0.4, &blurred));
+        bst_assert_ok(&ctx, bst_psf_camera_blurred(&ctx, &camera, 0.4, &blurred));
         bst_psf_free(psf); /* the copy holds what it needs */
         bst_psf *wide = (bst_psf *)blurred.psf, *again;
         /* rounding of a sum of squares */

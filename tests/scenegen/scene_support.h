@@ -79,18 +79,18 @@ static inline void scene_track_free(scene_track *t) {
 }
 
 /* A star that sits at pixel x, y in the identity attitude. */
-static inline bst_source scene_star(const bst_camera *camera, double x, double y,
-                                    double electrons_per_s) {
+static inline bst_scene_source scene_star(const bst_camera *camera, double x, double y,
+                                          double electrons_per_s) {
     bst_vec3 v = bst_camera_unproject(camera, x, y);
-    return (bst_source){
+    return (bst_scene_source){
         .kind = BST_SOURCE_STAR, .apparent_mid = v, .electrons_per_s = electrons_per_s};
 }
 
 /* `count` stars over the sensor and a rim of 40 px; fluxes over `magnitudes`, counts growing as
  * 10^(0.4 m), the brightest at `brightest` electrons per second. */
-static inline bst_source *scene_stars(const bst_camera *camera, int count, double brightest,
-                                      double magnitudes, uint64_t seed) {
-    bst_source *stars = malloc((size_t)count * sizeof *stars);
+static inline bst_scene_source *scene_stars(const bst_camera *camera, int count, double brightest,
+                                            double magnitudes, uint64_t seed) {
+    bst_scene_source *stars = malloc((size_t)count * sizeof *stars);
     bst_rng_key key = bst_rng_make_key(seed, 0, "scene", "stars");
     double top = pow(10.0, 0.4 * magnitudes);
     for (int i = 0; i < count; i++) {

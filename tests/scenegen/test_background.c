@@ -78,7 +78,7 @@ static void windows_have_the_same_bytes(void **state) {
     static float nodes[W * H], part[W * H];
     static uint16_t full[W * H];
     bst_camera camera = uneven_camera();
-    bst_source *stars = scene_stars(&camera, 100, 2e6, 6.0, 4);
+    bst_scene_source *stars = scene_stars(&camera, 100, 2e6, 6.0, 4);
     scene_track track = scene_track_make(&camera, &demo);
     bst_renderer *r;
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, NULL, &r));

@@ -34,21 +34,22 @@ static bst_camera broad_camera(double q, double rms_waves) {
 static const double b_minus_v[SOURCES] = {1.7, -0.25};
 
 static void make_sources(const bst_camera *c, const bst_psf *psf, double electrons,
-                         bst_source *sources) {
+                         bst_scene_source *sources) {
     for (int i = 0; i < SOURCES; i++) {
         sources[i] = scene_star(c, 40.3 + 22.7 * i, 60.2 - 19.37 * i, electrons / (1 + i));
-        bst_psf_colour(psf, bst_star_spectrum_k(b_minus_v[i]), sources[i].colour);
+        bst_psf_colour(psf, bst_optics_star_spectrum_k(b_minus_v[i]), sources[i].colour);
     }
 }
 
 /* The PSF of the i-th source's spectrum alone. */
 static bst_psf *own_psf(bst_ctx *ctx, bst_camera camera, int i) {
     double wavelength_m[WAVELENGTHS], photons[WAVELENGTHS];
-    double kelvin = bst_star_temperature_k(b_minus_v[i]);
+    double kelvin = bst_optics_star_temperature_k(b_minus_v[i]);
     for (int k = 0; k < WAVELENGTHS; k++) {
         double u = k < 4 ? -place[3 - k] : place[k - 4];
         wavelength_m[k] = 1e-9 * (650.0 + 250.0 * u);
-        photons[k] = weight[k < 4 ? 3 - k : k - 4] * bst_planck_photons(wavelength_m[k], kelvin);
+        photons[k] =
+            weight[k < 4 ? 3 - k : k - 4] * bst_optics_planck_photons(wavelength_m[k], kelvin);
     }
     const bst_psf_spectrum spectrum = {wavelength_m, photons, WAVELENGTHS};
     const bst_psf_inputs inputs = {.spectrum = &spectrum};
@@ -78,7 +79,7 @@ static errors compare(const float *fast, const double *exact, const bst_camera *
 
 /* Renders the sources; returns the predicted error. */
 static double render(fixture *f, const bst_camera *c, const bst_los_track *track,
-                     const bst_source *sources, float *image) {
+                     const bst_scene_source *sources, float *image) {
     bst_renderer *r;
     bst_render_stats stats;
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, c, NULL, &r));
@@ -111,7 +112,7 @@ static void stars_have_the_psf_of_their_spectrum(void **state) {
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         bst_camera c = broad_camera(cases[k].q, cases[k].waves);
         scene_track track = straight(&c, cases[k].travel_px);
-        bst_source sources[SOURCES];
+        bst_scene_source sources[SOURCES];
         bst_psf *psf;
         bst_assert_ok(&f->ctx, bst_psf_create(&f->ctx, &c, &psf));
         make_sources(&c, psf, cases[k].electrons, sources);
@@ -147,7 +148,7 @@ static void the_reference_mixes_too(void **state) {
     bst_camera c = broad_camera(3.4, 0.0);
     scene_track track = straight(&c, 0.0);
     bst_window window = {0, 0, WIDTH, HEIGHT};
-    bst_source sources[SOURCES];
+    bst_scene_source sources[SOURCES];
     bst_psf *psf;
     bst_assert_ok(&f->ctx, bst_psf_create(&f->ctx, &c, &psf));
     make_sources(&c, psf, 1e5, sources);
@@ -176,7 +177,7 @@ static void fields_and_sunlight(void **state) {
     static float image[2][PIXELS];
     bst_camera c = broad_camera(2.0, 0.07);
     scene_track track = straight(&c, 5.0);
-    bst_source sources[SOURCES];
+    bst_scene_source sources[SOURCES];
     bst_psf *psf;
     bst_assert_ok(&f->ctx, bst_psf_create(&f->ctx, &c, &psf));
     make_sources(&c, psf, 3e5, sources);

@@ -5,11 +5,11 @@
 
 enum { SIDE = 512 };
 
-static const bst_hits_config example = {.rate_per_cm2_s = 5.0,
-                                        .pixel_pitch_um = 13.0,
-                                        .depth_um = 15.0,
-                                        .e_per_um = 75.0,
-                                        .straggling = 0.15};
+static const bst_detector_cosmic_ray_config example = {.rate_per_cm2_s = 5.0,
+                                                       .pixel_pitch_um = 13.0,
+                                                       .depth_um = 15.0,
+                                                       .e_per_um = 75.0,
+                                                       .straggling = 0.15};
 
 /* Number: Poisson of rate, area and time. Charge: e_per_um times the mean path 2 depth (the density
  * 2 mu of the cosine and the length depth / mu) times the mean 1 + straggling (gamma + ln 2) of a
@@ -18,15 +18,16 @@ static void hits_have_their_rate_and_charge(void **state) {
     (void)state;
     enum { EXPOSURES = 4000 };
     bst_ctx ctx = {0};
-    bst_hits *hits;
-    bst_hits_config c = example;
+    bst_cosmic_rays *hits;
+    bst_detector_cosmic_ray_config c = example;
     c.straggling = 0.02; /* so that nothing is cut at 0 */
-    bst_assert_ok(&ctx, bst_hits_create(&ctx, &c, SIDE, SIDE, SIDE, &hits));
+    bst_assert_ok(&ctx, bst_cosmic_rays_create(&ctx, &c, SIDE, SIDE, SIDE, &hits));
     double tracks = 0.0, tracks2 = 0.0, sum = 0.0;
     for (int k = 0; k < EXPOSURES; k++) {
-        const bst_hit_pixel *pixels;
-        bst_hits_summary s;
-        bst_assert_ok(&ctx, bst_hits_draw(&ctx, hits, (bst_rng_key){{1, 2}}, k, 2.0, &pixels, &s));
+        const bst_cosmic_rays_pixel *pixels;
+        bst_cosmic_rays_summary s;
+        bst_assert_ok(&ctx,
+                      bst_cosmic_rays_draw(&ctx, hits, (bst_rng_key){{1, 2}}, k, 2.0, &pixels, &s));
         double total = 0.0;
         for (int i = 0; i < s.pixels; i++) {
             assert_in_range(pixels[i].index, 0, SIDE * SIDE - 1);
@@ -51,20 +52,20 @@ static void hits_have_their_rate_and_charge(void **state) {
     /* variance over mean of a Poisson number, of n exposures: standard deviation sqrt(2 / n) */
     double m = tracks / EXPOSURES, var = tracks2 / EXPOSURES - m * m;
     bst_assert_close(var / m, 1.0, 4.0 * sqrt(2.0 / EXPOSURES) + 4.0 / sqrt(tracks));
-    bst_hits_free(hits);
+    bst_cosmic_rays_free(hits);
 }
 
 static void too_many_hits_are_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_hits *hits;
-    const bst_hit_pixel *pixels;
-    bst_hits_summary s;
-    bst_assert_ok(&ctx, bst_hits_create(&ctx, &example, SIDE, SIDE, SIDE, &hits));
-    assert_int_equal(bst_hits_draw(&ctx, hits, (bst_rng_key){{1, 2}}, 0, 1e7, &pixels, &s),
+    bst_cosmic_rays *hits;
+    const bst_cosmic_rays_pixel *pixels;
+    bst_cosmic_rays_summary s;
+    bst_assert_ok(&ctx, bst_cosmic_rays_create(&ctx, &example, SIDE, SIDE, SIDE, &hits));
+    assert_int_equal(bst_cosmic_rays_draw(&ctx, hits, (bst_rng_key){{1, 2}}, 0, 1e7, &pixels, &s),
                      BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "rate_per_cm2_s"));
-    bst_hits_free(hits);
+    bst_cosmic_rays_free(hits);
 }
 
 static void take(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, uint16_t *out) {
@@ -118,7 +119,7 @@ static void windows_agree_with_every_effect(void **state) {
     bst_ctx ctx = {0};
     bst_device *device;
     bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
-    bst_source *stars = NULL;
+    bst_scene_source *stars = NULL;
     double time_s[2] = {0.0, 0.5};
     bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
     bst_los_track track = {2, time_s, q};

@@ -122,8 +122,8 @@ static void response_differs_from_pixel_to_pixel(void **state) {
     f->camera.detector.dead_fraction = 0.01;
     f->camera.detector.bad_columns = 3;
     make(f);
-    bst_assert_ok(&f->ctx,
-                  bst_pattern_gain(&f->ctx, &f->camera, (bst_rng_key){{21, 22}}, SIDE, gain));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_gain(&f->ctx, &f->camera,
+                                                        (bst_rng_key){{21, 22}}, SIDE, gain));
     mean_of(f, FRAMES, mean);
     double chi2 = 0.0, sum = 0.0, sum2 = 0.0;
     int dead = 0, columns = 0;
@@ -157,7 +157,7 @@ static void dark_current_differs_from_pixel_to_pixel(void **state) {
     f->camera.dark_current_e_per_s = 40.0;
     f->camera.detector.dsnu_rms = 0.3;
     bst_rng_key key = {{21, 22}};
-    bst_assert_ok(&f->ctx, bst_pattern_dark(&f->ctx, &f->camera, key, SIDE, dark));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, SIDE, dark));
     double sum = 0.0, sum2 = 0.0;
     for (int i = 0; i < PIXELS; i++) {
         sum += (double)dark[i] / 40.0 / PIXELS;
@@ -170,7 +170,7 @@ static void dark_current_differs_from_pixel_to_pixel(void **state) {
     f->camera.dark_current_e_per_s = 0.0;
     f->camera.detector = (bst_detector_config){
         .hot_fraction = 0.05, .hot_median_e_per_s = 200.0, .hot_spread_dex = 0.4};
-    bst_assert_ok(&f->ctx, bst_pattern_dark(&f->ctx, &f->camera, key, SIDE, dark));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, SIDE, dark));
     int hot = 0;
     for (int i = 0; i < PIXELS; i++) {
         if (dark[i] > 0.0f) {
@@ -244,20 +244,22 @@ static void maps_come_from_files(void **state) {
     char *path = f->camera.detector.prnu_map;
     snprintf(path, 512, "/tmp/bst_detector_map_%d.fits", (int)getpid());
     write_map(path, SIDE, SIDE, ramp);
-    bst_assert_ok(&f->ctx, bst_pattern_gain(&f->ctx, &f->camera, key, SIDE, map));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, SIDE, map));
     for (int i = 0; i < PIXELS; i += 997) {
         assert_true(map[i] == ramp(i % SIDE, i / SIDE)); /* as written, to the bit */
     }
     snprintf(f->camera.detector.dark_map, 512, "%s", path);
     f->camera.detector.temperature_c = 6.5; /* one doubling */
-    bst_assert_ok(&f->ctx, bst_pattern_dark(&f->ctx, &f->camera, key, SIDE, map));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, SIDE, map));
     assert_true(map[1000] == 2.0f * ramp(1000 % SIDE, 1000 / SIDE));
 
     write_map(path, SIDE, SIDE, negative);
-    assert_int_equal(bst_pattern_gain(&f->ctx, &f->camera, key, SIDE, map), BST_ERR_CONFIG);
+    assert_int_equal(bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, SIDE, map),
+                     BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "column 3, row 5"));
     write_map(path, SIDE, SIDE / 2, ramp);
-    assert_int_equal(bst_pattern_gain(&f->ctx, &f->camera, key, SIDE, map), BST_ERR_CONFIG);
+    assert_int_equal(bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, SIDE, map),
+                     BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "256 x 128"));
     remove(path);
 }
@@ -273,8 +275,8 @@ static void offsets_of_columns_and_rows(void **state) {
     mean_of(f, FRAMES, mean);
     float columns[SIDE], rows[SIDE];
     bst_rng_key key = {{21, 22}};
-    bst_pattern_offsets(&f->camera, key, "columns", SIDE, columns);
-    bst_pattern_offsets(&f->camera, key, "rows", SIDE, rows);
+    bst_fixed_pattern_noise_offsets(&f->camera, key, "columns", SIDE, columns);
+    bst_fixed_pattern_noise_offsets(&f->camera, key, "rows", SIDE, rows);
     double chi2 = 0.0, c2 = 0.0, r2 = 0.0;
     for (int i = 0; i < PIXELS; i++) {
         double want = 100.0 + (double)columns[i % SIDE] + (double)rows[i / SIDE];
@@ -408,7 +410,7 @@ static void full_wells_bloom(void **state) {
     fixture *f = open_with(state, 0.0, 0.0);
     f->camera.full_well_e = 1000.0;
     f->camera.read_noise_e = 1.0;
-    bst_source star = scene_star(&f->camera, 100.0, 120.0, 2.0 * 60000.0);
+    bst_scene_source star = scene_star(&f->camera, 100.0, 120.0, 2.0 * 60000.0);
     f->request.sources = &star;
     f->request.count = 1;
     make(f);
@@ -453,7 +455,7 @@ static void frame_transfer_smears(void **state) {
     static double mean[PIXELS];
     enum { FRAMES = 16 };
     fixture *f = open_with(state, 10.0, 0.0);
-    bst_source star = scene_star(&f->camera, 100.0, 120.0, 2.0 * 1e6);
+    bst_scene_source star = scene_star(&f->camera, 100.0, 120.0, 2.0 * 1e6);
     f->camera.full_well_e = 1e7;
     f->camera.bits = 16;
     f->camera.gain_e_per_dn = 20.0;
@@ -490,7 +492,7 @@ static void binning_adds_before_reading(void **state) {
         bst_assert_close(m.var, var, 4.0 * var * sqrt(2.0 / n));
         /* a star keeps its place and light */
         static float frame[PIXELS];
-        bst_source star = scene_star(&f->camera, 101.0, 57.0, 2.0 * 3e4);
+        bst_scene_source star = scene_star(&f->camera, 101.0, 57.0, 2.0 * 3e4);
         f->request.sources = &star;
         f->request.count = 1;
         f->request.window = (bst_window){64, 32, 2 * SIDE / 4, SIDE / 4};
@@ -518,23 +520,23 @@ static void numbers_are_companded(void **state) {
     static uint16_t codes[65536];
     fixture *f = open_with(state, 0.0, 0.0);
     f->camera.bits = 12;
-    bst_quantisation_config *q = &f->camera.detector.quantisation;
-    *q = (bst_quantisation_config){.model = BST_QUANTISE_SQUARE_ROOT, .bits = 8};
-    bst_assert_ok(&f->ctx, bst_pattern_codes(&f->ctx, &f->camera, codes));
+    bst_detector_quantisation_config *q = &f->camera.detector.quantisation;
+    *q = (bst_detector_quantisation_config){.model = BST_QUANTISE_SQUARE_ROOT, .bits = 8};
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_codes(&f->ctx, &f->camera, codes));
     assert_int_equal(codes[0], 0);
     assert_int_equal(codes[4095], 255);
     assert_int_equal(codes[1024], 128); /* 255 sqrt(1024 / 4095) = 127.52 */
     q->expand = true;
-    bst_assert_ok(&f->ctx, bst_pattern_codes(&f->ctx, &f->camera, codes));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_codes(&f->ctx, &f->camera, codes));
     for (int dn = 0; dn < 4096; dn++) { /* half a step: 255 / sqrt(4095) codes per root of dn */
         bst_assert_close(codes[dn], dn, sqrt(dn) * sqrt(4095.0) / 255.0 + 1.0);
     }
-    *q = (bst_quantisation_config){.model = BST_QUANTISE_TABLE};
+    *q = (bst_detector_quantisation_config){.model = BST_QUANTISE_TABLE};
     snprintf(q->table, sizeof q->table, "/tmp/bst_detector_codes_%d.txt", (int)getpid());
     FILE *file = fopen(q->table, "w");
     fputs("# three codes\n0\n100\n\n2000\n", file);
     fclose(file);
-    bst_assert_ok(&f->ctx, bst_pattern_codes(&f->ctx, &f->camera, codes));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_codes(&f->ctx, &f->camera, codes));
     assert_int_equal(codes[99], 0);
     assert_int_equal(codes[100], 1);
     assert_int_equal(codes[1999], 1);
@@ -556,7 +558,7 @@ static void numbers_are_companded(void **state) {
         file = fopen(q->table, "w");
         fputs(wrong[i], file);
         fclose(file);
-        assert_int_equal(bst_pattern_codes(&f->ctx, &f->camera, codes), BST_ERR_CONFIG);
+        assert_int_equal(bst_fixed_pattern_noise_codes(&f->ctx, &f->camera, codes), BST_ERR_CONFIG);
         assert_non_null(strstr(f->ctx.message, "quantisation.table"));
     }
     remove(q->table);

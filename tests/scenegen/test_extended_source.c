@@ -34,23 +34,23 @@ static int close_device(void **state) {
 
 /* A sphere of radius_px whose middle is off the sensor's by (x, y) px, lit at a phase angle from
  * the image's direction `turn`. */
-static bst_source_shape shape_of(const bst_camera *camera, bst_vec3 middle, double radius_px,
-                                 double phase_rad, double turn_rad) {
+static bst_scene_source_shape shape_of(const bst_camera *camera, bst_vec3 middle, double radius_px,
+                                       double phase_rad, double turn_rad) {
     double a = bst_camera_scale_rad(camera);
     bst_vec3 z = bst_vec3_scale(middle, -1.0);
     bst_vec3 x = bst_vec3_unit(
         bst_vec3_axpy((bst_vec3){cos(turn_rad), sin(turn_rad), 0.0},
                       -bst_vec3_dot((bst_vec3){cos(turn_rad), sin(turn_rad), 0.0}, z), z));
-    return (bst_source_shape){
+    return (bst_scene_source_shape){
         .radius = sin(atan(radius_px * a)),
         .sun = bst_vec3_axpy(bst_vec3_scale(z, cos(phase_rad)), sin(phase_rad), x),
         .earth = z,
         .diffuse = 1.0};
 }
 
-static bst_source source_at(const bst_camera *camera, double x, double y, double electrons,
-                            const bst_source_shape *shape) {
-    return (bst_source){
+static bst_scene_source source_at(const bst_camera *camera, double x, double y, double electrons,
+                                  const bst_scene_source_shape *shape) {
+    return (bst_scene_source){
         .kind = BST_SOURCE_OBJECT,
         .apparent_mid = bst_camera_unproject(camera, bst_camera_centre_x(camera) + x,
                                              bst_camera_centre_y(camera) + y),
@@ -65,7 +65,7 @@ typedef struct images {
 } images;
 
 static images render(fixture *f, const bst_camera *camera, const scene_motion *motion,
-                     const bst_source *source, bool with_reference) {
+                     const bst_scene_source *source, bool with_reference) {
     bst_renderer *r = f->renderer;
     size_t pixels = (size_t)camera->width_px * (size_t)camera->height_px;
     scene_track track = scene_track_make(camera, motion);
@@ -137,8 +137,8 @@ static void light_and_its_middle(void **state) {
         for (int k = 0; k < 5; k++) {
             double dx = 0.37 * i - 0.8, dy = 0.21 * k, turn = 0.7 + k;
             double phase = phases[k] * BST_DEG_RAD;
-            bst_source s = source_at(&camera, dx, dy, 1e6, NULL);
-            bst_source_shape shape = shape_of(&camera, s.apparent_mid, radii[i], phase, turn);
+            bst_scene_source s = source_at(&camera, dx, dy, 1e6, NULL);
+            bst_scene_source_shape shape = shape_of(&camera, s.apparent_mid, radii[i], phase, turn);
             s.shape = &shape;
             images m = render(f, &camera, &still, &s, false);
             double way = radii[i] * lambert_middle(phase);
@@ -160,8 +160,8 @@ static void discs_agree_with_the_reference(void **state) {
     const double radii[] = {0.3, 1.5, 6.0, 13.0};
     for (int i = 0; i < 4; i++) {
         for (int k = radii[i] > 10.0 ? 2 : 0; k < 3; k++) {
-            bst_source s = source_at(&camera, 0.3, -0.45, 3e5, NULL);
-            bst_source_shape shape =
+            bst_scene_source s = source_at(&camera, 0.3, -0.45, 3e5, NULL);
+            bst_scene_source_shape shape =
                 shape_of(&camera, s.apparent_mid, radii[i], 50.0 * k * BST_DEG_RAD, 0.4 + k);
             shape.diffuse = 0.8;
             shape.specular = 0.1;
@@ -182,8 +182,8 @@ static void moving_discs(void **state) {
     const scene_motion motion = {.x_px = 8.0, .y_px = 4.0, .duration_s = 1.0, .samples = 3};
     const double radii[] = {1.0, 4.0, 13.0};
     for (int i = 0; i < 3; i++) {
-        bst_source s = source_at(&camera, 0.0, 0.0, 3e5, NULL);
-        bst_source_shape shape = shape_of(&camera, s.apparent_mid, radii[i], 1.2, 2.0);
+        bst_scene_source s = source_at(&camera, 0.0, 0.0, 3e5, NULL);
+        bst_scene_source_shape shape = shape_of(&camera, s.apparent_mid, radii[i], 1.2, 2.0);
         s.shape = &shape;
         images m = render(f, &camera, &motion, &s, true);
         double worst = worst_sigma(&camera, &m);
@@ -201,8 +201,8 @@ static void a_disc_larger_than_the_frame(void **state) {
     bst_camera camera = scene_camera(SIDE, SIDE);
     camera.pixel_scale_arcsec = 0.5;
     double radius = 45000.0, a = bst_camera_scale_rad(&camera);
-    bst_source s = source_at(&camera, -radius + 0.3, 0.0, 1e13, NULL);
-    bst_source_shape shape = shape_of(&camera, s.apparent_mid, radius, 0.0, 0.0);
+    bst_scene_source s = source_at(&camera, -radius + 0.3, 0.0, 1e13, NULL);
+    bst_scene_source_shape shape = shape_of(&camera, s.apparent_mid, radius, 0.0, 0.0);
     /* the place of the limb: the angle from the middle is that of the sphere */
     double limb_rad = asin(shape.radius);
     double middle_rad = acos(-shape.sun.z);
@@ -239,8 +239,8 @@ static void fading_while_it_moves(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(SIDE, SIDE);
     const scene_motion motion = {.x_px = 30.0, .duration_s = 1.0, .samples = 2};
-    bst_source_rate rate = {.count = 2, .u = {0, 1}, .rate = {2, 0}, .light = {0, 1}};
-    bst_source s = source_at(&camera, 0.0, 0.0, 1e5, NULL);
+    bst_scene_source_rate rate = {.count = 2, .u = {0, 1}, .rate = {2, 0}, .light = {0, 1}};
+    bst_scene_source s = source_at(&camera, 0.0, 0.0, 1e5, NULL);
     s.rate = &rate;
     images m = render(f, &camera, &motion, &s, true);
     bst_assert_close(m.sum, 1e5, 1);
@@ -256,9 +256,9 @@ static void switched_off_half_way(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(SIDE, SIDE);
     const scene_motion motion = {.x_px = 30.0, .duration_s = 1.0, .samples = 2};
-    bst_source_rate rate = {
+    bst_scene_source_rate rate = {
         .count = 4, .u = {0, 0.499, 0.501, 1}, .rate = {2, 2, 0, 0}, .light = {0, 0.998, 1, 1}};
-    bst_source s = source_at(&camera, 0.0, 0.0, 1e5, NULL);
+    bst_scene_source s = source_at(&camera, 0.0, 0.0, 1e5, NULL);
     s.rate = &rate;
     images m = render(f, &camera, &motion, &s, true);
     double worst = worst_sigma(&camera, &m);
@@ -275,14 +275,14 @@ static void another_psf(void **state) {
     camera.optics.psf = BST_PSF_MOFFAT;
     camera.optics.moffat_beta = 4.0;
     camera.psf_fwhm_px = 2.5;
-    bst_source s = source_at(&camera, 0.2, 0.1, 3e5, NULL);
-    bst_source_shape shape = shape_of(&camera, s.apparent_mid, 3.0, 1.0, 2.0);
+    bst_scene_source s = source_at(&camera, 0.2, 0.1, 3e5, NULL);
+    bst_scene_source_shape shape = shape_of(&camera, s.apparent_mid, 3.0, 1.0, 2.0);
     s.shape = &shape;
     images m = render(f, &camera, &still, &s, true);
     bst_assert_close(worst_sigma(&camera, &m), 0, 0.05); /* the project's accuracy */
     release(&m);
     const scene_motion motion = {.x_px = 20.0, .duration_s = 1.0, .samples = 2};
-    bst_source_rate rate = {.count = 2, .u = {0, 1}, .rate = {2, 0}, .light = {0, 1}};
+    bst_scene_source_rate rate = {.count = 2, .u = {0, 1}, .rate = {2, 0}, .light = {0, 1}};
     s.shape = NULL;
     s.rate = &rate;
     m = render(f, &camera, &motion, &s, true);

@@ -11,7 +11,7 @@
 typedef struct scene {
     bst_camera camera;
     scene_track track;
-    bst_source *stars;
+    bst_scene_source *stars;
     int count;
     double background_e;
     double *reference;
@@ -336,7 +336,7 @@ static void places_far_from_the_origin(void **state) {
     enum { SIDE = 40, STARS = 40 };
     for (int i = 0; i < STARS; i++) {
         double x = 2020.0 + 0.0137 * i, y = 2017.5 + 0.0211 * i;
-        bst_source star = scene_star(&camera, x, y, 1e6);
+        bst_scene_source star = scene_star(&camera, x, y, 1e6);
         bst_render_request q = {.window = {2000, 1998, SIDE, SIDE},
                                 .track = &track.track,
                                 .sources = &star,

@@ -14,7 +14,7 @@ static const scene_motion still = {
 static long long render(fixture *f, const bst_camera *camera, bst_window w, int binning,
                         uint16_t *frame, uint8_t *flags) {
     scene_track track = scene_track_make(camera, &still);
-    bst_source stars[3];
+    bst_scene_source stars[3];
     static const double place[3][3] = {{40.2, 30.7, 3e6}, {100.5, 60.1, 4e5}, {120, 20, 2e4}};
     for (int i = 0; i < 3; i++) {
         stars[i] = scene_star(camera, place[i][0], place[i][1], place[i][2]);

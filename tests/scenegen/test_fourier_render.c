@@ -128,8 +128,8 @@ static scene_track straight(const bst_camera *c, double travel_px) {
 }
 
 /* Renders stars and the truth of them; spots along the track at Gauss-Legendre places. */
-static errors run(fixture *f, const bst_camera *c, bst_window w, const bst_source *stars, int count,
-                  double travel_px, int period) {
+static errors run(fixture *f, const bst_camera *c, bst_window w, const bst_scene_source *stars,
+                  int count, double travel_px, int period) {
     static const double node[4] = {0.06943184420297371, 0.33000947820757187, 0.66999052179242813,
                                    0.93056815579702629};
     static const double weight[4] = {0.17392742256872693, 0.32607257743127307, 0.32607257743127307,
@@ -178,7 +178,7 @@ static void static_stars_of_aberrated_optics(void **state) {
     static const double qs[5] = {0.7, 1.0, 1.5, 2.0, 3.0};
     for (int k = 0; k < 5; k++) {
         bst_camera c = diffraction(128, 96, qs[k]);
-        bst_source stars[5];
+        bst_scene_source stars[5];
         for (int i = 0; i < 5; i++) {
             stars[i] = scene_star(&c, 20.0 + 20.3 * i, 30.0 + 9.71 * i, 1e5 / (1 + i));
         }
@@ -193,7 +193,8 @@ static void streaks_of_aberrated_optics(void **state) {
     static const double qs[2] = {1.0, 2.0};
     for (int k = 0; k < 2; k++) {
         bst_camera c = diffraction(128, 96, qs[k]);
-        bst_source stars[2] = {scene_star(&c, 60.3, 40.2, 1e6), scene_star(&c, 70.8, 60.1, 1e4)};
+        bst_scene_source stars[2] = {scene_star(&c, 60.3, 40.2, 1e6),
+                                     scene_star(&c, 70.8, 60.1, 1e4)};
         errors e = run(f, &c, whole(&c), stars, 2, 14.0, 512);
         assert_true(e.sigma < 0.1);
         assert_true(e.flux < 1e-4);
@@ -204,7 +205,7 @@ static void streaks_of_aberrated_optics(void **state) {
 static void faint_streaks_keep_their_light(void **state) {
     fixture *f = *state;
     bst_camera c = moffat(96, 80, 2.0);
-    bst_source star = scene_star(&c, 47.3, 40.1, 1e3);
+    bst_scene_source star = scene_star(&c, 47.3, 40.1, 1e3);
     errors e = run(f, &c, whole(&c), &star, 1, 20.0, 256);
     assert_true(e.sigma < 0.05);
     assert_true(e.flux < 1e-4);
@@ -214,8 +215,8 @@ static void faint_streaks_keep_their_light(void **state) {
 static void stars_at_and_beyond_the_border(void **state) {
     fixture *f = *state;
     bst_camera c = moffat(96, 80, 2.2);
-    bst_source stars[4] = {scene_star(&c, -0.3, -0.4, 5e4), scene_star(&c, 110.2, 40.3, 1e5),
-                           scene_star(&c, 50.1, -6.2, 2e4), scene_star(&c, 95.5, 79.5, 3e4)};
+    bst_scene_source stars[4] = {scene_star(&c, -0.3, -0.4, 5e4), scene_star(&c, 110.2, 40.3, 1e5),
+                                 scene_star(&c, 50.1, -6.2, 2e4), scene_star(&c, 95.5, 79.5, 3e4)};
     errors e = run(f, &c, whole(&c), stars, 4, 0.0, 320);
     assert_true(e.sigma < 0.05);
     assert_true(e.flux < 1e-4);
@@ -225,12 +226,12 @@ static void stars_at_and_beyond_the_border(void **state) {
 static void wide_seeing(void **state) {
     fixture *f = *state;
     bst_camera c = moffat(128, 96, 40.0);
-    bst_source star = scene_star(&c, 60.2, 44.7, 1e7);
+    bst_scene_source star = scene_star(&c, 60.2, 44.7, 1e7);
     assert_true(run(f, &c, whole(&c), &star, 1, 0.0, 1024).sigma < 0.05);
 }
 
 static void render(fixture *f, bst_renderer *r, bst_window w, const bst_los_track *track,
-                   const bst_source *stars, int count, float *image) {
+                   const bst_scene_source *stars, int count, float *image) {
     bst_render_request q = {
         .window = w, .track = track, .sources = stars, .count = count, .background_e = 7.0};
     bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
@@ -238,7 +239,7 @@ static void render(fixture *f, bst_renderer *r, bst_window w, const bst_los_trac
 
 enum { WIDTH = 96, HEIGHT = 80, STARS = 6 };
 
-static void some_stars(const bst_camera *c, bst_source *stars) {
+static void some_stars(const bst_camera *c, bst_scene_source *stars) {
     for (int i = 0; i < STARS; i++) {
         stars[i] = scene_star(c, 8.3 + 15.7 * i, 70.1 - 11.3 * i, 4e4 / (1 + i));
     }
@@ -250,7 +251,7 @@ static void windows_show_the_same_light(void **state) {
     fixture *f = *state;
     bst_camera c = moffat(WIDTH, HEIGHT, 1.5);
     bst_renderer *r;
-    bst_source stars[STARS];
+    bst_scene_source stars[STARS];
     float image[WIDTH * HEIGHT], part[WIDTH * HEIGHT];
     some_stars(&c, stars);
     scene_track track = straight(&c, 9.0);
@@ -298,7 +299,7 @@ static void *simulate(void *user) {
     fixture f = {0};
     bst_renderer *r;
     bst_camera c = moffat(WIDTH, HEIGHT, 1.5);
-    bst_source stars[STARS];
+    bst_scene_source stars[STARS];
     some_stars(&c, stars);
     scene_track track = straight(&c, 9.0);
     bst_assert_ok(&f.ctx, bst_device_open(&f.ctx, "", j->threads, &f.device));
@@ -349,8 +350,8 @@ static void fields_mix_their_nodes(void **state) {
     c.optics.field = (bst_config_list){.items = nodes, .count = 2};
     bst_renderer *r;
     float image[81 * 40];
-    bst_source stars[3] = {scene_star(&c, 0.0, 20.3, 3e4), scene_star(&c, 40.0, 20.0, 3e4),
-                           scene_star(&c, 80.0, 19.6, 3e4)};
+    bst_scene_source stars[3] = {scene_star(&c, 0.0, 20.3, 3e4), scene_star(&c, 40.0, 20.0, 3e4),
+                                 scene_star(&c, 80.0, 19.6, 3e4)};
     scene_track track = straight(&c, 0.0);
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &c, NULL, &r));
     render(f, r, whole(&c), &track.track, stars, 3, image);
@@ -375,7 +376,7 @@ static void jitter_widens_nodes(void **state) {
         .x_px = 12.0, .y_px = 5.0, .jitter_px = 0.4, .duration_s = 0.5, .samples = 201, .seed = 5};
     scene_track track = scene_track_make(&c, &motion);
     bst_renderer *r;
-    bst_source star = scene_star(&c, 31.3, 22.8, 4e5);
+    bst_scene_source star = scene_star(&c, 31.3, 22.8, 4e5);
     float image[64 * 48];
     static double exact[64 * 48];
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &c, NULL, &r));

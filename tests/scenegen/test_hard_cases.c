@@ -16,7 +16,7 @@ typedef struct hard_case {
     bst_camera camera;
     bst_window window;
     const bst_los_track *track;
-    const bst_source *sources;
+    const bst_scene_source *sources;
     int count;
     double background_e;
     int deep; /* so many sources lie on one another; 0: none do */
@@ -57,7 +57,7 @@ static double check(fixture *f, const hard_case *c) {
     return sum;
 }
 
-static hard_case make_case(const bst_los_track *track, const bst_source *sources, int count) {
+static hard_case make_case(const bst_los_track *track, const bst_scene_source *sources, int count) {
     return (hard_case){.camera = scene_camera(160, 128),
                        .window = {0, 0, 160, 128},
                        .track = track,
@@ -104,7 +104,7 @@ static double across(double u) {
 
 static void no_motion(void **state) {
     bst_camera camera = scene_camera(160, 128);
-    bst_source *stars = scene_stars(&camera, 20, 1e6, 5.0, 2);
+    bst_scene_source *stars = scene_stars(&camera, 20, 1e6, 5.0, 2);
     scene_track t = turning((bst_vec3){1, 0, 0}, still_angle, 501, 0.5);
     hard_case c = make_case(&t.track, stars, 20);
     assert_true(check(*state, &c) > 1e5);
@@ -114,7 +114,7 @@ static void no_motion(void **state) {
 
 static void a_full_turn_about_the_boresight(void **state) {
     bst_camera camera = scene_camera(160, 128);
-    bst_source *stars = scene_stars(&camera, 12, 1e6, 5.0, 3);
+    bst_scene_source *stars = scene_stars(&camera, 12, 1e6, 5.0, 3);
     scene_track t = turning((bst_vec3){0, 0, 1}, full_turn, 721, 0.5);
     hard_case c = make_case(&t.track, stars, 12);
     assert_true(check(*state, &c) > 1e4);
@@ -124,14 +124,15 @@ static void a_full_turn_about_the_boresight(void **state) {
 
 /* The field sweeps a great circle: each star crosses in a millionth of the exposure. */
 static void a_full_turn_across_the_sky(void **state) {
-    bst_source stars[4];
+    bst_scene_source stars[4];
     bst_camera camera = scene_camera(160, 128);
     for (int i = 0; i < 4; i++) {
         /* around the circle that the boresight follows, beside each other */
         double a = 0.5 + 1.5 * i, off = (i - 1.5) * 20.0 * bst_camera_scale_rad(&camera);
-        stars[i] = (bst_source){.kind = BST_SOURCE_STAR,
-                                .apparent_mid = bst_vec3_unit((bst_vec3){off, sin(a), cos(a)}),
-                                .electrons_per_s = 1e8};
+        stars[i] =
+            (bst_scene_source){.kind = BST_SOURCE_STAR,
+                               .apparent_mid = bst_vec3_unit((bst_vec3){off, sin(a), cos(a)}),
+                               .electrons_per_s = 1e8};
     }
     scene_track t = turning((bst_vec3){1, 0, 0}, full_turn, 721, 0.5);
     hard_case c = make_case(&t.track, stars, 4);
@@ -141,7 +142,7 @@ static void a_full_turn_across_the_sky(void **state) {
 
 static void motion_that_reverses(void **state) {
     bst_camera camera = scene_camera(160, 128);
-    bst_source *stars = scene_stars(&camera, 20, 1e6, 5.0, 5);
+    bst_scene_source *stars = scene_stars(&camera, 20, 1e6, 5.0, 5);
     scene_track t = turning((bst_vec3){0.6, 0.8, 0}, there_and_back, 501, 0.5);
     hard_case c = make_case(&t.track, stars, 20);
     assert_true(check(*state, &c) > 1e4);
@@ -153,7 +154,7 @@ static void a_star_that_enters_through_a_corner(void **state) {
     bst_camera camera = scene_camera(160, 128);
     /* 100 px along the diagonal through pixel (0, 0) */
     scene_track t = turning((bst_vec3){-sqrt(0.5), sqrt(0.5), 0}, across, 501, 0.5);
-    bst_source star = scene_star(&camera, -0.5, -0.5, 1e6);
+    bst_scene_source star = scene_star(&camera, -0.5, -0.5, 1e6);
     hard_case c = make_case(&t.track, &star, 1);
     double on = check(*state, &c);
     assert_true(on > 0.2 * 5e5 && on < 0.8 * 5e5); /* about half of it comes in */
@@ -164,7 +165,7 @@ static void narrow_and_wide_psf(void **state) {
     const double fwhm_px[] = {0.3, 40.0};
     for (int i = 0; i < 2; i++) {
         bst_camera camera = scene_camera(160, 128);
-        bst_source *stars = scene_stars(&camera, 8, 1e6, 5.0, 7);
+        bst_scene_source *stars = scene_stars(&camera, 8, 1e6, 5.0, 7);
         const scene_motion motion = {
             .x_px = 6.0, .y_px = -3.0, .jitter_px = 0.1, .duration_s = 0.5, .samples = 501};
         scene_track t = scene_track_make(&camera, &motion);
@@ -183,7 +184,7 @@ static void narrow_and_wide_psf(void **state) {
 
 static void one_pixel_and_no_star(void **state) {
     bst_camera camera = scene_camera(160, 128);
-    bst_source star = scene_star(&camera, 80.3, 64.4, 1e6);
+    bst_scene_source star = scene_star(&camera, 80.3, 64.4, 1e6);
     scene_track t = turning((bst_vec3){0.6, 0.8, 0}, there_and_back, 501, 0.5);
     hard_case c = make_case(&t.track, &star, 1);
     c.window = (bst_window){80, 64, 1, 1};
@@ -196,7 +197,7 @@ static void one_pixel_and_no_star(void **state) {
 /* The same field and motion at the celestial pole and on the equator. */
 static void the_celestial_pole(void **state) {
     bst_camera camera = scene_camera(160, 128);
-    bst_source stars[16];
+    bst_scene_source stars[16];
     const scene_motion motion = {
         .x_px = 12.0, .y_px = 5.0, .roll_rad = 0.01, .duration_s = 0.5, .samples = 501};
     for (int i = 0; i < 16; i++) {
@@ -228,12 +229,12 @@ static void near_and_far_targets(void **state) {
         bst_vec3 mid = bst_vec3_scale(bst_camera_unproject(&camera, 70.3, 61.8), range_m[i]);
         double speed_mps = i == 0 ? 0.02 : 7000.0;
         bst_vec3 step = {0.25 * speed_mps, 0.05 * speed_mps, 0.1 * speed_mps}; /* in 0.25 s */
-        bst_source_path path =
-            bst_source_path_through(bst_vec3_sub(mid, step), mid, bst_vec3_add(mid, step));
-        bst_source target = {.kind = BST_SOURCE_OBJECT,
-                             .apparent_mid = bst_vec3_unit(mid),
-                             .electrons_per_s = 1e6,
-                             .path = &path};
+        bst_scene_source_path path =
+            bst_scene_source_path_through(bst_vec3_sub(mid, step), mid, bst_vec3_add(mid, step));
+        bst_scene_source target = {.kind = BST_SOURCE_OBJECT,
+                                   .apparent_mid = bst_vec3_unit(mid),
+                                   .electrons_per_s = 1e6,
+                                   .path = &path};
         hard_case c = make_case(&t.track, &target, 1);
         bst_assert_close(check(*state, &c), 5e5, 5.0); /* all of its light is on the field */
     }
@@ -245,7 +246,7 @@ static void near_and_far_targets(void **state) {
 static void means_of_zero_and_above_full_well(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(64, 64);
-    bst_source star = scene_star(&camera, 31.5, 31.5, 1e8);
+    bst_scene_source star = scene_star(&camera, 31.5, 31.5, 1e8);
     scene_track t = turning((bst_vec3){1, 0, 0}, still_angle, 2, 0.5);
     hard_case c = {.camera = camera,
                    .window = {0, 0, 64, 64},
@@ -282,7 +283,7 @@ static void means_of_zero_and_above_full_well(void **state) {
 
 static void exposures_of_nothing_and_a_thousand_seconds(void **state) {
     bst_camera camera = scene_camera(160, 128);
-    bst_source *stars = scene_stars(&camera, 10, 1e6, 5.0, 11);
+    bst_scene_source *stars = scene_stars(&camera, 10, 1e6, 5.0, 11);
     scene_track none = turning((bst_vec3){1, 0, 0}, still_angle, 2, 0.0);
     hard_case c = make_case(&none.track, stars, 10);
     assert_true(check(*state, &c) == 0.0); /* no time, no light */
@@ -300,8 +301,8 @@ static void exposures_of_nothing_and_a_thousand_seconds(void **state) {
 /* Light that falls to nothing in the middle of the way: from u = 0.5 - half to 0.5 + half of the
  * exposure, as the share 1/2 - 3/4 z + 1/4 z^3 of the Sun's disc with z = (u - 0.5) / half; knots
  * are hundredths apart, where the track has its samples. */
-static bst_source_rate into_the_umbra(double half) {
-    bst_source_rate r = {.count = (int)lround(200.0 * half) + 3};
+static bst_scene_source_rate into_the_umbra(double half) {
+    bst_scene_source_rate r = {.count = (int)lround(200.0 * half) + 3};
     double sum = 0.0;
     for (int k = 0; k < r.count; k++) {
         double t = (double)(k - 1) / (r.count - 3);
@@ -323,17 +324,17 @@ static bst_source_rate into_the_umbra(double half) {
 static void a_target_that_crosses_the_edge_of_the_umbra(void **state) {
     bst_camera camera = scene_camera(160, 128);
     scene_track t = turning((bst_vec3){1, 0, 0}, still_angle, 101, 0.5);
-    bst_source_path path = bst_source_path_through(bst_camera_unproject(&camera, 30.3, 40.2),
-                                                   bst_camera_unproject(&camera, 80.3, 64.2),
-                                                   bst_camera_unproject(&camera, 130.3, 88.2));
+    bst_scene_source_path path = bst_scene_source_path_through(
+        bst_camera_unproject(&camera, 30.3, 40.2), bst_camera_unproject(&camera, 80.3, 64.2),
+        bst_camera_unproject(&camera, 130.3, 88.2));
     const double halves[] = {0.2, 0.01};
     for (int i = 0; i < 2; i++) {
-        bst_source_rate rate = into_the_umbra(halves[i]);
-        bst_source target = {.kind = BST_SOURCE_OBJECT,
-                             .apparent_mid = bst_camera_unproject(&camera, 80.3, 64.2),
-                             .electrons_per_s = 1e6,
-                             .path = &path,
-                             .rate = &rate};
+        bst_scene_source_rate rate = into_the_umbra(halves[i]);
+        bst_scene_source target = {.kind = BST_SOURCE_OBJECT,
+                                   .apparent_mid = bst_camera_unproject(&camera, 80.3, 64.2),
+                                   .electrons_per_s = 1e6,
+                                   .path = &path,
+                                   .rate = &rate};
         hard_case c = make_case(&t.track, &target, 1);
         bst_assert_close(check(*state, &c), 5e5, 5.0); /* all of its light is on the field */
         c.window = (bst_window){115, 0, 45, 128};      /* the last of the way: dark */
@@ -348,8 +349,8 @@ static void a_hundred_thousand_stars(void **state) {
     fixture *f = *state;
     enum { STARS = 100000, CROP = 48, REACH = 24 };
     bst_camera camera = scene_camera(2048, 2048);
-    bst_source *stars = scene_stars(&camera, STARS, 1e6, 8.0, 12),
-               *near = malloc(STARS * sizeof *near);
+    bst_scene_source *stars = scene_stars(&camera, STARS, 1e6, 8.0, 12),
+                     *near = malloc(STARS * sizeof *near);
     const scene_motion motion = {.x_px = 3, .y_px = 4, .duration_s = 0.5, .samples = 26};
     scene_track t = scene_track_make(&camera, &motion);
     bst_renderer_options options = bst_renderer_default_options();

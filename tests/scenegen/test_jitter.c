@@ -42,10 +42,10 @@ static width measure(bst_ctx *ctx, bst_device *device, double top_hz, double rat
                                     1.0 / rate_hz, bst_rng_make_key(3, 0, "a", "jitter"),
                                     bst_rng_make_key(3, 0, "a", "attitude")));
     double lack_px = sqrt(platform.unresolved_rad2) / bst_camera_scale_rad(&camera);
-    bst_assert_ok(ctx, bst_camera_blurred(ctx, &camera, lack_px, &blurred));
+    bst_assert_ok(ctx, bst_psf_camera_blurred(ctx, &camera, lack_px, &blurred));
     bst_renderer *r;
     bst_assert_ok(ctx, bst_renderer_create(ctx, device, &blurred, NULL, &r));
-    bst_source star = scene_star(&camera, 19.3, 20.2, 1e6);
+    bst_scene_source star = scene_star(&camera, 19.3, 20.2, 1e6);
     int steps = (int)(exposure_s * rate_hz);
     scene_track t = {{steps + 1, NULL, NULL},
                      malloc((size_t)(steps + 1) * sizeof(double)),

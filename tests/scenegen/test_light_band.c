@@ -79,9 +79,9 @@ static void the_band_of_a_gaussian(void **state) {
                                .aperture_m = 0.15,
                                .psf_fwhm_px = 2.4};
     bst_psf *psf;
-    bst_light_band band;
+    bst_fourier_band band;
     bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
-    bst_assert_ok(&ctx, bst_light_band_measure(&ctx, psf, 1e-6, &band));
+    bst_assert_ok(&ctx, bst_fourier_band_measure(&ctx, psf, 1e-6, &band));
     double centre = share(-0.5, 0.5, SIGMA);
     bst_assert_close(band.peak, centre * centre, 1e-6); /* single precision, and what is cut */
     bst_assert_close(band.share_sigma_px, SIGMA, 1e-5);

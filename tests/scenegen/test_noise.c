@@ -177,7 +177,7 @@ static void draws_follow_the_law_where_light_varies(void **state) {
         camera.offset_dn = OFFSET;
         bst_renderer *r;
         bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
-        bst_source star = scene_star(&camera, 40.3, 52.8, 4e5);
+        bst_scene_source star = scene_star(&camera, 40.3, 52.8, 4e5);
         bst_render_request request = {.window = {0, 0, N, N},
                                       .track = &track,
                                       .sources = &star,

@@ -7,9 +7,9 @@
 enum { CALLS = 64, LANES = 16, WORDS = CALLS * 4 * LANES };
 
 /* Call i begins at the counter first + 16 i. */
-static const bst_kernel_source text = {
+static const bst_device_kernel_source text = {
     "words.cl",
-    "kernel void words(bst_scene_params p, uint first, uint stream, global uint16 *out) {\n"
+    "kernel void words(bst_kernel_frame_params p, uint first, uint stream, global uint16 *out) {\n"
     "    uint i = (uint)get_global_id(0);\n"
     "    uint16 w[4];\n"
     "    philox16(p, first + 16u * i, stream, w, w + 1, w + 2, w + 3);\n"
@@ -18,7 +18,8 @@ static const bst_kernel_source text = {
     0, 0};
 
 static void draw(fixture *f, const uint32_t counter[4], const uint32_t key[2], uint32_t *words) {
-    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_random, &text};
+    const bst_device_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_random,
+                                                 &text};
     cl_program program;
     bst_assert_ok(&f->ctx, bst_device_build(&f->ctx, f->device, sources, 3, "", &program));
     cl_int code;
@@ -28,7 +29,7 @@ static void draw(fixture *f, const uint32_t counter[4], const uint32_t key[2], u
     cl_mem out =
         clCreateBuffer(bst_device_context(f->device), CL_MEM_WRITE_ONLY, bytes, NULL, &code);
     bst_assert_ok(&f->ctx, bst_device_check(&f->ctx, code, "buffer"));
-    bst_scene_params p = {
+    bst_kernel_frame_params p = {
         .key0 = key[0], .key1 = key[1], .exposure_low = counter[2], .exposure_high = counter[3]};
     clSetKernelArg(kernel, 0, sizeof p, &p);
     clSetKernelArg(kernel, 1, sizeof counter[0], &counter[0]);

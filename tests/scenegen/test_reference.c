@@ -17,7 +17,7 @@ static double ramp(double z) {
     return z * cumulative(z) + exp(-0.5 * z * z) / sqrt(2.0 * BST_PI);
 }
 
-static void render(const bst_camera *camera, const scene_motion *m, const bst_source *s,
+static void render(const bst_camera *camera, const scene_motion *m, const bst_scene_source *s,
                    double *image) {
     bst_ctx ctx = {0};
     scene_track track = scene_track_make(camera, m);
@@ -32,7 +32,7 @@ static void a_static_star_is_a_product_of_erf_differences(void **state) {
     static double image[W * H];
     bst_camera camera = scene_camera(W, H);
     double sigma = bst_camera_psf_sigma_px(&camera), x = 30.3, y = 21.8;
-    bst_source star = scene_star(&camera, x, y, 2000.0);
+    bst_scene_source star = scene_star(&camera, x, y, 2000.0);
     render(&camera, &(scene_motion){.duration_s = 0.5, .samples = 2}, &star, image);
     double sum = 0.0;
     for (int j = 0; j < H; j++) {
@@ -54,7 +54,7 @@ static void a_uniform_streak_has_a_closed_form(void **state) {
     /* a tiny scale makes turn and image motion proportional: 30 px are 1.5 microradians */
     camera.pixel_scale_arcsec = 0.01;
     double sigma = bst_camera_psf_sigma_px(&camera), length = 30.0, y = 23.7;
-    bst_source star = scene_star(&camera, bst_camera_centre_x(&camera), y, 1000.0);
+    bst_scene_source star = scene_star(&camera, bst_camera_centre_x(&camera), y, 1000.0);
     render(&camera, &(scene_motion){.x_px = length, .duration_s = 1.0, .samples = 2}, &star, image);
     double x0 = bst_camera_centre_x(&camera) - 0.5 * length, x1 = x0 + length, sum = 0.0;
     for (int j = 0; j < H; j++) {
@@ -79,15 +79,15 @@ static void own_motion_and_camera_motion_cancel(void **state) {
     bst_camera camera = scene_camera(W, H);
     camera.pixel_scale_arcsec = 0.01;
     double cx = bst_camera_centre_x(&camera), cy = bst_camera_centre_y(&camera);
-    bst_source object = scene_star(&camera, cx, cy, 500.0);
+    bst_scene_source object = scene_star(&camera, cx, cy, 500.0);
     object.kind = BST_SOURCE_OBJECT;
-    bst_source_path path =
-        bst_source_path_through(bst_camera_unproject(&camera, cx + 10.0, cy), object.apparent_mid,
-                                bst_camera_unproject(&camera, cx - 10.0, cy));
+    bst_scene_source_path path = bst_scene_source_path_through(
+        bst_camera_unproject(&camera, cx + 10.0, cy), object.apparent_mid,
+        bst_camera_unproject(&camera, cx - 10.0, cy));
     object.path = &path;
     render(&camera, &(scene_motion){.x_px = 20.0, .duration_s = 1.0, .samples = 2}, &object,
            moving);
-    bst_source star = scene_star(&camera, cx, cy, 500.0);
+    bst_scene_source star = scene_star(&camera, cx, cy, 500.0);
     render(&camera, &(scene_motion){.duration_s = 1.0, .samples = 2}, &star, still);
     for (int p = 0; p < W * H; p++) {
         /* quadratic against circular arc: 20 px at 5e-8 rad, far below; unit vectors as above */
@@ -99,7 +99,7 @@ static void occulted_and_dark_sources_give_nothing(void **state) {
     (void)state;
     static double image[W * H];
     bst_camera camera = scene_camera(W, H);
-    bst_source star = scene_star(&camera, 20.0, 20.0, 500.0);
+    bst_scene_source star = scene_star(&camera, 20.0, 20.0, 500.0);
     star.occulted = true;
     render(&camera, &(scene_motion){.duration_s = 1.0, .samples = 2}, &star, image);
     for (int p = 0; p < W * H; p++) {
@@ -120,7 +120,8 @@ static void wings_keep_relative_precision(void **state) {
 /* ------------------------------------------------------------------ any PSF */
 
 /* Largest difference of the spectral method from the erf method, over the peak. */
-static double difference(const bst_camera *camera, const scene_motion *m, const bst_source *s) {
+static double difference(const bst_camera *camera, const scene_motion *m,
+                         const bst_scene_source *s) {
     static double want[W * H], got[W * H];
     bst_ctx ctx = {0};
     bst_psf *psf;
@@ -159,7 +160,7 @@ static void both_methods_agree_on_gaussians(void **state) {
     for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
         bst_camera camera = scene_camera(W, H);
         camera.psf_fwhm_px = cases[n].fwhm_px;
-        bst_source star = scene_star(&camera, 37.2, 17.9, 1000.0);
+        bst_scene_source star = scene_star(&camera, 37.2, 17.9, 1000.0);
         /* 1e-9 each: the OTF is cut where it is 1e-9, the wrap-around is less */
         assert_true(difference(&camera, &cases[n].motion, &star) < 4e-9);
     }
@@ -206,7 +207,7 @@ static void a_static_star_is_airys_pattern(void **state) {
     for (int n = 0; n < 3; n++) {
         double q = cases[n][0], e = cases[n][1], x = 30.3, y = 21.8, peak = 0.0, worst = 0.0;
         bst_camera camera = diffraction_camera(q, e);
-        bst_source star = scene_star(&camera, x, y, 1.0);
+        bst_scene_source star = scene_star(&camera, x, y, 1.0);
         render(&camera, &(scene_motion){.duration_s = 1.0, .samples = 2}, &star, image);
         for (int j = 0; j < H; j++) {
             for (int i = 0; i < W; i++) {
@@ -231,7 +232,7 @@ static void trails_are_sums_of_airys_patterns(void **state) {
                                     {.roll_rad = 0.8, .duration_s = 1.0, .samples = 2}};
     for (int n = 0; n < 2; n++) {
         bst_camera camera = diffraction_camera(1.5, 0.3);
-        bst_source star = scene_star(&camera, 43.2, 17.9, 1.0);
+        bst_scene_source star = scene_star(&camera, 43.2, 17.9, 1.0);
         render(&camera, &motions[n], &star, image);
         scene_track track = scene_track_make(&camera, &motions[n]);
         double peak = 0.0;
@@ -262,7 +263,7 @@ static void a_field_of_two_widths_mixes(void **state) {
     bst_camera camera = scene_camera(W, H);
     const scene_motion still = {.duration_s = 1.0, .samples = 2};
     double x = 0.25 * (W - 1);
-    bst_source star = scene_star(&camera, x, 20.0, 1000.0);
+    bst_scene_source star = scene_star(&camera, x, 20.0, 1000.0);
     bst_psf_field_node nodes[2] = {{.psf_fwhm_px = 1.5}, {.psf_fwhm_px = 4.0}};
     camera.psf_fwhm_px = 1.5;
     render(&camera, &still, &star, left);
@@ -283,11 +284,11 @@ static void vignetting_takes_its_share_of_each_pixel(void **state) {
     const scene_motion still = {.duration_s = 1.0, .samples = 2};
     for (int n = 0; n < 2; n++) {
         camera.optics.psf = n ? BST_PSF_MOFFAT : BST_PSF_GAUSSIAN;
-        camera.optics.vignetting = (bst_vignetting){0};
-        bst_source star = scene_star(&camera, 10.0, 30.0, 1000.0);
+        camera.optics.vignetting = (bst_optics_vignetting){0};
+        bst_scene_source star = scene_star(&camera, 10.0, 30.0, 1000.0);
         render(&camera, &still, &star, plain);
-        camera.optics.vignetting =
-            (bst_vignetting){.model = BST_VIGNETTING_POLYNOMIAL, .coefficients = {-0.3, 0.05, 0.0}};
+        camera.optics.vignetting = (bst_optics_vignetting){.model = BST_VIGNETTING_POLYNOMIAL,
+                                                           .coefficients = {-0.3, 0.05, 0.0}};
         render(&camera, &still, &star, image);
         for (int p = 0; p < W * H; p++) {
             double dx = p % W - 31.5, dy = p / W - 23.5, r2 = (dx * dx + dy * dy) / 1600.0;

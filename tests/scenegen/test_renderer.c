@@ -24,7 +24,7 @@ static void frame_of(fixture *f, bst_renderer *r, const bst_render_request *q, u
 
 /* Largest error of the noise-free image against the reference, in sigma of the pixel. */
 static double error_sigma(fixture *f, const bst_camera *camera, const scene_motion *motion,
-                          const bst_source *sources, int count, double background_e) {
+                          const bst_scene_source *sources, int count, double background_e) {
     bst_renderer *r = make(f, camera, NULL);
     scene_track track = scene_track_make(camera, motion);
     bst_render_request q = {.window = {0, 0, (int)camera->width_px, (int)camera->height_px},
@@ -63,7 +63,7 @@ static const scene_motion demo = {.x_px = 7.5,
 static void images_agree_with_the_reference(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(192, 160);
-    bst_source *stars = scene_stars(&camera, 12, 1e6, 5.0, 9);
+    bst_scene_source *stars = scene_stars(&camera, 12, 1e6, 5.0, 9);
     bst_assert_close(error_sigma(f, &camera, &demo, stars, 12, 1.0), 0.0, 0.05);
     scene_motion still = demo;
     still.x_px = still.y_px = 0.0;
@@ -99,15 +99,15 @@ static void distorted_images_agree_with_the_reference(void **state) {
         }
         bst_assert_ok(&f->ctx, bst_camera_prepare(&f->ctx, &camera));
         enum { STARS = 14 };
-        bst_source *stars = scene_stars(&camera, STARS, 1e6, 5.0, 9);
+        bst_scene_source *stars = scene_stars(&camera, STARS, 1e6, 5.0, 9);
         /* the last is an object that crosses the field by itself */
-        bst_source *object = &stars[STARS - 1];
+        bst_scene_source *object = &stars[STARS - 1];
         object->kind = BST_SOURCE_OBJECT;
         object->electrons_per_s = 3e5;
         object->apparent_mid = bst_camera_unproject(&camera, 90.0, 75.0);
-        bst_source_path path =
-            bst_source_path_through(bst_camera_unproject(&camera, 30.0, 60.0), object->apparent_mid,
-                                    bst_camera_unproject(&camera, 140.0, 100.0));
+        bst_scene_source_path path = bst_scene_source_path_through(
+            bst_camera_unproject(&camera, 30.0, 60.0), object->apparent_mid,
+            bst_camera_unproject(&camera, 140.0, 100.0));
         object->path = &path;
         bst_assert_close(error_sigma(f, &camera, &demo, stars, STARS, 1.0), 0.0, 0.05);
         scene_motion fast = {.x_px = 60.0,
@@ -131,7 +131,7 @@ static void distortion_keeps_the_light(void **state) {
     camera.rotation_deg = -75.0;
     camera.distortion.k1 = 0.3 / (corner * corner);
     bst_assert_ok(&f->ctx, bst_camera_prepare(&f->ctx, &camera));
-    bst_source star = scene_star(&camera, 165.25, 130.5, 1e5);
+    bst_scene_source star = scene_star(&camera, 165.25, 130.5, 1e5);
     scene_track track = scene_track_make(&camera, &demo);
     bst_renderer *r = make(f, &camera, NULL);
     bst_render_request q = {
@@ -152,7 +152,7 @@ static void distortion_keeps_the_light(void **state) {
 static void wide_narrow_and_bright(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(192, 160);
-    bst_source star = scene_star(&camera, 95.4, 80.7, 2e7);
+    bst_scene_source star = scene_star(&camera, 95.4, 80.7, 2e7);
     scene_motion still = {.duration_s = 0.5, .samples = 2};
     bst_assert_close(error_sigma(f, &camera, &still, &star, 1, 1.0), 0.0, 0.05);
     bst_assert_close(error_sigma(f, &camera, &demo, &star, 1, 1.0), 0.0, 0.05);
@@ -168,17 +168,17 @@ static void moving_objects_have_their_own_tracks(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(192, 160);
     double cx = bst_camera_centre_x(&camera), cy = bst_camera_centre_y(&camera);
-    bst_source tracked = scene_star(&camera, cx, cy, 4e4);
+    bst_scene_source tracked = scene_star(&camera, cx, cy, 4e4);
     tracked.kind = BST_SOURCE_OBJECT;
     bst_vec3 middle = tracked.apparent_mid;
-    bst_source_path path =
-        bst_source_path_through(bst_camera_unproject(&camera, cx + 3.75, cy + 1.25), middle,
-                                bst_camera_unproject(&camera, cx - 3.75, cy - 1.25));
+    bst_scene_source_path path =
+        bst_scene_source_path_through(bst_camera_unproject(&camera, cx + 3.75, cy + 1.25), middle,
+                                      bst_camera_unproject(&camera, cx - 3.75, cy - 1.25));
     tracked.path = &path;
     bst_assert_close(error_sigma(f, &camera, &demo, &tracked, 1, 1.0), 0.0, 0.05);
-    bst_source crossing = tracked;
-    path = bst_source_path_through(bst_camera_unproject(&camera, cx - 30.0, cy + 2.0), middle,
-                                   bst_camera_unproject(&camera, cx + 30.0, cy + 5.0));
+    bst_scene_source crossing = tracked;
+    path = bst_scene_source_path_through(bst_camera_unproject(&camera, cx - 30.0, cy + 2.0), middle,
+                                         bst_camera_unproject(&camera, cx + 30.0, cy + 5.0));
     scene_motion still = {.duration_s = 0.5, .samples = 2};
     bst_assert_close(error_sigma(f, &camera, &still, &crossing, 1, 1.0), 0.0, 0.05);
     still.jitter_px = 0.2;
@@ -190,15 +190,15 @@ static void moving_objects_have_their_own_tracks(void **state) {
 static void near_passes_are_drawn_where_they_cross(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(192, 160);
-    bst_source pass = scene_star(&camera, 0, 0, 1e8);
+    bst_scene_source pass = scene_star(&camera, 0, 0, 1e8);
     pass.kind = BST_SOURCE_OBJECT;
     scene_motion still = {.duration_s = 0.5, .samples = 301, .jitter_px = 0.2};
     /* straight at a distance of 1 at mid-exposure: beside, then slantwise from behind */
     for (int c = 0; c < 2; c++) {
         bst_vec3 mid = bst_camera_unproject(&camera, 90.0, 70.0);
         bst_vec3 step = c == 0 ? (bst_vec3){0.15, 0.05, 0.0} : (bst_vec3){0.2, -0.3, 1.3};
-        bst_source_path path =
-            bst_source_path_through(bst_vec3_sub(mid, step), mid, bst_vec3_add(mid, step));
+        bst_scene_source_path path =
+            bst_scene_source_path_through(bst_vec3_sub(mid, step), mid, bst_vec3_add(mid, step));
         pass.path = &path;
         double error = error_sigma(f, &camera, &still, &pass, 1, 1.0);
         bst_assert_close(error, 0.0, 0.05);
@@ -212,7 +212,7 @@ static void bytes_do_not_depend_on(fixture *f, double read_noise_e, double full_
     bst_camera camera = scene_camera(W, H);
     camera.read_noise_e = read_noise_e;
     camera.full_well_e = full_well_e;
-    bst_source *stars = scene_stars(&camera, 200, 2e6, 6.0, 4);
+    bst_scene_source *stars = scene_stars(&camera, 200, 2e6, 6.0, 4);
     scene_track track = scene_track_make(&camera, &demo);
     bst_render_request q = {.window = {0, 0, W, H},
                             .track = &track.track,
@@ -290,12 +290,12 @@ static void frames_under_way(void **state) {
     static uint16_t alone[FRAMES][W * H];
     bst_camera camera = scene_camera(W, H);
     camera.detector.row_noise_e = 20.0;
-    camera.detector.hits = (bst_hits_config){.rate_per_cm2_s = 200.0,
-                                             .pixel_pitch_um = 15.0,
-                                             .depth_um = 10.0,
-                                             .e_per_um = 80.0,
-                                             .straggling = 0.2};
-    bst_source *stars = scene_stars(&camera, STARS, 2e6, 6.0, 4);
+    camera.detector.hits = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 200.0,
+                                                            .pixel_pitch_um = 15.0,
+                                                            .depth_um = 10.0,
+                                                            .e_per_um = 80.0,
+                                                            .straggling = 0.2};
+    bst_scene_source *stars = scene_stars(&camera, STARS, 2e6, 6.0, 4);
     scene_track track = scene_track_make(&camera, &demo);
     bst_render_request q[FRAMES];
     for (int i = 0; i < FRAMES; i++) {
@@ -351,7 +351,7 @@ static void hard_cases(void **state) {
     bst_renderer *r = make(f, &camera, NULL);
     scene_motion motion = {.duration_s = 0.0, .samples = 2};
     scene_track track = scene_track_make(&camera, &motion);
-    bst_source star = scene_star(&camera, 60.0, 40.0, 1e6);
+    bst_scene_source star = scene_star(&camera, 60.0, 40.0, 1e6);
     bst_render_request q = {
         .window = {0, 0, W, H}, .track = &track.track, .sources = &star, .count = 1};
     /* no time, no light, no noise: the offset everywhere */
@@ -387,7 +387,7 @@ static void hard_cases(void **state) {
     bst_assert_ok(&f->ctx, bst_renderer_saturated(&f->ctx, r, &saturated));
     assert_true(saturated > 9 && saturated < 400); /* the star's core */
     /* occulted, dark, behind the camera, far off: nothing drawn */
-    bst_source none[4] = {star, star, star, star};
+    bst_scene_source none[4] = {star, star, star, star};
     none[0].occulted = true;
     none[1].electrons_per_s = 0.0;
     none[2].apparent_mid = (bst_vec3){0.0, 0.0, -1.0};
@@ -419,7 +419,7 @@ static void a_hundred_thousand_stars(void **state) {
     bst_renderer *r = make(f, &camera, NULL);
     scene_track track =
         scene_track_make(&camera, &(scene_motion){.x_px = 5.0, .duration_s = 0.5, .samples = 51});
-    bst_source *stars = malloc(N * sizeof *stars);
+    bst_scene_source *stars = malloc(N * sizeof *stars);
     bst_rng_key key = bst_rng_make_key(1, 0, "test", "stars");
     double total = 0.0;
     for (int i = 0; i < N; i++) {
@@ -484,7 +484,7 @@ static void streaks_without_end_are_refused(void **state) {
     /* 20,000 px take about as many nodes of 12 bytes, 9 GB in all: more than can be counted */
     scene_track track = scene_track_make(
         &camera, &(scene_motion){.x_px = 20000.0, .duration_s = 0.5, .samples = 51});
-    bst_source *stars = malloc(N * sizeof *stars);
+    bst_scene_source *stars = malloc(N * sizeof *stars);
     for (int i = 0; i < N; i++) {
         stars[i] = scene_star(&camera, 32.0, 64.0 * i / N, 1e9);
     }

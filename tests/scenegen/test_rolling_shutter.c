@@ -12,8 +12,8 @@ enum { W = 96, H = 80, STARS = 7, TARGETS = 2, SOURCES = STARS + TARGETS };
 typedef struct scene {
     bst_camera camera;
     scene_track track;
-    bst_source sources[SOURCES];
-    bst_source_path paths[TARGETS];
+    bst_scene_source sources[SOURCES];
+    bst_scene_source_path paths[TARGETS];
     bst_vec3 ends[TARGETS][3]; /* start, middle and end of the targets' way */
     double row_time_s, exposure_s;
 } scene;
@@ -46,9 +46,9 @@ static scene make_scene(double row_time_s, double exposure_s, const scene_motion
         for (int k = 0; k < 3; k++) {
             s.ends[i][k] = bst_camera_unproject(&s.camera, x + 0.5 * k * dx, y + 0.5 * k * dy);
         }
-        s.sources[STARS + i] = (bst_source){.kind = BST_SOURCE_OBJECT,
-                                            .apparent_mid = s.ends[i][1],
-                                            .electrons_per_s = 0.2 * brightest / exposure_s};
+        s.sources[STARS + i] = (bst_scene_source){.kind = BST_SOURCE_OBJECT,
+                                                  .apparent_mid = s.ends[i][1],
+                                                  .electrons_per_s = 0.2 * brightest / exposure_s};
     }
     return s;
 }
@@ -56,7 +56,7 @@ static scene make_scene(double row_time_s, double exposure_s, const scene_motion
 /* After it lies where it stays. */
 static void link_paths(scene *s) {
     for (int i = 0; i < TARGETS; i++) {
-        s->paths[i] = bst_source_path_through(s->ends[i][0], s->ends[i][1], s->ends[i][2]);
+        s->paths[i] = bst_scene_source_path_through(s->ends[i][0], s->ends[i][1], s->ends[i][2]);
         s->sources[STARS + i].path = &s->paths[i];
     }
 }
@@ -82,17 +82,17 @@ static void reference(bst_ctx *ctx, const scene *s, bst_window w, double *image)
         time_s[n] = s->exposure_s;
         q[n++] = attitude(track, to);
         bst_los_track own = {n, time_s, q};
-        bst_source sources[SOURCES];
-        bst_source_path paths[TARGETS];
+        bst_scene_source sources[SOURCES];
+        bst_scene_source_path paths[TARGETS];
         for (int i = 0; i < SOURCES; i++) {
             sources[i] = s->sources[i];
             if (i >= STARS) {
                 bst_vec3 d[3];
                 for (int k = 0; k < 3; k++) {
-                    d[k] = bst_source_direction(&s->sources[i],
-                                                (from + 0.5 * k * s->exposure_s) / total);
+                    d[k] = bst_scene_source_direction(&s->sources[i],
+                                                      (from + 0.5 * k * s->exposure_s) / total);
                 }
-                paths[i - STARS] = bst_source_path_through(d[0], d[1], d[2]);
+                paths[i - STARS] = bst_scene_source_path_through(d[0], d[1], d[2]);
                 sources[i].path = &paths[i - STARS];
                 sources[i].apparent_mid = bst_vec3_unit(d[1]);
             }

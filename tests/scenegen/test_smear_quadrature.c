@@ -6,13 +6,13 @@
 
 static const double sigma_px = 0.85;
 
-static bst_status make_nodes(bst_ctx *ctx, const bst_path_point *path, int count, double tolerance,
-                             double widest, bst_node_list *list) {
-    bst_node_aim aim = {.psf_sigma_px = sigma_px, .tolerance = tolerance, .widest = widest};
-    return bst_nodes_from_path(ctx, path, count, &aim, list);
+static bst_status make_nodes(bst_ctx *ctx, const bst_smear_path_point *path, int count,
+                             double tolerance, double widest, bst_smear_node_list *list) {
+    bst_smear_node_aim aim = {.psf_sigma_px = sigma_px, .tolerance = tolerance, .widest = widest};
+    return bst_smear_nodes_from_path(ctx, path, count, &aim, list);
 }
 
-static void moments_of(const bst_node_list *list, double *weight, double mean[3],
+static void moments_of(const bst_smear_node_list *list, double *weight, double mean[3],
                        double cov[3][3]) {
     *weight = 0.0;
     for (int i = 0; i < 3; i++) {
@@ -39,9 +39,9 @@ static void moments_of(const bst_node_list *list, double *weight, double mean[3]
 static void a_group_keeps_its_moments(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    const bst_path_point path[] = {
+    const bst_smear_path_point path[] = {
         {{5.0, 7.0, 1.0}, 0.0}, {{5.3, 7.0, 1.0}, 0.5}, {{5.3, 7.4, 0.8}, 1.0}};
-    bst_node_list list = {0};
+    bst_smear_node_list list = {0};
     bst_assert_ok(&ctx, make_nodes(&ctx, path, 3, 0.03, true, &list));
     double weight, mean[3], cov[3][3];
     moments_of(&list, &weight, mean, cov);
@@ -57,7 +57,7 @@ static void a_group_keeps_its_moments(void **state) {
     bst_assert_close(cov[1][1] + wide, 0.4 * 0.4 / 24.0 + 0.01, 0.043);
     list.count = 0;
     /* a finer tolerance keeps the covariance */
-    const bst_path_point small[] = {
+    const bst_smear_path_point small[] = {
         {{0, 0, 0}, 0.0}, {{0.1, 0.0, 0.0}, 0.3}, {{0.1, 0.1, 0.0}, 0.6}, {{0, 0.1, 0.1}, 1.0}};
     bst_assert_ok(&ctx, make_nodes(&ctx, small, 4, 1e-4, false, &list));
     moments_of(&list, &weight, mean, cov);
@@ -91,8 +91,8 @@ static void a_group_keeps_its_moments(void **state) {
 static void a_straight_group_is_gauss_legendre(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    const bst_path_point path[] = {{{0, 0, 0}, 0.0}, {{1.2, 0, 0}, 1.0}};
-    bst_node_list list = {0};
+    const bst_smear_path_point path[] = {{{0, 0, 0}, 0.0}, {{1.2, 0, 0}, 1.0}};
+    bst_smear_node_list list = {0};
     bst_assert_ok(&ctx, make_nodes(&ctx, path, 2, 0.03, true, &list));
     assert_int_equal(list.count, 2);
     double a = 0.6 - 0.6 / sqrt(3.0), b = 0.6 + 0.6 / sqrt(3.0);
@@ -105,10 +105,10 @@ static void a_straight_group_is_gauss_legendre(void **state) {
 static void long_segments_are_cut_and_finer_levels_have_more(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    const bst_path_point path[] = {{{0, 0, 0}, 0.0}, {{300, 40, 0}, 1.0}};
+    const bst_smear_path_point path[] = {{{0, 0, 0}, 0.0}, {{300, 40, 0}, 1.0}};
     int previous = 0;
     for (double tolerance = 0.03; tolerance > 1e-6; tolerance *= 0.1) {
-        bst_node_list list = {0};
+        bst_smear_node_list list = {0};
         bst_assert_ok(&ctx, make_nodes(&ctx, path, 2, tolerance, true, &list));
         double weight = 0.0;
         for (int n = 0; n < list.count; n++) {
@@ -124,7 +124,7 @@ static void long_segments_are_cut_and_finer_levels_have_more(void **state) {
 
 /* The image of a path at a place, over its centre's value for one node: by many midpoints. */
 enum { PARTS = 4 }; /* of a stretch between points, under 0.3 px */
-static double true_image(const bst_path_point *path, int count, double x, double y) {
+static double true_image(const bst_smear_path_point *path, int count, double x, double y) {
     double sum = 0.0, total = path[count - 1].s - path[0].s;
     for (int k = 0; k + 1 < count; k++) {
         double w = (path[k + 1].s - path[k].s) / total;
@@ -138,10 +138,10 @@ static double true_image(const bst_path_point *path, int count, double x, double
     return sum;
 }
 
-static double node_image(const bst_node_list *list, double x, double y) {
+static double node_image(const bst_smear_node_list *list, double x, double y) {
     double sum = 0.0;
     for (int n = 0; n < list->count; n++) {
-        const bst_node *node = &list->items[n];
+        const bst_smear_node *node = &list->items[n];
         double dx = x - node->p[0], dy = y - node->p[1];
         double variance = sigma_px * sigma_px + node->variance;
         sum += node->weight * sigma_px * sigma_px / variance *
@@ -151,8 +151,8 @@ static double node_image(const bst_node_list *list, double x, double y) {
 }
 
 /* Largest difference of a path's image from its nodes', over the peak. */
-static double worst_error(const bst_path_point *path, int count, const bst_node_list *list,
-                          double size) {
+static double worst_error(const bst_smear_path_point *path, int count,
+                          const bst_smear_node_list *list, double size) {
     double worst = 0.0, peak = 0.0;
     for (double y = -4.0; y < size + 4.0; y += 1.1) {
         for (double x = -4.0; x < size + 4.0; x += 0.9) {
@@ -171,15 +171,15 @@ static void jitter_is_kept_to_the_tolerance(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     enum { POINTS = 400 };
-    bst_path_point path[POINTS];
+    bst_smear_path_point path[POINTS];
     for (int trial = 0; trial < 24; trial++) {
         bst_rng_key key = bst_rng_make_key(7, (uint64_t)trial, "test", "path");
         double length = trial % 4 * 4.0, angle = trial * 0.7, jitter = trial % 3 * 0.15;
         for (int k = 0; k < POINTS; k++) {
             double t = (double)k / (POINTS - 1);
-            path[k] = (bst_path_point){{0.5 * length * fabs(cos(angle)) * 2.0 * t,
-                                        0.5 * length * fabs(sin(angle)) * 2.0 * t, 0.0},
-                                       t};
+            path[k] = (bst_smear_path_point){{0.5 * length * fabs(cos(angle)) * 2.0 * t,
+                                              0.5 * length * fabs(sin(angle)) * 2.0 * t, 0.0},
+                                             t};
             for (int i = 0; i < 2; i++) {
                 for (int f = 0; f < 12; f++) {
                     double phase = 6.283 * bst_rng_uniform(key, (uint64_t)i, (uint64_t)f);
@@ -190,12 +190,12 @@ static void jitter_is_kept_to_the_tolerance(void **state) {
         int previous = 1 << 30;
         for (int widen = 0; widen <= 1; widen++) {
             for (double tolerance = 0.03; tolerance > 2e-4; tolerance *= 0.1) {
-                bst_node_list list = {0};
+                bst_smear_node_list list = {0};
                 bst_assert_ok(&ctx, make_nodes(&ctx, path, POINTS, tolerance, widen, &list));
                 double error = worst_error(path, POINTS, &list, length);
                 assert_true(error <= tolerance);
                 /* 2e-6: what the midpoints of the image that is taken for true miss */
-                assert_true(error <= bst_nodes_error(list.error, 1.0) + 2e-6);
+                assert_true(error <= bst_smear_nodes_error(list.error, 1.0) + 2e-6);
                 if (length == 0.0 && tolerance > 0.02) {
                     assert_true(list.count <= previous);
                     previous = list.count;
@@ -210,8 +210,8 @@ static void jitter_is_kept_to_the_tolerance(void **state) {
 static void no_duration_is_one_node(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    const bst_path_point path[] = {{{3, 4, 5}, 0.5}, {{3, 4, 5}, 0.5}};
-    bst_node_list list = {0};
+    const bst_smear_path_point path[] = {{{3, 4, 5}, 0.5}, {{3, 4, 5}, 0.5}};
+    bst_smear_node_list list = {0};
     bst_assert_ok(&ctx, make_nodes(&ctx, path, 2, 0.03, true, &list));
     assert_int_equal(list.count, 1);
     bst_assert_close(list.items[0].weight, 1.0, 0.0);
@@ -224,15 +224,15 @@ static void no_duration_is_one_node(void **state) {
 static void peak_shares(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_node point = {{0, 0, 0}, 1.0, 0.0, 0.0};
+    bst_smear_node point = {{0, 0, 0}, 1.0, 0.0, 0.0};
     double line = erf(0.5 / (sigma_px * sqrt(2.0)));
-    bst_assert_close(bst_nodes_peak_share(&point, 1, sigma_px), line * line, 1e-15);
-    const bst_path_point path[] = {{{0, 0, 0}, 0.0}, {{50, 0, 0}, 1.0}};
-    bst_node_list list = {0};
+    bst_assert_close(bst_smear_nodes_peak_share(&point, 1, sigma_px), line * line, 1e-15);
+    const bst_smear_path_point path[] = {{{0, 0, 0}, 0.0}, {{50, 0, 0}, 1.0}};
+    bst_smear_node_list list = {0};
     bst_assert_ok(&ctx, make_nodes(&ctx, path, 2, 1e-3, true, &list));
     double expected = line * line * sigma_px * sqrt(2.0 * 3.14159265358979) / 50.0;
     /* the sum over nodes stands for the integral: 1 % at this spacing */
-    bst_assert_close(bst_nodes_peak_share(list.items, list.count, sigma_px), expected,
+    bst_assert_close(bst_smear_nodes_peak_share(list.items, list.count, sigma_px), expected,
                      0.01 * expected);
     free(list.items);
 }

@@ -49,8 +49,8 @@ typedef struct scene {
     scene_track track;
     bst_window window;
     int binning;
-    bst_source sources[MOST_SOURCES];
-    bst_source_path paths[MOST_SOURCES];
+    bst_scene_source sources[MOST_SOURCES];
+    bst_scene_source_path paths[MOST_SOURCES];
     int count;
     double background_e, tolerance_sigma;
 } scene;
@@ -218,13 +218,13 @@ static void make_sources(scene *s) {
             double length = draw_log(s, 0.5, 80.0), angle = draw(s, 0.0, 2.0 * BST_PI);
             double dx = 0.5 * length * cos(angle), dy = 0.5 * length * sin(angle);
             double bend = 0.1 * length * draw(s, -1.0, 1.0);
-            s->paths[i] = bst_source_path_through(
+            s->paths[i] = bst_scene_source_path_through(
                 bst_camera_unproject(&s->camera, x - dx, y - dy),
                 bst_camera_unproject(&s->camera, x - bend * sin(angle), y + bend * cos(angle)),
                 bst_camera_unproject(&s->camera, x + dx, y + dy));
             s->sources[i].kind = BST_SOURCE_OBJECT;
             s->sources[i].path = &s->paths[i];
-            s->sources[i].apparent_mid = bst_vec3_unit(bst_source_place(&s->paths[i], 0.5));
+            s->sources[i].apparent_mid = bst_vec3_unit(bst_scene_source_place(&s->paths[i], 0.5));
         }
     }
 }

@@ -11,7 +11,7 @@ static void renderer_and_reference_agree(void **state) {
     bst_ctx ctx = {0};
     bst_device *device;
     bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
-    const bst_vignetting cases[] = {
+    const bst_optics_vignetting cases[] = {
         {.model = BST_VIGNETTING_POLYNOMIAL, .coefficients = {-0.5, 0.3, -0.1}},
         {.model = BST_VIGNETTING_COS4, .limit_px = 90.0},
         {.limit_px = 60.0},
@@ -24,7 +24,7 @@ static void renderer_and_reference_agree(void **state) {
         camera.optics.psf = n == 3 ? BST_PSF_MOFFAT : BST_PSF_GAUSSIAN;
         const scene_motion motion = {.x_px = 12.0, .y_px = 5.0, .duration_s = 1.0, .samples = 2};
         scene_track track = scene_track_make(&camera, &motion);
-        bst_source *stars = scene_stars(&camera, 300, 30000.0, 4.0, 5);
+        bst_scene_source *stars = scene_stars(&camera, 300, 30000.0, 4.0, 5);
         bst_window window = {20, 10, 170, 130};
         static float fast[W * H];
         static double slow[W * H];

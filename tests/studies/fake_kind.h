@@ -48,7 +48,7 @@ static inline bst_status fake_run(bst_ctx *ctx, void *worker, const bst_study_ru
     return BST_OK;
 }
 
-static inline bst_status fake_open(bst_ctx *ctx, void *user, const bst_worker_place *place,
+static inline bst_status fake_open(bst_ctx *ctx, void *user, const bst_study_worker_place *place,
                                    void **worker) {
     static char kept;
     (void)ctx;
@@ -65,12 +65,12 @@ static inline bool fake_stop(void *user) {
     return false;
 }
 
-static const bst_metric fake_metrics[] = {{"third", "s", "A third.", BST_METRIC_VALUE},
-                                          {"flag", "", "A flag.", BST_METRIC_FLAG},
-                                          {"gaps", "", "With gaps.", BST_METRIC_VALUE}};
-static const bst_metric fake_series[] = {{"key", "", "Key.", BST_METRIC_KEY},
-                                         {"trials", "", "Trials.", BST_METRIC_TRIALS},
-                                         {"hits", "", "Hits.", BST_METRIC_HITS}};
+static const bst_study_metric fake_metrics[] = {{"third", "s", "A third.", BST_METRIC_VALUE},
+                                                {"flag", "", "A flag.", BST_METRIC_FLAG},
+                                                {"gaps", "", "With gaps.", BST_METRIC_VALUE}};
+static const bst_study_metric fake_series[] = {{"key", "", "Key.", BST_METRIC_KEY},
+                                               {"trials", "", "Trials.", BST_METRIC_TRIALS},
+                                               {"hits", "", "Hits.", BST_METRIC_HITS}};
 static const bst_study_kind fake_kind = {.name = "loop",
                                          .metrics = fake_metrics,
                                          .metric_count = 3,

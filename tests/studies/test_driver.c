@@ -172,7 +172,7 @@ static void test_wrong_shards(void **state) {
 
 /* An executor whose shards end well and publish nothing. */
 typedef struct idle_executor {
-    bst_shard_job jobs[256];
+    bst_study_shard_job jobs[256];
     int64_t count, started;
 } idle_executor;
 
@@ -180,7 +180,8 @@ static int64_t idle_room(void *self) {
     (void)self;
     return 4;
 }
-static bst_status idle_start(bst_ctx *ctx, void *self, const bst_shard_job *jobs, int64_t count) {
+static bst_status idle_start(bst_ctx *ctx, void *self, const bst_study_shard_job *jobs,
+                             int64_t count) {
     (void)ctx;
     idle_executor *e = self;
     for (int64_t i = 0; i < count; i++) {
@@ -189,15 +190,15 @@ static bst_status idle_start(bst_ctx *ctx, void *self, const bst_shard_job *jobs
     }
     return BST_OK;
 }
-static bst_status idle_poll(bst_ctx *ctx, void *self, int wait_ms, bst_shard_news *news, int room,
-                            int *count) {
+static bst_status idle_poll(bst_ctx *ctx, void *self, int wait_ms, bst_study_shard_news *news,
+                            int room, int *count) {
     (void)ctx;
     (void)wait_ms;
     idle_executor *e = self;
     for (*count = 0; *count < room && e->count > 0; ++*count) {
-        const bst_shard_job *job = &e->jobs[--e->count];
+        const bst_study_shard_job *job = &e->jobs[--e->count];
         news[*count] =
-            (bst_shard_news){.id = job->id, .kind = BST_SHARD_ENDED, .runs_done = job->count};
+            (bst_study_shard_news){.id = job->id, .kind = BST_SHARD_ENDED, .runs_done = job->count};
     }
     assert_true(e->started < 10000); /* it does not go on for ever */
     return BST_OK;

@@ -189,7 +189,7 @@ static void test_morris(void **state) {
  * changes by 3, 1 and 0. */
 static void test_sensitivity(void **state) {
     (void)state;
-    static const bst_metric metrics[] = {{"y", "", "y", BST_METRIC_VALUE}};
+    static const bst_study_metric metrics[] = {{"y", "", "y", BST_METRIC_VALUE}};
     const bst_study_kind kind = {.name = "loop", .metrics = metrics, .metric_count = 1};
     const char *axes =
         "[{\"path\": \"/a\", \"from\": 0, \"to\": 1%s}, {\"path\": \"/b/c\", "

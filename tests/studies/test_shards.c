@@ -31,9 +31,9 @@ static int tear_down(void **state) {
     return 0;
 }
 
-static void execute(fixture *f, int64_t first, int64_t count, bst_shard_news *news) {
+static void execute(fixture *f, int64_t first, int64_t count, bst_study_shard_news *news) {
     bst_shard_worker worker = {.study = &f->study, .kind = &fake_kind, .out = f->folder};
-    bst_shard_job job = {.first = first, .count = count};
+    bst_study_shard_job job = {.first = first, .count = count};
     bst_status status = bst_shard_execute(&f->ctx, &worker, &job, NULL, NULL, news);
     assert_int_equal(status == BST_OK, news->text[0] == '\0');
     bst_shard_worker_close(&worker);
@@ -52,7 +52,7 @@ static void touch(const fixture *f, const char *name) {
 static void test_round_trip(void **state) {
     fixture *f = *state;
     bst_results r;
-    bst_shard_news news;
+    bst_study_shard_news news;
     touch(f, "own-7");
     execute(f, 0, 12, &news);
     assert_int_equal(news.runs_done, 12);
@@ -88,7 +88,7 @@ static void test_round_trip(void **state) {
 static void test_fault_of_the_place(void **state) {
     fixture *f = *state;
     bst_results r;
-    bst_shard_news news;
+    bst_study_shard_news news;
     touch(f, "io-4");
     execute(f, 0, 10, &news);
     assert_int_equal(news.runs_done, 4);
@@ -100,14 +100,14 @@ static void test_fault_of_the_place(void **state) {
 
 static void first_file(const fixture *f, char *path, size_t bytes) {
     bst_ctx ctx = {0};
-    bst_assert_ok(&ctx, bst_shard_path(&ctx, f->folder, 0, 5, path, bytes));
+    bst_assert_ok(&ctx, bst_study_shard_path(&ctx, f->folder, 0, 5, path, bytes));
 }
 
 /* A name that is taken stays as it is. */
 static void test_first_wins(void **state) {
     fixture *f = *state;
     char path[512];
-    bst_shard_news news;
+    bst_study_shard_news news;
     struct stat before, after;
     execute(f, 0, 5, &news);
     first_file(f, path, sizeof path);
@@ -123,7 +123,7 @@ static void test_damage(void **state) {
     fixture *f = *state;
     char path[512], text[8192];
     bst_results r;
-    bst_shard_news news;
+    bst_study_shard_news news;
     execute(f, 0, 5, &news);
     first_file(f, path, sizeof path);
     FILE *file = fopen(path, "r");
@@ -180,7 +180,7 @@ static void test_malformed_middle(void **state) {
     fixture *f = *state;
     char path[512];
     bst_results r;
-    bst_shard_news news;
+    bst_study_shard_news news;
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
         execute(f, 0, 5, &news);
         first_file(f, path, sizeof path);
@@ -205,7 +205,7 @@ static void test_malformed_middle(void **state) {
 static void test_other_study(void **state) {
     fixture *f = *state;
     bst_results r;
-    bst_shard_news news;
+    bst_study_shard_news news;
     execute(f, 0, 5, &news);
     strcpy(f->study.digest, "0123456789abcdef");
     bst_assert_ok(&f->ctx, bst_results_create(&f->ctx, &f->study, &fake_kind, &r));

@@ -111,13 +111,13 @@ static bst_executor create(const bst_slurm_site *site) {
 static void start(bst_executor *executor, int64_t id, int64_t first, int64_t shards) {
     bst_ctx ctx = {0};
     for (int64_t i = 0; i < shards; i++) {
-        bst_shard_job job = {.id = id + i, .first = first + i, .count = 1, .attempt = 1};
+        bst_study_shard_job job = {.id = id + i, .first = first + i, .count = 1, .attempt = 1};
         bst_assert_ok(&ctx, executor->start(&ctx, executor->self, &job, 1));
     }
 }
 
 /* All news of the next `seconds`, at most until `wanted` came. */
-static int gather(bst_executor *executor, double seconds, int wanted, bst_shard_news *news) {
+static int gather(bst_executor *executor, double seconds, int wanted, bst_study_shard_news *news) {
     bst_ctx ctx = {0};
     int told = 0;
     double until = bst_wall_seconds() + seconds;
@@ -145,7 +145,7 @@ static void test_shards_run_once(void **state) {
     snprintf(site.account, sizeof site.account, "sst");
     snprintf(site.options, sizeof site.options, "--nice=10 --exclude=node7");
     bst_executor executor = create(&site);
-    bst_shard_news news[MOST_NEWS];
+    bst_study_shard_news news[MOST_NEWS];
     start(&executor, 0, 20, 5);
     assert_int_equal(gather(&executor, 20, 5, news), 5);
     int64_t ids = 0;
@@ -180,7 +180,7 @@ static void test_ends_are_told_apart(void **state) {
     (void)state;
     bst_slurm_site site = quick();
     bst_executor executor = create(&site);
-    bst_shard_news news[MOST_NEWS];
+    bst_study_shard_news news[MOST_NEWS];
     start(&executor, 0, 7, 2);
     assert_int_equal(gather(&executor, 20, 2, news), 2);
     for (int i = 0; i < 2; i++) {
@@ -202,7 +202,7 @@ static void test_lost_and_silent(void **state) {
     site.patience_s = 60;
     touch("hold", "");
     bst_executor executor = create(&site);
-    bst_shard_news news[MOST_NEWS];
+    bst_study_shard_news news[MOST_NEWS];
     start(&executor, 0, 0, 2);
     assert_int_equal(gather(&executor, 0.5, 1, news), 0);
     touch("silent", "");
@@ -245,7 +245,7 @@ static void test_submission(void **state) {
     bst_slurm_site site = quick();
     site.patience_s = 60;
     bst_executor executor = create(&site);
-    bst_shard_news news[MOST_NEWS];
+    bst_study_shard_news news[MOST_NEWS];
     touch("silent", "");
     start(&executor, 0, 20, 1);
     assert_int_equal(gather(&executor, 0.5, 1, news), 0);
@@ -273,7 +273,7 @@ static void test_cancelling(void **state) {
     assert_true(exists("cancelled"));
     assert_false(exists("queue/77.0"));
     touch("hold", "");
-    bst_shard_news news[MOST_NEWS];
+    bst_study_shard_news news[MOST_NEWS];
     start(&executor, 0, 0, 3);
     assert_int_equal(gather(&executor, 0.3, 1, news), 0);
     start(&executor, 3, 3, 1);

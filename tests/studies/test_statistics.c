@@ -33,7 +33,7 @@ static void test_too_few(void **state) {
     bst_assert_ok(&ctx, bst_statistics_of(&ctx, values, 1, 2, 100, key, out));
     assert_true(out[0].mean == 3.0 && isnan(out[0].std) && isnan(out[0].low));
     assert_true(isnan(out[1].mean) && isnan(out[1].median) && out[1].missing == 1);
-    assert_true(isnan(bst_quantile(values, 0, 0.5)));
+    assert_true(isnan(bst_study_quantile(values, 0, 0.5)));
 }
 
 /* 95 % intervals of the mean of 60 skewed (exponential) draws hold the truth about as often. */

@@ -118,7 +118,7 @@ static void monte_carlo(const setup *s, figures *out) {
     double mean = per_as2 * 4.0 * HALF_AS * HALF_AS;
     bst_mtt_params params = make_params(s, mean);
     const double r[3] = {pow(sigma_as * AS, 2), 0.0, pow(sigma_as * AS, 2)};
-    double factor = bst_information_factor(s->pd, per_as2 * sigma_as * sigma_as);
+    double factor = bst_eval_information_factor(s->pd, per_as2 * sigma_as * sigma_as);
     double angle2 = 0.0, rate2 = 0.0, bound_angle2 = 0.0, bound_rate2 = 0.0;
     int settled = 0, in_gate = 0, gates = 0;
     for (uint64_t run = 0; run < RUNS; run++) {

@@ -64,7 +64,7 @@ static bool positive(const double p[4][4]) {
             a[i][j] = p[i][j] / sqrt(p[i][i] * p[j][j]) + (i == j ? 1e-9 : 0.0);
         }
     }
-    return isfinite(bst_log_det4(a));
+    return isfinite(bst_mixture_log_det4(a));
 }
 
 /* Measurements a million times better along one axis than across it, the axes turning, gaps of ten

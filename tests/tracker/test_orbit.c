@@ -243,8 +243,8 @@ static void shared_errors_change(void **state) {
 static void assert_orbit(const bst_od_state *s, double a_km, double e, double i_deg,
                          double node_deg, double a_tolerance_km, double e_tolerance,
                          double tolerance_deg) {
-    bst_kepler_elements k =
-        bst_kepler_elements_of(BST_EARTH_MU_M3PS2, s->position_m, s->velocity_mps);
+    bst_astro_kepler_elements k =
+        bst_astro_kepler_elements_of(BST_EARTH_MU_M3PS2, s->position_m, s->velocity_mps);
     print_message("a %.3f km, e %.5f, i %.4f, node %.4f deg\n", 1e-3 * k.semi_major_axis_m,
                   k.eccentricity, k.inclination_rad / BST_DEG_RAD, k.raan_rad / BST_DEG_RAD);
     bst_assert_close(1e-3 * k.semi_major_axis_m, a_km, a_tolerance_km);

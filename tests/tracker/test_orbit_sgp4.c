@@ -11,7 +11,7 @@ static const bst_vec3 EARTH = {21000.0, -18500.0, -8000.0};
 
 typedef struct fixture {
     bst_ctx ctx;
-    bst_eop *eop;
+    bst_astro_eop *eop;
     bst_sky_clock *clock;
     bst_time epoch;
     bst_gravity *gravity;
@@ -46,7 +46,7 @@ static bst_sgp4 *open_set(int norad, double *offset_s) {
 /* SGP4's place in GCRF. */
 static bst_vec3 place(const bst_sgp4 *sgp4, double offset_s, double t) {
     double r[3], v[3];
-    bst_sky sky;
+    bst_sky_rotation sky;
     assert_int_equal(bst_sgp4_propagate(sgp4, (offset_s + t) / 60.0, r, v), BST_SGP4_OK);
     bst_assert_ok(&fx.ctx, bst_sky_clock_at(&fx.ctx, fx.clock, bst_time_add(fx.epoch, t), &sky));
     return bst_vec3_scale(
@@ -155,7 +155,7 @@ static void the_covariance_is_true(void **state) {
 
 static int open_sky(void **state) {
     (void)state;
-    bst_assert_ok(&fx.ctx, bst_eop_builtin(&fx.ctx, &fx.eop));
+    bst_assert_ok(&fx.ctx, bst_astro_eop_builtin(&fx.ctx, &fx.eop));
     bst_assert_ok(&fx.ctx, bst_sky_clock_create(&fx.ctx, fx.eop, &fx.clock));
     bst_assert_ok(&fx.ctx, bst_gravity_builtin(&fx.ctx, 20, 20, &fx.gravity));
     bst_assert_ok(&fx.ctx, bst_time_from_utc(&fx.ctx, "2022-06-16T22:10:00Z", &fx.epoch));
@@ -168,7 +168,7 @@ static int close_sky(void **state) {
     bst_sgp4_free(fx.eye);
     bst_gravity_free(fx.gravity);
     bst_sky_clock_free(fx.clock);
-    bst_eop_free(fx.eop);
+    bst_astro_eop_free(fx.eop);
     return 0;
 }
 

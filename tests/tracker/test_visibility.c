@@ -17,7 +17,7 @@ static bst_mtt_sight sight_at(double angle_deg, bst_vec3 eye, double snr, double
     bst_vec3 object = {-42164e3 * cos(a), 42164e3 * sin(a), 0};
     bst_mtt_light light;
     bst_mtt_sight sight =
-        bst_sight_of(object, eye, sun, &(bst_sight_seen){.snr = snr}, 5.0, &light);
+        bst_visibility_of(object, eye, sun, &(bst_visibility_seen){.snr = snr}, 5.0, &light);
     *sunlight = light.sunlight;
     return sight;
 }
@@ -49,7 +49,7 @@ static void shadow_by_angle(void **state) {
 static void behind_the_earth(void **state) {
     (void)state;
     bst_vec3 object = {42164e3, 0, 0};
-    const bst_sight_seen seen = {.snr = 20.0};
+    const bst_visibility_seen seen = {.snr = 20.0};
     bst_mtt_light light;
     const struct {
         double miss_km; /* of the line of sight, from the Earth's centre */
@@ -63,10 +63,10 @@ static void behind_the_earth(void **state) {
         /* the line from the object that misses the centre by so much, carried on by 5000 km */
         double angle = asin(cases[k].miss_km * 1e3 / 42164e3), length = 42164e3 * cos(angle) + 5e6;
         bst_vec3 eye = {42164e3 - length * cos(angle), length * sin(angle), 0};
-        assert_int_equal(bst_sight_of(object, eye, sun, &seen, 5.0, &light), cases[k].sight);
+        assert_int_equal(bst_visibility_of(object, eye, sun, &seen, 5.0, &light), cases[k].sight);
     }
     /* an observer on the near side sees it past nothing */
-    assert_int_equal(bst_sight_of(object, (bst_vec3){7e6, 0, 0}, sun, &seen, 5.0, &light),
+    assert_int_equal(bst_visibility_of(object, (bst_vec3){7e6, 0, 0}, sun, &seen, 5.0, &light),
                      BST_MTT_CLEAR);
 }
 
@@ -86,14 +86,14 @@ static void lit_from_behind(void **state) {
         {115, 0.42686, BST_MTT_SHADOW, BST_MTT_SHADOW},
         {135, 0.15175, BST_MTT_SHADOW, BST_MTT_SHADOW},
     };
-    bst_sight_seen seen = {.snr = 20.0};
+    bst_visibility_seen seen = {.snr = 20.0};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         double a = cases[k].phase_deg * BST_DEG_RAD;
         bst_vec3 eye = {object.x + range * cos(a), object.y + range * sin(a), object.z};
         bst_mtt_light light;
         for (int bright = 0; bright <= 1; bright++) {
             seen.was_bright = bright;
-            assert_int_equal(bst_sight_of(object, eye, sun, &seen, 5.0, &light),
+            assert_int_equal(bst_visibility_of(object, eye, sun, &seen, 5.0, &light),
                              bright ? cases[k].bright : cases[k].dim);
             /* the Sun stands 2e-4 rad beside its direction from the Earth */
             bst_assert_close(light.glow, 2.0 / (3.0 * BST_PI * BST_PI) * cases[k].light / 1225e12,
@@ -106,7 +106,7 @@ static void lit_from_behind(void **state) {
     bst_mtt_light light;
     bst_vec3 eye = {2.0 * range * cos(20.0 * BST_DEG_RAD), 2.0 * range * sin(20.0 * BST_DEG_RAD),
                     object.z};
-    assert_int_equal(bst_sight_of(object, eye, sun, &seen, 5.0, &light), BST_MTT_FAINT);
+    assert_int_equal(bst_visibility_of(object, eye, sun, &seen, 5.0, &light), BST_MTT_FAINT);
     bst_assert_close(light.snr, 5.0, 0.01); /* as above */
 }
 

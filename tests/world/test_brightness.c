@@ -25,19 +25,21 @@ static bst_brightness *make(const bst_brightness_config *config) {
 
 /* An object at 42,000 km on the x axis, seen from `range` at a phase angle; the Sun along +x at
  * 1 au from the object. */
-static bst_lighting lit(double range, double phase_rad) {
+static bst_scene_lighting lit(double range, double phase_rad) {
     bst_vec3 object = {4.2e7, 0, 0};
-    return (bst_lighting){.area_m2 = 4,
-                          .albedo = 0.25,
-                          .object_m = object,
-                          .eye_m = {object.x + range * cos(phase_rad), range * sin(phase_rad), 0},
-                          .sun_m = {object.x + BST_AU_M, 0, 0},
-                          .sunlit_fraction = 1};
+    return (bst_scene_lighting){
+        .area_m2 = 4,
+        .albedo = 0.25,
+        .object_m = object,
+        .eye_m = {object.x + range * cos(phase_rad), range * sin(phase_rad), 0},
+        .sun_m = {object.x + BST_AU_M, 0, 0},
+        .sunlit_fraction = 1};
 }
 
-static bst_glow glow_of(const bst_brightness_config *config, const bst_lighting *lighting) {
+static bst_scene_glow glow_of(const bst_brightness_config *config,
+                              const bst_scene_lighting *lighting) {
     bst_brightness *b = make(config);
-    bst_glow glow;
+    bst_scene_glow glow;
     bst_brightness_at(b, lighting, &glow);
     bst_brightness_free(b);
     return glow;
@@ -51,15 +53,16 @@ static void phase_laws(void **state) {
         double sum = 0;
         for (int i = 0; i < 20000; i++) {
             double phi = pi * (i + 0.5) / 20000;
-            sum += bst_sphere_phase(s, phi) * 2 * pi * sin(phi) * pi / 20000;
+            sum += bst_astro_sphere_phase(s, phi) * 2 * pi * sin(phi) * pi / 20000;
         }
         bst_assert_close(sum, 1, 1e-7); /* of the midpoints */
     }
-    bst_assert_close(bst_sphere_phase(0, 0), 2 / (3 * pi), 1e-15); /* closed forms: rounding */
-    bst_assert_close(bst_sphere_phase(0, pi / 2), 2 / (3 * pi * pi), 1e-15);
-    bst_assert_close(bst_sphere_phase(0, pi), 0, 1e-15);
-    bst_assert_close(bst_sphere_phase(1, pi), 1 / (4 * pi), 1e-15);
-    bst_assert_close(bst_sphere_phase(0.5, -0.7), bst_sphere_phase(0.5, 0.7), 0);
+    bst_assert_close(bst_astro_sphere_phase(0, 0), 2 / (3 * pi),
+                     1e-15); /* closed forms: rounding */
+    bst_assert_close(bst_astro_sphere_phase(0, pi / 2), 2 / (3 * pi * pi), 1e-15);
+    bst_assert_close(bst_astro_sphere_phase(0, pi), 0, 1e-15);
+    bst_assert_close(bst_astro_sphere_phase(1, pi), 1 / (4 * pi), 1e-15);
+    bst_assert_close(bst_astro_sphere_phase(0.5, -0.7), bst_astro_sphere_phase(0.5, 0.7), 0);
 }
 
 /* McCue's formula by hand: 4 m2, albedo 0.25, half specular, 90 degrees, 40,000 km: F = 0.5 *
@@ -69,25 +72,26 @@ static void diffuse_and_specular(void **state) {
     (void)state;
     bst_brightness_config c = plain();
     c.specular_fraction = 0.5;
-    bst_lighting l = lit(4e7, pi / 2);
-    bst_glow g = glow_of(&c, &l);
+    bst_scene_lighting l = lit(4e7, pi / 2);
+    bst_scene_glow g = glow_of(&c, &l);
     bst_assert_close(g.v_mag, 14.1036, 2e-4); /* digits above */
     bst_assert_close(g.specular_share, 0.0795775 / (2 * 0.0735624), 1e-5);
     /* without the mirror, as the function of old */
     c.specular_fraction = 0;
     g = glow_of(&c, &l);
-    bst_assert_close(g.v_mag, bst_lambert_sphere_v_mag(4, 0.25, pi / 2, 4e7, BST_AU_M), 1e-12);
+    bst_assert_close(g.v_mag, bst_world_lambert_sphere_v_mag(4, 0.25, pi / 2, 4e7, BST_AU_M),
+                     1e-12);
     bst_assert_close(g.specular_share, 0, 0);
 }
 
 static void the_ends_of_all_scales(void **state) {
     (void)state;
     bst_brightness_config c = plain();
-    bst_lighting l = lit(4e7, pi);
+    bst_scene_lighting l = lit(4e7, pi);
     assert_true(glow_of(&c, &l).v_mag > 50); /* phase 180 */
     l = lit(4e7, 1);
     l.area_m2 = 0;
-    bst_glow g = glow_of(&c, &l);
+    bst_scene_glow g = glow_of(&c, &l);
     assert_true(isinf(g.v_mag));
     bst_assert_close(g.emission_sr, 0, 0);
     l = lit(4e7, 1);
@@ -97,8 +101,8 @@ static void the_ends_of_all_scales(void **state) {
     bst_assert_close(g.emission_sr, 0.8 * 4 / 1.6e15, 1e-20); /* rounding */
     /* 1e6 km: as far as the law of squares goes */
     l = lit(1e9, 1);
-    bst_assert_close(glow_of(&c, &l).v_mag, bst_lambert_sphere_v_mag(4, 0.25, 1, 1e9, BST_AU_M),
-                     1e-12);
+    bst_assert_close(glow_of(&c, &l).v_mag,
+                     bst_world_lambert_sphere_v_mag(4, 0.25, 1, 1e9, BST_AU_M), 1e-12);
     /* from inside, of a speck, and out of nothing: numbers */
     l = lit(0.5, 1);
     assert_true(glow_of(&c, &l).v_mag < 100); /* a number */
@@ -113,7 +117,7 @@ static void standard_magnitudes(void **state) {
     bst_brightness_config c = plain();
     c.model = BST_BRIGHTNESS_STANDARD;
     c.standard_v_mag = 6.5;
-    bst_lighting l = lit(1e6, pi / 2);
+    bst_scene_lighting l = lit(1e6, pi / 2);
     bst_assert_close(glow_of(&c, &l).v_mag, 6.5, 1e-12); /* rounding */
     l = lit(2e6, pi / 2);
     bst_assert_close(glow_of(&c, &l).v_mag, 6.5 + 5 * log10(2), 1e-12);
@@ -140,8 +144,8 @@ static void light_curves(void **state) {
     (void)state;
     char path[BST_TEST_PATH];
     bst_brightness_config c;
-    bst_lighting l = lit(2e6, pi / 3);
-    double sphere = bst_lambert_sphere_v_mag(4, 0.25, pi / 3, 2e6, BST_AU_M);
+    bst_scene_lighting l = lit(2e6, pi / 3);
+    double sphere = bst_world_lambert_sphere_v_mag(4, 0.25, pi / 3, 2e6, BST_AU_M);
 
     write_curve(path, "time_s,factor\n10,1\n12,4\n14,0\n", &c);
     l.seconds = 11; /* factor 2.5 between the points */
@@ -201,25 +205,26 @@ static void earthshine_from_far_and_near(void **state) {
         double d = 2e9;
         bst_vec3 object = {d * cos(alpha), d * sin(alpha), 0};
         bst_vec3 eye = {object.x, object.y, 1e7}; /* Earth and eye at right angles */
-        double earth = bst_sphere_phase(0, alpha) * 0.3 * pi * pow(BST_EARTH_RADIUS_M / d, 2);
-        double expected = earth * bst_sphere_phase(0.4, pi / 2);
-        double found_full = expected / bst_sphere_phase(0, alpha) * bst_sphere_phase(0, 0);
-        double found = bst_earthshine(0.4, 0.3, object, eye, sun, &middle);
+        double earth = bst_astro_sphere_phase(0, alpha) * 0.3 * pi * pow(BST_EARTH_RADIUS_M / d, 2);
+        double expected = earth * bst_astro_sphere_phase(0.4, pi / 2);
+        double found_full =
+            expected / bst_astro_sphere_phase(0, alpha) * bst_astro_sphere_phase(0, 0);
+        double found = bst_scene_earthshine(0.4, 0.3, object, eye, sun, &middle);
         /* Earth's angular radius squared, and the quadrature across the terminator */
         bst_assert_close(found, expected, 6e-3 * expected + 1e-3 * found_full);
         bst_assert_close(bst_vec3_angle(middle, bst_vec3_scale(object, -1)), 0, 4e-3);
     }
     bst_vec3 low = {BST_EARTH_RADIUS_M + 100, 0, 0}, eye = {BST_EARTH_RADIUS_M + 1e6, 0, 0};
-    double found = bst_earthshine(1, 0.3, low, eye, sun, &middle);
+    double found = bst_scene_earthshine(1, 0.3, low, eye, sun, &middle);
     bst_assert_close(found / (0.3 / (2 * pi)), 1, 6e-3); /* the horizon's dip: 0.0056 */
     bst_vec3 night = {-7e6, 0, 0};
-    bst_assert_close(bst_earthshine(0, 0.3, night, eye, sun, &middle), 0, 0);
+    bst_assert_close(bst_scene_earthshine(0, 0.3, night, eye, sun, &middle), 0, 0);
     /* it adds to sunlight, and is all there is in the shadow's place when the Earth is lit */
     bst_brightness_config c = plain();
-    bst_lighting l = lit(4e7, 1);
+    bst_scene_lighting l = lit(4e7, 1);
     double sunlight = glow_of(&c, &l).v_mag;
     c.earthshine = true;
-    bst_glow g = glow_of(&c, &l);
+    bst_scene_glow g = glow_of(&c, &l);
     assert_true(g.v_mag < sunlight && g.earth_share > 0 && g.earth_share < 0.05);
     bst_assert_close(pow(10, -0.4 * (g.v_mag - sunlight)), 1 / (1 - g.earth_share), 1e-9);
     l.sunlit_fraction = 0;
@@ -244,7 +249,7 @@ static double patches(double ratio, double phase) {
         }
     }
     sum *= (1 - ratio) / N * 2 * pi / N / pi; /* radiance 1 / pi of unit sunlight */
-    return sum / (pi * ratio * ratio * bst_sphere_phase(0, phase));
+    return sum / (pi * ratio * ratio * bst_astro_sphere_phase(0, phase));
 }
 
 static void near_spheres(void **state) {
@@ -252,11 +257,12 @@ static void near_spheres(void **state) {
     for (double ratio = 0.01; ratio < 0.5; ratio *= 3) {
         for (double phase = 0; phase < 2.9; phase += 0.7) {
             double expected = patches(ratio, phase);
-            bst_assert_close(bst_sphere_nearness(ratio, phase), expected, 2e-3 * expected + 1e-4);
+            bst_assert_close(bst_scene_sphere_nearness(ratio, phase), expected,
+                             2e-3 * expected + 1e-4);
         }
     }
-    bst_assert_close(bst_sphere_nearness(0, 1), 1, 0);
-    bst_assert_close(bst_sphere_nearness(1e-6, 1), 1, 2e-6); /* first order in the ratio */
+    bst_assert_close(bst_scene_sphere_nearness(0, 1), 1, 0);
+    bst_assert_close(bst_scene_sphere_nearness(1e-6, 1), 1, 2e-6); /* first order in the ratio */
 }
 
 /* LWIR, 0.2 m, 0.5, 0.8: effective area 0.01256637 m2. In the shadow at 230 K: radiance 4.3e20 by
@@ -271,20 +277,20 @@ static void it_glows_in_the_shadow(void **state) {
     bst_camera camera = {
         .aperture_m = 0.2, .throughput = 0.5, .quantum_efficiency = 0.8, .spectrum = lwir};
     bst_brightness_config c = plain();
-    bst_lighting l = lit(1e6, 1);
+    bst_scene_lighting l = lit(1e6, 1);
     l.sunlit_fraction = 0;
-    bst_glow dark = glow_of(&c, &l);
-    double reflected, e = bst_glow_electrons_per_s(&camera, &dark, &reflected);
+    bst_scene_glow dark = glow_of(&c, &l);
+    double reflected, e = bst_scene_glow_electrons_per_s(&camera, &dark, &reflected);
     assert_true(isinf(dark.v_mag));
     bst_assert_close(dark.temperature_k, 230, 1e-9); /* rounding */
     bst_assert_close(reflected, 0, 0);
     bst_assert_close(e / (bst_band_radiance(lwir, 230) * 3.2e-12 * 0.01256637), 1, 1e-6);
     l.sunlit_fraction = 0.5;
-    bst_glow half = glow_of(&c, &l);
+    bst_scene_glow half = glow_of(&c, &l);
     bst_assert_close(half.temperature_k, 265.05, 0.05); /* (290^4 + 230^4) / 2 = 4.9356e9 */
     l.sunlit_fraction = 1;
-    bst_glow full = glow_of(&c, &l);
-    double all = bst_glow_electrons_per_s(&camera, &full, &reflected);
+    bst_scene_glow full = glow_of(&c, &l);
+    double all = bst_scene_glow_electrons_per_s(&camera, &full, &reflected);
     assert_true(all > 2 * e);
     /* what is reflected has 1 - 0.8 instead of the albedo 0.25; 1e-3 of the glow */
     double sun =
@@ -293,7 +299,7 @@ static void it_glows_in_the_shadow(void **state) {
     assert_true(reflected < 0.01 * all && reflected > 0);
     /* a visible camera sees nothing of it in the shadow */
     camera.spectrum = NULL;
-    bst_assert_close(bst_glow_electrons_per_s(&camera, &dark, NULL), 0, 0);
+    bst_assert_close(bst_scene_glow_electrons_per_s(&camera, &dark, NULL), 0, 0);
     bst_band_free(lwir);
 }
 
@@ -309,25 +315,25 @@ static void rates_with_an_edge(void **state) {
     (void)state;
     for (double width = 2.0; width > 1e-3; width *= 0.4) {
         double edge[2] = {0.31, width}, mean, sum = 0;
-        bst_source_rate rate;
+        bst_scene_source_rate rate;
         assert_true(bst_field_rate(step_rate, edge, &rate, &mean));
         for (int i = 0; i < 100000; i++) {
             sum += step_rate(edge, (i + 0.5) / 100000) / 100000;
         }
         bst_assert_close(mean, sum, 2e-5); /* 128 straight lines on a cubic */
-        bst_source s = {.rate = &rate};
-        bst_assert_close(bst_source_light(&s, 0), 0, 0);
-        bst_assert_close(bst_source_light(&s, 1), 1, 1e-12); /* rounding */
+        bst_scene_source s = {.rate = &rate};
+        bst_assert_close(bst_scene_source_light(&s, 0), 0, 0);
+        bst_assert_close(bst_scene_source_light(&s, 1), 1, 1e-12); /* rounding */
         double last = 0;
         for (double u = 0; u <= 1; u += 0.01) {
-            double light = bst_source_light(&s, u);
+            double light = bst_scene_source_light(&s, u);
             assert_true(light >= last - 1e-12);
             last = light;
-            bst_assert_close(bst_source_rate_at(&s, u) * mean, step_rate(edge, u), 2e-3);
+            bst_assert_close(bst_scene_source_rate_at(&s, u) * mean, step_rate(edge, u), 2e-3);
         }
     }
     double none[2] = {5, 1}, mean;
-    bst_source_rate rate;
+    bst_scene_source_rate rate;
     assert_false(bst_field_rate(step_rate, none, &rate, &mean));
     bst_assert_close(mean, 1, 0);
     double dark[2] = {-5, 1};
@@ -342,7 +348,7 @@ typedef struct look {
     bst_ctx ctx;
     bst_field *field;
     bst_truth truth;
-    const bst_source *source;
+    const bst_scene_source *source;
     bst_los_track track;
     double time_s[2];
     bst_quat q[2];
@@ -381,8 +387,8 @@ static void look_at(look *l, const bst_world *world, double start, double second
 static void into_the_umbra_mid_exposure(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_view *view;
-    bst_sight sight;
+    bst_world_view *view;
+    bst_world_sight sight;
     double start = -1;
     bst_world *world;
     const char *text =
@@ -393,11 +399,11 @@ static void into_the_umbra_mid_exposure(void **state) {
         "\"ISS\", \"offset_rtn_m\": [0, 1e6, 0]}, \"sensors\": [{" TEST_CAMERA
         ", \"cue\": {\"object\": \"ISS\"}}]}]}";
     bst_assert_ok(&ctx, test_world_try(&ctx, TEST_EPOCH, text, &world));
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     for (double t = 0; t < 20000 && start < 0; t += 1) {
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t, &sight));
-        bst_sight later;
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t + 6, &later));
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, t, &sight));
+        bst_world_sight later;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, t + 6, &later));
         if (!sight.occulted && !later.occulted && sight.sunlit_fraction > 0.9 &&
             sight.sunlit_fraction < 1 && later.sunlit_fraction < sight.sunlit_fraction) {
             start = t;
@@ -405,7 +411,7 @@ static void into_the_umbra_mid_exposure(void **state) {
     }
     assert_true(start > 0);
     const double seconds = 16;
-    bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, start + seconds / 2, &sight));
+    bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, start + seconds / 2, &sight));
     look l;
     look_at(&l, world, start, seconds, sight.apparent);
     assert_non_null(l.source->rate);
@@ -413,13 +419,13 @@ static void into_the_umbra_mid_exposure(void **state) {
     double mean = 0;
     enum { N = 4000 };
     for (int i = 0; i < N; i++) {
-        bst_assert_ok(&ctx,
-                      bst_view_sight(&ctx, view, 0, 0, start + seconds * (i + 0.5) / N, &sight));
-        mean += bst_glow_electrons_per_s(camera, &sight.glow, NULL) / N;
+        bst_assert_ok(
+            &ctx, bst_world_view_sight(&ctx, view, 0, 0, start + seconds * (i + 0.5) / N, &sight));
+        mean += bst_scene_glow_electrons_per_s(camera, &sight.glow, NULL) / N;
     }
     /* straight lines between knots, lag of light held constant */
     bst_assert_close(l.source->electrons_per_s / mean, 1, 1e-4);
-    assert_true(bst_source_light(l.source, 0.5) > 0.9);
+    assert_true(bst_scene_source_light(l.source, 0.5) > 0.9);
     bst_truth_item item;
     bst_window window = {0, 0, 1024, 1024};
     bst_field_truth_item(l.field, &l.track, l.source, window, 1, &l.truth, &item);
@@ -431,7 +437,7 @@ static void into_the_umbra_mid_exposure(void **state) {
         assert_true(early < 0.7 * late);
     }
     bst_field_free(l.field);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -449,33 +455,33 @@ static void light_curves_are_those_of_the_instant_of_emission(void **state) {
              path);
     bst_world *world = test_world_with(object, "");
     unlink(path);
-    bst_view *view;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     for (double t = 5.0; t < 80.0; t += 25.0) {
-        bst_sight varying, steady;
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t, &varying));
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 1, t, &steady));
+        bst_world_sight varying, steady;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, t, &varying));
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 1, t, &steady));
         assert_true(steady.range_m > 3e7);
         double factor = pow(10.0, -0.4 * (varying.v_mag - steady.v_mag));
         /* the instant to 1e-4 s; its sign would make 0.2 s */
         bst_assert_close(factor - 1.0, t - steady.range_m / BST_LIGHT_SPEED_MPS, 1e-4);
         /* and within an exposure of 2 s about it */
-        bst_source_path path_of;
-        bst_path_light light;
-        bst_sight mid;
-        bst_assert_ok(&ctx,
-                      bst_view_path(&ctx, view, 0, 0, t - 1.0, t + 1.0, &path_of, &light, &mid));
+        bst_scene_source_path path_of;
+        bst_scene_path_light light;
+        bst_world_sight mid;
+        bst_assert_ok(
+            &ctx, bst_world_view_path(&ctx, view, 0, 0, t - 1.0, t + 1.0, &path_of, &light, &mid));
         for (double u = 0.0; u <= 1.0; u += 0.25) {
-            bst_sight then;
-            bst_view_light(view, 0, &path_of, &light, t - 1.0, t + 1.0, u, &then);
+            bst_world_sight then;
+            bst_scene_view_light(view, 0, &path_of, &light, t - 1.0, t + 1.0, u, &then);
             double at = t - 1.0 + 2.0 * u;
-            bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 1, at, &steady));
+            bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 1, at, &steady));
             factor = pow(10.0, -0.4 * (then.v_mag - steady.v_mag));
             /* light time changes by 2 km in a second: 7e-6 s */
             bst_assert_close(factor - 1.0, at - steady.range_m / BST_LIGHT_SPEED_MPS, 1e-3);
         }
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -490,10 +496,10 @@ static void ten_metres_away(void **state) {
         "\"reference\": \"GX5\", \"offset_rtn_m\": [0, 10, 0]}, \"sensors\": [{" TEST_CAMERA
         ", \"cue\": {\"object\": \"GX5\"}}]}]}";
     bst_assert_ok(&ctx, test_world_try(&ctx, TEST_EPOCH, text, &world));
-    bst_view *view;
-    bst_sight sight;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
-    bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, 0.5, &sight));
+    bst_world_view *view;
+    bst_world_sight sight;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, 0.5, &sight));
     bst_assert_close(sight.range_m, 10, 1e-3);
     look l;
     look_at(&l, world, 0, 1, sight.apparent);
@@ -502,14 +508,14 @@ static void ten_metres_away(void **state) {
     bst_assert_close(l.source->shape->radius, ratio, 1e-4 * ratio); /* the range's millimetres */
     bst_assert_close(l.source->shape->diffuse, 1, 1e-12);
     double far =
-        bst_lambert_sphere_v_mag(4, 0.25, sight.phase_rad, sight.range_m, BST_AU_M * 1.0158);
-    double nearness = bst_sphere_nearness(ratio, sight.phase_rad);
+        bst_world_lambert_sphere_v_mag(4, 0.25, sight.phase_rad, sight.range_m, BST_AU_M * 1.0158);
+    double nearness = bst_scene_sphere_nearness(ratio, sight.phase_rad);
     /* the Sun is at 1.0158 au in the middle of June */
     bst_assert_close(sight.v_mag, far - 2.5 * log10(nearness), 2e-3);
     bst_assert_close(bst_vec3_angle(l.source->shape->sun, sight.apparent), pi - sight.phase_rad,
                      1e-3); /* aberration and the orbit's motion in half a second */
     bst_field_free(l.field);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 

@@ -120,12 +120,12 @@ static void satellites_of_a_world(void **state) {
     assert_int_equal(bst_world_find_object(world, "W 2-5"), -1);
     bst_assert_close(bst_world_object(world, 7)->area_m2, 7, 0);
     bst_assert_close(bst_world_object(world, 7)->albedo, 0.5, 0);
-    bst_view *view;
-    bst_state s[12], own;
+    bst_world_view *view;
+    bst_world_state s[12], own;
     bst_vec3 normal[12];
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     for (int i = 0; i < 12; i++) {
-        bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, 1 + i, 0, &s[i]));
+        bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 1 + i, 0, &s[i]));
         normal[i] = bst_vec3_unit(bst_vec3_cross(s[i].position_m, s[i].velocity_mps));
         /* the Moon and the Sun give the orbit an eccentricity of 3e-4 */
         bst_assert_close(bst_vec3_norm(s[i].position_m), 26560000, 1e4);
@@ -144,7 +144,7 @@ static void satellites_of_a_world(void **state) {
         assert_true(turn.z > 0);
     }
     /* the observer is the satellite that it says, and knows it */
-    bst_assert_ok(&ctx, bst_view_observer_state(&ctx, view, 0, 0, &own));
+    bst_assert_ok(&ctx, bst_world_view_observer_state(&ctx, view, 0, 0, &own));
     bst_assert_close(test_distance(own.position_m, s[6].position_m), 0, 1e-3);
     bst_knowledge *k;
     bst_assert_ok(&ctx, bst_knowledge_create(&ctx, world, 0, 0, &k));
@@ -152,7 +152,7 @@ static void satellites_of_a_world(void **state) {
         assert_true(bst_knowledge_is_itself(k, i) == (i == 7));
     }
     bst_knowledge_free(k);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 

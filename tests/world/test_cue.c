@@ -70,7 +70,7 @@ static void places_of_an_arc(void **state) {
         bst_assert_close(region.half_length_rad, arcs[a].half, 1e-14);
         bst_assert_close(region.half_width_rad, 3 * BST_DEG_RAD, 1e-16);
         /* the cue is its middle, as uncertain as it is long; it rests, and has no range */
-        bst_cue cue;
+        bst_onboard_cue cue;
         bool known = true;
         double range, rate;
         bst_assert_ok(&o.ctx, bst_knowledge_cue_at(&o.ctx, o.view, 7.0, &cue));
@@ -88,7 +88,7 @@ static void places_of_an_arc(void **state) {
     onboard o = make(
         ", \"cue\": {\"region\": {\"kind\": \"arc\", \"arc_radec_deg\": [0, 1, 0, 3], "
         "\"half_width_deg\": 5}}");
-    bst_cue cue;
+    bst_onboard_cue cue;
     bst_assert_ok(&o.ctx, bst_knowledge_cue_at(&o.ctx, o.view, 0, &cue));
     bst_assert_close(cue.sigma_rad, 5 * BST_DEG_RAD, 1e-15);
     drop(&o);
@@ -105,13 +105,13 @@ static void places_of_the_belt(void **state) {
     bst_knowledge_region(o.knowledge, &region);
     assert_int_equal(region.kind, BST_REGION_GEOSTATIONARY);
     bst_assert_close(region.half_length_rad, 20 * BST_DEG_RAD, 1e-15);
-    bst_view *view;
-    bst_assert_ok(&o.ctx, bst_view_create(&o.ctx, o.world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&o.ctx, bst_world_view_create(&o.ctx, o.world, &view));
     const double t = 600, believed = t + 90;
-    bst_earth_frames frames;
-    bst_state eye;
-    bst_assert_ok(&o.ctx, bst_view_earth_frames(&o.ctx, view, believed, &frames));
-    bst_assert_ok(&o.ctx, bst_view_observer_state(&o.ctx, view, 0, believed, &eye));
+    bst_astro_earth_frames frames;
+    bst_world_state eye;
+    bst_assert_ok(&o.ctx, bst_world_view_earth_frames(&o.ctx, view, believed, &frames));
+    bst_assert_ok(&o.ctx, bst_world_view_observer_state(&o.ctx, view, 0, believed, &eye));
     static const double places[][2] = {{0, 0}, {12, 1.5}, {-20, -2}};
     for (int i = 0; i < 3; i++) {
         double lon = (120 + places[i][0]) * BST_DEG_RAD, lat = places[i][1] * BST_DEG_RAD;
@@ -141,7 +141,7 @@ static void places_of_the_belt(void **state) {
     const double(*m)[3] = frames.itrf_from_gcrf.m;
     bst_vec3 pole = {m[2][0], m[2][1], m[2][2]};
     bst_assert_close(test_distance(bst_vec3_unit(belt.earth_radps), pole), 0, 3e-6);
-    bst_view_free(view);
+    bst_world_view_free(view);
     drop(&o);
 }
 
@@ -159,7 +159,7 @@ static void errors_at_an_angle(void **state) {
                  "25], \"offset_deg\": 2, \"offset_axis\": \"%s\", \"offset_angle_deg\": %g}",
                  axes[k % 4], turn);
         onboard o = make(text);
-        bst_cue cue;
+        bst_onboard_cue cue;
         bst_assert_ok(&o.ctx, bst_knowledge_cue_at(&o.ctx, o.view, 0, &cue));
         /* image axes: x as near the hint as the line of sight lets it */
         bst_vec3 z = radec(40, 25), hint = {0.3, -0.5, 0.2};
@@ -176,23 +176,23 @@ static void errors_at_an_angle(void **state) {
 static void range_of_the_cue_s_object(void **state) {
     (void)state;
     onboard o = make(", \"cue\": {\"object\": \"GX5\", \"offset_deg\": 1}");
-    bst_view *view;
-    bst_assert_ok(&o.ctx, bst_view_create(&o.ctx, o.world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&o.ctx, bst_world_view_create(&o.ctx, o.world, &view));
     for (double t = 100; t < 6000; t += 1500) {
         bool known = false;
         double range, rate, way[3];
         bst_assert_ok(&o.ctx, bst_knowledge_cue_range_at(&o.ctx, o.view, t, &known, &range, &rate));
         assert_true(known);
         for (int i = 0; i < 3; i++) {
-            bst_sight s;
-            bst_assert_ok(&o.ctx, bst_view_sight(&o.ctx, view, 0, 0, t + 2 * (i - 1), &s));
+            bst_world_sight s;
+            bst_assert_ok(&o.ctx, bst_world_view_sight(&o.ctx, view, 0, 0, t + 2 * (i - 1), &s));
             way[i] = s.light_time_s * BST_LIGHT_SPEED_MPS;
         }
         /* a few metres of light bending; of the third derivative, 7 km/s (1e-3 rad/s)^2, 2 s^2/3 */
         bst_assert_close(range, way[1], 20);
         bst_assert_close(rate, (way[2] - way[0]) / 4, 0.02);
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     drop(&o);
 }
 
@@ -203,14 +203,14 @@ static void a_task_takes_the_cue_s_place(void **state) {
         ", \"cue\": {\"region\": {\"kind\": \"arc\", \"arc_radec_deg\": [10, 20, 50, "
         "40]}, \"offset_deg\": 1, \"sigma_deg\": 0.3, \"rate_sigma_arcsec_per_s\": 4, "
         "\"v_mag\": 11, \"v_mag_sigma\": 2}");
-    bst_view *view;
-    bst_sight sight;
-    bst_assert_ok(&o.ctx, bst_view_create(&o.ctx, o.world, &view));
-    bst_assert_ok(&o.ctx, bst_view_sight(&o.ctx, view, 0, 0, 50, &sight));
+    bst_world_view *view;
+    bst_world_sight sight;
+    bst_assert_ok(&o.ctx, bst_world_view_create(&o.ctx, o.world, &view));
+    bst_assert_ok(&o.ctx, bst_world_view_sight(&o.ctx, view, 0, 0, 50, &sight));
     bst_task task = {.id = 5, .object = 0};
     assert_true(bst_knowledge_view_task(o.view, &task));
     assert_false(bst_knowledge_view_task(o.view, &task)); /* it is no new one */
-    bst_cue cue;
+    bst_onboard_cue cue;
     bst_assert_ok(&o.ctx, bst_knowledge_cue_at(&o.ctx, o.view, 50, &cue));
     bst_assert_close(test_distance(cue.direction_gcrf, sight.geometric), 0, 1e-10);
     bst_assert_close(cue.sigma_rad, 0.3 * BST_DEG_RAD, 1e-16);
@@ -247,7 +247,7 @@ static void a_task_takes_the_cue_s_place(void **state) {
     bst_assert_close(
         bst_vec3_angle(cue.direction_gcrf, radec(27.877987144333, 31.549175657725)) / BST_DEG_RAD,
         1, 1e-9);
-    bst_view_free(view);
+    bst_world_view_free(view);
     drop(&o);
 }
 

@@ -3,7 +3,7 @@
 
 #include "tests/world/lit_sphere.h"
 
-static moments of_points(const bst_source *source, int lights) {
+static moments of_points(const bst_scene_source *source, int lights) {
     bst_ctx ctx = {0};
     bst_disc_points list = {0};
     moments m = {.total = 0};
@@ -40,15 +40,15 @@ static void points_have_the_light_of_the_surface(void **state) {
     static const double radii[] = {0.01, 0.35};
     for (int r = 0; r < 2; r++) {
         for (int l = 0; l < 4; l++) {
-            bst_source_shape shape = {.radius = radii[r],
-                                      .sun = lights[l],
-                                      .earth = lights[(l + 1) % 4],
-                                      .diffuse = 0.4,
-                                      .earthshine = 0.25,
-                                      .specular = 0.2,
-                                      .thermal = 0.15};
+            bst_scene_source_shape shape = {.radius = radii[r],
+                                            .sun = lights[l],
+                                            .earth = lights[(l + 1) % 4],
+                                            .diffuse = 0.4,
+                                            .earthshine = 0.25,
+                                            .specular = 0.2,
+                                            .thermal = 0.15};
             /* any length will do for the direction */
-            bst_source s = {.apparent_mid = bst_vec3_scale(ahead, 3), .shape = &shape};
+            bst_scene_source s = {.apparent_mid = bst_vec3_scale(ahead, 3), .shape = &shape};
             compare(of_points(&s, BST_DISC_SUN), lit_surface(radii[r], &shape.sun), radii[r], 0.4);
             compare(of_points(&s, BST_DISC_EARTH), lit_surface(radii[r], &shape.earth), radii[r],
                     0.25);
@@ -63,8 +63,8 @@ static void points_have_the_light_of_the_surface(void **state) {
 static void the_mirror_shows_the_sun(void **state) {
     (void)state;
     for (int l = 0; l < 4; l++) {
-        bst_source_shape shape = {.radius = 1e-3, .sun = lights[l], .specular = 1};
-        bst_source s = {.apparent_mid = ahead, .shape = &shape};
+        bst_scene_source_shape shape = {.radius = 1e-3, .sun = lights[l], .specular = 1};
+        bst_scene_source s = {.apparent_mid = ahead, .shape = &shape};
         bst_vec3 to_eye = bst_vec3_scale(ahead, -1), sum = bst_vec3_add(to_eye, lights[l]);
         bst_vec3 normal = bst_vec3_norm(sum) > 1e-9 ? bst_vec3_unit(sum) : to_eye;
         bst_vec3 place = bst_vec3_axpy(ahead, 1e-3, normal);
@@ -85,13 +85,13 @@ static void radiance_is_that_of_the_place(void **state) {
     for (int r = 0; r < 2; r++) {
         double k = radii[r];
         for (int l = 0; l < 3; l++) {
-            bst_source_shape shape = {.radius = k,
-                                      .sun = lights[l],
-                                      .earth = lights[l + 1],
-                                      .diffuse = 0.5,
-                                      .earthshine = 0.3,
-                                      .thermal = 0.2};
-            bst_source s = {.apparent_mid = ahead, .shape = &shape};
+            bst_scene_source_shape shape = {.radius = k,
+                                            .sun = lights[l],
+                                            .earth = lights[l + 1],
+                                            .diffuse = 0.5,
+                                            .earthshine = 0.3,
+                                            .thermal = 0.2};
+            bst_scene_source s = {.apparent_mid = ahead, .shape = &shape};
             double sun = lit_surface(k, &shape.sun).total,
                    earth = lit_surface(k, &shape.earth).total;
             double element = 4 * BST_PI * k * k / (LIT_RINGS * LIT_SPOKES);

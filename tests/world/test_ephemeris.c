@@ -50,7 +50,7 @@ static bst_elements elements_of(const family *f, int i) {
 }
 
 static void set_orbit(bst_ctx *ctx, const bst_world *world, const bst_elements *set,
-                      bst_orbit *orbit) {
+                      bst_world_orbit *orbit) {
     bst_time epoch;
     bst_assert_ok(ctx, bst_time_from_utc_jd(ctx, set->epoch_utc_jd1, set->epoch_utc_jd2, &epoch));
     bst_sgp4_free(orbit->sgp4);
@@ -76,7 +76,7 @@ static bst_world *populated(int count, double pixel_arcsec) {
     for (int i = 0; i < count; i++) {
         bst_elements set = elements_of(&families[i % FAMILIES], i);
         set_orbit(&ctx, world, &set, &world->objects[i].orbit);
-        world->objects[i].info = (bst_object_info){.area_m2 = 4, .albedo = 0.25};
+        world->objects[i].info = (bst_world_object_info){.area_m2 = 4, .albedo = 0.25};
     }
     world->observers[0].sensors[0].config.camera.pixel_scale_arcsec = pixel_arcsec;
     renew(&ctx, world);
@@ -98,21 +98,22 @@ static void error_is_below_a_thousandth_of_a_pixel(void **state) {
         for (int k = 0; k < TIMES; k++) {
             double t = DAY * (k + drawn(k, 9)) / TIMES;
             for (int i = 0; i < world->object_count; i++) {
-                bst_state direct;
+                bst_world_state direct;
                 bst_vec3 r, v;
-                if (bst_orbit_state(&ctx, &world->objects[i].orbit, clock, world->epoch, t, true,
-                                    &direct) != BST_OK) {
+                if (bst_world_orbit_state(&ctx, &world->objects[i].orbit, clock, world->epoch, t,
+                                          true, &direct) != BST_OK) {
                     assert_false(bst_ephemeris_at(world->ephemeris, i, t, &r, &v));
                     continue;
                 }
                 if (bst_ephemeris_at(world->ephemeris, i, t, &r, &v)) {
                     used[i % FAMILIES]++;
                     bst_assert_close(test_distance(r, direct.position_m), 0, tolerance);
-                    bst_state before, after;
-                    bst_assert_ok(&ctx, bst_orbit_state(&ctx, &world->objects[i].orbit, clock,
+                    bst_world_state before, after;
+                    bst_assert_ok(&ctx,
+                                  bst_world_orbit_state(&ctx, &world->objects[i].orbit, clock,
                                                         world->epoch, t - 0.5, true, &before));
-                    bst_assert_ok(&ctx, bst_orbit_state(&ctx, &world->objects[i].orbit, clock,
-                                                        world->epoch, t + 0.5, true, &after));
+                    bst_assert_ok(&ctx, bst_world_orbit_state(&ctx, &world->objects[i].orbit, clock,
+                                                              world->epoch, t + 0.5, true, &after));
                     /* third derivative at perigee (1.2e-3 rad/s)^3 r / 24 = 0.5 mm/s */
                     bst_vec3 slope = bst_vec3_sub(after.position_m, before.position_m);
                     bst_assert_close(test_distance(v, slope), 0, 1e-3);
@@ -232,16 +233,16 @@ static void what_has_decayed_stays_away(void **state) {
         "\"tests/world/data/decayed.tle\", \"norad\": 28872}}, " GX5,
         "");
     bst_ephemeris_cone all = {.axis = {0, 0, 1}, .half_angle_rad = 3.0};
-    bst_view *view;
-    bst_state s;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_world_view *view;
+    bst_world_state s;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     for (double t = -10; t < 1000; t += 33) {
         int near[2] = {-1, -1};
         assert_int_equal(bst_ephemeris_near(world->ephemeris, t, &all, near), 1);
         assert_int_equal(near[0], 1);
-        assert_int_equal(bst_view_object_state(&ctx, view, 0, t, &s), BST_ERR_NUMERIC);
+        assert_int_equal(bst_world_view_object_state(&ctx, view, 0, t, &s), BST_ERR_NUMERIC);
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -256,56 +257,56 @@ static void near_objects_are_evaluated_directly(void **state) {
         "\"20 km\", \"orbit\": {\"source\": \"relative\", \"reference\": \"near\", "
         "\"offset_rtn_m\": [0, 20000, 0]}}",
         "");
-    bst_view *view;
+    bst_world_view *view;
     bst_sky_clock *clock;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, world->eop, &clock));
     int same = 0;
     for (double t = 1; t < 6000; t += 101) {
         for (int i = 1; i <= 2; i++) {
-            bst_state eye, target;
+            bst_world_state eye, target;
             bst_bodies bodies;
-            bst_sight sight;
+            bst_world_sight sight;
             bst_vec3 geometric;
             double emission;
-            bst_assert_ok(&ctx, bst_orbit_state(&ctx, &world->observers[0].orbit, clock,
-                                                world->epoch, t, true, &eye));
-            bst_assert_ok(&ctx, bst_view_bodies(&ctx, view, t, &bodies));
-            bst_assert_ok(&ctx, bst_orbit_line_of_sight(&ctx, &world->objects[i].orbit, &eye, clock,
-                                                        world->epoch, &bodies, t, true, &geometric,
-                                                        &target, &emission));
-            bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, i, t, &sight));
+            bst_assert_ok(&ctx, bst_world_orbit_state(&ctx, &world->observers[0].orbit, clock,
+                                                      world->epoch, t, true, &eye));
+            bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
+            bst_assert_ok(&ctx, bst_world_orbit_line_of_sight(&ctx, &world->objects[i].orbit, &eye,
+                                                              clock, world->epoch, &bodies, t, true,
+                                                              &geometric, &target, &emission));
+            bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, i, t, &sight));
             double off = test_distance(sight.geometric, bst_vec3_unit(geometric));
             same += i == 2 && off == 0;
             /* at 20 km half a thousandth of a pixel of 3 arcsec */
             bst_assert_close(off, 0, i == 1 ? 0 : 0.5e-3 * 3 * BST_ARCSEC_RAD);
         }
         /* the observer itself: nothing to see, and no failure */
-        bst_sight self;
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t, &self));
+        bst_world_sight self;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, t, &self));
         assert_true(self.range_m == 0);
     }
     assert_true(same < 10);
     bst_sky_clock_free(clock);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
 static const bst_window full = {0, 0, 1024, 1024};
 
 /* Whether the object is on the window at any of many instants. */
-static bool seen(bst_ctx *ctx, const bst_world *world, bst_view *view, int object, bst_quat q,
+static bool seen(bst_ctx *ctx, const bst_world *world, bst_world_view *view, int object, bst_quat q,
                  double start, double end) {
-    bst_source_path path;
-    bst_path_light light;
-    bst_sight mid;
-    if (bst_view_path(ctx, view, 0, object, start, end, &path, &light, &mid) != BST_OK) {
+    bst_scene_source_path path;
+    bst_scene_path_light light;
+    bst_world_sight mid;
+    if (bst_world_view_path(ctx, view, 0, object, start, end, &path, &light, &mid) != BST_OK) {
         return false;
     }
-    bst_source s = {.kind = BST_SOURCE_OBJECT, .path = &path};
+    bst_scene_source s = {.kind = BST_SOURCE_OBJECT, .path = &path};
     for (int k = 0; k <= 150; k++) {
         double x, y;
-        bst_vec3 d = bst_source_direction(&s, k / 150.0);
+        bst_vec3 d = bst_scene_source_direction(&s, k / 150.0);
         if (bst_camera_project(bst_world_camera(world, 0, 0), bst_quat_rotate(q, d), &x, &y) &&
             x >= -4 && x <= 1027 && y >= -4 && y <= 1027) {
             return true;
@@ -334,9 +335,9 @@ static void no_object_is_missed(void **state) {
         set_orbit(&ctx, world, &set, &world->objects[i].orbit);
     }
     renew(&ctx, world);
-    bst_view *view;
+    bst_world_view *view;
     bst_field *field;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     bst_assert_ok(&ctx, bst_field_create(&ctx, world, 0, 0, &field));
     int found = 0, extra = 0;
     for (int n = 0; n < QUERIES; n++) {
@@ -344,10 +345,10 @@ static void no_object_is_missed(void **state) {
         int64_t start = (int64_t)(6e6 * drawn(n, 30)),
                 end = start + (int64_t)(1e3 * lengths[n % 4]);
         /* towards an object in the middle of the exposure, a little beside it */
-        bst_sight sight;
+        bst_world_sight sight;
         double mid = 0.5e-3 * (double)(start + end);
-        bst_assert_ok(&ctx,
-                      bst_view_sight(&ctx, view, 0, (int)(OBJECTS * drawn(n, 31)), mid, &sight));
+        bst_assert_ok(
+            &ctx, bst_world_view_sight(&ctx, view, 0, (int)(OBJECTS * drawn(n, 31)), mid, &sight));
         bst_vec3 beside = {0.015 * (drawn(n, 32) - 0.5), 0.015 * (drawn(n, 33) - 0.5), 0};
         bst_quat q = bst_quat_look(bst_vec3_add(sight.apparent, beside), (bst_vec3){0, 0, 1});
         const double times[] = {0, 1e-3 * (double)(end - start)};
@@ -355,7 +356,7 @@ static void no_object_is_missed(void **state) {
         const bst_los_track track = {2, times, attitudes};
         const bst_field_options options = {.v_limit = -90, .margin_px = 5};
         bst_truth truth;
-        const bst_source *sources;
+        const bst_scene_source *sources;
         int count, next = 0;
         bst_assert_ok(&ctx, bst_field_query(&ctx, field, &track, start, end, 1000, full, &options,
                                             &truth, &sources, &count));
@@ -374,7 +375,7 @@ static void no_object_is_missed(void **state) {
     assert_true(found > QUERIES / 2);
     assert_true(extra < found); /* and the list is not simply everything */
     bst_field_free(field);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -396,27 +397,27 @@ static void three_observers_share_it(void **state) {
     }
     strcat(text, "]}");
     bst_world *world = test_world(text);
-    bst_view *view;
+    bst_world_view *view;
     bst_sky_clock *clock;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, world->eop, &clock));
     assert_int_equal(world->object_count, 5);
     for (int k = 0; k < 100; k++) {
         double t = 600.7 * k;
         for (int n = 0; n < 15; n++) {
-            const bst_orbit *eye_orbit = &world->observers[n % 3].orbit;
-            bst_state eye, target;
+            const bst_world_orbit *eye_orbit = &world->observers[n % 3].orbit;
+            bst_world_state eye, target;
             bst_bodies bodies;
-            bst_sight sight;
+            bst_world_sight sight;
             bst_vec3 geometric;
             double emission;
-            bst_assert_ok(&ctx,
-                          bst_orbit_state(&ctx, eye_orbit, clock, world->epoch, t, true, &eye));
-            bst_assert_ok(&ctx, bst_view_bodies(&ctx, view, t, &bodies));
-            bst_assert_ok(&ctx, bst_orbit_line_of_sight(&ctx, &world->objects[n / 3].orbit, &eye,
-                                                        clock, world->epoch, &bodies, t, true,
-                                                        &geometric, &target, &emission));
-            bst_assert_ok(&ctx, bst_view_sight(&ctx, view, n % 3, n / 3, t, &sight));
+            bst_assert_ok(
+                &ctx, bst_world_orbit_state(&ctx, eye_orbit, clock, world->epoch, t, true, &eye));
+            bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
+            bst_assert_ok(&ctx, bst_world_orbit_line_of_sight(
+                                    &ctx, &world->objects[n / 3].orbit, &eye, clock, world->epoch,
+                                    &bodies, t, true, &geometric, &target, &emission));
+            bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, n % 3, n / 3, t, &sight));
             if (sight.range_m > 0) {
                 bst_assert_close(test_distance(sight.geometric, bst_vec3_unit(geometric)), 0,
                                  1e-3 * 3 * BST_ARCSEC_RAD);
@@ -424,7 +425,7 @@ static void three_observers_share_it(void **state) {
         }
     }
     bst_sky_clock_free(clock);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 

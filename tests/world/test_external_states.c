@@ -6,19 +6,19 @@
 static const double radius = 7.5e6;
 
 /* A circle in a tilted plane: at `seconds`, of a phase of its own. */
-static bst_state circle(double phase, double seconds) {
+static bst_world_state circle(double phase, double seconds) {
     double w = sqrt(BST_EARTH_MU_M3PS2 / (radius * radius * radius)), a = phase + w * seconds;
     bst_vec3 u = {0.8, 0.0, 0.6}, v = {0.0, 1.0, 0.0};
-    return (bst_state){
+    return (bst_world_state){
         bst_vec3_axpy(bst_vec3_scale(u, radius * cos(a)), radius * sin(a), v),
         bst_vec3_axpy(bst_vec3_scale(u, -w * radius * sin(a)), w * radius * cos(a), v)};
 }
 
-static void check(bst_steering *s, double seconds, double phase) {
+static void check(bst_external_states *s, double seconds, double phase) {
     bst_ctx ctx = {0};
-    bst_state got, want = circle(phase, seconds);
+    bst_world_state got, want = circle(phase, seconds);
     bool steered = false;
-    bst_assert_ok(&ctx, bst_steering_state(&ctx, s, seconds, &steered, &got));
+    bst_assert_ok(&ctx, bst_external_states_state(&ctx, s, seconds, &steered, &got));
     assert_true(steered);
     /* rounding of Kepler's equation over minutes */
     bst_assert_close(test_distance(got.position_m, want.position_m), 0, 1e-5);
@@ -28,17 +28,17 @@ static void check(bst_steering *s, double seconds, double phase) {
 static void the_last_state_counts(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_steering *s;
-    bst_state out = {{1, 2, 3}, {4, 5, 6}};
+    bst_external_states *s;
+    bst_world_state out = {{1, 2, 3}, {4, 5, 6}};
     bool steered = true;
-    bst_assert_ok(&ctx, bst_steering_create(&ctx, &s));
-    bst_assert_ok(&ctx, bst_steering_state(&ctx, s, 0, &steered, &out));
+    bst_assert_ok(&ctx, bst_external_states_create(&ctx, &s));
+    bst_assert_ok(&ctx, bst_external_states_state(&ctx, s, 0, &steered, &out));
     assert_false(steered);
     for (int i = 0; i < 7; i++) {
-        bst_state at = circle(0.1 * i, 100.0 + 60 * i);
-        bst_assert_ok(&ctx, bst_steering_add(&ctx, s, 100.0 + 60 * i, &at));
+        bst_world_state at = circle(0.1 * i, 100.0 + 60 * i);
+        bst_assert_ok(&ctx, bst_external_states_add(&ctx, s, 100.0 + 60 * i, &at));
     }
-    bst_assert_ok(&ctx, bst_steering_state(&ctx, s, 99.999, &steered, &out));
+    bst_assert_ok(&ctx, bst_external_states_state(&ctx, s, 99.999, &steered, &out));
     assert_false(steered);
     assert_true(out.position_m.x == 1 && out.velocity_mps.z == 6); /* untouched */
     for (int i = 0; i < 7; i++) {
@@ -46,31 +46,31 @@ static void the_last_state_counts(void **state) {
         check(s, 100.0 + 60 * i + 59.9, 0.1 * i);
     }
     check(s, 2000, 0.6);
-    bst_state again = circle(0, 460);
-    assert_int_equal(bst_steering_add(&ctx, s, 460, &again), BST_ERR_ARGUMENT);
+    bst_world_state again = circle(0, 460);
+    assert_int_equal(bst_external_states_add(&ctx, s, 460, &again), BST_ERR_ARGUMENT);
     assert_string_equal(ctx.message,
                         "a state at 460 s after one at 460 s: they come in the order of time");
     check(s, 2000, 0.6);
-    bst_steering_free(s);
+    bst_external_states_free(s);
 }
 
 /* After more states than are kept, the earliest that is known goes for all before it. */
 static void the_oldest_are_forgotten(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_steering *s;
-    bst_assert_ok(&ctx, bst_steering_create(&ctx, &s));
+    bst_external_states *s;
+    bst_assert_ok(&ctx, bst_external_states_create(&ctx, &s));
     const int count = 4096 + 100;
     for (int i = 0; i < count; i++) {
-        bst_state at = circle(1e-4 * i, i);
-        bst_assert_ok(&ctx, bst_steering_add(&ctx, s, i, &at));
+        bst_world_state at = circle(1e-4 * i, i);
+        bst_assert_ok(&ctx, bst_external_states_add(&ctx, s, i, &at));
     }
     check(s, 99.5, 1e-4 * 100);
     check(s, 100.5, 1e-4 * 100);
     check(s, 101.5, 1e-4 * 101);
     check(s, 3000.25, 1e-4 * 3000);
     check(s, count - 0.5, 1e-4 * (count - 1));
-    bst_steering_free(s);
+    bst_external_states_free(s);
 }
 
 static void an_object_is_steered_by_name(void **state) {
@@ -79,20 +79,20 @@ static void an_object_is_steered_by_name(void **state) {
     bst_world *world = test_world_with("{\"name\": \"GX5\", " TEST_GX5
                                        "}, {\"name\": \"mine\", \"steered\": true, " TEST_GX5 "}",
                                        "");
-    bst_view *view;
-    bst_state before, at = circle(0.3, 50), now;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_world_view *view;
+    bst_world_state before, at = circle(0.3, 50), now;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     bst_assert_ok(&ctx, bst_world_steer(&ctx, world, "mine", 50, &at));
     assert_int_equal(bst_world_steer(&ctx, world, "GX5", 50, &at), BST_ERR_NOT_FOUND);
     assert_int_equal(bst_world_steer(&ctx, world, "nobody", 50, &at), BST_ERR_NOT_FOUND);
-    bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, 0, 40, &before));
-    bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, 1, 40, &now));
+    bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 0, 40, &before));
+    bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 1, 40, &now));
     bst_assert_close(test_distance(now.position_m, before.position_m), 0, 0.01); /* by its orbit */
-    bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, 1, 80, &now));
-    bst_state want = circle(0.3, 80);
+    bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 1, 80, &now));
+    bst_world_state want = circle(0.3, 80);
     bst_assert_close(test_distance(now.position_m, want.position_m), 0, 1e-3);
     bst_assert_close(test_distance(now.velocity_mps, want.velocity_mps), 0, 1e-6);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 

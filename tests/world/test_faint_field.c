@@ -39,7 +39,7 @@ static void field_query_has_them(void **state) {
         history->items[1] = (bst_los_sample){6000, q};
         bst_los_track track;
         bst_truth truth = {0};
-        const bst_source *sources;
+        const bst_scene_source *sources;
         int count;
         /* the renderer's own limit is 16: what lies between goes to the background */
         bst_field_options options = {.v_limit = 16, .margin_px = 0};
@@ -96,7 +96,7 @@ static void stars_left_out_are_in_the_background(void **state) {
     const double limits[2] = {16, 7};
     for (int i = 0; i < 2; i++) {
         bst_truth truth = {0};
-        const bst_source *sources;
+        const bst_scene_source *sources;
         int count;
         bst_field_options options = {.v_limit = limits[i]};
         bst_assert_ok(&ctx, bst_field_query(&ctx, field, &track, 0, 6000, 6000,

@@ -17,7 +17,7 @@ typedef struct scene {
     bst_los_history *history;
     bst_quat target; /* camera on GX5 at the epoch */
     bst_truth truth;
-    const bst_source *sources;
+    const bst_scene_source *sources;
     int count;
     bst_los_track track;
 } scene;
@@ -108,7 +108,7 @@ static void fill(scene *s, double dx, double dy, double roll, double rms) {
 
 /* Where the source is at many instants of the exposure, with equal weights. */
 enum { FINE = 16, MOST = 500 * FINE + 16 };
-static int dense_track(const scene *s, const bst_source *source, double *x, double *y) {
+static int dense_track(const scene *s, const bst_scene_source *source, double *x, double *y) {
     const bst_camera *camera = bst_world_camera(s->world, 0, 0);
     double total = s->track.time_s[s->track.count - 1];
     int n = 0;
@@ -118,7 +118,7 @@ static int dense_track(const scene *s, const bst_source *source, double *x, doub
             bst_quat q =
                 bst_quat_slerp(s->track.q_cam_from_gcrf[k], s->track.q_cam_from_gcrf[k + 1], f);
             double t = s->track.time_s[k] + f * (s->track.time_s[k + 1] - s->track.time_s[k]);
-            bst_vec3 d = bst_source_direction(source, t / total);
+            bst_vec3 d = bst_scene_source_direction(source, t / total);
             assert_true(n < MOST);
             assert_true(bst_camera_project(camera, bst_quat_rotate(q, d), &x[n], &y[n]));
             n++;
@@ -198,7 +198,8 @@ static double brute_squared_image(int n, double sigma) {
     return sum;
 }
 
-static void expect_snr(scene *s, const bst_source *source, double variance, double tolerance) {
+static void expect_snr(scene *s, const bst_scene_source *source, double variance,
+                       double tolerance) {
     int n = dense_track(s, source, x_of, y_of);
     double squared =
         brute_squared_image(n, bst_camera_psf_sigma_px(bst_world_camera(s->world, 0, 0)));
@@ -309,7 +310,7 @@ static void expect_no_star_missed(scene s) {
         fill(&s, cases[c][0], cases[c][1], cases[c][2] * BST_DEG_RAD, 0.2);
         for (int w = 0; w < 3; w++) {
             query(&s, 3000, windows[w]);
-            bst_light light = {s.truth.velocity_bary_mps, s.truth.sun_m};
+            bst_astro_light light = {s.truth.velocity_bary_mps, s.truth.sun_m};
             /* a wide cone stands for the whole sky, with proper motion to the same date */
             bst_vec3 centre = bst_quat_rotate(bst_quat_conj(s.target), (bst_vec3){0, 0, 1});
             int n = 0, there = 0;
@@ -317,7 +318,7 @@ static void expect_no_star_missed(scene s) {
                                                   6 * BST_DEG_RAD, 13, 2022.457, all, ROOM, &n));
             assert_true(n < ROOM);
             for (int i = 0; i < n; i++) {
-                bst_vec3 apparent = bst_light_apparent_star(&light, all[i].icrs);
+                bst_vec3 apparent = bst_astro_light_apparent_star(&light, all[i].icrs);
                 bool on = false;
                 for (int k = 0; k < s.track.count && !on; k += 10) {
                     double x, y;
@@ -374,13 +375,13 @@ static void the_target_is_where_the_sight_says(void **state) {
     scene s = make_scene(GX5);
     fill(&s, 0, 0, 0, 0);
     query(&s, 3000, full);
-    const bst_source *object = &s.sources[s.count - 1];
+    const bst_scene_source *object = &s.sources[s.count - 1];
     assert_int_equal(object->kind, BST_SOURCE_OBJECT);
-    bst_view *view;
-    bst_sight mid, end;
-    bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &view));
-    bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 0, 0.25, &mid));
-    bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 0, 0.5, &end));
+    bst_world_view *view;
+    bst_world_sight mid, end;
+    bst_assert_ok(&s.ctx, bst_world_view_create(&s.ctx, s.world, &view));
+    bst_assert_ok(&s.ctx, bst_world_view_sight(&s.ctx, view, 0, 0, 0.25, &mid));
+    bst_assert_ok(&s.ctx, bst_world_view_sight(&s.ctx, view, 0, 0, 0.5, &end));
     bst_truth_item item;
     bst_field_truth_item(s.field, &s.track, object, full, 1, &s.truth, &item);
     const bst_camera *camera = bst_world_camera(s.world, 0, 0);
@@ -400,17 +401,17 @@ static void the_target_is_where_the_sight_says(void **state) {
     bst_assert_close(bst_vec3_norm(bst_quat_to_rotvec(
                          bst_quat_mul(s.truth.q_cam_from_gcrf_mean, bst_quat_conj(s.target)))),
                      0, 1e-14);
-    bst_view_free(view);
+    bst_world_view_free(view);
     free_scene(&s);
 }
 
 static void the_earth_hides_stars(void **state) {
     (void)state;
     scene s = make_scene(GX5);
-    bst_view *view;
-    bst_state eye;
-    bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &view));
-    bst_assert_ok(&s.ctx, bst_view_observer_state(&s.ctx, view, 0, 0.25, &eye));
+    bst_world_view *view;
+    bst_world_state eye;
+    bst_assert_ok(&s.ctx, bst_world_view_create(&s.ctx, s.world, &view));
+    bst_assert_ok(&s.ctx, bst_world_view_observer_state(&s.ctx, view, 0, 0.25, &eye));
     bst_vec3 down = bst_vec3_scale(eye.position_m, -1.0);
     s.target = bst_quat_look(down, (bst_vec3){0, 0, 1});
     fill(&s, 0, 0, 0, 0);
@@ -431,7 +432,7 @@ static void the_earth_hides_stars(void **state) {
         assert_false(s.sources[i].occulted);
         assert_true(s.sources[i].electrons_per_s > 0);
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     free_scene(&s);
 }
 
@@ -500,25 +501,25 @@ static void fast_passes_are_followed(void **state) {
                  0.5 * duration, 1e3 * cases[c].radial_km, 1e3 * cases[c].radial_kmps,
                  1e3 * cases[c].along_kmps);
         scene s = make_scene(text);
-        bst_view *view;
-        bst_sight sight;
-        bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &view));
-        bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 2, 0.5 * duration, &sight));
+        bst_world_view *view;
+        bst_world_sight sight;
+        bst_assert_ok(&s.ctx, bst_world_view_create(&s.ctx, s.world, &view));
+        bst_assert_ok(&s.ctx, bst_world_view_sight(&s.ctx, view, 0, 2, 0.5 * duration, &sight));
         s.target = bst_quat_look(sight.apparent, (bst_vec3){0, 0, 1});
         int64_t end = (int64_t)(RATE * duration);
         push(s.history, 0, s.target);
         push(s.history, end, s.target);
         query(&s, end, full);
-        const bst_source *source = &s.sources[s.count - 1];
+        const bst_scene_source *source = &s.sources[s.count - 1];
         assert_true(source->kind == BST_SOURCE_OBJECT && source->id == 2);
         for (int i = 0; i <= 100; i++) {
             double u = i / 100.0;
-            bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 2, u * duration, &sight));
+            bst_assert_ok(&s.ctx, bst_world_view_sight(&s.ctx, view, 0, 2, u * duration, &sight));
             double off =
-                test_distance(bst_vec3_unit(bst_source_direction(source, u)), sight.apparent);
+                test_distance(bst_vec3_unit(bst_scene_source_direction(source, u)), sight.apparent);
             bst_assert_close(off / (0.5 * BST_ARCSEC_RAD), 0, cases[c].tolerance_px);
         }
-        bst_view_free(view);
+        bst_world_view_free(view);
         free_scene(&s);
     }
 }

@@ -13,7 +13,7 @@ typedef struct scene {
     bst_field *field;
     const bst_camera *camera;
     bst_quat q;
-    const bst_source *sources;
+    const bst_scene_source *sources;
     int count;
 } scene;
 
@@ -76,7 +76,7 @@ static void stars_by_their_colour_and_objects_by_the_sun_s(void **state) {
                                           2022.4, stars, MOST, &known));
     assert_true(known <= MOST);
     for (int i = 0; i < s.count; i++) {
-        const bst_source *source = &s.sources[i];
+        const bst_scene_source *source = &s.sources[i];
         if (source->kind == BST_SOURCE_OBJECT) {
             assert_true(is_colour(source->colour, none, 1.0));
             objects++;
@@ -90,7 +90,7 @@ static void stars_by_their_colour_and_objects_by_the_sun_s(void **state) {
             }
             if (!isnan(colour)) { /* held where the law of stellar colour is */
                 colour = fmin(fmax(colour, -0.4), 2.5);
-                bst_psf_colour(s.camera->psf, bst_star_temperature_k(colour), want);
+                bst_psf_colour(s.camera->psf, bst_optics_star_temperature_k(colour), want);
             }
             assert_true(is_colour(source->colour, want, 1.0));
             found++;
@@ -114,11 +114,11 @@ static void warm_objects_by_their_own_light(void **state) {
             ", \"area_m2\": 10, \"albedo\": 0.4, \"brightness\": {\"emissivity\": 0.6, "
             "\"temperature_k\": 320}",
             band);
-        bst_view *view;
-        bst_sight sight;
-        bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &view));
-        bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 0, 0.5 * END / RATE, &sight));
-        double reflected, all = bst_glow_electrons_per_s(s.camera, &sight.glow, &reflected);
+        bst_world_view *view;
+        bst_world_sight sight;
+        bst_assert_ok(&s.ctx, bst_world_view_create(&s.ctx, s.world, &view));
+        bst_assert_ok(&s.ctx, bst_world_view_sight(&s.ctx, view, 0, 0, 0.5 * END / RATE, &sight));
+        double reflected, all = bst_scene_glow_electrons_per_s(s.camera, &sight.glow, &reflected);
         float warm[BST_PSF_COLOURS];
         bst_psf_colour(s.camera->psf, 320.0, warm);
         assert_true(reflected > 1e-4 * all && all - reflected > 0.1 * all);
@@ -130,7 +130,7 @@ static void warm_objects_by_their_own_light(void **state) {
             }
         }
         assert_int_equal(objects, 1);
-        bst_view_free(view);
+        bst_world_view_free(view);
         end(&s);
     }
 }

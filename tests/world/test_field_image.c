@@ -35,12 +35,13 @@ static void light_on_a_crooked_track(void **state) {
     }
     const bst_los_track track = {SAMPLES, at_s, q};
     /* from half of the mean rate to one and a half: light u / 2 + u^2 / 2 */
-    const bst_source_rate rate = {.count = 2, .u = {0, 1}, .rate = {0.5, 1.5}, .light = {0, 1}};
-    const bst_source brighter = {.apparent_mid = {0, 0, 1}, .rate = &rate},
-                     steady = {.apparent_mid = {0, 0, 1}};
+    const bst_scene_source_rate rate = {
+        .count = 2, .u = {0, 1}, .rate = {0.5, 1.5}, .light = {0, 1}};
+    const bst_scene_source brighter = {.apparent_mid = {0, 0, 1}, .rate = &rate},
+                           steady = {.apparent_mid = {0, 0, 1}};
     static const double parts[][2] = {{0, 1}, {0.2, 0.7}, {0, 0.4}, {0.6, 1}};
     for (int p = 0; p < 8; p++) {
-        const bst_source *s = p < 4 ? &brighter : &steady;
+        const bst_scene_source *s = p < 4 ? &brighter : &steady;
         double u0 = parts[p % 4][0], u1 = parts[p % 4][1], w = 0, m[5] = {0};
         enum { N = 200000 };
         for (int i = 0; i < N; i++) {
@@ -56,7 +57,7 @@ static void light_on_a_crooked_track(void **state) {
         for (int i = 0; i < 5; i++) {
             m[i] /= w;
         }
-        bst_image_moments got = bst_image_by_light(&camera, &track, s, u0, u1);
+        bst_scene_image_moments got = bst_scene_image_by_light(&camera, &track, s, u0, u1);
         /* 128 intervals of at most a third of a pixel, with corners in some of them */
         bst_assert_close(got.x_mean, m[0], 0.01);
         bst_assert_close(got.y_mean, m[1], 0.01);
@@ -71,14 +72,14 @@ static void a_disc_moves_and_widens_the_image(void **state) {
     bst_camera camera = test_camera();
     const bst_vec3 sun = {0.36, 0.48, -0.8}, earth = {-0.96, 0.0, 0.28};
     for (int mirror = 0; mirror < 2; mirror++) {
-        bst_source_shape shape = {.radius = 20 * SCALE,
-                                  .sun = sun,
-                                  .earth = earth,
-                                  .diffuse = mirror ? 0 : 0.5,
-                                  .earthshine = mirror ? 0 : 0.3,
-                                  .specular = mirror ? 1 : 0.05,
-                                  .thermal = mirror ? 0 : 0.15};
-        bst_source s = {.apparent_mid = ahead, .shape = &shape};
+        bst_scene_source_shape shape = {.radius = 20 * SCALE,
+                                        .sun = sun,
+                                        .earth = earth,
+                                        .diffuse = mirror ? 0 : 0.5,
+                                        .earthshine = mirror ? 0 : 0.3,
+                                        .specular = mirror ? 1 : 0.05,
+                                        .thermal = mirror ? 0 : 0.15};
+        bst_scene_source s = {.apparent_mid = ahead, .shape = &shape};
         moments parts[3] = {lit_surface(shape.radius, &sun), lit_surface(shape.radius, &earth),
                             lit_surface(shape.radius, NULL)};
         /* the mirror's point, from far away */
@@ -101,8 +102,8 @@ static void a_disc_moves_and_widens_the_image(void **state) {
         const bst_mat3 rows = {{{cross_x.x, cross_x.y, cross_x.z},
                                 {cross_y.x, cross_y.y, cross_y.z},
                                 {ahead.x, ahead.y, ahead.z}}};
-        bst_image_moments m = {10, -7, 3, -2, 5};
-        bst_image_add_disc(&camera, bst_quat_from_mat3(&rows), &s, &m);
+        bst_scene_image_moments m = {10, -7, 3, -2, 5};
+        bst_scene_image_add_disc(&camera, bst_quat_from_mat3(&rows), &s, &m);
         /* 24 rings of 48 places on a radius of 20 px */
         bst_assert_close(m.x_mean, 10 + ex, 0.05);
         bst_assert_close(m.y_mean, -7 + ey, 0.05);
@@ -110,9 +111,9 @@ static void a_disc_moves_and_widens_the_image(void **state) {
         bst_assert_close(m.xy, -2 + xy - ex * ey, 0.8);
         bst_assert_close(m.yy, 5 + yy - ey * ey, 0.8);
         /* behind the camera nothing changes */
-        bst_image_moments same = {10, -7, 3, -2, 5};
+        bst_scene_image_moments same = {10, -7, 3, -2, 5};
         s.apparent_mid = bst_vec3_scale(ahead, -1);
-        bst_image_add_disc(&camera, bst_quat_from_mat3(&rows), &s, &same);
+        bst_scene_image_add_disc(&camera, bst_quat_from_mat3(&rows), &s, &same);
         assert_true(same.x_mean == 10 && same.y_mean == -7 && same.xx == 3 && same.yy == 5);
     }
 }
@@ -123,21 +124,21 @@ static void vignetting_moves_the_light(void **state) {
     bst_camera camera = test_camera();
     camera.optics.vignetting.model = BST_VIGNETTING_POLYNOMIAL;
     camera.optics.vignetting.coefficients[0] = -0.5;
-    const bst_source s = {.apparent_mid = {0, 0, 1}};
-    const bst_image_moments m = {330, 40, 9, -4, 6};
+    const bst_scene_source s = {.apparent_mid = {0, 0, 1}};
+    const bst_scene_image_moments m = {330, 40, 9, -4, 6};
     double half2 = 0.25 * (400.0 * 400 + 300.0 * 300), dx = 330 - 199.5, dy = 40 - 149.5;
     double v = 1 - 0.5 * (dx * dx + dy * dy) / half2;
     double gx = -dx / half2 / v, gy = -dy / half2 / v, psf = 4 / (8 * log(2.0));
     double x, y;
-    bst_image_centroid(&camera, &s, &m, &x, &y);
+    bst_scene_image_centroid(&camera, &s, &m, &x, &y);
     /* the gradient of a quadratic by a central difference is exact */
     bst_assert_close(x - 330, (9 + psf) * gx - 4 * gy, 1e-10);
     bst_assert_close(y - 40, -4 * gx + (6 + psf) * gy, 1e-10);
     camera.optics.vignetting.model = BST_VIGNETTING_NONE;
-    bst_image_centroid(&camera, &s, &m, &x, &y);
+    bst_scene_image_centroid(&camera, &s, &m, &x, &y);
     assert_true(x == 330 && y == 40);
-    const bst_image_moments nowhere = {NAN, 40, 0, 0, 0};
-    bst_image_centroid(&camera, &s, &nowhere, &x, &y);
+    const bst_scene_image_moments nowhere = {NAN, 40, 0, 0, 0};
+    bst_scene_image_centroid(&camera, &s, &nowhere, &x, &y);
     assert_true(isnan(x) && y == 40);
 }
 
@@ -159,7 +160,8 @@ static void squares_of_streaks(void **state) {
             }
             double expected = sum / (2 * sqrt(BST_PI) * across);
             /* differences of error functions of lengths of 1e-4: 1e-11; the series: a^4 */
-            bst_assert_close(bst_image_squared(along, across, length), expected, 1e-7 * expected);
+            bst_assert_close(bst_optics_image_squared(along, across, length), expected,
+                             1e-7 * expected);
         }
     }
 }

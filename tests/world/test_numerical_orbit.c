@@ -7,17 +7,17 @@
     "\"eccentricity\": 0.1, \"inclination_deg\": 60, \"raan_deg\": 30, \"arg_perigee_deg\": " \
     "40, \"true_anomaly_deg\": 50}"
 
-static bst_state object_at(bst_view *view, int object, double seconds) {
+static bst_world_state object_at(bst_world_view *view, int object, double seconds) {
     bst_ctx ctx = {0};
-    bst_state s;
-    bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, object, seconds, &s));
+    bst_world_state s;
+    bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, object, seconds, &s));
     return s;
 }
 
-static bst_view *view_of(const bst_world *world) {
+static bst_world_view *view_of(const bst_world *world) {
     bst_ctx ctx = {0};
-    bst_view *view;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     return view;
 }
 
@@ -27,8 +27,8 @@ static void keplerian_elements_give_the_orbit(void **state) {
                                        ", \"forces\": {\"gravity\": "
                                        "\"two_body\"}}}",
                                        "");
-    bst_view *view = view_of(world);
-    bst_state s = object_at(view, 0, 100);
+    bst_world_view *view = view_of(world);
+    bst_world_state s = object_at(view, 0, 100);
     bst_vec3 h = bst_vec3_cross(s.position_m, s.velocity_mps), n = bst_vec3_unit(h);
     double r = bst_vec3_norm(s.position_m), gm = BST_EARTH_MU_M3PS2;
     bst_vec3 e = bst_vec3_axpy(bst_vec3_scale(bst_vec3_cross(s.velocity_mps, h), 1 / gm), -1 / r,
@@ -42,7 +42,7 @@ static void keplerian_elements_give_the_orbit(void **state) {
     bst_assert_close(bst_vec3_angle(node, e), 40 * deg, 1e-12);
     bst_assert_close(bst_vec3_angle(e, s.position_m), 50 * deg, 1e-12);
     bst_assert_close(r * (1 + 0.1 * cos(50 * deg)), 7e6 * 1.1, 1e-6);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -100,8 +100,8 @@ static void element_sets_and_other_objects_start_one_too(void **state) {
         "\"rate_rtn_mps\": [0.1, 0, 0], \"state\": {\"from\": \"relative\", \"at_s\": -50}}}",
         "");
     assert_int_equal(bst_world_object(world, 1)->norad, 44801);
-    bst_view *view = view_of(world);
-    bst_state a = object_at(view, 0, 500), b = object_at(view, 1, 500);
+    bst_world_view *view = view_of(world);
+    bst_world_state a = object_at(view, 0, 500), b = object_at(view, 1, 500);
     /* the first is interpolated, to 20 um */
     bst_assert_close(test_distance(a.position_m, b.position_m), 0, 1e-4);
     /* SGP4's own error of velocity (0.1 m/s) and what it leaves out, over an hour */
@@ -116,7 +116,7 @@ static void element_sets_and_other_objects_start_one_too(void **state) {
     bst_assert_close(bst_vec3_dot(d, r), 10, 1e-4);
     bst_assert_close(bst_vec3_dot(d, bst_vec3_cross(n, r)), -200, 1e-4);
     bst_assert_close(bst_vec3_dot(d, n), 30, 1e-4);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -127,12 +127,13 @@ static void the_cue_leaves_burns_out(void **state) {
                         "}, \"burns\": [{\"time_s\": 200, \"dv_rtn_mps\": [0, 1, 0]}, "
                         "{\"time_s\": 300, \"duration_s\": 60, \"dv_rtn_mps\": [0, 1, 0]}]}",
                         "");
-    const bst_orbit *orbit = &world->objects[0].orbit;
+    const bst_world_orbit *orbit = &world->objects[0].orbit;
     bst_ctx ctx = {0};
     for (double t = 0; t < 600; t += 50) {
-        bst_state with, without;
-        bst_assert_ok(&ctx, bst_orbit_state(&ctx, orbit, NULL, world->epoch, t, true, &with));
-        bst_assert_ok(&ctx, bst_orbit_state(&ctx, orbit, NULL, world->epoch, t, false, &without));
+        bst_world_state with, without;
+        bst_assert_ok(&ctx, bst_world_orbit_state(&ctx, orbit, NULL, world->epoch, t, true, &with));
+        bst_assert_ok(&ctx,
+                      bst_world_orbit_state(&ctx, orbit, NULL, world->epoch, t, false, &without));
         double dv = test_distance(with.velocity_mps, without.velocity_mps);
         double spent = t < 200 ? 0 : 1 + fmin(fmax((t - 300) / 60, 0), 1);
         /* tides of the burnt orbit: n t of it */
@@ -224,20 +225,20 @@ static void the_rendezvous_closes_to_200_m(void **state) {
     strcpy(scene.world.star_catalogue, "embedded");
     bst_assert_ok(&ctx, bst_world_create(&ctx, "rendezvous.json", &scene.world, &scene.observers,
                                          "scenarios", epoch, &world));
-    bst_view *view = view_of(world);
+    bst_world_view *view = view_of(world);
     /* time, range and how far off the aim is allowed: linear theory about a circular orbit misses
      * by range^2 / radius and eccentricity times range */
     static const double way[][3] = {
         {0, 50000, 1}, {3660, 5000, 600}, {5160, 1000, 10}, {6090, 200, 2}, {6300, 200, 2}};
     for (size_t i = 0; i < sizeof way / sizeof *way; i++) {
-        bst_sight sight;
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, way[i][0], &sight));
+        bst_world_sight sight;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, way[i][0], &sight));
         bst_assert_close(sight.range_m, way[i][1], way[i][2]);
     }
     double last = 5.01e4;
     for (double t = 100; t < 6300; t += 10) {
-        bst_sight sight;
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t, &sight));
+        bst_world_sight sight;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, t, &sight));
         assert_true(sight.range_m < 1.01 * last); /* it closes all the way, and then stays */
         last = fmin(last, sight.range_m);
         assert_true(sight.range_m > 195);
@@ -245,7 +246,7 @@ static void the_rendezvous_closes_to_200_m(void **state) {
         assert_true(sight.sunlit_fraction == 1);
         bst_assert_close(sight.phase_rad, 90 * BST_DEG_RAD, 2 * BST_DEG_RAD);
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
     bst_config_free(table, &scene);
     bst_json_free(json);

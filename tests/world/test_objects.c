@@ -59,7 +59,7 @@ static void a_catalogue_adds_each_satellite_once(void **state) {
     static const char *const names[] = {"GX5", "DEBRIS", "NORAD 10003", "DEBRIS 10001"};
     static const int numbers[] = {44801, 10002, 10003, 10001};
     for (int i = 0; i < 4; i++) {
-        const bst_object_info *info = bst_world_object(world, i);
+        const bst_world_object_info *info = bst_world_object(world, i);
         assert_string_equal(info->name, names[i]);
         assert_int_equal(info->norad, numbers[i]);
         assert_int_equal(bst_world_find_object(world, names[i]), i);

@@ -5,22 +5,22 @@
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
 
-static bst_state object_at(bst_view *view, int object, double seconds) {
+static bst_world_state object_at(bst_world_view *view, int object, double seconds) {
     bst_ctx ctx = {0};
-    bst_state s;
-    bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, object, seconds, &s));
+    bst_world_state s;
+    bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, object, seconds, &s));
     return s;
 }
 
-static bst_view *view_of(const bst_world *world) {
+static bst_world_view *view_of(const bst_world *world) {
     bst_ctx ctx = {0};
-    bst_view *view;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     return view;
 }
 
 /* Velocity by five-point differences of the position, step h. */
-static bst_vec3 velocity_by_difference(bst_view *view, int object, double t, double h) {
+static bst_vec3 velocity_by_difference(bst_world_view *view, int object, double t, double h) {
     bst_vec3 d1 = bst_vec3_sub(object_at(view, object, t + h).position_m,
                                object_at(view, object, t - h).position_m);
     bst_vec3 d2 = bst_vec3_sub(object_at(view, object, t + 2 * h).position_m,
@@ -28,7 +28,7 @@ static bst_vec3 velocity_by_difference(bst_view *view, int object, double t, dou
     return bst_vec3_scale(bst_vec3_axpy(bst_vec3_scale(d1, 8.0), -1.0, d2), 1.0 / (12.0 * h));
 }
 
-static void rtn_of(bst_state s, bst_vec3 *r, bst_vec3 *t, bst_vec3 *n) {
+static void rtn_of(bst_world_state s, bst_vec3 *r, bst_vec3 *t, bst_vec3 *n) {
     *r = bst_vec3_unit(s.position_m);
     *n = bst_vec3_unit(bst_vec3_cross(s.position_m, s.velocity_mps));
     *t = bst_vec3_cross(*n, *r);
@@ -43,9 +43,9 @@ static void a_relative_orbit_keeps_its_offset(void **state) {
         ", {\"name\": \"nearer\", \"orbit\": {\"source\": \"relative\", \"reference\": "
         "\"near\", \"offset_rtn_m\": [0, 50, 0]}}",
         "");
-    bst_view *view = view_of(world);
+    bst_world_view *view = view_of(world);
     for (double t = -500; t <= 5000; t += 500) {
-        bst_state ref = object_at(view, 0, t), near = object_at(view, 1, t);
+        bst_world_state ref = object_at(view, 0, t), near = object_at(view, 1, t);
         bst_vec3 r, s, n, d = bst_vec3_sub(near.position_m, ref.position_m);
         rtn_of(ref, &r, &s, &n);
         /* 1e-5: the reference is interpolated, the other is not */
@@ -60,7 +60,7 @@ static void a_relative_orbit_keeps_its_offset(void **state) {
         /* that same inconsistency turns the axes by 2.5e-10 rad/s, at 2e4 m */
         bst_assert_close(test_distance(v, dv), 0, 3e-5);
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -73,12 +73,12 @@ static void leap_seconds_since_the_elements_do_not_count(void **state) {
         "{\"name\": \"old\", \"orbit\": {\"elements_file\": "
         "\"tests/world/data/before_leap.tle\", \"norad\": 39089}}",
         "");
-    bst_view *view = view_of(world);
+    bst_world_view *view = view_of(world);
     bst_elements *sets;
     int count;
     bst_sgp4 *sgp4;
-    bst_eop *eop;
-    bst_earth_frames frames;
+    bst_astro_eop *eop;
+    bst_astro_earth_frames frames;
     bst_time epoch;
     double jd1, jd2, r[3], v[3];
     bst_assert_ok(&ctx, bst_elements_load(&ctx, file, NULL, &sets, &count));
@@ -87,16 +87,16 @@ static void leap_seconds_since_the_elements_do_not_count(void **state) {
     bst_time_utc(epoch, &jd1, &jd2);
     double minutes = (jd1 - sets->epoch_utc_jd1) * 1440.0 + (jd2 - sets->epoch_utc_jd2) * 1440.0;
     assert_int_equal(bst_sgp4_propagate(sgp4, minutes, r, v), BST_SGP4_OK);
-    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
-    bst_assert_ok(&ctx, bst_earth_frames_at(&ctx, eop, epoch, &frames));
+    bst_assert_ok(&ctx, bst_astro_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_astro_earth_frames_at(&ctx, eop, epoch, &frames));
     bst_vec3 place =
         bst_mat3_mul_vec(&frames.gcrf_from_teme, (bst_vec3){1e3 * r[0], 1e3 * r[1], 1e3 * r[2]});
     /* a second is 7.5 km; the world interpolates to 1e-5 m, of minutes in double 1e-6 s is left */
     bst_assert_close(test_distance(object_at(view, 0, 0.0).position_m, place), 0.0, 0.05);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
     bst_sgp4_free(sgp4);
     free(sets);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -118,14 +118,14 @@ static void a_burn_moves_the_object_as_theory_says(void **state) {
         char text[600];
         snprintf(text, sizeof text, BURNT("{\"time_s\": 100, \"dv_rtn_mps\": [%s]}"), burns[axis]);
         bst_world *world = test_world_with(text, "");
-        bst_view *view = view_of(world);
+        bst_world_view *view = view_of(world);
         /* before: the catalogued orbit, of which one is interpolated */
         for (double t = -100; t < 100; t += 49.99) {
             assert_true(test_distance(object_at(view, 0, t).position_m,
                                       object_at(view, 1, t).position_m) < 1e-5);
         }
         /* at the burn: same place, velocity changed by 10 m/s along that axis of the orbit */
-        bst_state base = object_at(view, 0, 100), after = object_at(view, 1, 100);
+        bst_world_state base = object_at(view, 0, 100), after = object_at(view, 1, 100);
         bst_vec3 rtn[3];
         rtn_of(base, &rtn[0], &rtn[1], &rtn[2]);
         bst_assert_close(test_distance(base.position_m, after.position_m), 0, 1e-5);
@@ -133,7 +133,7 @@ static void a_burn_moves_the_object_as_theory_says(void **state) {
         bst_assert_close(test_distance(change, bst_vec3_scale(rtn[axis], 10)), 0, 1e-10);
         const double n = sqrt(BST_EARTH_MU_M3PS2 / pow(bst_vec3_norm(base.position_m), 3));
         for (double t = 1; t < 3000; t *= 3) {
-            bst_state a = object_at(view, 0, 100 + t), b = object_at(view, 1, 100 + t);
+            bst_world_state a = object_at(view, 0, 100 + t), b = object_at(view, 1, 100 + t);
             bst_vec3 r, s, w, d = bst_vec3_sub(b.position_m, a.position_m);
             rtn_of(a, &r, &s, &w);
             bst_vec3 h = hill(dv[axis], n, t);
@@ -151,7 +151,7 @@ static void a_burn_moves_the_object_as_theory_says(void **state) {
                                          object_at(view, 0, 3000).velocity_mps);
         /* rounding: 1.5 x 1e-8 m / 5 s, from positions of 4e7 m */
         bst_assert_close(test_distance(dv_difference, dv_state), 0, 1e-7);
-        bst_view_free(view);
+        bst_world_view_free(view);
         bst_world_free(world);
     }
 }
@@ -161,8 +161,8 @@ static void a_burn_moves_the_object_as_theory_says(void **state) {
 static void a_burnt_orbit_has_the_period_of_its_energy(void **state) {
     (void)state;
     bst_world *world = test_world_with(BURNT("{\"time_s\": 0, \"dv_rtn_mps\": [0, 10, 0]}"), "");
-    bst_view *view = view_of(world);
-    bst_state before = object_at(view, 0, 0), s = object_at(view, 1, 0);
+    bst_world_view *view = view_of(world);
+    bst_world_state before = object_at(view, 0, 0), s = object_at(view, 1, 0);
     double alpha0 = 2 / bst_vec3_norm(before.position_m) -
                     bst_vec3_dot(before.velocity_mps, before.velocity_mps) / BST_EARTH_MU_M3PS2;
     double alpha = 2 / bst_vec3_norm(s.position_m) -
@@ -172,12 +172,12 @@ static void a_burnt_orbit_has_the_period_of_its_energy(void **state) {
     assert_true(period - period0 > 800 && period - period0 < 860); /* 3 x 10 / 3075 x 86164 = 841 */
     /* the deviation after one new period: two-body motion of the burnt orbit is back, that of the
      * unburnt one is period - period0 ahead */
-    bst_state a = object_at(view, 0, period), b = object_at(view, 1, period);
+    bst_world_state a = object_at(view, 0, period), b = object_at(view, 1, period);
     double lag = test_distance(a.position_m, b.position_m);
     double ahead =
         2 * bst_vec3_norm(before.position_m) * sin(0.5 * (period - period0) * 2 * BST_PI / period0);
     bst_assert_close(lag / ahead, 1, 1e-3); /* eccentricity 2e-4 of the unburnt orbit */
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 
@@ -189,7 +189,7 @@ static void burns_add_up(void **state) {
         test_world_with(BURNT("{\"time_s\": 100, \"dv_rtn_mps\": [0, 10, 0]}, {\"time_s\": 101, "
                               "\"dv_rtn_mps\": [0, -10, 0]}"),
                         "");
-    bst_view *view = view_of(world);
+    bst_world_view *view = view_of(world);
     bst_assert_close(
         test_distance(object_at(view, 0, 100.5).position_m, object_at(view, 1, 100.5).position_m),
         5, 1e-3);
@@ -204,7 +204,7 @@ static void burns_add_up(void **state) {
     bst_assert_close(
         test_distance(object_at(view, 0, 400).position_m, object_at(view, 1, 400).position_m), 10,
         0.5);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
     bst_ctx ctx = {0};
     assert_int_equal(
@@ -231,13 +231,13 @@ static void lines_are_as_good_as_a_file(void **state) {
         test_world_with(GX5 ", {\"name\": \"lines\", \"orbit\": {\"tle_line1\": \"" GX5_1
                             "\", \"tle_line2\": \"" GX5_2 "\"}}",
                         "");
-    bst_view *view = view_of(world);
+    bst_world_view *view = view_of(world);
     assert_int_equal(bst_world_object(world, 1)->norad, 44801);
     for (double t = 0.0; t < 3600.0; t += 600.0) {
-        bst_state file = object_at(view, 0, t), lines = object_at(view, 1, t);
+        bst_world_state file = object_at(view, 0, t), lines = object_at(view, 1, t);
         assert_memory_equal(&file, &lines, sizeof file);
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
 }
 

@@ -93,34 +93,34 @@ static void an_oem_observer_sees_an_injected_target(void **state) {
     snprintf(states, sizeof states, "%s", write_states(&s, "t.csv", 120.0));
     bst_assert_ok(&ctx, make(&ctx, oem, states, "", &world));
     bst_assert_ok(&ctx, bst_world_check_spans(&ctx, "test", world, 119.5));
-    bst_view *view;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     /* the ends of the files too, and what look-back and look-ahead need beyond them */
     static const double times[] = {-4.9, -0.5, 0.0, 0.1, 0.75, 31.4159, 119.25, 119.5, 124.0};
     for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
-        bst_state eye, target;
+        bst_world_state eye, target;
         bst_vec3 r, v;
-        bst_assert_ok(&ctx, bst_view_observer_state(&ctx, view, 0, times[i], &eye));
+        bst_assert_ok(&ctx, bst_world_view_observer_state(&ctx, view, 0, times[i], &eye));
         at(eye_r, eye_v, times[i], &r, &v);
         /* Hermite of degree 5 through rows 60 s apart: 0.148 7.1e6 (1.055e-3 60)^6 / 720 = 9.4e-5
          * m; its slope */
         bst_assert_close(test_distance(eye.position_m, r), 0.0, 1e-4);
         bst_assert_close(test_distance(eye.velocity_mps, v), 0.0, 1e-5);
-        bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, 0, times[i], &target));
+        bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 0, times[i], &target));
         at(target_r, target_v, times[i], &r, &v);
         bst_assert_close(test_distance(target.position_m, r), 0.0, 1e-7); /* rounding at 4e7 */
-        bst_sight sight;
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, fmax(times[i], -4.0), &sight));
+        bst_world_sight sight;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, fmax(times[i], -4.0), &sight));
         assert_true(sight.range_m > 3e7 && sight.range_m < 4e7);
     }
-    bst_state target;
-    assert_int_equal(bst_view_object_state(&ctx, view, 0, -5.1, &target), BST_ERR_NUMERIC);
+    bst_world_state target;
+    assert_int_equal(bst_world_view_object_state(&ctx, view, 0, -5.1, &target), BST_ERR_NUMERIC);
     assert_non_null(strstr(ctx.message, "orbit of target: "));
     assert_non_null(strstr(ctx.message,
                            "t.csv: no state of \"T\" -5.100000 s after the epoch: the "
                            "file covers 0.000000 s to 119.500000 s"));
-    assert_int_equal(bst_view_object_state(&ctx, view, 0, 200.0, &target), BST_ERR_NUMERIC);
-    bst_view_free(view);
+    assert_int_equal(bst_world_view_object_state(&ctx, view, 0, 200.0, &target), BST_ERR_NUMERIC);
+    bst_world_view_free(view);
     char message[2000];
     /* the last frame ends before the run does */
     bst_assert_ok(&ctx, bst_world_check_spans(&ctx, "test", world, 120.0));
@@ -177,18 +177,18 @@ static void injected_states_may_be_teme(void **state) {
     snprintf(oem, sizeof oem, "%s", write_oem(&s, "eye.oem", -60.0, 120.0));
     snprintf(states, sizeof states, "%s", write_states(&s, "t.csv", 120.0));
     bst_assert_ok(&ctx, make(&ctx, oem, states, ", \"states_frame\": \"teme\"", &world));
-    bst_view *view;
-    bst_state target;
-    bst_earth_frames frames;
+    bst_world_view *view;
+    bst_world_state target;
+    bst_astro_earth_frames frames;
     bst_vec3 r, v;
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
-    bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, 0, 30.25, &target));
-    bst_assert_ok(&ctx, bst_view_earth_frames(&ctx, view, 30.25, &frames));
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 0, 30.25, &target));
+    bst_assert_ok(&ctx, bst_world_view_earth_frames(&ctx, view, 30.25, &frames));
     at(target_r, target_v, 30.25, &r, &v);
     bst_assert_close(test_distance(target.position_m, bst_mat3_mul_vec(&frames.gcrf_from_teme, r)),
                      0.0, 1e-7); /* rounding at 4e7 */
     assert_true(test_distance(target.position_m, r) > 1e4);
-    bst_view_free(view);
+    bst_world_view_free(view);
     bst_world_free(world);
     scratch_remove(&s);
 }
@@ -265,18 +265,18 @@ static void a_body_at_rest_stays(void **state) {
                                        "/observers/0/sensors/0/knowledge/orbit: an "
                                        "error along the transverse"));
             }
-            bst_view *view;
-            bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+            bst_world_view *view;
+            bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
             for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
-                bst_state eye;
+                bst_world_state eye;
                 double a = turning * turn * times[i];
-                bst_assert_ok(&ctx, bst_view_observer_state(&ctx, view, 0, times[i], &eye));
+                bst_assert_ok(&ctx, bst_world_view_observer_state(&ctx, view, 0, times[i], &eye));
                 /* 5 s beyond: third derivative 2.5e-6 m/s3 (5 s)^3 / 6 and half a second of its
                  * acceleration's lag, 2.5e-6 0.5 (5 s)^2 / 2; falling would be 120 m */
                 const bst_vec3 there = {radius * cos(a), radius * sin(a), 0.0};
                 bst_assert_close(test_distance(eye.position_m, there), 0.0, 1e-4);
             }
-            bst_view_free(view);
+            bst_world_view_free(view);
             bst_world_free(world);
         }
     }

@@ -12,8 +12,8 @@
 static void parts_are_the_same_polynomials(void **state) {
     (void)state;
     bst_rng_key key = bst_rng_make_key(1, 0, "test", "part");
-    bst_source_path path;
-    bst_source_rate rate = {.count = 7};
+    bst_scene_source_path path;
+    bst_scene_source_rate rate = {.count = 7};
     uint64_t n = 0;
     for (int k = 0; k < BST_PATH_NODES; k++) {
         path.place[k] = (bst_vec3){4e7 + 1e5 * k + 3e3 * bst_rng_uniform(key, 0, n++),
@@ -35,34 +35,36 @@ static void parts_are_the_same_polynomials(void **state) {
                                                         (rate.rate[k] + rate.rate[k - 1])
                               : 0.0;
     }
-    bst_source whole = {.path = &path, .rate = &rate, .electrons_per_s = 1000.0};
-    whole.apparent_mid = bst_vec3_unit(bst_source_direction(&whole, 0.5));
+    bst_scene_source whole = {.path = &path, .rate = &rate, .electrons_per_s = 1000.0};
+    whole.apparent_mid = bst_vec3_unit(bst_scene_source_direction(&whole, 0.5));
     static const double spans[][2] = {{0, 1}, {0, 0.3}, {0.21, 0.22}, {0.4, 1}, {0.1, 0.95}};
     for (size_t i = 0; i < sizeof spans / sizeof *spans; i++) {
-        bst_source_part part;
-        bst_source own;
+        bst_scene_source_part part;
+        bst_scene_source own;
         double a = spans[i][0], b = spans[i][1];
-        bst_source_during(&whole, a, b, &part, &own);
+        bst_scene_source_during(&whole, a, b, &part, &own);
         for (int k = 0; k <= 20; k++) {
             double v = k / 20.0, u = a + (b - a) * v;
-            bst_vec3 d = bst_source_direction(&whole, u), e = bst_source_direction(&own, v);
+            bst_vec3 d = bst_scene_source_direction(&whole, u),
+                     e = bst_scene_source_direction(&own, v);
             /* rounding of polynomials of 4e7 m */
             bst_assert_close(test_distance(d, e), 0.0, 1e-6);
             /* the light until then, per second of the whole */
-            double light =
-                whole.electrons_per_s * (bst_source_light(&whole, u) - bst_source_light(&whole, a));
-            bst_assert_close(own.electrons_per_s * (b - a) * bst_source_light(&own, v), light,
+            double light = whole.electrons_per_s *
+                           (bst_scene_source_light(&whole, u) - bst_scene_source_light(&whole, a));
+            bst_assert_close(own.electrons_per_s * (b - a) * bst_scene_source_light(&own, v), light,
                              1e-9);
-            bst_assert_close(own.electrons_per_s * bst_source_rate_at(&own, v),
-                             whole.electrons_per_s * bst_source_rate_at(&whole, u), 1e-9);
+            bst_assert_close(own.electrons_per_s * bst_scene_source_rate_at(&own, v),
+                             whole.electrons_per_s * bst_scene_source_rate_at(&whole, u), 1e-9);
         }
-        assert_true(bst_vec3_angle(own.apparent_mid, bst_source_direction(&own, 0.5)) < 1e-9);
+        assert_true(bst_vec3_angle(own.apparent_mid, bst_scene_source_direction(&own, 0.5)) < 1e-9);
     }
     /* no light in the part: none is left, and nothing divides by it */
-    rate = (bst_source_rate){.count = 3, .u = {0, 0.5, 1}, .rate = {4, 0, 0}, .light = {0, 1, 1}};
-    bst_source_part part;
-    bst_source dark;
-    bst_source_during(&whole, 0.6, 0.8, &part, &dark);
+    rate = (bst_scene_source_rate){
+        .count = 3, .u = {0, 0.5, 1}, .rate = {4, 0, 0}, .light = {0, 1, 1}};
+    bst_scene_source_part part;
+    bst_scene_source dark;
+    bst_scene_source_during(&whole, 0.6, 0.8, &part, &dark);
     assert_true(dark.electrons_per_s == 0.0 && !dark.rate);
 }
 
@@ -84,8 +86,8 @@ static void a_running_image_is_exposed_longer(void **state) {
                 q[n] = bst_quat_from_rotvec((bst_vec3){-y * scale, 0, 0});
             }
             bst_los_track track = {2, time_s, q};
-            bst_source star = {.apparent_mid = bst_camera_unproject(&camera, 100, 169.5),
-                               .electrons_per_s = 1};
+            bst_scene_source star = {.apparent_mid = bst_camera_unproject(&camera, 100, 169.5),
+                                     .electrons_per_s = 1};
             bst_row_times rows = {t, exposure, {0, 0, 400, 300}};
             double u[2], stretch = 1.0 / (1.0 - v * t);
             bst_row_source_times(&camera, &rows, &track, &star, u);
@@ -103,7 +105,7 @@ static void a_running_image_is_exposed_longer(void **state) {
     double time_s[2] = {0, duration}, u[2];
     bst_los_track track = {2, time_s, still};
     bst_row_times rows = {1e-3, exposure, {0, 100, 400, 101}};
-    bst_source star = {.apparent_mid = bst_camera_unproject(&camera, 100, 20)};
+    bst_scene_source star = {.apparent_mid = bst_camera_unproject(&camera, 100, 20)};
     bst_row_source_times(&camera, &rows, &track, &star, u);
     bst_assert_close(u[0] * duration, 0.5 * (duration - exposure) - 50e-3, 1e-12);
     bst_assert_close((u[1] - u[0]) * duration, exposure, 1e-12);
@@ -143,7 +145,7 @@ static void truth_is_that_of_each_row(void **state) {
     assert_int_equal(lead, 154); /* 511.5 rows of 50 us: 153.45 ticks */
     bst_los_track track;
     bst_truth truth = {0};
-    const bst_source *sources;
+    const bst_scene_source *sources;
     int count, seen = 0;
     bst_field_options options = {.v_limit = 16, .lead_s = (double)lead / RATE};
     bst_assert_ok(&ctx, bst_field_track(&ctx, field, h, start - lead, end + lead, RATE, &track));

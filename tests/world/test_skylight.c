@@ -7,36 +7,36 @@
 
 #define FULL_SUN pow(10.0, 0.4 * 26.74)
 
-static bst_pst *make_pst(const bst_pst_point *points, int count) {
+static bst_scene_pst *make_pst(const bst_optics_pst_point *points, int count) {
     bst_ctx ctx = {0};
     bst_background_config c = {.pst = {(void *)points, count}, .pixel_um = 10};
-    bst_pst *pst;
-    bst_assert_ok(&ctx, bst_pst_create(&ctx, &c, 0, "", &pst));
+    bst_scene_pst *pst;
+    bst_assert_ok(&ctx, bst_scene_pst_create(&ctx, &c, 0, "", &pst));
     return pst;
 }
 
 static void transmittance_is_log_linear(void **state) {
     (void)state;
-    bst_pst *pst = make_pst((bst_pst_point[]){{20, 1e-3}, {40, 1e-5}, {60, 0}}, 3);
-    bst_assert_close(bst_pst_at(pst, 30 * BST_DEG_RAD), 1e-4, 1e-15); /* geometric mean */
-    bst_assert_close(bst_pst_at(pst, 50 * BST_DEG_RAD), 5e-6, 1e-17); /* next to a zero */
-    bst_assert_close(bst_pst_at(pst, 0), 1e-3, 0);
-    bst_assert_close(bst_pst_at(pst, 3), 0, 0);
-    bst_pst_free(pst);
+    bst_scene_pst *pst = make_pst((bst_optics_pst_point[]){{20, 1e-3}, {40, 1e-5}, {60, 0}}, 3);
+    bst_assert_close(bst_scene_pst_at(pst, 30 * BST_DEG_RAD), 1e-4, 1e-15); /* geometric mean */
+    bst_assert_close(bst_scene_pst_at(pst, 50 * BST_DEG_RAD), 5e-6, 1e-17); /* next to a zero */
+    bst_assert_close(bst_scene_pst_at(pst, 0), 1e-3, 0);
+    bst_assert_close(bst_scene_pst_at(pst, 3), 0, 0);
+    bst_scene_pst_free(pst);
     bst_ctx ctx = {0};
-    bst_pst_point wrong[] = {{20, 1e-3}, {20, 1e-5}};
+    bst_optics_pst_point wrong[] = {{20, 1e-3}, {20, 1e-5}};
     bst_background_config c = {.pst = {wrong, 2}, .pixel_um = 10};
-    assert_int_equal(bst_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
+    assert_int_equal(bst_scene_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "pst/1/angle_deg"));
     c.pst.count = 1;
     c.pixel_um = 0;
-    assert_int_equal(bst_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
+    assert_int_equal(bst_scene_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "pixel_um"));
 }
 
 static void stray_light_by_hand(void **state) {
     (void)state;
-    bst_pst *flat = make_pst((bst_pst_point[]){{0, 1}}, 1);
+    bst_scene_pst *flat = make_pst((bst_optics_pst_point[]){{0, 1}}, 1);
     bst_vec3 x = {1, 0, 0};
     bst_bodies bodies = {.sun_m = {BST_AU_M, 0, 0}, .moon_m = {0, 3.844e8, 0}};
     bst_background_config sun = {.sun = true}, moon = {.moon = true},
@@ -48,8 +48,8 @@ static void stray_light_by_hand(void **state) {
     /* inside the Earth's shadow */
     assert_true(bst_stray_irradiance(flat, &sun, night, &bodies, x) == 0);
     /* a quarter Moon, seen from the Earth's centre's distance; hidden behind the Earth */
-    double v =
-        bst_moon_v_mag(bst_vec3_sub(bodies.moon_m, day), bst_vec3_sub(bodies.sun_m, bodies.moon_m));
+    double v = bst_scene_moon_v_mag(bst_vec3_sub(bodies.moon_m, day),
+                                    bst_vec3_sub(bodies.sun_m, bodies.moon_m));
     bst_assert_close(bst_stray_irradiance(flat, &moon, day, &bodies, x), pow(10, -0.4 * v),
                      1e-6 * pow(10, -0.4 * v));
     assert_true(bst_stray_irradiance(flat, &moon, (bst_vec3){0, -7e6, 0}, &bodies, x) == 0);
@@ -65,18 +65,18 @@ static void stray_light_by_hand(void **state) {
     /* the night side sends nothing; the Sun's place decides, not the Earth's */
     assert_true(bst_stray_irradiance(flat, &earth, (bst_vec3){-1e9, 0, 0}, &bodies, x) <
                 1e-6 * FULL_SUN * 1e-5);
-    bst_pst_free(flat);
-    bst_pst *steep = make_pst((bst_pst_point[]){{30, 1e-2}, {90, 1e-8}}, 2);
+    bst_scene_pst_free(flat);
+    bst_scene_pst *steep = make_pst((bst_optics_pst_point[]){{30, 1e-2}, {90, 1e-8}}, 2);
     double near = bst_stray_irradiance(steep, &sun, day, &bodies, bst_vec3_from_radec(0.6, 0));
     double far = bst_stray_irradiance(steep, &sun, day, &bodies, bst_vec3_from_radec(1.2, 0));
     /* 0.6 rad further out: 34.377 degrees of 0.1 decade each */
     bst_assert_close(log10(near / far), 0.1 * 0.6 / BST_DEG_RAD, 1e-9);
-    bst_pst_free(steep);
+    bst_scene_pst_free(steep);
 }
 
 /* A camera that looks along -x, columns along y, from `eye`. */
-static bst_surroundings look_down(bst_vec3 eye, double y_rad) {
-    bst_surroundings a = {
+static bst_scene_surroundings look_down(bst_vec3 eye, double y_rad) {
+    bst_scene_surroundings a = {
         .eye_m = eye,
         .bodies = {.sun_m = {BST_AU_M, 0, 0}, .moon_m = {0, 0, 3.844e8}, .pole = {0, 0, 1}},
         .itrf_from_gcrf = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
@@ -114,7 +114,7 @@ static void the_limb_is_where_geometry_has_it(void **state) {
         double r = radii[i], a = BST_EARTH_RADIUS_M, b = a * (1 - BST_EARTH_FLATTENING);
         double angle[2] = {asin(a / r), atan(b / sqrt(r * r - a * a))};
         for (int polar = 0; polar < 2; polar++) {
-            bst_surroundings around = look_down((bst_vec3){r, 0, 0}, 0);
+            bst_scene_surroundings around = look_down((bst_vec3){r, 0, 0}, 0);
             around.exposure_s = 1e-3; /* the observer falls by less than a micrometre */
             /* turned so that the boresight is 20 px inside of the limb */
             double scale = bst_camera_scale_rad(&camera), to = angle[polar] - 20 * scale;
@@ -151,12 +151,12 @@ static void stars_set_at_the_limb(void **state) {
     (void)state;
     bst_camera camera = test_camera(3);
     bst_vec3 eye = {7.2e6, 0, 0};
-    bst_surroundings around = look_down(eye, 0);
+    bst_scene_surroundings around = look_down(eye, 0);
     around.exposure_s = 1e-3;
     around.eye_mps = (bst_vec3){0, 5e3, 5.5e3};
     around.bodies.earth_bary_mps = (bst_vec3){0, 2e4, -2.2e4};
-    around.light = bst_light_at(&around.bodies, eye, around.eye_mps);
-    bst_light geocentric = bst_light_at(&around.bodies, eye, (bst_vec3){0, 0, 0});
+    around.light = bst_astro_light_at(&around.bodies, eye, around.eye_mps);
+    bst_astro_light geocentric = bst_astro_light_at(&around.bodies, eye, (bst_vec3){0, 0, 0});
     double to = asin(BST_EARTH_RADIUS_M / 7.2e6), scale = bst_camera_scale_rad(&camera);
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
@@ -168,10 +168,10 @@ static void stars_set_at_the_limb(void **state) {
         bst_vec3 d =
             bst_vec3_unit((bst_vec3){(i % 40 - 20) * 0.25 * scale, (i / 40 - 5) * 25 * scale, 1});
         double share = bst_discs_light(&discs, d).earth;
-        bst_vec3 star =
-            bst_light_catalogue_star(&around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
-        bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_light_apparent_star(&geocentric, star));
-        bool occulted = bst_earth_occults(eye, far, around.bodies.pole);
+        bst_vec3 star = bst_astro_light_catalogue_star(
+            &around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
+        bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_astro_light_apparent_star(&geocentric, star));
+        bool occulted = bst_astro_earth_occults(eye, far, around.bodies.pole);
         hidden += occulted;
         seen += !occulted;
         /* 0.05 px of an edge that the PSF softens to 0.9 px */
@@ -189,7 +189,7 @@ static void shares_of_windows(void **state) {
     int partial = 0;
     for (int turn = 0; turn < 6; turn++) {
         bst_vec3 eye = {7.2e6 + 3e6 * turn, 0, 0};
-        bst_surroundings around = look_down(eye, 0);
+        bst_scene_surroundings around = look_down(eye, 0);
         around.exposure_s = 1e-3;
         around.bodies.moon_m = (bst_vec3){-1.6e8, 3.5e8, 1e7};
         double to = asin(BST_EARTH_RADIUS_M / eye.x) + 0.01 * (turn - 3);
@@ -207,8 +207,8 @@ static void shares_of_windows(void **state) {
                 for (int x = at.x0; x < at.x0 + at.width; x += 2) {
                     bst_vec3 d = bst_quat_rotate(bst_quat_conj(around.q[0]),
                                                  bst_camera_unproject(&camera, x, y));
-                    hidden +=
-                        bst_earth_occults(eye, bst_vec3_axpy(eye, 1e12, d), around.bodies.pole);
+                    hidden += bst_astro_earth_occults(eye, bst_vec3_axpy(eye, 1e12, d),
+                                                      around.bodies.pole);
                     all++;
                 }
             }
@@ -221,7 +221,7 @@ static void shares_of_windows(void **state) {
     assert_true(partial >= 6);
     /* a Moon of 31 px in the middle: its area; its window's share; elsewhere none */
     bst_vec3 origin = {0, 0, 0};
-    bst_surroundings around = look_down(origin, 0);
+    bst_scene_surroundings around = look_down(origin, 0);
     around.bodies.moon_m = (bst_vec3){-3.844e8, 0, 0};
     around.bodies.sun_m = (bst_vec3){0, BST_AU_M, 0};
     bst_discs discs;
@@ -247,17 +247,18 @@ static void angle_from_the_limb(void **state) {
         for (int k = 0; k < 50; k++) {
             double a = 0.5 * (low + high);
             bst_vec3 d = bst_vec3_add(bst_vec3_scale(down, cos(a)), bst_vec3_scale(side, sin(a)));
-            *(bst_earth_occults(eye, bst_vec3_axpy(eye, 1e12, d), pole) ? &low : &high) = a;
+            *(bst_astro_earth_occults(eye, bst_vec3_axpy(eye, 1e12, d), pole) ? &low : &high) = a;
         }
         for (int n = -2; n <= 2; n++) {
             double a = low + 0.005 * n;
             bst_vec3 d = bst_vec3_add(bst_vec3_scale(down, cos(a)), bst_vec3_scale(side, sin(a)));
             /* next to the limb that is not straight at right angles to this plane: flattening */
-            bst_assert_close(bst_earth_limb_angle(eye, pole, d), 0.005 * n, 1e-4);
+            bst_assert_close(bst_astro_earth_limb_angle(eye, pole, d), 0.005 * n, 1e-4);
         }
     }
-    assert_true(bst_earth_limb_angle((bst_vec3){7e6, 0, 0}, pole, (bst_vec3){1, 0, 0}) > 1.0);
-    assert_true(bst_earth_limb_angle((bst_vec3){6e6, 0, 0}, pole, (bst_vec3){1, 0, 0}) < -1.0);
+    assert_true(bst_astro_earth_limb_angle((bst_vec3){7e6, 0, 0}, pole, (bst_vec3){1, 0, 0}) > 1.0);
+    assert_true(bst_astro_earth_limb_angle((bst_vec3){6e6, 0, 0}, pole, (bst_vec3){1, 0, 0}) <
+                -1.0);
 }
 
 /* Light of a whole disc, summed over pixels much smaller than it. */
@@ -277,7 +278,7 @@ static void discs_hold_their_light(void **state) {
     camera.background.earth = false;
     bst_vec3 eye = {0, 0, 0};
     for (int degrees = 0; degrees < 180; degrees += 30) {
-        bst_surroundings around = look_down(eye, 0);
+        bst_scene_surroundings around = look_down(eye, 0);
         double phase = degrees * BST_DEG_RAD;
         /* straight ahead, the Sun `phase` from opposition */
         around.bodies.moon_m = (bst_vec3){-3.844e8, 0, 0};
@@ -287,13 +288,13 @@ static void discs_hold_their_light(void **state) {
         bst_discs discs;
         bst_discs_make(&camera, &around, &discs);
         assert_true(discs.body[BST_BODY_MOON].present && !discs.body[BST_BODY_SUN].present);
-        double expected =
-            pow(10, -0.4 * bst_moon_v_mag(around.bodies.moon_m,
-                                          bst_vec3_sub(around.bodies.sun_m, around.bodies.moon_m)));
+        double expected = pow(10, -0.4 * bst_scene_moon_v_mag(around.bodies.moon_m,
+                                                              bst_vec3_sub(around.bodies.sun_m,
+                                                                           around.bodies.moon_m)));
         /* pixels of 1/93 of the radius, the edge softened as if it were straight: 2 % */
         bst_assert_close(disc_flux(&camera, &discs), expected, 0.02 * expected);
     }
-    bst_surroundings around = look_down(eye, 0);
+    bst_scene_surroundings around = look_down(eye, 0);
     around.bodies.sun_m = (bst_vec3){-BST_AU_M, 0, 0};
     around.light.sun_m = around.bodies.sun_m;
     bst_discs discs;
@@ -311,7 +312,7 @@ static void discs_hold_their_light(void **state) {
 static void moving_edges_are_the_mean_of_their_places(void **state) {
     (void)state;
     bst_camera camera = test_camera(20);
-    bst_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
+    bst_scene_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
     double to = asin(BST_EARTH_RADIUS_M / 4.2164e7), scale = bst_camera_scale_rad(&camera);
     bst_quat q0 = around.q[0];
     const double move_px = 60;
@@ -325,7 +326,7 @@ static void moving_edges_are_the_mean_of_their_places(void **state) {
     double share[11] = {0}, light[11] = {0};
     for (int n = 0; n < STILLS; n++) {
         double t = to + move_px * scale * ((n + 0.5) / STILLS - 0.5);
-        bst_surroundings still = around;
+        bst_scene_surroundings still = around;
         for (int k = 0; k <= BST_DISC_PARTS; k++) {
             still.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -t, 0}), q0);
         }
@@ -355,7 +356,7 @@ static void moving_edges_are_the_mean_of_their_places(void **state) {
     "\"width_px\": " size ", \"height_px\": " size                                     \
     ", \"background_mag_arcsec2\": 21, \"background\": {" background "}}}]}]}"
 
-static const bst_skylight_map *make(bst_world *world, const bst_surroundings *around,
+static const bst_skylight_map *make(bst_world *world, const bst_scene_surroundings *around,
                                     bst_window window, bst_skylight **skylight) {
     bst_ctx ctx = {0};
     const bst_skylight_map *map;
@@ -371,7 +372,7 @@ static void gradients_are_polynomials(void **state) {
                                             "\"curvature_e_per_s\": [1, -0.5, 0.25]"));
     const bst_camera *camera = bst_world_camera(world, 0, 0);
     assert_true(bst_skylight_varies(camera));
-    bst_surroundings around = look_down((bst_vec3){7e6, 0, 0}, 2);
+    bst_scene_surroundings around = look_down((bst_vec3){7e6, 0, 0}, 2);
     around.exposure_s = 3;
     bst_skylight *s;
     const bst_skylight_map *map = make(world, &around, (bst_window){0, 0, 300, 300}, &s);
@@ -397,7 +398,7 @@ static void windows_and_interpolation(void **state) {
                              "\"model\": \"sky\", \"starlight\": false, \"earth\": false, "
                              "\"moon\": false, \"sun\": false"));
     const bst_camera *camera = bst_world_camera(world, 0, 0);
-    bst_surroundings around = look_down((bst_vec3){7e6, 0, 0}, BST_PI - 0.5);
+    bst_scene_surroundings around = look_down((bst_vec3){7e6, 0, 0}, BST_PI - 0.5);
     bst_skylight *a, *b;
     const bst_skylight_map *whole = make(world, &around, (bst_window){0, 0, 1000, 1000}, &a);
     const bst_skylight_map *part = make(world, &around, (bst_window){437, 611, 130, 7}, &b);
@@ -428,7 +429,7 @@ static void edges_are_drawn_pixel_by_pixel(void **state) {
     (void)state;
     bst_world *world = test_world(SKY_WORLD("300", "\"model\": \"sky\""));
     const bst_camera *camera = bst_world_camera(world, 0, 0);
-    bst_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
+    bst_scene_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
     double to = asin(BST_EARTH_RADIUS_M / 4.2164e7);
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
@@ -466,7 +467,7 @@ static void stray_light_on_the_detector(void **state) {
     (void)state;
 #define DARK "\"model\": \"sky\", \"starlight\": false, \"earth\": false, \"moon\": false"
     double value[2];
-    bst_surroundings around = look_down((bst_vec3){7e6, 0, 0}, BST_PI - BST_PI / 6);
+    bst_scene_surroundings around = look_down((bst_vec3){7e6, 0, 0}, BST_PI - BST_PI / 6);
     around.exposure_s = 3;
     double v0 = 0, efficiency = 0;
     for (int table = 0; table < 2; table++) {
@@ -497,7 +498,7 @@ static void the_limb_fades_into_the_sky(void **state) {
                             test_world(SKY_WORLD("300", SKY_ONLY ", \"earth\": false"))};
     const bst_camera *camera = bst_world_camera(worlds[0], 0, 0);
     double scale = bst_camera_scale_rad(camera), limb = asin(BST_EARTH_RADIUS_M / 7.2e6);
-    bst_surroundings around = look_down((bst_vec3){7.2e6, 0, 0}, 0);
+    bst_scene_surroundings around = look_down((bst_vec3){7.2e6, 0, 0}, 0);
     double sun_e = bst_camera_electrons_per_s(camera, 0) * scale * scale * around.exposure_s;
     int followed = 0, beyond = 0;
     for (int k = 0; k <= BST_DISC_PARTS; k++) { /* a scale height is 25 px: 13 to 25 of them */
@@ -535,7 +536,7 @@ static void bodies_are_found_wherever_the_camera_turns(void **state) {
     double half = bst_camera_half_diagonal_rad(&camera), r = 4.2164e7;
     for (int i = 0; i < 60; i++) {
         double turn = 0.02 * (i % 6), away = half * (0.25 * (i / 6) + 0.2);
-        bst_surroundings around = look_down((bst_vec3){r, 0, 0}, 0);
+        bst_scene_surroundings around = look_down((bst_vec3){r, 0, 0}, 0);
         for (int k = 0; k <= BST_DISC_PARTS; k++) {
             double to = asin(BST_EARTH_RADIUS_M / r) + away + turn * (1 - fabs(k - 4.0) / 4);
             around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);

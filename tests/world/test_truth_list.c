@@ -23,7 +23,7 @@ typedef struct scene {
     bst_field *field;
     bst_los_history *history;
     bst_los_track track;
-    const bst_source *sources;
+    const bst_scene_source *sources;
     int count;
     bst_truth *truth;
     double peak_e[MOST];

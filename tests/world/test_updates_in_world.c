@@ -8,19 +8,19 @@
 static const double place[4][3] = {
     {7e6, -2e5, 3e5}, {1200, 7300, -800}, {-4, 0.5, 1.5}, {-0.002, -0.003, 0.001}};
 
-static bst_state cubic(double t) {
+static bst_world_state cubic(double t) {
     double p[3], v[3];
     for (int i = 0; i < 3; i++) {
         p[i] = place[0][i] + t * (place[1][i] + t * (place[2][i] + t * place[3][i]));
         v[i] = place[1][i] + t * (2 * place[2][i] + 3 * t * place[3][i]);
     }
-    return (bst_state){{p[0], p[1], p[2]}, {v[0], v[1], v[2]}};
+    return (bst_world_state){{p[0], p[1], p[2]}, {v[0], v[1], v[2]}};
 }
 
 static int print_object(char *out, size_t bytes, const char *name, double start, double end) {
     int n = snprintf(out, bytes, "{\"object\": \"%s\"", name);
     for (int e = 0; e < 2; e++) {
-        bst_state s = cubic(e ? end : start);
+        bst_world_state s = cubic(e ? end : start);
         const char *word = e ? "end" : "start";
         n += snprintf(out + n, bytes - (size_t)n,
                       ", \"%s_position_m\": [%.17g, %.17g, %.17g], \"%s_velocity_mps\": [%.17g, "
@@ -69,7 +69,7 @@ static void states_come_with_the_frames(void **state) {
     char path[BST_TEST_PATH + 8];
     bst_ctx ctx = {0};
     bst_world *world;
-    bst_view *view;
+    bst_world_view *view;
     write_file(path);
     bst_assert_ok(&ctx, try_world(&ctx, path, path, &world));
     assert_null(bst_world_frame_updates(world, 0, 0));
@@ -77,18 +77,18 @@ static void states_come_with_the_frames(void **state) {
     assert_non_null(updates);
     assert_int_equal(bst_frame_updates_count(updates), 3);
     assert_string_equal(bst_frame_updates_name(updates), path);
-    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     for (double t = 2; t <= 4.8; t += 0.1) {
-        bst_state got, want = cubic(t);
-        bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, 0, t, &got));
+        bst_world_state got, want = cubic(t);
+        bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 0, t, &got));
         /* rounding of 7e6 m, and of its derivative over half a second */
         bst_assert_close(test_distance(got.position_m, want.position_m), 0, 1e-6);
         bst_assert_close(test_distance(got.velocity_mps, want.velocity_mps), 0, 1e-5);
     }
-    bst_state got; /* for 5 s they are continued */
-    assert_int_equal(bst_view_object_state(&ctx, view, 0, -3.1, &got), BST_ERR_NUMERIC);
-    assert_int_equal(bst_view_object_state(&ctx, view, 0, 9.9, &got), BST_ERR_NUMERIC);
-    bst_view_free(view);
+    bst_world_state got; /* for 5 s they are continued */
+    assert_int_equal(bst_world_view_object_state(&ctx, view, 0, -3.1, &got), BST_ERR_NUMERIC);
+    assert_int_equal(bst_world_view_object_state(&ctx, view, 0, 9.9, &got), BST_ERR_NUMERIC);
+    bst_world_view_free(view);
     bst_world_free(world);
     /* of no sensor, the file has no times */
     assert_int_equal(try_world(&ctx, "", path, &world), BST_ERR_CONFIG);

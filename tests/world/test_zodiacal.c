@@ -49,11 +49,13 @@ static void the_moon_has_its_phases(void **state) {
     (void)state;
     bst_vec3 moon = {3.844e8, 0, 0};
     /* phase angles of 0, 90 and 180 degrees: 0.026 * 90 + 4e-9 * 90^4 = 2.6024 */
-    bst_assert_close(bst_moon_v_mag(moon, (bst_vec3){-BST_AU_M, 0, 0}), -12.73, 1e-9);
-    bst_assert_close(bst_moon_v_mag(moon, (bst_vec3){0, BST_AU_M, 0}), -12.73 + 2.60244, 1e-9);
-    bst_assert_close(bst_moon_v_mag(moon, (bst_vec3){BST_AU_M, 0, 0}), -12.73 + 8.87904, 1e-9);
+    bst_assert_close(bst_scene_moon_v_mag(moon, (bst_vec3){-BST_AU_M, 0, 0}), -12.73, 1e-9);
+    bst_assert_close(bst_scene_moon_v_mag(moon, (bst_vec3){0, BST_AU_M, 0}), -12.73 + 2.60244,
+                     1e-9);
+    bst_assert_close(bst_scene_moon_v_mag(moon, (bst_vec3){BST_AU_M, 0, 0}), -12.73 + 8.87904,
+                     1e-9);
     /* twice as far: 5 log10 2 */
-    bst_assert_close(bst_moon_v_mag(bst_vec3_scale(moon, 2), (bst_vec3){-BST_AU_M, 0, 0}),
+    bst_assert_close(bst_scene_moon_v_mag(bst_vec3_scale(moon, 2), (bst_vec3){-BST_AU_M, 0, 0}),
                      -12.73 + 1.50515, 1e-5);
 }
 

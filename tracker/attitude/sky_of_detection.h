@@ -11,6 +11,7 @@
  * widened by extra_px2 (px^2) per axis, and of the attitude (rad^2, about camera axes). */
 bst_sky_measurement bst_sky_of_detection(const bst_camera *camera, const bst_detection *item,
                                          double extra_px2, bst_quat q_cam_from_gcrf,
-                                         const double covariance_cam[3][3], const bst_light *light);
+                                         const double covariance_cam[3][3],
+                                         const bst_astro_light *light);
 
 #endif

@@ -59,7 +59,7 @@ static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *b
     if (!(chi2 <= m->params.memory_chi2)) {
         return;
     }
-    double misfit = chi2 + bst_log_det4(before->state.covariance);
+    double misfit = chi2 + bst_mixture_log_det4(before->state.covariance);
     if (misfit < choice->lowest) {
         choice->second = choice->lowest;
         choice->lowest = misfit;

@@ -85,7 +85,7 @@ void bst_sky_mix(const bst_sky_state *states, const double *weights, int count,
     *out = state_of(&base, &sum);
 }
 
-double bst_log_det4(const double p[4][4]) {
+double bst_mixture_log_det4(const double p[4][4]) {
     double a[4][4], sum = 0.0;
     memcpy(a, p, sizeof a);
     for (int k = 0; k < 4; k++) {
@@ -108,7 +108,7 @@ static component merge(const component *a, const component *b) {
     add(&sum, a, a->weight / sum.weight);
     add(&sum, b, b->weight / sum.weight);
     centre(&sum);
-    sum.log_det = bst_log_det4(sum.p);
+    sum.log_det = bst_mixture_log_det4(sum.p);
     return sum;
 }
 
@@ -144,7 +144,7 @@ int bst_sky_reduce(bst_sky_state *states, double *weights, int count, int keep) 
             n++;
         }
         express(&base, &states[i], weights[i], &list[at]);
-        list[at].log_det = bst_log_det4(list[at].p);
+        list[at].log_det = bst_mixture_log_det4(list[at].p);
     }
     double prices[MOST][MOST];
     for (int i = 0; n > keep && i < n; i++) {

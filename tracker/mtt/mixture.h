@@ -18,6 +18,6 @@ int bst_sky_reduce(bst_sky_state *states, double *weights, int count, int keep);
 void bst_sky_shift_by(bst_sky_state *state, const double x[4]);
 
 /* ln det; INFINITY when not positive definite. */
-double bst_log_det4(const double p[4][4]);
+double bst_mixture_log_det4(const double p[4][4]);
 
 #endif

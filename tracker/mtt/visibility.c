@@ -29,12 +29,13 @@ static double least_distance(bst_vec3 a, bst_vec3 b) {
     return bst_vec3_norm(bst_vec3_axpy(a, fmin(fmax(s, 0.0), 1.0), along));
 }
 
-bst_mtt_sight bst_sight_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3 sun_m,
-                           const bst_sight_seen *seen, double threshold_snr, bst_mtt_light *light) {
+bst_mtt_sight bst_visibility_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3 sun_m,
+                                const bst_visibility_seen *seen, double threshold_snr,
+                                bst_mtt_light *light) {
     bst_vec3 to_eye = bst_vec3_sub(observer_m, object_m);
     double phase = bst_vec3_angle(to_eye, bst_vec3_sub(sun_m, object_m));
-    light->sunlight = bst_sun_fraction(object_m, sun_m, BST_EARTH_POLE_J2000);
-    light->glow = bst_sphere_phase(0.0, phase) / bst_vec3_dot(to_eye, to_eye);
+    light->sunlight = bst_astro_sun_fraction(object_m, sun_m, BST_EARTH_POLE_J2000);
+    light->glow = bst_astro_sphere_phase(0.0, phase) / bst_vec3_dot(to_eye, to_eye);
     double kept = seen->glow > 0.0 ? light->glow / seen->glow : 1.0;
     light->snr = seen->snr * light->sunlight * kept;
     light->bright = light->snr > threshold_snr + BRIGHT_ABOVE;
@@ -43,7 +44,7 @@ bst_mtt_sight bst_sight_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3 sun_
         return BST_MTT_EARTH;
     }
     bst_vec3 farther = bst_vec3_scale(object_m, 1.0 + LIMB_SHARE);
-    if (bst_sun_fraction(farther, sun_m, BST_EARTH_POLE_J2000) == 0.0) {
+    if (bst_astro_sun_fraction(farther, sun_m, BST_EARTH_POLE_J2000) == 0.0) {
         return BST_MTT_DARK;
     }
     if (seen->snr > 0.0 ? light->snr < DARK_SHARE * threshold_snr : light->sunlight == 0.0) {
@@ -51,7 +52,7 @@ bst_mtt_sight bst_sight_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3 sun_
     }
     bst_vec3 nearer = bst_vec3_scale(object_m, 1.0 / (1.0 + LIMB_SHARE));
     bool in_full_light =
-        bst_sun_fraction(nearer, sun_m, BST_EARTH_POLE_J2000) == 1.0 && !seen->was_bright;
+        bst_astro_sun_fraction(nearer, sun_m, BST_EARTH_POLE_J2000) == 1.0 && !seen->was_bright;
     bool dim = !in_full_light && !light->bright;
     return dim || distance < 1.0 + LIMB_SHARE ? BST_MTT_FAINT : BST_MTT_CLEAR;
 }

@@ -27,7 +27,7 @@ static bst_status teme_at_hour(bst_ctx *ctx, const bst_od_motion *motion, int64_
     enum { SLOTS = sizeof motion->sgp4->hours / sizeof *motion->sgp4->hours };
     int slot = (int)(((hour % SLOTS) + SLOTS) % SLOTS);
     if (!motion->sgp4->hours[slot].valid || motion->sgp4->hours[slot].hour != hour) {
-        bst_sky sky;
+        bst_sky_rotation sky;
         BST_TRY(bst_sky_clock_at(ctx, motion->sgp4->clock,
                                  bst_time_add(motion->epoch, 3600.0 * (double)hour), &sky));
         motion->sgp4->hours[slot].gcrf_from_teme = sky.frames.gcrf_from_teme;

@@ -68,7 +68,7 @@ static bst_status run(bst_ctx *ctx, const char *path, int64_t frames) {
     BST_TRY(bst_json_load_extended(ctx, path, &json));
     bst_status status = bst_json_set(ctx, json, "/record/frames=none");
     if (status == BST_OK) {
-        status = bst_scenario_read(ctx, json, bst_app_registry(), &scenario);
+        status = bst_scenario_read(ctx, json, bst_registry_shipped(), &scenario);
         const bst_simulation_options options = {.device = NULL, .threads = 1};
         if (status == BST_OK) {
             status = bst_simulation_create(ctx, &scenario, &options, &simulation);

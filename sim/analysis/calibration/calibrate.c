@@ -12,12 +12,12 @@ enum { LEAST_COMMON = 8, GRID = 48, CAPACITY = 4096 };
 static const double BLEND_SNR = 10.0;
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
-bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
+bst_status bst_calibration_fitter_create(bst_ctx *ctx, bst_calibration_fitter **out) {
     *out = calloc(1, sizeof **out);
     return *out ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a calibration");
 }
 
-void bst_calibrator_free(bst_calibrator *c) {
+void bst_calibration_fitter_free(bst_calibration_fitter *c) {
     if (c) {
         bst_generator_free(c->theory);
         for (int i = 0; i < CALIBRATE_BLENDS; i++) {
@@ -32,7 +32,8 @@ void bst_calibrator_free(bst_calibrator *c) {
     }
 }
 
-bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calibrated_path *path) {
+bst_status bst_calibration_fitter_begin(bst_ctx *ctx, bst_calibration_fitter *c,
+                                        const bst_calibration_path *path) {
     bst_obsgen_calibration theory;
     bst_obsgen_calibration_theory(&theory);
     theory.crowding = theory.background_share = 0.0;
@@ -45,7 +46,7 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     c->theory = NULL;
     c->path = *path;
     c->sigma_px = hypot(bst_camera_psf_sigma_px(path->camera), path->jitter_px);
-    bst_bound_init(&c->bound, c->sigma_px);
+    bst_crlb_table_init(&c->bound, c->sigma_px);
     bst_rng_key key = bst_rng_make_key(1, 0, "calibration", "observations");
     BST_TRY(
         bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key, &c->theory));
@@ -132,12 +133,13 @@ typedef struct common_error {
     int count;
 } common_error;
 
-static double place_weight(const bst_calibrator *c, const bst_truth_item *t, double noise_e) {
-    bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length_of(t));
+static double place_weight(const bst_calibration_fitter *c, const bst_truth_item *t,
+                           double noise_e) {
+    bst_crlb_table_at at = bst_crlb_table_of(&c->bound, t->electrons, noise_e, length_of(t));
     return 1.0 / (at.var_along_px2 + at.var_across_px2 + 1e-4);
 }
 
-static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_detection *d,
+static void add_place(bst_calibration_fitter *c, const bst_truth_item *t, const bst_detection *d,
                       double noise_e, const common_error *common) {
     /* the mean follows each of its members by its share */
     double own = place_weight(c, t, noise_e) / common->weight;
@@ -149,7 +151,7 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
            dy = (d->y_px - t->y_centroid_px - common->y) * free_part;
     double cosine = length > 0.0 ? (t->x_end_px - t->x_start_px) / length : 1.0;
     double sine = length > 0.0 ? (t->y_end_px - t->y_start_px) / length : 0.0;
-    bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length);
+    bst_crlb_table_at at = bst_crlb_table_of(&c->bound, t->electrons, noise_e, length);
     double along = dx * cosine + dy * sine, across = dy * cosine - dx * sine;
     int node = snr_node(t->electrons * at.norm / noise_e);
     const double squares[2] = {along * along / at.var_along_px2,
@@ -171,7 +173,7 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
     }
 }
 
-static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item *t,
+static bst_status add_trial(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth_item *t,
                             double amplitude, double threshold, const bst_generator_filter *filter,
                             bool detected) {
     if (fabs(amplitude - threshold) > PD_REACH) {
@@ -188,7 +190,7 @@ static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_ite
 }
 
 /* above: of the threshold at the pixels' own noise over that for normal noise. */
-static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
+static bst_status add_alarms(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth *truth,
                              const bst_detections *detections, double reach, double taken,
                              double above) {
     double width = (double)c->path.camera->width_px, height = (double)c->path.camera->height_px;
@@ -219,7 +221,7 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
     return BST_OK;
 }
 
-static void add_noise(bst_calibrator *c, const bst_detections *detections,
+static void add_noise(bst_calibration_fitter *c, const bst_detections *detections,
                       const bst_generator_result *theory) {
     double variance = theory->noise_e * theory->noise_e, n = 1.0,
            q = theory->faint_square_e2 / variance,
@@ -234,7 +236,8 @@ static void add_noise(bst_calibrator *c, const bst_detections *detections,
 }
 
 /* Whether a star is whole on the frame, with nothing near it. */
-static bool stands_alone(const bst_calibrator *c, const bst_truth *truth, int i, double reach) {
+static bool stands_alone(const bst_calibration_fitter *c, const bst_truth *truth, int i,
+                         double reach) {
     const bst_truth_item *t = &truth->items[i];
     const bst_camera *camera = c->path.camera;
     double x = t->x_centroid_px, y = t->y_centroid_px, edge = reach + 0.5 * length_of(t);
@@ -249,7 +252,7 @@ static bool stands_alone(const bst_calibrator *c, const bst_truth *truth, int i,
 /* A star that stands alone, and its detection: number k, or -1. dark_e: background and dark
  * current.
  */
-static bst_status add_star(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item *t,
+static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth_item *t,
                            const bst_detections *detections, int k,
                            const bst_generator_result *theory, double dark_e,
                            const common_error *common) {
@@ -257,7 +260,7 @@ static bst_status add_star(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item
     double plain = sqrt(dark_e + camera->read_noise_e * camera->read_noise_e);
     /* what its background has too much is missing from the output */
     double missing = (detections->background_e - theory->background_e) /
-                     (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
+                     (bst_crlb_table_norm(&c->bound, length_of(t)) * detections->noise_e);
     double threshold = theory->filter.threshold + detections->threshold_snr - theory->threshold_snr;
     BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e, threshold + missing,
                       &theory->filter, k >= 0));
@@ -293,8 +296,8 @@ static bool is_beside(const bst_truth *truth, int i, double reach) {
 }
 
 /* Counts what is told apart in the image and at each distance of blends, paired alike. */
-static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generator_frame *frame,
-                             double fwhm) {
+static bst_status add_blends(bst_ctx *ctx, bst_calibration_fitter *c,
+                             const bst_generator_frame *frame, double fwhm) {
     const bst_truth *truth = frame->truth;
     double reach = 4.0 * fwhm;
     for (int n = 0; n < CALIBRATE_BLENDS; n++) {
@@ -315,8 +318,9 @@ static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generato
     return BST_OK;
 }
 
-bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
-                              const bst_detections *detections, double exposure_s) {
+bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *c,
+                                      const bst_truth *truth, const bst_detections *detections,
+                                      double exposure_s) {
     const bst_camera *camera = c->path.camera;
     bst_generator_frame frame = {.truth = truth,
                                  .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
@@ -364,7 +368,7 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
         }
     }
     double taken = (detections->background_e - theory.background_e) /
-                   (bst_bound_norm(&c->bound, 0.0) * detections->noise_e);
+                   (bst_crlb_table_norm(&c->bound, 0.0) * detections->noise_e);
     double above = theory.filter.threshold - theory.threshold_snr;
     return add_alarms(ctx, c, truth, detections, reach, taken, above);
 }

@@ -6,23 +6,24 @@
 #include "sim/messages/messages.h"
 #include "sim/optics/camera.h"
 
-typedef struct bst_calibrator bst_calibrator;
+typedef struct bst_calibration_fitter bst_calibration_fitter;
 
-bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) BST_MUST_CHECK;
-void bst_calibrator_free(bst_calibrator *calibrator);
+bst_status bst_calibration_fitter_create(bst_ctx *ctx, bst_calibration_fitter **out) BST_MUST_CHECK;
+void bst_calibration_fitter_free(bst_calibration_fitter *calibrator);
 
 /* Settings of the image path from here on, which theory goes by: of the frames that follow. */
-typedef struct bst_calibrated_path {
+typedef struct bst_calibration_path {
     const bst_camera *camera; /* the true one */
     double jitter_px;         /* of the line of sight, per axis, that widens the true PSF */
     double false_alarms_per_frame, streak_min_px, streak_max_px;
-} bst_calibrated_path;
-bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *calibrator,
-                                const bst_calibrated_path *path) BST_MUST_CHECK;
+} bst_calibration_path;
+bst_status bst_calibration_fitter_begin(bst_ctx *ctx, bst_calibration_fitter *calibrator,
+                                        const bst_calibration_path *path) BST_MUST_CHECK;
 
 /* Takes one full frame without binning. */
-bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *calibrator, const bst_truth *truth,
-                              const bst_detections *detections, double exposure_s) BST_MUST_CHECK;
+bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *calibrator,
+                                      const bst_truth *truth, const bst_detections *detections,
+                                      double exposure_s) BST_MUST_CHECK;
 
 /* What was seen, for people. */
 typedef struct bst_calibration_counts {
@@ -32,7 +33,8 @@ typedef struct bst_calibration_counts {
 /* The calibration: maximum likelihood for Pd (probit) and false alarms, mean squares for places,
  * least squares for noise. Where too little was seen theory's value stays. BST_ERR_STATE when there
  * is not enough for Pd or false alarms: the message says of what. */
-bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *calibrator, bst_obsgen_calibration *out,
-                              bst_calibration_counts *counts) BST_MUST_CHECK;
+bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *calibrator,
+                                      bst_obsgen_calibration *out,
+                                      bst_calibration_counts *counts) BST_MUST_CHECK;
 
 #endif

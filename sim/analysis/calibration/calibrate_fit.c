@@ -7,7 +7,7 @@
 enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30 };
 
 /* Log-likelihood of the trials of one streak length. */
-static double likelihood(const bst_calibrator *c, int node, double gain, double slope) {
+static double likelihood(const bst_calibration_fitter *c, int node, double gain, double slope) {
     double sum = 0.0;
     for (long i = 0; i < c->trial_count; i++) {
         const calibrate_trial *t = &c->trials[i];
@@ -30,7 +30,7 @@ static double likelihood(const bst_calibrator *c, int node, double gain, double 
 }
 
 /* The gain of one streak length at a slope, by golden section. */
-static double best_gain(const bst_calibrator *c, int node, double slope, double *value) {
+static double best_gain(const bst_calibration_fitter *c, int node, double slope, double *value) {
     const double part = 0.38196601125010515;
     double low = 0.5, high = 1.3, a = low + part * (high - low), b = high - part * (high - low);
     double at_a = likelihood(c, node, a, slope), at_b = likelihood(c, node, b, slope);
@@ -53,7 +53,7 @@ static double best_gain(const bst_calibrator *c, int node, double slope, double 
     return 0.5 * (low + high);
 }
 
-static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) {
+static void fit_detection(const bst_calibration_fitter *c, bst_obsgen_calibration *out) {
     long count[BST_OBSGEN_LENGTHS] = {0};
     for (long i = 0; i < c->trial_count; i++) {
         int own = 0;
@@ -100,7 +100,7 @@ static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) 
 }
 
 /* The distance at which the generator tells as many apart as the image path; fewer, the further. */
-static double fit_blends(const bst_calibrator *c) {
+static double fit_blends(const bst_calibration_fitter *c) {
     double image = (double)c->beside[CALIBRATE_BLENDS];
     if (c->beside[CALIBRATE_BLENDS] < LEAST_SOURCES) {
         return 1.0;
@@ -139,8 +139,8 @@ static void fit_places(const calibrate_mean *seen, double *factors) {
     }
 }
 
-bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibration *out,
-                              bst_calibration_counts *counts) {
+bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *c,
+                                      bst_obsgen_calibration *out, bst_calibration_counts *counts) {
     *counts = (bst_calibration_counts){.frames = c->frames,
                                        .sources = c->trial_count,
                                        .detected = c->detected,

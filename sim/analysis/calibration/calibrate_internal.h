@@ -25,14 +25,14 @@ typedef struct calibrate_mean {
     long count;
 } calibrate_mean;
 
-struct bst_calibrator {
-    bst_calibrated_path path;
+struct bst_calibration_fitter {
+    bst_calibration_path path;
     bst_generator *theory, *blended[CALIBRATE_BLENDS];
     bst_detections *made; /* of one of them */
     long beside[CALIBRATE_BLENDS +
                 1]; /* sources beside a brighter one that were found: in images, by each */
     double sigma_px;
-    bst_bound bound;
+    bst_crlb_table bound;
     bst_pairing pairing, blend_pairing;
     calibrate_trial *trials;
     long trial_count, trial_room;

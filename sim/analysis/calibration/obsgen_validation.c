@@ -75,8 +75,8 @@ static void on_track(void *user, double error_px) {
     j->sums->figure[TRACK].count += 1.0;
 }
 
-static bst_status play(bst_ctx *ctx, const bst_equivalence_options *o, bool generator, int number,
-                       run_sums *sums) {
+static bst_status play(bst_ctx *ctx, const bst_obsgen_validation_options *o, bool generator,
+                       int number, run_sums *sums) {
     static const char *const sensor = "/observers/0/sensors/0";
     char source[120], file[600], block[120];
     bst_load_options load = *o->load;
@@ -103,7 +103,8 @@ static bst_status play(bst_ctx *ctx, const bst_equivalence_options *o, bool gene
     const bst_sensor_config *first = observer->sensors.items;
     judging j = {.sums = sums,
                  .fwhm_px = 2.3548200450309493 * bst_camera_psf_sigma_px(&first->camera)};
-    const bst_watcher watcher = {.user = &j, .frame = on_frame, .track_error = on_track};
+    const bst_calibration_watcher watcher = {
+        .user = &j, .frame = on_frame, .track_error = on_track};
     bst_loop_figures figures;
     bst_status status = bst_watch_run(ctx, &scenario, &watcher, o->device, o->threads, &figures);
     if (status == BST_OK && isfinite(figures.time_to_confirm_s)) {
@@ -221,7 +222,8 @@ static bool judge_all(const run_sums *image, const run_sums *generator, int seed
     return all;
 }
 
-bst_status bst_equivalence_run(bst_ctx *ctx, const bst_equivalence_options *o, bool *equivalent) {
+bst_status bst_obsgen_validation_run(bst_ctx *ctx, const bst_obsgen_validation_options *o,
+                                     bool *equivalent) {
     size_t seeds = (size_t)o->seeds;
     run_sums *sums = calloc(2 * seeds, sizeof *sums);
     int *chosen = calloc(seeds, sizeof *chosen);
@@ -236,7 +238,7 @@ bst_status bst_equivalence_run(bst_ctx *ctx, const bst_equivalence_options *o, b
     }
     if (status == BST_OK) {
         printf("%s, %s each: image, generator, 95 %% interval over runs\n", o->scenario,
-               bst_count_text((char[BST_COUNT_TEXT]){0}, o->seeds, "run", "runs"));
+               bst_text_of_count((char[BST_COUNT_TEXT]){0}, o->seeds, "run", "runs"));
         *equivalent = judge_all(sums, sums + seeds, o->seeds, chosen, list);
         cJSON_AddStringToObject(root, "scenario", o->scenario);
         cJSON_AddNumberToObject(root, "runs", o->seeds);
@@ -244,7 +246,7 @@ bst_status bst_equivalence_run(bst_ctx *ctx, const bst_equivalence_options *o, b
     }
     if (status == BST_OK && o->json) {
         char *text = cJSON_Print(root);
-        status = text ? bst_write_file_atomic(ctx, o->json, text, strlen(text))
+        status = text ? bst_io_write_file_atomic(ctx, o->json, text, strlen(text))
                       : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %s", o->json);
         free(text);
     }

@@ -11,7 +11,7 @@ enum { WAITING = 32 };
 
 typedef struct watch {
     bst_ctx *ctx;
-    const bst_watcher *watcher;
+    const bst_calibration_watcher *watcher;
     char scope[160];
     bst_truth *waiting[WAITING];
     int room[WAITING];
@@ -84,8 +84,9 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     return BST_OK;
 }
 
-bst_status bst_watch_run(bst_ctx *ctx, const bst_scenario *scenario, const bst_watcher *watcher,
-                         const char *device, int threads, bst_loop_figures *figures) {
+bst_status bst_watch_run(bst_ctx *ctx, const bst_scenario *scenario,
+                         const bst_calibration_watcher *watcher, const char *device, int threads,
+                         bst_loop_figures *figures) {
     const bst_observer_config *observer = scenario->observers.items;
     const bst_sensor_config *sensor = observer->sensors.items;
     const bst_simulation_options options = {.device = device, .threads = threads};

@@ -30,7 +30,7 @@ typedef struct looking {
     int object;
     bst_knowledge *knowledge;
     bst_knowledge_view *cue;
-    bst_view *view;
+    bst_world_view *view;
     const bst_world *world;
     double half_rad; /* from the boresight to the farthest corner */
 } looking;
@@ -46,9 +46,9 @@ static bool has_tasking(const bst_scenario *scenario) {
 }
 
 static gaze gaze_of(const bst_scenario *scenario, looking *l) {
-    const bst_module_config *gimbal =
+    const bst_scenario_module_config *gimbal =
         bst_scenario_module(scenario, l->observer, l->sensor, "gimbal");
-    const bst_module_config *control =
+    const bst_scenario_module_config *control =
         bst_scenario_module(scenario, l->observer, l->sensor, "control");
     if (gimbal && gimbal->desc->config == bst_ideal_config_table) {
         l->ideal = gimbal->config;
@@ -82,8 +82,8 @@ static bst_status boresight_at(bst_ctx *ctx, looking *l, double seconds, bool *k
                                bst_vec3 *direction) {
     *known = true;
     if (l->gaze == GAZE_IDEAL && l->object >= 0) {
-        bst_sight sight;
-        BST_TRY(bst_view_sight(ctx, l->view, l->observer, l->object, seconds, &sight));
+        bst_world_sight sight;
+        BST_TRY(bst_world_view_sight(ctx, l->view, l->observer, l->object, seconds, &sight));
         *direction = sight.geometric;
         return BST_OK;
     }
@@ -101,7 +101,7 @@ static bst_status clearances(bst_ctx *ctx, looking *l, double seconds,
                              double clear[BST_FIELD_BODIES]) {
     bool known;
     bst_vec3 d;
-    bst_state eye;
+    bst_world_state eye;
     bst_bodies bodies;
     for (int b = 0; b < BST_FIELD_BODIES; b++) {
         clear[b] = BST_PI;
@@ -110,11 +110,11 @@ static bst_status clearances(bst_ctx *ctx, looking *l, double seconds,
     if (!known) {
         return BST_OK;
     }
-    BST_TRY(bst_view_observer_state(ctx, l->view, l->observer, seconds, &eye));
-    BST_TRY(bst_view_bodies(ctx, l->view, seconds, &bodies));
+    BST_TRY(bst_world_view_observer_state(ctx, l->view, l->observer, seconds, &eye));
+    BST_TRY(bst_world_view_bodies(ctx, l->view, seconds, &bodies));
     bst_vec3 moon = bst_vec3_sub(bodies.moon_m, eye.position_m);
     bst_vec3 sun = bst_vec3_sub(bodies.sun_m, eye.position_m);
-    double limb = bst_earth_limb_angle(eye.position_m, bodies.pole, d);
+    double limb = bst_astro_earth_limb_angle(eye.position_m, bodies.pole, d);
     clear[BST_FIELD_EARTH] = limb - l->half_rad;
     clear[BST_FIELD_MOON] =
         bst_vec3_angle(d, moon) - asin(BST_MOON_RADIUS_M / bst_vec3_norm(moon)) - l->half_rad;
@@ -141,7 +141,7 @@ typedef struct meeting {
     double from_s;
 } meeting;
 
-static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_body_span *spans,
+static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_check_body_span *spans,
                            int capacity, int *count) {
     double step = fmin(fmax(1e-3 * duration_s, LEAST_STEP_S), MOST_STEP_S);
     double clear[BST_FIELD_BODIES];
@@ -164,7 +164,7 @@ static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_body
             m->inside = in;
             if ((was && !in) || (in && now >= duration_s)) {
                 if (*count < capacity) {
-                    spans[*count] = (bst_body_span){(bst_field_body)b, m->from_s, at};
+                    spans[*count] = (bst_check_body_span){(bst_check_field_body)b, m->from_s, at};
                 }
                 (*count)++;
             }
@@ -174,12 +174,12 @@ static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_body
 }
 
 static bst_status look_ahead(bst_ctx *ctx, const bst_scenario *scenario, looking *l,
-                             bst_body_span *spans, int capacity, int *count) {
+                             bst_check_body_span *spans, int capacity, int *count) {
     l->gaze = gaze_of(scenario, l);
     if (l->gaze == GAZE_UNKNOWN) {
         return BST_OK;
     }
-    BST_TRY(bst_view_create(ctx, l->world, &l->view));
+    BST_TRY(bst_world_view_create(ctx, l->world, &l->view));
     if (l->gaze != GAZE_IDEAL) {
         bst_region region;
         BST_TRY(bst_knowledge_create(ctx, l->world, l->observer, l->sensor, &l->knowledge));
@@ -195,17 +195,17 @@ static bst_status look_ahead(bst_ctx *ctx, const bst_scenario *scenario, looking
 
 bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
                                      const bst_world *world, int observer, int sensor,
-                                     bst_body_span *spans, int capacity, int *count) {
+                                     bst_check_body_span *spans, int capacity, int *count) {
     looking l = {.observer = observer, .sensor = sensor, .world = world};
     *count = 0;
     bst_status status = look_ahead(ctx, scenario, &l, spans, capacity, count);
     bst_knowledge_view_free(l.cue);
     bst_knowledge_free(l.knowledge);
-    bst_view_free(l.view);
+    bst_world_view_free(l.view);
     return status;
 }
 
-static void warn_of_body(bst_ctx *ctx, const char *name, int body, const bst_body_span *spans,
+static void warn_of_body(bst_ctx *ctx, const char *name, int body, const bst_check_body_span *spans,
                          int count, double duration_s) {
     bst_check_spans met = {0};
     for (int i = 0; i < count; i++) {
@@ -230,7 +230,7 @@ bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,
         for (int i = 0; i < observers[o].sensors.count; i++) {
             char name[160];
             int count;
-            bst_body_span spans[MOST_SPANS];
+            bst_check_body_span spans[MOST_SPANS];
             snprintf(name, sizeof name, "%s/%s", observers[o].name, sensors[i].name);
             bst_status status =
                 bst_check_bodies_in_field(ctx, scenario, world, o, i, spans, MOST_SPANS, &count);

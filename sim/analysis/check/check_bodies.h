@@ -5,19 +5,19 @@
 #include "sim/engine/simulation.h"
 #include "sim/world/world.h"
 
-typedef enum bst_field_body {
+typedef enum bst_check_field_body {
     BST_FIELD_EARTH,
     BST_FIELD_MOON,
     BST_FIELD_SUN,
     BST_FIELD_BODIES
-} bst_field_body;
+} bst_check_field_body;
 
 /* A time in which the circle about the sensor meets a body's disc. */
-typedef struct bst_body_span {
-    bst_field_body body;
+typedef struct bst_check_body_span {
+    bst_check_field_body body;
     double from_s, until_s; /* after the epoch, to 0.1 s; until_s: at most the run's duration,
                              * of longer runs BST_CHECK_LOOKED_S */
-} bst_body_span;
+} bst_check_body_span;
 
 /* Times at which bodies are in the field of a sensor whose boresight is known beforehand.
  *
@@ -32,7 +32,8 @@ typedef struct bst_body_span {
  * to 10 s: shorter meetings may be missed. */
 bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
                                      const bst_world *world, int observer, int sensor,
-                                     bst_body_span *spans, int capacity, int *count) BST_MUST_CHECK;
+                                     bst_check_body_span *spans, int capacity,
+                                     int *count) BST_MUST_CHECK;
 
 /* Logs a warning for each body that comes into a sensor's field, with the first time span, and
  * number and sum of all. */

@@ -16,7 +16,8 @@ typedef struct limits {
 
 /* False: the tracker is not one whose filter is known here. */
 static bool limits_of(const bst_scenario *scenario, int observer, int sensor, limits *out) {
-    const bst_module_config *tracker = bst_scenario_module(scenario, observer, sensor, "tracker");
+    const bst_scenario_module_config *tracker =
+        bst_scenario_module(scenario, observer, sensor, "tracker");
     double gate, quiet, swift, events, window;
     if (!tracker || !bst_scenario_module_number(tracker, "gate_chi2", &gate) ||
         !bst_scenario_module_number(tracker, "process_noise_arcsec_per_s15", &quiet) ||
@@ -42,11 +43,11 @@ static bool limits_of(const bst_scenario *scenario, int observer, int sensor, li
 }
 
 /* Speed across the line of sight that a burn gives, m/s, and the range, m. */
-static bst_status speed_across(bst_ctx *ctx, bst_view *view, int object, int observer,
+static bst_status speed_across(bst_ctx *ctx, bst_world_view *view, int object, int observer,
                                const bst_burn_config *burn, double *across_mps, double *range_m) {
-    bst_state target, eye;
-    BST_TRY(bst_view_object_state(ctx, view, object, burn->time_s, &target));
-    BST_TRY(bst_view_observer_state(ctx, view, observer, burn->time_s, &eye));
+    bst_world_state target, eye;
+    BST_TRY(bst_world_view_object_state(ctx, view, object, burn->time_s, &target));
+    BST_TRY(bst_world_view_observer_state(ctx, view, observer, burn->time_s, &eye));
     bst_vec3 radial = bst_vec3_unit(target.position_m);
     bst_vec3 normal = bst_vec3_unit(bst_vec3_cross(target.position_m, target.velocity_mps));
     bst_vec3 along = bst_vec3_cross(normal, radial);
@@ -60,7 +61,7 @@ static bst_status speed_across(bst_ctx *ctx, bst_view *view, int object, int obs
 }
 
 static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world,
-                               bst_view *view, int observer, int sensor) {
+                               bst_world_view *view, int observer, int sensor) {
     const bst_observer_config *observers = scenario->observers.items;
     const bst_sensor_config *sensors = observers[observer].sensors.items;
     const bst_object_config *objects = scenario->world.objects.items;
@@ -100,13 +101,13 @@ bst_status bst_check_burns(bst_ctx *ctx, const bst_scenario *scenario,
                            const bst_simulation *simulation) {
     const bst_world *world = bst_simulation_world(simulation);
     const bst_observer_config *observers = scenario->observers.items;
-    bst_view *view = NULL;
-    bst_status status = bst_view_create(ctx, world, &view);
+    bst_world_view *view = NULL;
+    bst_status status = bst_world_view_create(ctx, world, &view);
     for (int o = 0; status == BST_OK && o < scenario->observers.count; o++) {
         for (int i = 0; status == BST_OK && i < observers[o].sensors.count; i++) {
             status = check_sensor(ctx, scenario, world, view, o, i);
         }
     }
-    bst_view_free(view);
+    bst_world_view_free(view);
     return status;
 }

@@ -25,7 +25,7 @@ static limits lowest(const bst_mount_status *mount) {
     return low;
 }
 
-double bst_mount_slew_s(const bst_mount_status *mount, double angle_rad) {
+double bst_check_mount_slew_s(const bst_mount_status *mount, double angle_rad) {
     limits low = lowest(mount);
     if (isinf(low.accel_radps2)) {
         return isinf(low.rate_radps) ? 0.0 : angle_rad / low.rate_radps;
@@ -35,7 +35,7 @@ double bst_mount_slew_s(const bst_mount_status *mount, double angle_rad) {
 }
 
 /* Of the greatest step of a search; 0: it has one place. */
-static double step_of(const bst_mount_moves *m) {
+static double step_of(const bst_check_mount_moves *m) {
     double side = fmax(m->width_rad, m->height_rad), least = fmin(m->width_rad, m->height_rad);
     double reach = fmin(m->control->search_sigmas * m->cue_sigma_rad,
                         m->control->search_max_deg * BST_DEG_RAD);
@@ -43,7 +43,7 @@ static double step_of(const bst_mount_moves *m) {
     return m->control->strategy != BST_CONTROL_TRACK || one ? 0.0 : m->control->search_step * side;
 }
 
-static double dwell_of(const bst_mount_moves *m) {
+static double dwell_of(const bst_check_mount_moves *m) {
     /* the first whole frame at rest begins up to a period after the arrival */
     return (double)m->control->dwell_frames * m->period_s + m->exposure_s;
 }
@@ -54,20 +54,20 @@ static const char *seconds_text(double seconds, char out[32]) {
     return out;
 }
 
-double bst_search_place_s(const bst_mount_moves *moves) {
+double bst_check_search_place_s(const bst_check_mount_moves *moves) {
     double step = step_of(moves);
-    return step > 0.0 ? bst_mount_slew_s(moves->mount, step) + dwell_of(moves) : 0.0;
+    return step > 0.0 ? bst_check_mount_slew_s(moves->mount, step) + dwell_of(moves) : 0.0;
 }
 
-static int check_search(bst_ctx *ctx, const char *name, const bst_mount_moves *m) {
+static int check_search(bst_ctx *ctx, const char *name, const bst_check_mount_moves *m) {
     double step = step_of(m), allowed = m->control->dwell_timeout_s;
     /* too short a time for the frames alone is the rule short_times' */
-    if (step == 0.0 || bst_search_place_s(m) <= allowed || dwell_of(m) > allowed) {
+    if (step == 0.0 || bst_check_search_place_s(m) <= allowed || dwell_of(m) > allowed) {
         return 0;
     }
     limits low = lowest(m->mount);
     char text[32];
-    double slew = bst_mount_slew_s(m->mount, step);
+    double slew = bst_check_mount_slew_s(m->mount, step);
     bst_log(ctx, BST_LOG_WARNING,
             "%s: the mount takes %s for a step of the search (%.3g deg at %.3g deg/s^2 and at "
             "most %.3g deg/s): with dwell_frames of %lld, dwell_timeout_s of %g s is over first; "
@@ -78,7 +78,7 @@ static int check_search(bst_ctx *ctx, const char *name, const bst_mount_moves *m
     return 1;
 }
 
-static int check_scan(bst_ctx *ctx, const char *name, const bst_mount_moves *m) {
+static int check_scan(bst_ctx *ctx, const char *name, const bst_check_mount_moves *m) {
     double rate = fabs(m->control->scan_rate_arcsec_per_s) * BST_ARCSEC_RAD;
     if (m->control->strategy != BST_CONTROL_SCAN || m->region.kind == BST_REGION_NONE) {
         return 0;
@@ -105,14 +105,14 @@ static int check_scan(bst_ctx *ctx, const char *name, const bst_mount_moves *m) 
     return 0;
 }
 
-int bst_check_moves(bst_ctx *ctx, const char *name, const bst_mount_moves *moves) {
+int bst_check_moves(bst_ctx *ctx, const char *name, const bst_check_mount_moves *moves) {
     return check_search(ctx, name, moves) + check_scan(ctx, name, moves);
 }
 
-int bst_check_first_slew(bst_ctx *ctx, const char *name, const bst_mount_moves *moves,
+int bst_check_first_slew(bst_ctx *ctx, const char *name, const bst_check_mount_moves *moves,
                          double angle_rad) {
     limits low = lowest(moves->mount);
-    double slew = bst_mount_slew_s(moves->mount, angle_rad);
+    double slew = bst_check_mount_slew_s(moves->mount, angle_rad);
     if (slew <= moves->duration_s) {
         return 0;
     }

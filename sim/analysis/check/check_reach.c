@@ -25,17 +25,18 @@ typedef struct seeing {
     const bst_guidance_config *guidance;
     bst_knowledge *knowledge;
     bst_knowledge_view *cue;
-    bst_view *view;
+    bst_world_view *view;
     bool turns; /* the body follows a law */
     bst_pointing_law law;
     bst_mount_status mount;
 } seeing;
 
-static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+static bst_status look(void *user, bst_ctx *ctx, double seconds,
+                       bst_pointing_feasibility_look *out) {
     seeing *s = user;
-    *out = (bst_reach_look){.valid = false};
+    *out = (bst_pointing_feasibility_look){.valid = false};
     bst_vec3 direction;
-    bst_state state;
+    bst_world_state state;
     bst_bodies bodies;
     bool known;
     double rate;
@@ -45,14 +46,14 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look 
     }
     BST_TRY(bst_knowledge_cue_range_at(ctx, s->cue, seconds, &known, &out->range_m, &rate));
     out->range_m = known ? out->range_m : 0.0;
-    BST_TRY(bst_view_believed(ctx, s->view, s->observer, s->sensor, seconds, &state, &bodies));
-    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
-    out->direction_gcrf = bst_light_aberrate(&light, direction);
+    BST_TRY(bst_world_view_nav(ctx, s->view, s->observer, s->sensor, seconds, &state, &bodies));
+    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
+    out->direction_gcrf = bst_astro_light_aberrate(&light, direction);
     out->position_m = state.position_m;
-    bst_law_inputs inputs = {.position_m = state.position_m,
-                             .velocity_mps = state.velocity_mps,
-                             .sun_m = light.sun_m,
-                             .target = out->direction_gcrf};
+    bst_spacecraft_law_inputs inputs = {.position_m = state.position_m,
+                                        .velocity_mps = state.velocity_mps,
+                                        .sun_m = light.sun_m,
+                                        .target = out->direction_gcrf};
     out->q_body_from_gcrf =
         s->turns ? bst_pointing_law_attitude(&s->law, &inputs) : s->law.q_nominal;
     bst_nav_telemetry nav = {.position_gcrf_m = state.position_m,
@@ -76,7 +77,7 @@ static void warn(bst_ctx *ctx, const char *name, const found *f, double examined
             bst_check_span_words words =
                 bst_check_spans_word(&f->spans[reason], examined_s, duration_s);
             bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach %s: %s%s%s", name,
-                    words.from, bst_reach_reason(reason),
+                    words.from, bst_pointing_feasibility_reason(reason),
                     rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "",
                     words.more);
         }
@@ -84,17 +85,18 @@ static void warn(bst_ctx *ctx, const char *name, const found *f, double examined
 }
 
 /* What the mount's limits lose about [from_s, until_s]; *until_s: the end of the last loss. */
-static bst_status chase(bst_ctx *ctx, const bst_reach_problem *problem, double tolerance_rad,
-                        int reason, double from_s, double *until_s, double duration_s, found *f) {
-    bst_reach_loss losses[MOST_LOSSES];
-    bst_reach middle;
+static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *problem,
+                        double tolerance_rad, int reason, double from_s, double *until_s,
+                        double duration_s, found *f) {
+    bst_pointing_feasibility_loss losses[MOST_LOSSES];
+    bst_pointing_feasibility middle;
     int count;
     double end_s = fmin(*until_s + RUN_OUT_S, duration_s);
     /* on the way to the pole it is the acceleration that is too great first */
-    BST_TRY(bst_reach_at(ctx, problem, 0.5 * (from_s + *until_s), &middle));
+    BST_TRY(bst_pointing_feasibility_at(ctx, problem, 0.5 * (from_s + *until_s), &middle));
     reason = middle == BST_REACH_KEYHOLE ? (int)middle : reason;
-    BST_TRY(bst_reach_chase(ctx, problem, fmax(from_s - RUN_UP_S, 0.0), end_s, tolerance_rad,
-                            losses, MOST_LOSSES, &count));
+    BST_TRY(bst_pointing_feasibility_chase(ctx, problem, fmax(from_s - RUN_UP_S, 0.0), end_s,
+                                           tolerance_rad, losses, MOST_LOSSES, &count));
     for (int i = 0; i < count; i++) {
         double until = fmin(losses[i].until_s, end_s);
         bst_check_spans_add(&f->spans[reason], losses[i].from_s, until);
@@ -105,23 +107,23 @@ static bst_status chase(bst_ctx *ctx, const bst_reach_problem *problem, double t
 
 static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double tolerance_rad,
                         found *f) {
-    const bst_reach_problem problem = {.look = look,
-                                       .user = s,
-                                       .mount = s->mount.axes > 0 ? &s->mount : NULL,
-                                       .limits_share = s->guidance->limits_share};
+    const bst_pointing_feasibility_problem problem = {.look = look,
+                                                      .user = s,
+                                                      .mount = s->mount.axes > 0 ? &s->mount : NULL,
+                                                      .limits_share = s->guidance->limits_share};
     double step = fmin(fmax(1e-3 * duration_s, LEAST_STEP_S), MOST_STEP_S);
     double at = 0.0;
     for (int i = 0; i < MOST_SPANS && at < duration_s; i++) {
         bool lost, back;
         double from, until = duration_s;
-        bst_reach why;
-        BST_TRY(
-            bst_reach_next(ctx, &problem, at, duration_s - at, step, false, &lost, &from, &why));
+        bst_pointing_feasibility why;
+        BST_TRY(bst_pointing_feasibility_next(ctx, &problem, at, duration_s - at, step, false,
+                                              &lost, &from, &why));
         if (!lost) {
             break;
         }
-        BST_TRY(bst_reach_next(ctx, &problem, from, duration_s - from, step, true, &back, &until,
-                               NULL));
+        BST_TRY(bst_pointing_feasibility_next(ctx, &problem, from, duration_s - from, step, true,
+                                              &back, &until, NULL));
         until = back ? until : duration_s;
         if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
             BST_TRY(chase(ctx, &problem, tolerance_rad, (int)why, from, &until, duration_s, f));
@@ -135,16 +137,16 @@ static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double toler
 
 /* ---- a sensor ---- */
 
-static bst_status set_mount(bst_ctx *ctx, const bst_module_config *gimbal, double dt_s,
+static bst_status set_mount(bst_ctx *ctx, const bst_scenario_module_config *gimbal, double dt_s,
                             bst_quat nominal, seeing *s) {
     const bst_platform_config *platform;
     if (gimbal->desc->config == bst_two_axis_config_table) {
-        const bst_two_axis_config *config = gimbal->config;
-        const bst_two_axis_keys keys = {{{0, 0}}, {{0, 0}}, {{0, 0}}};
-        bst_two_axis plant;
+        const bst_mount_two_axis_config *config = gimbal->config;
+        const bst_mount_two_axis_keys keys = {{{0, 0}}, {{0, 0}}, {{0, 0}}};
+        bst_mount_two_axis plant;
         platform = &config->platform;
-        BST_TRY(bst_two_axis_init(ctx, &plant, config, nominal, 1e-5, dt_s, &keys));
-        bst_two_axis_status(&plant, 0, &s->mount);
+        BST_TRY(bst_mount_two_axis_init(ctx, &plant, config, nominal, 1e-5, dt_s, &keys));
+        bst_mount_two_axis_status(&plant, 0, &s->mount);
         bst_platform_free(&plant.platform);
     } else {
         const bst_mount_config *config = gimbal->config;
@@ -156,10 +158,10 @@ static bst_status set_mount(bst_ctx *ctx, const bst_module_config *gimbal, doubl
                                config, dt_s, (bst_rng_key){{0, 0}}));
         bst_mount_status_of(&mount, 0, &s->mount);
     }
-    const bst_attitude_config *a = &platform->spacecraft.attitude;
+    const bst_spacecraft_attitude_config *a = &platform->spacecraft.attitude;
     s->turns = platform->spacecraft.type == BST_CRAFT_RIGID_BODY;
     s->law = (bst_pointing_law){
-        .law = (bst_law)a->law,
+        .law = (bst_spacecraft_law)a->law,
         .q_nominal = nominal,
         .axis = bst_vec3_unit((bst_vec3){a->axis[0], a->axis[1], a->axis[2]}),
         .second_axis =
@@ -192,19 +194,19 @@ static bst_status moves(bst_ctx *ctx, const bst_scenario *scenario, seeing *s,
     const bst_camera *camera = bst_knowledge_camera(s->knowledge);
     double pixel = bst_camera_scale_rad(camera), width_px, height_px;
     bst_camera_field_px(camera, &width_px, &height_px);
-    bst_cue cue;
+    bst_onboard_cue cue;
     BST_TRY(bst_knowledge_cue_at(ctx, s->cue, 0.0, &cue));
-    bst_mount_moves request = {.control = config,
-                               .mount = &s->mount,
-                               .period_s = timing.period_s,
-                               .exposure_s = timing.exposure_s,
-                               .width_rad = width_px * pixel,
-                               .height_rad = height_px * pixel,
-                               .cue_sigma_rad = cue.valid ? cue.sigma_rad : 0.0,
-                               .duration_s = scenario->duration_s};
+    bst_check_mount_moves request = {.control = config,
+                                     .mount = &s->mount,
+                                     .period_s = timing.period_s,
+                                     .exposure_s = timing.exposure_s,
+                                     .width_rad = width_px * pixel,
+                                     .height_rad = height_px * pixel,
+                                     .cue_sigma_rad = cue.valid ? cue.sigma_rad : 0.0,
+                                     .duration_s = scenario->duration_s};
     bst_knowledge_region(s->knowledge, &request.region);
     (void)bst_check_moves(ctx, name, &request);
-    bst_reach_look first;
+    bst_pointing_feasibility_look first;
     BST_TRY(look(s, ctx, 0.0, &first));
     bool goes = config->strategy == BST_CONTROL_TRACK || config->strategy == BST_CONTROL_RATE;
     if (goes && first.valid) {
@@ -217,9 +219,9 @@ static bst_status moves(bst_ctx *ctx, const bst_scenario *scenario, seeing *s,
 
 static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world,
                                seeing *s, const char *name) {
-    const bst_module_config *gimbal =
+    const bst_scenario_module_config *gimbal =
         bst_scenario_module(scenario, s->observer, s->sensor, "gimbal");
-    const bst_module_config *control =
+    const bst_scenario_module_config *control =
         bst_scenario_module(scenario, s->observer, s->sensor, "control");
     if (!gimbal || !control || control->desc->config != bst_control_config_table ||
         (gimbal->desc->config != bst_two_axis_config_table &&
@@ -230,7 +232,7 @@ static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const
     s->guidance = &config->guidance;
     BST_TRY(bst_knowledge_create(ctx, world, s->observer, s->sensor, &s->knowledge));
     BST_TRY(bst_knowledge_view_create(ctx, s->knowledge, &s->cue));
-    BST_TRY(bst_view_create(ctx, world, &s->view));
+    BST_TRY(bst_world_view_create(ctx, world, &s->view));
     BST_TRY(set_mount(ctx, gimbal, (double)gimbal->period_ticks / (double)scenario->tick_rate_hz,
                       bst_knowledge_body_attitude(s->knowledge), s));
     BST_TRY(moves(ctx, scenario, s, config, name));
@@ -260,7 +262,7 @@ bst_status bst_check_reach(bst_ctx *ctx, const bst_scenario *scenario,
             seeing s = {.observer = o, .sensor = i};
             bst_status status =
                 check_sensor(ctx, scenario, bst_simulation_world(simulation), &s, name);
-            bst_view_free(s.view);
+            bst_world_view_free(s.view);
             bst_knowledge_view_free(s.cue);
             bst_knowledge_free(s.knowledge);
             if (status != BST_OK) {

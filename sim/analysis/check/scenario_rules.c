@@ -30,7 +30,7 @@ typedef struct subject {
     char place[600]; /* file and JSON pointer */
 } subject;
 
-static const bst_module_config *module_of(const subject *s, const char *role) {
+static const bst_scenario_module_config *module_of(const subject *s, const char *role) {
     return bst_scenario_module(s->scenario, s->observer, s->number, role);
 }
 
@@ -138,7 +138,7 @@ static bst_status no_modules(const subject *s) {
     static const char *const roles[] = {"scenegen", "obsgen"};
     bool any = false, sees = false, moves = module_of(s, "gimbal") != NULL;
     for (int m = 0; m < s->scenario->module_count; m++) {
-        const bst_module_config *module = &s->scenario->modules[m];
+        const bst_scenario_module_config *module = &s->scenario->modules[m];
         any |= module->observer == s->observer && module->sensor == s->number;
     }
     for (size_t r = 0; r < sizeof roles / sizeof *roles; r++) {
@@ -221,7 +221,8 @@ static void warn_short(const subject *s, const char *role, const char *key, doub
 static bst_status short_times(const subject *s) {
     bst_loop_timing timing;
     bst_loop_timing_of(s->scenario, s->observer, s->number, &timing);
-    const bst_module_config *tracker = module_of(s, "tracker"), *control = module_of(s, "control");
+    const bst_scenario_module_config *tracker = module_of(s, "tracker"),
+                                     *control = module_of(s, "control");
     double period = timing.period_s, value, frames;
     if (bst_scenario_module_number(tracker, "initiation_gap_s", &value)) {
         warn_short(s, "tracker", "initiation_gap_s", value, period, "no track can begin");
@@ -300,8 +301,8 @@ static bst_status apply_to_sensors(bst_ctx *ctx, const rule *r, const bst_scenar
     return BST_OK;
 }
 
-bst_status bst_rules_apply(bst_ctx *ctx, const bst_scenario *scenario,
-                           const bst_simulation *simulation) {
+bst_status bst_check_rules_apply(bst_ctx *ctx, const bst_scenario *scenario,
+                                 const bst_simulation *simulation) {
     const bst_world *world = bst_simulation_world(simulation);
     for (size_t i = 0; i < sizeof rules / sizeof *rules; i++) {
         const rule *r = &rules[i];
@@ -318,7 +319,7 @@ bst_status bst_rules_apply(bst_ctx *ctx, const bst_scenario *scenario,
     return BST_OK;
 }
 
-void bst_rules_print(FILE *out) {
+void bst_check_rules_print(FILE *out) {
     for (size_t i = 0; i < sizeof rules / sizeof *rules; i++) {
         fprintf(out, "%-18s %s\n", rules[i].name, rules[i].looks_for);
     }

@@ -5,18 +5,18 @@
 
 static double complex body_open(const void *user, double omega) {
     const bst_loop_body *body = user;
-    bst_craft_response r =
-        bst_craft_response_at(body->config, body->number, omega / (2.0 * BST_PI));
+    bst_spacecraft_response r =
+        bst_spacecraft_response_at(body->config, body->number, omega / (2.0 * BST_PI));
     return (r.plant[0] + I * r.plant[1]) * (r.controller[0] + I * r.controller[1]);
 }
 
-bst_status bst_loop_build_body(bst_ctx *ctx, const bst_craft_config *config,
+bst_status bst_loop_build_body(bst_ctx *ctx, const bst_spacecraft_config *config,
                                bst_loop_model *model) {
     static const char *const names[BST_LOOP_BODY] = {"x", "y", "z"};
     if (config->type != BST_CRAFT_RIGID_BODY || config->attitude.law == BST_LAW_FREE) {
         return BST_OK;
     }
-    const bst_mode_config *modes = config->modes.items;
+    const bst_spacecraft_mode_config *modes = config->modes.items;
     for (int i = 0; i < BST_LOOP_BODY; i++) {
         bst_loop_body *body = &model->body[i];
         body->name = names[i];
@@ -28,7 +28,7 @@ bst_status bst_loop_build_body(bst_ctx *ctx, const bst_craft_config *config,
         }
         body->loop = (bst_loop){.open = body_open,
                                 .user = body,
-                                .dt_s = bst_attitude_control_of(config).dt_s,
+                                .dt_s = bst_spacecraft_attitude_control_of(config).dt_s,
                                 .hint_hz = body->hint_hz,
                                 .hints = hints};
         BST_TRY(bst_loop_analyse(ctx, &body->loop, &body->margins));
@@ -39,7 +39,7 @@ bst_status bst_loop_build_body(bst_ctx *ctx, const bst_craft_config *config,
 
 /* The mount points by the believed attitude: its error moves the line of sight as jitter does, in
  * bands from a day's to ten times a second's. */
-void bst_loop_body_bands(const bst_craft_config *config, int body_axis, double pixel_rad,
+void bst_loop_body_bands(const bst_spacecraft_config *config, int body_axis, double pixel_rad,
                          bst_loop_axis *axis) {
     if (config->type != BST_CRAFT_RIGID_BODY) {
         return;
@@ -49,7 +49,7 @@ void bst_loop_body_bands(const bst_craft_config *config, int body_axis, double p
     double low = 0.0, high = lowest_hz;
     for (int i = 0; i <= BANDS; i++) {
         double middle = i == 0 ? 0.5 * high : sqrt(low * high);
-        double density = bst_craft_noise_at(config, body_axis, middle).knowledge;
+        double density = bst_spacecraft_noise_at(config, body_axis, middle).knowledge;
         bst_loop_add_band(axis, low, high, density * (high - low) / (pixel_rad * pixel_rad));
         low = high;
         high *= ratio;

@@ -7,10 +7,10 @@
 
 static const double two_pi = 2.0 * BST_PI;
 
-static const bst_module_config *find_module(const bst_scenario *scenario, int observer, int sensor,
-                                            const char *role) {
+static const bst_scenario_module_config *find_module(const bst_scenario *scenario, int observer,
+                                                     int sensor, const char *role) {
     for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         if (module->observer == observer && module->sensor == sensor && !module->off &&
             strcmp(module->desc->role, role) == 0) {
             return module;
@@ -29,7 +29,7 @@ static double complex second_order_open(const void *user, double omega) {
     return (2.0 * servo->damping * w * s + w * w) / (s * s);
 }
 
-static bst_status second_order_servo(bst_ctx *ctx, const bst_two_axis_config *config,
+static bst_status second_order_servo(bst_ctx *ctx, const bst_mount_two_axis_config *config,
                                      bst_loop_servo *servo) {
     servo->there = true;
     servo->continuous = true;
@@ -57,8 +57,8 @@ static int axis_response(const bst_axis_spec *spec, double rate, int most, doubl
     return n;
 }
 
-static bst_status second_order_response(bst_ctx *ctx, const bst_two_axis_config *config,
-                                        double dt_s, bst_servo_response *out) {
+static bst_status second_order_response(bst_ctx *ctx, const bst_mount_two_axis_config *config,
+                                        double dt_s, bst_control_servo_response *out) {
     bst_axis_spec spec = {.rate_limit_radps = config->rate_limit_degps * BST_DEG_RAD,
                           .accel_limit_radps2 = config->accel_limit_degps2 * BST_DEG_RAD,
                           .natural_frequency_radps = two_pi * config->natural_frequency_hz,
@@ -74,8 +74,8 @@ static bst_status second_order_response(bst_ctx *ctx, const bst_two_axis_config 
     for (int n = a; n < b; n++) {
         step[n] = 1.0;
     }
-    *out =
-        (bst_servo_response){.dt_s = dt_s, .count = a > b ? a : b, .step = step, .ramp_lag = lag};
+    *out = (bst_control_servo_response){
+        .dt_s = dt_s, .count = a > b ? a : b, .step = step, .ramp_lag = lag};
     return BST_OK;
 }
 
@@ -87,7 +87,7 @@ void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, doubl
 
 /* A table cut at its points, and these at a quarter of an octave, up to what the plant's steps can
  * follow. */
-static void table_bands(const bst_density *table, double scale, double top_hz,
+static void table_bands(const bst_jitter_density *table, double scale, double top_hz,
                         bst_loop_axis *axis) {
     for (int i = 0; i + 1 < table->count; i++) {
         double from = table->points[i].frequency_hz;
@@ -95,7 +95,7 @@ static void table_bands(const bst_density *table, double scale, double top_hz,
         int parts = from > 0.0 && to > from ? (int)fmin(ceil(4.0 * log2(to / from)), 40.0) : 8;
         for (int k = 0; k < parts && to > from; k++) {
             double a = from + (to - from) * k / parts, b = from + (to - from) * (k + 1) / parts;
-            bst_loop_add_band(axis, a, b, scale * bst_density_integral(table, a, b));
+            bst_loop_add_band(axis, a, b, scale * bst_jitter_density_integral(table, a, b));
         }
     }
 }
@@ -196,7 +196,7 @@ static void predict(bst_loop_axis *axis, double drift_pxps, const bst_loop_optio
 }
 
 bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
-                                   const bst_servo_response *servo,
+                                   const bst_control_servo_response *servo,
                                    const bst_platform_config *platform, int camera_axis,
                                    double drift_pxps, const bst_loop_options *options,
                                    bst_loop_model *model, bst_loop_axis *axis) {
@@ -224,14 +224,14 @@ bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *contr
 
 /* ---- a sensor ---- */
 
-static bst_status build_second_order(bst_ctx *ctx, const bst_module_config *gimbal,
+static bst_status build_second_order(bst_ctx *ctx, const bst_scenario_module_config *gimbal,
                                      const bst_control_config *control,
                                      const bst_loop_options *options, bst_loop_model *model) {
-    const bst_two_axis_config *config = gimbal->config;
+    const bst_mount_two_axis_config *config = gimbal->config;
     static const char *const names[] = {"outer", "inner"};
     model->axes = 2;
     double dt = model->timing.gimbal_period_s, arcsec_px = model->pixel_rad / BST_ARCSEC_RAD;
-    bst_servo_response servo = {0};
+    bst_control_servo_response servo = {0};
     BST_TRY(second_order_response(ctx, config, dt, &servo));
     bst_status status = BST_OK;
     for (int a = 0; status == BST_OK && a < model->axes; a++) {
@@ -253,8 +253,8 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
                                  int sensor, const bst_loop_options *options,
                                  bst_loop_model **out) {
     *out = NULL;
-    const bst_module_config *gimbal = find_module(scenario, observer, sensor, "gimbal");
-    const bst_module_config *control = find_module(scenario, observer, sensor, "control");
+    const bst_scenario_module_config *gimbal = find_module(scenario, observer, sensor, "gimbal");
+    const bst_scenario_module_config *control = find_module(scenario, observer, sensor, "control");
     bool simple = gimbal && gimbal->desc->config == bst_two_axis_config_table;
     bool full = gimbal && gimbal->desc->config == bst_mount_config_table;
     if (!simple && !full) {
@@ -286,7 +286,7 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
     }
     if (status == BST_OK && simple) {
         status = build_second_order(ctx, gimbal, law, options, model);
-        const bst_two_axis_config *c = gimbal->config;
+        const bst_mount_two_axis_config *c = gimbal->config;
         status =
             status == BST_OK ? bst_loop_build_body(ctx, &c->platform.spacecraft, model) : status;
     } else if (status == BST_OK) {

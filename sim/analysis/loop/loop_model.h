@@ -52,7 +52,7 @@ typedef struct bst_loop_axis {
 typedef struct bst_loop_body {
     const char *name; /* "x", "y", "z" */
     int number;
-    const bst_craft_config *config;
+    const bst_spacecraft_config *config;
     double hint_hz[BST_LOOP_HINTS];
     bst_loop loop; /* its `user` is this struct */
     bst_loop_margins margins;
@@ -100,17 +100,17 @@ void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario);
 void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, double variance_px2);
 
 /* The loops of a rigid_body with an attitude law; nothing of other spacecraft. */
-bst_status bst_loop_build_body(bst_ctx *ctx, const bst_craft_config *config,
+bst_status bst_loop_build_body(bst_ctx *ctx, const bst_spacecraft_config *config,
                                bst_loop_model *model) BST_MUST_CHECK;
 /* What the error of its believed attitude about a body axis does to an axis of the mount. */
-void bst_loop_body_bands(const bst_craft_config *config, int body_axis, double pixel_rad,
+void bst_loop_body_bands(const bst_spacecraft_config *config, int body_axis, double pixel_rad,
                          bst_loop_axis *axis);
 
 /* Adds the platform's jitter and attitude errors to an axis that turns about a camera axis (0 x, 1
  * y), and closes the tracking loop round it (control NULL:
  * none). drift_pxps: of the image along this axis. */
 bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
-                                   const bst_servo_response *servo,
+                                   const bst_control_servo_response *servo,
                                    const bst_platform_config *platform, int camera_axis,
                                    double drift_pxps, const bst_loop_options *options,
                                    bst_loop_model *model, bst_loop_axis *axis) BST_MUST_CHECK;

@@ -93,7 +93,7 @@ static int mount_response(const bst_mount_axis_model *model, const bst_axis_spec
 
 static bst_status respond(bst_ctx *ctx, const bst_mount_config *config,
                           const bst_mount_axis_model *model, int k, double dt_s,
-                          bst_servo_response *out) {
+                          bst_control_servo_response *out) {
     bst_axis_spec spec = {.rate_limit_radps = config->rate_limit_degps[k] * BST_DEG_RAD,
                           .accel_limit_radps2 = 1e6, /* far beyond a tiny command */
                           .natural_frequency_radps = 1.0,
@@ -110,8 +110,8 @@ static bst_status respond(bst_ctx *ctx, const bst_mount_config *config,
     for (int n = a; n < b; n++) {
         step[n] = 1.0;
     }
-    *out =
-        (bst_servo_response){.dt_s = dt_s, .count = a > b ? a : b, .step = step, .ramp_lag = lag};
+    *out = (bst_control_servo_response){
+        .dt_s = dt_s, .count = a > b ? a : b, .step = step, .ramp_lag = lag};
     return BST_OK;
 }
 
@@ -133,7 +133,7 @@ bst_status bst_loop_build_mount(bst_ctx *ctx, int type, const bst_mount_config *
         int camera_axis = fabs(about.x) > fabs(about.y) ? 0 : 1;
         const double *d = config->platform.drift_arcsec_per_s;
         double drift = (about.x * d[0] + about.y * d[1] + about.z * d[2]) / arcsec_px;
-        bst_servo_response servo = {0};
+        bst_control_servo_response servo = {0};
         BST_TRY(respond(ctx, config, &axis->servo.mount, k, dt, &servo));
         bst_status status = bst_loop_close_tracking(ctx, control, &servo, &config->platform,
                                                     camera_axis, drift, options, model, axis);

@@ -31,9 +31,9 @@ static bst_status consider(void *user, bst_ctx *ctx, const bst_run_track *track)
 
 static bst_status choose(bst_ctx *ctx, const bst_orbit_request *q, bst_run_scene *scene,
                          bst_orbit_choice *out) {
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
     int count;
-    BST_TRY(bst_export_sensors(ctx, scene->run, q->sensor, sensors, &count));
+    BST_TRY(bst_run_sensors(ctx, scene->run, q->sensor, sensors, &count));
     for (int i = 0; i < count; i++) {
         BST_TRY(bst_run_observations(ctx, scene, &sensors[i], q->track, false, consider, out));
     }
@@ -52,11 +52,11 @@ static bst_status choose(bst_ctx *ctx, const bst_orbit_request *q, bst_run_scene
 
 /* The law by which the object moves in the scenario. A track that belongs to none of the objects
  * moves as all of them, where they all are element sets. */
-static bst_object_motion motion_of(const bst_world *world, int object) {
+static bst_world_motion_law motion_of(const bst_world *world, int object) {
     if (object >= 0) {
         return bst_world_object_motion(world, object);
     }
-    bst_object_motion all = {.sgp4 = bst_world_object_count(world) > 0};
+    bst_world_motion_law all = {.sgp4 = bst_world_object_count(world) > 0};
     for (int i = 0; i < bst_world_object_count(world); i++) {
         all.sgp4 = all.sgp4 && bst_world_object_motion(world, i).sgp4;
     }

@@ -16,12 +16,12 @@ typedef struct bst_orbit_request {
 typedef struct bst_orbit_choice {
     bst_run_track track;
     bst_run_observation *items;
-    bst_export_sensor sensor;
+    bst_run_sensor sensor;
     bst_time epoch; /* of the observations' seconds */
     int norad;      /* 0: not known */
     bst_run_reader *run;
-    bst_run_scene scene;      /* its world NULL: a TDM */
-    bst_object_motion motion; /* of the object in the scenario; lent by the scene */
+    bst_run_scene scene;         /* its world NULL: a TDM */
+    bst_world_motion_law motion; /* of the object in the scenario; lent by the scene */
 } bst_orbit_choice;
 
 /* From the folder of a run, or a TDM; `out` zeroed before. Freed with bst_orbit_choice_free, also

@@ -61,14 +61,14 @@ static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const bst_oem
     o->od.cov_11 = o->od.cov_22 = variance;
     o->od.direction = bst_vec3_from_radec(a->ra_rad, a->dec_rad);
     if (q->aberrated) {
-        bst_light light = bst_light_at(&bodies, eye->position_m, eye->velocity_mps);
-        o->od.direction = bst_light_unaberrate(&light, o->od.direction);
+        bst_astro_light light = bst_astro_light_at(&bodies, eye->position_m, eye->velocity_mps);
+        o->od.direction = bst_astro_light_unaberrate(&light, o->od.direction);
     }
     return BST_OK;
 }
 
 static bst_status gather(bst_ctx *ctx, const bst_tdm_request *q, const bst_tdm *tdm,
-                         const bst_oem *oem, bst_sky_clock *clock, bst_export_sensor *sensor,
+                         const bst_oem *oem, bst_sky_clock *clock, bst_run_sensor *sensor,
                          bst_run_observation *items, const bst_tdm_pair *pair) {
     int object;
     const char *name = q->observer_name ? q->observer_name : pair->observer;
@@ -97,18 +97,18 @@ static bst_status gather(bst_ctx *ctx, const bst_tdm_request *q, const bst_tdm *
         }
     }
     qsort(items, (size_t)n, sizeof *items, by_time);
-    *sensor = (bst_export_sensor){.index = -1};
+    *sensor = (bst_run_sensor){.index = -1};
     snprintf(sensor->observer, sizeof sensor->observer, "%.79s", pair->observer);
     snprintf(sensor->name, sizeof sensor->name, "TDM");
     snprintf(sensor->target, sizeof sensor->target, "%.79s", pair->object);
     return BST_OK;
 }
 
-bst_status bst_tdm_observations(bst_ctx *ctx, const bst_tdm_request *q, bst_export_sensor *sensor,
+bst_status bst_tdm_observations(bst_ctx *ctx, const bst_tdm_request *q, bst_run_sensor *sensor,
                                 bst_run_observation **items, int64_t *count) {
     bst_tdm *tdm = NULL;
     bst_oem *oem = NULL;
-    bst_eop *eop = NULL;
+    bst_astro_eop *eop = NULL;
     bst_sky_clock *clock = NULL;
     const bst_tdm_pair *pair = NULL;
     *items = NULL;
@@ -120,7 +120,7 @@ bst_status bst_tdm_observations(bst_ctx *ctx, const bst_tdm_request *q, bst_expo
     }
     bst_status status = bst_tdm_load(ctx, q->path, &tdm);
     status = status == BST_OK ? bst_oem_load(ctx, q->observer, &oem) : status;
-    status = status == BST_OK ? bst_eop_builtin(ctx, &eop) : status;
+    status = status == BST_OK ? bst_astro_eop_builtin(ctx, &eop) : status;
     status = status == BST_OK ? bst_sky_clock_create(ctx, eop, &clock) : status;
     status = status == BST_OK ? choose_pair(ctx, q, tdm, &pair) : status;
     if (status == BST_OK) {
@@ -134,7 +134,7 @@ bst_status bst_tdm_observations(bst_ctx *ctx, const bst_tdm_request *q, bst_expo
         *items = NULL;
     }
     bst_sky_clock_free(clock);
-    bst_eop_free(eop);
+    bst_astro_eop_free(eop);
     bst_oem_free(oem);
     bst_tdm_free(tdm);
     return status;

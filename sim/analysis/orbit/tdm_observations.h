@@ -19,7 +19,7 @@ typedef struct bst_tdm_request {
  * such object; BST_ERR_NUMERIC where the OEM has no state at the time of an angle; other errors as
  * bst_tdm_load and bst_oem_load. */
 bst_status bst_tdm_observations(bst_ctx *ctx, const bst_tdm_request *request,
-                                bst_export_sensor *sensor, bst_run_observation **items,
+                                bst_run_sensor *sensor, bst_run_observation **items,
                                 int64_t *count) BST_MUST_CHECK;
 
 #endif

@@ -46,13 +46,13 @@ typedef struct bst_pd_target {
 /* One frame: its targets and what is needed to render and process it. */
 typedef struct bst_pd_frame {
     int count;
-    bst_match_target *places; /* [count] */
+    bst_eval_match_target *places; /* [count] */
     bst_pd_target *targets;
-    bst_source *sources; /* targets, then the stars */
+    bst_scene_source *sources; /* targets, then the stars */
     int source_room;
     bst_pd_stars stars; /* that may be found */
-    bst_source_path *paths;
-    bst_motion motion; /* the camera's, as told to image processing */
+    bst_scene_source_path *paths;
+    bst_camera_motion motion; /* the camera's, as told to image processing */
     double time_s[2];
     bst_quat q[2];
     bst_los_track track;
@@ -63,7 +63,7 @@ typedef struct bst_pd_frame {
 typedef struct bst_pd_scene {
     bst_pd_options options;
     const bst_scenario *scenario;
-    const bst_module_config *imgproc; /* of the sensor */
+    const bst_scenario_module_config *imgproc; /* of the sensor */
     int observer, sensor;
     char name[160];    /* observer/sensor */
     bst_camera camera; /* as rendered: widened by the jitter */
@@ -76,7 +76,7 @@ typedef struct bst_pd_scene {
     double exposure_s, sky_e, dark_e;
     double noise_e;       /* of a pixel without the source's own light, at the boresight */
     double fwhm_px;       /* of the PSF: how near a detection must be */
-    double own_light;     /* as bst_matched_filter_pd has it, mean of places and directions */
+    double own_light;     /* as bst_eval_matched_filter_pd has it, mean of places and directions */
     double sigma_px;      /* of the Gaussian with the PSF's noise-equivalent area */
     bst_pd_image *image;  /* of targets; NULL: the PSF is that Gaussian */
     struct bst_psf *seen; /* that it is made from */
@@ -101,7 +101,7 @@ int bst_pd_scene_room(const bst_pd_scene *scene);
 bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *scene, int64_t number, bool targets,
                             bst_pd_frame *frame) BST_MUST_CHECK;
 /* sum p^2 of a target of unit flux. */
-double bst_pd_sharpness(const bst_pd_scene *scene, const bst_match_target *place);
+double bst_pd_sharpness(const bst_pd_scene *scene, const bst_eval_match_target *place);
 
 /* Frames that a detector takes before it answers. */
 int bst_pd_scene_stacked(const bst_pd_scene *scene);

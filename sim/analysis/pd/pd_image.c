@@ -103,7 +103,7 @@ static void add_place(bst_pd_image *m, const stamp *s, const mix *nodes, double 
 }
 
 /* Share of a target's light by pixel, and its derivatives; returns the number of pixels. */
-static int draw(bst_pd_image *m, const bst_match_target *place, bool slopes) {
+static int draw(bst_pd_image *m, const bst_eval_match_target *place, bool slopes) {
     double half_x = 0.5 * fabs(place->dx_px) + REACH_PX;
     double half_y = 0.5 * fabs(place->dy_px) + REACH_PX;
     stamp s = {(int)ceil(place->x_px - half_x), (int)ceil(place->y_px - half_y), 0, 0};
@@ -127,7 +127,7 @@ static int draw(bst_pd_image *m, const bst_match_target *place, bool slopes) {
     return s.width * s.height;
 }
 
-void bst_pd_image_powers(bst_pd_image *m, const bst_match_target *place, double out[2]) {
+void bst_pd_image_powers(bst_pd_image *m, const bst_eval_match_target *place, double out[2]) {
     int count = draw(m, place, false);
     out[0] = out[1] = 0.0;
     for (int i = 0; i < count; i++) {
@@ -136,8 +136,8 @@ void bst_pd_image_powers(bst_pd_image *m, const bst_match_target *place, double 
     }
 }
 
-bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *m, const bst_match_target *place,
-                              double flux_e, const bst_bound_noise *noise,
+bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *m, const bst_eval_match_target *place,
+                              double flux_e, const bst_eval_bound_noise *noise,
                               bst_location_bound *out) {
     int count = draw(m, place, true);
     return bst_location_bound_of(ctx, m->share, m->by_x, m->by_y, count, flux_e, noise, out);

@@ -16,11 +16,11 @@ void bst_pd_image_free(bst_pd_image *image);
 
 /* Sums of share^2 and share^3 over the pixels of a target of unit flux, at its own place in the
  * field and in the pixel (to 1/32 px). */
-void bst_pd_image_powers(bst_pd_image *image, const bst_match_target *place, double out[2]);
+void bst_pd_image_powers(bst_pd_image *image, const bst_eval_match_target *place, double out[2]);
 
 /* As bst_location_bound_of, of a target with flux_e. */
-bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *image, const bst_match_target *place,
-                              double flux_e, const bst_bound_noise *noise,
+bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *image, const bst_eval_match_target *place,
+                              double flux_e, const bst_eval_bound_noise *noise,
                               bst_location_bound *out) BST_MUST_CHECK;
 
 #endif

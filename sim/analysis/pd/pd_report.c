@@ -24,14 +24,14 @@ static double ratio(double square, double count, double bound_square, double bou
 static row row_of(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_figures *f, int i) {
     const bst_pd_tally *t = &r->tallies[i];
     double n = (double)t->matched, bounds = (double)t->bounds;
-    bst_interval w = bst_wilson_interval(t->matched, t->trials, BST_NORMAL_95);
+    bst_eval_interval w = bst_eval_wilson_interval(t->matched, t->trials, BST_NORMAL_95);
     double raw = t->trials > 0 ? n / (double)t->trials : NAN;
     row out = {.pd = bst_pd_without_chance(raw, f->chance),
                .low = bst_pd_without_chance(w.low, f->chance),
                .high = bst_pd_without_chance(w.high, f->chance),
-               .ideal = f->pfa > 0.0 ? bst_ideal_pd(f->pfa, s->snr[i]) : NAN,
+               .ideal = f->pfa > 0.0 ? bst_eval_ideal_pd(f->pfa, s->snr[i]) : NAN,
                .matched_filter =
-                   f->pfa > 0.0 ? bst_matched_filter_pd(f->pfa, s->snr[i], s->own_light) : NAN,
+                   f->pfa > 0.0 ? bst_eval_matched_filter_pd(f->pfa, s->snr[i], s->own_light) : NAN,
                .over_bound_both = ratio(t->error_square[0] + t->error_square[1], n,
                                         t->bound_square[0] + t->bound_square[1], bounds),
                .flux_over_bound = ratio(t->flux_square, n, t->flux_bound_square, bounds),
@@ -93,7 +93,7 @@ static void print_head(const bst_pd_scene *s, const bst_pd_result *r) {
     printf(
         "%s with up to %d targets, %lld without; processing %.1f ms a frame, %.1f s in "
         "all\n\n",
-        bst_count_text((char[BST_COUNT_TEXT]){0}, r->frames, "frame", "frames"),
+        bst_text_of_count((char[BST_COUNT_TEXT]){0}, r->frames, "frame", "frames"),
         bst_pd_scene_room(s), (long long)r->empty_frames, 1e3 * r->process_s, r->wall_s);
     const char *const axes[2] = {s->sharpness ? "along" : "x", s->sharpness ? "across" : "y"};
     printf("%56s RMS error over bound\n%7s %7s %8s %7s  %-16s %6s %7s  %7s %7s %7s %6s %9s", "",
@@ -125,10 +125,10 @@ void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
         printf(", %g requested", s->options.false_alarms);
     }
     printf("\n");
-    print_loss("0.5", f->pd50, bst_ideal_snr(f->pfa, 0.5), f->loss_db_pd50, f->loss_db_sigma_pd50,
-               f->own_light_db_pd50);
-    print_loss("0.9", f->pd90, bst_ideal_snr(f->pfa, 0.9), f->loss_db_pd90, f->loss_db_sigma_pd90,
-               f->own_light_db_pd90);
+    print_loss("0.5", f->pd50, bst_eval_ideal_snr(f->pfa, 0.5), f->loss_db_pd50,
+               f->loss_db_sigma_pd50, f->own_light_db_pd50);
+    print_loss("0.9", f->pd90, bst_eval_ideal_snr(f->pfa, 0.9), f->loss_db_pd90,
+               f->loss_db_sigma_pd90, f->own_light_db_pd90);
     if (s->options.stack > 0 && isfinite(f->gain_db_pd50) && isfinite(f->gain_db_pd90)) {
         printf(
             "  gain of the stack at the same false alarms per frame, ideal %.2f dB: Pd 0.5 %.2f dB "
@@ -139,7 +139,7 @@ void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
     }
     if (r->lost > 0) {
         printf("  no room for %s, which are missing\n",
-               bst_count_text((char[BST_COUNT_TEXT]){0}, r->lost, "detection", "detections"));
+               bst_text_of_count((char[BST_COUNT_TEXT]){0}, r->lost, "detection", "detections"));
     }
 }
 
@@ -251,8 +251,8 @@ static void put_points(FILE *o, const bst_pd_scene *s, const bst_pd_result *r,
     fputs("$ideal << BST_END\n", o);
     for (int i = 0; i <= 200 && f->pfa > 0.0; i++) {
         double snr = low + (high - low) * i / 200.0;
-        fprintf(o, "%.9g %.9g %.9g\n", snr, bst_ideal_pd(f->pfa, snr),
-                bst_matched_filter_pd(f->pfa, snr, s->own_light));
+        fprintf(o, "%.9g %.9g %.9g\n", snr, bst_eval_ideal_pd(f->pfa, snr),
+                bst_eval_matched_filter_pd(f->pfa, snr, s->own_light));
     }
     fputs("0 nan nan\nBST_END\n", o);
     fprintf(o, "set xrange [%.9g:%.9g]\n", low - 0.02 * (high - low), high + 0.02 * (high - low));

@@ -25,20 +25,20 @@ typedef struct runner {
     bst_pd_result *result;
 } runner;
 
-static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_match_target *place,
+static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_eval_match_target *place,
                             const bst_pd_target *target, bst_pd_tally *tally) {
     const bst_pd_scene *s = r->scene;
     if (tally->bounds >= (s->sharpness ? BOUNDS_OF_STREAKS : BOUNDS_AT_REST) ||
         (s->options.known_rate && tally->bounds > r->result->frames)) { /* one direction a frame */
         return BST_OK;
     }
-    bst_bound_source source = {.x_px = place->x_px,
-                               .y_px = place->y_px,
-                               .dx_px = place->dx_px,
-                               .dy_px = place->dy_px,
-                               .sigma_px = s->sigma_px,
-                               .flux_e = target->flux_e};
-    bst_bound_noise noise = {target->noise_e, true};
+    bst_eval_bound_source source = {.x_px = place->x_px,
+                                    .y_px = place->y_px,
+                                    .dx_px = place->dx_px,
+                                    .dy_px = place->dy_px,
+                                    .sigma_px = s->sigma_px,
+                                    .flux_e = target->flux_e};
+    bst_eval_bound_noise noise = {target->noise_e, true};
     bst_location_bound bound;
     double along[2];
     if (s->image) {
@@ -58,7 +58,7 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_match_targe
     return BST_OK;
 }
 
-static void add_error(const bst_match_target *place, const bst_pd_target *target,
+static void add_error(const bst_eval_match_target *place, const bst_pd_target *target,
                       const bst_detection *d, bst_pd_tally *tally) {
     double x = d->x_px - place->x_px, y = d->y_px - place->y_px;
     double length = hypot(place->dx_px, place->dy_px);
@@ -87,8 +87,8 @@ static void add_error(const bst_match_target *place, const bst_pd_target *target
 static bst_status count_targets(bst_ctx *ctx, runner *r, const bst_pd_frame *f) {
     bst_pd_result *out = r->result;
     int taken = 0, near = 0;
-    bst_match_targets(f->places, f->count, r->scene->fwhm_px, r->detections, r->of_target,
-                      r->of_detection);
+    bst_eval_match_targets(f->places, f->count, r->scene->fwhm_px, r->detections, r->of_target,
+                           r->of_detection);
     for (int i = 0; i < f->count; i++) {
         bst_pd_tally *tally = &out->tallies[f->targets[i].point];
         BST_TRY(add_bound(ctx, r, &f->places[i], &f->targets[i], tally));
@@ -110,8 +110,8 @@ static bst_status count_targets(bst_ctx *ctx, runner *r, const bst_pd_frame *f) 
 
 static void count_chance(runner *r, const bst_pd_frame *f) {
     bst_pd_result *out = r->result;
-    out->chance_hits += bst_match_targets(f->places, f->count, r->scene->fwhm_px, r->detections,
-                                          r->of_target, r->of_detection);
+    out->chance_hits += bst_eval_match_targets(f->places, f->count, r->scene->fwhm_px,
+                                               r->detections, r->of_target, r->of_detection);
     out->chance_trials += f->count;
     for (int i = 0; i < r->detections->count; i++) {
         bool star = bst_pd_is_star(&f->stars, r->scene->fwhm_px, &r->detections->items[i]);
@@ -225,7 +225,7 @@ bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *detector,
 static double loss_sigma(bst_pd_needed needed, double pfa, int64_t alarms, double pd) {
     /* d ln(snr) of both; Q^-1(pfa) changes by -d ln(pfa) / hazard, the hazard of a normal tail
      * being near Q^-1 itself */
-    double t = bst_ideal_snr(pfa, 0.5), ideal = bst_ideal_snr(pfa, pd);
+    double t = bst_eval_ideal_snr(pfa, 0.5), ideal = bst_eval_ideal_snr(pfa, pd);
     double of_alarms = 1.0 / (sqrt((double)alarms) * t * ideal);
     return 20.0 / log(10.0) * hypot(needed.sigma / needed.snr, of_alarms);
 }
@@ -236,7 +236,7 @@ void bst_pd_figures_of(const bst_pd_scene *s, const bst_pd_result *r, bst_pd_fig
         points[i] = (bst_pd_point){s->snr[i], r->tallies[i].trials, r->tallies[i].matched};
     }
     double frames = (double)r->empty_frames;
-    bst_interval alarms = bst_poisson_interval(r->false_alarms, 0.05);
+    bst_eval_interval alarms = bst_eval_poisson_interval(r->false_alarms, 0.05);
     *out = (bst_pd_figures){.false_alarms_per_frame = (double)r->false_alarms / frames,
                             .false_alarms_low = alarms.low / frames,
                             .false_alarms_high = alarms.high / frames};
@@ -247,9 +247,9 @@ void bst_pd_figures_of(const bst_pd_scene *s, const bst_pd_result *r, bst_pd_fig
     out->loss_db_pd50 = bst_pd_loss_db(out->pd50.snr, out->pfa, 0.5);
     out->loss_db_pd90 = bst_pd_loss_db(out->pd90.snr, out->pfa, 0.9);
     out->own_light_db_pd50 =
-        20.0 * log10(out->pd50.snr / bst_matched_filter_snr(out->pfa, 0.5, s->own_light));
+        20.0 * log10(out->pd50.snr / bst_eval_matched_filter_snr(out->pfa, 0.5, s->own_light));
     out->own_light_db_pd90 =
-        20.0 * log10(out->pd90.snr / bst_matched_filter_snr(out->pfa, 0.9, s->own_light));
+        20.0 * log10(out->pd90.snr / bst_eval_matched_filter_snr(out->pfa, 0.9, s->own_light));
     out->gain_db_pd50 = -out->loss_db_pd50;
     out->gain_db_pd90 = -out->loss_db_pd90;
     out->gain_over_single_db_pd50 = out->gain_over_single_db_pd90 = NAN;

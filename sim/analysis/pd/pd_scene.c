@@ -29,7 +29,7 @@ static const bst_sensor_config *sensor_config(const bst_scenario *scenario, int 
 static bst_status find_sensor(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_observer_config *observers = s->scenario->observers.items;
     for (int m = 0; m < s->scenario->module_count; m++) {
-        const bst_module_config *module = &s->scenario->modules[m];
+        const bst_scenario_module_config *module = &s->scenario->modules[m];
         if (strcmp(module->desc->role, "imgproc") != 0) {
             continue;
         }
@@ -76,7 +76,7 @@ static bst_status open_sky(bst_ctx *ctx, bst_pd_scene *s) {
     bst_quat q = bst_pd_sky_attitude(s->sky, 0.0);
     const bst_quat both[2] = {q, q};
     bst_los_track track = {2, time_s, both};
-    const bst_source *stars;
+    const bst_scene_source *stars;
     int count;
     BST_TRY(bst_pd_sky_look(ctx, s->sky, &track, &stars, &count));
     s->sky_e =
@@ -96,7 +96,7 @@ static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
     s->camera = *bst_world_camera(s->world, s->observer, s->sensor);
     if (s->options.jitter_px > 0.0) {
         bst_camera widened;
-        BST_TRY(bst_camera_blurred(ctx, &s->camera, s->options.jitter_px, &widened));
+        BST_TRY(bst_psf_camera_blurred(ctx, &s->camera, s->options.jitter_px, &widened));
         s->camera = widened;
         s->psf = (struct bst_psf *)widened.psf;
     }
@@ -142,14 +142,14 @@ static bst_status make_sharpness(bst_ctx *ctx, bst_pd_scene *s) {
     for (int a = 0; a < ANGLES; a++) {
         double angle = 0.5 * BST_PI * a / (ANGLES - 1);
         for (int p = 0; p < 4; p++) {
-            bst_bound_source source = {.x_px = 0.125 + 0.5 * (p % 2),
-                                       .y_px = 0.125 + 0.5 * (p / 2),
-                                       .dx_px = s->options.streak_px * cos(angle),
-                                       .dy_px = s->options.streak_px * sin(angle),
-                                       .sigma_px = s->sigma_px,
-                                       .flux_e = 1.0};
+            bst_eval_bound_source source = {.x_px = 0.125 + 0.5 * (p % 2),
+                                            .y_px = 0.125 + 0.5 * (p / 2),
+                                            .dx_px = s->options.streak_px * cos(angle),
+                                            .dy_px = s->options.streak_px * sin(angle),
+                                            .sigma_px = s->sigma_px,
+                                            .flux_e = 1.0};
             double powers[2];
-            BST_TRY(bst_gaussian_powers(ctx, &source, powers));
+            BST_TRY(bst_eval_gaussian_powers(ctx, &source, powers));
             s->sharpness[a] += 0.25 * powers[0];
         }
     }
@@ -169,7 +169,7 @@ static double axis_sharpness(double x, double sigma) {
     return sum;
 }
 
-double bst_pd_sharpness(const bst_pd_scene *s, const bst_match_target *place) {
+double bst_pd_sharpness(const bst_pd_scene *s, const bst_eval_match_target *place) {
     if (s->image) {
         double powers[2];
         bst_pd_image_powers(s->image, place, powers);
@@ -185,28 +185,28 @@ double bst_pd_sharpness(const bst_pd_scene *s, const bst_match_target *place) {
 }
 
 /* A place in the pixel on the middle of the sensor. */
-static bst_match_target middle_of(const bst_pd_scene *s, double x, double y) {
-    return (bst_match_target){.x_px = floor(bst_camera_centre_x(&s->camera)) + x,
-                              .y_px = floor(bst_camera_centre_y(&s->camera)) + y};
+static bst_eval_match_target middle_of(const bst_pd_scene *s, double x, double y) {
+    return (bst_eval_match_target){.x_px = floor(bst_camera_centre_x(&s->camera)) + x,
+                                   .y_px = floor(bst_camera_centre_y(&s->camera)) + y};
 }
 
 /* What the targets' own light adds to the noise of a matched filter's output. */
 static bst_status set_own_light(bst_ctx *ctx, bst_pd_scene *s) {
     for (int p = 0; p < 4; p++) {
-        bst_bound_source source = {.x_px = 0.125 + 0.5 * (p % 2),
-                                   .y_px = 0.125 + 0.5 * (p / 2),
-                                   .dx_px = 0.8 * s->options.streak_px,
-                                   .dy_px = 0.6 * s->options.streak_px,
-                                   .sigma_px = s->sigma_px,
-                                   .flux_e = 1.0};
+        bst_eval_bound_source source = {.x_px = 0.125 + 0.5 * (p % 2),
+                                        .y_px = 0.125 + 0.5 * (p / 2),
+                                        .dx_px = 0.8 * s->options.streak_px,
+                                        .dy_px = 0.6 * s->options.streak_px,
+                                        .sigma_px = s->sigma_px,
+                                        .flux_e = 1.0};
         double powers[2];
         if (s->image) {
-            bst_match_target place = middle_of(s, source.x_px, source.y_px);
+            bst_eval_match_target place = middle_of(s, source.x_px, source.y_px);
             place.dx_px = source.dx_px;
             place.dy_px = source.dy_px;
             bst_pd_image_powers(s->image, &place, powers);
         } else {
-            BST_TRY(bst_gaussian_powers(ctx, &source, powers));
+            BST_TRY(bst_eval_gaussian_powers(ctx, &source, powers));
         }
         s->own_light += 0.25 * powers[1] / pow(powers[0], 1.5) / s->noise_e;
     }
@@ -249,9 +249,9 @@ static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
 
 static void set_points(bst_pd_scene *s) {
     const bst_pd_options *o = &s->options;
-    bst_match_target quarter = {0.25, 0.25, 0.6 * o->streak_px, 0.8 * o->streak_px};
+    bst_eval_match_target quarter = {0.25, 0.25, 0.6 * o->streak_px, 0.8 * o->streak_px};
     if (s->image) {
-        bst_match_target middle = middle_of(s, quarter.x_px, quarter.y_px);
+        bst_eval_match_target middle = middle_of(s, quarter.x_px, quarter.y_px);
         quarter.x_px = middle.x_px;
         quarter.y_px = middle.y_px;
     }
@@ -352,10 +352,10 @@ static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int
     int i = f->count++;
     const bst_camera *c = &s->camera;
     double length = s->options.streak_px, dx = length * cos(angle), dy = length * sin(angle);
-    bst_source *source = &f->sources[i];
-    *source = (bst_source){.kind = BST_SOURCE_STAR,
-                           .id = (uint32_t)i + 1,
-                           .apparent_mid = direction(c, f->motion.q_cam_from_gcrf, x, y)};
+    bst_scene_source *source = &f->sources[i];
+    *source = (bst_scene_source){.kind = BST_SOURCE_STAR,
+                                 .id = (uint32_t)i + 1,
+                                 .apparent_mid = direction(c, f->motion.q_cam_from_gcrf, x, y)};
     if (length > 0.0 && s->options.known_rate) {
         double x0, y0, x1, y1;
         if (seen(c, f, 0, source->apparent_mid, &x0, &y0) &&
@@ -365,12 +365,12 @@ static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int
         }
     } else if (length > 0.0 || s->options.star_streak_px > 0.0) {
         source->kind = BST_SOURCE_OBJECT;
-        f->paths[i] = bst_source_path_through(direction(c, f->q[0], x - 0.5 * dx, y - 0.5 * dy),
-                                              source->apparent_mid,
-                                              direction(c, f->q[1], x + 0.5 * dx, y + 0.5 * dy));
+        f->paths[i] = bst_scene_source_path_through(
+            direction(c, f->q[0], x - 0.5 * dx, y - 0.5 * dy), source->apparent_mid,
+            direction(c, f->q[1], x + 0.5 * dx, y + 0.5 * dy));
         source->path = &f->paths[i];
     }
-    f->places[i] = (bst_match_target){x, y, dx, dy};
+    f->places[i] = (bst_eval_match_target){x, y, dx, dy};
     double flux = s->flux_e[point], noise_e = noise_at(s, x, y);
     if (!s->options.by_magnitude) { /* the SNR is that of its own place */
         flux = s->snr[point] * noise_e / sqrt(bst_pd_sharpness(s, &f->places[i]));
@@ -390,8 +390,8 @@ static bst_vec3 turn_for(const bst_camera *c, double dx, double dy) {
 /* The camera's attitude through the exposure. */
 static void set_motion(bst_pd_scene *s, bst_pd_frame *f, double heading, double roll) {
     const bst_pd_options *o = &s->options;
-    f->motion = (bst_motion){.q_cam_from_gcrf =
-                                 s->sky ? bst_pd_sky_attitude(s->sky, roll) : BST_QUAT_IDENTITY};
+    f->motion = (bst_camera_motion){.q_cam_from_gcrf = s->sky ? bst_pd_sky_attitude(s->sky, roll)
+                                                              : BST_QUAT_IDENTITY};
     double length = o->known_rate ? o->streak_px : o->star_streak_px;
     if (length > 0.0) {
         f->motion.turn_cam_rad = turn_for(&s->camera, length * cos(heading), length * sin(heading));
@@ -444,11 +444,11 @@ static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_r
 }
 
 /* Stars beside the targets: copied, for a request has one list. */
-static bst_status add_stars(bst_ctx *ctx, bst_pd_scene *s, const bst_source *stars, int count,
+static bst_status add_stars(bst_ctx *ctx, bst_pd_scene *s, const bst_scene_source *stars, int count,
                             int targets, bst_pd_frame *f) {
     int wanted = f->count + count;
     if (wanted > f->source_room) {
-        bst_source *more = realloc(f->sources, (size_t)wanted * sizeof *more);
+        bst_scene_source *more = realloc(f->sources, (size_t)wanted * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", wanted);
         }
@@ -467,7 +467,7 @@ bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *s, int64_t number, bool 
     bst_rng_key key = bst_rng_make_key(seed, run, s->name, "pd targets");
     double heading = 2.0 * BST_PI * bst_rng_uniform(camera, n, 0);
     double roll = 2.0 * BST_PI * bst_rng_uniform(camera, n, 1);
-    const bst_source *stars = NULL;
+    const bst_scene_source *stars = NULL;
     int count = 0;
     set_motion(s, f, heading, roll);
     if (s->sky) {

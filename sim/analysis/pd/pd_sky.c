@@ -20,14 +20,14 @@ struct bst_pd_sky {
     bst_quat attitude;
     int64_t tick_rate_hz, exposure_ticks;
     bst_truth header;
-    bst_match_target *unsorted;
+    bst_eval_match_target *unsorted;
     int room;
 };
 
 /* "v_limit" of the sensor's rendering module, as its table has it. */
 static double v_limit_of(const bst_pd_scene *s) {
     for (int m = 0; m < s->scenario->module_count; m++) {
-        const bst_module_config *module = &s->scenario->modules[m];
+        const bst_scenario_module_config *module = &s->scenario->modules[m];
         if (module->observer != s->observer || module->sensor != s->sensor ||
             strcmp(module->desc->role, "scenegen") != 0) {
             continue;
@@ -77,7 +77,7 @@ bst_quat bst_pd_sky_attitude(const bst_pd_sky *sky, double roll_rad) {
 }
 
 bst_status bst_pd_sky_look(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
-                           const bst_source **stars, int *count) {
+                           const bst_scene_source **stars, int *count) {
     bst_window window = {0, 0, (int)sky->camera->width_px, (int)sky->camera->height_px};
     return bst_field_query(ctx, sky->field, track, 0, sky->exposure_ticks, sky->tick_rate_hz,
                            window, &sky->options, &sky->header, stars, count);
@@ -121,7 +121,7 @@ static int cell_of(const bst_pd_stars *s, double x_px, double y_px) {
 }
 
 bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
-                            const bst_source *stars, int count, bst_pd_stars *out) {
+                            const bst_scene_source *stars, int count, bst_pd_stars *out) {
     bst_window window = {0, 0, (int)sky->camera->width_px, (int)sky->camera->height_px};
     BST_TRY(make_room(ctx, sky, count, out));
     int cells = out->columns * out->rows;
@@ -133,10 +133,10 @@ bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *
         if (!(item.snr >= BST_PD_STAR_SNR) || !isfinite(item.x_centroid_px)) {
             continue;
         }
-        bst_match_target *place = &sky->unsorted[out->count++];
-        *place =
-            (bst_match_target){item.x_centroid_px, item.y_centroid_px,
-                               item.x_end_px - item.x_start_px, item.y_end_px - item.y_start_px};
+        bst_eval_match_target *place = &sky->unsorted[out->count++];
+        *place = (bst_eval_match_target){item.x_centroid_px, item.y_centroid_px,
+                                         item.x_end_px - item.x_start_px,
+                                         item.y_end_px - item.y_start_px};
         out->first[cell_of(out, place->x_px, place->y_px) + 1]++;
     }
     for (int c = 0; c < cells; c++) {
@@ -162,14 +162,14 @@ void bst_pd_stars_free(bst_pd_stars *stars) {
 
 /* Whether a star lies on a detection that is as long as it says: many stars in a crowd, or one and
  * its neighbours, make a streak. */
-static bool holds(const bst_detection *d, double reach_px, const bst_match_target *star) {
+static bool holds(const bst_detection *d, double reach_px, const bst_eval_match_target *star) {
     if (!(d->flags & BST_DETECTION_STREAK)) {
         return false;
     }
-    bst_match_target line = {d->x_px, d->y_px, d->length_px * cos(d->angle_rad),
-                             d->length_px * sin(d->angle_rad)};
+    bst_eval_match_target line = {d->x_px, d->y_px, d->length_px * cos(d->angle_rad),
+                                  d->length_px * sin(d->angle_rad)};
     bst_detection at = {.x_px = star->x_px, .y_px = star->y_px};
-    return bst_match_belongs(&line, reach_px, &at);
+    return bst_eval_match_belongs(&line, reach_px, &at);
 }
 
 bool bst_pd_is_star(const bst_pd_stars *s, double reach_px, const bst_detection *d) {
@@ -191,7 +191,7 @@ bool bst_pd_is_star(const bst_pd_stars *s, double reach_px, const bst_detection 
             double x = d->x_px + i * s->cell_px, y = d->y_px + j * s->cell_px;
             int cell = cell_of(s, x, y);
             for (int k = s->first[cell]; k < s->first[cell + 1]; k++) {
-                if (bst_match_belongs(&s->places[k], reach_px, d) ||
+                if (bst_eval_match_belongs(&s->places[k], reach_px, d) ||
                     holds(d, reach_px, &s->places[k])) {
                     return true;
                 }

@@ -10,8 +10,8 @@ struct bst_pd_scene;
 /* Stars that a detector may find in one frame: those of at least BST_PD_STAR_SNR, in cells. */
 #define BST_PD_STAR_SNR 1.0
 typedef struct bst_pd_stars {
-    bst_match_target *places; /* [count] by cell */
-    int *first;               /* [columns * rows + 1] of each cell */
+    bst_eval_match_target *places; /* [count] by cell */
+    int *first;                    /* [columns * rows + 1] of each cell */
     int count, room, columns, rows;
     double cell_px;
 } bst_pd_stars;
@@ -26,10 +26,11 @@ void bst_pd_sky_close(bst_pd_sky *sky);
 bst_quat bst_pd_sky_attitude(const bst_pd_sky *sky, double roll_rad);
 /* Looks: stars and background along `track`, held in `sky` until the next look. */
 bst_status bst_pd_sky_look(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
-                           const bst_source **stars, int *count) BST_MUST_CHECK;
+                           const bst_scene_source **stars, int *count) BST_MUST_CHECK;
 /* Places of those that can be found, into `out`, which grows. */
 bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
-                            const bst_source *stars, int count, bst_pd_stars *out) BST_MUST_CHECK;
+                            const bst_scene_source *stars, int count,
+                            bst_pd_stars *out) BST_MUST_CHECK;
 void bst_pd_stars_free(bst_pd_stars *stars);
 /* Expected electrons of sky in a pixel of the latest look, and its map (NULL: the same all over).
  */

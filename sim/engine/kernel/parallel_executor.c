@@ -469,7 +469,7 @@ bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads, bool *
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     while (s->thread_count < wanted &&
-           bst_thread_start(&s->threads[s->thread_count], work, s) == 0) {
+           bst_core_thread_start(&s->threads[s->thread_count], work, s) == 0) {
         s->thread_count++;
     }
     pthread_sigmask(SIG_SETMASK, &before, NULL);

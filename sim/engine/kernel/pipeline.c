@@ -555,9 +555,9 @@ bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) {
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    int error = bst_thread_start(&o->thread, work, o);
+    int error = bst_core_thread_start(&o->thread, work, o);
     /* without it all is done by the other */
-    o->looks = !error && has_ahead(engine) && bst_thread_start(&o->looker, look_ahead, o) == 0;
+    o->looks = !error && has_ahead(engine) && bst_core_thread_start(&o->looker, look_ahead, o) == 0;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (error) {
         pthread_cond_destroy(&o->changed);

@@ -24,48 +24,48 @@ static const bst_fits_content plane_contents[] = {
     BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ITEMS, BST_FITS_FLAGS};
 
 const bst_config_desc bst_record_config_table[] = {
-    BST_ENUM(bst_record_config, frames, frame_choices, "\"extensions\"",
+    BST_ENUM(bst_recorder_config, frames, frame_choices, "\"extensions\"",
              "Frames in FITS: an image extension each, one datacube with a table of times and "
              "WCS, or none."),
-    BST_ENUM(bst_record_config, compression, compression_choices, "\"auto\"",
+    BST_ENUM(bst_recorder_config, compression, compression_choices, "\"auto\"",
              "Of frames in extensions: \"rice\" is lossless FITS tile compression, done beside "
              "the simulation by a thread of its own; \"auto\" is rice for extensions and none for "
              "a cube."),
-    BST_BOOL(bst_record_config, checksums, "true",
+    BST_BOOL(bst_recorder_config, checksums, "true",
              "CHECKSUM and DATASUM in each HDU; they take about 0.1 ms per million pixels."),
     BST_CHOICES(
-        bst_record_config, planes, plane_choices, "[]",
+        bst_recorder_config, planes, plane_choices, "[]",
         "Noise-free images beside each frame, a FITS file each: expected electrons of the "
         "stars, of the targets, of sky and dark current; the mask of who each pixel belongs "
         "to; and which of the frame's own pixels are saturated."),
-    BST_REAL(bst_record_config, mask_threshold_sigma, "sigma", 1e-3, 1e6, "1",
+    BST_REAL(bst_recorder_config, mask_threshold_sigma, "sigma", 1e-3, 1e6, "1",
              "planes segmentation: least light of a source in a pixel of its own, in the noise of "
              "a pixel without sources."),
-    BST_BOOL(bst_record_config, truth, "true", "True exposures and sources."),
-    BST_BOOL(bst_record_config, truth_stars, "true", "Stars among the true sources."),
-    BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
-    BST_ENUM(bst_record_config, detections_of, detection_choices, "\"all\"",
+    BST_BOOL(bst_recorder_config, truth, "true", "True exposures and sources."),
+    BST_BOOL(bst_recorder_config, truth_stars, "true", "Stars among the true sources."),
+    BST_BOOL(bst_recorder_config, detections, "true", "What image processing found."),
+    BST_ENUM(bst_recorder_config, detections_of, detection_choices, "\"all\"",
              "Which of the detections: all, all but those labelled star, or only those labelled "
              "object."),
-    BST_BOOL(bst_record_config, tracks, "true", "Tracks and the attitude from stars."),
-    BST_BOOL(bst_record_config, commands, "true", "Commands to gimbal and sensor."),
-    BST_BOOL(bst_record_config, events, "true", "Events, and tasks where sensors are given any."),
+    BST_BOOL(bst_recorder_config, tracks, "true", "Tracks and the attitude from stars."),
+    BST_BOOL(bst_recorder_config, commands, "true", "Commands to gimbal and sensor."),
+    BST_BOOL(bst_recorder_config, events, "true", "Events, and tasks where sensors are given any."),
     BST_BOOL(
-        bst_record_config, sightings, "true",
+        bst_recorder_config, sightings, "true",
         "Who saw what: the objects' passes through the fields, and their sums, against truth."),
-    BST_REAL(bst_record_config, custody_s, "s", 0, 1e9, "21600",
+    BST_REAL(bst_recorder_config, custody_s, "s", 0, 1e9, "21600",
              "sightings: an object counts as in custody for this long after each detection."),
-    BST_REAL(bst_record_config, telemetry_hz, "Hz", 0.0, 1e6, "1",
+    BST_REAL(bst_recorder_config, telemetry_hz, "Hz", 0.0, 1e6, "1",
              "Rate at which telemetry, control status and the true line of sight are kept; 0: "
              "not at all."),
     BST_CONFIG_END,
 };
 
-bool bst_record_compresses(const bst_record_config *config) {
+bool bst_recorder_compresses(const bst_recorder_config *config) {
     return config->frames == BST_RECORD_EXTENSIONS && config->compression != BST_FITS_RAW;
 }
 
-bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config) {
+bst_status bst_recorder_config_check(bst_ctx *ctx, const bst_recorder_config *config) {
     if (config->compression == BST_FITS_RICE && config->frames == BST_RECORD_CUBE) {
         return bst_fail(
             ctx, BST_ERR_CONFIG,
@@ -78,7 +78,7 @@ bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config
 /* A channel that is recorded: what of it needs which table. */
 typedef struct channel_rows {
     const char *channel;
-    bst_record_table table;
+    bst_recorder_table table;
     bst_status (*rows)(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
                        int64_t written_tick);
 } channel_rows;
@@ -189,7 +189,7 @@ static bst_status flush_frames(bst_ctx *ctx, void *user) {
     return BST_OK;
 }
 
-bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_config *config,
+bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config,
                                const bst_recorder_info *info, bst_recorder **out) {
     *out = NULL;
     if (info->sensor_count < 1 || info->tick_rate_hz < 1) {
@@ -206,7 +206,7 @@ bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_conf
     recorder->tick_rate_hz = info->tick_rate_hz;
     recorder->sensor_count = info->sensor_count;
     recorder->world = info->world;
-    bst_status status = bst_record_config_check(ctx, config);
+    bst_status status = bst_recorder_config_check(ctx, config);
     if (info->world) {
         recorder->object_seen =
             calloc((size_t)bst_world_object_count(info->world) + 1, sizeof *recorder->object_seen);
@@ -239,7 +239,7 @@ static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_s
                           .program = recorder->program,
                           .camera = &s->camera,
                           .checksums = recorder->config.checksums,
-                          .compression = frames && bst_record_compresses(&recorder->config)
+                          .compression = frames && bst_recorder_compresses(&recorder->config)
                                              ? BST_FITS_RICE
                                              : BST_FITS_RAW,
                           .content = content};
@@ -249,12 +249,12 @@ static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_s
 }
 
 /* Fits the frame's WCS; a field too wide for one gets none, and is told of once. */
-static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_truth_head *head,
+static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_recorder_truth_head *head,
                       bst_fits_frame *frame) {
     bst_camera camera = s->camera;
     if (head->pixel_scale_arcsec > 0.0 &&
         head->pixel_scale_arcsec != s->camera.pixel_scale_arcsec &&
-        bst_camera_at_scale(ctx, &s->camera, head->pixel_scale_arcsec, &camera) != BST_OK) {
+        bst_world_camera_at_scale(ctx, &s->camera, head->pixel_scale_arcsec, &camera) != BST_OK) {
         camera = s->camera; /* cannot be: the frame was rendered so */
     }
     frame->pixel_scale_arcsec = camera.pixel_scale_arcsec;
@@ -273,7 +273,7 @@ static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_truth_head 
 
 /* Writes a frame and its row. head NULL: its truth never came. */
 static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
-                              const bst_frame_message *m, const bst_truth_head *head) {
+                              const bst_frame_message *m, const bst_recorder_truth_head *head) {
     bst_recorder_state *s = &recorder->sensors[sensor];
     bst_fits_frame frame = {
         .id = m->exposure_id,
@@ -304,7 +304,7 @@ static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
 
 /* Writes the frame that waits, with or without its truth, and lets go of it. */
 static bst_status write_waiting(bst_ctx *ctx, bst_recorder *recorder, int sensor,
-                                const bst_truth_head *head) {
+                                const bst_recorder_truth_head *head) {
     bst_recorder_state *s = &recorder->sensors[sensor];
     if (!s->frame_waits) {
         return BST_OK;
@@ -342,7 +342,7 @@ static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, 
     return BST_OK;
 }
 
-static bst_truth_head *find_head(bst_recorder_state *s, int64_t exposure_id) {
+static bst_recorder_truth_head *find_head(bst_recorder_state *s, int64_t exposure_id) {
     for (int i = 0; i < BST_TRUTH_HEADS; i++) {
         if (s->heads[i].valid && s->heads[i].exposure_id == exposure_id) {
             return &s->heads[i];
@@ -361,7 +361,7 @@ static bst_status take_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
                 s->sensor, (long long)s->frame.exposure_id);
         BST_TRY(write_waiting(ctx, recorder, sensor, NULL));
     }
-    bst_truth_head *head = find_head(s, m->exposure_id);
+    bst_recorder_truth_head *head = find_head(s, m->exposure_id);
     if (head || !s->has_truth) {
         bst_status status = write_frame(ctx, recorder, sensor, m, head);
         if (head) {
@@ -381,14 +381,15 @@ static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
                              int64_t written_tick) {
     const bst_truth *t = payload;
     bst_recorder_state *s = &recorder->sensors[sensor];
-    bst_truth_head head = {.valid = true,
-                           .exposure_id = t->exposure_id,
-                           .q_cam_from_gcrf_mean = t->q_cam_from_gcrf_mean,
-                           .observer_gcrf_m = t->observer_gcrf_m,
-                           .observer_gcrf_mps = t->observer_gcrf_mps,
-                           .pixel_scale_arcsec = t->pixel_scale_arcsec,
-                           .body_fraction = {t->earth_fraction, t->moon_fraction, t->sun_fraction},
-                           .light = {.velocity_mps = t->velocity_bary_mps, .sun_m = t->sun_m}};
+    bst_recorder_truth_head head = {
+        .valid = true,
+        .exposure_id = t->exposure_id,
+        .q_cam_from_gcrf_mean = t->q_cam_from_gcrf_mean,
+        .observer_gcrf_m = t->observer_gcrf_m,
+        .observer_gcrf_mps = t->observer_gcrf_mps,
+        .pixel_scale_arcsec = t->pixel_scale_arcsec,
+        .body_fraction = {t->earth_fraction, t->moon_fraction, t->sun_fraction},
+        .light = {.velocity_mps = t->velocity_bary_mps, .sun_m = t->sun_m}};
     if (s->frame_waits && s->frame.exposure_id == t->exposure_id) {
         BST_TRY(write_waiting(ctx, recorder, sensor, &head));
     } else if (!t->dropped) {
@@ -415,10 +416,10 @@ bst_status bst_recorder_event(bst_ctx *ctx, bst_recorder *recorder, int64_t tick
     if (!recorder->tables[BST_TABLE_EVENTS]) {
         return BST_OK;
     }
-    const bst_value cells[] = {bst_int_value(tick),
-                               bst_real_value((double)tick / (double)recorder->tick_rate_hz),
-                               bst_text_value(source), bst_text_value(kind), bst_text_value(text)};
-    return bst_table_append(ctx, recorder->tables[BST_TABLE_EVENTS], cells);
+    const bst_io_value cells[] = {
+        bst_io_int_value(tick), bst_io_real_value((double)tick / (double)recorder->tick_rate_hz),
+        bst_io_text_value(source), bst_io_text_value(kind), bst_io_text_value(text)};
+    return bst_io_table_append(ctx, recorder->tables[BST_TABLE_EVENTS], cells);
 }
 
 bst_status bst_recorder_close(bst_ctx *ctx, bst_recorder *recorder) {

@@ -8,21 +8,21 @@
 #include "sim/messages/messages.h"
 #include "sim/optics/camera.h"
 
-typedef enum bst_record_frames {
+typedef enum bst_recorder_frames {
     BST_RECORD_EXTENSIONS,
     BST_RECORD_CUBE,
     BST_RECORD_NO_FRAMES,
-} bst_record_frames;
+} bst_recorder_frames;
 
-typedef enum bst_record_detections {
+typedef enum bst_recorder_detections {
     BST_RECORD_ALL_DETECTIONS,
     BST_RECORD_NO_STARS, /* without those labelled star */
     BST_RECORD_OBJECTS,  /* those labelled so */
-} bst_record_detections;
+} bst_recorder_detections;
 
 /* The scenario's "record" block. */
-typedef struct bst_record_config {
-    int32_t frames;      /* bst_record_frames */
+typedef struct bst_recorder_config {
+    int32_t frames;      /* bst_recorder_frames */
     int32_t compression; /* bst_fits_compression, or 2: auto; of extensions */
     bool checksums;      /* of each HDU */
     uint32_t planes;     /* bit k: the bst_plane k */
@@ -30,22 +30,23 @@ typedef struct bst_record_config {
     bool truth;
     bool truth_stars;
     bool detections;
-    int32_t detections_of; /* bst_record_detections */
+    int32_t detections_of; /* bst_recorder_detections */
     bool tracks;
     bool commands;
     bool events;
     bool sightings; /* by the caller, who judges */
     double custody_s;
     double telemetry_hz;
-} bst_record_config;
+} bst_recorder_config;
 
 extern const bst_config_desc bst_record_config_table[];
 
 /* Checks what the table cannot: BST_ERR_CONFIG when a cube is to be compressed. */
-bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config) BST_MUST_CHECK;
+bst_status bst_recorder_config_check(bst_ctx *ctx,
+                                     const bst_recorder_config *config) BST_MUST_CHECK;
 
 /* Whether frames are Rice compressed: "auto" does so for extensions. */
-bool bst_record_compresses(const bst_record_config *config);
+bool bst_recorder_compresses(const bst_recorder_config *config);
 
 /* A sensor whose channels are recorded. Names and camera are copied or used in create only. */
 typedef struct bst_recorder_sensor {
@@ -69,7 +70,7 @@ typedef struct bst_recorder bst_recorder;
 
 /* Makes the tables in `run` (which must outlive the recorder). FITS files are made with the first
  * frame: frames.fits, or frames_<observer>_<sensor>.fits when there are several sensors. */
-bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_config *config,
+bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config,
                                const bst_recorder_info *info, bst_recorder **out) BST_MUST_CHECK;
 
 /* Index of a sensor in info->sensors, -1 when it is not recorded. */

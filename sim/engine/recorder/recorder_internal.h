@@ -6,7 +6,7 @@
 #include "sim/io/fits_frames.h"
 #include "sim/world/world.h"
 
-typedef enum bst_record_table {
+typedef enum bst_recorder_table {
     BST_TABLE_RUN,
     BST_TABLE_SENSORS,
     BST_TABLE_FRAMES,
@@ -27,18 +27,18 @@ typedef enum bst_record_table {
     BST_TABLE_EVENTS,
     BST_TABLE_TASKS,
     BST_TABLE_COUNT
-} bst_record_table;
+} bst_recorder_table;
 
 /* What a frame's header needs of its truth. */
-typedef struct bst_truth_head {
+typedef struct bst_recorder_truth_head {
     bool valid;
     int64_t exposure_id;
     bst_quat q_cam_from_gcrf_mean;
     bst_vec3 observer_gcrf_m, observer_gcrf_mps;
-    bst_light light;
+    bst_astro_light light;
     double pixel_scale_arcsec;
     double body_fraction[3]; /* as bst_fits_frame */
-} bst_truth_head;
+} bst_recorder_truth_head;
 
 /* Truth may run ahead of its frame by the readout delay: so many exposures at most. */
 #define BST_TRUTH_HEADS 64
@@ -53,7 +53,7 @@ typedef struct bst_recorder_state {
     bool wcs_warned;
     bool frame_waits;
     bst_frame_message frame; /* one reference held while frame_waits */
-    bst_truth_head heads[BST_TRUTH_HEADS];
+    bst_recorder_truth_head heads[BST_TRUTH_HEADS];
     int next_head;
     /* the last period of the telemetry's grid in which each of these was recorded */
     int64_t last_los, last_pointing, last_mount, last_nav, last_control;
@@ -63,13 +63,13 @@ typedef struct bst_recorder_state {
 
 struct bst_recorder {
     bst_run *run;
-    bst_record_config config;
+    bst_recorder_config config;
     bst_time epoch;
     int64_t tick_rate_hz;
     char program[64];
-    const struct bst_world *world;      /* NULL: objects have no names */
-    bool *object_seen;                  /* [objects of the world] */
-    bst_table *tables[BST_TABLE_COUNT]; /* NULL: not wanted */
+    const struct bst_world *world;         /* NULL: objects have no names */
+    bool *object_seen;                     /* [objects of the world] */
+    bst_io_table *tables[BST_TABLE_COUNT]; /* NULL: not wanted */
     int sensor_count;
     bst_recorder_state sensors[];
 };

@@ -9,21 +9,21 @@
 
 /* A row that is being filled, column by column. */
 typedef struct row {
-    bst_value cells[BST_TABLE_COLUMNS];
+    bst_io_value cells[BST_TABLE_COLUMNS];
     int count;
 } row;
 
 static void put_int(row *r, int64_t value) {
-    r->cells[r->count++] = bst_int_value(value);
+    r->cells[r->count++] = bst_io_int_value(value);
 }
 static void put_flag(row *r, bool value) {
     put_int(r, value ? 1 : 0);
 }
 static void put_real(row *r, double value) {
-    r->cells[r->count++] = bst_real_value(value);
+    r->cells[r->count++] = bst_io_real_value(value);
 }
 static void put_text(row *r, const char *value) {
-    r->cells[r->count++] = bst_text_value(value);
+    r->cells[r->count++] = bst_io_text_value(value);
 }
 static void put_vector(row *r, bst_vec3 v) {
     put_real(r, v.x);
@@ -71,9 +71,9 @@ bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last)
     return true;
 }
 
-static bst_status append(bst_ctx *ctx, bst_recorder *recorder, bst_record_table table,
+static bst_status append(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_table table,
                          const row *r) {
-    return bst_table_append(ctx, recorder->tables[table], r->cells);
+    return bst_io_table_append(ctx, recorder->tables[table], r->cells);
 }
 
 bst_status bst_recorder_run_row(bst_ctx *ctx, bst_recorder *recorder) {
@@ -122,7 +122,7 @@ bst_status bst_recorder_frame_row(bst_ctx *ctx, bst_recorder *recorder, int sens
     put_int(&r, m->binning);
     put_int(&r, m->bits);
     r.cells[r.count++] =
-        fits_index < 0 ? bst_null_value(BST_COLUMN_INT) : bst_int_value(fits_index);
+        fits_index < 0 ? bst_io_null_value(BST_COLUMN_INT) : bst_io_int_value(fits_index);
     put_real(&r, wcs ? wcs->crpix[0] : NAN);
     put_real(&r, wcs ? wcs->crpix[1] : NAN);
     put_real(&r, wcs ? wcs->crval_deg[0] : NAN);
@@ -175,7 +175,7 @@ static bst_status object_row(bst_ctx *ctx, bst_recorder *recorder, uint32_t id) 
         return BST_OK;
     }
     recorder->object_seen[id] = true;
-    const bst_object_info *info = bst_world_object(recorder->world, (int)id);
+    const bst_world_object_info *info = bst_world_object(recorder->world, (int)id);
     row r = {.count = 0};
     put_int(&r, id);
     put_text(&r, info->name);

@@ -19,12 +19,12 @@
     REAL(name "_x_" tail, unit, doc), REAL(name "_y_" tail, unit, doc), \
         REAL(name "_z_" tail, unit, doc)
 
-static const bst_column run_columns[] = {
+static const bst_io_column run_columns[] = {
     TEXT("program", "what made the run"),
     TEXT("epoch_utc", "UTC of tick 0"),
     INT("tick_rate_hz", "Hz", "ticks per second"),
 };
-static const bst_column sensor_columns[] = {
+static const bst_io_column sensor_columns[] = {
     SENSOR,
     TEXT("observer", "name of the observer"),
     TEXT("name", "name of the sensor"),
@@ -34,7 +34,7 @@ static const bst_column sensor_columns[] = {
     INT("height_px", "px", "rows"),
     REAL("pixel_scale_arcsec", "arcsec/px", "at the boresight"),
 };
-static const bst_column frame_columns[] = {
+static const bst_io_column frame_columns[] = {
     SENSOR,
     EXPOSURE,
     INT("start_tick", "tick", "start of the exposure"),
@@ -59,7 +59,7 @@ static const bst_column frame_columns[] = {
     REAL("cd2_2_deg", "deg/px", "TAN matrix"),
     REAL("wcs_residual_px", "px", "largest misfit of the WCS"),
 };
-static const bst_column exposure_columns[] = {
+static const bst_io_column exposure_columns[] = {
     SENSOR,
     EXPOSURE,
     INT("start_tick", "tick", "start of the exposure"),
@@ -90,7 +90,7 @@ static const bst_column exposure_columns[] = {
     INT("nodes", "", "points that the sources' tracks became"),
     INT("one_track", "", "1: the stars shared one track"),
 };
-static const bst_column truth_columns[] = {
+static const bst_io_column truth_columns[] = {
     SENSOR,
     EXPOSURE,
     REAL("mid_s", "s",
@@ -123,14 +123,14 @@ static const bst_column truth_columns[] = {
     REAL("phase_deg", "deg", "object: Sun - object - observer"),
     REAL("range_m", "m", "object: from the observer"),
 };
-static const bst_column object_columns[] = {
+static const bst_io_column object_columns[] = {
     INT("id", "", "index in the scenario: id in truth"),
     TEXT("name", "name"),
     INT("norad", "", "catalogue number, 0: none"),
     REAL("area_m2", "m^2", "cross-section of the sphere"),
     REAL("albedo", "", "of the sphere"),
 };
-static const bst_column los_truth_columns[] = {
+static const bst_io_column los_truth_columns[] = {
     SENSOR,
     TICK,
     TIME,
@@ -138,7 +138,7 @@ static const bst_column los_truth_columns[] = {
     REAL("ra_deg", "deg", "apparent direction of the boresight"),
     REAL("dec_deg", "deg", "apparent direction of the boresight"),
 };
-static const bst_column detection_frame_columns[] = {
+static const bst_io_column detection_frame_columns[] = {
     SENSOR,
     EXPOSURE,
     INT("start_tick", "tick", "start of the exposure"),
@@ -159,7 +159,7 @@ static const bst_column detection_frame_columns[] = {
     INT("lost", "", "detections that found no room"),
     INT("bad_pixels", "", "pixels of the sensor that are learned to be bad"),
 };
-static const bst_column detection_columns[] = {
+static const bst_io_column detection_columns[] = {
     SENSOR,
     EXPOSURE,
     MID,
@@ -190,7 +190,7 @@ static const bst_column detection_columns[] = {
     REAL("rate_sigma_pxps", "px/s", "standard deviation of each"),
     INT("bloom", "", "1: charge overflowed along its columns; placed by its wings"),
 };
-static const bst_column track_frame_columns[] = {
+static const bst_io_column track_frame_columns[] = {
     SENSOR,
     EXPOSURE,
     TICK,
@@ -214,7 +214,7 @@ static const bst_column track_frame_columns[] = {
     REAL("attitude_shared", "",
          "share of the variance about camera x and y that successive frames have in common"),
 };
-static const bst_column track_columns[] = {
+static const bst_io_column track_columns[] = {
     SENSOR,
     EXPOSURE,
     TICK,
@@ -247,7 +247,7 @@ static const bst_column track_columns[] = {
     REAL("y_px", "px", "latest detection, whole sensor"),
     INT("uncorrelated", "", "1: confirmed, and neither the target nor what the cue expects"),
 };
-static const bst_column los_command_columns[] = {
+static const bst_io_column los_command_columns[] = {
     SENSOR,
     INT("written_tick", "tick", "when the command was written"),
     TICK,
@@ -257,7 +257,7 @@ static const bst_column los_command_columns[] = {
     VECTOR("rate_gcrf", "radps", "rad/s", "rate of the direction"),
     VECTOR("accel_gcrf", "radps2", "rad/s^2", "its acceleration"),
 };
-static const bst_column sensor_command_columns[] = {
+static const bst_io_column sensor_command_columns[] = {
     SENSOR,
     TICK,
     TIME,
@@ -269,7 +269,7 @@ static const bst_column sensor_command_columns[] = {
     INT("height_px", "px", "window"),
     INT("binning", "", "0: keep"),
 };
-static const bst_column pointing_columns[] = {
+static const bst_io_column pointing_columns[] = {
     SENSOR,
     TICK,
     TIME,
@@ -284,7 +284,7 @@ static const bst_column pointing_columns[] = {
     REAL("axis" n "_deg", "deg", "encoder of the axis, with whole turns"), \
         REAL("axis" n "_rate_degps", "deg/s", "rate of the axis"),         \
         INT("axis" n "_flags", "", "1: stuck, 2: at a limit, 4: at a stop")
-static const bst_column mount_columns[] = {
+static const bst_io_column mount_columns[] = {
     SENSOR,
     TICK,
     TIME,
@@ -295,14 +295,14 @@ static const bst_column mount_columns[] = {
     VECTOR("body_rate", "degps", "deg/s", "measured rate of the body, body axes"),
     INT("wheels_saturated", "", "1: the spacecraft's wheels are"),
 };
-static const bst_column nav_columns[] = {
+static const bst_io_column nav_columns[] = {
     SENSOR,
     TICK,
     TIME,
     VECTOR("position_gcrf", "m", "m", "the observer as the spacecraft believes it, geocentric"),
     VECTOR("velocity_gcrf", "mps", "m/s", "geocentric"),
 };
-static const bst_column control_columns[] = {
+static const bst_io_column control_columns[] = {
     SENSOR,
     TICK,
     TIME,
@@ -312,7 +312,7 @@ static const bst_column control_columns[] = {
     REAL("aim_error_x_px", "px", "target from the boresight, as control believes"),
     REAL("aim_error_y_px", "px", "target from the boresight, as control believes"),
 };
-static const bst_column event_columns[] = {
+static const bst_io_column event_columns[] = {
     TICK,
     TIME,
     TEXT("source", "who reports it"),
@@ -320,7 +320,7 @@ static const bst_column event_columns[] = {
     TEXT("text", "what happened"),
 };
 
-static const bst_column task_columns[] = {
+static const bst_io_column task_columns[] = {
     SENSOR,
     INT("tick", "tick", "when it was given"),
     TIME,
@@ -335,7 +335,7 @@ static const bst_column task_columns[] = {
 
 typedef struct table_spec {
     const char *name, *doc;
-    const bst_column *columns;
+    const bst_io_column *columns;
     int count;
 } table_spec;
 
@@ -371,7 +371,7 @@ static const table_spec specs[BST_TABLE_COUNT] = {
     [BST_TABLE_TASKS] = SPEC("tasks", task_columns, "What the sensors were given to look for."),
 };
 
-static bool wanted(const bst_record_config *config, bst_record_table table) {
+static bool wanted(const bst_recorder_config *config, bst_recorder_table table) {
     switch (table) {
         case BST_TABLE_EXPOSURES:
         case BST_TABLE_TRUTH:
@@ -403,9 +403,9 @@ static bool wanted(const bst_record_config *config, bst_record_table table) {
 
 bst_status bst_recorder_make_tables(bst_ctx *ctx, bst_recorder *recorder) {
     for (int i = 0; i < BST_TABLE_COUNT; i++) {
-        if (wanted(&recorder->config, (bst_record_table)i)) {
-            BST_TRY(bst_table_create(ctx, recorder->run, specs[i].name, specs[i].doc,
-                                     specs[i].columns, specs[i].count, &recorder->tables[i]));
+        if (wanted(&recorder->config, (bst_recorder_table)i)) {
+            BST_TRY(bst_io_table_create(ctx, recorder->run, specs[i].name, specs[i].doc,
+                                        specs[i].columns, specs[i].count, &recorder->tables[i]));
         }
     }
     return BST_OK;

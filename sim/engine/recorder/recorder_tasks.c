@@ -1,14 +1,14 @@
 /* Rows of tasks. */
 #include "sim/engine/recorder/recorder_internal.h"
 
-static bst_value integer(int64_t value) {
-    return (bst_value){.type = BST_COLUMN_INT, .as.integer = value};
+static bst_io_value integer(int64_t value) {
+    return (bst_io_value){.type = BST_COLUMN_INT, .as.integer = value};
 }
-static bst_value real(double value) {
-    return (bst_value){.type = BST_COLUMN_REAL, .is_null = !isfinite(value), .as.real = value};
+static bst_io_value real(double value) {
+    return (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !isfinite(value), .as.real = value};
 }
-static bst_value text(const char *value) {
-    return (bst_value){.type = BST_COLUMN_TEXT, .is_null = !value, .as.text = value};
+static bst_io_value text(const char *value) {
+    return (bst_io_value){.type = BST_COLUMN_TEXT, .is_null = !value, .as.text = value};
 }
 
 bst_status bst_recorder_task_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
@@ -16,7 +16,7 @@ bst_status bst_recorder_task_rows(bst_ctx *ctx, bst_recorder *recorder, int sens
     const bst_task *task = payload;
     bool named = recorder->world && task->object >= 0;
     (void)written_tick;
-    const bst_value row[] = {
+    const bst_io_value row[] = {
         integer(sensor),
         integer(task->tick),
         real((double)task->tick / (double)recorder->tick_rate_hz),
@@ -28,5 +28,5 @@ bst_status bst_recorder_task_rows(bst_ctx *ctx, bst_recorder *recorder, int sens
         real(task->object >= 0 ? task->snr : NAN),
         text(bst_task_end_name(task->before)),
     };
-    return bst_table_append(ctx, recorder->tables[BST_TABLE_TASKS], row);
+    return bst_io_table_append(ctx, recorder->tables[BST_TABLE_TASKS], row);
 }

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-static bool has_port(const bst_module_config *module, bst_port_direction direction,
+static bool has_port(const bst_scenario_module_config *module, bst_port_direction direction,
                      const char *channel) {
     for (int p = 0; p < module->desc->port_count; p++) {
         const bst_port *port = &module->desc->ports[p];
@@ -14,7 +14,7 @@ static bool has_port(const bst_module_config *module, bst_port_direction directi
     return false;
 }
 
-static double delay_of(const bst_scenario *scenario, const bst_module_config *module,
+static double delay_of(const bst_scenario *scenario, const bst_scenario_module_config *module,
                        const char *channel) {
     for (int i = 0; i < module->delay_count; i++) {
         if (strcmp(module->desc->ports[module->delays[i].port].channel, channel) == 0) {
@@ -39,7 +39,7 @@ void bst_loop_timing_of(const bst_scenario *scenario, int observer, int sensor,
     double tick_s = 1.0 / (double)scenario->tick_rate_hz;
     *out = (bst_loop_timing){.exposure_s = exposure->exposure_s, .period_s = exposure->period_s};
     for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         if (module->observer != observer || module->sensor != sensor || module->off) {
             continue;
         }

@@ -31,10 +31,12 @@ static bool plain(bst_config_type type) {
 }
 
 /* The module of the same sensor whose value a key takes; NULL: it is its own. */
-static const bst_module_config *giver(const bst_scenario *s, const bst_module_config *module,
-                                      const bst_config_desc *key, const bst_config_desc **theirs) {
+static const bst_scenario_module_config *giver(const bst_scenario *s,
+                                               const bst_scenario_module_config *module,
+                                               const bst_config_desc *key,
+                                               const bst_config_desc **theirs) {
     for (int m = 0; module->desc->stands_for && m < s->module_count; m++) {
-        const bst_module_config *other = &s->modules[m];
+        const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer != module->observer || other->sensor != module->sensor ||
             !other->desc || !stands_for(module->desc, other->desc->role)) {
             continue;
@@ -48,14 +50,16 @@ static const bst_module_config *giver(const bst_scenario *s, const bst_module_co
     return NULL;
 }
 
-bool bst_stand_in_taken(const bst_scenario *s, const bst_module_config *module, const char *key) {
+bool bst_module_substitution_taken(const bst_scenario *s, const bst_scenario_module_config *module,
+                                   const char *key) {
     const bst_config_desc *own = find_key(module->desc->config, key), *theirs;
     return own && giver(s, module, own, &theirs) != NULL;
 }
 
-bool bst_stand_in_delayed(const bst_scenario *s, const bst_module_config *module) {
+bool bst_module_substitution_delayed(const bst_scenario *s,
+                                     const bst_scenario_module_config *module) {
     for (int m = 0; m < s->module_count; m++) {
-        const bst_module_config *other = &s->modules[m];
+        const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer == module->observer && other->sensor == module->sensor &&
             stands_for(module->desc, other->desc->role)) {
             return true;
@@ -65,10 +69,10 @@ bool bst_stand_in_delayed(const bst_scenario *s, const bst_module_config *module
 }
 
 static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scenario *s,
-                                bst_module_config *module) {
+                                bst_scenario_module_config *module) {
     for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
         const bst_config_desc *theirs;
-        const bst_module_config *other = giver(s, module, d, &theirs);
+        const bst_scenario_module_config *other = giver(s, module, d, &theirs);
         if (!other) {
             continue;
         }
@@ -100,9 +104,10 @@ static bool writes(const bst_module_desc *desc, const char *channel) {
 }
 
 /* Whether a module that is stood in for writes this channel. */
-static bool is_inner(const bst_scenario *s, const bst_module_config *module, const char *channel) {
+static bool is_inner(const bst_scenario *s, const bst_scenario_module_config *module,
+                     const char *channel) {
     for (int m = 0; m < s->module_count; m++) {
-        const bst_module_config *other = &s->modules[m];
+        const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer == module->observer && other->sensor == module->sensor &&
             stands_for(module->desc, other->desc->role) && writes(other->desc, channel)) {
             return true;
@@ -111,7 +116,8 @@ static bool is_inner(const bst_scenario *s, const bst_module_config *module, con
     return false;
 }
 
-static bst_status add_delay(bst_ctx *ctx, bst_module_config *module, int port, int64_t ticks) {
+static bst_status add_delay(bst_ctx *ctx, bst_scenario_module_config *module, int port,
+                            int64_t ticks) {
     for (int i = 0; i < module->delay_count; i++) {
         if (module->delays[i].port == port) {
             module->delays[i].ticks += ticks;
@@ -130,10 +136,11 @@ static bst_status add_delay(bst_ctx *ctx, bst_module_config *module, int port, i
 
 /* The delays of its inputs are those of the same inputs of the others; what one of them waits for
  * another is waited for with the last trigger. */
-static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s, bst_module_config *module) {
+static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s,
+                              bst_scenario_module_config *module) {
     const bst_module_desc *own = module->desc;
     int last = -1;
-    if (!bst_stand_in_delayed(s, module)) {
+    if (!bst_module_substitution_delayed(s, module)) {
         return BST_OK;
     }
     if (module->delay_count > 0) {
@@ -147,7 +154,7 @@ static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s, bst_module_co
         last = own->ports[p].flags & BST_PORT_TRIGGER ? p : last;
     }
     for (int m = 0; m < s->module_count; m++) {
-        const bst_module_config *other = &s->modules[m];
+        const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer != module->observer || other->sensor != module->sensor ||
             !stands_for(own, other->desc->role)) {
             continue;
@@ -171,8 +178,8 @@ static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s, bst_module_co
     return BST_OK;
 }
 
-static bst_status make_default(bst_ctx *ctx, const bst_registry *registry, int observer, int sensor,
-                               bst_scenario *s, bst_module_config **out) {
+static bst_status make_default(bst_ctx *ctx, const bst_scenario_registry *registry, int observer,
+                               int sensor, bst_scenario *s, bst_scenario_module_config **out) {
     const bst_module_desc *desc = NULL;
     for (int i = 0; i < registry->count && !desc; i++) {
         desc = registry->modules[i]->stands_for ? registry->modules[i] : NULL;
@@ -183,8 +190,8 @@ static bst_status make_default(bst_ctx *ctx, const bst_registry *registry, int o
                         "generates observations (allowed: \"image\")",
                         s->file, observer, sensor);
     }
-    bst_module_config *module = &s->modules[s->module_count++];
-    *module = (bst_module_config){.observer = observer, .sensor = sensor, .desc = desc};
+    bst_scenario_module_config *module = &s->modules[s->module_count++];
+    *module = (bst_scenario_module_config){.observer = observer, .sensor = sensor, .desc = desc};
     snprintf(module->name, sizeof module->name, "%s", desc->role);
     module->config = calloc(1, desc->config_bytes + 1);
     if (!module->config) {
@@ -194,14 +201,14 @@ static bst_status make_default(bst_ctx *ctx, const bst_registry *registry, int o
     return bst_config_defaults(ctx, desc->config, module->config);
 }
 
-bst_status bst_stand_in(bst_ctx *ctx, const bst_registry *registry, const cJSON *block,
-                        int observer, int sensor, bst_scenario *s) {
+bst_status bst_module_substitution(bst_ctx *ctx, const bst_scenario_registry *registry,
+                                   const cJSON *block, int observer, int sensor, bst_scenario *s) {
     const bst_observer_config *observers = s->observers.items;
     const bst_sensor_config *sensors = observers[observer].sensors.items;
     bool generator = sensors[sensor].observation_source == BST_OBSERVE_GENERATOR;
-    bst_module_config *stand_in = NULL;
+    bst_scenario_module_config *stand_in = NULL;
     for (int m = 0; m < s->module_count; m++) {
-        bst_module_config *module = &s->modules[m];
+        bst_scenario_module_config *module = &s->modules[m];
         if (module->observer == observer && module->sensor == sensor && module->desc->stands_for) {
             stand_in = module;
         }
@@ -215,7 +222,7 @@ bst_status bst_stand_in(bst_ctx *ctx, const bst_registry *registry, const cJSON 
     }
     stand_in->off = !generator;
     for (int m = 0; m < s->module_count; m++) {
-        bst_module_config *module = &s->modules[m];
+        bst_scenario_module_config *module = &s->modules[m];
         if (module->observer == observer && module->sensor == sensor &&
             stands_for(stand_in->desc, module->desc->role)) {
             module->off = generator;

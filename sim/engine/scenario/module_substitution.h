@@ -12,13 +12,15 @@ struct cJSON;
  * makes the former, with its defaults, where it is needed and the block has none; gives it the
  * settings of the others. BST_ERR_CONFIG where its own block says what is another's to say, and
  * where it is asked for and there is none of the kind. */
-bst_status bst_stand_in(bst_ctx *ctx, const bst_registry *registry, const struct cJSON *block,
-                        int observer, int sensor, bst_scenario *scenario) BST_MUST_CHECK;
+bst_status bst_module_substitution(bst_ctx *ctx, const bst_scenario_registry *registry,
+                                   const struct cJSON *block, int observer, int sensor,
+                                   bst_scenario *scenario) BST_MUST_CHECK;
 
 /* Whether a key of a module's table has its value from a module that it stands for. */
-bool bst_stand_in_taken(const bst_scenario *scenario, const bst_module_config *module,
-                        const char *key);
+bool bst_module_substitution_taken(const bst_scenario *scenario,
+                                   const bst_scenario_module_config *module, const char *key);
 /* Whether the delays of its inputs come from modules that it stands for. */
-bool bst_stand_in_delayed(const bst_scenario *scenario, const bst_module_config *module);
+bool bst_module_substitution_delayed(const bst_scenario *scenario,
+                                     const bst_scenario_module_config *module);
 
 #endif

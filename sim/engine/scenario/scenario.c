@@ -160,8 +160,8 @@ static bst_status check_extended(bst_ctx *ctx, const bst_json *json) {
                                   "there is nothing that it changes", "only beside \"extends\"");
 }
 
-static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                                bst_scenario *out) {
+static bst_status read_scenario(bst_ctx *ctx, const bst_json *json,
+                                const bst_scenario_registry *registry, bst_scenario *out) {
     memset(out, 0, sizeof *out);
     BST_TRY(check_extended(ctx, json));
     BST_TRY(bst_config_read(ctx, json, bst_json_root(json), "", bst_scenario_table, out));
@@ -178,7 +178,7 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_re
         BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /duration_s", out->file);
     }
-    if (bst_record_config_check(ctx, &out->record) != BST_OK) {
+    if (bst_recorder_config_check(ctx, &out->record) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
     }
     BST_TRY(prepare_cameras(ctx, out));
@@ -188,8 +188,8 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_re
     return bst_scenario_modules(ctx, json, registry, out);
 }
 
-bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                             bst_scenario *out) {
+bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
+                             const bst_scenario_registry *registry, bst_scenario *out) {
     bst_status status = read_scenario(ctx, json, registry, out);
     if (status != BST_OK) {
         bst_json_name_file(ctx, json);
@@ -199,7 +199,7 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
 
 void bst_scenario_free(bst_scenario *s) {
     for (int i = 0; s->modules && i < s->module_count; i++) {
-        bst_module_config *module = &s->modules[i];
+        bst_scenario_module_config *module = &s->modules[i];
         if (module->config && module->desc && module->desc->config) {
             bst_config_free(module->desc->config, module->config);
         }

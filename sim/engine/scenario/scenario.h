@@ -9,32 +9,32 @@
 #include "sim/world/world_config.h"
 
 /* What becomes of "plugin" in a scenario. */
-typedef enum bst_plugin_policy {
+typedef enum bst_scenario_plugin_policy {
     BST_PLUGINS_LOAD = 0,
     BST_PLUGINS_SKIP,   /* what names one is left unread: for those who need no modules, as their
                            code is not to run when somebody's results are looked at */
     BST_PLUGINS_REFUSE, /* an error */
-} bst_plugin_policy;
+} bst_scenario_plugin_policy;
 
 /* All modules that a scenario may name; the list is the program's (or a test's). */
-typedef struct bst_registry {
+typedef struct bst_scenario_registry {
     const bst_module_desc *const *modules;
     int count;
-    bst_plugin_policy policy;
+    bst_scenario_plugin_policy policy;
     /* libraries that some of these modules come from, so that it is told which were used */
     const bst_plugin *plugins;
     int plugin_count;
-} bst_registry;
+} bst_scenario_registry;
 
 /* A module or stage of a plug-in that a scenario uses. */
-typedef struct bst_plugin_use {
+typedef struct bst_scenario_plugin_use {
     char where[300]; /* JSON pointer of its block */
     char file[512], sha256[BST_SHA256_TEXT];
     char type[64];
-} bst_plugin_use;
+} bst_scenario_plugin_use;
 
 /* One entry of a sensor's "modules" block, or "tasking". */
-typedef struct bst_module_config {
+typedef struct bst_scenario_module_config {
     int observer, sensor; /* -1: it links those of the scenario */
     char name[64];        /* key in the block; equals the role of the built-in modules */
     const bst_module_desc *desc;
@@ -46,7 +46,7 @@ typedef struct bst_module_config {
     int delay_count;
     bool off;     /* another stands in for it, or it for others that are there: does not step */
     bool plugged; /* its block names the plug-in that it comes from */
-} bst_module_config;
+} bst_scenario_module_config;
 
 typedef struct bst_scenario {
     int64_t format; /* "boresight": version of the scenario format */
@@ -58,7 +58,7 @@ typedef struct bst_scenario {
     int64_t run;
     bst_world_config world;
     bst_config_list observers; /* bst_observer_config */
-    bst_record_config record;
+    bst_recorder_config record;
     bst_link_config link;
     bst_pacing_config pacing;
     /* filled by bst_scenario_read, not by the table */
@@ -66,9 +66,9 @@ typedef struct bst_scenario {
     char base_dir[512]; /* folder that relative paths start from */
     bst_time epoch;
     int64_t duration_ticks;
-    bst_module_config *modules;
+    bst_scenario_module_config *modules;
     int module_count;
-    bst_plugin_use *plugins; /* all that are used, in the order in which they were read */
+    bst_scenario_plugin_use *plugins; /* all that are used, in the order in which they were read */
     int plugin_count;
 } bst_scenario;
 
@@ -78,25 +78,27 @@ extern const bst_config_desc bst_scenario_table[];
  * Paths of files that exist are made absolute; a file that a module's table names (BST_CONFIG_PATH,
  * outside of lists) has to. Plug-ins are loaded into the process: see bst_plugin_open. Free with
  * bst_scenario_free, also after an error. */
-bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
+bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
+                             const bst_scenario_registry *registry,
                              bst_scenario *out) BST_MUST_CHECK;
 void bst_scenario_free(bst_scenario *scenario);
 
 /* The module of a role ("gimbal", "control") that steps for a sensor; NULL: there is none, or
  * another stands in for it. Lent by the scenario. */
-const bst_module_config *bst_scenario_module(const bst_scenario *scenario, int observer, int sensor,
-                                             const char *role);
+const bst_scenario_module_config *bst_scenario_module(const bst_scenario *scenario, int observer,
+                                                      int sensor, const char *role);
 
 /* Value of a module's key of type real or integer, in the key's unit.
  *
  * Given:    module  NULL: as a module without the key
  *           key     its name, as in the scenario
  * Returned: true and *out; false where the module has no such number, *out unchanged */
-bool bst_scenario_module_number(const bst_module_config *module, const char *key, double *out);
+bool bst_scenario_module_number(const bst_scenario_module_config *module, const char *key,
+                                double *out);
 
 /* The scenario with every default written out; the caller deletes it. NULL when out of memory. */
 struct cJSON *bst_scenario_echo(const bst_scenario *scenario);
 /* JSON Schema (draft 2020-12) of scenarios for these modules; the caller deletes it. */
-struct cJSON *bst_scenario_schema(const bst_registry *registry);
+struct cJSON *bst_scenario_schema(const bst_scenario_registry *registry);
 
 #endif

@@ -7,7 +7,7 @@
 #include "sim/engine/scenario/scenario.h"
 
 /* JSON pointer of a module's block. */
-static void module_path(const bst_module_config *module, char *path, size_t bytes) {
+static void module_path(const bst_scenario_module_config *module, char *path, size_t bytes) {
     if (module->observer < 0) {
         snprintf(path, bytes, "/tasking");
     } else {
@@ -16,7 +16,7 @@ static void module_path(const bst_module_config *module, char *path, size_t byte
     }
 }
 
-static cJSON *echo_module(const bst_scenario *s, const bst_module_config *module) {
+static cJSON *echo_module(const bst_scenario *s, const bst_scenario_module_config *module) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "type", module->desc->type);
     for (int i = 0; module->plugged && i < s->plugin_count; i++) {
@@ -31,7 +31,7 @@ static cJSON *echo_module(const bst_scenario *s, const bst_module_config *module
         cJSON_AddNumberToObject(node, "rate_hz", module->rate_hz);
     }
     cJSON_AddNumberToObject(node, "offset_s", module->offset_s);
-    if (module->delay_count > 0 && !bst_stand_in_delayed(s, module)) {
+    if (module->delay_count > 0 && !bst_module_substitution_delayed(s, module)) {
         cJSON *delays = cJSON_AddObjectToObject(node, "delay_s");
         for (int i = 0; i < module->delay_count; i++) {
             cJSON_AddNumberToObject(delays, module->desc->ports[module->delays[i].port].channel,
@@ -42,7 +42,7 @@ static cJSON *echo_module(const bst_scenario *s, const bst_module_config *module
         module->desc->config ? bst_config_echo(module->desc->config, module->config) : NULL;
     while (own && own->child) {
         cJSON *item = cJSON_DetachItemViaPointer(own, own->child);
-        if (bst_stand_in_taken(s, module, item->string)) {
+        if (bst_module_substitution_taken(s, module, item->string)) {
             cJSON_Delete(item); /* said where it comes from */
         } else {
             cJSON_AddItemToObject(node, item->string, item);
@@ -55,7 +55,7 @@ static cJSON *echo_module(const bst_scenario *s, const bst_module_config *module
 cJSON *bst_scenario_echo(const bst_scenario *s) {
     cJSON *root = bst_config_echo(bst_scenario_table, s);
     for (int i = 0; root && i < s->module_count; i++) {
-        const bst_module_config *module = &s->modules[i];
+        const bst_scenario_module_config *module = &s->modules[i];
         if (module->observer < 0) {
             cJSON_AddItemToObject(root, module->name, echo_module(s, module));
             continue;

@@ -17,20 +17,22 @@ bst_status bst_scenario_paths(bst_ctx *ctx, const bst_json *json, const bst_scen
                               bool must_exist) BST_MUST_CHECK;
 
 /* scenario_modules.c: reads the modules of all sensors, and "tasking". */
-bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
+bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json,
+                                const bst_scenario_registry *registry,
                                 bst_scenario *out) BST_MUST_CHECK;
 
 /* scenario_plugins.c: opens the plug-in that `text`, at the JSON pointer `where`, names. *out NULL:
  * the registry says that plug-ins are left unread. */
-bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                               bst_scenario *s, const char *where, const char *text,
-                               bst_plugin *out, bool *skip) BST_MUST_CHECK;
+bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json,
+                               const bst_scenario_registry *registry, bst_scenario *s,
+                               const char *where, const char *text, bst_plugin *out,
+                               bool *skip) BST_MUST_CHECK;
 /* Notes that a module or stage of it is used at `where`. */
 bst_status bst_scenario_plugin_used(bst_ctx *ctx, bst_scenario *s, const bst_plugin *plugin,
                                     const char *where, const char *type) BST_MUST_CHECK;
-/* For bst_config_read_stages; user: a bst_scenario_stages. */
+/* For bst_stage_read_config; user: a bst_scenario_stages. */
 typedef struct bst_scenario_stages {
-    const bst_registry *registry;
+    const bst_scenario_registry *registry;
     bst_scenario *scenario;
 } bst_scenario_stages;
 bst_status bst_scenario_stage(void *user, bst_ctx *ctx, const bst_json *json, const char *path,

@@ -49,7 +49,7 @@ static cJSON *part_of(const cJSON *node, bool common) {
     return part;
 }
 
-static const bst_module_desc *find_module(const bst_registry *registry, const char *role,
+static const bst_module_desc *find_module(const bst_scenario_registry *registry, const char *role,
                                           const char *type) {
     for (int i = 0; i < registry->count; i++) {
         const bst_module_desc *m = registry->modules[i];
@@ -62,7 +62,8 @@ static const bst_module_desc *find_module(const bst_registry *registry, const ch
 }
 
 /* "a", "b", "c": the types of a role, or all roles when role is NULL. */
-static void list_names(const bst_registry *registry, const char *role, char *buffer, size_t bytes) {
+static void list_names(const bst_scenario_registry *registry, const char *role, char *buffer,
+                       size_t bytes) {
     buffer[0] = '\0';
     for (int i = 0; i < registry->count; i++) {
         const bst_module_desc *m = registry->modules[i];
@@ -79,7 +80,7 @@ static void list_names(const bst_registry *registry, const char *role, char *buf
 }
 
 static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const cJSON *node,
-                              const char *path, bst_module_config *module) {
+                              const char *path, bst_scenario_module_config *module) {
     char where[400];
     snprintf(where, sizeof where, "%s/delay_s", path);
     if (node && !cJSON_IsObject(node)) {
@@ -127,14 +128,15 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
     return BST_OK;
 }
 
-static bool fits(const bst_module_desc *desc, const bst_module_config *module) {
+static bool fits(const bst_module_desc *desc, const bst_scenario_module_config *module) {
     return (desc->flags & BST_MODULE_LINKS) == (module->observer < 0 ? BST_MODULE_LINKS : 0);
 }
 
 /* The descriptor that a block asks for; of a plug-in that is left unread, NULL. */
-static bst_status find_desc(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                            bst_scenario *scenario, const common_config *common, const char *path,
-                            bst_module_config *module) {
+static bst_status find_desc(bst_ctx *ctx, const bst_json *json,
+                            const bst_scenario_registry *registry, bst_scenario *scenario,
+                            const common_config *common, const char *path,
+                            bst_scenario_module_config *module) {
     char where[400], names[400];
     snprintf(where, sizeof where, "%s/plugin", path);
     if (*common->plugin) {
@@ -187,9 +189,10 @@ static bst_status find_desc(bst_ctx *ctx, const bst_json *json, const bst_regist
 }
 
 /* desc of *module stays NULL when the block names a plug-in that is left unread. */
-static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                              bst_scenario *scenario, const cJSON *node, const char *path,
-                              bst_module_config *module) {
+static bst_status read_module(bst_ctx *ctx, const bst_json *json,
+                              const bst_scenario_registry *registry, bst_scenario *scenario,
+                              const cJSON *node, const char *path,
+                              bst_scenario_module_config *module) {
     char names[400];
     snprintf(module->name, sizeof module->name, "%s", node->string);
     const bst_module_desc *any = find_module(registry, node->string, NULL);
@@ -224,9 +227,9 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
     const bst_stage_loader loader = {&stages, bst_scenario_stage};
     module->config = calloc(1, module->desc->config_bytes + 1);
     status = module->config
-                 ? bst_config_read_stages(ctx, json, own_part, path,
-                                          module->desc->config ? module->desc->config : no_keys,
-                                          &loader, module->config)
+                 ? bst_stage_read_config(ctx, json, own_part, path,
+                                         module->desc->config ? module->desc->config : no_keys,
+                                         &loader, module->config)
                  : bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
     if (status == BST_OK) {
         status = bst_scenario_paths(ctx, json, scenario, path, module->desc->config, module->config,
@@ -259,8 +262,8 @@ static const cJSON *modules_node(const cJSON *root, int observer, int sensor) {
     return cJSON_GetObjectItemCaseSensitive(node, "modules");
 }
 
-bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                                bst_scenario *out) {
+bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json,
+                                const bst_scenario_registry *registry, bst_scenario *out) {
     const cJSON *root = bst_json_root(json);
     const bst_observer_config *observers = out->observers.items;
     const cJSON *tasking = cJSON_GetObjectItemCaseSensitive(root, "tasking");
@@ -280,20 +283,20 @@ bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json, const bst_re
                 }
                 bool whole = true;
                 for (const cJSON *node = block ? block->child : NULL; node; node = node->next) {
-                    bst_module_config *module = &out->modules[out->module_count++];
+                    bst_scenario_module_config *module = &out->modules[out->module_count++];
                     module->observer = i;
                     module->sensor = s;
                     char module_path[300];
                     snprintf(module_path, sizeof module_path, "%s/%.60s", path, node->string);
                     BST_TRY(read_module(ctx, json, registry, out, node, module_path, module));
                     if (!module->desc) { /* left unread */
-                        *module = (bst_module_config){.desc = NULL};
+                        *module = (bst_scenario_module_config){.desc = NULL};
                         out->module_count--;
                         whole = false;
                     }
                 }
                 if (whole) {
-                    BST_TRY(bst_stand_in(ctx, registry, block, i, s, out));
+                    BST_TRY(bst_module_substitution(ctx, registry, block, i, s, out));
                 }
             }
         }
@@ -305,7 +308,7 @@ bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json, const bst_re
         }
     }
     if (tasking) {
-        bst_module_config *module = &out->modules[out->module_count++];
+        bst_scenario_module_config *module = &out->modules[out->module_count++];
         module->observer = module->sensor = -1;
         BST_TRY(read_module(ctx, json, registry, out, tasking, "/tasking", module));
         out->module_count -= module->desc == NULL;
@@ -313,10 +316,10 @@ bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json, const bst_re
     return BST_OK;
 }
 
-const bst_module_config *bst_scenario_module(const bst_scenario *scenario, int observer, int sensor,
-                                             const char *role) {
+const bst_scenario_module_config *bst_scenario_module(const bst_scenario *scenario, int observer,
+                                                      int sensor, const char *role) {
     for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
+        const bst_scenario_module_config *module = &scenario->modules[m];
         if (module->observer == observer && module->sensor == sensor && !module->off &&
             strcmp(module->desc->role, role) == 0) {
             return module;
@@ -325,7 +328,8 @@ const bst_module_config *bst_scenario_module(const bst_scenario *scenario, int o
     return NULL;
 }
 
-bool bst_scenario_module_number(const bst_module_config *module, const char *key, double *out) {
+bool bst_scenario_module_number(const bst_scenario_module_config *module, const char *key,
+                                double *out) {
     for (const bst_config_desc *d = module ? module->desc->config : NULL; d && d->key; d++) {
         const char *at = (const char *)module->config + d->offset;
         if (strcmp(d->key, key) == 0 && d->type == BST_CONFIG_REAL) {

@@ -4,9 +4,9 @@
 
 #include "sim/engine/scenario/scenario_internal.h"
 
-bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                               bst_scenario *s, const char *where, const char *text,
-                               bst_plugin *out, bool *skip) {
+bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json,
+                               const bst_scenario_registry *registry, bst_scenario *s,
+                               const char *where, const char *text, bst_plugin *out, bool *skip) {
     char folder[sizeof s->base_dir], path[sizeof folder + 520];
     *skip = registry->policy == BST_PLUGINS_SKIP;
     *out = (bst_plugin){.modules = NULL};
@@ -32,13 +32,14 @@ bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_reg
 
 bst_status bst_scenario_plugin_used(bst_ctx *ctx, bst_scenario *s, const bst_plugin *plugin,
                                     const char *where, const char *type) {
-    bst_plugin_use *more = realloc(s->plugins, ((size_t)s->plugin_count + 1) * sizeof *s->plugins);
+    bst_scenario_plugin_use *more =
+        realloc(s->plugins, ((size_t)s->plugin_count + 1) * sizeof *s->plugins);
     if (!more) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the plug-ins of a scenario");
     }
     s->plugins = more;
-    bst_plugin_use *use = &s->plugins[s->plugin_count++];
-    *use = (bst_plugin_use){.where = ""};
+    bst_scenario_plugin_use *use = &s->plugins[s->plugin_count++];
+    *use = (bst_scenario_plugin_use){.where = ""};
     snprintf(use->where, sizeof use->where, "%s", where);
     snprintf(use->file, sizeof use->file, "%s", plugin->file);
     snprintf(use->sha256, sizeof use->sha256, "%s", plugin->sha256);

@@ -77,7 +77,7 @@ static cJSON *unknown_module(void) {
     return node;
 }
 
-static bool is_plugged(const bst_registry *registry, const bst_module_desc *module) {
+static bool is_plugged(const bst_scenario_registry *registry, const bst_module_desc *module) {
     for (int i = 0; i < registry->plugin_count; i++) {
         const bst_module_desc *const *m = registry->plugins[i].modules;
         for (; m && *m; m++) {
@@ -90,7 +90,7 @@ static bool is_plugged(const bst_registry *registry, const bst_module_desc *modu
 }
 
 /* The schema of a stage's block where it names a plug-in, for the known ones of the kind. */
-static cJSON *stage_schemas(const bst_registry *registry, const char *kind) {
+static cJSON *stage_schemas(const bst_scenario_registry *registry, const char *kind) {
     static const bst_config_desc none[] = {BST_CONFIG_END};
     cJSON *list = cJSON_CreateArray();
     for (int i = 0; i < registry->plugin_count; i++) {
@@ -115,7 +115,7 @@ static cJSON *stage_schemas(const bst_registry *registry, const char *kind) {
 }
 
 /* Puts what is known of plug-ins' stages where bst_config_schema left room for them. */
-static void fill_stages(cJSON *node, const bst_registry *registry) {
+static void fill_stages(cJSON *node, const bst_scenario_registry *registry) {
     for (cJSON *item = node->child; item; item = item->next) {
         fill_stages(item, registry);
     }
@@ -153,7 +153,7 @@ static void extended_schema(cJSON *root, cJSON *properties) {
     cJSON_AddItemToObject(cJSON_AddObjectToObject(root, "dependentRequired"), "set", needed);
 }
 
-cJSON *bst_scenario_schema(const bst_registry *registry) {
+cJSON *bst_scenario_schema(const bst_scenario_registry *registry) {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "$schema", "https://json-schema.org/draft/2020-12/schema");
     cJSON_AddStringToObject(root, "title", "Boresight scenario");

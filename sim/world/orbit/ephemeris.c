@@ -41,7 +41,7 @@ enum { TABLE_STEP_S = 8, TABLES = 4 };
 enum { BODIES_FOR_THREADS = 1024, GRAIN = 256 };
 
 typedef struct body {
-    const bst_orbit *orbit; /* NULL: not interpolated */
+    const bst_world_orbit *orbit; /* NULL: not interpolated */
     int step_class;
     int64_t first, last; /* the knots that the slots hold; last < first: none */
     double place_m[3][RING];
@@ -122,7 +122,7 @@ static bool smooth(double p[3][CHECKED], double limit_m) {
 }
 
 /* Whether the polynomial from knot `first` + 1 on would run over a place where the model jumps. */
-static bool jumps(const bst_orbit *orbit, double step, int64_t first) {
+static bool jumps(const bst_world_orbit *orbit, double step, int64_t first) {
     double period = 60.0 * bst_sgp4_step_minutes(orbit->sgp4);
     if (!(period > 0.0)) {
         return false;
@@ -143,7 +143,7 @@ static const bst_mat3 *rotation_at(bst_ephemeris *e, int step_class, int64_t kno
     rotations *r = &e->rotations[step_class];
     int slot = slot_of(knot, ROTATIONS);
     if (r->knot[slot] != knot) {
-        bst_sky sky;
+        bst_sky_rotation sky;
         bst_time t = bst_time_add(e->world->epoch, (double)knot * step_of(step_class));
         if (bst_sky_clock_at(NULL, e->clock_knots, t, &sky) != BST_OK) {
             sky.frames.gcrf_from_teme = (bst_mat3){{{NAN, NAN, NAN}}};
@@ -154,7 +154,8 @@ static const bst_mat3 *rotation_at(bst_ephemeris *e, int step_class, int64_t kno
     return &r->gcrf_from_teme[slot];
 }
 
-static bst_vec3 place_at(const bst_orbit *orbit, const bst_mat3 *gcrf_from_teme, double seconds) {
+static bst_vec3 place_at(const bst_world_orbit *orbit, const bst_mat3 *gcrf_from_teme,
+                         double seconds) {
     double r_km[3], v_kmps[3];
     if (bst_sgp4_propagate(orbit->sgp4, (orbit->epoch_offset_s + seconds) / 60.0, r_km, v_kmps) !=
         BST_SGP4_OK) {
@@ -252,7 +253,7 @@ typedef struct table_job {
 } table_job;
 
 /* The row of an orbit that is no polynomial then; false when there is no orbit. */
-static bool table_row_directly(const table_job *job, const bst_orbit *orbit, int i) {
+static bool table_row_directly(const table_job *job, const bst_world_orbit *orbit, int i) {
     double seconds = (double)job->table->index * TABLE_STEP_S;
     bst_vec3 p = place_at(orbit, &job->gcrf_from_teme[1], seconds);
     bool none = isnan(p.x) &&
@@ -315,7 +316,7 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
         }
     }
     for (int i = 0; i < 3; i++) {
-        bst_sky sky;
+        bst_sky_rotation sky;
         bst_time time = bst_time_add(e->world->epoch, seconds + (i - 1) * TABLE_STEP_S);
         if (bst_sky_clock_at(NULL, e->clock_tables, time, &sky) != BST_OK) {
             sky.frames.gcrf_from_teme = (bst_mat3){{{NAN, NAN, NAN}}};
@@ -448,7 +449,7 @@ static double perigee_error(double e, double radians_per_step) {
 }
 
 /* The longest step that is good enough at perigee, where the path bends most. */
-static int choose_class(const bst_ephemeris *e, const bst_orbit *orbit) {
+static int choose_class(const bst_ephemeris *e, const bst_world_orbit *orbit) {
     double r_km[3], v_kmps[3];
     if (bst_sgp4_propagate(orbit->sgp4, orbit->epoch_offset_s / 60.0, r_km, v_kmps) !=
         BST_SGP4_OK) {
@@ -484,7 +485,7 @@ static double sharpest_pixel(const bst_world *world) {
     return sharpest;
 }
 
-static void set_body(const bst_ephemeris *e, const bst_orbit *orbit, body *b) {
+static void set_body(const bst_ephemeris *e, const bst_world_orbit *orbit, body *b) {
     if (orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && !orbit->steering) {
         b->orbit = orbit;
         b->step_class = choose_class(e, orbit);

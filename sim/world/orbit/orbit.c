@@ -5,7 +5,7 @@
 #include "sim/world/world_internal.h"
 
 /* Columns of the rotation from radial, transverse, normal axes to GCRF. */
-static void rtn_axes(const bst_state *s, bst_vec3 *r, bst_vec3 *t, bst_vec3 *n) {
+static void rtn_axes(const bst_world_state *s, bst_vec3 *r, bst_vec3 *t, bst_vec3 *n) {
     *r = bst_vec3_unit(s->position_m);
     *n = bst_vec3_unit(bst_vec3_cross(s->position_m, s->velocity_mps));
     *t = bst_vec3_cross(*n, *r);
@@ -15,8 +15,8 @@ static bst_vec3 from_rtn(bst_vec3 r, bst_vec3 t, bst_vec3 n, bst_vec3 v) {
     return bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(r, v.x), v.y, t), v.z, n);
 }
 
-static bst_status sgp4_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                             bst_time epoch, double seconds, bst_state *out) {
+static bst_status sgp4_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
+                             bst_time epoch, double seconds, bst_world_state *out) {
     double r_km[3], v_kmps[3];
     bst_sgp4_error error =
         bst_sgp4_propagate(orbit->sgp4, (orbit->epoch_offset_s + seconds) / 60.0, r_km, v_kmps);
@@ -24,7 +24,7 @@ static bst_status sgp4_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock
         return bst_fail(ctx, BST_ERR_NUMERIC, "orbit of %s, %.3f s after the epoch: %s",
                         orbit->name, seconds, bst_sgp4_error_text(error));
     }
-    bst_sky sky;
+    bst_sky_rotation sky;
     BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(epoch, seconds), &sky));
     const bst_mat3 *m = &sky.frames.gcrf_from_teme;
     out->position_m =
@@ -34,18 +34,19 @@ static bst_status sgp4_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock
     return BST_OK;
 }
 
-static bst_status numerical_state(bst_ctx *ctx, const bst_orbit *orbit, double seconds,
-                                  bool with_burns, bst_state *out) {
+static bst_status numerical_state(bst_ctx *ctx, const bst_world_orbit *orbit, double seconds,
+                                  bool with_burns, bst_world_state *out) {
     const bst_trajectory *path = with_burns && orbit->burnt ? orbit->burnt : orbit->unburnt;
     bst_status status =
         bst_trajectory_state(ctx, path, seconds, &out->position_m, &out->velocity_mps);
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
 }
 
-static bst_status relative_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                                 bst_time epoch, double seconds, bool with_burns, bst_state *out) {
-    bst_state ref;
-    BST_TRY(bst_orbit_state(ctx, orbit->reference, clock, epoch, seconds, with_burns, &ref));
+static bst_status relative_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
+                                 bst_time epoch, double seconds, bool with_burns,
+                                 bst_world_state *out) {
+    bst_world_state ref;
+    BST_TRY(bst_world_orbit_state(ctx, orbit->reference, clock, epoch, seconds, with_burns, &ref));
     bst_vec3 r, t, n;
     rtn_axes(&ref, &r, &t, &n);
     bst_vec3 offset = from_rtn(
@@ -64,8 +65,9 @@ static bst_status relative_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_c
  * two-body orbits from the time of the burn, so that the perturbations that the analytic orbit
  * already has are kept (Encke's idea; the neglected difference of perturbations grows as the
  * separation does: below 1 m per km in an hour at GEO). */
-static bst_status deviation_at(bst_ctx *ctx, const bst_burn *burn, double seconds, bst_state *out) {
-    bst_state base, moved;
+static bst_status deviation_at(bst_ctx *ctx, const bst_world_burn *burn, double seconds,
+                               bst_world_state *out) {
+    bst_world_state base, moved;
     double dt = seconds - burn->time_s;
     BST_TRY(bst_kepler_propagate(ctx, BST_EARTH_MU_M3PS2, burn->base.position_m,
                                  burn->base.velocity_mps, dt, &base.position_m,
@@ -79,25 +81,25 @@ static bst_status deviation_at(bst_ctx *ctx, const bst_burn *burn, double second
     return BST_OK;
 }
 
-static void add_state(bst_state *to, const bst_state *what) {
+static void add_state(bst_world_state *to, const bst_world_state *what) {
     to->position_m = bst_vec3_add(to->position_m, what->position_m);
     to->velocity_mps = bst_vec3_add(to->velocity_mps, what->velocity_mps);
 }
 
-bst_status bst_orbit_set_burns(bst_ctx *ctx, bst_orbit *orbit, bst_sky_clock *clock, bst_time epoch,
-                               const bst_burn_config *burns, int count) {
+bst_status bst_world_orbit_set_burns(bst_ctx *ctx, bst_world_orbit *orbit, bst_sky_clock *clock,
+                                     bst_time epoch, const bst_burn_config *burns, int count) {
     orbit->burns = calloc((size_t)count + 1, sizeof *orbit->burns);
     if (!orbit->burns) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for burns");
     }
     for (int i = 0; i < count; i++) {
-        bst_burn *burn = &orbit->burns[i];
+        bst_world_burn *burn = &orbit->burns[i];
         burn->time_s = burns[i].time_s;
-        BST_TRY(bst_orbit_state(ctx, orbit, clock, epoch, burn->time_s, false, &burn->base));
+        BST_TRY(bst_world_orbit_state(ctx, orbit, clock, epoch, burn->time_s, false, &burn->base));
         if (i > 0) {
             BST_TRY(deviation_at(ctx, burn - 1, burn->time_s, &burn->deviation));
         }
-        bst_state before = burn->base;
+        bst_world_state before = burn->base;
         add_state(&before, &burn->deviation);
         bst_vec3 r, t, n;
         rtn_axes(&before, &r, &t, &n);
@@ -109,11 +111,12 @@ bst_status bst_orbit_set_burns(bst_ctx *ctx, bst_orbit *orbit, bst_sky_clock *cl
     return BST_OK;
 }
 
-bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                           bst_time epoch, double seconds, bool with_burns, bst_state *out) {
+bst_status bst_world_orbit_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
+                                 bst_time epoch, double seconds, bool with_burns,
+                                 bst_world_state *out) {
     bool steered = false;
     if (with_burns && orbit->steering) {
-        BST_TRY(bst_steering_state(ctx, orbit->steering, seconds, &steered, out));
+        BST_TRY(bst_external_states_state(ctx, orbit->steering, seconds, &steered, out));
     }
     if (steered) {
         return BST_OK;
@@ -124,7 +127,7 @@ bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *
             break;
         case BST_ORBIT_OEM:
         case BST_ORBIT_INJECTED:
-            BST_TRY(bst_orbit_file_state(ctx, orbit, clock, epoch, seconds, out));
+            BST_TRY(bst_world_orbit_file_state(ctx, orbit, clock, epoch, seconds, out));
             break;
         case BST_ORBIT_NUMERICAL:
             return numerical_state(ctx, orbit, seconds, with_burns, out);
@@ -136,24 +139,25 @@ bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *
         burn--;
     }
     if (burn >= 0) {
-        bst_state deviation;
+        bst_world_state deviation;
         BST_TRY(deviation_at(ctx, &orbit->burns[burn], seconds, &deviation));
         add_state(out, &deviation);
     }
     return BST_OK;
 }
 
-bst_status bst_orbit_line_of_sight(bst_ctx *ctx, const bst_orbit *object, const bst_state *observer,
-                                   bst_sky_clock *clock, bst_time epoch, const bst_bodies *bodies,
-                                   double seconds, bool with_burns, bst_vec3 *geometric_m,
-                                   bst_state *object_state, double *emission_s) {
+bst_status bst_world_orbit_line_of_sight(bst_ctx *ctx, const bst_world_orbit *object,
+                                         const bst_world_state *observer, bst_sky_clock *clock,
+                                         bst_time epoch, const bst_bodies *bodies, double seconds,
+                                         bool with_burns, bst_vec3 *geometric_m,
+                                         bst_world_state *object_state, double *emission_s) {
     /* Barycentric light time: the Earth moves by v_earth * tau between emission and reception, and
      * the observer's aberration is taken with its barycentric velocity. Leaving either out would be
      * 20 arcsec wrong. Three rounds shrink the error by (v/c)^3. */
     double tau = 0.0;
     for (int i = 0; i < 3; i++) {
-        BST_TRY(
-            bst_orbit_state(ctx, object, clock, epoch, seconds - tau, with_burns, object_state));
+        BST_TRY(bst_world_orbit_state(ctx, object, clock, epoch, seconds - tau, with_burns,
+                                      object_state));
         bst_vec3 d = bst_vec3_sub(object_state->position_m, observer->position_m);
         *geometric_m = bst_vec3_axpy(d, -tau, bodies->earth_bary_mps);
         tau = bst_vec3_norm(*geometric_m) / BST_LIGHT_SPEED_MPS;

@@ -16,8 +16,8 @@ bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path)
     return full;
 }
 
-bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *set,
-                                const char *name, bst_orbit *orbit) {
+bst_status bst_world_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *set,
+                                      const char *name, bst_world_orbit *orbit) {
     bst_time epoch;
     BST_TRY(bst_time_from_utc_jd(b->ctx, set->epoch_utc_jd1, set->epoch_utc_jd2, &epoch));
     orbit->source = BST_ORBIT_SGP4;
@@ -34,19 +34,21 @@ bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *
 
 /* From the two lines in the scenario. */
 static bst_status build_lines(const bst_world_builder *b, const bst_orbit_config *config,
-                              const char *path, const char *name, bst_orbit *orbit, int *norad) {
+                              const char *path, const char *name, bst_world_orbit *orbit,
+                              int *norad) {
     bst_elements set;
     bst_status status = bst_tle_parse(b->ctx, config->tle_line1, config->tle_line2, &set);
     if (status == BST_OK) {
         *norad = set.norad;
-        status = bst_orbit_build_sgp4(b, &set, name, orbit);
+        status = bst_world_orbit_build_sgp4(b, &set, name, orbit);
     }
     return status == BST_OK ? BST_OK
                             : bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s", b->scenario, path);
 }
 
 static bst_status build_sgp4(const bst_world_builder *b, const bst_orbit_config *config,
-                             const char *path, const char *name, bst_orbit *orbit, int *norad) {
+                             const char *path, const char *name, bst_world_orbit *orbit,
+                             int *norad) {
     bool lines = *config->tle_line1 || *config->tle_line2;
     bool file_given = *config->elements_file || config->norad != 0;
     if (lines && !file_given) {
@@ -79,14 +81,14 @@ static bst_status build_sgp4(const bst_world_builder *b, const bst_orbit_config 
     }
     if (status == BST_OK) {
         *norad = sets[best].norad;
-        status = bst_orbit_build_sgp4(b, &sets[best], name, orbit);
+        status = bst_world_orbit_build_sgp4(b, &sets[best], name, orbit);
     }
     free(sets);
     return status == BST_OK ? BST_OK : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, path);
 }
 
 static bst_status build_relative(const bst_world_builder *b, const bst_orbit_config *config,
-                                 const char *path, bst_orbit *orbit) {
+                                 const char *path, bst_world_orbit *orbit) {
     int reference = bst_world_find_object(b->world, config->reference);
     if (reference < 0) {
         return bst_fail(b->ctx, BST_ERR_CONFIG,
@@ -102,7 +104,7 @@ static bst_status build_relative(const bst_world_builder *b, const bst_orbit_con
 }
 
 static bst_status build_member(const bst_world_builder *b, const bst_orbit_config *config,
-                               const char *path, const char *name, bst_orbit *orbit) {
+                               const char *path, const char *name, bst_world_orbit *orbit) {
     const bst_constellation_config *list = b->constellations->items, *found = NULL;
     for (int i = 0; i < b->constellations->count && !found; i++) {
         found = strcmp(list[i].name, config->constellation) == 0 ? &list[i] : NULL;
@@ -124,7 +126,7 @@ static bst_status build_member(const bst_world_builder *b, const bst_orbit_confi
     }
     const bst_elements set =
         bst_constellation_elements(found, b->world->epoch, (int)plane, (int)slot);
-    bst_status status = bst_orbit_build_sgp4(b, &set, name, orbit);
+    bst_status status = bst_world_orbit_build_sgp4(b, &set, name, orbit);
     return status == BST_OK ? BST_OK : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, path);
 }
 
@@ -151,9 +153,9 @@ static bst_status check_burns(const bst_world_builder *b, const bst_config_list 
     return BST_OK;
 }
 
-bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *config,
-                           const bst_config_list *burns, const char *path, const char *name,
-                           bst_orbit *orbit, int *norad) {
+bst_status bst_world_orbit_build(const bst_world_builder *b, const bst_orbit_config *config,
+                                 const bst_config_list *burns, const char *path, const char *name,
+                                 bst_world_orbit *orbit, int *norad) {
     orbit->source = config->source;
     orbit->name = name;
     *norad = 0;
@@ -164,29 +166,29 @@ bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *c
             break;
         case BST_ORBIT_OEM:
         case BST_ORBIT_INJECTED:
-            BST_TRY(bst_orbit_build_file(b, config, path, orbit));
+            BST_TRY(bst_world_orbit_build_file(b, config, path, orbit));
             break;
         case BST_ORBIT_CONSTELLATION:
             BST_TRY(build_member(b, config, path, name, orbit));
             break;
         case BST_ORBIT_NUMERICAL:
-            return bst_orbit_build_numerical(b, config, burns, path, name, orbit, norad);
+            return bst_world_orbit_build_numerical(b, config, burns, path, name, orbit, norad);
         default:
             BST_TRY(build_relative(b, config, path, orbit));
     }
-    if (burns->count > 0 && bst_orbit_set_burns(b->ctx, orbit, b->clock, b->world->epoch,
-                                                burns->items, burns->count) != BST_OK) {
+    if (burns->count > 0 && bst_world_orbit_set_burns(b->ctx, orbit, b->clock, b->world->epoch,
+                                                      burns->items, burns->count) != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %.*s/burns", b->scenario,
                                (int)(strlen(path) - strlen("/orbit")), path);
     }
     return BST_OK;
 }
 
-void bst_orbit_free(bst_orbit *orbit) {
+void bst_world_orbit_free(bst_world_orbit *orbit) {
     bst_sgp4_free(orbit->sgp4);
     bst_trajectory_free(orbit->unburnt);
     bst_trajectory_free(orbit->burnt);
     bst_gravity_free(orbit->gravity);
-    bst_steering_free(orbit->steering);
+    bst_external_states_free(orbit->steering);
     free(orbit->burns);
 }

@@ -40,7 +40,7 @@ static bst_world_file *find_file(bst_world *world, const char *key) {
 }
 
 static bst_status open_oem(const bst_world_builder *b, const char *object, bst_world_file *file,
-                           const char *path, bst_orbit *orbit) {
+                           const char *path, bst_world_orbit *orbit) {
     if (!file->oem) {
         BST_TRY(bst_oem_load(b->ctx, path, &file->oem));
     }
@@ -54,21 +54,21 @@ static bst_status open_oem(const bst_world_builder *b, const char *object, bst_w
 }
 
 static bst_status open_injected(const bst_world_builder *b, const char *object,
-                                bst_world_file *file, const char *path, bst_orbit *orbit) {
+                                bst_world_file *file, const char *path, bst_world_orbit *orbit) {
     size_t length = strlen(path);
     bool json = length > 5 && strcmp(path + length - 5, ".json") == 0;
     if (!file->injected) {
         BST_TRY(json ? bst_world_updates_injected(b, path, &file->injected)
-                     : bst_injected_load(b->ctx, path, b->world->epoch, &file->injected));
+                     : bst_state_table_load(b->ctx, path, b->world->epoch, &file->injected));
     }
     orbit->injected = file->injected;
-    BST_TRY(bst_injected_find(b->ctx, orbit->injected, object, &orbit->file_object));
-    bst_injected_span(orbit->injected, orbit->file_object, &orbit->from_s, &orbit->to_s);
+    BST_TRY(bst_state_table_find(b->ctx, orbit->injected, object, &orbit->file_object));
+    bst_state_table_span(orbit->injected, orbit->file_object, &orbit->from_s, &orbit->to_s);
     return BST_OK;
 }
 
-bst_status bst_orbit_build_file(const bst_world_builder *b, const bst_orbit_config *config,
-                                const char *path, bst_orbit *orbit) {
+bst_status bst_world_orbit_build_file(const bst_world_builder *b, const bst_orbit_config *config,
+                                      const char *path, bst_world_orbit *orbit) {
     bool oem = config->source == BST_ORBIT_OEM;
     const char *key = oem ? "oem_file" : "states_file";
     const char *given = oem ? config->oem_file : config->states_file;
@@ -93,16 +93,16 @@ bst_status bst_orbit_build_file(const bst_world_builder *b, const bst_orbit_conf
                                  "%s: %s/%s", b->scenario, path, key);
 }
 
-static bst_status state_within(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                               bst_time epoch, double seconds, bst_state *out) {
+static bst_status state_within(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
+                               bst_time epoch, double seconds, bst_world_state *out) {
     if (orbit->source == BST_ORBIT_OEM) {
         return bst_oem_state(ctx, orbit->oem, orbit->file_object, clock,
                              bst_time_add(epoch, seconds), &out->position_m, &out->velocity_mps);
     }
-    BST_TRY(bst_injected_state(ctx, orbit->injected, orbit->file_object, seconds, &out->position_m,
-                               &out->velocity_mps));
+    BST_TRY(bst_state_table_state(ctx, orbit->injected, orbit->file_object, seconds,
+                                  &out->position_m, &out->velocity_mps));
     if (orbit->in_teme) {
-        bst_sky sky;
+        bst_sky_rotation sky;
         BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(epoch, seconds), &sky));
         out->position_m = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, out->position_m);
         out->velocity_mps = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, out->velocity_mps);
@@ -111,15 +111,16 @@ static bst_status state_within(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clo
 }
 
 /* Continues `end`, the state at the file's end that is nearer, by `beyond_s`. */
-static bst_status go_on(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock, bst_time epoch,
-                        const bst_state *end, double beyond_s, bst_state *out) {
+static bst_status go_on(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
+                        bst_time epoch, const bst_world_state *end, double beyond_s,
+                        bst_world_state *out) {
     double end_s = beyond_s > 0.0 ? orbit->to_s : orbit->from_s;
     double step = fmin(ACCELERATION_S, orbit->to_s - orbit->from_s) * (beyond_s > 0.0 ? -1.0 : 1.0);
     double r = bst_vec3_norm(end->position_m);
     bst_vec3 gravity = bst_vec3_scale(end->position_m, -BST_EARTH_MU_M3PS2 / (r * r * r));
     bst_vec3 acceleration = gravity;
     if (fabs(step) > 1e-3 * ACCELERATION_S) {
-        bst_state inner;
+        bst_world_state inner;
         BST_TRY(state_within(ctx, orbit, clock, epoch, end_s + step, &inner));
         acceleration =
             bst_vec3_scale(bst_vec3_sub(inner.velocity_mps, end->velocity_mps), 1.0 / step);
@@ -137,8 +138,9 @@ static bst_status go_on(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clo
     return BST_OK;
 }
 
-bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                                bst_time epoch, double seconds, bst_state *out) {
+bst_status bst_world_orbit_file_state(bst_ctx *ctx, const bst_world_orbit *orbit,
+                                      bst_sky_clock *clock, bst_time epoch, double seconds,
+                                      bst_world_state *out) {
     double end_s = fmax(orbit->from_s, fmin(orbit->to_s, seconds));
     double beyond_s = seconds - end_s;
     if (!(fabs(beyond_s) <= MARGIN_S)) {
@@ -147,7 +149,7 @@ bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_cl
     }
     bst_status status = state_within(ctx, orbit, clock, epoch, end_s, out);
     if (status == BST_OK && beyond_s != 0.0) {
-        bst_state end = *out;
+        bst_world_state end = *out;
         status = go_on(ctx, orbit, clock, epoch, &end, beyond_s, out);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
@@ -156,7 +158,7 @@ bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_cl
 /* Fails unless the file that the orbit, or what it is relative to, comes from covers the run, and
  * the run as a clock shows it that is clock_offset_s ahead. */
 static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world *world,
-                             const bst_orbit *orbit, double duration_s, double clock_offset_s,
+                             const bst_world_orbit *orbit, double duration_s, double clock_offset_s,
                              const char *path) {
     while (orbit->reference) {
         orbit = orbit->reference;
@@ -186,7 +188,7 @@ static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world
  * of a body at rest, or in motion straight up. */
 static bst_status check_axes(bst_ctx *ctx, const char *scenario, const bst_world *world,
                              int observer, int sensor) {
-    const bst_orbit *orbit = &world->observers[observer].orbit;
+    const bst_world_orbit *orbit = &world->observers[observer].orbit;
     const bst_orbit_error_config *e =
         &world->observers[observer].sensors[sensor].config.knowledge.orbit;
     bool across = e->position_rtn_m[1] != 0.0 || e->position_rtn_m[2] != 0.0 ||
@@ -196,9 +198,9 @@ static bst_status check_axes(bst_ctx *ctx, const char *scenario, const bst_world
         return BST_OK;
     }
     bst_sky_clock *clock;
-    bst_state at = {0};
+    bst_world_state at = {0};
     BST_TRY(bst_sky_clock_create_on(ctx, world->sky_grid, &clock));
-    bst_status status = bst_orbit_file_state(ctx, orbit, clock, world->epoch, 0.0, &at);
+    bst_status status = bst_world_orbit_file_state(ctx, orbit, clock, world->epoch, 0.0, &at);
     bst_sky_clock_free(clock);
     BST_TRY(status);
     double h = bst_vec3_norm(bst_vec3_cross(at.position_m, at.velocity_mps));
@@ -238,7 +240,7 @@ void bst_world_files_free(bst_world *world) {
     for (int i = 0; i < world->file_count; i++) {
         free(world->files[i].key);
         bst_oem_free(world->files[i].oem);
-        bst_injected_free(world->files[i].injected);
+        bst_state_table_free(world->files[i].injected);
     }
     free(world->files);
 }

@@ -60,12 +60,14 @@ const bst_config_desc bst_force_table[] = {
     BST_CONFIG_END,
 };
 
-const bst_config_desc bst_spacecraft_table[] = {
-    BST_REAL(bst_spacecraft_config, mass_kg, "kg", 1e-6, 1e9, "500", "Mass."),
-    BST_REAL(bst_spacecraft_config, drag_area_m2, "m2", 0, 1e6, "4", "Cross-section in the air."),
-    BST_REAL(bst_spacecraft_config, cd, "", 0, 10, "2.2", "Coefficient of drag."),
-    BST_REAL(bst_spacecraft_config, srp_area_m2, "m2", 0, 1e6, "4", "Cross-section in sunlight."),
-    BST_REAL(bst_spacecraft_config, cr, "", 0, 10, "1.3",
+const bst_config_desc bst_orbit_spacecraft_table[] = {
+    BST_REAL(bst_orbit_spacecraft_config, mass_kg, "kg", 1e-6, 1e9, "500", "Mass."),
+    BST_REAL(bst_orbit_spacecraft_config, drag_area_m2, "m2", 0, 1e6, "4",
+             "Cross-section in the air."),
+    BST_REAL(bst_orbit_spacecraft_config, cd, "", 0, 10, "2.2", "Coefficient of drag."),
+    BST_REAL(bst_orbit_spacecraft_config, srp_area_m2, "m2", 0, 1e6, "4",
+             "Cross-section in sunlight."),
+    BST_REAL(bst_orbit_spacecraft_config, cr, "", 0, 10, "1.3",
              "Coefficient of solar pressure: 1 black, 2 a mirror that faces the Sun."),
     BST_CONFIG_END,
 };
@@ -75,7 +77,7 @@ static bst_vec3 vec(const double v[3]) {
 }
 
 static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_config *given,
-                            const char *path, double gm, bst_state *out) {
+                            const char *path, double gm, bst_world_state *out) {
     bst_initial_state_config all = *given;
     const bst_initial_state_config *s = &all;
     if (bst_keplerian_resolve(b->ctx, &all) != BST_OK) {
@@ -96,11 +98,11 @@ static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_
 }
 
 static bst_status initial_state(const bst_world_builder *b, const bst_orbit_config *config,
-                                const char *path, const char *name, double gm, bst_state *out,
+                                const char *path, const char *name, double gm, bst_world_state *out,
                                 int *norad) {
     const bst_initial_state_config *s = &config->state;
     if (s->from == BST_STATE_CARTESIAN) {
-        *out = (bst_state){vec(s->position_gcrf_m), vec(s->velocity_gcrf_mps)};
+        *out = (bst_world_state){vec(s->position_gcrf_m), vec(s->velocity_gcrf_mps)};
         return BST_OK;
     }
     if (s->from == BST_STATE_KEPLERIAN) {
@@ -111,13 +113,13 @@ static bst_status initial_state(const bst_world_builder *b, const bst_orbit_conf
     other.source = s->from == BST_STATE_ELEMENT_SET ? BST_ORBIT_SGP4 : BST_ORBIT_RELATIVE;
     other.at_s = s->at_s;
     const bst_config_list no_burns = {NULL, 0};
-    bst_orbit orbit = {0};
-    bst_status status = bst_orbit_build(b, &other, &no_burns, path, name, &orbit, norad);
-    if (status == BST_OK &&
-        bst_orbit_state(b->ctx, &orbit, b->clock, b->world->epoch, s->at_s, true, out) != BST_OK) {
+    bst_world_orbit orbit = {0};
+    bst_status status = bst_world_orbit_build(b, &other, &no_burns, path, name, &orbit, norad);
+    if (status == BST_OK && bst_world_orbit_state(b->ctx, &orbit, b->clock, b->world->epoch,
+                                                  s->at_s, true, out) != BST_OK) {
         status = bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/state", b->scenario, path);
     }
-    bst_orbit_free(&orbit);
+    bst_world_orbit_free(&orbit);
     return status;
 }
 
@@ -145,14 +147,15 @@ static bst_status make_gravity(const bst_world_builder *b, const bst_force_confi
                : bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/forces/gravity", b->scenario, path);
 }
 
-bst_status bst_orbit_build_numerical(const bst_world_builder *b, const bst_orbit_config *config,
-                                     const bst_config_list *burns, const char *path,
-                                     const char *name, bst_orbit *orbit, int *norad) {
+bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
+                                           const bst_orbit_config *config,
+                                           const bst_config_list *burns, const char *path,
+                                           const char *name, bst_world_orbit *orbit, int *norad) {
     BST_TRY(make_gravity(b, &config->forces, path, &orbit->gravity));
-    bst_state state;
+    bst_world_state state;
     BST_TRY(initial_state(b, config, path, name, bst_gravity_gm(orbit->gravity), &state, norad));
     const bst_force_config *f = &config->forces;
-    const bst_spacecraft_config *s = &config->spacecraft;
+    const bst_orbit_spacecraft_config *s = &config->spacecraft;
     bst_trajectory_options options = {
         .forces = {.gravity = orbit->gravity,
                    .eop = b->world->eop,
@@ -171,13 +174,13 @@ bst_status bst_orbit_build_numerical(const bst_world_builder *b, const bst_orbit
     bst_status status = bst_trajectory_create(b->ctx, &options, &orbit->unburnt);
     if (status == BST_OK && burns->count > 0) {
         const bst_burn_config *items = burns->items;
-        bst_thrust *thrusts = calloc((size_t)burns->count, sizeof *thrusts);
+        bst_astro_thrust *thrusts = calloc((size_t)burns->count, sizeof *thrusts);
         if (!thrusts) {
             return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for burns");
         }
         for (int i = 0; i < burns->count; i++) {
             thrusts[i] =
-                (bst_thrust){items[i].time_s, items[i].duration_s, vec(items[i].dv_rtn_mps)};
+                (bst_astro_thrust){items[i].time_s, items[i].duration_s, vec(items[i].dv_rtn_mps)};
         }
         options.burns = thrusts;
         options.burn_count = burns->count;

@@ -19,7 +19,7 @@ enum { AS_MAGNITUDE, AS_FACTOR };
 
 struct bst_brightness {
     bst_brightness_config config;
-    bst_curve curve;
+    bst_bench_error_curve curve;
 };
 
 bst_status bst_brightness_create(bst_ctx *ctx, const bst_brightness_config *config,
@@ -46,7 +46,7 @@ bst_status bst_brightness_create(bst_ctx *ctx, const bst_brightness_config *conf
         if (status != BST_OK) {
             status = bst_fail_prefix(ctx, BST_ERR_CONFIG, "light_curve_file");
         }
-        const bst_curve *c = &b->curve;
+        const bst_bench_error_curve *c = &b->curve;
         for (int i = 0; i < c->count && status == BST_OK; i++) {
             if (c->y_column == AS_FACTOR && c->y[i] < 0.0) {
                 status =
@@ -97,8 +97,8 @@ static double gauss8(int i, double *weight) {
     return i < 4 ? -gauss_place[k] : gauss_place[k];
 }
 
-double bst_earthshine(double specular_fraction, double earth_albedo, bst_vec3 object_m,
-                      bst_vec3 eye_m, bst_vec3 sun_m, bst_vec3 *middle) {
+double bst_scene_earthshine(double specular_fraction, double earth_albedo, bst_vec3 object_m,
+                            bst_vec3 eye_m, bst_vec3 sun_m, bst_vec3 *middle) {
     enum { PANELS = 3, AROUND = 48 };
     double distance = bst_vec3_norm(object_m), au = bst_vec3_norm(sun_m) / BST_AU_M;
     *middle = bst_vec3_scale(object_m, -1.0 / distance);
@@ -129,7 +129,7 @@ double bst_earthshine(double specular_fraction, double earth_albedo, bst_vec3 ob
             bst_vec3 normal = bst_vec3_unit(bst_vec3_axpy(object_m, way, u));
             double radiance = earth_albedo / BST_PI * fmax(bst_vec3_dot(normal, to_sun), 0.0);
             double light = radiance * solid_angle *
-                           bst_sphere_phase(specular_fraction, bst_vec3_angle(u, to_eye));
+                           bst_astro_sphere_phase(specular_fraction, bst_vec3_angle(u, to_eye));
             total += light;
             sum = bst_vec3_axpy(sum, light, u);
         }
@@ -166,20 +166,20 @@ static double disc_light(double ratio, double phi) {
     return sum;
 }
 
-double bst_sphere_nearness(double ratio, double phase_rad) {
+double bst_scene_sphere_nearness(double ratio, double phase_rad) {
     double far = disc_light(0.0, fabs(phase_rad));
     return ratio > 0.0 && far > 0.0 ? disc_light(ratio, fabs(phase_rad)) / far : 1.0;
 }
 
 /* Reflected sunlight over sunlight at 1 au, were the whole Sun seen, as a magnitude. */
-static double full_v_mag(const bst_brightness *b, const bst_lighting *l, double phase,
+static double full_v_mag(const bst_brightness *b, const bst_scene_lighting *l, double phase,
                          double range_m, double sun_distance_m) {
     const bst_brightness_config *c = &b->config;
     double au = sun_distance_m / BST_AU_M;
     double far = 5.0 * log10(range_m / STANDARD_RANGE_M) + 5.0 * log10(au);
     if (c->model == BST_BRIGHTNESS_STANDARD) {
-        double law = bst_sphere_phase(c->specular_fraction, phase) /
-                     bst_sphere_phase(c->specular_fraction, 0.5 * BST_PI);
+        double law = bst_astro_sphere_phase(c->specular_fraction, phase) /
+                     bst_astro_sphere_phase(c->specular_fraction, 0.5 * BST_PI);
         return law > 0.0 ? c->standard_v_mag - 2.5 * log10(law) + far : (double)INFINITY;
     }
     double curve = 1.0;
@@ -196,11 +196,12 @@ static double full_v_mag(const bst_brightness *b, const bst_lighting *l, double 
     }
     double v;
     if (c->specular_fraction > 0.0) {
-        double ratio = l->albedo * l->area_m2 * bst_sphere_phase(c->specular_fraction, phase) /
+        double ratio = l->albedo * l->area_m2 *
+                       bst_astro_sphere_phase(c->specular_fraction, phase) /
                        (range_m * range_m * au * au);
         v = ratio > 0.0 ? BST_SUN_V_MAG - 2.5 * log10(ratio) : (double)INFINITY;
     } else {
-        v = bst_lambert_sphere_v_mag(l->area_m2, l->albedo, phase, range_m, sun_distance_m);
+        v = bst_world_lambert_sphere_v_mag(l->area_m2, l->albedo, phase, range_m, sun_distance_m);
     }
     return curve > 0.0 ? v - 2.5 * log10(curve) : (double)INFINITY;
 }
@@ -209,7 +210,7 @@ static double ratio_of(double v_mag) {
     return pow(10.0, -0.4 * (v_mag - BST_SUN_V_MAG));
 }
 
-void bst_brightness_at(const bst_brightness *b, const bst_lighting *l, bst_glow *out) {
+void bst_brightness_at(const bst_brightness *b, const bst_scene_lighting *l, bst_scene_glow *out) {
     static const bst_brightness plain = {.config = {.model = BST_BRIGHTNESS_SPHERE}};
     b = b ? b : &plain;
     const bst_brightness_config *c = &b->config;
@@ -218,19 +219,20 @@ void bst_brightness_at(const bst_brightness *b, const bst_lighting *l, bst_glow 
     double range_m = bst_vec3_norm(to_eye), phase = bst_vec3_angle(to_eye, to_sun);
     double full = full_v_mag(b, l, phase, range_m, bst_vec3_norm(to_sun));
     double sunlight = l->sunlight ? l->sunlight->light[BST_SUNLIGHT_V] : l->sunlit_fraction;
-    *out = (bst_glow){.v_mag = sunlight > 0.0 ? full - 2.5 * log10(sunlight) : (double)INFINITY,
-                      .resolved = c->resolved};
+    *out =
+        (bst_scene_glow){.v_mag = sunlight > 0.0 ? full - 2.5 * log10(sunlight) : (double)INFINITY,
+                         .resolved = c->resolved};
     for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
         out->redness[k] = l->sunlight && sunlight > 0.0 ? l->sunlight->light[k] / sunlight : 1.0;
     }
-    double law = bst_sphere_phase(c->specular_fraction, phase);
+    double law = bst_astro_sphere_phase(c->specular_fraction, phase);
     out->specular_share = law > 0.0 ? c->specular_fraction / (4.0 * BST_PI) / law : 0.0;
     double ratio = sqrt(l->area_m2 / BST_PI) / range_m, disc = 1.0;
     if (c->model != BST_BRIGHTNESS_SPHERE) {
         ratio = 0.0; /* the magnitude is what it is at any range */
     }
     if (ratio > NEAR_RATIO && ratio < 1.0) {
-        double nearness = bst_sphere_nearness(ratio, phase);
+        double nearness = bst_scene_sphere_nearness(ratio, phase);
         double factor = out->specular_share + (1.0 - out->specular_share) * nearness;
         out->v_mag = factor > 0.0 ? out->v_mag - 2.5 * log10(factor) : (double)INFINITY;
         out->specular_share = factor > 0.0 ? out->specular_share / factor : 0.0;
@@ -241,11 +243,11 @@ void bst_brightness_at(const bst_brightness *b, const bst_lighting *l, bst_glow 
         double sphere = l->albedo * l->area_m2;
         if (c->model == BST_BRIGHTNESS_STANDARD) {
             sphere = ratio_of(c->standard_v_mag) * STANDARD_RANGE_M * STANDARD_RANGE_M /
-                     bst_sphere_phase(c->specular_fraction, 0.5 * BST_PI);
+                     bst_astro_sphere_phase(c->specular_fraction, 0.5 * BST_PI);
         }
         double earth = sphere / (range_m * range_m) *
-                       bst_earthshine(c->specular_fraction, c->earth_albedo, l->object_m, l->eye_m,
-                                      l->sun_m, &out->earth);
+                       bst_scene_earthshine(c->specular_fraction, c->earth_albedo, l->object_m,
+                                            l->eye_m, l->sun_m, &out->earth);
         double sun = ratio_of(out->v_mag), all = sun + earth;
         out->earth_share = all > 0.0 ? earth / all : 0.0;
         out->specular_share *= 1.0 - out->earth_share;
@@ -258,7 +260,8 @@ void bst_brightness_at(const bst_brightness *b, const bst_lighting *l, bst_glow 
     out->thermal_reflection = l->albedo > 0.0 ? (1.0 - c->emissivity) / l->albedo : 0.0;
 }
 
-double bst_glow_electrons_per_s(const bst_camera *camera, const bst_glow *glow, double *reflected) {
+double bst_scene_glow_electrons_per_s(const bst_camera *camera, const bst_scene_glow *glow,
+                                      double *reflected) {
     bool thermal = camera->spectrum && bst_band_is_thermal(camera->spectrum);
     double sunlight = isinf(glow->v_mag) ? 0.0 : bst_camera_electrons_per_s(camera, glow->v_mag);
     if (camera->spectrum) {

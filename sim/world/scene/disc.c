@@ -15,7 +15,7 @@ static const double gauss_weight[GAUSS] = {0.17392742256872693, 0.32607257743127
 
 typedef bst_disc_aspect aspect;
 
-static aspect make_aspect(const bst_source *source, bst_vec3 light) {
+static aspect make_aspect(const bst_scene_source *source, bst_vec3 light) {
     aspect a = {.z = bst_vec3_scale(bst_vec3_unit(source->apparent_mid), -1.0),
                 .radius = source->shape->radius};
     a.cosine = bst_vec3_dot(light, a.z);
@@ -109,16 +109,16 @@ static bst_status add_light(bst_ctx *ctx, const aspect *a, bool uniform, double 
     return BST_OK;
 }
 
-bst_vec3 bst_disc_specular(const bst_source *source) {
+bst_vec3 bst_disc_specular(const bst_scene_source *source) {
     aspect a = make_aspect(source, source->shape->sun);
     /* the normal halves the phase angle */
     double half = 0.5 * atan2(a.sine, a.cosine);
     return offset_at(&a, sin(half), 0.0);
 }
 
-bst_status bst_disc_make_points(bst_ctx *ctx, const bst_source *source, int lights,
+bst_status bst_disc_make_points(bst_ctx *ctx, const bst_scene_source *source, int lights,
                                 double panel_rad, bst_disc_points *out) {
-    const bst_source_shape *s = source->shape;
+    const bst_scene_source_shape *s = source->shape;
     aspect sun = make_aspect(source, s->sun);
     if ((lights & BST_DISC_SUN) && s->diffuse > 0.0) {
         BST_TRY(add_light(ctx, &sun, false, s->diffuse, panel_rad, out));
@@ -136,18 +136,18 @@ bst_status bst_disc_make_points(bst_ctx *ctx, const bst_source *source, int ligh
     return BST_OK;
 }
 
-static aspect lit_aspect(const bst_source *source, bst_vec3 light, double share) {
+static aspect lit_aspect(const bst_scene_source *source, bst_vec3 light, double share) {
     aspect a = make_aspect(source, light);
     double phase = atan2(a.sine, a.cosine);
     /* integral of the cosine of incidence over the disc's solid angle */
-    double whole = BST_PI * BST_PI * a.radius * a.radius * bst_sphere_phase(0.0, phase) *
-                   bst_sphere_nearness(a.radius, phase);
+    double whole = BST_PI * BST_PI * a.radius * a.radius * bst_astro_sphere_phase(0.0, phase) *
+                   bst_scene_sphere_nearness(a.radius, phase);
     a.scale = whole > 0.0 ? share / whole : 0.0;
     return a;
 }
 
-void bst_disc_begin(const bst_source *source, bst_disc *out) {
-    const bst_source_shape *s = source->shape;
+void bst_disc_begin(const bst_scene_source *source, bst_disc *out) {
+    const bst_scene_source_shape *s = source->shape;
     double r2 = s->radius * s->radius;
     *out = (bst_disc){.sun = lit_aspect(source, s->sun, s->diffuse),
                       .earth = lit_aspect(source, s->earth, s->earthshine),

@@ -30,7 +30,7 @@ enum {
  * varies over the size of a panel as a Gaussian of that standard deviation does is right to 1e-7;
  * with panels of twice that, to 2e-5. Lambert's law with the Sun far away and the eye at its
  * distance: near by, less of the sphere is seen. BST_ERR_MEMORY. */
-bst_status bst_disc_make_points(bst_ctx *ctx, const bst_source *source, int lights,
+bst_status bst_disc_make_points(bst_ctx *ctx, const bst_scene_source *source, int lights,
                                 double panel_rad, bst_disc_points *out) BST_MUST_CHECK;
 
 /* The disc as one light sees it. */
@@ -47,13 +47,13 @@ typedef struct bst_disc {
     double thermal; /* radiance, shares per steradian */
 } bst_disc;
 
-void bst_disc_begin(const bst_source *source, bst_disc *out);
+void bst_disc_begin(const bst_scene_source *source, bst_disc *out);
 
 /* Share of the source's light per steradian in a direction (unit, apparent); 0 beside the disc. The
  * specular point is not in it. */
 double bst_disc_radiance(const bst_disc *disc, bst_vec3 direction);
 
 /* Place of the specular point, as bst_disc_point.offset. */
-bst_vec3 bst_disc_specular(const bst_source *source);
+bst_vec3 bst_disc_specular(const bst_scene_source *source);
 
 #endif

@@ -17,7 +17,7 @@ static double sun_radiance_scale(double sun_distance_m) {
 }
 
 /* Observer at `dt` from mid-exposure: free fall about a point mass. */
-static bst_vec3 eye_at(const bst_surroundings *a, double dt) {
+static bst_vec3 eye_at(const bst_scene_surroundings *a, double dt) {
     double r = bst_vec3_norm(a->eye_m);
     double fall = r > 0.0 ? -0.5 * dt * dt * BST_EARTH_MU_M3PS2 / (r * r * r) : 0.0;
     return bst_vec3_axpy(bst_vec3_scale(a->eye_m, 1.0 + fall), dt, a->eye_mps);
@@ -36,7 +36,7 @@ static bst_mat3 columns(bst_vec3 x, bst_vec3 y, bst_vec3 z) {
 /* Angle of the direction from the edge of the Earth, positive outside, in the coordinates in which
  * it is a sphere. near: the point of the ray that is nearest to the centre, or where it meets the
  * surface; unit. height: of the nearest point above the surface, Earth radii. */
-static double earth_edge(const bst_body_disc *d, int k, bst_vec3 direction, bst_vec3 *near,
+static double earth_edge(const bst_scene_body_disc *d, int k, bst_vec3 direction, bst_vec3 *near,
                          double *height) {
     bst_vec3 way = bst_vec3_unit(bst_mat3_mul_vec(&d->frame[k], direction));
     double along = -bst_vec3_dot(d->eye[k], way), distance = bst_vec3_norm(d->eye[k]);
@@ -52,7 +52,7 @@ static double earth_edge(const bst_body_disc *d, int k, bst_vec3 direction, bst_
     return atan2(depth, along) - asin(1.0 / distance);
 }
 
-static double edge_at(const bst_body_disc *d, int body, int k, bst_vec3 direction) {
+static double edge_at(const bst_scene_body_disc *d, int body, int k, bst_vec3 direction) {
     bst_vec3 near;
     double height;
     return body == BST_BODY_EARTH ? earth_edge(d, k, direction, &near, &height)
@@ -60,7 +60,7 @@ static double edge_at(const bst_body_disc *d, int body, int k, bst_vec3 directio
 }
 
 /* How far the disc moves across the camera, and how many stretches follow from that. */
-static void choose_parts(bst_body_disc *d, int body, double scale_rad, double sensor_px) {
+static void choose_parts(bst_scene_body_disc *d, int body, double scale_rad, double sensor_px) {
     double moved = 0.0, size = body == BST_BODY_EARTH
                                    ? asin(fmin(1.0, 1.0 / bst_vec3_norm(d->eye[4])))
                                    : d->radius_rad;
@@ -83,8 +83,8 @@ static double limb_fade_rad(const bst_discs *discs, double distance) {
     return discs->limb_scale / sqrt(fmax(distance * distance - 1.0, 1e-4));
 }
 
-static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_discs *out) {
-    bst_body_disc *d = &out->body[BST_BODY_EARTH];
+static void make_earth(const bst_camera *camera, const bst_scene_surroundings *a, bst_discs *out) {
+    bst_scene_body_disc *d = &out->body[BST_BODY_EARTH];
     d->present = camera->background.earth;
     d->radiance = camera->background.earth_albedo / BST_PI *
                   sun_radiance_scale(bst_vec3_norm(a->bodies.sun_m));
@@ -93,15 +93,15 @@ static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_
     d->moon = bst_vec3_unit(bst_mat3_mul_vec(&a->itrf_from_gcrf, a->bodies.moon_m));
     bst_vec3 sun_from_moon = bst_vec3_sub(a->bodies.sun_m, a->bodies.moon_m);
     d->moonlight = camera->background.earth_albedo / BST_PI *
-                   pow(10.0, -0.4 * bst_moon_v_mag(a->bodies.moon_m, sun_from_moon));
+                   pow(10.0, -0.4 * bst_scene_moon_v_mag(a->bodies.moon_m, sun_from_moon));
     /* aberration by the observer's motion about the Earth turns all directions near the boresight
      * alike */
-    bst_light moving = {a->eye_mps, a->light.sun_m};
+    bst_astro_light moving = {a->eye_mps, a->light.sun_m};
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         bst_vec3 eye = eye_at(a, a->exposure_s * ((double)k / BST_DISC_PARTS - 0.5));
         bst_quat back = bst_quat_conj(a->q[k]);
         bst_vec3 apparent = bst_quat_rotate(back, (bst_vec3){0, 0, 1});
-        bst_vec3 geometric = bst_light_unaberrate(&moving, apparent);
+        bst_vec3 geometric = bst_astro_light_unaberrate(&moving, apparent);
         bst_quat turn = bst_quat_from_rotvec(bst_vec3_cross(apparent, geometric));
         bst_vec3 axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
         for (int i = 0; i < 3; i++) {
@@ -119,18 +119,18 @@ static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_
     d->reach_px = fade_px < 128.0 ? LIMB_HEIGHTS * fade_px : 0.0;
 }
 
-static void make_round(const bst_camera *camera, const bst_surroundings *a, int body,
+static void make_round(const bst_camera *camera, const bst_scene_surroundings *a, int body,
                        bst_discs *out) {
     bool moon = body == BST_BODY_MOON;
-    bst_body_disc *d = &out->body[body];
+    bst_scene_body_disc *d = &out->body[body];
     bst_vec3 place = moon ? a->bodies.moon_m : a->bodies.sun_m;
     double radius = moon ? BST_MOON_RADIUS_M : BST_SUN_RADIUS_M;
     d->present = moon ? camera->background.moon : camera->background.sun;
-    bst_light moving = {moon ? a->eye_mps : a->light.velocity_mps, a->light.sun_m};
+    bst_astro_light moving = {moon ? a->eye_mps : a->light.velocity_mps, a->light.sun_m};
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         bst_vec3 eye = eye_at(a, a->exposure_s * ((double)k / BST_DISC_PARTS - 0.5));
         bst_vec3 seen = bst_vec3_unit(bst_vec3_sub(place, eye));
-        d->centre[k] = bst_quat_rotate(a->q[k], bst_light_aberrate(&moving, seen));
+        d->centre[k] = bst_quat_rotate(a->q[k], bst_astro_light_aberrate(&moving, seen));
         d->sun[k] = bst_quat_rotate(a->q[k], bst_vec3_unit(bst_vec3_sub(a->bodies.sun_m, place)));
     }
     bst_vec3 from_eye = bst_vec3_sub(place, a->eye_m);
@@ -144,7 +144,8 @@ static void make_round(const bst_camera *camera, const bst_surroundings *a, int 
     bst_vec3 to_sun = bst_vec3_sub(a->bodies.sun_m, place);
     double phase = bst_vec3_angle(bst_vec3_scale(from_eye, -1.0), to_sun);
     double even = 2.0 / (3.0 * BST_PI) * (sin(phase) + (BST_PI - phase) * cos(phase));
-    d->radiance = pow(10.0, -0.4 * bst_moon_v_mag(from_eye, to_sun)) / (solid * (even + MOON_EVEN));
+    d->radiance =
+        pow(10.0, -0.4 * bst_scene_moon_v_mag(from_eye, to_sun)) / (solid * (even + MOON_EVEN));
 }
 
 /* How far beyond a body's edge the boresight may be for its light to reach the sensor, rad. */
@@ -155,7 +156,7 @@ static double reach_rad(const bst_camera *camera, const bst_discs *discs, int bo
 }
 
 /* Angle of the camera's turn from mid-exposure, at most. */
-static double largest_turn_rad(const bst_surroundings *a) {
+static double largest_turn_rad(const bst_scene_surroundings *a) {
     bst_quat mid = bst_quat_unit(a->q[BST_DISC_PARTS / 2]);
     double least = 1.0;
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
@@ -169,8 +170,8 @@ static double largest_turn_rad(const bst_surroundings *a) {
  * else moves its edge: the camera's turn, the observer's way, aberration (twice that of Earth and
  * observer) and, of the Earth, the difference between its own coordinates and those in which it is
  * a sphere. */
-static bool stays_away(const bst_camera *camera, const bst_surroundings *a, const bst_discs *discs,
-                       int body, double turn_rad) {
+static bool stays_away(const bst_camera *camera, const bst_scene_surroundings *a,
+                       const bst_discs *discs, int body, double turn_rad) {
     static const double TURN_MARGIN = 1e-6;
     const double radii[] = {BST_EARTH_RADIUS_M, BST_MOON_RADIUS_M, BST_SUN_RADIUS_M};
     bst_vec3 places[] = {{0, 0, 0}, a->bodies.moon_m, a->bodies.sun_m};
@@ -192,7 +193,8 @@ static bool stays_away(const bst_camera *camera, const bst_surroundings *a, cons
     return edge - margin > reach_rad(camera, discs, body, nearest_radii);
 }
 
-void bst_discs_make(const bst_camera *camera, const bst_surroundings *around, bst_discs *out) {
+void bst_discs_make(const bst_camera *camera, const bst_scene_surroundings *around,
+                    bst_discs *out) {
     double sigma = bst_camera_psf_sigma_px(camera);
     double sensor_px = hypot((double)camera->width_px, (double)camera->height_px);
     double turn_rad = largest_turn_rad(around);
@@ -200,7 +202,7 @@ void bst_discs_make(const bst_camera *camera, const bst_surroundings *around, bs
                        .sigma_px = sqrt(sigma * sigma + 1.0 / 12.0),
                        .limb_scale = camera->background.limb_scale_height_m / BST_EARTH_RADIUS_M};
     for (int i = 0; i < BST_BODY_COUNT; i++) {
-        bst_body_disc *d = &out->body[i];
+        bst_scene_body_disc *d = &out->body[i];
         if (stays_away(camera, around, out, i, turn_rad)) {
             continue;
         }
@@ -226,7 +228,7 @@ bool bst_discs_any(const bst_discs *discs) {
 
 double bst_discs_share(const bst_discs *discs, const bst_camera *camera, int body, bst_window w) {
     enum { PLACES = 33 };
-    const bst_body_disc *d = &discs->body[body];
+    const bst_scene_body_disc *d = &discs->body[body];
     const int middle = BST_DISC_PARTS / 2;
     if (!d->near) {
         return 0.0;
@@ -250,7 +252,7 @@ double bst_discs_share(const bst_discs *discs, const bst_camera *camera, int bod
 double bst_discs_edge_px(const bst_discs *discs, bst_vec3 direction) {
     double nearest = INFINITY;
     for (int i = 0; i < BST_BODY_COUNT; i++) {
-        const bst_body_disc *d = &discs->body[i];
+        const bst_scene_body_disc *d = &discs->body[i];
         if (!d->present) {
             continue;
         }
@@ -288,7 +290,7 @@ static bst_vec3 normal_at(bst_vec3 near) {
 }
 
 bool bst_discs_terminator(const bst_discs *discs, const bst_vec3 directions[4]) {
-    const bst_body_disc *d = &discs->body[BST_BODY_EARTH];
+    const bst_scene_body_disc *d = &discs->body[BST_BODY_EARTH];
     bool day = false, night = false;
     for (int i = 0; i < 4 && d->present; i++) {
         for (int k = 0; k <= BST_DISC_PARTS; k += BST_DISC_PARTS / 2) {
@@ -306,7 +308,7 @@ bool bst_discs_terminator(const bst_discs *discs, const bst_vec3 directions[4]) 
 /* Light of the Earth's disc, or of its limb above it, at the middle of a stretch. */
 static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, double share,
                              double *sunlight) {
-    const bst_body_disc *d = &discs->body[BST_BODY_EARTH];
+    const bst_scene_body_disc *d = &discs->body[BST_BODY_EARTH];
     bst_vec3 near;
     double height;
     (void)earth_edge(d, k, direction, &near, &height);
@@ -320,7 +322,7 @@ static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, 
     return share;
 }
 
-static double moon_radiance(const bst_body_disc *d, int k, bst_vec3 direction) {
+static double moon_radiance(const bst_scene_body_disc *d, int k, bst_vec3 direction) {
     /* place on the disc, in radii */
     bst_vec3 across =
         bst_vec3_axpy(direction, -bst_vec3_dot(direction, d->centre[k]), d->centre[k]);
@@ -338,7 +340,7 @@ bst_disc_light bst_discs_light(const bst_discs *discs, bst_vec3 direction) {
     bst_disc_light light = {0};
     double beyond = 0.0; /* Sun and Moon, which the Earth hides */
     for (int i = BST_BODY_COUNT - 1; i >= 0; i--) {
-        const bst_body_disc *d = &discs->body[i];
+        const bst_scene_body_disc *d = &discs->body[i];
         if (!d->present) {
             continue;
         }

@@ -10,21 +10,21 @@
 enum { BST_DISC_PARTS = 8 };
 
 /* What a camera is surrounded by in one exposure. */
-typedef struct bst_surroundings {
+typedef struct bst_scene_surroundings {
     bst_vec3 eye_m, eye_mps; /* observer at mid-exposure, GCRF */
     bst_bodies bodies;       /* at mid-exposure, as the rotation */
     bst_mat3 itrf_from_gcrf;
-    bst_light light;                /* of the observer */
+    bst_astro_light light;          /* of the observer */
     bst_quat q[BST_DISC_PARTS + 1]; /* q_cam_from_gcrf at equidistant times, start to end */
     double exposure_s;
     double v_limit,
         faint_limit; /* stars fainter are not drawn: of the catalogue, statistical ones */
-} bst_surroundings;
+} bst_scene_surroundings;
 
 enum { BST_BODY_EARTH, BST_BODY_MOON, BST_BODY_SUN, BST_BODY_COUNT };
 
 /* One body as the camera sees it during the exposure. */
-typedef struct bst_body_disc {
+typedef struct bst_scene_body_disc {
     bool near;         /* may touch the sensor */
     bool present;      /* and is to be drawn */
     double radius_rad; /* of the Moon and the Sun */
@@ -40,10 +40,10 @@ typedef struct bst_body_disc {
     bst_vec3 eye[BST_DISC_PARTS + 1];    /* Earth: observer, in coordinates in which it is a sphere
                                             of radius 1 */
     bst_mat3 frame[BST_DISC_PARTS + 1];  /* Earth: those coordinates from camera axes */
-} bst_body_disc;
+} bst_scene_body_disc;
 
 typedef struct bst_discs {
-    bst_body_disc body[BST_BODY_COUNT];
+    bst_scene_body_disc body[BST_BODY_COUNT];
     double scale_rad;  /* per px */
     double sigma_px;   /* by which the PSF and the pixel soften an edge */
     double limb_scale; /* Earth radii */
@@ -51,7 +51,7 @@ typedef struct bst_discs {
 
 /* Works out the bodies of one exposure. Those that `config` leaves out, or that are too far beside
  * the sensor, are not present. Directions are apparent ones. */
-void bst_discs_make(const bst_camera *camera, const bst_surroundings *around, bst_discs *out);
+void bst_discs_make(const bst_camera *camera, const bst_scene_surroundings *around, bst_discs *out);
 bool bst_discs_any(const bst_discs *discs);
 
 /* Whether the background block asks for any disc. */

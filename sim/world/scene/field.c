@@ -24,18 +24,18 @@ enum { SIGMA_DIMENSIONS = 4, SIGMA_POINTS = 2 * SIGMA_DIMENSIONS + 1 };
 
 struct bst_field {
     const bst_world *world;
-    bst_view *view;
+    bst_world_view *view;
     const bst_camera *camera;
     int observer;
-    bst_track_store track, middle; /* middle: of a rolling shutter's middle row */
+    bst_los_track_store track, middle; /* middle: of a rolling shutter's middle row */
     bst_star *stars;
     int star_capacity;
     bst_faint_stars *faint;      /* NULL: none */
     bst_skylight *skylight;      /* NULL: always the same all over the sensor */
     const bst_skylight_map *map; /* of the latest query */
-    bst_source *sources;
+    bst_scene_source *sources;
     int source_capacity;
-    bst_object_parts *parts; /* [part_capacity], of the objects among the sources */
+    bst_scene_object_parts *parts; /* [part_capacity], of the objects among the sources */
     int part_capacity;
     int *near; /* objects that may be in the field; room for all */
     bst_quat q_mid;
@@ -58,7 +58,7 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     field->stars = malloc((size_t)field->star_capacity * sizeof *field->stars);
     field->near = malloc(((size_t)bst_world_object_count(world) + 1) * sizeof *field->near);
     bst_status status = field->stars && field->near
-                            ? bst_view_create(ctx, world, &field->view)
+                            ? bst_world_view_create(ctx, world, &field->view)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
     if (status == BST_OK && bst_skylight_may_vary(field->camera)) {
         status = bst_skylight_create(ctx, world, field->camera, &field->skylight);
@@ -76,11 +76,11 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
 
 void bst_field_free(bst_field *field) {
     if (field) {
-        bst_view_free(field->view);
+        bst_world_view_free(field->view);
         bst_faint_stars_free(field->faint);
         bst_skylight_free(field->skylight);
-        bst_track_store_free(&field->track);
-        bst_track_store_free(&field->middle);
+        bst_los_track_store_free(&field->track);
+        bst_los_track_store_free(&field->middle);
         free(field->stars);
         free(field->sources);
         free(field->parts);
@@ -99,7 +99,7 @@ void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
 bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history *history,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_los_track *out) {
-    return bst_track_cut(ctx, &field->track, history, start_tick, end_tick, tick_rate_hz, out);
+    return bst_los_track_cut(ctx, &field->track, history, start_tick, end_tick, tick_rate_hz, out);
 }
 
 /* Rotation vector from attitude `from` to `to`, camera axes. */
@@ -132,13 +132,13 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     enum { D = SIGMA_DIMENSIONS };
     double exposure = track->time_s[track->count - 1];
     field->exposure_s = exposure;
-    field->q_mid = bst_track_attitude(track, 0.5 * exposure);
+    field->q_mid = bst_los_track_attitude(track, 0.5 * exposure);
     double first[D] = {0}, second[D][D] = {{0}}, total = 0.0, reach = 0.0;
     double previous[D] = {0};
     for (int k = 0; k < track->count; k++) {
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
         double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
-        reach = fmax(reach, bst_track_turned_px(field->camera, d));
+        reach = fmax(reach, bst_los_track_turned_px(field->camera, d));
         /* moments of the piecewise linear path between the samples */
         double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
         for (int i = 0; i < D; i++) {
@@ -182,12 +182,12 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
 }
 
 bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
-                       const bst_source *source, double *x_px, double *y_px) {
+                       const bst_scene_source *source, double *x_px, double *y_px) {
     double exposure = track->time_s[track->count - 1];
     double u = exposure > 0.0 ? track->time_s[k] / exposure : 0.5;
     return bst_camera_project(
-        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_source_direction(source, u)), x_px,
-        y_px);
+        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_scene_source_direction(source, u)),
+        x_px, y_px);
 }
 
 static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
@@ -228,7 +228,7 @@ static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, d
 }
 
 /* Notes in the truth how much of the window bright bodies cover; whether any is to be drawn. */
-static bool bodies_in_field(const bst_camera *camera, const bst_surroundings *around,
+static bool bodies_in_field(const bst_camera *camera, const bst_scene_surroundings *around,
                             bst_window window, bst_truth *truth) {
     bst_discs discs;
     bst_discs_make(camera, around, &discs);
@@ -240,7 +240,7 @@ static bool bodies_in_field(const bst_camera *camera, const bst_surroundings *ar
 
 static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     if (count > field->source_capacity) {
-        bst_source *more = realloc(field->sources, (size_t)count * sizeof *more);
+        bst_scene_source *more = realloc(field->sources, (size_t)count * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", count);
         }
@@ -288,7 +288,7 @@ static bool is_self(const bst_field *field, int index) {
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_window window, const bst_field_options *options, bst_truth *truth,
-                           const bst_source **sources, int *count) {
+                           const bst_scene_source **sources, int *count) {
     const bst_camera *camera = field->camera;
     double start_s = (double)start_tick / (double)tick_rate_hz,
            end_s = (double)end_tick / (double)tick_rate_hz;
@@ -297,25 +297,25 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bst_quat mean;
     bst_los_track own = *track; /* of the exposure itself */
     if (options->lead_s > 0.0) {
-        BST_TRY(bst_track_part(ctx, &field->middle, track, options->lead_s,
-                               options->lead_s + exposure, &own));
+        BST_TRY(bst_los_track_part(ctx, &field->middle, track, options->lead_s,
+                                   options->lead_s + exposure, &own));
     }
     summarise_track(field, &own, &mean, &reach_px);
     for (int k = 0; options->lead_s > 0.0 && k < track->count; k++) {
         reach_px =
-            fmax(reach_px, bst_track_moved_px(camera, field->q_mid, track->q_cam_from_gcrf[k]));
+            fmax(reach_px, bst_los_track_moved_px(camera, field->q_mid, track->q_cam_from_gcrf[k]));
     }
     start_s -= options->lead_s;
     end_s += options->lead_s;
 
-    bst_state eye;
+    bst_world_state eye;
     bst_bodies bodies;
-    BST_TRY(bst_view_observer_state(ctx, field->view, field->observer, mid_s, &eye));
-    BST_TRY(bst_view_bodies(ctx, field->view, mid_s, &bodies));
-    bst_earth_frames frames;
-    BST_TRY(bst_view_earth_frames(ctx, field->view, mid_s, &frames));
-    bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
-    bst_light geocentric = bst_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
+    BST_TRY(bst_world_view_observer_state(ctx, field->view, field->observer, mid_s, &eye));
+    BST_TRY(bst_world_view_bodies(ctx, field->view, mid_s, &bodies));
+    bst_astro_earth_frames frames;
+    BST_TRY(bst_world_view_earth_frames(ctx, field->view, mid_s, &frames));
+    bst_astro_light light = bst_astro_light_at(&bodies, eye.position_m, eye.velocity_mps);
+    bst_astro_light geocentric = bst_astro_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
 
     truth->start_tick = start_tick;
     truth->end_tick = end_tick;
@@ -349,16 +349,16 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     int star_count;
     field->map = NULL;
     double faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag);
-    bst_surroundings around = {.eye_m = eye.position_m,
-                               .eye_mps = eye.velocity_mps,
-                               .bodies = bodies,
-                               .itrf_from_gcrf = frames.itrf_from_gcrf,
-                               .light = light,
-                               .exposure_s = exposure,
-                               .v_limit = options->v_limit,
-                               .faint_limit = faint_limit};
+    bst_scene_surroundings around = {.eye_m = eye.position_m,
+                                     .eye_mps = eye.velocity_mps,
+                                     .bodies = bodies,
+                                     .itrf_from_gcrf = frames.itrf_from_gcrf,
+                                     .light = light,
+                                     .exposure_s = exposure,
+                                     .v_limit = options->v_limit,
+                                     .faint_limit = faint_limit};
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
-        around.q[k] = bst_track_attitude(&own, exposure * k / BST_DISC_PARTS);
+        around.q[k] = bst_los_track_attitude(&own, exposure * k / BST_DISC_PARTS);
     }
     if (bodies_in_field(camera, &around, window, truth) || bst_skylight_varies(camera)) {
         bst_window lit = window;
@@ -378,43 +378,44 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit, faint_limit,
                         2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
     int near_count;
-    BST_TRY(bst_view_near(ctx, field->view, field->observer, start_s, end_s, centre, radius,
-                          field->near, &near_count));
+    BST_TRY(bst_world_view_near(ctx, field->view, field->observer, start_s, end_s, centre, radius,
+                                field->near, &near_count));
     BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     int n = 0;
     bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
     for (int i = 0; i < star_count; i++) {
         const bst_star *star = &field->stars[i];
-        bst_vec3 apparent = bst_light_apparent_star(&light, star->icrs);
+        bst_vec3 apparent = bst_astro_light_apparent_star(&light, star->icrs);
         if (!near_window(field, field->q_mid, apparent, window, margin_px)) {
             continue;
         }
-        bst_source *s = &field->sources[n++];
-        *s = (bst_source){.kind = BST_SOURCE_STAR,
-                          .id = star->id,
-                          .apparent_mid = apparent,
-                          .electrons_per_s = bst_camera_star_electrons_per_s(
-                              camera, (double)star->v_mag, (double)star->b_minus_v),
-                          .v_mag = (double)star->v_mag,
-                          .sunlit_fraction = NAN,
-                          .phase_rad = NAN,
-                          .range_m = INFINITY};
+        bst_scene_source *s = &field->sources[n++];
+        *s = (bst_scene_source){.kind = BST_SOURCE_STAR,
+                                .id = star->id,
+                                .apparent_mid = apparent,
+                                .electrons_per_s = bst_camera_star_electrons_per_s(
+                                    camera, (double)star->v_mag, (double)star->b_minus_v),
+                                .v_mag = (double)star->v_mag,
+                                .sunlit_fraction = NAN,
+                                .phase_rad = NAN,
+                                .range_m = INFINITY};
         if (coloured && !isnan(star->b_minus_v)) {
-            bst_psf_colour(camera->psf, bst_star_spectrum_k((double)star->b_minus_v), s->colour);
+            bst_psf_colour(camera->psf, bst_optics_star_spectrum_k((double)star->b_minus_v),
+                           s->colour);
         }
         /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
          * move with the Earth, stands for the star */
-        bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
-        s->occulted = bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray),
-                                        bodies.pole);
+        bst_vec3 ray = bst_astro_light_apparent_star(&geocentric, star->icrs);
+        s->occulted = bst_astro_earth_occults(
+            eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray), bodies.pole);
         if (s->occulted) {
             s->electrons_per_s = 0.0;
         }
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
     BST_TRY(reserve_parts(ctx, field, near_count));
-    const bst_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
-                                      field->q_mid, window, margin_px,       centre,  radius};
+    const bst_scene_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
+                                            field->q_mid, window, margin_px,       centre,  radius};
     for (int i = 0, used = 0; i < near_count; i++) {
         bool there;
         if (is_self(field, field->near[i])) {
@@ -431,11 +432,11 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
 }
 
 /* Of the image of a point; NAN when it is behind the camera. */
-static bst_image_moments smear_of(const bst_field *field, const bst_source *source) {
-    bst_image_moments m = {0};
+static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_source *source) {
+    bst_scene_image_moments m = {0};
     double x[SIGMA_POINTS], y[SIGMA_POINTS];
     for (int p = 0; p < SIGMA_POINTS; p++) {
-        bst_vec3 d = bst_source_direction(source, field->sigma_time[p]);
+        bst_vec3 d = bst_scene_source_direction(source, field->sigma_time[p]);
         x[p] = y[p] = NAN;
         (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
                                  &y[p]);
@@ -462,8 +463,9 @@ static const double BENT = 0.12;
  * pixel's own width, widened along and across the way from the first to the last
  * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
  * Returns the variance before that widening. */
-static double blur(const bst_camera *camera, const bst_source *source, const bst_image_moments *m,
-                   double dx, double dy, double *along, double *across) {
+static double blur(const bst_camera *camera, const bst_scene_source *source,
+                   const bst_scene_image_moments *m, double dx, double dy, double *along,
+                   double *across) {
     double psf = bst_camera_psf_sigma_px(camera), sigma;
     if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
         psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
@@ -488,9 +490,9 @@ double bst_field_background_e(const bst_field *field, const bst_truth *header, d
 }
 
 /* What a rolling shutter sees of a source: it is exposed while the row where it is. */
-static bst_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
-                                       const bst_source *source, bst_window window, double u[2],
-                                       bst_quat *q_mid, bst_truth_item *out) {
+static bst_scene_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
+                                             const bst_scene_source *source, bst_window window,
+                                             double u[2], bst_quat *q_mid, bst_truth_item *out) {
     const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
     double duration = track->time_s[track->count - 1];
     bst_row_source_times(field->camera, &rows, track, source, u);
@@ -498,20 +500,21 @@ static bst_image_moments place_in_rows(const bst_field *field, const bst_los_tra
     const double when[3] = {u[0], middle, u[1]};
     double *const x[3] = {&out->x_start_px, &out->x_mid_px, &out->x_end_px};
     double *const y[3] = {&out->y_start_px, &out->y_mid_px, &out->y_end_px};
-    *q_mid = bst_track_attitude(track, middle * duration);
+    *q_mid = bst_los_track_attitude(track, middle * duration);
     for (int k = 0; k < 3; k++) {
-        bst_quat q = bst_track_attitude(track, when[k] * duration);
-        (void)bst_camera_project(
-            field->camera, bst_quat_rotate(q, bst_source_direction(source, when[k])), x[k], y[k]);
+        bst_quat q = bst_los_track_attitude(track, when[k] * duration);
+        (void)bst_camera_project(field->camera,
+                                 bst_quat_rotate(q, bst_scene_source_direction(source, when[k])),
+                                 x[k], y[k]);
     }
     out->delay_s = (middle - 0.5) * duration;
     out->electrons = source->electrons_per_s * duration *
-                     (bst_source_light(source, u[1]) - bst_source_light(source, u[0]));
-    return bst_image_by_light(field->camera, track, source, u[0], u[1]);
+                     (bst_scene_source_light(source, u[1]) - bst_scene_source_light(source, u[0]));
+    return bst_scene_image_by_light(field->camera, track, source, u[0], u[1]);
 }
 
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
-                          const bst_source *source, bst_window window, int binning,
+                          const bst_scene_source *source, bst_window window, int binning,
                           const bst_truth *header, bst_truth_item *out) {
     const bst_camera *camera = field->camera;
     *out = (bst_truth_item){.kind = source->kind,
@@ -536,7 +539,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             .y_chief_px = NAN,
                             .x_centroid_px = NAN,
                             .y_centroid_px = NAN};
-    bst_image_moments image, path;
+    bst_scene_image_moments image, path;
     bst_quat q_mid = field->q_mid;
     double u[2] = {0.0, 1.0}; /* of the track, while the source is exposed */
     if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
@@ -547,16 +550,16 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                                 &out->y_end_px);
         (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
                                  &out->x_mid_px, &out->y_mid_px);
-        image = source->rate ? bst_image_by_light(field->camera, track, source, 0.0, 1.0)
+        image = source->rate ? bst_scene_image_by_light(field->camera, track, source, 0.0, 1.0)
                              : smear_of(field, source);
     }
     path = image;
     out->x_chief_px = image.x_mean;
     out->y_chief_px = image.y_mean;
     if (source->shape) {
-        bst_image_add_disc(field->camera, q_mid, source, &image);
+        bst_scene_image_add_disc(field->camera, q_mid, source, &image);
     }
-    bst_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
+    bst_scene_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
     if (isfinite(image.x_mean)) {
         out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
     }
@@ -570,14 +573,14 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     double sharp = blur(camera, source, &image, out->x_end_px - out->x_start_px,
                         out->y_end_px - out->y_start_px, &along, &across);
     if (isfinite(length) && variance > 0.0) {
-        double square = bst_image_squared(sqrt(along * along + widened),
-                                          sqrt(across * across + widened), length);
+        double square = bst_optics_image_squared(sqrt(along * along + widened),
+                                                 sqrt(across * across + widened), length);
         double excess = along * along + across * across - 2.0 * sharp;
         if (excess > BENT * (sharp + widened)) {
             /* a disc's own light widens the path */
             double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
-            double exact = bst_image_squared_path(camera, track, source, u[0], u[1], &path, excess,
-                                                  sharp + widened + disc);
+            double exact = bst_scene_image_squared_path(camera, track, source, u[0], u[1], &path,
+                                                        excess, sharp + widened + disc);
             square = isfinite(exact) ? exact : square;
         }
         out->snr = out->electrons * sqrt(square / variance);

@@ -11,53 +11,53 @@
  * polynomial follows, its direction is not. What light time and aberration add in direction is
  * first of all the relative velocity over c, which changes little. Any unit of length. */
 enum { BST_PATH_NODES = 5 };
-typedef struct bst_source_path {
+typedef struct bst_scene_source_path {
     bst_vec3 place[BST_PATH_NODES]; /* object minus observer at the same instant, GCRF axes */
     bst_vec3 shift[3]; /* at start, middle and end: place + |place| shift has the apparent direction
                         */
-} bst_source_path;
+} bst_scene_source_path;
 
 /* Brightness through an exposure, where it changes (the edge of the Earth's shadow, a light curve,
  * a near pass): straight between knots. */
 enum { BST_RATE_KNOTS = 129 };
-typedef struct bst_source_rate {
+typedef struct bst_scene_source_rate {
     int count;                    /* knots, >= 2 */
     double u[BST_RATE_KNOTS];     /* time as a fraction of the exposure, from 0 to 1, ascending */
     double rate[BST_RATE_KNOTS];  /* over the mean of the exposure */
     double light[BST_RATE_KNOTS]; /* share of the exposure's light until then, from 0 to 1 */
-} bst_source_rate;
+} bst_scene_source_rate;
 
 /* A sphere that is large enough to be drawn as what it is, a disc with a terminator. Its parts are
  * shares of the light, together 1. */
-typedef struct bst_source_shape {
+typedef struct bst_scene_source_shape {
     double radius;       /* of the sphere, over its distance at mid-exposure; below 1 */
     bst_vec3 sun, earth; /* where light comes from: unit, from the sphere, GCRF */
     double diffuse;      /* sunlight, Lambert's law */
     double specular;     /* sunlight, mirror ball: a point on the disc */
     double earthshine;   /* Lambert's law, as if it all came from its middle */
     double thermal;      /* the same from all of the disc */
-} bst_source_shape;
+} bst_scene_source_shape;
 
 /* A source that may put light on the window. */
-typedef struct bst_source {
+typedef struct bst_scene_source {
     int32_t kind; /* bst_source_kind */
     uint32_t id;  /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
-    bst_vec3 apparent_mid;         /* at mid-exposure, GCRF axes, unit */
-    const bst_source_path *path;   /* NULL: at rest; owned by who made the source */
-    const bst_source_rate *rate;   /* NULL: constant; owned likewise */
-    const bst_source_shape *shape; /* NULL: a point; owned likewise */
-    double electrons_per_s;        /* detected, mean of the exposure */
-    float colour[BST_PSF_COLOURS]; /* of its light (bst_psf_colour); all 0: the Sun's */
+    bst_vec3 apparent_mid;               /* at mid-exposure, GCRF axes, unit */
+    const bst_scene_source_path *path;   /* NULL: at rest; owned by who made the source */
+    const bst_scene_source_rate *rate;   /* NULL: constant; owned likewise */
+    const bst_scene_source_shape *shape; /* NULL: a point; owned likewise */
+    double electrons_per_s;              /* detected, mean of the exposure */
+    float colour[BST_PSF_COLOURS];       /* of its light (bst_psf_colour); all 0: the Sun's */
     double v_mag;
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;
     bool occulted; /* no light */
-} bst_source;
+} bst_scene_source;
 
 /* Place at time u in [0, 1] of the exposure: the quartic through the five. For orbits of radius r
  * and angular rate w about the Earth it misses the path by 1e-3 r (w T / 2)^5: 1 um in LEO for an
  * exposure T of 20 s. */
-static inline bst_vec3 bst_source_place(const bst_source_path *p, double u) {
+static inline bst_vec3 bst_scene_source_place(const bst_scene_source_path *p, double u) {
     double a = 4.0 * u, b = a - 1.0, c = a - 2.0, d = a - 3.0, e = a - 4.0;
     const double w[BST_PATH_NODES] = {b * c * d * e / 24.0, -a * c * d * e / 6.0,
                                       a * b * d * e / 4.0, -a * b * c * e / 6.0,
@@ -70,7 +70,7 @@ static inline bst_vec3 bst_source_place(const bst_source_path *p, double u) {
 }
 
 /* The quadratic through the three shifts. */
-static inline bst_vec3 bst_source_shift(const bst_source_path *p, double u) {
+static inline bst_vec3 bst_scene_source_shift(const bst_scene_source_path *p, double u) {
     double a = 4.0 * u, c = a - 2.0, e = a - 4.0;
     bst_vec3 shift = bst_vec3_scale(p->shift[0], 0.125 * c * e);
     shift = bst_vec3_axpy(shift, -0.25 * a * e, p->shift[1]);
@@ -78,18 +78,18 @@ static inline bst_vec3 bst_source_shift(const bst_source_path *p, double u) {
 }
 
 /* Apparent direction (any length) at time u in [0, 1] of the exposure. */
-static inline bst_vec3 bst_source_direction(const bst_source *s, double u) {
+static inline bst_vec3 bst_scene_source_direction(const bst_scene_source *s, double u) {
     if (!s->path) {
         return s->apparent_mid;
     }
-    bst_vec3 place = bst_source_place(s->path, u);
-    return bst_vec3_axpy(place, bst_vec3_norm(place), bst_source_shift(s->path, u));
+    bst_vec3 place = bst_scene_source_place(s->path, u);
+    return bst_vec3_axpy(place, bst_vec3_norm(place), bst_scene_source_shift(s->path, u));
 }
 
 /* Share of the exposure's light that comes until time u in [0, 1]: what weighs the places of a
  * source in its image. */
-static inline double bst_source_light(const bst_source *s, double u) {
-    const bst_source_rate *r = s->rate;
+static inline double bst_scene_source_light(const bst_scene_source *s, double u) {
+    const bst_scene_source_rate *r = s->rate;
     if (!r) {
         return u;
     }
@@ -104,8 +104,8 @@ static inline double bst_source_light(const bst_source *s, double u) {
 }
 
 /* Rate at time u over the mean of the exposure. */
-static inline double bst_source_rate_at(const bst_source *s, double u) {
-    const bst_source_rate *r = s->rate;
+static inline double bst_scene_source_rate_at(const bst_scene_source *s, double u) {
+    const bst_scene_source_rate *r = s->rate;
     if (!r) {
         return 1.0;
     }
@@ -119,8 +119,9 @@ static inline double bst_source_rate_at(const bst_source *s, double u) {
 
 /* A path whose direction is the quadratic through three (in apparent_mid's unit), for scenes that
  * are not made of orbits. */
-static inline bst_source_path bst_source_path_through(bst_vec3 start, bst_vec3 mid, bst_vec3 end) {
-    bst_source_path path = {.place = {{0}}};
+static inline bst_scene_source_path bst_scene_source_path_through(bst_vec3 start, bst_vec3 mid,
+                                                                  bst_vec3 end) {
+    bst_scene_source_path path = {.place = {{0}}};
     bst_vec3 slope = bst_vec3_sub(end, start);
     bst_vec3 bend = bst_vec3_sub(bst_vec3_add(start, end), bst_vec3_scale(mid, 2.0));
     for (int k = 0; k < BST_PATH_NODES; k++) {
@@ -167,7 +168,7 @@ bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_window window, const bst_field_options *options, bst_truth *truth,
-                           const bst_source **sources, int *count) BST_MUST_CHECK;
+                           const bst_scene_source **sources, int *count) BST_MUST_CHECK;
 
 /* The background of the latest query as a map of expected electrons without dark current, held in
  * `field` until the next one; NULL where it is truth->background_e all over the sensor. */
@@ -178,7 +179,7 @@ double bst_field_background_e(const bst_field *field, const bst_truth *header, d
 
 /* Pixel position of a source at sample k of the track. false when behind the camera. */
 bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
-                       const bst_source *source, double *x_px, double *y_px);
+                       const bst_scene_source *source, double *x_px, double *y_px);
 
 /* Makes the truth item of a source (positions, magnitude, electrons after vignetting at its mean
  * place; SNR for a Gaussian PSF that is smeared along the source's own track, sigma from
@@ -188,7 +189,7 @@ bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int
  * at the time: start and end are where the exposure of its own row starts and ends.
  */
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
-                          const bst_source *source, bst_window window, int binning,
+                          const bst_scene_source *source, bst_window window, int binning,
                           const bst_truth *header, bst_truth_item *out);
 
 #endif

@@ -4,10 +4,12 @@
 #include "sim/world/scene/disc.h"
 #include "sim/world/scene/los_track.h"
 
-bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
-                                     const bst_source *source, double u0, double u1) {
-    bst_image_moments m = {0};
-    double total = bst_source_light(source, u1) - bst_source_light(source, u0);
+bst_scene_image_moments bst_scene_image_by_light(const bst_camera *camera,
+                                                 const bst_los_track *track,
+                                                 const bst_scene_source *source, double u0,
+                                                 double u1) {
+    bst_scene_image_moments m = {0};
+    double total = bst_scene_source_light(source, u1) - bst_scene_source_light(source, u0);
     double whole = u0 > 0.0 || u1 < 1.0 ? (total > 0.0 ? total : 1.0) : 1.0;
     double duration = track->time_s[track->count - 1];
     int sample = 0;
@@ -15,8 +17,8 @@ bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_tra
     double xx = 0.0, xy = 0.0, yy = 0.0;
     for (int n = 0; n < count; n++) {
         double u = u0 + (u1 - u0) * ((n + 0.5) / count), x = NAN, y = NAN;
-        double weight = (bst_source_light(source, u0 + (u1 - u0) * ((n + 1.0) / count)) -
-                         bst_source_light(source, u0 + (u1 - u0) * ((double)n / count))) /
+        double weight = (bst_scene_source_light(source, u0 + (u1 - u0) * ((n + 1.0) / count)) -
+                         bst_scene_source_light(source, u0 + (u1 - u0) * ((double)n / count))) /
                         whole;
         while (sample + 2 < track->count && track->time_s[sample + 1] < u * duration) {
             sample++;
@@ -25,8 +27,8 @@ bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_tra
         bst_quat q =
             bst_quat_slerp(track->q_cam_from_gcrf[sample], track->q_cam_from_gcrf[sample + 1],
                            step > 0.0 ? (u * duration - track->time_s[sample]) / step : 0.0);
-        (void)bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x,
-                                 &y);
+        (void)bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
+                                 &x, &y);
         double dx = x - m.x_mean, dy = y - m.y_mean;
         if (n == 0) { /* moments about the first place */
             m.x_mean = x;
@@ -40,12 +42,12 @@ bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_tra
         yy += weight * dy * dy;
     }
     double ex = m.xx, ey = m.xy;
-    return (bst_image_moments){m.x_mean + ex, m.y_mean + ey, xx - ex * ex, xy - ex * ey,
-                               yy - ey * ey};
+    return (bst_scene_image_moments){m.x_mean + ex, m.y_mean + ey, xx - ex * ex, xy - ex * ey,
+                                     yy - ey * ey};
 }
 
-void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,
-                        bst_image_moments *m) {
+void bst_scene_image_add_disc(const bst_camera *camera, bst_quat q_mid,
+                              const bst_scene_source *source, bst_scene_image_moments *m) {
     enum { TIMES = 24, AROUND = 48 };
     bst_disc disc;
     bst_disc_begin(source, &disc);
@@ -90,8 +92,8 @@ void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_sour
     }
 }
 
-void bst_image_centroid(const bst_camera *camera, const bst_source *source,
-                        const bst_image_moments *m, double *x_px, double *y_px) {
+void bst_scene_image_centroid(const bst_camera *camera, const bst_scene_source *source,
+                              const bst_scene_image_moments *m, double *x_px, double *y_px) {
     double shift[2] = {0.0, 0.0}, sigma = bst_camera_psf_sigma_px(camera);
     *x_px = m->x_mean;
     *y_px = m->y_mean;
@@ -130,19 +132,19 @@ static double roughness(const double *x, const double *y, int count) {
     return sum;
 }
 
-double bst_image_squared_path(const bst_camera *camera, const bst_los_track *track,
-                              const bst_source *source, double u0, double u1,
-                              const bst_image_moments *moments, double excess_px2,
-                              double variance_px2) {
+double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_track *track,
+                                    const bst_scene_source *source, double u0, double u1,
+                                    const bst_scene_image_moments *moments, double excess_px2,
+                                    double variance_px2) {
     enum { COARSE = 9, FEWEST = 20, MOST = 256 };
     const double step_px = 1.5;
     double x[MOST], y[MOST], w[MOST], total = 0.0, length = 0.0, line = 0.0;
-    double duration = track->time_s[track->count - 1], before = bst_source_light(source, u0);
+    double duration = track->time_s[track->count - 1], before = bst_scene_source_light(source, u0);
     for (int k = 0; k < COARSE; k++) { /* most jitter shows in a few places */
         double u = u0 + (u1 - u0) * ((k + 0.5) / COARSE);
-        bst_quat q = bst_track_attitude(track, u * duration);
-        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x[k],
-                                &y[k])) {
+        bst_quat q = bst_los_track_attitude(track, u * duration);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
+                                &x[k], &y[k])) {
             return NAN;
         }
     }
@@ -154,10 +156,10 @@ double bst_image_squared_path(const bst_camera *camera, const bst_los_track *tra
     int count = wanted < FEWEST ? FEWEST : wanted < MOST ? (int)wanted : MOST;
     for (int k = 0; k < count; k++) {
         double u = u0 + (u1 - u0) * ((k + 0.5) / count);
-        double after = bst_source_light(source, u0 + (u1 - u0) * ((k + 1.0) / count));
-        bst_quat q = bst_track_attitude(track, u * duration);
-        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x[k],
-                                &y[k])) {
+        double after = bst_scene_source_light(source, u0 + (u1 - u0) * ((k + 1.0) / count));
+        bst_quat q = bst_los_track_attitude(track, u * duration);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
+                                &x[k], &y[k])) {
             return NAN;
         }
         w[k] = after - before;

@@ -7,25 +7,27 @@
 
 /* Mean and covariance over the exposure of where a source's image is, px; NAN when it is behind the
  * camera. */
-typedef struct bst_image_moments {
+typedef struct bst_scene_image_moments {
     double x_mean, y_mean, xx, xy, yy;
-} bst_image_moments;
+} bst_scene_image_moments;
 
 /* Of a source whose brightness changes, weighted by its light, from time u0 to u1 of the track (0
  * to 1: all of it). */
-bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
-                                     const bst_source *source, double u0, double u1);
+bst_scene_image_moments bst_scene_image_by_light(const bst_camera *camera,
+                                                 const bst_los_track *track,
+                                                 const bst_scene_source *source, double u0,
+                                                 double u1);
 
 /* Where the centroid of the light is of a source whose chief ray has these moments: the PSF's own
  * centroid lies beside it, and where the illumination falls over the image, light is lost on one
  * side. NAN when the moments are. */
-void bst_image_centroid(const bst_camera *camera, const bst_source *source,
-                        const bst_image_moments *m, double *x_px, double *y_px);
+void bst_scene_image_centroid(const bst_camera *camera, const bst_scene_source *source,
+                              const bst_scene_image_moments *m, double *x_px, double *y_px);
 
 /* Moves and widens the moments of a point by the places of the light on the source's disc, seen
  * with attitude q_mid. */
-void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,
-                        bst_image_moments *m);
+void bst_scene_image_add_disc(const bst_camera *camera, bst_quat q_mid,
+                              const bst_scene_source *source, bst_scene_image_moments *m);
 
 /* The same of any path: that of the source from time u0 to u1 of the track (0 to 1: all of it),
  * weighted by its light, blurred by a circular Gaussian of this variance (px^2): the double
@@ -34,9 +36,9 @@ void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_sour
  * not meet themselves: 1 / (2 sqrt(pi) sigma) times the integral of the squared light per px. NAN
  * when a place is behind the camera, and when jitter faster than the places makes more than half of
  * `excess_px2`, what the moments have beyond a straight path: that is as good as Gaussian. */
-double bst_image_squared_path(const bst_camera *camera, const bst_los_track *track,
-                              const bst_source *source, double u0, double u1,
-                              const bst_image_moments *moments, double excess_px2,
-                              double variance_px2);
+double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_track *track,
+                                    const bst_scene_source *source, double u0, double u1,
+                                    const bst_scene_image_moments *moments, double excess_px2,
+                                    double variance_px2);
 
 #endif

@@ -7,14 +7,14 @@
 enum { TIMES = 16 };
 
 /* Whether the object's path over the image comes near the window; disc: its angular radius, rad. */
-static bool path_touches(const bst_object_query *q, const bst_source *s, double disc) {
+static bool path_touches(const bst_scene_object_query *q, const bst_scene_source *s, double disc) {
     enum { PIECES = 8 };
     double disc_px = tan(disc) / bst_camera_scale_rad(q->camera) * bst_camera_stretch(q->camera);
     bst_vec3 at[PIECES + 1];
     double x[PIECES + 1], y[PIECES + 1], bend = 0.0;
     bool front[PIECES + 1];
     for (int k = 0; k <= PIECES; k++) {
-        at[k] = bst_source_direction(s, (double)k / PIECES);
+        at[k] = bst_scene_source_direction(s, (double)k / PIECES);
         x[k] = y[k] = 0.0;
         front[k] = bst_camera_project(q->camera, bst_quat_rotate(q->q_mid, at[k]), &x[k], &y[k]);
     }
@@ -41,7 +41,7 @@ static bool path_touches(const bst_object_query *q, const bst_source *s, double 
     return false;
 }
 
-bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_source_rate *out,
+bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_scene_source_rate *out,
                     double *mean) {
     enum { FIRST = 16 };
     double middle[BST_RATE_KNOTS], low = INFINITY, high = 0.0;
@@ -101,24 +101,24 @@ bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_source_r
 
 /* An object's brightness through an exposure, for bst_field_rate. */
 typedef struct course {
-    const bst_object_query *query;
+    const bst_scene_object_query *query;
     int object;
-    const bst_source_path *path;
-    const bst_path_light *light;
+    const bst_scene_source_path *path;
+    const bst_scene_path_light *light;
 } course;
 
 static double course_at(void *user, double u) {
     const course *c = user;
-    bst_sight sight;
-    bst_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s, c->query->end_s,
-                   u, &sight);
-    return bst_glow_electrons_per_s(c->query->camera, &sight.glow, NULL);
+    bst_world_sight sight;
+    bst_scene_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
+                         c->query->end_s, u, &sight);
+    return bst_scene_glow_electrons_per_s(c->query->camera, &sight.glow, NULL);
 }
 
 /* Adds the light of one instant to the parts of a shape, in electrons. */
-static void add_parts(const bst_camera *camera, const bst_glow *glow, double weight,
-                      bst_source_shape *shape) {
-    double reflected, all = bst_glow_electrons_per_s(camera, glow, &reflected);
+static void add_parts(const bst_camera *camera, const bst_scene_glow *glow, double weight,
+                      bst_scene_source_shape *shape) {
+    double reflected, all = bst_scene_glow_electrons_per_s(camera, glow, &reflected);
     double direct = 1.0 - glow->earth_share - glow->specular_share;
     shape->diffuse += weight * reflected * direct;
     shape->specular += weight * reflected * glow->specular_share;
@@ -127,22 +127,23 @@ static void add_parts(const bst_camera *camera, const bst_glow *glow, double wei
 }
 
 /* What is seen at instant k of TIMES, or at mid-exposure where brightness is constant. */
-static bst_sight sight_at(const course *c, const bst_sight *mid, const bst_source *source, int k) {
-    bst_sight sight = *mid;
+static bst_world_sight sight_at(const course *c, const bst_world_sight *mid,
+                                const bst_scene_source *source, int k) {
+    bst_world_sight sight = *mid;
     if (source->rate) {
-        bst_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
-                       c->query->end_s, (k + 0.5) / TIMES, &sight);
+        bst_scene_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
+                             c->query->end_s, (k + 0.5) / TIMES, &sight);
     }
     return sight;
 }
 
 /* Sunlight and emission, by their shares of the exposure's light. */
-static void make_colour(const course *c, const bst_sight *mid, bst_source *source) {
+static void make_colour(const course *c, const bst_world_sight *mid, bst_scene_source *source) {
     const bst_camera *camera = c->query->camera;
     double sum[BST_PSF_COLOURS] = {0}, total = 0.0;
     for (int k = 0; k < (source->rate ? TIMES : 1); k++) {
-        bst_sight sight = sight_at(c, mid, source, k);
-        double reflected, all = bst_glow_electrons_per_s(camera, &sight.glow, &reflected);
+        bst_world_sight sight = sight_at(c, mid, source, k);
+        double reflected, all = bst_scene_glow_electrons_per_s(camera, &sight.glow, &reflected);
         float warm[BST_PSF_COLOURS];
         bst_psf_colour(camera->psf, sight.glow.temperature_k, warm);
         total += all;
@@ -157,18 +158,18 @@ static void make_colour(const course *c, const bst_sight *mid, bst_source *sourc
 
 /* The sphere as a disc, where it spans more than a fifth of a pixel. Its parts are those of the
  * whole exposure. */
-static bool make_shape(const course *c, const bst_sight *mid, const bst_source *source,
-                       bst_source_shape *shape) {
+static bool make_shape(const course *c, const bst_world_sight *mid, const bst_scene_source *source,
+                       bst_scene_source_shape *shape) {
     const bst_camera *camera = c->query->camera;
-    const bst_object_info *info = bst_view_object(c->query->view, (int)source->id);
+    const bst_world_object_info *info = bst_scene_view_object(c->query->view, (int)source->id);
     double radius = sqrt(info->area_m2 / BST_PI) / mid->range_m;
     double pixels = 2.0 * radius / bst_camera_scale_rad(camera) * bst_camera_stretch(camera);
     if (!mid->glow.resolved || !(radius < 1.0) || !(pixels > 0.2)) {
         return false;
     }
-    *shape = (bst_source_shape){.radius = radius};
+    *shape = (bst_scene_source_shape){.radius = radius};
     for (int k = 0; k < (source->rate ? TIMES : 1); k++) {
-        bst_sight sight = sight_at(c, mid, source, k);
+        bst_world_sight sight = sight_at(c, mid, source, k);
         add_parts(camera, &sight.glow, 1.0, shape);
     }
     double all = shape->diffuse + shape->specular + shape->earthshine + shape->thermal;
@@ -186,13 +187,13 @@ static bool make_shape(const course *c, const bst_sight *mid, const bst_source *
     return true;
 }
 
-bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *q, int object,
-                            bst_object_parts *parts, bst_source *out, bool *there) {
-    bst_sight mid;
-    bst_path_light light;
+bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int object,
+                            bst_scene_object_parts *parts, bst_scene_source *out, bool *there) {
+    bst_world_sight mid;
+    bst_scene_path_light light;
     *there = false;
-    bst_status status = bst_view_path(ctx, q->view, q->observer, object, q->start_s, q->end_s,
-                                      &parts->path, &light, &mid);
+    bst_status status = bst_world_view_path(ctx, q->view, q->observer, object, q->start_s, q->end_s,
+                                            &parts->path, &light, &mid);
     if (status == BST_ERR_NUMERIC) {
         return BST_OK;
     }
@@ -200,17 +201,17 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *q, int object,
     if (!(mid.range_m > 0.0)) {
         return BST_OK;
     }
-    *out = (bst_source){.kind = BST_SOURCE_OBJECT,
-                        .id = (uint32_t)object,
-                        .apparent_mid = mid.apparent,
-                        .path = &parts->path,
-                        .v_mag = mid.v_mag,
-                        .sunlit_fraction = mid.sunlit_fraction,
-                        .phase_rad = mid.phase_rad,
-                        .range_m = mid.range_m,
-                        .occulted = mid.occulted};
+    *out = (bst_scene_source){.kind = BST_SOURCE_OBJECT,
+                              .id = (uint32_t)object,
+                              .apparent_mid = mid.apparent,
+                              .path = &parts->path,
+                              .v_mag = mid.v_mag,
+                              .sunlit_fraction = mid.sunlit_fraction,
+                              .phase_rad = mid.phase_rad,
+                              .range_m = mid.range_m,
+                              .occulted = mid.occulted};
     bst_vec3_to_radec(mid.geometric, &out->ra_rad, &out->dec_rad);
-    double radius = sqrt(bst_view_object(q->view, object)->area_m2 / BST_PI) / mid.range_m;
+    double radius = sqrt(bst_scene_view_object(q->view, object)->area_m2 / BST_PI) / mid.range_m;
     *there = path_touches(q, out, mid.glow.resolved && radius < 1.0 ? asin(radius) : 0.0);
     if (!*there) {
         return BST_OK;
@@ -221,7 +222,7 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *q, int object,
         out->rate = &parts->rate;
     } else {
         out->electrons_per_s =
-            mid.occulted ? 0.0 : bst_glow_electrons_per_s(q->camera, &mid.glow, NULL);
+            mid.occulted ? 0.0 : bst_scene_glow_electrons_per_s(q->camera, &mid.glow, NULL);
     }
     if (q->camera->psf && bst_psf_spectra(q->camera->psf) > 1) {
         make_colour(&c, &mid, out);

@@ -1,7 +1,7 @@
 #include "sim/world/world.h"
 
-double bst_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad, double range_m,
-                                double sun_distance_m) {
+double bst_world_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad,
+                                      double range_m, double sun_distance_m) {
     double phi = fabs(phase_rad);
     double phase = (BST_PI - phi) * cos(phi) + sin(phi);
     double au = sun_distance_m / BST_AU_M;

@@ -22,7 +22,7 @@ static bst_quat between(const bst_los_history *history, int64_t number, int64_t 
     return bst_quat_slerp(a->q_cam_from_gcrf, b->q_cam_from_gcrf, s);
 }
 
-static bst_status reserve(bst_ctx *ctx, bst_track_store *store, int count) {
+static bst_status reserve(bst_ctx *ctx, bst_los_track_store *store, int count) {
     if (count <= store->capacity) {
         return BST_OK;
     }
@@ -37,9 +37,9 @@ static bst_status reserve(bst_ctx *ctx, bst_track_store *store, int count) {
     return BST_OK;
 }
 
-bst_status bst_track_cut(bst_ctx *ctx, bst_track_store *store, const bst_los_history *history,
-                         int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
-                         bst_los_track *out) {
+bst_status bst_los_track_cut(bst_ctx *ctx, bst_los_track_store *store,
+                             const bst_los_history *history, int64_t start_tick, int64_t end_tick,
+                             int64_t tick_rate_hz, bst_los_track *out) {
     int64_t newest = history->written - 1;
     int64_t oldest =
         history->written > history->capacity ? history->written - history->capacity : 0;
@@ -86,7 +86,7 @@ bst_status bst_track_cut(bst_ctx *ctx, bst_track_store *store, const bst_los_his
     return BST_OK;
 }
 
-bst_quat bst_track_attitude(const bst_los_track *track, double time_s) {
+bst_quat bst_los_track_attitude(const bst_los_track *track, double time_s) {
     int k = 0, high = track->count - 2; /* the first stretch that ends at time_s or later */
     while (k < high) {
         int middle = (k + high) / 2;
@@ -101,12 +101,12 @@ bst_quat bst_track_attitude(const bst_los_track *track, double time_s) {
     return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], s);
 }
 
-bst_status bst_track_part(bst_ctx *ctx, bst_track_store *store, const bst_los_track *track,
-                          double from_s, double to_s, bst_los_track *out) {
+bst_status bst_los_track_part(bst_ctx *ctx, bst_los_track_store *store, const bst_los_track *track,
+                              double from_s, double to_s, bst_los_track *out) {
     BST_TRY(reserve(ctx, store, track->count + 2));
     int count = 0;
     store->time_s[count] = 0.0;
-    store->q[count++] = bst_track_attitude(track, from_s);
+    store->q[count++] = bst_los_track_attitude(track, from_s);
     for (int k = 0; k < track->count; k++) {
         if (track->time_s[k] > from_s && track->time_s[k] < to_s) {
             store->time_s[count] = track->time_s[k] - from_s;
@@ -114,16 +114,17 @@ bst_status bst_track_part(bst_ctx *ctx, bst_track_store *store, const bst_los_tr
         }
     }
     store->time_s[count] = to_s - from_s;
-    store->q[count] = bst_track_attitude(track, to_s);
+    store->q[count] = bst_los_track_attitude(track, to_s);
     *out = (bst_los_track){count + 1, store->time_s, store->q};
     return BST_OK;
 }
 
-double bst_track_moved_px(const bst_camera *camera, bst_quat from, bst_quat to) {
-    return bst_track_turned_px(camera, bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from))));
+double bst_los_track_moved_px(const bst_camera *camera, bst_quat from, bst_quat to) {
+    return bst_los_track_turned_px(camera,
+                                   bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from))));
 }
 
-double bst_track_turned_px(const bst_camera *camera, bst_vec3 d) {
+double bst_los_track_turned_px(const bst_camera *camera, bst_vec3 d) {
     double width = (double)camera->width_px, height = (double)camera->height_px;
     double half_px = 0.5 * sqrt(width * width + height * height);
     double scale = bst_camera_scale_rad(camera), stretch = bst_camera_stretch(camera);
@@ -133,7 +134,7 @@ double bst_track_turned_px(const bst_camera *camera, bst_vec3 d) {
     return sqrt(d.x * d.x + d.y * d.y) / scale * tilt + fabs(d.z) * half_px;
 }
 
-void bst_track_store_free(bst_track_store *store) {
+void bst_los_track_store_free(bst_los_track_store *store) {
     free(store->time_s);
     free(store->q);
 }

@@ -9,10 +9,10 @@ double bst_row_start_s(const bst_row_times *rows, const bst_los_track *track, do
 }
 
 static bool row_of(const bst_camera *camera, const bst_row_times *rows, const bst_los_track *track,
-                   const bst_source *source, double time_s, double *y) {
+                   const bst_scene_source *source, double time_s, double *y) {
     double x, u = time_s / track->time_s[track->count - 1];
-    bst_vec3 v =
-        bst_quat_rotate(bst_track_attitude(track, time_s), bst_source_direction(source, u));
+    bst_vec3 v = bst_quat_rotate(bst_los_track_attitude(track, time_s),
+                                 bst_scene_source_direction(source, u));
     if (!bst_camera_project(camera, v, &x, y)) {
         return false;
     }
@@ -21,7 +21,7 @@ static bool row_of(const bst_camera *camera, const bst_row_times *rows, const bs
 }
 
 void bst_row_source_times(const bst_camera *camera, const bst_row_times *rows,
-                          const bst_los_track *track, const bst_source *source, double u[2]) {
+                          const bst_los_track *track, const bst_scene_source *source, double u[2]) {
     enum { MOST_STEPS = 60 };
     double duration = track->time_s[track->count - 1], spare = duration - rows->exposure_s;
     for (int end = 0; end < 2; end++) {
@@ -43,10 +43,11 @@ void bst_row_source_times(const bst_camera *camera, const bst_row_times *rows,
     u[1] = fmax(u[0], u[1]);
 }
 
-static void rate_during(const bst_source *source, double u0, double u1, bst_source_part *part,
-                        bst_source *out) {
-    const bst_source_rate *r = source->rate;
-    double before = bst_source_light(source, u0), share = bst_source_light(source, u1) - before;
+static void rate_during(const bst_scene_source *source, double u0, double u1,
+                        bst_scene_source_part *part, bst_scene_source *out) {
+    const bst_scene_source_rate *r = source->rate;
+    double before = bst_scene_source_light(source, u0),
+           share = bst_scene_source_light(source, u1) - before;
     out->electrons_per_s *= share / (u1 - u0);
     out->rate = &part->rate;
     if (!(share > 0.0)) {
@@ -65,25 +66,25 @@ static void rate_during(const bst_source *source, double u0, double u1, bst_sour
     part->rate.count = count;
     for (int k = 0; k < count; k++) {
         part->rate.u[k] = (knots[k] - u0) / (u1 - u0);
-        part->rate.rate[k] = bst_source_rate_at(source, knots[k]) * (u1 - u0) / share;
-        part->rate.light[k] = (bst_source_light(source, knots[k]) - before) / share;
+        part->rate.rate[k] = bst_scene_source_rate_at(source, knots[k]) * (u1 - u0) / share;
+        part->rate.light[k] = (bst_scene_source_light(source, knots[k]) - before) / share;
     }
     part->rate.u[count - 1] = part->rate.light[count - 1] = 1.0;
 }
 
-void bst_source_during(const bst_source *source, double u0, double u1, bst_source_part *part,
-                       bst_source *out) {
+void bst_scene_source_during(const bst_scene_source *source, double u0, double u1,
+                             bst_scene_source_part *part, bst_scene_source *out) {
     *out = *source;
     double span = u1 - u0;
     if (source->path) {
         for (int k = 0; k < BST_PATH_NODES; k++) {
             part->path.place[k] =
-                bst_source_place(source->path, u0 + span * k / (BST_PATH_NODES - 1.0));
+                bst_scene_source_place(source->path, u0 + span * k / (BST_PATH_NODES - 1.0));
         }
         for (int k = 0; k < 3; k++) {
-            part->path.shift[k] = bst_source_shift(source->path, u0 + 0.5 * span * k);
+            part->path.shift[k] = bst_scene_source_shift(source->path, u0 + 0.5 * span * k);
         }
-        out->apparent_mid = bst_vec3_unit(bst_source_direction(source, u0 + 0.5 * span));
+        out->apparent_mid = bst_vec3_unit(bst_scene_source_direction(source, u0 + 0.5 * span));
         out->path = &part->path;
     }
     if (source->rate) {

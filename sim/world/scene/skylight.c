@@ -31,7 +31,7 @@ struct bst_skylight {
 /* One exposure on its way to a map. */
 typedef struct painter {
     const bst_skylight *b;
-    const bst_surroundings *around;
+    const bst_scene_surroundings *around;
     bst_discs discs;
     bst_mat3 gcrf_from_cam;
     bst_vec3 sun;
@@ -42,7 +42,7 @@ typedef struct painter {
 
 bool bst_skylight_varies(const bst_camera *camera) {
     const bst_background_config *c = &camera->background;
-    const bst_vignetting *v = &camera->optics.vignetting;
+    const bst_optics_vignetting *v = &camera->optics.vignetting;
     bool added = c->stray_e_per_s != 0.0;
     for (int i = 0; i < 2; i++) {
         added = added || c->gradient_e_per_s[i] != 0.0;
@@ -280,7 +280,7 @@ static bst_status paint_pixels(bst_ctx *ctx, const painter *p, bst_skylight *b, 
 static void prepare(painter *p) {
     const bst_camera *camera = p->b->camera;
     const bst_background_config *c = &camera->background;
-    const bst_surroundings *a = p->around;
+    const bst_scene_surroundings *a = p->around;
     double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
     bst_quat mid = a->q[BST_DISC_PARTS / 2];
     p->gcrf_from_cam = bst_quat_to_mat3(bst_quat_conj(mid));
@@ -295,7 +295,7 @@ static void prepare(painter *p) {
          * light-gathering area and transmission of the optics, which the PST holds */
         double gathered = 0.25 * BST_PI * camera->aperture_m * camera->aperture_m *
                           (1.0 - camera->obscuration) * camera->throughput;
-        double pitch = bst_pst_pixel_m(camera->pst);
+        double pitch = bst_scene_pst_pixel_m(camera->pst);
         double irradiance = bst_stray_irradiance(camera->pst, c, a->eye_m, &a->bodies,
                                                  to_gcrf(p, (bst_vec3){0, 0, 1}));
         p->even_e += gathered > 0.0 ? irradiance * pitch * pitch *
@@ -304,7 +304,7 @@ static void prepare(painter *p) {
     }
 }
 
-bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_surroundings *around,
+bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surroundings *around,
                              bst_window window, const bst_skylight_map **out) {
     painter p = {.b = b, .around = around};
     prepare(&p);

@@ -42,7 +42,8 @@ void bst_skylight_set_camera(bst_skylight *skylight, const bst_camera *camera);
 /* Makes the map of one exposure for a window. The nodes are 32 px apart, closer where that is more
  * than 0.3 degrees, and 1 px where the edge of a disc, the terminator or the edge of the vignetting
  * is anywhere on the sensor. *out is held in `skylight` until the next call. BST_ERR_MEMORY. */
-bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *skylight, const bst_surroundings *around,
-                             bst_window window, const bst_skylight_map **out) BST_MUST_CHECK;
+bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *skylight,
+                             const bst_scene_surroundings *around, bst_window window,
+                             const bst_skylight_map **out) BST_MUST_CHECK;
 
 #endif

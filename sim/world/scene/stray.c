@@ -6,13 +6,14 @@
 #include "sim/optics/band.h"
 #include "sim/optics/curve_file.h"
 
-struct bst_pst {
+struct bst_scene_pst {
     int count;
     double pixel_m;
-    bst_pst_point points[];
+    bst_optics_pst_point points[];
 };
 
-static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst_curve *curve) {
+static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir,
+                       bst_bench_error_curve *curve) {
     static const char *const angle[] = {"angle_deg", NULL};
     static const char *const value[] = {"pst", NULL};
     const bst_curve_format format = {
@@ -24,7 +25,7 @@ static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst
     return status == BST_OK ? status : bst_fail_prefix(ctx, BST_ERR_CONFIG, "pst_file");
 }
 
-static bst_status check(bst_ctx *ctx, const bst_pst *pst) {
+static bst_status check(bst_ctx *ctx, const bst_scene_pst *pst) {
     if (!(pst->pixel_m > 0.0)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "pixel_um: stray light by a table needs the pixel pitch; give it here or "
@@ -40,10 +41,10 @@ static bst_status check(bst_ctx *ctx, const bst_pst *pst) {
     return BST_OK;
 }
 
-bst_status bst_pst_create(bst_ctx *ctx, const bst_background_config *config, double optics_pixel_um,
-                          const char *base_dir, bst_pst **out) {
+bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *config,
+                                double optics_pixel_um, const char *base_dir, bst_scene_pst **out) {
     *out = NULL;
-    bst_curve curve = {0};
+    bst_bench_error_curve curve = {0};
     if (*config->pst_file && config->pst.count > 0) {
         return bst_fail(ctx, BST_ERR_CONFIG, "pst: give either the list or pst_file, not both");
     }
@@ -56,16 +57,17 @@ bst_status bst_pst_create(bst_ctx *ctx, const bst_background_config *config, dou
         bst_curve_free(&curve);
         return status;
     }
-    bst_pst *pst = malloc(sizeof *pst + (size_t)count * sizeof *pst->points);
+    bst_scene_pst *pst = malloc(sizeof *pst + (size_t)count * sizeof *pst->points);
     if (!pst) {
         bst_curve_free(&curve);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d points of transmittance", count);
     }
-    const bst_pst_point *given = config->pst.items;
+    const bst_optics_pst_point *given = config->pst.items;
     pst->count = count;
     pst->pixel_m = 1e-6 * (config->pixel_um > 0.0 ? config->pixel_um : optics_pixel_um);
     for (int i = 0; i < count; i++) {
-        pst->points[i] = *config->pst_file ? (bst_pst_point){curve.x[i], curve.y[i]} : given[i];
+        pst->points[i] =
+            *config->pst_file ? (bst_optics_pst_point){curve.x[i], curve.y[i]} : given[i];
     }
     bst_curve_free(&curve);
     status = check(ctx, pst);
@@ -77,13 +79,13 @@ bst_status bst_pst_create(bst_ctx *ctx, const bst_background_config *config, dou
     return BST_OK;
 }
 
-void bst_pst_free(bst_pst *pst) {
+void bst_scene_pst_free(bst_scene_pst *pst) {
     free(pst);
 }
 
-double bst_pst_at(const bst_pst *pst, double angle_rad) {
+double bst_scene_pst_at(const bst_scene_pst *pst, double angle_rad) {
     double angle = angle_rad / BST_DEG_RAD;
-    const bst_pst_point *p = pst->points;
+    const bst_optics_pst_point *p = pst->points;
     if (angle <= p[0].angle_deg || pst->count == 1) {
         return p[0].pst;
     }
@@ -98,28 +100,28 @@ double bst_pst_at(const bst_pst *pst, double angle_rad) {
     return (1.0 - s) * p[i].pst + s * p[i + 1].pst;
 }
 
-double bst_pst_pixel_m(const bst_pst *pst) {
+double bst_scene_pst_pixel_m(const bst_scene_pst *pst) {
     return pst->pixel_m;
 }
 
-double bst_moon_v_mag(bst_vec3 moon_from_eye_m, bst_vec3 sun_from_moon_m) {
+double bst_scene_moon_v_mag(bst_vec3 moon_from_eye_m, bst_vec3 sun_from_moon_m) {
     double range = bst_vec3_norm(moon_from_eye_m), sun = bst_vec3_norm(sun_from_moon_m);
     double a = bst_vec3_angle(bst_vec3_scale(moon_from_eye_m, -1.0), sun_from_moon_m) / BST_DEG_RAD;
     return -12.73 + 0.026 * a + 4e-9 * a * a * a * a +
            5.0 * log10(range / 3.844e8 * (sun / BST_AU_M));
 }
 
-double bst_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m, bst_vec3 pole) {
+double bst_scene_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m, bst_vec3 pole) {
     /* a body of the Sun's size in the same direction and as large in the sky */
     bst_vec3 from_eye = bst_vec3_sub(body_m, eye_m);
-    return bst_sun_fraction(eye_m, bst_vec3_axpy(eye_m, BST_SUN_RADIUS_M / radius_m, from_eye),
-                            pole);
+    return bst_astro_sun_fraction(
+        eye_m, bst_vec3_axpy(eye_m, BST_SUN_RADIUS_M / radius_m, from_eye), pole);
 }
 
 /* Integral over the visible part of a sunlit Lambertian sphere, midpoints of cells that are equal
  * in solid angle. */
-static double earth_irradiance(const bst_pst *pst, double albedo, bst_vec3 eye_m, bst_vec3 sun_m,
-                               bst_vec3 boresight) {
+static double earth_irradiance(const bst_scene_pst *pst, double albedo, bst_vec3 eye_m,
+                               bst_vec3 sun_m, bst_vec3 boresight) {
     enum { RINGS = 16, SPOKES = 32 };
     double distance = bst_vec3_norm(eye_m);
     if (distance <= BST_EARTH_RADIUS_M) {
@@ -142,7 +144,7 @@ static double earth_irradiance(const bst_pst *pst, double albedo, bst_vec3 eye_m
                                        s * sin(phi), e2);
             double lit = bst_vec3_dot(bst_vec3_axpy(eye_m, way, d), sun) / BST_EARTH_RADIUS_M;
             if (lit > 0.0) {
-                sum += lit * bst_pst_at(pst, bst_vec3_angle(d, boresight));
+                sum += lit * bst_scene_pst_at(pst, bst_vec3_angle(d, boresight));
             }
         }
     }
@@ -151,20 +153,20 @@ static double earth_irradiance(const bst_pst *pst, double albedo, bst_vec3 eye_m
     return radiance * sum * 2.0 * BST_PI * cap / (RINGS * SPOKES);
 }
 
-double bst_stray_irradiance(const bst_pst *pst, const bst_background_config *config, bst_vec3 eye_m,
-                            const bst_bodies *bodies, bst_vec3 boresight) {
+double bst_stray_irradiance(const bst_scene_pst *pst, const bst_background_config *config,
+                            bst_vec3 eye_m, const bst_bodies *bodies, bst_vec3 boresight) {
     double sum = 0.0;
     bst_vec3 sun = bst_vec3_sub(bodies->sun_m, eye_m), moon = bst_vec3_sub(bodies->moon_m, eye_m);
     if (config->sun) {
         double au = bst_vec3_norm(sun) / BST_AU_M;
-        sum += bst_sun_fraction(eye_m, bodies->sun_m, bodies->pole) *
+        sum += bst_astro_sun_fraction(eye_m, bodies->sun_m, bodies->pole) *
                pow(10.0, -0.4 * BST_SUN_V_MAG) / (au * au) *
-               bst_pst_at(pst, bst_vec3_angle(sun, boresight));
+               bst_scene_pst_at(pst, bst_vec3_angle(sun, boresight));
     }
     if (config->moon) {
-        double v = bst_moon_v_mag(moon, bst_vec3_sub(bodies->sun_m, bodies->moon_m));
-        sum += bst_disc_fraction(eye_m, bodies->moon_m, BST_MOON_RADIUS_M, bodies->pole) *
-               pow(10.0, -0.4 * v) * bst_pst_at(pst, bst_vec3_angle(moon, boresight));
+        double v = bst_scene_moon_v_mag(moon, bst_vec3_sub(bodies->sun_m, bodies->moon_m));
+        sum += bst_scene_disc_fraction(eye_m, bodies->moon_m, BST_MOON_RADIUS_M, bodies->pole) *
+               pow(10.0, -0.4 * v) * bst_scene_pst_at(pst, bst_vec3_angle(moon, boresight));
     }
     if (config->earth) {
         sum += earth_irradiance(pst, config->earth_albedo, eye_m, bodies->sun_m, boresight);

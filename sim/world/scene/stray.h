@@ -10,34 +10,35 @@
 #define BST_MOON_RADIUS_M 1737400.0 /* IAU mean radius */
 
 /* Point source transmittance by angle; immutable. */
-typedef struct bst_pst bst_pst;
+typedef struct bst_scene_pst bst_scene_pst;
 
 /* *out is NULL where the block has no table. `base_dir` is the folder that relative paths start
  * from. BST_ERR_CONFIG with the key below `background`, when the angles do not ascend, both tables
  * are given, or there is no pixel pitch (pixel_um, the optics' one). */
-bst_status bst_pst_create(bst_ctx *ctx, const bst_background_config *config, double optics_pixel_um,
-                          const char *base_dir, bst_pst **out) BST_MUST_CHECK;
-void bst_pst_free(bst_pst *pst);
+bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *config,
+                                double optics_pixel_um, const char *base_dir,
+                                bst_scene_pst **out) BST_MUST_CHECK;
+void bst_scene_pst_free(bst_scene_pst *pst);
 
 /* Irradiance on the detector over that at the entrance (normal to the light's direction), of a
  * source angle_rad from the boresight: log-linear between the table's points (linear next to a
  * zero), its first and last value beyond. */
-double bst_pst_at(const bst_pst *pst, double angle_rad);
-double bst_pst_pixel_m(const bst_pst *pst);
+double bst_scene_pst_at(const bst_scene_pst *pst, double angle_rad);
+double bst_scene_pst_pixel_m(const bst_scene_pst *pst);
 
 /* V magnitude of the Moon: -12.73 + 0.026 |a| + 4e-9 a^4, a the phase angle (Sun - Moon - observer)
  * in degrees, at its mean distance of 384400 km and 1 au from the Sun (Krisciunas and Schaefer,
  * PASP 103, 1033 (1991), after Allen), times the inverse squares of both distances. */
-double bst_moon_v_mag(bst_vec3 moon_from_eye_m, bst_vec3 sun_from_moon_m);
+double bst_scene_moon_v_mag(bst_vec3 moon_from_eye_m, bst_vec3 sun_from_moon_m);
 
 /* Fraction of a body's disc (radius_m, at body_m from the Earth's centre) that a point at eye_m
- * sees past the Earth, as bst_sun_fraction. */
-double bst_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m, bst_vec3 pole);
+ * sees past the Earth, as bst_astro_sun_fraction. */
+double bst_scene_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m, bst_vec3 pole);
 
 /* Irradiance of the Sun, the Moon and the Earth at a camera's entrance, weighted with the PST, in
  * units of one star of V = 0; the Earth as a Lambertian sphere of `albedo`. Uniform over the
  * detector. boresight: unit, GCRF. */
-double bst_stray_irradiance(const bst_pst *pst, const bst_background_config *config, bst_vec3 eye_m,
-                            const bst_bodies *bodies, bst_vec3 boresight);
+double bst_stray_irradiance(const bst_scene_pst *pst, const bst_background_config *config,
+                            bst_vec3 eye_m, const bst_bodies *bodies, bst_vec3 boresight);
 
 #endif

@@ -29,7 +29,7 @@ static int by_index(const void *a, const void *b) {
     return (p > q) - (p < q);
 }
 
-static bst_status pick_sources(bst_ctx *ctx, bst_truth_list *list, const bst_source *sources,
+static bst_status pick_sources(bst_ctx *ctx, bst_truth_list *list, const bst_scene_source *sources,
                                int count, int capacity) {
     if (count > list->capacity) {
         pick *more = realloc(list->picks, 2 * (size_t)count * sizeof *more);

@@ -20,7 +20,7 @@ typedef struct bst_truth_request {
     const bst_field *field; /* after its query */
     const bst_camera *camera;
     const bst_los_track *track;
-    const bst_source *sources;
+    const bst_scene_source *sources;
     int count;
     bst_window window;
     int binning;

@@ -10,8 +10,8 @@ typedef struct eye {
     bool valid;
     int observer;
     double seconds;
-    bst_state state;
-    bst_sky sky;
+    bst_world_state state;
+    bst_sky_rotation sky;
 } eye;
 
 /* Velocities of one observer at six whole seconds about one, by a quintic. */
@@ -27,7 +27,7 @@ typedef struct pace {
  * less. */
 static const double SMOOTH_MPS = 1e-7;
 
-struct bst_view {
+struct bst_world_view {
     const bst_world *world;
     bst_sky_clock *clock;
     pace pace;
@@ -37,9 +37,9 @@ struct bst_view {
 /* Where a body comes from in a solution: both ends of a line of sight take the same way. */
 typedef enum from { FROM_EPHEMERIS, FROM_ORBIT } from;
 
-bst_status bst_view_create(bst_ctx *ctx, const bst_world *world, bst_view **out) {
+bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world_view **out) {
     *out = NULL;
-    bst_view *view = calloc(1, sizeof *view);
+    bst_world_view *view = calloc(1, sizeof *view);
     if (!view) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of the world");
     }
@@ -53,29 +53,29 @@ bst_status bst_view_create(bst_ctx *ctx, const bst_world *world, bst_view **out)
     return BST_OK;
 }
 
-void bst_view_free(bst_view *view) {
+void bst_world_view_free(bst_world_view *view) {
     if (view) {
         bst_sky_clock_free(view->clock);
         free(view);
     }
 }
 
-static const bst_orbit *orbit_of(const bst_world *world, int body) {
+static const bst_world_orbit *orbit_of(const bst_world *world, int body) {
     return body < world->object_count ? &world->objects[body].orbit
                                       : &world->observers[body - world->object_count].orbit;
 }
 
 /* Position, and velocity: the derivative, or the orbit's own (see state_of). */
-static bst_status place_of(bst_ctx *ctx, bst_view *view, int body, double seconds, from source,
-                           bst_vec3 *position_m, bst_vec3 *velocity_mps) {
+static bst_status place_of(bst_ctx *ctx, bst_world_view *view, int body, double seconds,
+                           from source, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const bst_world *world = view->world;
     if (source == FROM_EPHEMERIS &&
         bst_ephemeris_at(world->ephemeris, body, seconds, position_m, velocity_mps)) {
         return BST_OK;
     }
-    bst_state state;
-    BST_TRY(bst_orbit_state(ctx, orbit_of(world, body), view->clock, world->epoch, seconds, true,
-                            &state));
+    bst_world_state state;
+    BST_TRY(bst_world_orbit_state(ctx, orbit_of(world, body), view->clock, world->epoch, seconds,
+                                  true, &state));
     *position_m = state.position_m;
     *velocity_mps = state.velocity_mps;
     return BST_OK;
@@ -85,11 +85,11 @@ static bst_status place_of(bst_ctx *ctx, bst_view *view, int body, double second
  * derivative of its position by 0.1 m/s in low orbits, by metres per second at the perigee of
  * transfer orbits.
  */
-static bst_status state_of(bst_ctx *ctx, bst_view *view, int body, double seconds, from source,
-                           bst_state *out) {
+static bst_status state_of(bst_ctx *ctx, bst_world_view *view, int body, double seconds,
+                           from source, bst_world_state *out) {
     const bst_world *world = view->world;
-    BST_TRY(
-        bst_orbit_state(ctx, orbit_of(world, body), view->clock, world->epoch, seconds, true, out));
+    BST_TRY(bst_world_orbit_state(ctx, orbit_of(world, body), view->clock, world->epoch, seconds,
+                                  true, out));
     bst_vec3 derivative;
     if (source == FROM_EPHEMERIS) {
         (void)bst_ephemeris_at(world->ephemeris, body, seconds, &out->position_m, &derivative);
@@ -97,21 +97,22 @@ static bst_status state_of(bst_ctx *ctx, bst_view *view, int body, double second
     return BST_OK;
 }
 
-bst_status bst_view_object_state(bst_ctx *ctx, bst_view *view, int object, double seconds,
-                                 bst_state *out) {
+bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int object,
+                                       double seconds, bst_world_state *out) {
     return state_of(ctx, view, object, seconds, FROM_EPHEMERIS, out);
 }
 
-bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, double seconds,
-                                   bst_state *out) {
+bst_status bst_world_view_observer_state(bst_ctx *ctx, bst_world_view *view, int observer,
+                                         double seconds, bst_world_state *out) {
     return state_of(ctx, view, view->world->object_count + observer, seconds, FROM_EPHEMERIS, out);
 }
 
 /* The view's pace about a second; what the second before has known is not worked out again. */
-static void make_pace(bst_view *view, const bst_orbit *orbit, int observer, double second) {
+static void make_pace(bst_world_view *view, const bst_world_orbit *orbit, int observer,
+                      double second) {
     pace *p = &view->pace;
     bst_ctx quiet = {0};
-    bst_state state;
+    bst_world_state state;
     int known = 0;
     if (p->made && p->smooth && p->observer == observer && p->second + 1.0 == second) {
         known = BST_QUINTIC_POINTS - 1;
@@ -121,8 +122,8 @@ static void make_pace(bst_view *view, const bst_orbit *orbit, int observer, doub
     p->observer = observer;
     p->second = second;
     for (int i = known; i < BST_QUINTIC_POINTS && p->smooth; i++) {
-        p->smooth = bst_orbit_state(&quiet, orbit, view->clock, view->world->epoch,
-                                    second + i - BST_QUINTIC_BEFORE, true, &state) == BST_OK;
+        p->smooth = bst_world_orbit_state(&quiet, orbit, view->clock, view->world->epoch,
+                                          second + i - BST_QUINTIC_BEFORE, true, &state) == BST_OK;
         p->velocity[i] = state.velocity_mps;
     }
     memcpy(p->quintic, p->velocity, sizeof p->quintic);
@@ -130,10 +131,10 @@ static void make_pace(bst_view *view, const bst_orbit *orbit, int observer, doub
 }
 
 /* The same of an observer that is asked for many times a second. */
-static bst_status dense_state(bst_ctx *ctx, bst_view *view, int observer, double seconds,
-                              bst_state *out) {
+static bst_status dense_state(bst_ctx *ctx, bst_world_view *view, int observer, double seconds,
+                              bst_world_state *out) {
     const bst_world *world = view->world;
-    const bst_orbit *orbit = &world->observers[observer].orbit;
+    const bst_world_orbit *orbit = &world->observers[observer].orbit;
     const pace *p = &view->pace;
     double second = floor(seconds);
     if (orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && fabs(seconds) < 1e12 &&
@@ -147,34 +148,35 @@ static bst_status dense_state(bst_ctx *ctx, bst_view *view, int observer, double
         out->velocity_mps = bst_quintic_at(p->quintic, seconds - second);
         return BST_OK;
     }
-    return bst_view_observer_state(ctx, view, observer, seconds, out);
+    return bst_world_view_observer_state(ctx, view, observer, seconds, out);
 }
 
-bst_status bst_view_believed(bst_ctx *ctx, bst_view *view, int observer, int sensor, double seconds,
-                             bst_state *state, bst_bodies *bodies) {
-    double t = bst_believed_seconds(view->world, observer, sensor, seconds);
+bst_status bst_world_view_nav(bst_ctx *ctx, bst_world_view *view, int observer, int sensor,
+                              double seconds, bst_world_state *state, bst_bodies *bodies) {
+    double t = bst_world_nav_seconds(view->world, observer, sensor, seconds);
     BST_TRY(dense_state(ctx, view, observer, t, state));
-    bst_believe(view->world, observer, sensor, t, state);
-    return bst_view_bodies(ctx, view, t, bodies);
+    bst_world_nav_estimate(view->world, observer, sensor, t, state);
+    return bst_world_view_bodies(ctx, view, t, bodies);
 }
 
-bst_status bst_view_earth_frames(bst_ctx *ctx, bst_view *view, double seconds,
-                                 bst_earth_frames *out) {
-    bst_sky sky;
+bst_status bst_world_view_earth_frames(bst_ctx *ctx, bst_world_view *view, double seconds,
+                                       bst_astro_earth_frames *out) {
+    bst_sky_rotation sky;
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &sky));
     *out = sky.frames;
     return BST_OK;
 }
 
-bst_status bst_view_bodies(bst_ctx *ctx, bst_view *view, double seconds, bst_bodies *out) {
-    bst_sky sky;
+bst_status bst_world_view_bodies(bst_ctx *ctx, bst_world_view *view, double seconds,
+                                 bst_bodies *out) {
+    bst_sky_rotation sky;
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &sky));
     *out = sky.bodies;
     return BST_OK;
 }
 
-static bst_status eye_at(bst_ctx *ctx, bst_view *view, int observer, double seconds, from source,
-                         eye *out) {
+static bst_status eye_at(bst_ctx *ctx, bst_world_view *view, int observer, double seconds,
+                         from source, eye *out) {
     *out = (eye){.observer = observer, .seconds = seconds};
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &out->sky));
     BST_TRY(
@@ -184,8 +186,8 @@ static bst_status eye_at(bst_ctx *ctx, bst_view *view, int observer, double seco
 }
 
 /* The same out of the view's memory. */
-static bst_status known_eye(bst_ctx *ctx, bst_view *view, int observer, double seconds, int place,
-                            const eye **out) {
+static bst_status known_eye(bst_ctx *ctx, bst_world_view *view, int observer, double seconds,
+                            int place, const eye **out) {
     eye *e = &view->eyes[place];
     if (!e->valid || e->observer != observer || e->seconds != seconds) {
         BST_TRY(eye_at(ctx, view, observer, seconds, FROM_EPHEMERIS, e));
@@ -199,9 +201,9 @@ static double node_time(double start_s, double end_s, int i) {
 }
 
 /* Light time and aberration. now_m: the object at the instant of the eye. *emitted_m: when the
- * light left. See bst_orbit_line_of_sight. */
-static bst_status look(bst_ctx *ctx, bst_view *view, const eye *e, int object, from source,
-                       bst_vec3 now_m, bst_vec3 *emitted_m, bst_sight *out) {
+ * light left. See bst_world_orbit_line_of_sight. */
+static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, int object, from source,
+                       bst_vec3 now_m, bst_vec3 *emitted_m, bst_world_sight *out) {
     double tau = 0.0;
     bst_vec3 geometric = {0}, velocity;
     *emitted_m = now_m;
@@ -209,12 +211,13 @@ static bst_status look(bst_ctx *ctx, bst_view *view, const eye *e, int object, f
         if (i > 0) {
             BST_TRY(place_of(ctx, view, object, e->seconds - tau, source, emitted_m, &velocity));
         }
-        geometric = bst_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
+        geometric = bst_astro_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
         tau = bst_vec3_norm(geometric) / BST_LIGHT_SPEED_MPS;
     }
-    bst_light light = bst_light_at(&e->sky.bodies, e->state.position_m, e->state.velocity_mps);
+    bst_astro_light light =
+        bst_astro_light_at(&e->sky.bodies, e->state.position_m, e->state.velocity_mps);
     out->geometric = bst_vec3_unit(geometric);
-    out->apparent = bst_light_aberrate(&light, out->geometric);
+    out->apparent = bst_astro_light_aberrate(&light, out->geometric);
     out->range_m = bst_vec3_norm(bst_vec3_sub(e->state.position_m, *emitted_m));
     out->light_time_s = tau;
     return BST_OK;
@@ -222,41 +225,41 @@ static bst_status look(bst_ctx *ctx, bst_view *view, const eye *e, int object, f
 
 /* How bright an object is that the light left at `emitted_m` and is seen from `eye_m`. */
 static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst_vec3 eye_m,
-                     const bst_bodies *bodies, double seconds, bst_sight *out) {
-    const bst_object_info *info = &world->objects[object].info;
+                     const bst_bodies *bodies, double seconds, bst_world_sight *out) {
+    const bst_world_object_info *info = &world->objects[object].info;
     bst_vec3 to_eye = bst_vec3_sub(eye_m, emitted_m);
     bst_vec3 to_sun = bst_vec3_sub(bodies->sun_m, emitted_m);
-    bst_sunlight sunlight;
-    bst_sunlight_at(emitted_m, bst_bodies_sunlight_from(bodies), bodies->pole,
-                    world->shadow_atmosphere, &sunlight);
+    bst_astro_sunlight sunlight;
+    bst_astro_sunlight_at(emitted_m, bst_bodies_sunlight_from(bodies), bodies->pole,
+                          world->shadow_atmosphere, &sunlight);
     out->phase_rad = bst_vec3_angle(to_eye, to_sun);
     out->sunlit_fraction = sunlight.disc;
-    bst_lighting lighting = {.area_m2 = info->area_m2,
-                             .albedo = info->albedo,
-                             .object_m = emitted_m,
-                             .eye_m = eye_m,
-                             .sun_m = bodies->sun_m,
-                             .seconds = seconds,
-                             .sunlit_fraction = sunlight.disc,
-                             .sunlight = &sunlight};
+    bst_scene_lighting lighting = {.area_m2 = info->area_m2,
+                                   .albedo = info->albedo,
+                                   .object_m = emitted_m,
+                                   .eye_m = eye_m,
+                                   .sun_m = bodies->sun_m,
+                                   .seconds = seconds,
+                                   .sunlit_fraction = sunlight.disc,
+                                   .sunlight = &sunlight};
     bst_brightness_at(info->brightness, &lighting, &out->glow);
     out->v_mag = out->glow.v_mag;
 }
 
 /* The same of a sight, and whether the Earth hides it. */
-static void shine(const bst_view *view, const eye *e, int object, bst_vec3 emitted_m,
-                  bst_sight *out) {
+static void shine(const bst_world_view *view, const eye *e, int object, bst_vec3 emitted_m,
+                  bst_world_sight *out) {
     shine_at(view->world, object, emitted_m, e->state.position_m, &e->sky.bodies,
              e->seconds - out->light_time_s, out);
-    out->occulted = bst_earth_occults(e->state.position_m, emitted_m, e->sky.bodies.pole);
+    out->occulted = bst_astro_earth_occults(e->state.position_m, emitted_m, e->sky.bodies.pole);
 }
 
 static bool too_near(bst_vec3 a_m, bst_vec3 b_m) {
     return bst_vec3_norm(bst_vec3_sub(a_m, b_m)) < BST_EPHEMERIS_NEAREST_M;
 }
 
-bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object, double seconds,
-                          bst_sight *out) {
+bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer, int object,
+                                double seconds, bst_world_sight *out) {
     eye e;
     bst_vec3 now, velocity, emitted;
     from source = FROM_EPHEMERIS;
@@ -272,9 +275,10 @@ bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object
     return BST_OK;
 }
 
-static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[BST_PATH_NODES],
-                            int object, from source, bst_source_path *path, bst_path_light *light,
-                            bst_sight *mid) {
+static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
+                            const eye *const eyes[BST_PATH_NODES], int object, from source,
+                            bst_scene_source_path *path, bst_scene_path_light *light,
+                            bst_world_sight *mid) {
     for (int i = 0; i < BST_PATH_NODES; i++) {
         const eye *e = eyes[i];
         bst_vec3 now, velocity, emitted;
@@ -285,7 +289,7 @@ static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[
         if (i % 2 != 0) {
             continue;
         }
-        bst_sight sight = {0};
+        bst_world_sight sight = {0};
         BST_TRY(look(ctx, view, e, object, source, now, &emitted, &sight));
         bst_vec3 unit = bst_vec3_unit(path->place[i]);
         bst_vec3 relative = bst_vec3_sub(e->state.velocity_mps, velocity);
@@ -304,9 +308,9 @@ static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[
     return BST_OK;
 }
 
-bst_status bst_view_path(bst_ctx *ctx, bst_view *view, int observer, int object, double start_s,
-                         double end_s, bst_source_path *path, bst_path_light *light,
-                         bst_sight *mid) {
+bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, int observer, int object,
+                               double start_s, double end_s, bst_scene_source_path *path,
+                               bst_scene_path_light *light, bst_world_sight *mid) {
     const eye *eyes[BST_PATH_NODES];
     for (int i = 0; i < BST_PATH_NODES; i++) {
         BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, i), i, &eyes[i]));
@@ -340,9 +344,9 @@ static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
     return sum;
 }
 
-void bst_view_light(const bst_view *view, int object, const bst_source_path *path,
-                    const bst_path_light *light, double start_s, double end_s, double u,
-                    bst_sight *out) {
+void bst_scene_view_light(const bst_world_view *view, int object, const bst_scene_source_path *path,
+                          const bst_scene_path_light *light, double start_s, double end_s, double u,
+                          bst_world_sight *out) {
     bst_vec3 eye_m = quartic(light->eye_m, u);
     bst_vec3 emitted_m = bst_vec3_add(bst_vec3_add(eye_m, quartic(path->place, u)), light->lag_m);
     double seconds = start_s + u * (end_s - start_s) - light->light_time_s;
@@ -352,8 +356,9 @@ void bst_view_light(const bst_view *view, int object, const bst_source_path *pat
     shine_at(view->world, object, emitted_m, eye_m, &bodies, seconds, out);
 }
 
-bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double start_s, double end_s,
-                         bst_vec3 axis, double half_angle_rad, int *indices, int *count) {
+bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, int observer, double start_s,
+                               double end_s, bst_vec3 axis, double half_angle_rad, int *indices,
+                               int *count) {
     bst_ephemeris_cone cone = {
         .axis = axis, .half_angle_rad = half_angle_rad, .half_span_s = 0.5 * (end_s - start_s)};
     const eye *e;
@@ -370,6 +375,6 @@ bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double star
     return BST_OK;
 }
 
-const bst_object_info *bst_view_object(const bst_view *view, int object) {
+const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object) {
     return bst_world_object(view->world, object);
 }
