@@ -5,13 +5,14 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 # libboresight: all parts and the list of modules in one shared library, so that a C program links it
-# with nothing else: the C++ run time and the libraries below come with it. Only bst_* is visible.
+# with nothing else: the C++ run time and the libraries below come with it. Visible is what
+# include/boresight declares.
 # Sanitized and fuzzed builds are for this tree's own tests and have none.
 if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   set(BST_VISIBLE ${PROJECT_SOURCE_DIR}/cmake/libboresight.map)
   set(parts bst_core bst_messages bst_dynamics bst_astro bst_device bst_catalogue bst_optics bst_world
     bst_onboard bst_io bst_link bst_engine bst_eval bst_scenegen bst_gimbal
-    bst_imgproc bst_tracker bst_control bst_obsgen bst_scenario_registry)
+    bst_imgproc bst_tracker bst_control bst_obsgen bst_scenario_registry bst_api)
   # all objects of each part, not only what others call; the archives then add nothing but what the
   # parts themselves link
   list(TRANSFORM parts REPLACE ".+" "$<TARGET_OBJECTS:\\0>" OUTPUT_VARIABLE objects)
@@ -27,44 +28,13 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   target_link_options(libboresight PRIVATE
     -Wl,--version-script=${BST_VISIBLE} -Wl,-Bsymbolic -Wl,-z,defs -Wl,--as-needed)
   target_include_directories(libboresight
-    INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/boresight>)
-  # sim/device/device.h speaks of OpenCL's types, and inline functions call the maths library
-  target_link_libraries(libboresight INTERFACE OpenCL::OpenCL m)
+    INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  # inline functions call the maths library
+  target_link_libraries(libboresight INTERFACE m)
 
   install(TARGETS libboresight EXPORT boresight LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 
-  # #include "sim/core/status.h" works unchanged with include/boresight on the path. Of a subsystem,
-  # only the header with its modules: what two of them call the same does not meet inside.
-  set(headers ${CMAKE_INSTALL_INCLUDEDIR}/boresight)
-  # a header that includes an internal one is internal too
-  set(inner "")
-  file(GLOB_RECURSE all CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} sim/*.h)
-  foreach(header ${all})
-    file(STRINGS ${header} lines REGEX "^#include \".*_internal\\.h\"")
-    if(lines)
-      list(APPEND inner PATTERN ${header} EXCLUDE)
-    endif()
-  endforeach()
-  install(DIRECTORY sim DESTINATION ${headers}
-    FILES_MATCHING PATTERN "*.h"
-    PATTERN "*_internal.h" EXCLUDE
-    PATTERN "sim/cli" EXCLUDE
-    PATTERN "sim/run" EXCLUDE
-    PATTERN "sim/analysis" EXCLUDE
-    PATTERN "sim/export" EXCLUDE
-    PATTERN "sim/report" EXCLUDE
-    PATTERN "sim/study_kinds" EXCLUDE
-    PATTERN "sim/bench" EXCLUDE
-    PATTERN "sim/app" EXCLUDE
-    PATTERN "sim/astro/eop_table.h" EXCLUDE
-    PATTERN "sim/*/data" EXCLUDE
-    ${inner})
-  foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h
-      imgproc/calibrate/pixel_learner_config.h imgproc/stack/stack.h obsgen/obsgen.h
-      scenegen/module.h sim/registry/registry.h tracker/module.h)
-    get_filename_component(folder ${header} DIRECTORY)
-    install(FILES ${header} DESTINATION ${headers}/${folder})
-  endforeach()
+  install(DIRECTORY include/boresight DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 
   set(package ${CMAKE_INSTALL_LIBDIR}/cmake/boresight)
   configure_package_config_file(cmake/boresightConfig.cmake.in

@@ -125,8 +125,8 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
     if (nav && (!c->nav_valid || nav->tick != c->nav.tick)) {
         c->nav = *nav;
         c->nav_valid = true;
-        c->aberration = bst_astro_aberration_of(
-            &(bst_astro_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m});
+        c->aberration = bst_light_aberration_of(
+            &(bst_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m});
     }
 }
 

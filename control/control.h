@@ -3,14 +3,14 @@
 #ifndef BST_CONTROL_CONTROL_H
 #define BST_CONTROL_CONTROL_H
 
+#include "boresight/config.h"
+#include "boresight/messages.h"
 #include "control/guidance/guidance.h"
 #include "control/loop/image_loop.h"
 #include "control/loop/model_error.h"
 #include "control/loop/pointing_error.h"
 #include "control/modes/search_pattern.h"
-#include "sim/core/config.h"
 #include "sim/core/quintic.h"
-#include "sim/messages/messages.h"
 #include "sim/onboard/knowledge.h"
 
 typedef enum bst_control_strategy {
@@ -154,7 +154,7 @@ typedef struct bst_control {
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;
-    bst_astro_aberration aberration; /* by nav, once that is valid */
+    bst_light_aberration aberration; /* by nav, once that is valid */
     bool nav_valid;
     bst_control_held held; /* the track that the aim is on */
     bst_control_held lost; /* the target that BST_MODE_REACQUIRE looks for */

@@ -5,9 +5,9 @@
 
 #include <stdint.h>
 
+#include "boresight/status.h"
+#include "boresight/vec.h"
 #include "gimbal/platform.h"
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
 
 /* What the module "ideal" keeps the boresight on. */
 enum { BST_IDEAL_OBJECT, BST_IDEAL_DIRECTION, BST_IDEAL_STAR };

@@ -46,8 +46,8 @@ static bst_status apparent(void *user, bst_ctx *ctx, double seconds, bst_vec3 *d
     bst_bodies bodies;
     BST_TRY(bst_world_view_observer_state(ctx, view, m->base.observer, seconds, &state));
     BST_TRY(bst_world_view_bodies(ctx, view, seconds, &bodies));
-    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
-    *direction = bst_astro_light_apparent_star(&light, m->icrs);
+    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
+    *direction = bst_light_apparent_star(&light, m->icrs);
     return BST_OK;
 }
 

@@ -2,7 +2,7 @@
 #ifndef BST_GIMBAL_MODULES_H
 #define BST_GIMBAL_MODULES_H
 
-#include "sim/messages/module.h"
+#include "boresight/module.h"
 
 extern const bst_module_desc bst_gimbal_second_order_module; /* role "gimbal", "second_order" */
 extern const bst_module_desc bst_gimbal_azimuth_elevation_module;

@@ -3,11 +3,11 @@
 #ifndef BST_GIMBAL_PLATFORM_H
 #define BST_GIMBAL_PLATFORM_H
 
+#include "boresight/config.h"
+#include "boresight/module.h"
+#include "boresight/status.h"
 #include "gimbal/jitter/jitter_spectrum.h"
 #include "gimbal/spacecraft/spacecraft.h"
-#include "sim/core/config.h"
-#include "sim/core/status.h"
-#include "sim/messages/module.h"
 
 /* The "platform" block of a gimbal's configuration. */
 typedef struct bst_platform_config {

@@ -24,7 +24,7 @@ static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_spacecraf
 
     BST_TRY(
         bst_world_view_nav(ctx, sky->view, sky->observer, sky->sensor, seconds, &state, &bodies));
-    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
+    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
     out->known = (bst_spacecraft_law_inputs){
         .position_m = state.position_m, .velocity_mps = state.velocity_mps, .sun_m = light.sun_m};
     if (sky->knowledge) {
@@ -32,7 +32,7 @@ static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_spacecraf
         bst_vec3 direction;
         BST_TRY(bst_knowledge_cue_direction_at(ctx, sky->knowledge, seconds, &valid, &direction));
         if (valid) {
-            out->known.target = bst_astro_light_aberrate(&light, direction);
+            out->known.target = bst_light_aberrate(&light, direction);
         }
     }
     return BST_OK;

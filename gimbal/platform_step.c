@@ -147,7 +147,7 @@ bst_status bst_gimbal_publish_nav(struct bst_step *step, const bst_gimbal_base *
     bst_bodies bodies;
     BST_TRY(bst_world_view_nav(ctx, base->view, base->observer, base->sensor,
                                bst_step_seconds(step), &state, &bodies));
-    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
+    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
     *out = (bst_nav_telemetry){.tick = bst_step_tick(step),
                                .position_gcrf_m = state.position_m,
                                .velocity_gcrf_mps = state.velocity_mps,

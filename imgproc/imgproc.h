@@ -6,13 +6,13 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
+#include "boresight/camera.h"
+#include "boresight/camera_motion.h"
+#include "boresight/messages.h"
+#include "boresight/module.h"
+#include "boresight/stage.h"
 #include "imgproc/calibrate/pixel_learner_config.h"
 #include "imgproc/stack/stack.h"
-#include "sim/core/stage.h"
-#include "sim/messages/messages.h"
-#include "sim/messages/module.h"
-#include "sim/onboard/camera_motion.h"
-#include "sim/optics/camera.h"
 #include "sim/optics/photometry.h"
 
 typedef struct bst_imgproc_bad_pixel {

@@ -220,7 +220,7 @@ static void add_stars(imgproc_module *m, const bst_frame_message *message,
  * bright stars. False: everywhere. */
 static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
                                const bst_frame_message *message, const bst_camera_motion *motion,
-                               const bst_astro_light *light, const bst_predictions *predictions,
+                               const bst_light *light, const bst_predictions *predictions,
                                const bst_quat *q_cam_from_gcrf, bool *use) {
     *use = false;
     m->windows.count = 0;
@@ -234,7 +234,7 @@ static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
     for (int i = 0; i < predictions->count; i++) {
         const bst_prediction *p = &predictions->items[i];
         bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(p->direction_gcrf, age_s, p->rate_gcrf_radps));
-        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_astro_light_aberrate(light, d));
+        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_light_aberrate(light, d));
         double x, y, reach = half + 5.0 * p->sigma_rad / scale;
         bool added = bst_camera_project(&m->camera, v, &x, &y) &&
                      bst_region_of_interest_add(&m->windows, &message->window, x, y, reach, reach);
@@ -266,9 +266,9 @@ static int in_windows(imgproc_module *m, int expected) {
 
 /* *q_cam_from_gcrf: in, the attitude that is believed; out, that of the stars, when any are
  * identified. */
-static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
-                           const bst_astro_light *light, bst_window window, bool locked,
-                           bst_detections *out, bst_quat *q_cam_from_gcrf) {
+static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const bst_light *light,
+                           bst_window window, bool locked, bst_detections *out,
+                           bst_quat *q_cam_from_gcrf) {
     double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
     double v_limit =
         m->plugged ? bst_plugin_detector_v_limit(m->plugged, snr) : bst_imgproc_v_limit(l->ip, snr);
@@ -481,8 +481,8 @@ static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l
 }
 
 /* Of the middle of an exposure: navigation may be later by the read-out. */
-static bst_astro_light light_at(const imgproc_module *m, const bst_nav_telemetry *nav,
-                                double middle_tick) {
+static bst_light light_at(const imgproc_module *m, const bst_nav_telemetry *nav,
+                          double middle_tick) {
     return bst_nav_light_after(nav, (middle_tick - (double)nav->tick) / (double)m->tick_rate_hz);
 }
 
@@ -511,7 +511,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     m->windows.count = 0;
     out->windows = 0;
     bool navigated = nav.payload && !nav.stale;
-    bst_astro_light light = navigated ? light_at(m, nav.payload, middle) : (bst_astro_light){0};
+    bst_light light = navigated ? light_at(m, nav.payload, middle) : (bst_light){0};
     if (m->config->track_windows && locked && navigated) {
         bool use;
         BST_TRY(plan_windows(m, ctx, l, message, &motion, &light, predictions,

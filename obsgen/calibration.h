@@ -2,7 +2,7 @@
 #ifndef BST_OBSGEN_CALIBRATION_H
 #define BST_OBSGEN_CALIBRATION_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 enum { BST_OBSGEN_CALIBRATION_VERSION = 4, BST_OBSGEN_LENGTHS = 4, BST_OBSGEN_SNRS = 6 };
 

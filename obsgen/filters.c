@@ -2,9 +2,9 @@
  */
 #include <math.h>
 
+#include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
 #include "sim/core/threshold_statistics.h"
-#include "sim/core/vec.h"
 #include "sim/optics/column_level.h"
 
 /* Shot noise of a source through its own filter, times the noise of a pixel, over sqrt(sum p^2):

@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/camera_motion.h"
 #include "obsgen/generator_internal.h"
 #include "obsgen/model/false_alarms.h"
 #include "obsgen/streak/streak_breakup.h"
-#include "sim/onboard/camera_motion.h"
 #include "sim/optics/column_level.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;

@@ -2,13 +2,13 @@
 #ifndef BST_OBSGEN_GENERATOR_H
 #define BST_OBSGEN_GENERATOR_H
 
+#include "boresight/camera.h"
+#include "boresight/messages.h"
+#include "boresight/rng.h"
 #include "obsgen/calibration.h"
 #include "obsgen/model/crlb_table.h"
 #include "obsgen/model/matched_filter_theory.h"
 #include "obsgen/model/response.h"
-#include "sim/core/rng.h"
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
 
 /* Settings of the image path that the generator follows. */
 typedef struct bst_generator_settings {

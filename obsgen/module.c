@@ -2,11 +2,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/camera_motion.h"
 #include "obsgen/generator.h"
 #include "obsgen/identify.h"
 #include "obsgen/model/psf_bound.h"
 #include "obsgen/obsgen.h"
-#include "sim/onboard/camera_motion.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/optics/column_level.h"
 #include "sim/optics/photometry.h"

@@ -3,7 +3,7 @@
 #ifndef BST_OBSGEN_OBSGEN_H
 #define BST_OBSGEN_OBSGEN_H
 
-#include "sim/messages/module.h"
+#include "boresight/module.h"
 
 extern const bst_module_desc bst_obsgen_module;
 

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 #include "sim/device/device.h"
 
 /* All zero: empty. Its owner releases the buffer. */

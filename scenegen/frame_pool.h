@@ -3,7 +3,7 @@
 #ifndef BST_SCENEGEN_FRAME_POOL_H
 #define BST_SCENEGEN_FRAME_POOL_H
 
-#include "sim/core/frame.h"
+#include "boresight/frame.h"
 #include "sim/device/device.h"
 
 typedef struct bst_frame_pool bst_frame_pool;

@@ -2,7 +2,7 @@
 #ifndef BST_SCENEGEN_MODULE_H
 #define BST_SCENEGEN_MODULE_H
 
-#include "sim/messages/module.h"
+#include "boresight/module.h"
 
 /* Triggered by `exposure`; reads `los_history`; writes `truth` for every exposure and `frame` for
  * every one that is not dropped. Truth items carry BST_TRUTH_SATURATED when the source's brightest

@@ -3,12 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/stages.h"
 #include "scenegen/detector/detector.h"
 #include "scenegen/frame_pool.h"
 #include "scenegen/module.h"
 #include "scenegen/planes.h"
 #include "scenegen/renderer.h"
-#include "sim/onboard/stages.h"
 #include "sim/optics/psf.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/scene/truth_list.h"

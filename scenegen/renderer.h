@@ -9,8 +9,8 @@
 #ifndef BST_SCENEGEN_RENDERER_H
 #define BST_SCENEGEN_RENDERER_H
 
+#include "boresight/rng.h"
 #include "scenegen/smear/smear.h"
-#include "sim/core/rng.h"
 #include "sim/device/device.h"
 #include "sim/world/scene/field.h"
 

@@ -2,8 +2,8 @@
 #ifndef BST_SCENEGEN_SOURCE_ORDER_H
 #define BST_SCENEGEN_SOURCE_ORDER_H
 
+#include "boresight/camera.h"
 #include "scenegen/kernels/scene_shared.h"
-#include "sim/optics/camera.h"
 
 /* Writes the `count` sources to `sorted` by the cells of the sensor that they are in, those of one
  * cell as they come, so that what a tile draws lies together in memory. The order of two sources

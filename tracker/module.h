@@ -3,7 +3,7 @@
 #ifndef BST_TRACKER_MODULE_H
 #define BST_TRACKER_MODULE_H
 
-#include "sim/messages/module.h"
+#include "boresight/module.h"
 
 /* Ports: detections (in, trigger), pointing_telemetry (in, optional), nav_telemetry (in), tracks
  * (out), predictions (out). Configuration: bst_tracker_config. */

@@ -177,7 +177,7 @@ typedef struct frame_attitude {
 } frame_attitude;
 
 /* Returns the number of t->stars that were looked at. */
-static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_astro_light *light,
+static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
                           bst_attitude_solution *out) {
     int count = 0;
     for (int i = 0; i < d->count && count < MAX_STARS; i++) {
@@ -190,7 +190,7 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_ast
         }
         t->stars[count++] =
             (bst_attitude_star){.id = item->star_id,
-                                .apparent_gcrf = bst_astro_light_apparent_star(light, icrs),
+                                .apparent_gcrf = bst_light_apparent_star(light, icrs),
                                 .x_px = item->x_px,
                                 .y_px = item->y_px,
                                 .cov_xx = item->cov_xx,
@@ -205,7 +205,7 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_ast
     return count;
 }
 
-static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_astro_light *light,
+static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
                           int64_t tick, double dt_s, frame_attitude *out) {
     memset(out, 0, sizeof *out);
     bst_quat q_telemetry = bst_quat_unit(d->q_telemetry_from_gcrf);
@@ -250,7 +250,7 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_ast
 }
 
 static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *item,
-                                  const frame_attitude *attitude, const bst_astro_light *light) {
+                                  const frame_attitude *attitude, const bst_light *light) {
     double extra = t->floor_variance_px2;
     if (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) {
         extra += t->blend_variance_px2;
@@ -260,7 +260,7 @@ static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *ite
 }
 
 static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
-                           const bst_astro_light *light, int *lost) {
+                           const bst_light *light, int *lost) {
     double scale = bst_camera_scale_rad(&t->camera);
     int count = 0;
     *lost = 0;
@@ -461,7 +461,7 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     }
     double seconds = (double)tick / t->tick_rate_hz;
     double dt = t->started ? (double)(tick - t->last_tick) / t->tick_rate_hz : 0.0;
-    bst_astro_light light =
+    bst_light light =
         bst_nav_light_after(input->nav, seconds - (double)input->nav->tick / t->tick_rate_hz);
     frame_attitude attitude;
     find_attitude(t, d, &light, tick, dt, &attitude);

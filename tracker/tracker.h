@@ -6,10 +6,10 @@
 #ifndef BST_TRACKER_TRACKER_H
 #define BST_TRACKER_TRACKER_H
 
+#include "boresight/camera.h"
+#include "boresight/config.h"
+#include "boresight/messages.h"
 #include "sim/astro/belt.h"
-#include "sim/core/config.h"
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
 #include "tracker/mtt/filter.h"
 
 /* Values of a scenario's tracker block; the table says what each is. */

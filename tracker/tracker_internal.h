@@ -53,7 +53,7 @@ struct bst_tracker {
 typedef struct bst_tracker_frame_view {
     const bst_tracker *tracker;
     bst_quat q_cam_from_gcrf;
-    bst_astro_light light;
+    bst_light light;
     bst_target_cue cue;
     double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
     bst_od_observer observer;

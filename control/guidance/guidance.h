@@ -2,11 +2,11 @@
 #ifndef BST_CONTROL_GUIDANCE_GUIDANCE_H
 #define BST_CONTROL_GUIDANCE_GUIDANCE_H
 
+#include "boresight/config.h"
+#include "boresight/messages.h"
 #include "control/guidance/keep_out.h"
 #include "control/guidance/pointing_feasibility.h"
 #include "control/guidance/slew.h"
-#include "sim/core/config.h"
-#include "sim/messages/messages.h"
 
 typedef enum bst_guidance_slews {
     BST_SLEWS_MOUNT = 0, /* the mount gets there by itself */

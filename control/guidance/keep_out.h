@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 typedef enum bst_keep_out_zone_kind {
     BST_ZONE_SUN = 0,

@@ -3,7 +3,7 @@
 #ifndef BST_CONTROL_GUIDANCE_MOUNT_INVERSE_KINEMATICS_H
 #define BST_CONTROL_GUIDANCE_MOUNT_INVERSE_KINEMATICS_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 /* Whether the angles of a mount can be told from directions: two axes that are not redundant. */
 bool bst_mount_steers(const bst_mount_status *mount);

@@ -2,9 +2,9 @@
 #ifndef BST_CONTROL_GUIDANCE_POINTING_FEASIBILITY_H
 #define BST_CONTROL_GUIDANCE_POINTING_FEASIBILITY_H
 
+#include "boresight/status.h"
 #include "control/guidance/keep_out.h"
 #include "control/guidance/mount_inverse_kinematics.h"
-#include "sim/core/status.h"
 
 typedef enum bst_pointing_feasibility {
     BST_REACH_OK = 0,

@@ -3,9 +3,9 @@
 #ifndef BST_CONTROL_LOOP_IMAGE_LOOP_H
 #define BST_CONTROL_LOOP_IMAGE_LOOP_H
 
+#include "boresight/compensator.h"
 #include "control/loop/pointing_error.h"
 #include "control/modes/aim_history.h"
-#include "sim/dynamics/compensator.h"
 
 /* In front of the names of bst_compensator_type stand those; after them: */
 enum { BST_CONTROL_OBSERVER = BST_COMPENSATOR_TYPE_COUNT };

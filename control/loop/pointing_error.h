@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 /* q_true = q_telemetry * error, so that the camera looks at the true (inertial) direction s when
  * the telemetry's boresight is at rotate(error, s). In GCRF axes the error of a drifting body turns

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 static const double two_pi = 2.0 * BST_PI;
 

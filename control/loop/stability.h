@@ -2,8 +2,8 @@
 #ifndef BST_CONTROL_LOOP_STABILITY_H
 #define BST_CONTROL_LOOP_STABILITY_H
 
-#include "sim/core/status.h"
-#include "sim/dynamics/compensator.h"
+#include "boresight/compensator.h"
+#include "boresight/status.h"
 
 /* Response at omega rad/s of a loop with later_s of delay more. */
 typedef double complex (*bst_stability_delayed_response_fn)(const void *user, double omega_radps,

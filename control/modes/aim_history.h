@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { BST_AIM_HISTORY_SAMPLES = 256 };
 

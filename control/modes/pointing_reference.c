@@ -146,7 +146,7 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
 }
 
 bst_vec3 bst_control_apparent(const bst_control *c, bst_vec3 geometric) {
-    return bst_astro_aberrate(&c->aberration, geometric);
+    return bst_light_aberration_apply(&c->aberration, geometric);
 }
 
 void bst_control_forget_aims(bst_control *c) {
@@ -168,12 +168,12 @@ static bool held_in_body(const bst_control *c) {
 
 /* What aberrates a direction at a tick that navigation's telemetry is not of: the observer falls.
  */
-static bst_astro_aberration aberration_at(const bst_control *c, int64_t tick) {
+static bst_light_aberration aberration_at(const bst_control *c, int64_t tick) {
     const bst_nav_telemetry *nav = &c->nav;
     double dt = fmax(fmin(bst_control_seconds(c, tick - nav->tick), FALL_S), -FALL_S);
     double r = bst_vec3_norm(nav->position_gcrf_m);
     double fall = r > 0.0 ? -BST_EARTH_MU_M3PS2 / (r * r * r) : 0.0;
-    return bst_astro_aberration_of(&(bst_astro_light){
+    return bst_light_aberration_of(&(bst_light){
         .velocity_mps = bst_vec3_axpy(nav->velocity_bary_mps, dt * fall, nav->position_gcrf_m),
         .sun_m = nav->sun_m});
 }
@@ -203,9 +203,9 @@ static bst_status work_out(bst_ctx *ctx, const bst_control *c, int64_t tick,
     bst_vec3 d = {0.0, 0.0, 0.0};
     BST_TRY(bst_control_aim(ctx, c, tick, &valid, &d));
     if (valid && !held_in_body(c)) { /* else, where the stars are does not matter */
-        bst_astro_aberration aberration = aberration_at(c, tick);
+        bst_light_aberration aberration = aberration_at(c, tick);
         bst_quat error = bst_control_correction_at(c, tick);
-        d = bst_quat_rotate(error, bst_astro_aberrate(&aberration, d));
+        d = bst_quat_rotate(error, bst_light_aberration_apply(&aberration, d));
     }
     keep(c, aimed, tick, valid, d);
     return BST_OK;

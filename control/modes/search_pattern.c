@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Fields on each side of the middle. */
 static int reach(double extent, double field, double step) {

@@ -1,8 +1,8 @@
 /* Zeros outside the unit circle, by the turns of a function about zero. */
 #include <math.h>
 
+#include "boresight/vec.h"
 #include "control/loop/stability.h"
-#include "sim/core/vec.h"
 
 static const double two_pi = 2.0 * BST_PI;
 

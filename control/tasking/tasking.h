@@ -11,9 +11,9 @@
 #ifndef BST_CONTROL_TASKING_TASKING_H
 #define BST_CONTROL_TASKING_TASKING_H
 
+#include "boresight/config.h"
+#include "boresight/module.h"
 #include "control/guidance/keep_out.h"
-#include "sim/core/config.h"
-#include "sim/messages/module.h"
 #include "sim/onboard/knowledge.h"
 
 /* A line of the list of targets: an object, or all whose apsides lie within bounds. */

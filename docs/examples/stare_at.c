@@ -8,8 +8,8 @@
  */
 #include <stdlib.h>
 
-#include "sim/astro/bodies.h"
-#include "sim/messages/module.h"
+#include <boresight/light.h>
+#include <boresight/module.h>
 
 /* 1. The configuration: a struct and a table that fills it from the scenario. */
 typedef struct stare_at_config {
@@ -59,10 +59,10 @@ static bst_status step(void *self, struct bst_step *s) {
         return BST_OK;
     }
     const bst_nav_telemetry *nav = sample.payload;
-    bst_astro_light light = {.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m};
+    bst_light light = {.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m};
     bst_los_command *command = bst_step_write(s, PORT_COMMAND, NULL);
     *command = (bst_los_command){.tick = bst_step_tick(s) + m->latency_ticks,
-                                 .direction_gcrf = bst_astro_light_apparent_star(&light, m->icrs)};
+                                 .direction_gcrf = bst_light_apparent_star(&light, m->icrs)};
     bst_control_status *status = bst_step_write(s, PORT_STATUS, NULL);
     *status = (bst_control_status){.tick = bst_step_tick(s), .mode = BST_MODE_STARE};
     return BST_OK;

@@ -2,9 +2,9 @@
 
 #include <math.h>
 
+#include "boresight/vec.h"
 #include "gimbal/jitter/jitter_more.h"
 #include "sim/core/simd.h"
-#include "sim/core/vec.h"
 
 /* Rotation steps between two evaluations of the exact phase: rounding grows to about 1e-14. */
 #define RESYNC_STEPS 256

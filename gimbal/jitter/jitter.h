@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 
 #define BST_JITTER_LOW_LINES 16
 #define BST_JITTER_HIGH_LINES 32

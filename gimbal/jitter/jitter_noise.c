@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { N = BST_NOISE_POINTS, HALF = N / 2 };
 

@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
+#include "boresight/rng.h"
 #include "gimbal/jitter/jitter_table.h"
-#include "sim/core/rng.h"
 
 enum { BST_NOISE_POINTS = 2048 };
 

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "gimbal/jitter/jitter_more.h"
-#include "sim/core/vec.h"
 
 /* One band's table: inline or of a file, scaled; owned by *out. */
 static bst_status take_table(bst_ctx *ctx, const char *key, const bst_config_list *list,

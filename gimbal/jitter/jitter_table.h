@@ -2,7 +2,7 @@
 #ifndef BST_GIMBAL_JITTER_JITTER_TABLE_H
 #define BST_GIMBAL_JITTER_JITTER_TABLE_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 /* One point of a one-sided density. */
 typedef struct bst_jitter_density_point {

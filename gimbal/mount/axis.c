@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 #define SHAPED_SHARE 0.95    /* of the limits, for the reference */
 #define BRAKE_SHARE 0.8      /* of the shaped acceleration, for the braking curve */

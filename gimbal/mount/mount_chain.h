@@ -3,7 +3,7 @@
 #ifndef BST_GIMBAL_MOUNT_MOUNT_CHAIN_H
 #define BST_GIMBAL_MOUNT_MOUNT_CHAIN_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { BST_CHAIN_MOST = 3 };
 

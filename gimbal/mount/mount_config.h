@@ -2,10 +2,10 @@
 #ifndef BST_GIMBAL_MOUNT_MOUNT_CONFIG_H
 #define BST_GIMBAL_MOUNT_MOUNT_CONFIG_H
 
+#include "boresight/compensator.h"
 #include "gimbal/mount/mount_geometry.h"
 #include "gimbal/mount/mount_joints.h"
 #include "gimbal/platform.h"
-#include "sim/dynamics/compensator.h"
 
 /* Triples are of the outer, the inner and the third axis. */
 typedef struct bst_mount_friction_config {

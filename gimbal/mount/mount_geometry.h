@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { BST_MOUNT_MOST = 3 };
 

@@ -7,7 +7,7 @@
 #ifndef BST_GIMBAL_SPACECRAFT_ATTITUDE_FILTER_H
 #define BST_GIMBAL_SPACECRAFT_ATTITUDE_FILTER_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 typedef struct bst_attitude_filter {
     bst_quat q_body_from_gcrf;

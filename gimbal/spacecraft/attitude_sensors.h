@@ -5,9 +5,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/config.h"
-#include "sim/core/rng.h"
-#include "sim/core/vec.h"
+#include "boresight/config.h"
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 
 #define BST_TRACKERS_MOST 4
 

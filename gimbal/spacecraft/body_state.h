@@ -2,7 +2,7 @@
 #ifndef BST_GIMBAL_SPACECRAFT_BODY_STATE_H
 #define BST_GIMBAL_SPACECRAFT_BODY_STATE_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* The true state of the body at one plant step. */
 typedef struct bst_body_state {

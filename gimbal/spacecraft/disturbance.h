@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
-#include "sim/core/config.h"
-#include "sim/core/vec.h"
+#include "boresight/config.h"
+#include "boresight/vec.h"
 
 typedef struct bst_disturbance_config {
     bool gravity_gradient;

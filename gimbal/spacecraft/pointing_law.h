@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 typedef enum bst_spacecraft_law {
     BST_LAW_INERTIAL, /* "inertial": the attitude of the epoch */

@@ -3,11 +3,11 @@
 #ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_H
 #define BST_GIMBAL_SPACECRAFT_SPACECRAFT_H
 
+#include "boresight/messages.h"
 #include "gimbal/spacecraft/attitude_filter.h"
 #include "gimbal/spacecraft/body_state.h"
 #include "gimbal/spacecraft/spacecraft_config.h"
 #include "gimbal/spacecraft/spacecraft_sky.h"
-#include "sim/messages/messages.h"
 
 typedef struct bst_spacecraft bst_spacecraft;
 

@@ -12,8 +12,8 @@
 #ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_BODY_H
 #define BST_GIMBAL_SPACECRAFT_SPACECRAFT_BODY_H
 
+#include "boresight/status.h"
 #include "gimbal/spacecraft/body_state.h"
-#include "sim/core/status.h"
 #include "sim/dynamics/integrators.h"
 
 #define BST_WHEELS_MOST 8

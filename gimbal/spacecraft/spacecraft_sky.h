@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
+#include "boresight/status.h"
 #include "gimbal/spacecraft/pointing_law.h"
-#include "sim/core/status.h"
 
 /* Nodes per second. A cubic through four of them is off by at most 9/384 h^4 of the fourth
  * derivative: 1e-9 m of a low orbit's place, 1e-9 rad of a pass at 0.03 rad/s. */

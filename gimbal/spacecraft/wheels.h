@@ -5,9 +5,9 @@
 
 #include <stdbool.h>
 
+#include "boresight/config.h"
+#include "boresight/rng.h"
 #include "gimbal/spacecraft/spacecraft_body.h"
-#include "sim/core/config.h"
-#include "sim/core/rng.h"
 
 typedef struct bst_wheel_config {
     double axis[3];

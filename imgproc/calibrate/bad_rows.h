@@ -2,8 +2,8 @@
 #ifndef BST_IMGPROC_CALIBRATE_BAD_ROWS_H
 #define BST_IMGPROC_CALIBRATE_BAD_ROWS_H
 
-#include "sim/core/status.h"
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
+#include "boresight/status.h"
 
 typedef struct bst_bad_rows {
     int width, height, capacity, count;

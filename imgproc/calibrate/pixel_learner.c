@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum {
     MEMORY_LOOKS = 64, /* older looks count half */

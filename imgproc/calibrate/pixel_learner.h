@@ -25,9 +25,9 @@
 #ifndef BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_H
 #define BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_H
 
+#include "boresight/module.h"
 #include "imgproc/calibrate/pixel_evidence.h"
 #include "imgproc/calibrate/pixel_learner_config.h"
-#include "sim/messages/module.h"
 
 /* A frame as far as its pixels' evidence needs it. */
 typedef struct bst_pixel_frame {

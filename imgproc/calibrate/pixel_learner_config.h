@@ -2,7 +2,7 @@
 #ifndef BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_CONFIG_H
 #define BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_CONFIG_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 typedef struct bst_pixel_learner_config {
     bool enabled;

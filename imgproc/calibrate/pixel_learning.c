@@ -33,7 +33,7 @@ static int predict(const bst_camera *camera, const bst_imgproc_frame_knowledge *
         bst_vec3 d = bst_vec3_unit(
             bst_vec3_axpy(p->direction_gcrf, known->predictions_age_s, p->rate_gcrf_radps));
         if (known->oriented) {
-            d = bst_astro_light_aberrate(&known->light, d);
+            d = bst_light_aberrate(&known->light, d);
         }
         if (bst_camera_project(camera, bst_quat_rotate(known->q_cam_from_gcrf, d), &out[count][0],
                                &out[count][1])) {

@@ -4,10 +4,10 @@
 
 #include <stdbool.h>
 
+#include "boresight/status.h"
 #include "imgproc/detect/row_kernels.h"
 #include "imgproc/detect/scratch_pool.h"
 #include "sim/core/parallel.h"
-#include "sim/core/status.h"
 
 /* Values of pixels that hold no measurement. Anything below BST_PIXEL_NONE is one of them. */
 #define BST_PIXEL_BAD (-2e30f)

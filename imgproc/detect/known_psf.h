@@ -6,7 +6,7 @@
 #ifndef BST_IMGPROC_DETECT_KNOWN_PSF_H
 #define BST_IMGPROC_DETECT_KNOWN_PSF_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 #include "sim/optics/psf.h"
 
 enum { BST_KNOWN_PSF_TERMS = 10, BST_KNOWN_PSF_POINTS = 8 };

@@ -3,9 +3,9 @@
 #ifndef BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 #define BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 
+#include "boresight/stages.h"
 #include "imgproc/detect/psf_wings.h"
 #include "imgproc/imgproc.h"
-#include "sim/onboard/stages.h"
 
 typedef struct bst_plugin_detector bst_plugin_detector;
 

@@ -4,7 +4,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Nodes of the rule with n nodes start at n (n - 1) / 2. Roots of the Legendre polynomial by Newton
  * from the asymptotic guess (Abramowitz and Stegun 25.4.29 and 22.16.6). */

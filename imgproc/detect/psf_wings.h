@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
-#include "sim/core/status.h"
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
+#include "boresight/status.h"
 #include "sim/optics/psf.h"
 
 /* Pixels to either side of a star over which its light is known. */

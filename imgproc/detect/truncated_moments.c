@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { HERMITE = 9, PASSES = 2, COUNTED_PASSES = 4, MOST_ELECTRONS = 80, MOST_STEPS = 100 };
 

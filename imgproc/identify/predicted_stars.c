@@ -37,7 +37,7 @@ static double seen_mag(const bst_camera *camera, const bst_star *star) {
 }
 
 bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
-                                      bst_quat q_cam_from_gcrf, const bst_astro_light *light,
+                                      bst_quat q_cam_from_gcrf, const bst_light *light,
                                       bst_window window, double margin_px, double v_limit,
                                       int *count) {
     *count = 0;
@@ -55,7 +55,7 @@ bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
         radius = bst_camera_reach_rad(sky->camera, centre, x0, y0, x1, y1, 0.0);
     }
     bst_vec3 direction = bst_quat_rotate(bst_quat_conj(q_cam_from_gcrf), centre);
-    direction = bst_astro_light_catalogue_star(light, direction);
+    direction = bst_light_catalogue_star(light, direction);
     int total = 0;
     for (; v_limit > BRIGHTEST_V; v_limit -= 0.5) {
         BST_TRY(bst_stars_query(ctx, sky->stars, direction, radius + BST_ARCSEC_RAD, v_limit,
@@ -67,7 +67,7 @@ bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
     total = total < sky->capacity ? total : sky->capacity;
     for (int i = 0; i < total; i++) {
         const bst_star *star = &sky->found[i];
-        bst_vec3 apparent = bst_astro_light_apparent_star(light, star->icrs);
+        bst_vec3 apparent = bst_light_apparent_star(light, star->icrs);
         double x, y;
         if (bst_camera_project(sky->camera, bst_quat_rotate(q_cam_from_gcrf, apparent), &x, &y) &&
             x >= x0 && x <= x1 && y >= y0 && y <= y1) {

@@ -2,10 +2,10 @@
 #ifndef BST_IMGPROC_IDENTIFY_PREDICTED_STARS_H
 #define BST_IMGPROC_IDENTIFY_PREDICTED_STARS_H
 
+#include "boresight/camera.h"
 #include "imgproc/identify/starid.h"
 #include "sim/astro/bodies.h"
 #include "sim/catalogue/stars.h"
-#include "sim/optics/camera.h"
 
 typedef struct bst_predicted_stars {
     const bst_camera *camera;
@@ -25,7 +25,7 @@ void bst_predicted_stars_free(bst_predicted_stars *sky);
  * window, for a camera at q_cam_from_gcrf that sees light as `light` says. Where there are more
  * than fit, the limit is raised by half a magnitude until they do. */
 bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
-                                      bst_quat q_cam_from_gcrf, const bst_astro_light *light,
+                                      bst_quat q_cam_from_gcrf, const bst_light *light,
                                       bst_window window, double margin_px, double v_limit,
                                       int *count) BST_MUST_CHECK;
 

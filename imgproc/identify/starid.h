@@ -2,7 +2,7 @@
 #ifndef BST_IMGPROC_IDENTIFY_STARID_H
 #define BST_IMGPROC_IDENTIFY_STARID_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 /* A catalogue star where telemetry says that it should be, mean over the exposure. */
 typedef struct bst_imgproc_expected_star {

@@ -377,8 +377,7 @@ static void label_predicted(const bst_imgproc_discriminator *d,
         bst_vec3 direction = bst_vec3_unit(
             bst_vec3_axpy(track->direction_gcrf, f->predictions_age_s, track->rate_gcrf_radps));
         double x, y, closest = fmin(1.0 + 3.0 * track->sigma_rad / scale, 2.0 * MAX_GATE_PX);
-        if (!project(d, f->q_cam_from_gcrf, bst_astro_light_aberrate(&f->light, direction), &x,
-                     &y)) {
+        if (!project(d, f->q_cam_from_gcrf, bst_light_aberrate(&f->light, direction), &x, &y)) {
             continue;
         }
         int best = -1;

@@ -3,15 +3,15 @@
 #ifndef BST_IMGPROC_MEASURE_DISCRIMINATE_H
 #define BST_IMGPROC_MEASURE_DISCRIMINATE_H
 
+#include "boresight/camera.h"
+#include "boresight/messages.h"
 #include "sim/astro/bodies.h"
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
 
 /* One frame, as far as it is known. */
 typedef struct bst_imgproc_frame_knowledge {
     bool oriented;            /* stars are identified: attitude is theirs */
     bst_quat q_cam_from_gcrf; /* mid-exposure */
-    bst_astro_light light;
+    bst_light light;
     bst_window window;
     double streak_px;                        /* of the stars; below streak_min_px: 0 */
     const bst_predictions *predictions;      /* moving tracks; NULL: none */

@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/status.h"
 #include "imgproc/measure/source_profile.h"
-#include "sim/core/status.h"
 
 enum { BST_FIT_MAX_FREE = 5, BST_FIT_MAX_PARAMETERS = 3 * BST_FIT_MAX_FREE + 1 };
 

@@ -4,10 +4,10 @@
 
 #include <stddef.h>
 
+#include "boresight/camera_motion.h"
 #include "imgproc/detect/candidates.h"
 #include "imgproc/measure/fit.h"
 #include "imgproc/measure/sharpness.h"
-#include "sim/onboard/camera_motion.h"
 
 /* Charge that is not light, in pixels of the frame. */
 typedef struct bst_imgproc_cosmic_ray {

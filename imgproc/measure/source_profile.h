@@ -4,10 +4,10 @@
 
 #include <stdbool.h>
 
+#include "boresight/status.h"
 #include "imgproc/detect/known_psf.h"
 #include "imgproc/detect/psf.h"
 #include "imgproc/detect/simd_layout.h"
-#include "sim/core/status.h"
 
 enum {
     BST_PROFILE_PHASES = 128,

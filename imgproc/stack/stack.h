@@ -14,9 +14,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/config.h"
-#include "sim/core/vec.h"
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
+#include "boresight/config.h"
+#include "boresight/vec.h"
 
 enum { BST_STACK_MAX_FRAMES = 64, BST_STACK_MAX_FOUND = 4096 };
 

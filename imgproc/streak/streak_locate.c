@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/messages.h"
+#include "boresight/vec.h"
 #include "imgproc/measure/cosmic_ray.h"
-#include "sim/core/vec.h"
-#include "sim/messages/messages.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* A point this many times brighter than the streak under it is a source of its own. */

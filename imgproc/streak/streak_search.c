@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "imgproc/measure/heapsort.h"
-#include "sim/core/vec.h"
 
 /* Lines of the bank this much below the threshold are followed up: what the bank's steps cost. */
 static const double MARGIN_SNR = 0.8;

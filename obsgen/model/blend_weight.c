@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Half a side of the pixels that image processing fits, in sigmas. */
 static const double FITTED_SIGMAS = 3.8;

@@ -1,8 +1,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
-#include "sim/core/vec.h"
 
 /* Sources below this share of the threshold are no detections, but light. */
 static const double FAINTEST_SHARE = 0.3;

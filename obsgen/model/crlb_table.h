@@ -3,7 +3,7 @@
 #ifndef BST_OBSGEN_MODEL_CRLB_TABLE_H
 #define BST_OBSGEN_MODEL_CRLB_TABLE_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_BOUND_RATIOS = 25, BST_BOUND_LENGTHS = 11 };
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* As image processing clips pixels, and when opposite neighbours agree with a mesh, standard
  * errors. */

@@ -3,7 +3,7 @@
 #ifndef BST_OBSGEN_MODEL_LOCAL_SKY_H
 #define BST_OBSGEN_MODEL_LOCAL_SKY_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Heights of lines, SNR, that what a clipped mean holds of them is tabulated at, four to one. */
 enum { BST_LOCAL_SKY_HEIGHTS = 256 };

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 static const double ROOT_2PI = 2.5066282746310002;
 

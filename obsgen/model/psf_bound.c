@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Of the grid that images are sampled on, px that are read: its step, how far it goes beyond a
  * streak's ends, and the longest streak that is drawn. */

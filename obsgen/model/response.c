@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 static const double PIXEL_VARIANCE = 1.0 / 12.0;
 /* Steps of the sums over an OTF: an image that ends within REACH_PX is exact to its square there.

@@ -4,7 +4,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 static double density(double z) {
     return exp(-0.5 * z * z) / 2.5066282746310002;

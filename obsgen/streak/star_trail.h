@@ -3,8 +3,8 @@
 #ifndef BST_OBSGEN_STREAK_STAR_TRAIL_H
 #define BST_OBSGEN_STREAK_STAR_TRAIL_H
 
+#include "boresight/status.h"
 #include "obsgen/model/blend_weight.h"
-#include "sim/core/status.h"
 
 enum { BST_ROUTE_NODES = 4096 };
 

@@ -4,13 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "obsgen/model/false_alarms.h"
 #include "obsgen/model/local_sky.h"
 #include "obsgen/streak/streak_light.h"
 #include "obsgen/streak/streak_noise.h"
 #include "obsgen/streak/streak_path.h"
 #include "sim/core/pages.h"
-#include "sim/core/vec.h"
 
 /* As image processing tells maxima apart. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;

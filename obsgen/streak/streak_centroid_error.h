@@ -5,8 +5,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/rng.h"
 #include "obsgen/model/matched_filter_theory.h"
-#include "sim/core/rng.h"
 
 /* Rows across the streak that are looked at, 0.7 sigma apart; most steps along it, with what the
  * filters need beyond; taps of a point's image on either side of its middle. */

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Rows on either side of the way that its light reaches, and those that are looked at. */
 enum {

@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/rng.h"
 #include "obsgen/streak/streak_light.h"
-#include "sim/core/rng.h"
 
 /* Taps of the filter on either side, and rows of noise that is filtered across the way already. */
 enum {

@@ -2,9 +2,9 @@
 #ifndef BST_SCENEGEN_DETECTOR_COSMIC_RAYS_H
 #define BST_SCENEGEN_DETECTOR_COSMIC_RAYS_H
 
-#include "sim/core/rng.h"
-#include "sim/core/status.h"
-#include "sim/optics/detector_config.h"
+#include "boresight/detector_config.h"
+#include "boresight/rng.h"
+#include "boresight/status.h"
 
 /* Charge left in a pixel. */
 typedef struct bst_cosmic_rays_pixel {

@@ -6,11 +6,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "boresight/camera.h"
+#include "boresight/rng.h"
 #include "scenegen/detector/cosmic_rays.h"
 #include "scenegen/upload_ring.h"
-#include "sim/core/rng.h"
 #include "sim/device/device.h"
-#include "sim/optics/camera.h"
 
 enum { BST_DETECTOR_BUFFERS = 6 };
 

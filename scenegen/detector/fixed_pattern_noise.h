@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#include "sim/core/rng.h"
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
+#include "boresight/rng.h"
 
 /* Whether the camera has such a map. */
 bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera);

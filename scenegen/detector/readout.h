@@ -3,9 +3,9 @@
 #ifndef BST_SCENEGEN_DETECTOR_READOUT_H
 #define BST_SCENEGEN_DETECTOR_READOUT_H
 
+#include "boresight/messages.h"
 #include "scenegen/detector/detector.h"
 #include "scenegen/kernels/scene_shared.h"
-#include "sim/messages/messages.h"
 
 typedef struct bst_readout bst_readout;
 

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 
 /* Writes the build options of kernels/vignetting.cl, nothing for a camera without vignetting.
  * Returns their length, as snprintf does. */

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { MOST_PASSES = 24, MOST_RADIX = 8 };
 

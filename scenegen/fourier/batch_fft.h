@@ -7,7 +7,7 @@
 #ifndef BST_SCENEGEN_FOURIER_BATCH_FFT_H
 #define BST_SCENEGEN_FOURIER_BATCH_FFT_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_LANES = 16 };
 

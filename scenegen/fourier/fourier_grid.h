@@ -3,8 +3,8 @@
 #ifndef BST_SCENEGEN_FOURIER_FOURIER_GRID_H
 #define BST_SCENEGEN_FOURIER_FOURIER_GRID_H
 
+#include "boresight/status.h"
 #include "scenegen/fourier/nufft_kernel.h"
-#include "sim/core/status.h"
 #include "sim/optics/psf.h"
 
 /* Binnings of pixels that are distinguished, the last for all above. */

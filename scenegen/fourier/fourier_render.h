@@ -8,11 +8,11 @@
 #ifndef BST_SCENEGEN_FOURIER_FOURIER_RENDER_H
 #define BST_SCENEGEN_FOURIER_FOURIER_RENDER_H
 
+#include "boresight/messages.h"
 #include "scenegen/fourier/fourier_grid.h"
 #include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/kernels/scene_shared.h"
 #include "sim/device/device.h"
-#include "sim/messages/messages.h"
 
 typedef struct bst_fourier_render bst_fourier_render;
 

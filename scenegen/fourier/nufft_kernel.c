@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { QUADRATURE = 40, TRIALS = 16 };
 

@@ -48,7 +48,7 @@ static float16 width_of(float16 widening) {
 #endif
 
 #ifdef DISTORTED
-/* Distortion (sim/optics/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
+/* Distortion (include/boresight/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
  * beyond the fold gives no light on the sensor. */
 static void add_distortion(float16 x, float16 y, float16 *dx, float16 *dy, float16 *stretch2) {
     float16 s = x * x + y * y;

@@ -10,8 +10,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/status.h"
 #include "scenegen/smear/smear_quadrature.h"
-#include "sim/core/status.h"
 
 typedef struct bst_error_budget bst_error_budget;
 

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 double bst_motion_spread_px(const bst_smear_path_point *path, int count, double scale_rad,
                             double stretch, double roll_px, double corner_px) {

@@ -3,8 +3,8 @@
 #ifndef BST_SCENEGEN_SMEAR_MOTION_H
 #define BST_SCENEGEN_SMEAR_MOTION_H
 
+#include "boresight/vec.h"
 #include "scenegen/smear/smear_quadrature.h"
-#include "sim/core/vec.h"
 #include "sim/world/scene/field.h"
 
 /* How far, at most, a star at the sensor's corner (corner_px from the boresight, undistorted) moves

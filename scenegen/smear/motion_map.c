@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "scenegen/kernels/scene_shared.h"
-#include "sim/core/vec.h"
 
 /* Cells per axis: as many as it takes for a cell's stars to move alike, but for UNLIKE of the
  * path's length, or where most cells would have to be filled, UNLIKE_MANY; and nodes about which

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "scenegen/smear/smear_quadrature_internal.h"
-#include "sim/core/vec.h"
 
 typedef struct maker {
     const bst_smear_path_point *path;

@@ -12,7 +12,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* A point of a path, straight and uniform in time up to the next one: two tilts of the camera in
  * pixels of image motion (or the two coordinates of the image), and its roll in pixels of motion at

@@ -2,8 +2,8 @@
 #ifndef BST_SCENEGEN_STAMP_FIXED_POINT_PX_H
 #define BST_SCENEGEN_STAMP_FIXED_POINT_PX_H
 
+#include "boresight/camera.h"
 #include "scenegen/kernels/scene_shared.h"
-#include "sim/optics/camera.h"
 
 /* No stamp is longer, px. */
 enum { BST_PLACE_TAPS = 512 };

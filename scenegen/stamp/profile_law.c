@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/reference.h"
-#include "sim/core/vec.h"
 
 /* Share of pixel d and its derivatives by the widening: the heat equation makes them derivatives by
  * place, which are those of the Gaussian at the pixel's edges. order 0 to 2, over order!. */

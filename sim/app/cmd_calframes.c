@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "boresight/version.h"
 #include "scenegen/detector/detector.h"
 #include "scenegen/renderer.h"
 #include "sim/app/app.h"
@@ -15,7 +16,6 @@
 #include "sim/core/draft.h"
 #include "sim/core/folder.h"
 #include "sim/core/text.h"
-#include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
 
 typedef struct calframes_request {

@@ -3,12 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/version.h"
 #include "sim/analysis/calibration/calibrate.h"
 #include "sim/analysis/calibration/obsgen_validation.h"
 #include "sim/analysis/calibration/watch.h"
 #include "sim/app/app.h"
 #include "sim/cli/load.h"
-#include "sim/core/version.h"
 #include "sim/registry/registry.h"
 
 typedef struct errand {

@@ -3,11 +3,11 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "boresight/version.h"
 #include "sim/app/app.h"
 #include "sim/cli/plugins.h"
 #include "sim/cli/stack.h"
 #include "sim/core/text.h"
-#include "sim/core/version.h"
 
 typedef struct command {
     const char *name;

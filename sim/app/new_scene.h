@@ -4,8 +4,8 @@
 
 #include <stdio.h>
 
+#include "boresight/status.h"
 #include "sim/astro/tle.h"
-#include "sim/core/status.h"
 
 /* One satellite and the file of its element set. */
 typedef struct bst_new_satellite {

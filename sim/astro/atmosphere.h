@@ -2,7 +2,7 @@
 #ifndef BST_ASTRO_ATMOSPHERE_H
 #define BST_ASTRO_ATMOSPHERE_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Height (m) above the WGS-84 ellipsoid of a position in Earth-fixed axes, along the radius: 2 m
  * too high at most below 400 km of height, 10 m below 2000 km. */

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "boresight/light.h"
 #include "sim/astro/frames.h"
 
 #define BST_LIGHT_SPEED_MPS 299792458.0
@@ -88,51 +89,14 @@ double bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 d
  * that a point on the surface sees what is above its horizon. */
 bool bst_astro_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole);
 
-/* What turns a geometric direction into the one that an observer measures. */
-typedef struct bst_astro_light {
-    bst_vec3 velocity_mps; /* observer relative to the barycentre */
-    bst_vec3 sun_m;        /* observer to the Sun's centre */
-} bst_astro_light;
-
 /* Light of an observer with geocentric GCRF position and velocity. */
-bst_astro_light bst_astro_light_at(const bst_bodies *bodies, bst_vec3 position_m,
-                                   bst_vec3 velocity_mps);
+bst_light bst_light_at(const bst_bodies *bodies, bst_vec3 position_m, bst_vec3 velocity_mps);
 
-/* Apparent direction of a star (unit, ICRS axes): the Sun's light deflection (eraLdsun), then
- * stellar aberration with special relativity and the Sun's potential (eraAb). Without parallax.
- * Sources: Urban and Seidelmann, Explanatory Supplement (3rd edition), sections 7.2.3 and 7.2.4;
- * Klioner, AJ 125 (2003) 1580. */
-bst_vec3 bst_astro_light_apparent_star(const bst_astro_light *light, bst_vec3 icrs);
-/* The inverse, to 1e-12 rad. */
-bst_vec3 bst_astro_light_catalogue_star(const bst_astro_light *light, bst_vec3 apparent);
-
-/* Aberration only, for objects of the Earth-Moon space (unit vectors). The velocity is
- * barycentric, so the geometric direction must run from the observer at reception to the object at
- * emission in the barycentric frame: with geocentric positions and light time tau that is
- * r_object(t - tau) - r_observer(t) - tau * earth_bary_mps (see bst_astro_light_path). */
-bst_vec3 bst_astro_light_aberrate(const bst_astro_light *light, bst_vec3 direction);
-bst_vec3 bst_astro_light_unaberrate(const bst_astro_light *light,
-                                    bst_vec3 apparent); /* to 1e-12 rad */
-
-/* What bst_astro_light_aberrate takes from the light alone, for many directions. */
-typedef struct bst_astro_aberration {
-    bst_vec3 velocity;                      /* in units of the speed of light */
-    double inverse_gamma, share, potential; /* share: 1 / (1 + inverse_gamma) */
-} bst_astro_aberration;
-
-bst_astro_aberration bst_astro_aberration_of(const bst_astro_light *light);
-static inline bst_vec3 bst_astro_aberrate(const bst_astro_aberration *a, bst_vec3 direction) {
-    double along = bst_vec3_dot(direction, a->velocity);
-    bst_vec3 q = bst_vec3_scale(direction, a->inverse_gamma - a->potential * along);
-    q = bst_vec3_axpy(q, 1.0 + along * a->share + a->potential, a->velocity);
-    return bst_vec3_scale(q, 1.0 / bst_vec3_norm(q));
-}
-
-/* The vector from observer to object that bst_astro_light_aberrate wants, from geocentric GCRF
+/* The vector from observer to object that bst_light_aberrate wants, from geocentric GCRF
  * positions of the object at emission, tau_s before the observer's instant. The Earth's own motion
  * during tau counts: 20 arcsec, which aberration by the Earth's velocity takes back. */
-static inline bst_vec3 bst_astro_light_path(const bst_bodies *bodies, bst_vec3 object_at_emission_m,
-                                            bst_vec3 observer_m, double tau_s) {
+static inline bst_vec3 bst_light_path(const bst_bodies *bodies, bst_vec3 object_at_emission_m,
+                                      bst_vec3 observer_m, double tau_s) {
     return bst_vec3_axpy(bst_vec3_sub(object_at_emission_m, observer_m), -tau_s,
                          bodies->earth_bary_mps);
 }

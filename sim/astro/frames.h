@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/time.h"
-#include "sim/core/vec.h"
 
 /* Table of Earth-orientation parameters; immutable once made, shareable between threads. */
 typedef struct bst_astro_eop bst_astro_eop;

@@ -2,8 +2,8 @@
 #ifndef BST_ASTRO_GAUSS_ANGLES_H
 #define BST_ASTRO_GAUSS_ANGLES_H
 
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
+#include "boresight/status.h"
+#include "boresight/vec.h"
 
 enum { BST_GAUSS_ROOTS = 3 }; /* an equation of these signs has no more positive roots */
 

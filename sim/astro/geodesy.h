@@ -2,7 +2,7 @@
 #ifndef BST_ASTRO_GEODESY_H
 #define BST_ASTRO_GEODESY_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 #ifdef __cplusplus
 #define BST_NOEXCEPT noexcept

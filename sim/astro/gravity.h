@@ -4,8 +4,8 @@
 
 #include <stddef.h>
 
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
+#include "boresight/status.h"
+#include "boresight/vec.h"
 
 enum {
     BST_GRAVITY_BUILTIN_DEGREE = 20, /* the most that bst_gravity_builtin has */

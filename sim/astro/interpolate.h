@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* A tabulated state, m and m/s in any axes, `t_s` seconds after any instant. */
 typedef struct bst_astro_table_state {

@@ -2,8 +2,8 @@
 #ifndef BST_ASTRO_KEPLER_H
 #define BST_ASTRO_KEPLER_H
 
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
+#include "boresight/status.h"
+#include "boresight/vec.h"
 
 /* State after `seconds` (either sign) of two-body motion about a centre of gravitational parameter
  * mu (m^3/s^2), for any conic: universal variables with Stumpff functions, solved by

@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
+#include "boresight/status.h"
+#include "boresight/vec.h"
 
 typedef struct bst_lambert_way {
     bool long_way;    /* through more than half a turn about the centre */

@@ -2,15 +2,14 @@
 
 #define SUN_SCHWARZSCHILD_M (1.97412574336e-8 * BST_AU_M)
 
-bst_astro_light bst_astro_light_at(const bst_bodies *bodies, bst_vec3 position_m,
-                                   bst_vec3 velocity_mps) {
-    return (bst_astro_light){bst_vec3_add(bodies->earth_bary_mps, velocity_mps),
-                             bst_vec3_sub(bodies->sun_m, position_m)};
+bst_light bst_light_at(const bst_bodies *bodies, bst_vec3 position_m, bst_vec3 velocity_mps) {
+    return (bst_light){bst_vec3_add(bodies->earth_bary_mps, velocity_mps),
+                       bst_vec3_sub(bodies->sun_m, position_m)};
 }
 
 /* Direction of a star behind the Sun's field. Close to the Sun's centre the deflection is held
  * down as in eraLdsun: no observer sees a star there. */
-static bst_vec3 deflect(const bst_astro_light *light, bst_vec3 p) {
+static bst_vec3 deflect(const bst_light *light, bst_vec3 p) {
     double distance = bst_vec3_norm(light->sun_m);
     double distance_au = distance * (1.0 / BST_AU_M);
     bst_vec3 e = bst_vec3_scale(light->sun_m, -1.0 / distance); /* Sun to observer */
@@ -20,30 +19,30 @@ static bst_vec3 deflect(const bst_astro_light *light, bst_vec3 p) {
     return bst_vec3_axpy(p, w, bst_vec3_axpy(e, -pe, p));
 }
 
-bst_astro_aberration bst_astro_aberration_of(const bst_astro_light *light) {
+bst_light_aberration bst_light_aberration_of(const bst_light *light) {
     bst_vec3 v = bst_vec3_scale(light->velocity_mps, 1.0 / BST_LIGHT_SPEED_MPS);
     double inverse_gamma = sqrt(1.0 - bst_vec3_dot(v, v));
-    return (bst_astro_aberration){v, inverse_gamma, 1.0 / (1.0 + inverse_gamma),
+    return (bst_light_aberration){v, inverse_gamma, 1.0 / (1.0 + inverse_gamma),
                                   SUN_SCHWARZSCHILD_M / bst_vec3_norm(light->sun_m)};
 }
 
-static bst_vec3 aberrate(const bst_astro_light *light, bst_vec3 p) {
-    bst_astro_aberration a = bst_astro_aberration_of(light);
-    return bst_astro_aberrate(&a, p);
+static bst_vec3 aberrate(const bst_light *light, bst_vec3 p) {
+    bst_light_aberration a = bst_light_aberration_of(light);
+    return bst_light_aberration_apply(&a, p);
 }
 
-bst_vec3 bst_astro_light_apparent_star(const bst_astro_light *light, bst_vec3 icrs) {
+bst_vec3 bst_light_apparent_star(const bst_light *light, bst_vec3 icrs) {
     return aberrate(light, deflect(light, icrs));
 }
 
-bst_vec3 bst_astro_light_aberrate(const bst_astro_light *light, bst_vec3 direction) {
+bst_vec3 bst_light_aberrate(const bst_light *light, bst_vec3 direction) {
     return aberrate(light, direction);
 }
 
 /* Solves forward(light, p) = apparent. Each step shrinks the error by the deflection's or
  * aberration's gradient: 1e-4, and 0.02 in front of the Sun's disc. */
-static bst_vec3 invert(bst_vec3 (*forward)(const bst_astro_light *, bst_vec3),
-                       const bst_astro_light *light, bst_vec3 apparent) {
+static bst_vec3 invert(bst_vec3 (*forward)(const bst_light *, bst_vec3), const bst_light *light,
+                       bst_vec3 apparent) {
     bst_vec3 p = apparent;
     for (int i = 0; i < 12; i++) {
         bst_vec3 miss = bst_vec3_sub(apparent, forward(light, p));
@@ -55,10 +54,10 @@ static bst_vec3 invert(bst_vec3 (*forward)(const bst_astro_light *, bst_vec3),
     return p;
 }
 
-bst_vec3 bst_astro_light_catalogue_star(const bst_astro_light *light, bst_vec3 apparent) {
-    return invert(bst_astro_light_apparent_star, light, apparent);
+bst_vec3 bst_light_catalogue_star(const bst_light *light, bst_vec3 apparent) {
+    return invert(bst_light_apparent_star, light, apparent);
 }
 
-bst_vec3 bst_astro_light_unaberrate(const bst_astro_light *light, bst_vec3 apparent) {
+bst_vec3 bst_light_unaberrate(const bst_light *light, bst_vec3 apparent) {
     return invert(aberrate, light, apparent);
 }

@@ -6,10 +6,10 @@
 
 #include <cjson/cJSON.h>
 
+#include "boresight/config.h"
+#include "boresight/vec.h"
 #include "sim/astro/ccsds_time.h"
 #include "sim/astro/elements_internal.h"
-#include "sim/core/config.h"
-#include "sim/core/vec.h"
 
 typedef enum key {
     KEY_OBJECT_NAME,

@@ -2,8 +2,8 @@
 #ifndef BST_ASTRO_RADAU_H
 #define BST_ASTRO_RADAU_H
 
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
+#include "boresight/status.h"
+#include "boresight/vec.h"
 
 /* Everhart's implicit Gauss-Radau scheme (1985, in Dynamics of Comets, IAU Coll. 83, 185) in the
  * form of Rein and Spiegel (MNRAS 446, 2015, 1424; equation numbers below are theirs): inside of a

@@ -2,8 +2,8 @@
 #ifndef BST_ASTRO_SGP4_FIT_H
 #define BST_ASTRO_SGP4_FIT_H
 
+#include "boresight/vec.h"
 #include "sim/astro/sgp4.h"
-#include "sim/core/vec.h"
 
 /* A place on the orbit, TEME of date, m, so many minutes after the elements' epoch. */
 typedef struct bst_sgp4_place {

@@ -11,8 +11,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/sgp4.h"
-#include "sim/core/vec.h"
 
 #define BST_SGP4_TWO_PI (2.0 * BST_PI)
 

@@ -2,8 +2,8 @@
 #ifndef BST_ASTRO_STATE_TABLE_H
 #define BST_ASTRO_STATE_TABLE_H
 
+#include "boresight/vec.h"
 #include "sim/astro/time.h"
-#include "sim/core/vec.h"
 
 /* The states of one file; immutable once made, shareable between threads. */
 typedef struct bst_state_table bst_state_table;

@@ -7,10 +7,10 @@
 #include <string.h>
 #include <strings.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/ccsds_time.h"
 #include "sim/astro/text_internal.h"
 #include "sim/core/file.h"
-#include "sim/core/vec.h"
 
 #define MAX_FILE_BYTES ((uint64_t)256 << 20)
 

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* A line of text: not terminated, without its line end and trailing white space. */
 typedef struct bst_text_line {

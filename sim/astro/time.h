@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* An instant: a two-part Julian date in TAI. jd1 is the Julian date of a midnight (x.5), jd2 in
  * [0, 1) the fraction of the day; resolution better than 1e-10 s. */

@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/tle_internal.h"
-#include "sim/core/vec.h"
 
 #define LINE_CHARS 69
 

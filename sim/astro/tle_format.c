@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/tle.h"
-#include "sim/core/vec.h"
 
 enum { ALPHA5_FIRST = 100000, ALPHA5_END = 340000 };
 

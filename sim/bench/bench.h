@@ -4,7 +4,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_BENCH_PHASES = 8 };
 

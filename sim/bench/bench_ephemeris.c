@@ -4,9 +4,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "boresight/rng.h"
 #include "sim/astro/sgp4.h"
 #include "sim/bench/bench.h"
-#include "sim/core/rng.h"
 #include "sim/world/scene/field.h"
 #include "sim/world/world_config.h"
 

@@ -5,9 +5,9 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "boresight/version.h"
 #include "sim/bench/bench.h"
 #include "sim/core/json_number.h"
-#include "sim/core/version.h"
 #include "sim/device/device.h"
 
 static bst_status describe(bst_ctx *ctx, void *user, void *out) {

@@ -1,8 +1,8 @@
 #include <math.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/trajectory.h"
 #include "sim/bench/bench.h"
-#include "sim/core/vec.h"
 
 enum { STATES = 1440 };
 

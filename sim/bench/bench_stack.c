@@ -2,10 +2,10 @@
  * the search's share included. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/detect/background.h"
 #include "imgproc/stack/stack.h"
 #include "sim/bench/bench.h"
-#include "sim/core/rng.h"
 
 enum { SIDE = 2048, FRAMES = 16, STACKS = 4, APART = 64 };
 

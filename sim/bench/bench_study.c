@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "boresight/rng.h"
 #include "sim/bench/bench.h"
-#include "sim/core/rng.h"
 #include "sim/core/wall_clock.h"
 #include "sim/io/manifest.h"
 #include "sim/studies/results.h"

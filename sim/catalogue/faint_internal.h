@@ -7,8 +7,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/rng.h"
 #include "sim/catalogue/faint_stars.h"
-#include "sim/core/rng.h"
 
 enum {
     FAINT_BANDS = 400,

@@ -3,7 +3,7 @@
 #ifndef BST_CATALOGUE_STAR_COUNTS_H
 #define BST_CATALOGUE_STAR_COUNTS_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* The magnitudes at which the table has nodes: V 6, 7, ... 26. */
 enum { BST_COUNT_NODES = 21, BST_COUNT_FIRST_V = 6 };

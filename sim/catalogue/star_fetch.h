@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stdio.h>
 
+#include "boresight/status.h"
 #include "sim/catalogue/star_import.h"
-#include "sim/core/status.h"
 
 #define BST_STAR_TARBALL_NAME "tycho2_2.orig.tar.xz"
 #define BST_STAR_TARBALL_BYTES 121142216LL

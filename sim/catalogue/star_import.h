@@ -5,8 +5,8 @@
 
 #include <stdio.h>
 
+#include "boresight/status.h"
 #include "sim/catalogue/star_index.h"
-#include "sim/core/status.h"
 
 #define BST_STAR_TYCHO2_COUNT 2557501LL /* main table and supplement 1 */
 #define BST_STAR_TYCHO2_COMPLETE_V 11.0 /* 98 % of all stars are in the catalogue */

@@ -9,8 +9,8 @@
 
 #include <stdint.h>
 
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
+#include "boresight/status.h"
+#include "boresight/vec.h"
 
 #define BST_STAR_MAGIC "BSTSTARS"
 #define BST_STAR_ENDIAN 0x01020304u

@@ -7,10 +7,10 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "boresight/rng.h"
 #include "sim/catalogue/bright_stars.h"
 #include "sim/catalogue/star_index.h"
 #include "sim/core/file.h"
-#include "sim/core/rng.h"
 
 #define MAX_FILE_BYTES ((uint64_t)1 << 30)
 

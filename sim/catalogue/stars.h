@@ -6,8 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
-#include "sim/core/vec.h"
+#include "boresight/status.h"
+#include "boresight/vec.h"
 
 /* A star as a query returns it. */
 typedef struct bst_star {

@@ -2,7 +2,7 @@
 #ifndef BST_CLI_CLI_H
 #define BST_CLI_CLI_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum {
     BST_EXIT_OK = 0,

@@ -6,7 +6,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef enum bst_option_kind {
     BST_OPTION_FLAG,   /* bool: set to true */

@@ -8,7 +8,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 #include "sim/io/run_files.h"
 
 enum { PATH_BYTES = 4096 };

@@ -1,4 +1,4 @@
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -9,7 +9,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/core/stage.h"
+#include "boresight/stage.h"
 #include "sim/core/text.h"
 
 /* 2^53, which the text 2^53 + 1 also reads as */

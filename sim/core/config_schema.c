@@ -2,7 +2,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/core/stage.h"
+#include "boresight/stage.h"
 
 /* The largest magnitude that is shown as a bound; wider ranges mean "any finite number". */
 static const double OPEN_BOUND = 1e300;

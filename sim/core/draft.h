@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 #ifdef __cplusplus
 extern "C" {

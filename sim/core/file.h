@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -2,7 +2,7 @@
 #ifndef BST_CORE_FOLDER_H
 #define BST_CORE_FOLDER_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -4,7 +4,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 #include "sim/core/file.h"
 #include "sim/core/json_internal.h"
 

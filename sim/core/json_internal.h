@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 enum {
     BST_JSON_MAX_DEPTH = 64,

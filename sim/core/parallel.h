@@ -3,7 +3,7 @@
 #define BST_CORE_PARALLEL_H
 
 #include <pthread.h>
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_parallel bst_parallel;
 

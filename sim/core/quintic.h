@@ -2,7 +2,7 @@
 #ifndef BST_CORE_QUINTIC_H
 #define BST_CORE_QUINTIC_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 #define BST_QUINTIC_POINTS 6
 #define BST_QUINTIC_BEFORE 2 /* of them before the one that u is counted from */

@@ -1,11 +1,11 @@
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "sim/core/fnv.h"
-#include "sim/core/vec.h"
 
 /* Byte order independent, so that a seed means the same on every machine. */
 static uint64_t fnv1a_u64(uint64_t hash, uint64_t value) {

@@ -2,9 +2,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "sim/core/simd.h"
-#include "sim/core/vec.h"
 
 enum { COUNT = BST_RNG_BLOCK };
 

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_SHA256_TEXT = 65 }; /* 64 digits and a zero byte */
 

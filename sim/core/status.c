@@ -1,4 +1,4 @@
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 #include <stdbool.h>
 #include <stdio.h>

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <sys/types.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_subprocess {
     pid_t pid;

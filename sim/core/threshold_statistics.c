@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 double bst_threshold_maxima(double u, double density) {
     return density * u * exp(-0.5 * u * u) / (2.0 * BST_PI * sqrt(2.0 * BST_PI));

@@ -1,4 +1,4 @@
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 bst_quat bst_quat_from_mat3(const bst_mat3 *a) {
     const double(*m)[3] = a->m;

@@ -5,7 +5,7 @@
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_device bst_device;
 

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <time.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Whether PoCL cannot write its cache; then `text` says so, which folder it is, why, and what to
  * do. The folder is, as PoCL 3 to 6 choose it, $POCL_CACHE_DIR, else pocl/kcache in

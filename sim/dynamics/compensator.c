@@ -1,8 +1,8 @@
-#include "sim/dynamics/compensator.h"
+#include "boresight/compensator.h"
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 static const double two_pi = 2.0 * BST_PI;
 

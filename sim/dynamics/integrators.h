@@ -4,7 +4,7 @@
 #ifndef BST_DYNAMICS_INTEGRATORS_H
 #define BST_DYNAMICS_INTEGRATORS_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* How the attitude is stepped; the names a scenario gives. */
 typedef enum bst_integrator {

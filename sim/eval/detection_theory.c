@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 static double density(double x) {
     return exp(-0.5 * x * x) / sqrt(2.0 * BST_PI);

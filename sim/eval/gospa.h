@@ -4,7 +4,7 @@
 #ifndef BST_EVAL_GOSPA_H
 #define BST_EVAL_GOSPA_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_gospa_result {
     double gospa;

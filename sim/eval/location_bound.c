@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "sim/core/symmetric.h"
-#include "sim/core/vec.h"
 
 enum { N = BST_BOUND_COUNT };
 

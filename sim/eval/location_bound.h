@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum {
     BST_BOUND_X, /* px */

@@ -1,6 +1,6 @@
 #include "sim/eval/loop_figures.h"
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 double bst_eval_pointing_error_px(const bst_camera *camera, double pixel_scale_arcsec,
                                   bst_quat q_cam_from_gcrf, bst_vec3 apparent, double *x_px,

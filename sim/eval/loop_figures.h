@@ -4,8 +4,8 @@
 #ifndef BST_EVAL_LOOP_FIGURES_H
 #define BST_EVAL_LOOP_FIGURES_H
 
+#include "boresight/camera.h"
 #include "sim/eval/error_statistics.h"
-#include "sim/optics/camera.h"
 
 /* A track or a detection within this many pixels of the true place is the object's: 2.5 FWHM of the
  * shipped cameras. */

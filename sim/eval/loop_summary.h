@@ -2,8 +2,8 @@
 #ifndef BST_EVAL_LOOP_SUMMARY_H
 #define BST_EVAL_LOOP_SUMMARY_H
 
+#include "boresight/messages.h"
 #include "sim/eval/loop_figures.h"
-#include "sim/messages/messages.h"
 #include "sim/world/world.h"
 
 typedef struct bst_loop_summary bst_loop_summary;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "sim/eval/detection_theory.h"
 
 enum { TERMS = 3 };

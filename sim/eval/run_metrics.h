@@ -3,8 +3,8 @@
 #ifndef BST_EVAL_RUN_METRICS_H
 #define BST_EVAL_RUN_METRICS_H
 
+#include "boresight/messages.h"
 #include "sim/eval/loop_summary.h"
-#include "sim/messages/messages.h"
 #include "sim/world/world.h"
 
 typedef struct bst_run_metrics bst_run_metrics;

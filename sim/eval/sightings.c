@@ -38,7 +38,7 @@ typedef struct frame {
     bool valid;
     int64_t exposure_id;
     double mid_s;
-    bst_astro_light light;
+    bst_light light;
     int count;
     seen_object objects[IN_FRAME];
     bst_eval_match_target targets[IN_FRAME];
@@ -262,7 +262,7 @@ bst_status bst_sightings_truth(bst_ctx *ctx, bst_sightings *s, int sensor_index,
     f->valid = true;
     f->exposure_id = truth->exposure_id;
     f->mid_s = mid_s;
-    f->light = (bst_astro_light){.sun_m = truth->sun_m, .velocity_mps = truth->velocity_bary_mps};
+    f->light = (bst_light){.sun_m = truth->sun_m, .velocity_mps = truth->velocity_bary_mps};
     f->count = 0;
     BST_TRY(end_passes(ctx, s, e, mid_s - BST_PASS_BREAK_S));
     for (int i = 0; i < truth->count; i++) {
@@ -374,7 +374,7 @@ void bst_sightings_tracks(bst_sightings *s, int sensor_index, const bst_tracks *
         bst_eval_pass *pass = &s->records[o->record].pass;
         if (o->detected && tracks->attitude.valid) {
             bst_vec3 v = bst_camera_unproject(e->camera, o->x_px, o->y_px);
-            bst_vec3 seen = bst_astro_light_unaberrate(&f->light, bst_quat_rotate(back, v));
+            bst_vec3 seen = bst_light_unaberrate(&f->light, bst_quat_rotate(back, v));
             add_error(&pass->place, bst_vec3_angle(seen, o->direction) / BST_ARCSEC_RAD);
         }
         const bst_track *track = track_of(tracks, o->direction, reach);

@@ -2,7 +2,7 @@
 #ifndef BST_EVAL_SIGHTINGS_H
 #define BST_EVAL_SIGHTINGS_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 #include "sim/world/world.h"
 
 /* Errors against the truth, arcsec. */

@@ -2,7 +2,7 @@
 #ifndef BST_EVAL_TARGET_MATCH_H
 #define BST_EVAL_TARGET_MATCH_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 typedef struct bst_eval_match_target {
     double x_px, y_px;   /* true place, mean of the exposure */

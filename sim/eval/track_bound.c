@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "sim/core/symmetric.h"
-#include "sim/core/vec.h"
 
 bool bst_track_bound_start(bst_track_bound *bound, const double r1[3], const double r2[3],
                            double dt_s, double noise_rad2ps3) {

@@ -8,11 +8,11 @@
 
 #include <cjson/cJSON.h>
 
+#include "boresight/version.h"
 #include "sim/cli/progress.h"
 #include "sim/core/folder.h"
 #include "sim/core/json_number.h"
 #include "sim/core/text.h"
-#include "sim/core/version.h"
 #include "sim/export/export.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_reader.h"

@@ -9,13 +9,13 @@
 
 #include <cjson/cJSON.h>
 
+#include "boresight/version.h"
 #include "sim/cli/plugins.h"
 #include "sim/cli/progress.h"
 #include "sim/core/fnv.h"
 #include "sim/core/folder.h"
 #include "sim/core/json_number.h"
 #include "sim/core/text.h"
-#include "sim/core/version.h"
 #include "sim/export/export.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_frames.h"
@@ -101,7 +101,7 @@ static bst_status read_frame_row(bst_ctx *ctx, const job *j, const bst_io_rows *
     f->has_observer = true;
     f->observer_gcrf_m = vector(rows, 16);
     f->observer_gcrf_mps = vector(rows, 19);
-    bst_astro_light light = {.velocity_mps = vector(rows, 22), .sun_m = vector(rows, 25)};
+    bst_light light = {.velocity_mps = vector(rows, 22), .sun_m = vector(rows, 25)};
     bst_camera camera;
     BST_TRY(bst_world_camera_at_scale(ctx, j->camera, f->pixel_scale_arcsec, &camera));
     f->has_wcs = bst_wcs_fit(ctx, &camera, q, &light, &f->wcs) == BST_OK;

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_video bst_video;
 

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "boresight/messages.h"
 #include "sim/io/html.h"
-#include "sim/messages/messages.h"
 
 /* Margins round the plotting area; the left one is the chart's own. */
 #define MARGIN_TOP 10.0

@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_draft {
     FILE *stream;

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 #define BST_FITS_BLOCK 2880
 #define BST_FITS_CARD 80

@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Checks that a file of `bytes` bytes at `data` is a sequence of HDUs whose sizes, by BITPIX,
  * NAXIS, NAXISn and PCOUNT, are plain integers that fit into the file, each given once; that

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Reads the file's first image of two axes, in the primary array or an extension, of any BITPIX,
  * not compressed. *pixels is row-major [*height][*width], physical values (BSCALE and

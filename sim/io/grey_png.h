@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Writes width x height pixels, row 0 at the top, whole or not at all: of 16 bits, values as they
  * are (their scale is linear, and the file says so), or of 8 bits. Errors: BST_ERR_MEMORY,

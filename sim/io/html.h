@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Text of an element or of a quoted attribute: & < > " ' become references; what is no UTF-8, and
  * control characters other than tab and line feed, become U+FFFD. NULL is "". */

@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* A mask and where the source `item` lies in it. */
 typedef struct bst_mask_item {

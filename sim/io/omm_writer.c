@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "sim/io/text_writer_internal.h"
 
 static void write_text(FILE *stream, const char *key, const char *text) {

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 #ifdef __cplusplus
 #define BST_NOEXCEPT noexcept

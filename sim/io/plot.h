@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* A plot that is being written: `script` takes gnuplot commands and inline data ("$name << EOD").
  */

@@ -1,8 +1,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "boresight/messages.h"
 #include "sim/io/plot.h"
-#include "sim/messages/messages.h"
 
 #define FLOOR_PX 0.01
 

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "sim/io/fits_image.h"
 
 /* OVERSAMP of the first image of two to `most_axes` axes; 0: there is none. */

@@ -3,7 +3,7 @@
 #ifndef BST_IO_PSF_FITS_H
 #define BST_IO_PSF_FITS_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 #include "sim/optics/psf.h"
 
 /* Longest side of the image. */

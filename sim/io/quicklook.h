@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef enum bst_io_mark_kind {
     BST_MARK_DETECTION,

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 #include "sim/io/run_internal.h"
 
 enum { MAX_PROBLEMS = 16 };

@@ -14,14 +14,14 @@ static const double INVERSE_PX = 1e-4;  /* aim of the inverse */
 typedef struct mapping {
     const bst_camera *camera;
     bst_quat q_gcrf_from_cam;
-    const bst_astro_light *light;
+    const bst_light *light;
     double x0, y0;         /* boresight */
     double cx, cy, hx, hy; /* middle and half sides of the sensor, px */
 } mapping;
 
 static bst_vec3 place(const mapping *m, double x, double y) {
     bst_vec3 cam = bst_camera_unproject(m->camera, x, y);
-    return bst_astro_light_catalogue_star(m->light, bst_quat_rotate(m->q_gcrf_from_cam, cam));
+    return bst_light_catalogue_star(m->light, bst_quat_rotate(m->q_gcrf_from_cam, cam));
 }
 
 static double evaluate(const double *c, int order, double u, double v) {
@@ -259,7 +259,7 @@ static void misfit(const bst_sip *sip, const pair *pairs, int count, double *for
     }
 }
 
-bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_astro_light *light,
+bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_light *light,
                  double crval_rad[2], double cd[2][2], bst_sip *out, double *residual_px) {
     double w = (double)camera->width_px, h = (double)camera->height_px;
     mapping m = {.camera = camera,

@@ -5,8 +5,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/camera.h"
 #include "sim/astro/bodies.h"
-#include "sim/optics/camera.h"
 
 #define BST_SIP_ORDER 9 /* the highest that readers know */
 #define BST_SIP_TERMS 55
@@ -32,7 +32,7 @@ static inline int bst_sip_term(int p, int q) {
  * sensor, of the lowest order that leaves less than 1e-5 px out, at most 9; the inverse by least
  * squares. *residual_px: the largest misfit of either over the sensor. False when the field is too
  * wide for one tangent plane. */
-bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_astro_light *light,
+bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_light *light,
                  double crval_rad[2], double cd_rad[2][2], bst_sip *out, double *residual_px);
 
 /* (U, V) of (u, v), and back; the inverse is that of the first polynomials, which the second ones

@@ -2,8 +2,8 @@
 #ifndef BST_IO_STATE_SERIES_H
 #define BST_IO_STATE_SERIES_H
 
+#include "boresight/vec.h"
 #include "sim/astro/time.h"
-#include "sim/core/vec.h"
 
 #ifdef __cplusplus
 extern "C" {

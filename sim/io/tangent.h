@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Tangent plane at a place: unit vectors to it, east and north. */
 typedef struct bst_io_sky_plane {

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "sim/io/text_writer_internal.h"
 
 bst_status bst_tdm_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,

@@ -46,7 +46,7 @@ static bst_status too_wide(bst_ctx *ctx) {
 }
 
 static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
-                                const bst_astro_light *light, bst_wcs *out) {
+                                const bst_light *light, bst_wcs *out) {
     double crval[2], cd[2][2];
     *out =
         (bst_wcs){.crpix = {bst_camera_centre_x(camera) + 1.0, bst_camera_centre_y(camera) + 1.0}};
@@ -63,7 +63,7 @@ static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat
 }
 
 bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
-                       const bst_astro_light *light, bst_wcs *out) {
+                       const bst_light *light, bst_wcs *out) {
     if (bst_camera_distorted(camera)) {
         return fit_distorted(ctx, camera, q_cam_from_gcrf, light, out);
     }
@@ -78,7 +78,7 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
         s->dx = half_x * (2.0 * (i % GRID) / (GRID - 1) - 1.0);
         s->dy = half_y * (2.0 * (i / GRID) / (GRID - 1) - 1.0);
         bst_vec3 cam = bst_camera_unproject(camera, cx + s->dx, cy + s->dy);
-        s->icrs = bst_astro_light_catalogue_star(light, bst_quat_rotate(q_gcrf_from_cam, cam));
+        s->icrs = bst_light_catalogue_star(light, bst_quat_rotate(q_gcrf_from_cam, cam));
     }
     double ra, dec, offset[2], cd[2][2];
     bst_vec3_to_radec(samples[GRID * GRID / 2].icrs, &ra, &dec);
@@ -115,7 +115,7 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
 
 double bst_wcs_distortion_misfit_px(const bst_camera *camera) {
     /* the Sun behind the camera, which looks along z, so that it deflects nothing */
-    const bst_astro_light at_rest = {.sun_m = {0.0, 0.0, -BST_AU_M}};
+    const bst_light at_rest = {.sun_m = {0.0, 0.0, -BST_AU_M}};
     const bst_quat q = {0.0, 0.0, 0.0, 1.0};
     double crval[2], cd[2][2], misfit;
     bst_sip sip;

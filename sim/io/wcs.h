@@ -3,10 +3,10 @@
 #ifndef BST_IO_WCS_H
 #define BST_IO_WCS_H
 
+#include "boresight/camera.h"
+#include "boresight/messages.h"
 #include "sim/astro/bodies.h"
 #include "sim/io/sip.h"
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
 
 /* FITS pixels count from 1. xi, eta (deg, east and north on the tangent plane at crval) =
  * cd * (pixel - crpix), the pixel undistorted by `sip`. Calabretta and Greisen (2002), section
@@ -25,7 +25,7 @@ typedef struct bst_wcs {
  * 9 x 9 grid of pixels; bst_sip_fit for a camera with distortion. BST_ERR_NUMERIC when the field is
  * too wide for one tangent plane. */
 bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
-                       const bst_astro_light *light, bst_wcs *out) BST_MUST_CHECK;
+                       const bst_light *light, bst_wcs *out) BST_MUST_CHECK;
 
 /* How far (px) the polynomials of a frame's solution miss the distortion of the camera, at worst
  * over the sensor, for an observer at rest: WCSRESID without aberration. 0 for a camera without

@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_CURVE_TEXT = 41 }; /* 32 bytes in Z85, and a zero */
 

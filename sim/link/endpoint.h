@@ -2,7 +2,7 @@
 #ifndef BST_LINK_ENDPOINT_H
 #define BST_LINK_ENDPOINT_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_LINK_ENDPOINT_BYTES = 128 };
 

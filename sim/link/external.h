@@ -2,9 +2,9 @@
 #ifndef BST_LINK_EXTERNAL_H
 #define BST_LINK_EXTERNAL_H
 
+#include "boresight/module.h"
 #include "sim/link/link.h"
 #include "sim/link/wire.h"
-#include "sim/messages/module.h"
 
 extern const bst_module_desc bst_external_imgproc_module;
 extern const bst_module_desc bst_external_tracker_module;

@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* Writes docs/icd.md (Markdown). BST_ERR_IO: the stream took less. */
 bst_status bst_link_icd(bst_ctx *ctx, FILE *out) BST_MUST_CHECK;

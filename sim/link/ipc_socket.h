@@ -5,7 +5,7 @@
 #include <sys/types.h>
 #include <time.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_ipc_socket {
     int fd; /* listening; the receiver closes it */

@@ -8,8 +8,8 @@
 #ifndef BST_LINK_LINK_H
 #define BST_LINK_LINK_H
 
+#include "boresight/config.h"
 #include "sim/astro/time.h"
-#include "sim/core/config.h"
 #include "sim/link/packet.h"
 #include "sim/link/payloads.h"
 

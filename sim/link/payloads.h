@@ -1,8 +1,8 @@
-/* The payloads that only the link has; the others are those of sim/messages/messages.h. */
+/* The payloads that only the link has; the others are those of include/boresight/messages.h. */
 #ifndef BST_LINK_PAYLOADS_H
 #define BST_LINK_PAYLOADS_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 enum { BST_LINK_NAME_BYTES = 64, BST_LINK_TEXT_BYTES = 256 };
 

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum {
     BST_LINK_SLOTS = 2,

@@ -1,4 +1,4 @@
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 #include <string.h>
 

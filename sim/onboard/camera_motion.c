@@ -1,4 +1,4 @@
-#include "sim/onboard/camera_motion.h"
+#include "boresight/camera_motion.h"
 
 static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int64_t n) {
     return &t->items[n % t->capacity];

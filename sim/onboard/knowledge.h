@@ -3,8 +3,8 @@
 #ifndef BST_ONBOARD_KNOWLEDGE_H
 #define BST_ONBOARD_KNOWLEDGE_H
 
+#include "boresight/messages.h"
 #include "sim/astro/belt.h"
-#include "sim/messages/messages.h"
 #include "sim/onboard/region.h"
 #include "sim/world/world.h"
 

@@ -77,7 +77,7 @@ bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int ob
     BST_TRY(bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, &eye, view->clock,
                                           world->epoch, &sky.bodies, t, false, &line, &target,
                                           &emission_s));
-    bst_astro_light light = bst_astro_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
+    bst_light light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
     bst_vec3 to_eye = bst_vec3_sub(eye.position_m, target.position_m);
     bst_vec3 to_sun = bst_vec3_sub(sky.bodies.sun_m, target.position_m);
     bst_astro_sunlight sunlight;
@@ -88,7 +88,7 @@ bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int ob
                              .light_time_s = t - emission_s,
                              .phase_rad = bst_vec3_angle(to_eye, to_sun),
                              .sunlit_fraction = sunlight.disc};
-    out->apparent = bst_astro_light_aberrate(&light, out->geometric);
+    out->apparent = bst_light_aberrate(&light, out->geometric);
     bst_scene_lighting lighting = {.area_m2 = info->area_m2,
                                    .albedo = info->albedo,
                                    .object_m = target.position_m,

@@ -12,10 +12,10 @@ void bst_nav_state_after(const bst_nav_telemetry *nav, double dt_s, bst_vec3 *po
     }
 }
 
-bst_astro_light bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s) {
+bst_light bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s) {
     bst_vec3 position_m, velocity_mps;
     bst_nav_state_after(nav, dt_s, &position_m, &velocity_mps);
     bst_vec3 gained_mps = bst_vec3_sub(velocity_mps, nav->velocity_gcrf_mps);
-    return (bst_astro_light){.velocity_mps = bst_vec3_add(nav->velocity_bary_mps, gained_mps),
-                             .sun_m = nav->sun_m};
+    return (bst_light){.velocity_mps = bst_vec3_add(nav->velocity_bary_mps, gained_mps),
+                       .sun_m = nav->sun_m};
 }

@@ -2,8 +2,8 @@
 #ifndef BST_ONBOARD_NAV_MOTION_H
 #define BST_ONBOARD_NAV_MOTION_H
 
+#include "boresight/messages.h"
 #include "sim/astro/bodies.h"
-#include "sim/messages/messages.h"
 
 /* The observer's geocentric state (GCRF, m and m/s) dt_s after the telemetry's tick, either sign:
  * two-body motion, or a straight line where the telemetry is no orbit (at rest, or straight up).
@@ -14,6 +14,6 @@ void bst_nav_state_after(const bst_nav_telemetry *nav, double dt_s, bst_vec3 *po
 /* What aberrates light that the observer receives dt_s after the telemetry's tick: its velocity of
  * that time. A low orbit's velocity turns by 8.5 m/s, 6 mas of aberration, each second. The Sun's
  * direction and the Earth's barycentric velocity are those of the telemetry. */
-bst_astro_light bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
+bst_light bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
 
 #endif

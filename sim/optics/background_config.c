@@ -1,4 +1,4 @@
-#include "sim/optics/background_config.h"
+#include "boresight/background_config.h"
 
 static const char *const models[] = {"uniform", "sky", NULL};
 

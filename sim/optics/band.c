@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/bodies.h"
-#include "sim/core/vec.h"
 #include "sim/optics/curve_file.h"
 #include "sim/optics/solar_table.h"
 

@@ -5,9 +5,9 @@
 #ifndef BST_OPTICS_BAND_H
 #define BST_OPTICS_BAND_H
 
+#include "boresight/band_config.h"
+#include "boresight/status.h"
 #include "sim/astro/bodies.h"
-#include "sim/core/status.h"
-#include "sim/optics/band_config.h"
 
 /* Immutable once made; shareable between threads. */
 typedef struct bst_band bst_band;

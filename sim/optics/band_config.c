@@ -1,4 +1,5 @@
-#include "sim/optics/band_config.h"
+#include "boresight/band_config.h"
+#include "sim/optics/band.h"
 
 static const char *const presets[] = {"v", "silicon", "swir", "mwir", "lwir", NULL};
 

@@ -1,4 +1,5 @@
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
+#include "sim/optics/band.h"
 
 #define DISTORTION(k, doc) BST_REAL(bst_camera_distortion, k, "", -1e30, 1e30, "0", doc)
 const bst_config_desc bst_distortion_config[] = {

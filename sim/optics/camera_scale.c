@@ -1,5 +1,5 @@
 /* Pixel scale, focal length and pixel pitch: which of them a camera gives, and the rest. */
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 
 /* How far given values may contradict each other: data sheets round to three digits or more. */
 static const double AGREES = 1e-3;

@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 
 /* The configuration's choice, and its words in this order. */
 enum { BST_COLUMN_LEVEL_AUTO, BST_COLUMN_LEVEL_ON, BST_COLUMN_LEVEL_OFF };

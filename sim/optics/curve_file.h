@@ -3,7 +3,7 @@
 #ifndef BST_OPTICS_CURVE_FILE_H
 #define BST_OPTICS_CURVE_FILE_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_CURVE_POINTS_MAX = 100000 };
 

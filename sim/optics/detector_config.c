@@ -1,4 +1,4 @@
-#include "sim/optics/detector_config.h"
+#include "boresight/detector_config.h"
 
 #include <math.h>
 

@@ -1,6 +1,6 @@
 #include <string.h>
 
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 
 /* The map u -> u L(r^2) + 2 u (q.u) + q r^2 with q = (p2, p1) is the gradient of a potential: its
  * Jacobian is symmetric. Where that is positive definite on a disc, the map is strictly monotone

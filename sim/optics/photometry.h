@@ -2,8 +2,8 @@
 #ifndef BST_OPTICS_PHOTOMETRY_H
 #define BST_OPTICS_PHOTOMETRY_H
 
-#include "sim/core/status.h"
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
+#include "boresight/status.h"
 
 typedef struct bst_optics_zero_point {
     int stars;          /* it comes from; 0: they were too few, and the others are 0 */

@@ -11,7 +11,8 @@
 
 #include <stdbool.h>
 
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
+#include "sim/optics/band.h"
 
 typedef struct bst_psf bst_psf;
 

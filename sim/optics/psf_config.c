@@ -1,4 +1,4 @@
-#include "sim/optics/psf_config.h"
+#include "boresight/psf_config.h"
 
 static const char *const psf_models[] = {"gaussian", "moffat", "diffraction", "file", NULL};
 static const char *const spectra[] = {"flat", "solar", "sources", NULL};

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "sim/optics/band.h"
 #include "sim/optics/psf_internal.h"
 #include "sim/optics/pupil.h"
 

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 enum { LEAST_PERIOD_PX = 64, MOST_FREQUENCIES = 1024 };
 

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Lines per cell on which a cell's open share is measured. */
 enum { LINES = 16 };

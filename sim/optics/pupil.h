@@ -3,7 +3,7 @@
 #ifndef BST_OPTICS_PUPIL_H
 #define BST_OPTICS_PUPIL_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 #include "sim/optics/zernike.h"
 
 /* An aperture of diameter 1. */

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 double bst_optics_image_squared(double along, double across, double length) {
     const double root_pi = sqrt(BST_PI);

@@ -2,7 +2,7 @@
 #ifndef BST_OPTICS_ZERNIKE_H
 #define BST_OPTICS_ZERNIKE_H
 
-#include "sim/optics/psf_config.h"
+#include "boresight/psf_config.h"
 
 /* Highest radial degree, that of term 37. */
 enum { BST_ZERNIKE_DEGREE = 8 };

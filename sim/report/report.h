@@ -4,11 +4,11 @@
 
 #include <stdio.h>
 
+#include "boresight/messages.h"
 #include "sim/engine/scenario/scenario.h"
 #include "sim/eval/loop_figures.h"
 #include "sim/io/chart.h"
 #include "sim/io/html.h"
-#include "sim/messages/messages.h"
 #include "sim/run/run_losses.h"
 #include "sim/run/run_observations.h"
 

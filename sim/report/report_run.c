@@ -5,8 +5,8 @@
 
 #include <cjson/cJSON.h>
 
+#include "boresight/version.h"
 #include "sim/core/text.h"
-#include "sim/core/version.h"
 #include "sim/export/export.h"
 #include "sim/report/report.h"
 

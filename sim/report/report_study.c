@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/version.h"
 #include "sim/core/text.h"
-#include "sim/core/version.h"
 
 /* Rows of tables that are shown at most; figures in a table of settings. */
 enum { MOST_SETTINGS = 200, MOST_FAILED = 50, MOST_WORST = 8, COLUMNS = 6 };

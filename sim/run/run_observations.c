@@ -111,7 +111,7 @@ typedef struct gathering {
 } gathering;
 
 /* The detection's place on the sky, and what its errors and the attitude's make of it. */
-static void measure(const gathering *g, const bst_io_rows *rows, const bst_astro_light *light,
+static void measure(const gathering *g, const bst_io_rows *rows, const bst_light *light,
                     bst_od_observation *out) {
     double x = bst_io_rows_real(rows, X_PX), y = bst_io_rows_real(rows, Y_PX);
     bst_quat back = bst_quat_conj(bst_quat_unit(
@@ -130,7 +130,7 @@ static void measure(const gathering *g, const bst_io_rows *rows, const bst_astro
         double sigma = bst_io_rows_real(rows, SIGMA + i) * BST_ARCSEC_RAD;
         c[2 + i][2 + i] = sigma * sigma;
     }
-    out->direction = bst_astro_light_unaberrate(light, bst_quat_rotate(back, v));
+    out->direction = bst_light_unaberrate(light, bst_quat_rotate(back, v));
     bst_tangent axes = bst_tangent_at(out->direction);
     double j[2][5];
     for (int i = 0; i < 5; i++) {
@@ -210,7 +210,7 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_io_rows *rows) {
         o->od.cov_12 = bst_io_rows_real(rows, COV_D + 1);
         o->od.cov_22 = bst_io_rows_real(rows, COV_D + 2);
     } else {
-        bst_astro_light light = bst_astro_light_at(&bodies, eye.position_m, eye.velocity_mps);
+        bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
         measure(g, rows, &light, &o->od);
         o->od.shared_change = change_of_stars(g, rows);
         g->share = bst_io_rows_real(rows, SHARED);

@@ -4,8 +4,8 @@
 #ifndef BST_RUN_RUN_PICTURES_H
 #define BST_RUN_RUN_PICTURES_H
 
+#include "boresight/messages.h"
 #include "sim/eval/loop_summary.h"
-#include "sim/messages/messages.h"
 
 typedef struct bst_run_pictures bst_run_pictures;
 

@@ -6,11 +6,11 @@
 
 #include <cjson/cJSON.h>
 
+#include "boresight/version.h"
 #include "sim/cli/cli.h"
 #include "sim/cli/plugins.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/core/json_number.h"
-#include "sim/core/version.h"
 #include "sim/core/wall_clock.h"
 #include "sim/device/device.h"
 #include "sim/engine/recorder/recorder.h"

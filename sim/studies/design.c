@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/studies/study_internal.h"
 
 bst_study_place bst_study_place_of(const bst_study *study, int64_t run) {

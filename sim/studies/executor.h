@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 /* One attempt at the runs first .. first + count - 1. */
 typedef struct bst_study_shard_job {

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/studies/study_internal.h"
 
 /* All designs of a study together, 128 MiB. */

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/rng.h"
 #include "sim/astro/tle.h"
-#include "sim/core/rng.h"
 #include "sim/core/text.h"
 #include "sim/studies/study_internal.h"
 

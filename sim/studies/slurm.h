@@ -10,8 +10,8 @@
 #ifndef BST_STUDIES_SLURM_H
 #define BST_STUDIES_SLURM_H
 
-#include "sim/core/config.h"
-#include "sim/core/status.h"
+#include "boresight/config.h"
+#include "boresight/status.h"
 #include "sim/studies/executor.h"
 
 /* What differs between clusters; one small JSON file. Texts are "" where nothing is asked for. */

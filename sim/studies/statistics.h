@@ -2,8 +2,8 @@
 #ifndef BST_STUDIES_STATISTICS_H
 #define BST_STUDIES_STATISTICS_H
 
-#include "sim/core/rng.h"
-#include "sim/core/status.h"
+#include "boresight/rng.h"
+#include "boresight/status.h"
 
 /* Of the values that are numbers; NAN where there are too few. */
 typedef struct bst_statistics {

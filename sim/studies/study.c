@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/version.h"
 #include "sim/core/fnv.h"
 #include "sim/core/text.h"
-#include "sim/core/version.h"
 #include "sim/studies/study_internal.h"
 
 static const double MOST_RUNS = 1e9;

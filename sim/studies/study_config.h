@@ -2,7 +2,7 @@
 #ifndef BST_STUDIES_STUDY_CONFIG_H
 #define BST_STUDIES_STUDY_CONFIG_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 typedef enum bst_study_kind_id { BST_STUDY_LOOP, BST_STUDY_PD, BST_STUDY_CUBES } bst_study_kind_id;
 

@@ -2,7 +2,7 @@
 #ifndef BST_STUDIES_STUDY_INTERNAL_H
 #define BST_STUDIES_STUDY_INTERNAL_H
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/studies/study.h"
 
 /* Reads the scenarios; relative paths start from the folder of `file`. */

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/version.h"
+#include "boresight/version.h"
 #include "sim/eval/detection_theory.h"
 #include "sim/studies/statistics.h"
 #include "sim/studies/tables_internal.h"

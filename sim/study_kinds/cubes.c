@@ -8,12 +8,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "boresight/rng.h"
+#include "boresight/version.h"
 #include "sim/cli/plugins.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/core/draft.h"
 #include "sim/core/folder.h"
-#include "sim/core/rng.h"
-#include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
 #include "sim/study_kinds/study_card.h"
 #include "sim/study_kinds/study_kinds.h"
@@ -152,7 +152,7 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
         .observer_gcrf_m = truth->observer_gcrf_m,
         .observer_gcrf_mps = truth->observer_gcrf_mps,
         .body_fraction = {truth->earth_fraction, truth->moon_fraction, truth->sun_fraction}};
-    const bst_astro_light light = {.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
+    const bst_light light = {.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
     if (truth->pixel_scale_arcsec > 0.0 && truth->pixel_scale_arcsec != camera.pixel_scale_arcsec) {
         BST_TRY(bst_world_camera_at_scale(ctx, c->camera, truth->pixel_scale_arcsec, &camera));
     }

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/version.h"
 #include "sim/core/json_number.h"
-#include "sim/core/version.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/manifest.h"
 

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 enum { BST_STUDY_DEVICES = 64, BST_STUDY_DEVICE_BYTES = 128 };
 

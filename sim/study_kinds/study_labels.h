@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 #include "sim/world/world.h"
 
 typedef struct bst_study_labels {

@@ -4,7 +4,7 @@
 #ifndef BST_WORLD_FRAME_UPDATES_H
 #define BST_WORLD_FRAME_UPDATES_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 #include "sim/world/world_config.h"
 
 /* The file of one sensor; immutable once made. */

@@ -2,7 +2,7 @@
 #ifndef BST_WORLD_NAME_INDEX_H
 #define BST_WORLD_NAME_INDEX_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_name_index bst_name_index;
 

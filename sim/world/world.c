@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/optics/band.h"
 #include "sim/optics/psf.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/orbit/ephemeris.h"

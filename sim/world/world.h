@@ -3,11 +3,11 @@
 #ifndef BST_WORLD_WORLD_H
 #define BST_WORLD_WORLD_H
 
+#include "boresight/camera.h"
+#include "boresight/config.h"
 #include "sim/astro/bodies.h"
 #include "sim/astro/forces.h"
 #include "sim/catalogue/stars.h"
-#include "sim/core/config.h"
-#include "sim/optics/camera.h"
 #include "sim/world/scene/brightness.h"
 
 typedef struct bst_world bst_world; /* immutable once made; shareable between threads */

@@ -2,12 +2,12 @@
 #ifndef BST_WORLD_WORLD_CONFIG_H
 #define BST_WORLD_WORLD_CONFIG_H
 
+#include "boresight/camera.h"
+#include "boresight/config.h"
+#include "boresight/messages.h"
 #include "sim/astro/time.h"
 #include "sim/catalogue/stars.h"
-#include "sim/core/config.h"
-#include "sim/messages/messages.h"
 #include "sim/onboard/region.h"
-#include "sim/optics/camera.h"
 #include "sim/world/scene/brightness_config.h"
 
 enum {

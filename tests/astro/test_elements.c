@@ -2,8 +2,8 @@
 
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/sgp4.h"
-#include "sim/core/vec.h"
 #include "tests/io/scratch.h"
 #include "tests/test_support.h"
 

@@ -2,7 +2,7 @@
 
 #include "sim/astro/geodesy.h"
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 static void known_points(void **state) {

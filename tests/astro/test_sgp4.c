@@ -3,7 +3,7 @@
 #include <float.h>
 #include <stdlib.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 /* The verification files of Vallado et al., AIAA 2006-6753, as Debian's python3-sgp4 has them. */

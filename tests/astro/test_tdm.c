@@ -1,6 +1,6 @@
 /* TDM files read: forms that the standard allows, and what is wrong with others. */
+#include "boresight/vec.h"
 #include "sim/astro/tdm.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 static const char whole[] =

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 /* Public element sets of the US space catalogue, June 2022. */

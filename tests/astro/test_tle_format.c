@@ -1,8 +1,8 @@
 /* Element sets written as two lines, against the lines of a catalogue. */
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "sim/astro/tle.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 /* What may differ between two writers of the same numbers: the classification, the sign of a zero's

@@ -11,7 +11,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 #include "tests/io/scratch.h"
 
 /* A reader of one kind of file. `read` opens a path, releases what it got and returns how it went.

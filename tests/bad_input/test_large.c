@@ -1,11 +1,11 @@
 /* Files of 200 MB: refused by size, or read within 10 s and 2 GiB. */
+#include "boresight/config.h"
 #include "sim/astro/elements.h"
 #include "sim/astro/frames.h"
 #include "sim/astro/oem.h"
 #include "sim/astro/state_table.h"
 #include "sim/astro/tle.h"
 #include "sim/catalogue/stars.h"
-#include "sim/core/config.h"
 #include "sim/io/fits_image.h"
 #include "tests/bad_input/faults.h"
 

@@ -67,8 +67,8 @@ static bst_nav_telemetry nav_at(double t, int64_t tick) {
     return nav;
 }
 
-static bst_astro_light light_of(const bst_nav_telemetry *nav) {
-    return (bst_astro_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m};
+static bst_light light_of(const bst_nav_telemetry *nav) {
+    return (bst_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m};
 }
 
 /* ---- a tracker of one target ---- */
@@ -173,8 +173,8 @@ bst_quat sim_body_with_pole_at(double t_s) {
     sim_options o = sim_defaults();
     scene s = {.o = &o};
     bst_nav_telemetry nav = nav_at(t_s, 0);
-    bst_astro_light light = light_of(&nav);
-    bst_vec3 y = bst_astro_light_aberrate(&light, target_direction(&s, t_s, false));
+    bst_light light = light_of(&nav);
+    bst_vec3 y = bst_light_aberrate(&light, target_direction(&s, t_s, false));
     bst_vec3 z = bst_vec3_perpendicular(y), x = bst_vec3_cross(y, z);
     bst_mat3 rows = {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, {z.x, z.y, z.z}}};
     return bst_quat_from_mat3(&rows);
@@ -228,8 +228,8 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
     out->attitude.q_cam_from_gcrf = bst_quat_mul(bst_quat_from_rotvec(noisy), x->q_tel_mid);
 
     bst_nav_telemetry nav = nav_at(t, x->mid_tick);
-    bst_astro_light light = light_of(&nav);
-    bst_vec3 apparent = bst_astro_light_aberrate(&light, target_direction(s, t, false));
+    bst_light light = light_of(&nav);
+    bst_vec3 apparent = bst_light_aberrate(&light, target_direction(s, t, false));
     bst_vec3 v = bst_quat_rotate(bst_quat_mul(bst_quat_from_rotvec(e), x->q_tel_mid), apparent);
     double px = v.x / v.z / SIM_PIXEL_RAD, py = v.y / v.z / SIM_PIXEL_RAD;
     bool in_field = v.z > 0.0 && fabs(px) < 511.5 && fabs(py) < 511.5;
@@ -245,7 +245,7 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
         bst_rng_normal2(noise_key, (uint64_t)frame, 2, a);
         bst_vec3 w = bst_vec3_unit(
             (bst_vec3){px * SIM_PIXEL_RAD + c * a[0], py * SIM_PIXEL_RAD + c * a[1], 1.0});
-        seen = bst_astro_light_unaberrate(
+        seen = bst_light_unaberrate(
             &light, bst_quat_rotate(bst_quat_conj(out->attitude.q_cam_from_gcrf), w));
     }
     bst_ctx ctx = {0};
@@ -356,12 +356,11 @@ void sim_run(const sim_options *o, sim_result *r) {
         }
         bst_nav_telemetry nav = nav_at(t, tick);
         if (n % 10 == 0) { /* the true apparent place, linear over 10 ms */
-            bst_astro_light light = light_of(&nav);
+            bst_light light = light_of(&nav);
             bst_nav_telemetry nav2 = nav_at(t + 0.01, tick + 60);
-            bst_astro_light light2 = light_of(&nav2);
-            apparent = bst_astro_light_aberrate(&light, target_direction(&s, t, false));
-            bst_vec3 next =
-                bst_astro_light_aberrate(&light2, target_direction(&s, t + 0.01, false));
+            bst_light light2 = light_of(&nav2);
+            apparent = bst_light_aberrate(&light, target_direction(&s, t, false));
+            bst_vec3 next = bst_light_aberrate(&light2, target_direction(&s, t + 0.01, false));
             apparent_step = bst_vec3_scale(bst_vec3_sub(next, apparent), 0.1);
         }
         bst_vec3 place = bst_vec3_axpy(apparent, (double)(n % 10), apparent_step);

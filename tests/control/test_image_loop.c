@@ -1,7 +1,7 @@
 /* The correction by image error in a loop without dynamics: the camera points at once where it is
  * told, wrong by a rotation that the loop has to find. */
+#include "boresight/rng.h"
 #include "control/loop/image_loop.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 #define TICKS 1000 /* a second */

@@ -1,6 +1,6 @@
 /* Ways round keep-out cones against closed forms on the sphere and a brute-force search. */
+#include "boresight/rng.h"
 #include "control/guidance/keep_out.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 #define DEG BST_DEG_RAD

@@ -1,6 +1,6 @@
 /* Axis angles of mounts, and the choice among turns and ways. */
+#include "boresight/rng.h"
 #include "control/guidance/mount_inverse_kinematics.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 #define DEG BST_DEG_RAD

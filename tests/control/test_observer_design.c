@@ -2,9 +2,9 @@
  * tenth of a period to ten, by the loop with the mount's true response. */
 #include "control/loop/observer_design.h"
 
+#include "boresight/vec.h"
 #include "control/control.h"
 #include "gimbal/mount/axis.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3

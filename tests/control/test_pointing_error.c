@@ -1,6 +1,6 @@
 /* The pointing-error compensator: steady gains, jitter left over, large errors, signs, outliers. */
+#include "boresight/rng.h"
 #include "control/loop/pointing_error.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 #define TICKS 1000

@@ -3,7 +3,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 static const double field = 0.8533 * BST_DEG_RAD;

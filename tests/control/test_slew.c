@@ -1,7 +1,7 @@
 /* Slews against closed forms and the bounds of what limits allow. */
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "control/guidance/slew.h"
-#include "sim/core/rng.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 #include <string.h>

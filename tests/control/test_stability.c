@@ -1,7 +1,7 @@
 /* Margins against closed forms, and stability against the roots of the closed loop. */
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "control/loop/stability.h"
-#include "sim/core/rng.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 enum { DEGREE = 6 };

@@ -1,8 +1,8 @@
 /* The linear model of the tracking loop against that loop stepped in time: the mount's servo at
  * 1 kHz, frames averaged over their exposure, corrections late. */
+#include "boresight/vec.h"
 #include "control/loop/tracking_loop.h"
 #include "gimbal/mount/axis.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3

@@ -2,7 +2,7 @@
 #include <cjson/cJSON.h>
 #include <stdlib.h>
 
-#include "sim/core/stage.h"
+#include "boresight/stage.h"
 #include "tests/test_support.h"
 
 typedef struct burn {

@@ -4,9 +4,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "boresight/messages.h"
 #include "sim/core/draft.h"
 #include "sim/core/file.h"
-#include "sim/messages/messages.h"
 #include "tests/test_support.h"
 
 static char folder[BST_TEST_PATH];

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 #include "tests/test_support.h"
 
 static void expect_refused(const char *text, size_t bytes, bst_status status, const char *message) {

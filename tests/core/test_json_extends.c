@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <sys/stat.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 #include "tests/io/scratch.h"
 #include "tests/test_support.h"
 

@@ -1,4 +1,4 @@
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 
 /* Known-answer vectors published with Random123 (file kat_vectors, philox4x32-10). */

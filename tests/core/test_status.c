@@ -1,5 +1,5 @@
 /* Messages: what they quote cannot write to a terminal or pretend to be a second message. */
-#include "sim/core/status.h"
+#include "boresight/status.h"
 #include "tests/test_support.h"
 
 static void keep(void *user, bst_log_level level, const char *message) {

@@ -1,4 +1,4 @@
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 static void assert_vec(bst_vec3 a, bst_vec3 e, double tol) {

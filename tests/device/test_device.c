@@ -1,5 +1,5 @@
+#include "boresight/rng.h"
 #include "bst_device_kernels.h"
-#include "sim/core/rng.h"
 #include "sim/device/device.h"
 #include "tests/test_support.h"
 

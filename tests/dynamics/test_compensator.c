@@ -1,6 +1,6 @@
 /* Compensators against the closed forms of their continuous and discrete responses. */
-#include "sim/core/vec.h"
-#include "sim/dynamics/compensator.h"
+#include "boresight/compensator.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 /* Rounding of a few dozen operations on numbers near one. */

@@ -1,6 +1,6 @@
 /* Designed loops against their specification, the loop worked out anew. */
-#include "sim/core/vec.h"
-#include "sim/dynamics/compensator.h"
+#include "boresight/compensator.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 typedef struct plant {

@@ -68,11 +68,11 @@ static inline void onboard_find_stars(onboard *o) {
         bst_stars_query(&o->ctx, bst_knowledge_stars(o->knowledge), boresight, 2.0 * BST_DEG_RAD,
                         INFINITY, bst_knowledge_julian_year(o->knowledge), found, 4096, &count));
     assert_true(count <= 4096);
-    bst_astro_light light = {o->nav.velocity_bary_mps, o->nav.sun_m};
+    bst_light light = {o->nav.velocity_bary_mps, o->nav.sun_m};
     o->star_count = 0;
     for (int i = 0; i < count; i++) {
         onboard_star star = {.id = found[i].id, .v_mag = (double)found[i].v_mag};
-        bst_vec3 apparent = bst_astro_light_apparent_star(&light, found[i].icrs);
+        bst_vec3 apparent = bst_light_apparent_star(&light, found[i].icrs);
         if (bst_camera_project(camera, bst_quat_rotate(o->q_true, apparent), &star.x_px,
                                &star.y_px) &&
             star.x_px > 10 && star.y_px > 10 && star.x_px < ONBOARD_SIDE - 11 &&

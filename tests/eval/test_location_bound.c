@@ -1,7 +1,7 @@
 /* The bound against closed forms of the finely sampled Gaussian and 25-digit sums over pixels. */
 #include "sim/eval/location_bound.h"
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 static bst_location_bound bound_of(const bst_eval_bound_source *source, double noise, bool shot,

@@ -1,7 +1,7 @@
 /* What the figures of a loop mean, frame by frame, against closed forms. */
 #include "sim/eval/loop_figures.h"
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 #include "tests/test_support.h"
 
 static const double px_rad = 2.5 * BST_ARCSEC_RAD;

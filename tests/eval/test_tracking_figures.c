@@ -1,6 +1,6 @@
 /* Chi-square bounds, the posterior bound and GOSPA against tables, closed forms and brute force. */
-#include "sim/core/rng.h"
-#include "sim/core/vec.h"
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "sim/eval/consistency.h"
 #include "sim/eval/gospa.h"
 #include "sim/eval/track_bound.h"

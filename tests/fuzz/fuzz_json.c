@@ -7,7 +7,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 #include "sim/world/world_config.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);

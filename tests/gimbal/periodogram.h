@@ -2,7 +2,7 @@
 #ifndef BST_TESTS_PERIODOGRAM_H
 #define BST_TESTS_PERIODOGRAM_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Periodogram of x at f: one-sided density, Hann window. */
 static inline double periodogram(const double *x, int count, double dt_s, double f) {

@@ -1,7 +1,7 @@
 /* One axis: the servo against the closed form, limits, slew time, lag. */
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "gimbal/mount/axis.h"
-#include "sim/core/rng.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 static bst_axis_spec spec_with(double damping) {

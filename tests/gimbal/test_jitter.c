@@ -1,8 +1,8 @@
 /* Jitter: RMS, spectrum, independence of the order of calls, a day without drift. */
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "gimbal/jitter/jitter.h"
-#include "sim/core/vec.h"
 #include "tests/gimbal/periodogram.h"
 #include "tests/test_support.h"
 

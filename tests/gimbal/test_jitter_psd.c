@@ -3,9 +3,9 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "boresight/vec.h"
 #include "gimbal/jitter/jitter_noise.h"
 #include "gimbal/jitter/jitter_spectrum.h"
-#include "sim/core/vec.h"
 #include "tests/gimbal/periodogram.h"
 #include "tests/test_support.h"
 

@@ -2,7 +2,7 @@
 # says extern "C", also as C++17.
 include(${CMAKE_CURRENT_LIST_DIR}/folders.cmake)
 set(flags -Wall -Wextra -Wshadow -Wconversion -Werror -D_POSIX_C_SOURCE=200809L -fsyntax-only
-  -I . -I ${BUILD} -I /usr/include/cjson)
+  -I include -I . -I ${BUILD} -I /usr/include/cjson)
 set(empty ${BUILD}/tests/headers/empty.c)
 file(WRITE ${empty} "")
 set(failures 0)

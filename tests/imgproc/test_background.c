@@ -1,7 +1,7 @@
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/detect/background.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 256 };

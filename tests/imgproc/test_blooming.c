@@ -2,7 +2,7 @@
  * overflow is drawn here, charge by charge, without the renderer. */
 #include <stdlib.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

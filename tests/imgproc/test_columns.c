@@ -1,8 +1,8 @@
 /* Columns with levels of their own, as a frame transfer under light leaves them. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/calibrate/columns.h"
-#include "sim/core/rng.h"
 #include "sim/optics/column_level.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"

@@ -1,8 +1,8 @@
 /* Bad pixels learned from frames: a sky that moves, pixels that do not, and a target at rest. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/calibrate/pixel_learner.h"
-#include "sim/core/rng.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

@@ -9,7 +9,7 @@ static void check(bst_camera camera) {
     bst_stars *stars = NULL;
     bst_assert_ok(&ctx, bst_stars_open(&ctx, "embedded", &stars));
     bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &camera));
-    bst_astro_light light = {{29000.0, -7000.0, 3000.0}, {1e11, 1.1e11, 0.2e11}};
+    bst_light light = {{29000.0, -7000.0, 3000.0}, {1e11, 1.1e11, 0.2e11}};
     bst_vec3 direction = bst_vec3_from_radec(1.4, -0.1);
     bst_quat q = bst_quat_look(direction, (bst_vec3){0.1, 0.3, 0.9});
     bst_window window = {1000, 200, 2000, 1500};
@@ -26,7 +26,7 @@ static void check(bst_camera camera) {
         bst_assert_ok(&ctx, bst_stars_find(&ctx, stars, e->id, 2022.46, &star));
         bst_vec3 apparent =
             bst_quat_rotate(bst_quat_conj(q), bst_camera_unproject(&camera, e->x_px, e->y_px));
-        bst_vec3 place = bst_astro_light_catalogue_star(&light, apparent);
+        bst_vec3 place = bst_light_catalogue_star(&light, apparent);
         bst_assert_close(bst_vec3_angle(place, star.icrs), 0.0, 1e-9);
         /* aberration is there: v/c sin(angle), up to 20 arcsec */
         assert_true(bst_vec3_angle(apparent, star.icrs) > 1e-5);
@@ -50,7 +50,7 @@ static void check(bst_camera camera) {
     assert_true(total > 10000 && total <= 60000);
     for (int i = 0; i < total; i++) {
         double x = 0, y = 0;
-        bst_vec3 v = bst_quat_rotate(q, bst_astro_light_apparent_star(&light, all[i].icrs));
+        bst_vec3 v = bst_quat_rotate(q, bst_light_apparent_star(&light, all[i].icrs));
         inside += bst_camera_project(&camera, v, &x, &y) && x >= 950 && x <= 3049 && y >= 150 &&
                   y <= 1749;
     }

@@ -2,8 +2,8 @@
  */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/detect/region_of_interest.h"
-#include "sim/core/rng.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

@@ -1,9 +1,9 @@
 /* Loops over rows against what they say, one element at a time. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/detect/background.h"
 #include "imgproc/detect/row_kernels.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 enum { PAD = 40, MOST = 150, LINE = MOST + 2 * PAD, ROWS = 16 };

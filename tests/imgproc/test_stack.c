@@ -2,9 +2,9 @@
  * among stars, hits and hot pixels, under a camera that turns, and at the edges. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/detect/background.h"
 #include "imgproc/stack/stack.h"
-#include "sim/core/rng.h"
 #include "sim/core/threshold_statistics.h"
 #include "tests/test_support.h"
 

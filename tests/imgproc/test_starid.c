@@ -1,7 +1,7 @@
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "imgproc/identify/starid.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 enum { MOST = 12000 };

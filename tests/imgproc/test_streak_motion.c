@@ -1,5 +1,5 @@
 /* Motion that the telemetry gets wrong, measured on the stars' own streaks. */
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "synthetic.h"
 #include "tests/test_support.h"
 

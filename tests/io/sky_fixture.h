@@ -20,16 +20,16 @@ static inline bst_camera fixture_camera(void) {
 }
 
 /* Aberration of about 20 arcsec and a Sun that is 90 deg away. */
-static inline bst_astro_light fixture_light(void) {
-    return (bst_astro_light){.velocity_mps = {20000.0, -21000.0, 9000.0},
-                             .sun_m = {2.0e10, 1.4e11, 5e10}};
+static inline bst_light fixture_light(void) {
+    return (bst_light){.velocity_mps = {20000.0, -21000.0, 9000.0},
+                       .sun_m = {2.0e10, 1.4e11, 5e10}};
 }
 
 /* Pixel (0-based) at which the camera shows an ICRS place, through ERFA alone. False when it is not
  * in front. */
 static inline bool fixture_project(const bst_camera *camera, bst_quat q_cam_from_gcrf,
-                                   const bst_astro_light *light, double ra_rad, double dec_rad,
-                                   double *x, double *y) {
+                                   const bst_light *light, double ra_rad, double dec_rad, double *x,
+                                   double *y) {
     double star[3], bent[3], seen[3], sun_to_observer[3], beta[3];
     eraS2c(ra_rad, dec_rad, star);
     double distance_m = bst_vec3_norm(light->sun_m);

@@ -57,7 +57,7 @@ static bst_fits_frame make_frame(bst_ctx *ctx, const bst_camera *camera, int64_t
     bst_time epoch;
     bst_assert_ok(ctx, bst_time_from_utc(ctx, "2022-06-16T23:59:58.25Z", &epoch));
     frame.start = bst_time_add(epoch, (double)id);
-    bst_astro_light light = fixture_light();
+    bst_light light = fixture_light();
     bst_quat q = bst_quat_look(bst_vec3_from_radec(1.0 + 0.001 * (double)id, -0.3),
                                (bst_vec3){0.3, 0.1, 1.0});
     bst_assert_ok(ctx, bst_wcs_fit(ctx, camera, q, &light, &frame.wcs));
@@ -115,7 +115,7 @@ static void write_places(bst_ctx *ctx, const char *path) {
     FILE *f = fopen(path, "w");
     assert_non_null(f);
     bst_camera camera = small_camera();
-    bst_astro_light light = fixture_light();
+    bst_light light = fixture_light();
     for (int64_t i = 0; i < FRAMES; i++) {
         bst_fits_frame frame = make_frame(ctx, &camera, i);
         bst_quat q = bst_quat_look(bst_vec3_from_radec(1.0 + 0.001 * (double)i, -0.3),

@@ -1,11 +1,11 @@
 /* Pictures, plots and the quicklook. With BST_KEEP_PICTURES=folder the pictures are left there. */
 #include <stdint.h>
 
-#include "sim/core/rng.h"
+#include "boresight/messages.h"
+#include "boresight/rng.h"
 #include "sim/io/picture.h"
 #include "sim/io/plot.h"
 #include "sim/io/quicklook.h"
-#include "sim/messages/messages.h"
 #include "tests/io/scratch.h"
 
 enum { SIZE = 512 };

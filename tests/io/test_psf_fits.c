@@ -7,7 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/io/scratch.h"
 #include "tests/test_support.h"
 

@@ -41,7 +41,7 @@ static void fit_agrees_with_the_camera(void **state) {
     (void)state;
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_astro_light light = fixture_light();
+    bst_light light = fixture_light();
     for (int i = 0; i < CASES; i++) {
         bst_camera camera = lens(&ctx, i);
         bst_wcs wcs;
@@ -70,7 +70,7 @@ static void plain_projection_without_distortion(void **state) {
     (void)state;
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_astro_light light = fixture_light();
+    bst_light light = fixture_light();
     bst_camera camera = fixture_camera();
     camera.rotation_deg = -37;
     camera.boresight_offset_px[0] = 100;
@@ -90,7 +90,7 @@ static void plain_projection_without_distortion(void **state) {
 
 static void write_case(bst_ctx *ctx, scratch *s, FILE *places, int i, bst_fits_layout layout) {
     bst_camera camera = lens(ctx, i);
-    bst_astro_light light = fixture_light();
+    bst_light light = fixture_light();
     bst_fits_info info = {.observer = "neossat",
                           .instrument = "lens",
                           .program = "boresight test",
@@ -116,7 +116,7 @@ static void write_case(bst_ctx *ctx, scratch *s, FILE *places, int i, bst_fits_l
         double x = 1023.0 * (k % 17) / 16.0, y = 767.0 * (double)(k / 17) / 16.0, ra, dec;
         bst_vec3 v =
             bst_quat_rotate(bst_quat_conj(attitude(i)), bst_camera_unproject(&camera, x, y));
-        bst_vec3_to_radec(bst_astro_light_catalogue_star(&light, v), &ra, &dec);
+        bst_vec3_to_radec(bst_light_catalogue_star(&light, v), &ra, &dec);
         fprintf(places, "%d %.15g %.15g %.15g %.15g\n", i, ra / BST_DEG_RAD, dec / BST_DEG_RAD,
                 (x + 0.5 - 500) / 2 - 0.5, (y + 0.5 - 300) / 2 - 0.5);
     }

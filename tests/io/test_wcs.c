@@ -16,7 +16,7 @@ static void test_against_erfa(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
     bst_camera camera = fixture_camera();
-    bst_astro_light light = fixture_light();
+    bst_light light = fixture_light();
     static const double places[][3] = {{123.4, 5.6, 30.0},  {0.05, -45.0, 200.0},
                                        {359.9, 12.0, 0.0},  {80.0, 89.9, 77.0},
                                        {10.0, -89.99, 1.0}, {270.0, 66.0, 90.0}};
@@ -57,7 +57,7 @@ static void test_exact_without_light(void **state) {
     bst_camera camera = fixture_camera();
     camera.width_px = 2048;
     camera.height_px = 333;
-    bst_astro_light still = {.velocity_mps = {0, 0, 0}, .sun_m = {0, 1e22, 0}}; /* no deflection */
+    bst_light still = {.velocity_mps = {0, 0, 0}, .sun_m = {0, 1e22, 0}}; /* no deflection */
     bst_quat q = look(200.0, -30.0, 10.0);
     bst_wcs wcs;
     bst_assert_ok(&ctx, bst_wcs_fit(&ctx, &camera, q, &still, &wcs));
@@ -81,7 +81,7 @@ static void test_window(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
     bst_camera camera = fixture_camera();
-    bst_astro_light light = fixture_light();
+    bst_light light = fixture_light();
     bst_wcs full;
     bst_assert_ok(&ctx, bst_wcs_fit(&ctx, &camera, look(33.0, 20.0, 50.0), &light, &full));
     bst_window window = {.x0 = 300, .y0 = 17, .width = 256, .height = 128};

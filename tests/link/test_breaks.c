@@ -8,7 +8,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/core/wall_clock.h"
 #include "sim/link/link.h"
 

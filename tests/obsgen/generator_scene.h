@@ -2,8 +2,8 @@
 #ifndef BST_TESTS_OBSGEN_GENERATOR_SCENE_H
 #define BST_TESTS_OBSGEN_GENERATOR_SCENE_H
 
+#include "boresight/vec.h"
 #include "obsgen/generator.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 1024, MOST = 1200 };

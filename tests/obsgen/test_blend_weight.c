@@ -1,6 +1,6 @@
 /* Where one source fitted to two lands, against the fit on pixels. */
+#include "boresight/vec.h"
 #include "obsgen/model/blend_weight.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 enum { REACH = 4 }; /* of the fitted pixels, from the brighter one's */

@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "obsgen/generator.h"
-#include "sim/core/rng.h"
-#include "sim/core/vec.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 

@@ -1,7 +1,7 @@
 /* Background and noise that long streaks are part of, against clipped pixels. */
+#include "boresight/rng.h"
+#include "boresight/vec.h"
 #include "obsgen/model/local_sky.h"
-#include "sim/core/rng.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 256, MESH = 64, TRIALS = 60 };

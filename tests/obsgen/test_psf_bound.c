@@ -1,6 +1,6 @@
 /* The tabulated bound of a PSF against that of a Gaussian and against sums over its OTF. */
+#include "boresight/vec.h"
 #include "obsgen/model/psf_bound.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 static void a_gaussian_has_its_own_bound(void **state) {

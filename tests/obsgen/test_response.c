@@ -1,6 +1,6 @@
 /* The answer of a filter to images that it was not made for, against sums over pixels. */
+#include "boresight/vec.h"
 #include "obsgen/model/response.h"
-#include "sim/core/vec.h"
 #include "sim/optics/psf_image.h"
 #include "tests/test_support.h"
 

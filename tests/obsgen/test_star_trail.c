@@ -1,6 +1,6 @@
 /* What the camera's true path does to streaks, against sums over the plane. */
+#include "boresight/vec.h"
 #include "obsgen/streak/star_trail.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 enum { STEPS = 401 };

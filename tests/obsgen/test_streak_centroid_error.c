@@ -1,7 +1,7 @@
 /* Where the top of the filters' output about a faint streak lies: against the bound where noise is
  * little, and against filtered pixels where it is much. */
+#include "boresight/vec.h"
 #include "obsgen/streak/streak_centroid_error.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 static const double LENGTH = 8.0, SIGMA = 0.9, FAR = 1.625;

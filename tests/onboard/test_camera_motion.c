@@ -1,7 +1,7 @@
 #include <stdlib.h>
 
-#include "sim/core/rng.h"
-#include "sim/onboard/camera_motion.h"
+#include "boresight/camera_motion.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 
 enum { CAPACITY = 64 };

@@ -148,11 +148,11 @@ static void a_velocity_error_is_aberration(void **state) {
     bst_assert_ok(&s.ctx, bst_world_view_nav(&s.ctx, s.view, 0, 0, 60, &own, &bodies));
     bst_assert_close(test_distance(own.velocity_mps, eye.velocity_mps), 1000, 1e-9);
     bst_assert_close(test_distance(own.position_m, eye.position_m), 0, 1e-9);
-    bst_astro_light wrong = bst_astro_light_at(&bodies, own.position_m, own.velocity_mps);
-    bst_astro_light right = bst_astro_light_at(&bodies, eye.position_m, eye.velocity_mps);
+    bst_light wrong = bst_light_at(&bodies, own.position_m, own.velocity_mps);
+    bst_light right = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
     bst_vec3 across = bst_vec3_unit(eye.position_m); /* at right angles to N */
-    double angle = bst_vec3_angle(bst_astro_light_aberrate(&wrong, across),
-                                  bst_astro_light_aberrate(&right, across));
+    double angle =
+        bst_vec3_angle(bst_light_aberrate(&wrong, across), bst_light_aberrate(&right, across));
     /* v/c of 1e-4 of it, from the velocity that both have */
     bst_assert_close(angle / BST_ARCSEC_RAD, 0.688, 1e-3);
     drop(&s);

@@ -30,7 +30,7 @@ static void circular_orbit(void **state) {
         bst_nav_state_after(&now, after_s[i], &position, &velocity);
         assert_near(position, then.position_gcrf_m, 1e-5); /* m: rounding of 7e6 m */
         assert_near(velocity, then.velocity_gcrf_mps, 1e-8);
-        bst_astro_light light = bst_nav_light_after(&now, after_s[i]);
+        bst_light light = bst_nav_light_after(&now, after_s[i]);
         assert_near(light.velocity_mps, then.velocity_bary_mps, 1e-8);
         assert_near(light.sun_m, now.sun_m, 0.0);
     }

@@ -4,8 +4,8 @@
 
 #include <unistd.h>
 
-#include "sim/core/vec.h"
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 static bst_band *band_of(int preset) {

@@ -1,5 +1,5 @@
 /* Focal-plane geometry, radiometry, and the brightness of a sphere, against numbers by hand. */
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 
 #include <string.h>
 

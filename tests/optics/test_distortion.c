@@ -1,6 +1,6 @@
 /* Rotation and distortion of the focal plane: the convention by hand, the inverse, folds, and the
  * helpers for those who linearise. */
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 #include "tests/test_support.h"
 
 static bst_camera make(double scale_arcsec, double rotation_deg, bst_camera_distortion d) {

@@ -1,5 +1,5 @@
 /* Zero point of a frame, on drawn magnitudes whose distribution is known. */
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/optics/photometry.h"
 #include "tests/test_support.h"
 

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/optics/band.h"
 #include "sim/optics/psf.h"
 #include "tests/test_support.h"
 

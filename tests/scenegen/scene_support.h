@@ -4,8 +4,8 @@
 
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "scenegen/renderer.h"
-#include "sim/core/rng.h"
 
 /* A camera like the demonstration's. */
 static inline bst_camera scene_camera(int width, int height) {

@@ -2,8 +2,8 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "scenegen/fourier/batch_fft.h"
-#include "sim/core/vec.h"
 #include "tests/test_support.h"
 
 /* Numbers without symmetry, of order one. */

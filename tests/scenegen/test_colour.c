@@ -2,6 +2,7 @@
  * are made of each source's spectrum alone. */
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
+#include "sim/optics/band.h"
 #include "sim/optics/psf.h"
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"

@@ -1,7 +1,7 @@
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "scenegen/smear/motion.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 
 static const double sigma_px = 0.85;

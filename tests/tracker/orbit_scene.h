@@ -4,8 +4,8 @@
 #ifndef BST_TESTS_ORBIT_SCENE_H
 #define BST_TESTS_ORBIT_SCENE_H
 
+#include "boresight/rng.h"
 #include "sim/astro/bodies.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 #include "tracker/mtt/tangent.h"
 #include "tracker/orbit/orbit_initial.h"

@@ -2,7 +2,7 @@
 #ifndef BST_TESTS_SKY_BENCH_H
 #define BST_TESTS_SKY_BENCH_H
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 #include "tracker/mtt/multitarget.h"
 

@@ -1,7 +1,7 @@
 /* Sparse assignment against exhaustive search. */
 #include <stdlib.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 #include "tracker/mtt/assignment.h"
 

@@ -1,5 +1,5 @@
 /* Attitude from stars against its bound, with wrong identities, and where it must say no. */
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 #include "tracker/attitude/attitude.h"
 #include "tracker/attitude/attitude_error.h"

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 
 #define AS BST_ARCSEC_RAD

@@ -1,6 +1,6 @@
 /* Whole tracks against theory: NEES and NIS over Monte Carlo runs, errors over the posterior
  * Cramer-Rao bound, without and with clutter, for each filter and association. */
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/eval/consistency.h"
 #include "sim/eval/track_bound.h"
 #include "tests/test_support.h"

@@ -2,7 +2,7 @@
  * manoeuvres, changes of brightness, false events. */
 #include <time.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 #include "tests/tracker/sky_bench.h"
 #include "tracker/mtt/multitarget.h"

@@ -1,7 +1,7 @@
 /* Many targets in clutter: identity through crossings, false tracks, load, misses. */
 #include <stdlib.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/tracker/pixel_tracker.h"
 
 #define MAX_DETECTIONS 8000

@@ -1,7 +1,7 @@
 /* Tracks on orbits: consistent while they are seen, and over gaps in which a constant rate is lost.
  */
+#include "boresight/rng.h"
 #include "sim/astro/kepler.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 #include "tests/tracker/geo_look.h"
 #include "tracker/mtt/multitarget.h"

@@ -1,5 +1,5 @@
 /* The filter on the sphere: motion, covariance, consistency, and the places where angles fail. */
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 #include "tracker/mtt/sky_filter.h"
 

@@ -3,8 +3,8 @@
  * jitter, a cue that is 0.6 degree wrong. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "sim/astro/bodies.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 #include "tracker/mtt/tangent.h"
 #include "tracker/tracker.h"
@@ -46,7 +46,7 @@ typedef struct world {
     bst_rng_key key;
     uint64_t draw;
     const options *o;
-    bst_astro_light light;
+    bst_light light;
     bst_detections *detections;
     bst_tracks *tracks;
     bst_predictions *predictions;
@@ -105,7 +105,7 @@ static void world_open(world *w, uint64_t seed, const options *o) {
     w->centre = bst_vec3_from_radec(359.7 * BST_DEG_RAD, -8.0 * BST_DEG_RAD);
     w->e1 = bst_vec3_unit(bst_vec3_cross((bst_vec3){0, 0, 1}, w->centre));
     w->e2 = bst_vec3_cross(w->centre, w->e1);
-    w->light = (bst_astro_light){.velocity_mps = nav.velocity_bary_mps, .sun_m = nav.sun_m};
+    w->light = (bst_light){.velocity_mps = nav.velocity_bary_mps, .sun_m = nav.sun_m};
     for (int i = 0; i < STARS; i++) {
         /* about 40 a field over the sky that the run crosses */
         w->stars[i] = at(w, 36000 * uniform(w) - 4000, 18000 * uniform(w) - 6000);
@@ -157,7 +157,7 @@ static bst_quat expose(world *w, int k) {
     *d = (bst_detections){.exposure_id = k,
                           .start_tick = (int64_t)k * RATE_HZ - RATE_HZ / 4,
                           .end_tick = (int64_t)k * RATE_HZ + RATE_HZ / 4};
-    bst_vec3 sight = bst_astro_light_aberrate(&w->light, target_direction(w, t, true));
+    bst_vec3 sight = bst_light_aberrate(&w->light, target_direction(w, t, true));
     bst_quat q_true = bst_quat_look(sight, w->e1);
     bst_vec3 wander = {3 * AS * sin(0.2 * t) + 0.6 * AS * normal(w),
                        3 * AS * cos(0.17 * t) + 0.6 * AS * normal(w), 2 * AS * normal(w)};
@@ -173,14 +173,14 @@ static bst_quat expose(world *w, int k) {
         if (bst_vec3_dot(w->stars[i], sight) < 0.9998) {
             continue; /* 1.1 degrees away */
         }
-        if (project(q_true, bst_astro_light_apparent_star(&w->light, w->stars[i]), &x, &y)) {
+        if (project(q_true, bst_light_apparent_star(&w->light, w->stars[i]), &x, &y)) {
             bool wrong = uniform(w) < 0.05;
             /* a misidentified star bears a neighbour's name */
             detect(w, x, y, 0.1, wrong ? 1 + (i + 1) % STARS : i + 1, 9.0);
         }
     }
     bool lit = !(o->dark && t >= o->dark_from_s);
-    bst_vec3 target = bst_astro_light_aberrate(&w->light, target_direction(w, t, true));
+    bst_vec3 target = bst_light_aberrate(&w->light, target_direction(w, t, true));
     if (lit && uniform(w) < o->pd && project(q_true, target, &x, &y)) {
         detect(w, x, y, o->sigma_px, 0, 13.0);
     }
@@ -190,7 +190,7 @@ static bst_quat expose(world *w, int k) {
         double tau = t - 150.0; /* all pass the target within 20 px about then */
         p[0] += o->neighbour_rate[n][0] * tau + 15.0 * (n - 1);
         p[1] += o->neighbour_rate[n][1] * tau + 20.0;
-        bst_vec3 apparent = bst_astro_light_aberrate(&w->light, at(w, p[0], p[1]));
+        bst_vec3 apparent = bst_light_aberrate(&w->light, at(w, p[0], p[1]));
         if (uniform(w) < o->pd && project(q_true, apparent, &x, &y)) {
             detect(w, x, y, o->sigma_px, 0, 13.0);
         }
@@ -551,7 +551,7 @@ static void late_navigation(void **state) {
     *d = (bst_detections){.start_tick = -RATE_HZ / 4, .end_tick = RATE_HZ / 4};
     d->q_telemetry_from_gcrf = d->q_cam_from_gcrf = q;
     for (uint32_t i = 0; i < STARS; i++) {
-        bst_vec3 apparent = bst_astro_light_apparent_star(&w.light, w.stars[i]);
+        bst_vec3 apparent = bst_light_apparent_star(&w.light, w.stars[i]);
         double x, y;
         if (bst_vec3_dot(w.stars[i], w.centre) > 0.9998 && project(q, apparent, &x, &y)) {
             d->items[d->count++] = (bst_detection){.label = BST_LABEL_STAR,

@@ -2,8 +2,8 @@
  * they wake as themselves. */
 #include "tracker/mtt/visibility.h"
 
+#include "boresight/rng.h"
 #include "sim/astro/kepler.h"
-#include "sim/core/rng.h"
 #include "tests/test_support.h"
 #include "tests/tracker/geo_look.h"
 

@@ -3,7 +3,7 @@
 #ifndef BST_TESTS_WORLD_LIT_SPHERE_H
 #define BST_TESTS_WORLD_LIT_SPHERE_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "tests/test_support.h"
 
 /* Mean direction beside the middle, second moments and total of the light, by elements of the

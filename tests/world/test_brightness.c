@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include "sim/optics/band.h"
 #include "sim/world/scene/field_objects.h"
 #include "tests/world/world_support.h"
 

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/world/scene/field_objects.h"
 #include "tests/world/world_support.h"
 

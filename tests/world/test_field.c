@@ -310,7 +310,7 @@ static void expect_no_star_missed(scene s) {
         fill(&s, cases[c][0], cases[c][1], cases[c][2] * BST_DEG_RAD, 0.2);
         for (int w = 0; w < 3; w++) {
             query(&s, 3000, windows[w]);
-            bst_astro_light light = {s.truth.velocity_bary_mps, s.truth.sun_m};
+            bst_light light = {s.truth.velocity_bary_mps, s.truth.sun_m};
             /* a wide cone stands for the whole sky, with proper motion to the same date */
             bst_vec3 centre = bst_quat_rotate(bst_quat_conj(s.target), (bst_vec3){0, 0, 1});
             int n = 0, there = 0;
@@ -318,7 +318,7 @@ static void expect_no_star_missed(scene s) {
                                                   6 * BST_DEG_RAD, 13, 2022.457, all, ROOM, &n));
             assert_true(n < ROOM);
             for (int i = 0; i < n; i++) {
-                bst_vec3 apparent = bst_astro_light_apparent_star(&light, all[i].icrs);
+                bst_vec3 apparent = bst_light_apparent_star(&light, all[i].icrs);
                 bool on = false;
                 for (int k = 0; k < s.track.count && !on; k += 10) {
                     double x, y;

@@ -1,6 +1,7 @@
 /* What the field query says of the colour of each source's light. */
 #include <stdlib.h>
 
+#include "sim/optics/band.h"
 #include "sim/optics/psf.h"
 #include "sim/world/scene/field.h"
 #include "tests/world/world_support.h"

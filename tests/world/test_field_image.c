@@ -2,7 +2,7 @@
  * vignetting, and what a matched filter gathers; against sums and integrals made here. */
 #include "sim/world/scene/field_image.h"
 
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 #include "tests/world/lit_sphere.h"
 
 #define SCALE (5.0 * BST_ARCSEC_RAD)

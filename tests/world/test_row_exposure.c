@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-#include "sim/core/rng.h"
+#include "boresight/rng.h"
 #include "sim/world/scene/field.h"
 #include "sim/world/scene/los_track.h"
 #include "tests/world/world_support.h"

@@ -59,7 +59,7 @@ static void light_time_is_consistent(void **state) {
         bst_assert_ok(&ctx,
                       bst_world_view_object_state(&ctx, view, 0, t - sight.light_time_s, &then));
         bst_vec3 path =
-            bst_astro_light_path(&bodies, then.position_m, eye.position_m, sight.light_time_s);
+            bst_light_path(&bodies, then.position_m, eye.position_m, sight.light_time_s);
         /* three rounds leave (v / c)^3 of the range: 40 um; positions round to 1e-8 m */
         bst_assert_close(bst_vec3_norm(path) / BST_LIGHT_SPEED_MPS, sight.light_time_s, 1e-12);
         bst_assert_close(test_distance(bst_vec3_unit(path), sight.geometric), 0, 1e-11);

@@ -155,8 +155,8 @@ static void stars_set_at_the_limb(void **state) {
     around.exposure_s = 1e-3;
     around.eye_mps = (bst_vec3){0, 5e3, 5.5e3};
     around.bodies.earth_bary_mps = (bst_vec3){0, 2e4, -2.2e4};
-    around.light = bst_astro_light_at(&around.bodies, eye, around.eye_mps);
-    bst_astro_light geocentric = bst_astro_light_at(&around.bodies, eye, (bst_vec3){0, 0, 0});
+    around.light = bst_light_at(&around.bodies, eye, around.eye_mps);
+    bst_light geocentric = bst_light_at(&around.bodies, eye, (bst_vec3){0, 0, 0});
     double to = asin(BST_EARTH_RADIUS_M / 7.2e6), scale = bst_camera_scale_rad(&camera);
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
@@ -168,9 +168,9 @@ static void stars_set_at_the_limb(void **state) {
         bst_vec3 d =
             bst_vec3_unit((bst_vec3){(i % 40 - 20) * 0.25 * scale, (i / 40 - 5) * 25 * scale, 1});
         double share = bst_discs_light(&discs, d).earth;
-        bst_vec3 star = bst_astro_light_catalogue_star(
-            &around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
-        bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_astro_light_apparent_star(&geocentric, star));
+        bst_vec3 star =
+            bst_light_catalogue_star(&around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
+        bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_light_apparent_star(&geocentric, star));
         bool occulted = bst_astro_earth_occults(eye, far, around.bodies.pole);
         hidden += occulted;
         seen += !occulted;

@@ -2,7 +2,7 @@
 #ifndef BST_TRACKER_ATTITUDE_ATTITUDE_H
 #define BST_TRACKER_ATTITUDE_ATTITUDE_H
 
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
 
 /* One identified star: where it should be seen and where it was. */
 typedef struct bst_attitude_star {

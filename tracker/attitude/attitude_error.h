@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 typedef struct bst_attitude_error_params {
     double rate_sigma_radps; /* 1 sigma per axis of the drift rate before any fix */

@@ -18,8 +18,7 @@ bool bst_tracker_frame_in_field(const void *user, bst_vec3 direction) {
     const bst_tracker_frame_view *f = user;
     const bst_camera *camera = &f->tracker->camera;
     double x, y, margin = f->tracker->edge_margin_px;
-    bst_vec3 v =
-        bst_quat_rotate(f->q_cam_from_gcrf, bst_astro_light_aberrate(&f->light, direction));
+    bst_vec3 v = bst_quat_rotate(f->q_cam_from_gcrf, bst_light_aberrate(&f->light, direction));
     return bst_camera_project(camera, v, &x, &y) && x >= margin && y >= margin &&
            x <= (double)(camera->width_px - 1) - margin &&
            y <= (double)(camera->height_px - 1) - margin;

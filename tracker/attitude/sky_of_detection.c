@@ -3,11 +3,11 @@
 bst_sky_measurement bst_sky_of_detection(const bst_camera *camera, const bst_detection *item,
                                          double extra_px2, bst_quat q_cam_from_gcrf,
                                          const double covariance_cam[3][3],
-                                         const bst_astro_light *light) {
+                                         const bst_light *light) {
     bst_vec3 v = bst_camera_unproject(camera, item->x_px, item->y_px);
     bst_quat back = bst_quat_conj(q_cam_from_gcrf);
     bst_vec3 apparent = bst_quat_rotate(back, v);
-    bst_sky_measurement m = {.direction = bst_astro_light_unaberrate(light, apparent)};
+    bst_sky_measurement m = {.direction = bst_light_unaberrate(light, apparent)};
     bst_tangent axes = bst_tangent_at(m.direction);
     double scale = bst_camera_scale_rad(camera) * v.z; /* rad per px towards the field's edge */
     /* derivatives of the direction by x, y (px) and by rotation about camera x, y, z */

@@ -3,7 +3,7 @@
 #ifndef BST_TRACKER_MTT_ASSIGNMENT_H
 #define BST_TRACKER_MTT_ASSIGNMENT_H
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_assignment bst_assignment; /* work space */
 

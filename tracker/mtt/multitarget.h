@@ -21,8 +21,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
+#include "boresight/status.h"
 #include "tracker/mtt/filter.h"
 #include "tracker/orbit/orbit_track.h"
 

@@ -3,7 +3,7 @@
 #ifndef BST_TRACKER_MTT_TANGENT_H
 #define BST_TRACKER_MTT_TANGENT_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Axes of the tangent plane at a unit vector. */
 typedef struct bst_tangent {

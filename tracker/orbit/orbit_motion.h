@@ -56,7 +56,7 @@ bst_status bst_od_path_state(bst_ctx *ctx, const bst_od_path *path, double time_
 
 /* What the observer sees: the unit vector, geometric as bst_track has it (light time in, aberration
  * out), from the observer at reception to the body at emission in the barycentric frame (see
- * bst_astro_light_path), and its rate; range_m is the length of the light's path. The light time is
+ * bst_light_path), and its rate; range_m is the length of the light's path. The light time is
  * solved on the body's path about `state` (that of reception) to third order in it: below 0.1 mm
  * within 0.3 s of light of the Earth. */
 typedef struct bst_od_sight {

@@ -7,7 +7,7 @@
  *
  *   "control": {"type": "standard", "compensator": {"plugin": "leaky.so", "gain_per_s": 0.4}}
  */
-#include "sim/onboard/stages.h"
+#include <boresight/stages.h>
 
 /* 1. What a scenario may set. */
 typedef struct config {

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/onboard/stages.h"
+#include <boresight/stages.h>
 
 /* 1. What a scenario may set: errors and `boresight schema` know it from this table. */
 typedef struct config {

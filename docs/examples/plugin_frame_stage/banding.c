@@ -10,8 +10,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/core/rng.h"
-#include "sim/onboard/stages.h"
+#include <boresight/rng.h>
+#include <boresight/stages.h>
 
 /* 1. What a scenario may set. */
 typedef struct config {

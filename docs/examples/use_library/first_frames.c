@@ -9,11 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/version.h"
-#include "sim/engine/simulation.h"
-#include "sim/registry/registry.h"
+#include <boresight/boresight.h>
 
-/* What the hooks below need from one message to the next. */
+/* What the observer below keeps from one message to the next. */
 typedef struct watch {
     bst_ctx *ctx;
     int64_t tracked; /* frames that the tracker has seen */
@@ -35,7 +33,8 @@ static bst_status print_frame(watch *w, const bst_frame_message *m) {
     return BST_OK;
 }
 
-/* Sees every message of every sensor. The payload's type follows from the channel: messages.h. */
+/* Sees every message of every sensor. The payload's type follows from the channel:
+ * boresight/messages.h. */
 static bst_status on_message(void *user, const char *scope, const char *channel,
                              const void *payload, int64_t tick) {
     watch *w = user;
@@ -62,32 +61,23 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
 }
 
 static bst_status run(bst_ctx *ctx, const char *path, int64_t frames) {
-    bst_json *json = NULL;
-    bst_scenario scenario;
-    bst_simulation *simulation = NULL;
-    BST_TRY(bst_json_load_extended(ctx, path, &json));
-    bst_status status = bst_json_set(ctx, json, "/record/frames=none");
+    const char *const assignments[] = {"/record/frames=none"};
+    const bst_sim_options options = {.threads = 1};
+    watch w = {.ctx = ctx};
+    const bst_sim_observer observer = {.user = &w, .message = on_message};
+    bst_model *model = NULL;
+    bst_sim *sim = NULL;
+    BST_TRY(bst_model_load(ctx, path, assignments, 1, &model));
+    bst_status status = bst_sim_create(ctx, model, &options, &sim);
     if (status == BST_OK) {
-        status = bst_scenario_read(ctx, json, bst_registry_shipped(), &scenario);
-        const bst_simulation_options options = {.device = NULL, .threads = 1};
-        if (status == BST_OK) {
-            status = bst_simulation_create(ctx, &scenario, &options, &simulation);
-        }
-        if (status == BST_OK) {
-            watch w = {.ctx = ctx};
-            const bst_engine_hooks hooks = {.user = &w, .message = on_message};
-            bst_engine *engine = bst_simulation_engine(simulation);
-            bst_engine_set_hooks(engine, &hooks);
-            /* a tenth of a second at a time, until enough frames went through the whole chain */
-            for (int64_t tick = 0; status == BST_OK && w.tracked < frames;) {
-                tick += scenario.tick_rate_hz / 10;
-                status = bst_engine_run(ctx, engine, tick);
-            }
-        }
-        bst_simulation_free(simulation);
-        bst_scenario_free(&scenario);
+        bst_sim_observe(sim, &observer);
     }
-    bst_json_free(json);
+    /* a tenth of a second at a time, until enough frames went through the whole chain */
+    for (int tenths = 1; status == BST_OK && w.tracked < frames; tenths++) {
+        status = bst_sim_run_until(ctx, sim, tenths / 10.0);
+    }
+    bst_sim_free(sim);
+    bst_model_free(model);
     return status;
 }
 

@@ -2,9 +2,9 @@
 #ifndef BST_ANALYSIS_CALIBRATION_CALIBRATE_H
 #define BST_ANALYSIS_CALIBRATION_CALIBRATE_H
 
+#include "boresight/camera.h"
+#include "boresight/messages.h"
 #include "obsgen/calibration.h"
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
 
 typedef struct bst_calibration_fitter bst_calibration_fitter;
 

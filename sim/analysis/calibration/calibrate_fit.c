@@ -1,7 +1,7 @@
 #include <math.h>
 
+#include "boresight/vec.h"
 #include "sim/analysis/calibration/calibrate_internal.h"
-#include "sim/core/vec.h"
 
 /* Least numbers for a fit. */
 enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30 };

@@ -8,9 +8,9 @@
 
 #include <cjson/cJSON.h>
 
+#include "boresight/rng.h"
 #include "sim/analysis/calibration/pairing.h"
 #include "sim/analysis/calibration/watch.h"
-#include "sim/core/rng.h"
 #include "sim/core/text.h"
 #include "sim/io/manifest.h"
 

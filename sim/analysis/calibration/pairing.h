@@ -2,7 +2,7 @@
 #ifndef BST_ANALYSIS_CALIBRATION_PAIRING_H
 #define BST_ANALYSIS_CALIBRATION_PAIRING_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 
 /* Room for one frame's pairs. All zero: empty. */
 typedef struct bst_pairing {

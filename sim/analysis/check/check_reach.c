@@ -47,8 +47,8 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds,
     BST_TRY(bst_knowledge_cue_range_at(ctx, s->cue, seconds, &known, &out->range_m, &rate));
     out->range_m = known ? out->range_m : 0.0;
     BST_TRY(bst_world_view_nav(ctx, s->view, s->observer, s->sensor, seconds, &state, &bodies));
-    bst_astro_light light = bst_astro_light_at(&bodies, state.position_m, state.velocity_mps);
-    out->direction_gcrf = bst_astro_light_aberrate(&light, direction);
+    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
+    out->direction_gcrf = bst_light_aberrate(&light, direction);
     out->position_m = state.position_m;
     bst_spacecraft_law_inputs inputs = {.position_m = state.position_m,
                                         .velocity_mps = state.velocity_mps,

@@ -1,8 +1,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "sim/analysis/loop/loop_model.h"
-#include "sim/core/vec.h"
 #include "sim/io/plot.h"
 
 static const double two_pi = 2.0 * BST_PI;

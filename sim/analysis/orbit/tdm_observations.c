@@ -61,8 +61,8 @@ static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const bst_oem
     o->od.cov_11 = o->od.cov_22 = variance;
     o->od.direction = bst_vec3_from_radec(a->ra_rad, a->dec_rad);
     if (q->aberrated) {
-        bst_astro_light light = bst_astro_light_at(&bodies, eye->position_m, eye->velocity_mps);
-        o->od.direction = bst_astro_light_unaberrate(&light, o->od.direction);
+        bst_light light = bst_light_at(&bodies, eye->position_m, eye->velocity_mps);
+        o->od.direction = bst_light_unaberrate(&light, o->od.direction);
     }
     return BST_OK;
 }

@@ -2,8 +2,8 @@
 #ifndef BST_ENGINE_KERNEL_ENGINE_H
 #define BST_ENGINE_KERNEL_ENGINE_H
 
+#include "boresight/module.h"
 #include "sim/engine/kernel/pacing.h"
-#include "sim/messages/module.h"
 
 typedef struct bst_engine bst_engine;
 

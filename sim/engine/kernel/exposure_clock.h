@@ -2,7 +2,7 @@
 #ifndef BST_ENGINE_KERNEL_EXPOSURE_CLOCK_H
 #define BST_ENGINE_KERNEL_EXPOSURE_CLOCK_H
 
-#include "sim/messages/module.h"
+#include "boresight/module.h"
 
 /* Role "exposure", type "clock"; its configuration is the sensor's "exposure" block
  * (bst_exposure_config). Reads sensor_command at each exposure's start, publishes `exposure` at its

@@ -4,7 +4,7 @@
 #ifndef BST_ENGINE_KERNEL_PACING_H
 #define BST_ENGINE_KERNEL_PACING_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 typedef enum bst_pacing_mode {
     BST_PACING_LOCKSTEP, /* as quickly as the work and the answers of peers allow */

@@ -2,11 +2,11 @@
 #ifndef BST_ENGINE_RECORDER_RECORDER_H
 #define BST_ENGINE_RECORDER_RECORDER_H
 
+#include "boresight/camera.h"
+#include "boresight/config.h"
+#include "boresight/messages.h"
 #include "sim/astro/time.h"
-#include "sim/core/config.h"
 #include "sim/io/run_store.h"
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
 
 typedef enum bst_recorder_frames {
     BST_RECORD_EXTENSIONS,

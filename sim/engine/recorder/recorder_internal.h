@@ -35,7 +35,7 @@ typedef struct bst_recorder_truth_head {
     int64_t exposure_id;
     bst_quat q_cam_from_gcrf_mean;
     bst_vec3 observer_gcrf_m, observer_gcrf_mps;
-    bst_astro_light light;
+    bst_light light;
     double pixel_scale_arcsec;
     double body_fraction[3]; /* as bst_fits_frame */
 } bst_recorder_truth_head;

@@ -7,8 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "sim/core/version.h"
-#include "sim/onboard/stages.h"
+#include "boresight/stages.h"
+#include "boresight/version.h"
 
 static bst_status check_modules(bst_ctx *ctx, const bst_plugin *plugin) {
     for (int i = 0; plugin->modules && plugin->modules[i]; i++) {

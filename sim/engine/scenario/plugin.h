@@ -2,9 +2,9 @@
 #ifndef BST_ENGINE_SCENARIO_PLUGIN_H
 #define BST_ENGINE_SCENARIO_PLUGIN_H
 
+#include "boresight/module.h"
+#include "boresight/stage.h"
 #include "sim/core/sha256.h"
-#include "sim/core/stage.h"
-#include "sim/messages/module.h"
 
 /* What such a library defines, one of the two or both: lists that NULL ends,
  *     const bst_module_desc *const bst_plugin_modules[] = {&my_module, NULL};

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* WGS-72, as SGP4 has it: m^3/s^2, m. */
 static const double MU_72 = 3.986008e14, RADIUS_72_M = 6378135.0;

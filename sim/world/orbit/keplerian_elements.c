@@ -1,7 +1,7 @@
 /* Keplerian elements as scenarios give them. */
 #include <math.h>
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 #include "sim/world/world_config.h"
 
 static const double AGREES = 1e-6; /* of the radius; degrees of an anomaly */

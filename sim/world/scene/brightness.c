@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "sim/astro/bodies.h"
+#include "sim/optics/band.h"
 #include "sim/optics/curve_file.h"
 #include "sim/world/world.h"
 

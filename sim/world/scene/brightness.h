@@ -2,9 +2,9 @@
 #ifndef BST_WORLD_SCENE_BRIGHTNESS_H
 #define BST_WORLD_SCENE_BRIGHTNESS_H
 
+#include "boresight/camera.h"
+#include "boresight/vec.h"
 #include "sim/astro/bodies.h"
-#include "sim/core/vec.h"
-#include "sim/optics/camera.h"
 #include "sim/world/scene/brightness_config.h"
 
 /* A brightness ready to be evaluated; immutable, may serve many objects. */

@@ -3,7 +3,7 @@
 #ifndef BST_WORLD_SCENE_BRIGHTNESS_CONFIG_H
 #define BST_WORLD_SCENE_BRIGHTNESS_CONFIG_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
 
 enum { BST_BRIGHTNESS_SPHERE, BST_BRIGHTNESS_STANDARD, BST_BRIGHTNESS_LIGHT_CURVE };
 

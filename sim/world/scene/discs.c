@@ -1,5 +1,7 @@
 #include "sim/world/scene/discs.h"
 
+#include "sim/optics/band.h"
+
 #include "sim/world/scene/stray.h"
 
 /* Share of the Moon's light that comes evenly from its whole disc: what keeps a thin crescent from
@@ -96,12 +98,12 @@ static void make_earth(const bst_camera *camera, const bst_scene_surroundings *a
                    pow(10.0, -0.4 * bst_scene_moon_v_mag(a->bodies.moon_m, sun_from_moon));
     /* aberration by the observer's motion about the Earth turns all directions near the boresight
      * alike */
-    bst_astro_light moving = {a->eye_mps, a->light.sun_m};
+    bst_light moving = {a->eye_mps, a->light.sun_m};
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         bst_vec3 eye = eye_at(a, a->exposure_s * ((double)k / BST_DISC_PARTS - 0.5));
         bst_quat back = bst_quat_conj(a->q[k]);
         bst_vec3 apparent = bst_quat_rotate(back, (bst_vec3){0, 0, 1});
-        bst_vec3 geometric = bst_astro_light_unaberrate(&moving, apparent);
+        bst_vec3 geometric = bst_light_unaberrate(&moving, apparent);
         bst_quat turn = bst_quat_from_rotvec(bst_vec3_cross(apparent, geometric));
         bst_vec3 axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
         for (int i = 0; i < 3; i++) {
@@ -126,11 +128,11 @@ static void make_round(const bst_camera *camera, const bst_scene_surroundings *a
     bst_vec3 place = moon ? a->bodies.moon_m : a->bodies.sun_m;
     double radius = moon ? BST_MOON_RADIUS_M : BST_SUN_RADIUS_M;
     d->present = moon ? camera->background.moon : camera->background.sun;
-    bst_astro_light moving = {moon ? a->eye_mps : a->light.velocity_mps, a->light.sun_m};
+    bst_light moving = {moon ? a->eye_mps : a->light.velocity_mps, a->light.sun_m};
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         bst_vec3 eye = eye_at(a, a->exposure_s * ((double)k / BST_DISC_PARTS - 0.5));
         bst_vec3 seen = bst_vec3_unit(bst_vec3_sub(place, eye));
-        d->centre[k] = bst_quat_rotate(a->q[k], bst_astro_light_aberrate(&moving, seen));
+        d->centre[k] = bst_quat_rotate(a->q[k], bst_light_aberrate(&moving, seen));
         d->sun[k] = bst_quat_rotate(a->q[k], bst_vec3_unit(bst_vec3_sub(a->bodies.sun_m, place)));
     }
     bst_vec3 from_eye = bst_vec3_sub(place, a->eye_m);

@@ -2,9 +2,9 @@
 #ifndef BST_WORLD_SCENE_DISCS_H
 #define BST_WORLD_SCENE_DISCS_H
 
+#include "boresight/camera.h"
+#include "boresight/messages.h"
 #include "sim/astro/bodies.h"
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
 
 /* Stretches of the exposure in which an edge is taken to move evenly. */
 enum { BST_DISC_PARTS = 8 };
@@ -14,7 +14,7 @@ typedef struct bst_scene_surroundings {
     bst_vec3 eye_m, eye_mps; /* observer at mid-exposure, GCRF */
     bst_bodies bodies;       /* at mid-exposure, as the rotation */
     bst_mat3 itrf_from_gcrf;
-    bst_astro_light light;          /* of the observer */
+    bst_light light;                /* of the observer */
     bst_quat q[BST_DISC_PARTS + 1]; /* q_cam_from_gcrf at equidistant times, start to end */
     double exposure_s;
     double v_limit,

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/optics/band.h"
 #include "sim/optics/psf.h"
 #include "sim/world/scene/field_image.h"
 #include "sim/world/scene/field_objects.h"
@@ -314,8 +315,8 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     BST_TRY(bst_world_view_bodies(ctx, field->view, mid_s, &bodies));
     bst_astro_earth_frames frames;
     BST_TRY(bst_world_view_earth_frames(ctx, field->view, mid_s, &frames));
-    bst_astro_light light = bst_astro_light_at(&bodies, eye.position_m, eye.velocity_mps);
-    bst_astro_light geocentric = bst_astro_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
+    bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+    bst_light geocentric = bst_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
 
     truth->start_tick = start_tick;
     truth->end_tick = end_tick;
@@ -385,7 +386,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
     for (int i = 0; i < star_count; i++) {
         const bst_star *star = &field->stars[i];
-        bst_vec3 apparent = bst_astro_light_apparent_star(&light, star->icrs);
+        bst_vec3 apparent = bst_light_apparent_star(&light, star->icrs);
         if (!near_window(field, field->q_mid, apparent, window, margin_px)) {
             continue;
         }
@@ -405,7 +406,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         }
         /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
          * move with the Earth, stands for the star */
-        bst_vec3 ray = bst_astro_light_apparent_star(&geocentric, star->icrs);
+        bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
         s->occulted = bst_astro_earth_occults(
             eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray), bodies.pole);
         if (s->occulted) {

@@ -3,7 +3,7 @@
 #ifndef BST_WORLD_SCENE_FIELD_H
 #define BST_WORLD_SCENE_FIELD_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 #include "sim/world/world.h"
 
 /* Apparent motion of an object during an exposure, at equidistant times from its start to its end.

@@ -1,3 +1,4 @@
+#include "sim/optics/band.h"
 #include "sim/world/world.h"
 
 double bst_world_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad,

@@ -3,7 +3,7 @@
 #ifndef BST_WORLD_SCENE_SKYLIGHT_H
 #define BST_WORLD_SCENE_SKYLIGHT_H
 
-#include "sim/messages/messages.h"
+#include "boresight/messages.h"
 #include "sim/world/scene/discs.h"
 #include "sim/world/world.h"
 

@@ -3,9 +3,9 @@
 #ifndef BST_WORLD_SCENE_STRAY_H
 #define BST_WORLD_SCENE_STRAY_H
 
+#include "boresight/background_config.h"
+#include "boresight/status.h"
 #include "sim/astro/bodies.h"
-#include "sim/core/status.h"
-#include "sim/optics/background_config.h"
 
 #define BST_MOON_RADIUS_M 1737400.0 /* IAU mean radius */
 

@@ -211,13 +211,12 @@ static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, int obj
         if (i > 0) {
             BST_TRY(place_of(ctx, view, object, e->seconds - tau, source, emitted_m, &velocity));
         }
-        geometric = bst_astro_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
+        geometric = bst_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
         tau = bst_vec3_norm(geometric) / BST_LIGHT_SPEED_MPS;
     }
-    bst_astro_light light =
-        bst_astro_light_at(&e->sky.bodies, e->state.position_m, e->state.velocity_mps);
+    bst_light light = bst_light_at(&e->sky.bodies, e->state.position_m, e->state.velocity_mps);
     out->geometric = bst_vec3_unit(geometric);
-    out->apparent = bst_astro_light_aberrate(&light, out->geometric);
+    out->apparent = bst_light_aberrate(&light, out->geometric);
     out->range_m = bst_vec3_norm(bst_vec3_sub(e->state.position_m, *emitted_m));
     out->light_time_s = tau;
     return BST_OK;

@@ -2,7 +2,7 @@
 #ifndef BST_WORLD_SCENE_ZODIACAL_H
 #define BST_WORLD_SCENE_ZODIACAL_H
 
-#include "sim/core/vec.h"
+#include "boresight/vec.h"
 
 /* Surface brightness in S10: stars like the Sun of V = 10 per square degree, as seen from 1 au.
  *

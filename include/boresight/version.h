@@ -1,6 +1,8 @@
 /* The version of the library that is running. */
-#ifndef BST_CORE_VERSION_H
-#define BST_CORE_VERSION_H
+#ifndef BORESIGHT_VERSION_H
+#define BORESIGHT_VERSION_H
+
+#pragma GCC visibility push(default)
 
 #ifdef __cplusplus
 extern "C" {
@@ -14,5 +16,7 @@ const char *bst_version_git_revision(void);
 #ifdef __cplusplus
 }
 #endif
+
+#pragma GCC visibility pop
 
 #endif

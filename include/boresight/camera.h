@@ -1,17 +1,19 @@
 /* The camera: focal-plane geometry, radiometry and detector numbers, one description for rendering,
  * truth and the onboard side. */
-#ifndef BST_OPTICS_CAMERA_H
-#define BST_OPTICS_CAMERA_H
+#ifndef BORESIGHT_CAMERA_H
+#define BORESIGHT_CAMERA_H
 
 #include <math.h>
 #include <stdbool.h>
 
-#include "sim/core/config.h"
-#include "sim/core/vec.h"
-#include "sim/optics/background_config.h"
-#include "sim/optics/band.h"
-#include "sim/optics/detector_config.h"
-#include "sim/optics/psf_config.h"
+#include "boresight/background_config.h"
+#include "boresight/band_config.h"
+#include "boresight/config.h"
+#include "boresight/detector_config.h"
+#include "boresight/psf_config.h"
+#include "boresight/vec.h"
+
+#pragma GCC visibility push(default)
 
 /* Lens distortion in the focal plane's tangent coordinates u = (x, y), r^2 = x^2 + y^2, in units of
  * the focal length (Brown 1971, Photogrammetric Engineering 37, 855; the sign and order of the
@@ -58,7 +60,7 @@ typedef struct bst_camera {
                                   optics, aperture or scale are changed must clear it */
     bst_detector_config detector;
     bst_band_config band;
-    const bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
+    const struct bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
                                  photon_flux_v0_per_s_m2, the same for all colours */
     bst_background_config background;
     const struct bst_scene_pst *pst; /* made from `background` and kept by the world; NULL: none */
@@ -196,5 +198,7 @@ double bst_camera_optics_e_per_s(const bst_camera *c);
 double bst_camera_background_e_per_s(const bst_camera *c);
 /* Mean dark current at the detector's temperature, e-/s, without hot pixels and maps. */
 double bst_camera_dark_e_per_s(const bst_camera *c);
+
+#pragma GCC visibility pop
 
 #endif

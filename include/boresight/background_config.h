@@ -1,11 +1,13 @@
 /* The block `background` of a camera: the light that fills its pixels between the sources. All zero
  * is a uniform sky of background_mag_arcsec2. */
-#ifndef BST_OPTICS_BACKGROUND_CONFIG_H
-#define BST_OPTICS_BACKGROUND_CONFIG_H
+#ifndef BORESIGHT_BACKGROUND_CONFIG_H
+#define BORESIGHT_BACKGROUND_CONFIG_H
 
 #include <stdbool.h>
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
+
+#pragma GCC visibility push(default)
 
 enum { BST_BACKGROUND_UNIFORM, BST_BACKGROUND_SKY };
 
@@ -29,5 +31,7 @@ typedef struct bst_background_config {
 } bst_background_config;
 
 extern const bst_config_desc bst_background_config_table[];
+
+#pragma GCC visibility pop
 
 #endif

@@ -1,8 +1,8 @@
 /* Philox4x32-10 (Salmon, Moraes, Dror and Shaw, "Parallel random numbers: as easy as 1, 2, 3",
  * SC11, 2011), for C17 and OpenCL C alike. A counter-based generator: the same key and counter give
  * the same four words on every device, whatever the order in which they are asked for. */
-#ifndef BST_CORE_PHILOX_SHARED_H
-#define BST_CORE_PHILOX_SHARED_H
+#ifndef BORESIGHT_PHILOX_SHARED_H
+#define BORESIGHT_PHILOX_SHARED_H
 
 #ifdef __OPENCL_VERSION__
 typedef uint bst_u32;

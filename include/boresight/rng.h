@@ -4,12 +4,14 @@
  * A key is derived from (master seed, run number, instance name, stream name); a draw from (key,
  * counter). Draws with the same key and counter are equal; different keys or counters are
  * independent. */
-#ifndef BST_CORE_RNG_H
-#define BST_CORE_RNG_H
+#ifndef BORESIGHT_RNG_H
+#define BORESIGHT_RNG_H
 
 #include <stdint.h>
 
-#include "sim/core/philox_shared.h"
+#include "boresight/philox_shared.h"
+
+#pragma GCC visibility push(default)
 
 /* The 64-bit key of one stream. */
 typedef struct bst_rng_key {
@@ -39,5 +41,7 @@ void bst_rng_normal_block(bst_rng_key key, uint64_t first, double out[2][BST_RNG
 
 /* One standard normal deviate: the first of bst_rng_normal2. */
 double bst_rng_normal(bst_rng_key key, uint64_t a, uint64_t b);
+
+#pragma GCC visibility pop
 
 #endif

@@ -1,19 +1,21 @@
 /* Stages that a plug-in can take the place of: what their functions are given and give back. A
- * stage's descriptor (sim/core/stage.h) points to one of these structs. Onboard stages know the
- * camera as the onboard side does; nobody knows the truth. `config` is the filled struct of the
- * descriptor's own table and outlives the stage. Errors are told by bst_fail and end the run.
- * Results are to depend on nothing but what is given, so that a run can be repeated. */
-#ifndef BST_ONBOARD_STAGES_H
-#define BST_ONBOARD_STAGES_H
+ * stage's descriptor (include/boresight/stage.h) points to one of these structs. Onboard stages
+ * know the camera as the onboard side does; nobody knows the truth. `config` is the filled struct
+ * of the descriptor's own table and outlives the stage. Errors are told by bst_fail and end the
+ * run. Results are to depend on nothing but what is given, so that a run can be repeated. */
+#ifndef BORESIGHT_STAGES_H
+#define BORESIGHT_STAGES_H
 
-#include "sim/core/stage.h"
-#include "sim/dynamics/compensator.h"
-#include "sim/onboard/camera_motion.h"
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
+#include "boresight/camera_motion.h"
+#include "boresight/compensator.h"
+#include "boresight/stage.h"
+
+#pragma GCC visibility push(default)
 
 #define BST_STAGE_DETECTOR "detector" /* of imgproc: bst_detector_stage */
 /* BST_STAGE_COMPENSATOR, of control and of a mount's servo: bst_compensator_stage, in
- * sim/dynamics/compensator.h */
+ * include/boresight/compensator.h */
 #define BST_STAGE_FRAME "frame_stage" /* of scenegen: bst_frame_stage */
 
 extern const char *const bst_stage_kinds[]; /* these, then NULL */
@@ -78,5 +80,7 @@ typedef struct bst_frame_stage {
                         uint16_t *pixels);
     void (*destroy)(void *self);
 } bst_frame_stage;
+
+#pragma GCC visibility pop
 
 #endif

@@ -3,10 +3,12 @@
  * Conventions (docs/conventions.md): quaternions are scalar last {x, y, z, w}, unit, Hamilton
  * product; q_b_from_a takes the coordinates of a vector in frame a to its coordinates in frame b.
  * Matrices are row-major. */
-#ifndef BST_CORE_VEC_H
-#define BST_CORE_VEC_H
+#ifndef BORESIGHT_VEC_H
+#define BORESIGHT_VEC_H
 
 #include <math.h>
+
+#pragma GCC visibility push(default)
 
 #define BST_PI 3.14159265358979323846
 #define BST_ARCSEC_RAD (BST_PI / 648000.0)
@@ -174,5 +176,7 @@ bst_quat bst_quat_slerp(bst_quat a, bst_quat b, double s);
  * be to x_hint_ref (both reference-frame vectors, any length). Parallel vectors: some perpendicular
  * x is taken. */
 bst_quat bst_quat_look(bst_vec3 boresight_ref, bst_vec3 x_hint_ref);
+
+#pragma GCC visibility pop
 
 #endif

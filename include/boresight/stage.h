@@ -1,9 +1,12 @@
 /* A stage: a part of a module that a user's plug-in can take the place of, the rest of the module
- * staying as it is. Which kinds there are, and what functions each has: sim/onboard/stages.h. */
-#ifndef BST_CORE_STAGE_H
-#define BST_CORE_STAGE_H
+ * staying as it is. Which kinds there are, and what functions each has: include/boresight/stages.h.
+ */
+#ifndef BORESIGHT_STAGE_H
+#define BORESIGHT_STAGE_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
+
+#pragma GCC visibility push(default)
 
 #define BST_STAGE_ABI 1
 
@@ -56,5 +59,7 @@ typedef struct bst_stage_loader {
 bst_status bst_stage_read_config(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
                                  const char *path, const bst_config_desc *table,
                                  const bst_stage_loader *loader, void *object) BST_MUST_CHECK;
+
+#pragma GCC visibility pop
 
 #endif

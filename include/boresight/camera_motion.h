@@ -1,11 +1,13 @@
 /* How the camera moved during one exposure, as pointing telemetry tells it. */
-#ifndef BST_ONBOARD_CAMERA_MOTION_H
-#define BST_ONBOARD_CAMERA_MOTION_H
+#ifndef BORESIGHT_CAMERA_MOTION_H
+#define BORESIGHT_CAMERA_MOTION_H
 
 #include <stdbool.h>
 
-#include "sim/messages/messages.h"
-#include "sim/optics/camera.h"
+#include "boresight/camera.h"
+#include "boresight/messages.h"
+
+#pragma GCC visibility push(default)
 
 typedef struct bst_camera_motion {
     bst_quat q_cam_from_gcrf; /* mean over the exposure, so that a streak's centroid agrees */
@@ -44,5 +46,7 @@ void bst_camera_motion_widen(double bend_x_px, double bend_y_px, double followed
  * (bend_x_px, bend_y_px) more. */
 void bst_camera_motion_add(bst_camera_motion *motion, const bst_camera *camera, double dx_px,
                            double dy_px, double bend_x_px, double bend_y_px);
+
+#pragma GCC visibility pop
 
 #endif

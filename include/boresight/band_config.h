@@ -1,9 +1,11 @@
 /* The block `band` of a camera: what wavelengths it sees. All zero is the V band of
  * photon_flux_v0_per_s_m2. */
-#ifndef BST_OPTICS_BAND_CONFIG_H
-#define BST_OPTICS_BAND_CONFIG_H
+#ifndef BORESIGHT_BAND_CONFIG_H
+#define BORESIGHT_BAND_CONFIG_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
+
+#pragma GCC visibility push(default)
 
 enum {
     BST_BAND_V,
@@ -33,5 +35,7 @@ typedef struct bst_band_config {
 } bst_band_config;
 
 extern const bst_config_desc bst_band_config_table[];
+
+#pragma GCC visibility pop
 
 #endif

@@ -1,11 +1,11 @@
 /* A focal-plane frame: an opaque, reference-counted handle. Whoever renders makes it (usually on an
  * OpenCL device); whoever reads maps it. */
-#ifndef BST_CORE_FRAME_H
-#define BST_CORE_FRAME_H
+#ifndef BORESIGHT_FRAME_H
+#define BORESIGHT_FRAME_H
 
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
 
 typedef struct bst_frame bst_frame;
 

@@ -1,10 +1,12 @@
 /* What a module is: a static descriptor, a configuration table, ports, and three functions. */
-#ifndef BST_MESSAGES_MODULE_H
-#define BST_MESSAGES_MODULE_H
+#ifndef BORESIGHT_MODULE_H
+#define BORESIGHT_MODULE_H
 
-#include "sim/core/config.h"
-#include "sim/core/rng.h"
-#include "sim/messages/messages.h"
+#include "boresight/config.h"
+#include "boresight/messages.h"
+#include "boresight/rng.h"
+
+#pragma GCC visibility push(default)
 
 #define BST_MODULE_ABI 3
 
@@ -174,5 +176,7 @@ void bst_step_event(struct bst_step *step, const char *kind, const char *format,
     BST_PRINTF(3, 4);
 /* Counts a condition of the data ("saturated", "queue_overflow", ...) for the run summary. */
 void bst_step_count(struct bst_step *step, const char *what);
+
+#pragma GCC visibility pop
 
 #endif

@@ -1,9 +1,11 @@
 /* Status codes and the per-run context that carries error messages, log and warnings. */
-#ifndef BST_CORE_STATUS_H
-#define BST_CORE_STATUS_H
+#ifndef BORESIGHT_STATUS_H
+#define BORESIGHT_STATUS_H
 
 #include <stdarg.h>
 #include <stddef.h>
+
+#pragma GCC visibility push(default)
 
 #ifdef __cplusplus
 extern "C" {
@@ -86,5 +88,7 @@ const char *bst_status_name(bst_status status);
 #ifdef __cplusplus
 }
 #endif
+
+#pragma GCC visibility pop
 
 #endif

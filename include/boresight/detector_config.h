@@ -1,9 +1,11 @@
 /* What the detector does beyond the camera's plain numbers: block `camera.detector`. Every effect
  * is off by default. */
-#ifndef BST_OPTICS_DETECTOR_CONFIG_H
-#define BST_OPTICS_DETECTOR_CONFIG_H
+#ifndef BORESIGHT_DETECTOR_CONFIG_H
+#define BORESIGHT_DETECTOR_CONFIG_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
+
+#pragma GCC visibility push(default)
 
 /* What happens to charge above the full well. */
 enum { BST_WELL_CLIP, BST_WELL_BLOOM };
@@ -65,5 +67,7 @@ bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d)
 double bst_detector_lead_s(const bst_detector_config *d, int rows);
 /* The same in ticks, rounded up. */
 int64_t bst_detector_lead_ticks(const bst_detector_config *d, int rows, double tick_rate_hz);
+
+#pragma GCC visibility pop
 
 #endif

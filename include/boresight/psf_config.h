@@ -1,9 +1,11 @@
 /* The block `optics` of a camera: what its point spread function is made of, and its vignetting.
  * All zero is the plain Gaussian of psf_fwhm_px with full pixels. */
-#ifndef BST_OPTICS_PSF_CONFIG_H
-#define BST_OPTICS_PSF_CONFIG_H
+#ifndef BORESIGHT_PSF_CONFIG_H
+#define BORESIGHT_PSF_CONFIG_H
 
-#include "sim/core/config.h"
+#include "boresight/config.h"
+
+#pragma GCC visibility push(default)
 
 enum { BST_PSF_GAUSSIAN, BST_PSF_MOFFAT, BST_PSF_DIFFRACTION, BST_PSF_FILE };
 
@@ -72,5 +74,7 @@ typedef struct bst_optics_config {
 } bst_optics_config;
 
 extern const bst_config_desc bst_optics_config_table[];
+
+#pragma GCC visibility pop
 
 #endif

@@ -1,13 +1,15 @@
 /* Compensators of control loops: cascades of biquads with feed-forward, limits and anti-windup,
  * from gains or from a specification. */
-#ifndef BST_DYNAMICS_COMPENSATOR_H
-#define BST_DYNAMICS_COMPENSATOR_H
+#ifndef BORESIGHT_COMPENSATOR_H
+#define BORESIGHT_COMPENSATOR_H
 
 #include <complex.h>
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/stage.h"
+#include "boresight/stage.h"
+
+#pragma GCC visibility push(default)
 
 /* (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2) */
 typedef struct bst_dynamics_biquad {
@@ -217,5 +219,7 @@ void bst_compensator_set(bst_compensator *compensator, double error, double feed
 /* Response from error to output at omega rad/s, gain_scale and delay in it, limits not. At the pole
  * of an integrator it is infinite. */
 double complex bst_compensator_response(const bst_compensator *compensator, double omega_radps);
+
+#pragma GCC visibility pop
 
 #endif

@@ -1,13 +1,15 @@
 /* Configuration by descriptor tables: one table drives parsing, validation, the resolved echo and
  * the JSON Schema. */
-#ifndef BST_CORE_CONFIG_H
-#define BST_CORE_CONFIG_H
+#ifndef BORESIGHT_CONFIG_H
+#define BORESIGHT_CONFIG_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "boresight/status.h"
+
+#pragma GCC visibility push(default)
 
 typedef enum bst_config_type {
     BST_CONFIG_BOOL,    /* bool */
@@ -22,7 +24,7 @@ typedef enum bst_config_type {
     BST_CONFIG_OBJECT,  /* nested struct, children */
     BST_CONFIG_LIST,    /* bst_config_list of structs, children, item_bytes */
     BST_CONFIG_RAW,     /* not stored: checked elsewhere (module blocks) */
-    BST_CONFIG_STAGE,   /* bst_stage_use of sim/core/stage.h; choices: the stage's kind */
+    BST_CONFIG_STAGE,   /* bst_stage_use of include/boresight/stage.h; choices: the stage's kind */
 } bst_config_type;
 
 /* Where a LIST lands: `items` is one allocation of count * item_bytes, owned by the config object,
@@ -184,5 +186,7 @@ bool bst_config_is_open(const bst_config_desc *desc);
 struct cJSON *bst_config_echo(const bst_config_desc *table, const void *object);
 /* The JSON Schema (draft 2020-12) of a table as an object node; caller frees. */
 struct cJSON *bst_config_schema(const bst_config_desc *table);
+
+#pragma GCC visibility pop
 
 #endif

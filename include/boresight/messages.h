@@ -1,0 +1,58 @@
+/* The messages that modules exchange: one header for each channel in messages/, and what a channel
+ * is. The table in sim/messages/messages.c gives each channel its kind.
+ *
+ * Camera frame: +z boresight, +x along columns (image x), +y along rows (image y), right-handed.
+ * Pixel (0, 0) has its centre at (0.0, 0.0). Directions are unit vectors in GCRF axes (ICRS
+ * orientation). "Apparent" directions contain stellar aberration of the observer; "geometric" ones
+ * have it removed and hold light time. */
+#ifndef BORESIGHT_MESSAGES_H
+#define BORESIGHT_MESSAGES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "boresight/messages/control_status.h"
+#include "boresight/messages/detections.h"
+#include "boresight/messages/exposure.h"
+#include "boresight/messages/frame_message.h"
+#include "boresight/messages/los_command.h"
+#include "boresight/messages/los_history.h"
+#include "boresight/messages/mount_status.h"
+#include "boresight/messages/nav_telemetry.h"
+#include "boresight/messages/planes.h"
+#include "boresight/messages/pointing_telemetry.h"
+#include "boresight/messages/predictions.h"
+#include "boresight/messages/sensor_command.h"
+#include "boresight/messages/task.h"
+#include "boresight/messages/tracks.h"
+#include "boresight/messages/truth.h"
+#include "boresight/messages/window.h"
+
+#pragma GCC visibility push(default)
+
+typedef enum bst_channel_kind { BST_CHANNEL_LATEST, BST_CHANNEL_QUEUE } bst_channel_kind;
+
+/* How a channel stores its payload: `header_bytes` then `capacity` items of `item_bytes`. */
+typedef struct bst_channel_type {
+    const char *name;
+    bst_channel_kind kind;
+    size_t header_bytes;
+    size_t item_bytes; /* 0: no items */
+    bool in_place;     /* a ring that its writer extends in place: cannot be read with a delay */
+    void (*release)(
+        void *payload); /* lets go of what a slot owns before it is written again; may be NULL */
+    void (*retain)(void *payload); /* makes a copy of the payload own the same; with release */
+    bool lends; /* the payload points to memory of its writer that the next message overwrites */
+    int (*count)(const void *payload); /* items in use, the first ones; NULL: any may be */
+} bst_channel_type;
+
+/* The type of a channel by its unscoped name; NULL when there is none. */
+const bst_channel_type *bst_channel_type_find(const char *name);
+
+/* Which modules write a channel, for messages: "gimbal", "imgproc or obsgen"; NULL for channels
+ * that every sensor has, and for unknown names. */
+const char *bst_channel_writers(const char *name);
+
+#pragma GCC visibility pop
+
+#endif

@@ -1,0 +1,40 @@
+/* Channel control_status: mode and target of control. */
+#ifndef BORESIGHT_MESSAGES_CONTROL_STATUS_H
+#define BORESIGHT_MESSAGES_CONTROL_STATUS_H
+
+#include <stdint.h>
+
+#pragma GCC visibility push(default)
+
+#define BST_CHANNEL_CONTROL_STATUS "control_status"
+
+typedef enum bst_mode {
+    BST_MODE_IDLE = 0,
+    BST_MODE_SLEW,    /* to the cue */
+    BST_MODE_SEARCH,  /* step-stare pattern about the cue */
+    BST_MODE_ACQUIRE, /* a candidate is being centred and confirmed */
+    BST_MODE_TRACK,
+    BST_MODE_REACQUIRE, /* target lost: predicted place, then search about it */
+    BST_MODE_STARE,     /* open loop, inertial */
+    BST_MODE_RATE,      /* open loop, on the cue */
+    BST_MODE_COAST,     /* on the prediction of a target that cannot be seen */
+    BST_MODE_FIXED,     /* open loop, a direction held in inertial space or in the body */
+    BST_MODE_SCAN,      /* open loop, along an arc at a constant rate */
+    BST_MODE_COUNT
+} bst_mode;
+
+/* control_status (latest): for the record, the progress line and the evaluator. */
+typedef struct bst_control_status {
+    int64_t tick;
+    int32_t mode; /* bst_mode */
+    int64_t target_id;
+    int32_t search_step;
+    double aim_error_px[2]; /* as control believes: where the target is from the boresight */
+} bst_control_status;
+
+/* "track" for BST_MODE_TRACK, and so on. */
+const char *bst_mode_name(int mode);
+
+#pragma GCC visibility pop
+
+#endif

@@ -1,0 +1,65 @@
+/* Channel detections: the sources found in one frame. */
+#ifndef BORESIGHT_MESSAGES_DETECTIONS_H
+#define BORESIGHT_MESSAGES_DETECTIONS_H
+
+#include <stdint.h>
+
+#include "boresight/vec.h"
+
+#define BST_CHANNEL_DETECTIONS "detections"
+
+typedef enum bst_label {
+    BST_LABEL_UNKNOWN = 0,
+    BST_LABEL_STAR,   /* identified in the onboard catalogue; without star_id: at rest among them */
+    BST_LABEL_OBJECT, /* not a star: moves, or no catalogue star is there */
+    BST_LABEL_ARTEFACT,  /* cut by the edge, spike of a bright star, no source's shape */
+    BST_LABEL_HOT_PIXEL, /* sharper than the PSF, at the same pixel again, or one pixel alone */
+    BST_LABEL_HIT,       /* radiation: sharper than the PSF, in this frame only */
+} bst_label;
+
+enum {
+    BST_DETECTION_SATURATED = 1u << 0,
+    BST_DETECTION_EDGE = 1u << 1,
+    BST_DETECTION_STREAK = 1u << 2, /* elongated beyond the PSF */
+    BST_DETECTION_BLEND = 1u << 3,
+    BST_DETECTION_BLOOM = 1u << 5, /* charge overflowed along its columns: placed by its wings */
+    BST_DETECTION_STACK = 1u << 4, /* seen in the sum of several frames, this one the last */
+};
+
+typedef struct bst_detection {
+    double x_px, y_px;             /* full-sensor coordinates, mid-exposure centroid */
+    double cov_xx, cov_xy, cov_yy; /* px^2 */
+    double flux_e, flux_sigma_e;
+    double snr;
+    double length_px, width_px, angle_rad; /* extent; angle of the long axis from +x towards +y */
+    double v_mag;                          /* from flux and zero point */
+    double v_mag_sigma; /* of the flux's noise and the zero point; INFINITY without light */
+    uint32_t flags;
+    uint32_t star_id;         /* Tycho-2 identity, 0 when none */
+    int32_t label;            /* bst_label */
+    double label_probability; /* that the label is right, 0 to 1; 0 where the label is UNKNOWN */
+    double rate_x_pxps, rate_y_pxps; /* against the stars; only of BST_DETECTION_STACK, else 0 */
+    double rate_sigma_pxps;          /* of each */
+} bst_detection;
+
+/* detections (queue): what image processing (or the generator) found in one frame. */
+typedef struct bst_detections {
+    int64_t exposure_id;
+    int64_t start_tick, end_tick;
+    bst_quat q_cam_from_gcrf;       /* onboard attitude used for star identification, mid-exposure:
+                                       telemetry with the       tracker's predicted correction */
+    bst_quat q_telemetry_from_gcrf; /* telemetry alone, mid-exposure */
+    double background_e, noise_e;   /* median per pixel */
+    double threshold_snr;
+    /* V of one electron per second, by zero_point_stars of the frame's stars; when these are 0, by
+     * the camera's own figures */
+    double zero_point_mag, zero_point_sigma_mag;
+    int32_t zero_point_stars;
+    int32_t stars_identified;
+    int32_t windows; /* of the frame that were looked at, round predicted places; 0: all of it */
+    int32_t count, lost; /* items; detections that found no room */
+    int32_t bad_pixels;  /* of the sensor, that image processing has learned so far */
+    bst_detection items[];
+} bst_detections;
+
+#endif

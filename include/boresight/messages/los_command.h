@@ -1,0 +1,29 @@
+/* Channel los_command: where the boresight is commanded to point. */
+#ifndef BORESIGHT_MESSAGES_LOS_COMMAND_H
+#define BORESIGHT_MESSAGES_LOS_COMMAND_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "boresight/messages/mount_status.h"
+#include "boresight/vec.h"
+
+#define BST_CHANNEL_LOS_COMMAND "los_command"
+
+/* los_command (latest): where the boresight shall be, as the onboard attitude knowledge sees it.
+ * The command at tick t is the unit vector along direction + rate * dt + acceleration * dt^2 / 2,
+ * dt = (t - tick) / tick rate. All zero after the rate: straight on, by the nearest way round. */
+typedef struct bst_los_command {
+    int64_t tick;                      /* of reference */
+    bst_vec3 direction_gcrf;           /* unit, apparent */
+    bst_vec3 rate_gcrf_radps;          /* d(direction)/dt, perpendicular to direction */
+    bst_vec3 accel_gcrf_radps2;        /* d2(direction)/dt2 */
+    bool near_given;                   /* which of the angles that point alike are meant is told: */
+    double near_rad[BST_MOUNT_AXES];   /* those next to these (by axis of mount_status), at `tick`;
+                                          else those next to the present angles */
+    double near_radps[BST_MOUNT_AXES]; /* their rates */
+    bool roll_given;                   /* the body is to go to this angle of bst_body_roll: */
+    double roll_rad;
+} bst_los_command;
+
+#endif

@@ -1,0 +1,72 @@
+/* Channel tracks: the state of the tracker after one frame. */
+#ifndef BORESIGHT_MESSAGES_TRACKS_H
+#define BORESIGHT_MESSAGES_TRACKS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "boresight/vec.h"
+
+#define BST_CHANNEL_TRACKS "tracks"
+
+typedef enum bst_track_status {
+    BST_TRACK_TENTATIVE = 0,
+    BST_TRACK_CONFIRMED,
+    BST_TRACK_COASTING, /* confirmed, no detection in the latest frames */
+} bst_track_status;
+
+/* What keeps a track's object from being seen, as its believed orbit has it. */
+typedef enum bst_track_hidden {
+    BST_HIDDEN_NOT = 0,
+    BST_HIDDEN_SHADOW,  /* in the Earth's shadow */
+    BST_HIDDEN_EARTH,   /* behind the Earth */
+    BST_HIDDEN_AWAITED, /* nothing any more, but it has not been seen again yet */
+    BST_HIDDEN_DIM,     /* nothing, but it is too dim: far away, or lit from behind */
+} bst_track_hidden;
+
+typedef struct bst_track {
+    int64_t id; /* 1, 2, ...: never reused */
+    int32_t status;
+    bool target_of_interest;
+    bst_vec3 direction_gcrf;  /* unit, geometric */
+    bst_vec3 rate_gcrf_radps; /* d(direction)/dt, perpendicular to direction */
+    /* covariance of (direction, rate) along two tangent axes e1 = unit(z x d) (or unit(x x d) where
+     * hypot(d.x, d.y) < 1e-6), e2 = d x e1: order d1, d2, r1, r2; rad^2, rad^2/s, rad^2/s^2 */
+    double covariance[4][4];
+    double v_mag;
+    double snr;   /* of the latest detection */
+    double score; /* log-likelihood ratio of an object against chance pairings of detections */
+    int32_t hits, misses_in_row;
+    int64_t first_tick, last_update_tick;
+    double x_px, y_px; /* latest detection, full-sensor coordinates */
+    bool uncorrelated; /* confirmed, and neither the target nor what the cue expects */
+    int32_t hidden;    /* bst_track_hidden; other than 0: coasting, and no detection is taken for it
+                          before one of its place and motion has been confirmed on its own */
+} bst_track;
+
+/* Attitude from stars, and the telemetry's error that follows from it. */
+typedef struct bst_attitude_fix {
+    bool valid;
+    int32_t stars;
+    int64_t tick;             /* mid-exposure */
+    bst_quat q_cam_from_gcrf; /* from stars */
+    bst_vec3 error_cam_rad;   /* rotation vector e, camera axes: q_stars = bst_quat_from_rotvec(e) *
+                                 q_telemetry */
+    double sigma_rad[3];      /* standard deviation about camera x, y, z */
+    double rms_px;            /* of the star residuals */
+    double shared; /* share of the variance about camera x and y that successive frames have in
+                      common, 0 to 1: errors that stay with the stars */
+} bst_attitude_fix;
+
+/* tracks (queue): the tracker's state after one frame, valid at `tick` (mid-exposure). */
+typedef struct bst_tracks {
+    int64_t exposure_id;
+    int64_t tick;
+    bst_attitude_fix attitude;
+    int64_t target_id; /* track of interest, 0 when none */
+    int32_t at_rest;   /* followed but not told: at rest among the stars, as a star is */
+    int32_t count, lost;
+    bst_track items[];
+} bst_tracks;
+
+#endif
