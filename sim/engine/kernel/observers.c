@@ -58,6 +58,17 @@ static record_segment *segment_of(logical_process *self) {
     return &self->log.segments[self->log.filled % BST_MOST_SEGMENTS];
 }
 
+/* Whether another process has failed before: then what was noted down since is for nobody. */
+static bool another_failed(const bst_executor *x, const logical_process *self) {
+    for (int k = 0; k < x->count; k++) {
+        const logical_process *other = &x->processes[k];
+        if (other != self && !other->busy && other->status != BST_OK) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Has what was noted down until now observed: the payload is overwritten when the step is over.
  * Only a process that has the calling thread for itself may wait. */
 static bst_status await_observers(struct bst_step *step, logical_process *self) {
@@ -68,15 +79,11 @@ static bst_status await_observers(struct bst_step *step, logical_process *self) 
     self->order = step->self->order + 1;
     bst_sync_follow(x, self);
     bst_sync_wake(x);
-    bool fails = false; /* what comes before in another process: then nobody will observe it */
-    while (x->heard == BST_OK && !fails && self->log.observed < self->log.filled) {
+    while (x->heard == BST_OK && !another_failed(x, self) &&
+           self->log.observed < self->log.filled) {
         x->sleeping++;
         pthread_cond_wait(&x->changed, &x->lock);
         x->sleeping--;
-        for (int k = 0; k < x->count; k++) {
-            const logical_process *other = &x->processes[k];
-            fails |= other != self && !other->busy && other->status != BST_OK;
-        }
     }
     bst_status status = x->heard;
     pthread_mutex_unlock(&x->lock);
