@@ -3,9 +3,9 @@
  * Every source has its own track through the exposure. Its light is a sum of weighted nodes, as
  * many as the source's brightness needs. A node is the product of two pixel-integrated Gaussian
  * profiles (kernels/splat.cl) or, for any other PSF, a point on a grid that is convolved with it
- * (fourier_render.h). Then background, shot noise, full well, read noise, gain, offset and quantisation
- * (detector.h). Noise is keyed by (key, exposure, pixel of the full sensor). The same bytes come
- * from any number of threads and work-group size and, with a Gaussian PSF, window. */
+ * (fourier_render.h). Then background, shot noise, full well, read noise, gain, offset and
+ * quantisation (detector.h). Noise is keyed by (key, exposure, pixel of the full sensor). The same
+ * bytes come from any number of threads and work-group size and, with a Gaussian PSF, window. */
 #ifndef BST_SCENEGEN_RENDERER_H
 #define BST_SCENEGEN_RENDERER_H
 
@@ -26,6 +26,10 @@ typedef struct bst_renderer_options {
      * two nearest pixels; odd degree of the PSF's profile (scenegen/stamp/profile_law.h); taps of
      * the Fourier path's spreading (4, 6 or 8). */
     int temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
+    /* Nodes that a frame may have beyond 16 for each source, 0: 2^24; BST_SCENE_SLEW times as many
+     * where the paths of a slew need them (scenegen/scene_plan.h). Where the tolerance asks for
+     * more, sources are drawn coarser. */
+    long long most_nodes;
     bool saturation_flags;              /* kept of the latest frame, for bst_renderer_flags */
     int pool_frames;                    /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
@@ -68,10 +72,11 @@ typedef struct bst_render_stats {
     int sources;            /* drawn */
     long long nodes;        /* all sources, filled blocks included */
     double predicted_sigma; /* largest error of the image that is expected in any pixel, in its
-                               sigma (error_budget.h); NAN with temporal_oversample, spatial_oversample or
-                               four fft_taps */
+                               sigma (error_budget.h); NAN with temporal_oversample,
+                               spatial_oversample or four fft_taps */
     bool tolerance_missed;  /* that is above the tolerance: the Fourier path's grid, or as many
                                nodes as may be, are too coarse */
+    bool nodes_bounded;     /* the tolerance asks for more nodes than most_nodes */
     bool single_kernel;     /* the stars followed one track */
     int hits;               /* radiation hits on the sensor */
     double hits_e;          /* their charge */
