@@ -5,7 +5,7 @@
  * flagged, and its prediction still holds: at most one in thirty. The
  * median of predicted over measured error is at most 3, and no scene has more than
  * BST_SCENE_MOST_NODES nodes and a block for each source. Usage: test_tolerance_sweep [slow]
- * [scenes [first scene [seed]]]. */
+ * [scenes [first scene [seed]]]; slow: 200 scenes of each of two seeds. */
 #include <string.h>
 
 #include "scenegen/reference.h"
@@ -18,6 +18,7 @@
 
 static int scenes = 12, first_scene = 0, stride = 7; /* all motions and PSFs */
 static uint64_t seed = 0;
+enum { SCENES_OF_A_SEED = 200 };
 
 typedef enum motion_kind {
     STARE,
@@ -234,7 +235,9 @@ static void make_sources(scene *s) {
 static void open_scene(fixture *f, scene *s, int index) {
     static const double tolerances[] = {0.02, 0.05, 0.05, 0.2};
     memset(s, 0, sizeof *s);
-    s->key = bst_rng_make_key((uint64_t)index, seed, "test", "tolerance sweep");
+    uint64_t own_seed = seed + (uint64_t)(index / SCENES_OF_A_SEED);
+    index %= SCENES_OF_A_SEED;
+    s->key = bst_rng_make_key((uint64_t)index, own_seed, "test", "tolerance sweep");
     s->motion = (motion_kind)(index % MOTIONS);
     s->psf_kind = (psf_kind)(index / MOTIONS * 2 + index % MOTIONS) % PSFS;
     s->camera = scene_camera(WIDTH, HEIGHT);
@@ -360,7 +363,7 @@ static void the_tolerance_is_kept(void **state) {
 int main(int argc, char **argv) {
     int next = 1;
     if (argc > next && strcmp(argv[next], "slow") == 0) {
-        scenes = 200;
+        scenes = 2 * SCENES_OF_A_SEED;
         stride = 1;
         next++;
     }
