@@ -72,7 +72,7 @@ struct bst_generator {
     double
         fit_light; /* brightest pixel over the noise's variance, per sqrt(sum p^2) and electron */
     bst_path_px straight_path; /* nearest to the true one */
-    double widening;           /* width of the images over the PSF's: the path is not straight */
+    double widening;           /* width of the images over the fitted ones': the path is another */
     double known_width;        /* width of the filters' images over the PSF's */
     double place_ratio2;       /* variance of a place over that of a Gaussian of the PSF's
                                               noise-equivalent             area */

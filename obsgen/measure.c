@@ -54,15 +54,9 @@ static double misfit(const double image[2], const double model[2]) {
     return sqrt(along * sqrt(along * across));
 }
 
-/* Bound of an image at rest that the camera's path widens, or of a streak: what a path of the
- * stars' own length bends widens it across, not along. */
+/* Bound of an image that is wider by what the camera's true path is off the path that is fitted. */
 static bst_bound_at bound_of_image(const bst_generator *g, double flux_e, double length) {
     const bst_bound *bound = g->image_bound ? g->image_bound : &g->bound;
-    if (length > 1.0) {
-        bst_bound_at b = bst_bound_of(bound, flux_e, g->noise_e, length);
-        b.var_across_px2 *= g->widening * g->widening;
-        return b;
-    }
     return bst_bound_wider(bound, flux_e, g->noise_e, length, g->widening);
 }
 

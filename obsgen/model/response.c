@@ -1,3 +1,4 @@
+#define _XOPEN_SOURCE 700 /* j0 */
 #include "obsgen/model/response.h"
 
 #include <math.h>
@@ -7,14 +8,17 @@
 static const double PIXEL_VARIANCE = 1.0 / 12.0;
 /* Steps of the sums over an OTF: an image that ends within REACH_PX is exact to its square there.
  */
-enum { REACH_PX = 24 };
+enum { REACH_PX = 24, RINGS = 512 };
 /* OTF without the pixel below which frequencies count for nothing. */
 static const double LEAST_OTF = 1e-4;
+/* Cycles per sensor pixel beyond which no OTF with its pixel counts. */
+static const double MOST_FREQUENCY = 3.0;
 
 /* Sums over frequencies of the products of source and filter: at rest, and on a line. */
 typedef struct spectral_sums {
     double point[3], line[3];     /* source by source, filter by filter, source by filter */
     double gradient[3], filtered; /* filter's: xx, xy, yy */
+    double ring[RINGS];           /* source by filter, by the frequency's part of the limit */
 } spectral_sums;
 
 /* Of a pixel of b x b sensor pixels instead of one of them, at f cycles per sensor pixel. */
@@ -77,7 +81,7 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
     const bst_response_side *const sides[2] = {source, filter};
     int node[2][4] = {{0}}, nodes[2] = {0, 0};
     double weight[2][4] = {{0.0}}, step = 0.5 / (REACH_PX * binning);
-    double limit = fmin(fmax(cutoff(source), cutoff(filter)), 3.0);
+    double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
     for (int k = 0; k < 2; k++) {
         if (sides[k]->psf) {
             nodes[k] = bst_psf_weights(sides[k]->psf, x_px, y_px, node[k], weight[k]);
@@ -105,6 +109,8 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
              * of the plane; at the origin the mean of 1 / (pi f) over the cell */
             double line = i == 0 && j == 0 ? 4.0 * log(1.0 + sqrt(2.0)) / (BST_PI * step)
                                            : 1.0 / (BST_PI * f);
+            int ring = (int)(f / limit * RINGS);
+            s->ring[ring < RINGS ? ring : RINGS - 1] += area * products[2];
             for (int k = 0; k < 3; k++) {
                 s->point[k] += area * products[k];
                 s->line[k] += area * line / binning * products[k];
@@ -116,6 +122,49 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
         }
     }
     s->filtered = s->point[1];
+}
+
+/* The correlation's mean over all directions: a Hankel transform of its spectrum's. */
+static void tabulate_falloff(const spectral_sums *s, double limit, int binning, bst_falloff *out) {
+    out->tabulated = true;
+    for (int i = 0; i < BST_FALLOFF_DISTANCES; i++) {
+        double turn = 2.0 * BST_PI * i / BST_FALLOFF_PER_PX * limit * binning / RINGS, sum = 0.0;
+        for (int k = 0; k < RINGS; k++) {
+            sum += s->ring[k] * j0(turn * (k + 0.5));
+        }
+        out->value[i] = (float)(sum / s->point[2]);
+    }
+}
+
+static double falloff_at(const bst_response *r, double distance_px) {
+    double at = distance_px * r->falloff_scale * BST_FALLOFF_PER_PX;
+    int i = (int)at;
+    if (i >= BST_FALLOFF_DISTANCES - 1) {
+        return 0.0;
+    }
+    double low = (double)r->falloff.value[i], high = (double)r->falloff.value[i + 1];
+    return low + (at - i) * (high - low);
+}
+
+double bst_response_falloff(const bst_response *r, double along_px, double across_px,
+                            double length_px) {
+    if (!r->falloff.tabulated) {
+        double sigma_px = sqrt(r->both.across_px * r->both.along_px);
+        return bst_matched_falloff(along_px, across_px, length_px, sigma_px);
+    }
+    if (length_px < 0.5) {
+        return falloff_at(r, hypot(along_px, across_px));
+    }
+    /* places of the path and of the filter's differ by a triangle's distribution */
+    enum { MOST = 64 };
+    int half = (int)fmin(ceil(1.5 * length_px), MOST);
+    double sum = 0.0, own = 0.0;
+    for (int k = 1 - half; k < half; k++) {
+        double weight = 1.0 - fabs((double)k) / half, at = length_px * k / half;
+        sum += weight * falloff_at(r, hypot(along_px - at, across_px));
+        own += weight * falloff_at(r, fabs(at));
+    }
+    return sum / own;
 }
 
 static bst_image_width width_of(double point, double line) {
@@ -134,7 +183,11 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         double scale = 1.0 / ((double)binning * binning);
         double s = source->sigma_px * source->sigma_px * scale + PIXEL_VARIANCE;
         double f = filter->sigma_px * filter->sigma_px * scale + PIXEL_VARIANCE;
-        *out = (bst_response){even(s), even(f), even(0.5 * (s + f)), sqrt(f)};
+        *out = (bst_response){.source = even(s),
+                              .filter = even(f),
+                              .both = even(0.5 * (s + f)),
+                              .maxima_sigma_px = sqrt(f),
+                              .falloff_scale = 1.0};
         return;
     }
     spectral_sums sums;
@@ -146,6 +199,9 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         sqrt(fmax(sums.gradient[0] * sums.gradient[2] - sums.gradient[1] * sums.gradient[1], 0.0)) /
         sums.filtered;
     out->maxima_sigma_px = sqrt(0.5 / fmax(steep, 1e-6));
+    out->falloff_scale = 1.0;
+    double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
+    tabulate_falloff(&sums, limit, binning, &out->falloff);
 }
 
 static bst_image_width widen(bst_image_width w, double variance_px2) {
@@ -157,6 +213,8 @@ bst_response bst_response_widened(const bst_response *r, double variance_px2) {
     bst_response out = *r;
     out.source = widen(r->source, variance_px2);
     out.both = widen(r->both, 0.5 * variance_px2);
+    out.falloff_scale *= sqrt(r->both.across_px * r->both.along_px /
+                              (out.both.across_px * out.both.along_px));
     return out;
 }
 

@@ -337,7 +337,9 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     add_noise(c, detections, &theory);
     double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
-    BST_TRY(add_blends(ctx, c, &frame, fwhm));
+    if (!(theory.streak_px > 0.0)) { /* of streaks the angle to the line between both counts too */
+        BST_TRY(add_blends(ctx, c, &frame, fwhm));
+    }
     /* first what all have in common, then each */
     common_error common = {0.0, 0.0, 0.0, 0};
     for (int pass = 0; pass < 2; pass++) {
