@@ -128,6 +128,8 @@ double bst_generator_output_variance(const bst_generator *g, const generator_sou
 /* What source b adds at source a's place to the output of the filter for a. */
 double bst_generator_overlap(const bst_generator *g, const generator_source *a,
                              const generator_source *b);
+/* The output from which image processing looks at maxima. */
+double bst_generator_looks_from(const bst_generator *g);
 /* Whether image processing would find two maxima: the fainter source beside the brighter one. */
 bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
                              const generator_source *faint);

@@ -8,7 +8,7 @@
 static const double PIXEL_VARIANCE = 1.0 / 12.0;
 /* Steps of the sums over an OTF: an image that ends within REACH_PX is exact to its square there.
  */
-enum { REACH_PX = 24, RINGS = 512 };
+enum { REACH_PX = 24 };
 /* OTF without the pixel below which frequencies count for nothing. */
 static const double LEAST_OTF = 1e-4;
 /* Cycles per sensor pixel beyond which no OTF with its pixel counts. */
@@ -18,7 +18,6 @@ static const double MOST_FREQUENCY = 3.0;
 typedef struct spectral_sums {
     double point[3], line[3];     /* source by source, filter by filter, source by filter */
     double gradient[3], filtered; /* filter's: xx, xy, yy */
-    double ring[RINGS];           /* source by filter, by the frequency's part of the limit */
 } spectral_sums;
 
 /* Of a pixel of b x b sensor pixels instead of one of them, at f cycles per sensor pixel. */
@@ -109,8 +108,6 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
              * of the plane; at the origin the mean of 1 / (pi f) over the cell */
             double line = i == 0 && j == 0 ? 4.0 * log(1.0 + sqrt(2.0)) / (BST_PI * step)
                                            : 1.0 / (BST_PI * f);
-            int ring = (int)(f / limit * RINGS);
-            s->ring[ring < RINGS ? ring : RINGS - 1] += area * products[2];
             for (int k = 0; k < 3; k++) {
                 s->point[k] += area * products[k];
                 s->line[k] += area * line / binning * products[k];
@@ -124,16 +121,36 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
     s->filtered = s->point[1];
 }
 
-/* The correlation's mean over all directions: a Hankel transform of its spectrum's. */
-static void tabulate_falloff(const spectral_sums *s, double limit, int binning, bst_falloff *out) {
-    out->tabulated = true;
-    for (int i = 0; i < BST_FALLOFF_DISTANCES; i++) {
-        double turn = 2.0 * BST_PI * i / BST_FALLOFF_PER_PX * limit * binning / RINGS, sum = 0.0;
-        for (int k = 0; k < RINGS; k++) {
-            sum += s->ring[k] * j0(turn * (k + 0.5));
-        }
-        out->value[i] = (float)(sum / s->point[2]);
+/* The correlation's mean over all directions: the Hankel transform of its spectrum's, in steps so
+ * fine that the cusp at 0, which makes the wings, is resolved. */
+static void tabulate_falloff(const bst_response_side *source, const bst_response_side *filter,
+                             int binning, double x_px, double y_px, bst_falloff *out) {
+    enum { RINGS = 768, DIRECTIONS = 12 }; /* of the half plane */
+    const bst_response_side *const sides[2] = {source, filter};
+    bst_response_nodes nodes[2];
+    double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
+    double spectrum[RINGS], sum[BST_FALLOFF_DISTANCES] = {0.0};
+    for (int k = 0; k < 2; k++) {
+        bst_response_nodes_at(sides[k], x_px, y_px, &nodes[k]);
     }
+    for (int i = 0; i < RINGS; i++) {
+        double f = limit * (i + 0.5) / RINGS;
+        spectrum[i] = 0.0;
+        for (int a = 0; a < DIRECTIONS; a++) {
+            double angle = BST_PI * (a + 0.5) / DIRECTIONS, p[2], q[2];
+            bst_response_otf(source, &nodes[0], binning, f * cos(angle), f * sin(angle), p);
+            bst_response_otf(filter, &nodes[1], binning, f * cos(angle), f * sin(angle), q);
+            spectrum[i] += f * (p[0] * q[0] + p[1] * q[1]);
+        }
+    }
+    for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
+        double turn = 2.0 * BST_PI * n / BST_FALLOFF_PER_PX * limit * binning / RINGS;
+        for (int i = 0; i < RINGS; i++) {
+            sum[n] += spectrum[i] * j0(turn * (i + 0.5));
+        }
+        out->value[n] = (float)(sum[n] / sum[0]);
+    }
+    out->tabulated = true;
 }
 
 static double falloff_at(const bst_response *r, double distance_px) {
@@ -200,8 +217,7 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         sums.filtered;
     out->maxima_sigma_px = sqrt(0.5 / fmax(steep, 1e-6));
     out->falloff_scale = 1.0;
-    double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
-    tabulate_falloff(&sums, limit, binning, &out->falloff);
+    tabulate_falloff(source, filter, binning, x_px, y_px, &out->falloff);
 }
 
 static bst_image_width widen(bst_image_width w, double variance_px2) {
