@@ -109,7 +109,8 @@ static double sharpness(const bst_generator *g, const bst_generator_frame *f,
                         const bst_truth_item *item, double length) {
     double v = (double)g->binning * g->binning * (f->truth->background_e + f->truth->dark_e) +
                g->camera->read_noise_e * g->camera->read_noise_e;
-    double plain = item->electrons * bst_bound_norm(&g->bound, length) / sqrt(fmax(v, 1e-6));
+    const bst_bound *bound = g->image_bound ? g->image_bound : &g->bound;
+    double plain = item->electrons * bst_bound_norm(bound, length) / sqrt(fmax(v, 1e-6));
     bool known = item->snr > 0.0 && plain > 0.0;
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }

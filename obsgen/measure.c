@@ -101,7 +101,8 @@ static void measure_place(const bst_generator *g, const generator_source *s,
         b->widen * g->place_ratio2 / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen * g->place_ratio2 / fmax(s->visible, LEAST_SEEN);
     /* what of `sharp` is not the wider image, which `truth` is for: the background's place */
-    double sharp = s->sharp * bst_bound_norm(&g->bound, s->length) / truth->norm;
+    const bst_bound *bound = g->image_bound ? g->image_bound : &g->bound;
+    double sharp = s->sharp * bst_bound_norm(bound, s->length) / truth->norm;
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
     double open = b->drawn ? 0.0 : worse;
     /* a point that is fitted to a short streak */

@@ -570,15 +570,24 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     double sharp = blur(camera, source, &image, out->x_end_px - out->x_start_px,
                         out->y_end_px - out->y_start_px, &along, &across);
     if (isfinite(length) && variance > 0.0) {
-        double square = bst_image_squared(sqrt(along * along + widened),
-                                          sqrt(across * across + widened), length);
+        double gauss = bst_image_squared(sqrt(along * along + widened),
+                                         sqrt(across * across + widened), length);
+        double square = gauss, sigma;
+        bool plain = !camera->psf || bst_psf_gaussian(camera->psf, &sigma);
+        if (!plain) {
+            square = bst_psf_squared_image(camera->psf, source->colour, image.x_mean, image.y_mean,
+                                           along * along - sharp + widened,
+                                           across * across - sharp + widened, length);
+        }
         double excess = along * along + across * across - 2.0 * sharp;
         if (excess > BENT * (sharp + widened)) {
             /* a disc's own light widens the path */
             double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
             double exact = bst_image_squared_path(camera, track, source, u[0], u[1], &path, excess,
                                                   sharp + widened + disc);
-            square = isfinite(exact) ? exact : square;
+            if (isfinite(exact)) {
+                square = plain ? exact : square * exact / gauss;
+            }
         }
         out->snr = out->electrons * sqrt(square / variance);
     }
