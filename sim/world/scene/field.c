@@ -575,9 +575,11 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         double square = gauss, sigma;
         bool plain = !camera->psf || bst_psf_gaussian(camera->psf, &sigma);
         if (!plain) {
+            /* jitter widens both ways alike; what the path has more along itself is its length */
+            double blurred = across * across - sharp;
+            double drawn = sqrt(12.0 * fmax(image.xx + image.yy - 2.0 * blurred, 0.0));
             square = bst_psf_squared_image(camera->psf, source->colour, image.x_mean, image.y_mean,
-                                           along * along - sharp + widened,
-                                           across * across - sharp + widened, length);
+                                           blurred + widened, blurred + widened, drawn);
         }
         double excess = along * along + across * across - 2.0 * sharp;
         if (excess > BENT * (sharp + widened)) {
