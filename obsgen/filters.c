@@ -100,8 +100,14 @@ static void set_threshold(bst_generator *g) {
             bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
                                   (double)g->width * g->height, &t->streak_share[step]);
     }
-    g->threshold = fmax(t->threshold[step] + g->calibration.threshold_offset, 1.0);
+    double threshold = t->threshold[step];
     g->streak_share = t->streak_share[step];
+    if (g->open_share < 1.0) { /* noise makes detections only there */
+        threshold =
+            bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
+                                  g->open_share * g->width * g->height, &g->streak_share);
+    }
+    g->threshold = fmax(threshold + g->calibration.threshold_offset, 1.0);
 }
 
 /* Sum over an axis of the squares of the sums across it of a filter of unit norm, drawn along a
@@ -196,4 +202,23 @@ void bst_generator_set_filters(bst_generator *g) {
             break;
         }
     }
+}
+
+/* A frame with more than a maximum in so many pixels is crowded: what image processing takes for
+ * background and noise then, it takes from the pixels that are this far from outputs of stars. */
+static const double CROWDED_PX = 400.0, STAR_SNR = 3.0, LEAST_OPEN = 0.02;
+enum { SPARED_PX = 2 };
+
+double bst_generator_open_share(const bst_generator *g) {
+    double pixels = (double)g->width * g->height, covered = 0.0, maxima = 0.0;
+    for (int i = 0; i < g->source_count; i++) {
+        const generator_source *s = &g->sources[i];
+        maxima += s->amplitude > bst_generator_looks_from(g);
+        if (s->amplitude > STAR_SNR) {
+            /* within the output's outline, a circle, and a square about each pixel of it */
+            double r = 2.0 * g->cross_sigma * sqrt(log(s->amplitude / STAR_SNR)), h = SPARED_PX;
+            covered += BST_PI * r * r + 8.0 * h * r + 4.0 * h * h + 2.0 * (r + h) * s->length;
+        }
+    }
+    return maxima > pixels / CROWDED_PX ? fmax(exp(-covered / pixels), LEAST_OPEN) : 1.0;
 }

@@ -89,6 +89,7 @@ struct bst_generator {
     bst_wander *wander; /* for `streak`, once it was asked for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
+    double open_share;   /* of a crowded frame: what is no star's; 1: not crowded */
     double dark_noise_e; /* the noise without the light that is part of it */
     double faint_light_e, faint_square_e2, background_bias_e; /* bias: what is too much of it */
     struct generator_thresholds {
@@ -120,6 +121,9 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
  * thresholds and noise. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
 void bst_generator_set_filters(bst_generator *g);
+/* Share of a crowded frame that image processing takes for open sky, by the amplitudes of its
+ * sources; 1 where it is not crowded. */
+double bst_generator_open_share(const bst_generator *g);
 /* What offsets of columns add to the variance of a pixel, electrons^2: none where image processing
  * takes the columns' levels off. */
 double bst_generator_column_variance(const bst_generator *g);
