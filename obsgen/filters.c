@@ -103,9 +103,8 @@ static void set_threshold(bst_generator *g) {
     double threshold = t->threshold[step];
     g->streak_share = t->streak_share[step];
     if (g->open_share < 1.0) { /* noise makes detections only there */
-        threshold =
-            bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
-                                  g->open_share * g->width * g->height, &g->streak_share);
+        threshold = bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
+                                          g->open_share * g->width * g->height, &g->streak_share);
     }
     g->threshold = fmax(threshold + g->calibration.threshold_offset, 1.0);
 }

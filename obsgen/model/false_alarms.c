@@ -7,8 +7,8 @@
 /* Draws of clutter begin beyond those of sources, whose names have 33 bits. */
 static const uint64_t FALSE_ALARM = (uint64_t)1 << 40, HIT = (uint64_t)1 << 41,
                       WING_ALARM = (uint64_t)1 << 42;
-/* Light of wings below this, SNR, makes no alarms to speak of; maxima above LEAST_OUTPUT are as rare
- * as the law for high ones says. */
+/* Light of wings below this, SNR, makes no alarms to speak of; maxima above LEAST_OUTPUT are as
+ * rare as the law for high ones says. */
 static const double LEAST_WING = 0.3, LEAST_OUTPUT = 1.5;
 /* Places of independent noise between two maxima that are near. */
 static const double WAY_PLACES = 2.0;
@@ -74,8 +74,8 @@ static double wing_noise(const bst_generator *g, double light) {
     return sqrt(1.0 + light * bst_bound_norm(&g->bound, 0.0) / g->noise_e);
 }
 
-/* How many more of the noise's maxima on such light are seen: they exceed the threshold, and a place
- * on the way to a higher one nearby is below what image processing looks at. */
+/* How many more of the noise's maxima on such light are seen: they exceed the threshold, and a
+ * place on the way to a higher one nearby is below what image processing looks at. */
 static double wing_gain(const bst_generator *g, double light) {
     double t = g->filters[0].threshold, noise = wing_noise(g, light);
     double u = fmax((t - light) / noise, LEAST_OUTPUT);
@@ -96,8 +96,7 @@ static void draw_wing_alarms(bst_generator *g, const generator_source *s, double
     enum { RINGS = 64 };
     double reach = ceil(6.0 * g->fitted_sigma + g->streak) + 2.5;
     double end = (BST_FALLOFF_DISTANCES - 1.0) / BST_FALLOFF_PER_PX, step = (end - reach) / RINGS;
-    if (!(step > 0.0) ||
-        wing_light(g, s, reach) < LEAST_WING) {
+    if (!(step > 0.0) || wing_light(g, s, reach) < LEAST_WING) {
         return;
     }
     uint64_t draw = WING_ALARM | s->name << 8;
@@ -119,12 +118,11 @@ static void draw_wing_alarms(bst_generator *g, const generator_source *s, double
                 continue;
             }
             double least = (g->filters[0].threshold - light) / noise;
-            double above = sqrt(fmax(least, 0.0) * fmax(least, 0.0) + 2.0 * energy) -
-                           fmax(least, 0.0);
-            bst_generated item = {
-                .detection = bst_generator_point(
-                    g, x, y, g->filters[0].threshold + noise * above, 0.0),
-                .item = -1};
+            double above =
+                sqrt(fmax(least, 0.0) * fmax(least, 0.0) + 2.0 * energy) - fmax(least, 0.0);
+            bst_generated item = {.detection = bst_generator_point(
+                                      g, x, y, g->filters[0].threshold + noise * above, 0.0),
+                                  .item = -1};
             item.detection.label = BST_LABEL_ARTEFACT;
             bst_generator_keep(g, &item);
         }

@@ -229,8 +229,8 @@ bst_response bst_response_widened(const bst_response *r, double variance_px2) {
     bst_response out = *r;
     out.source = widen(r->source, variance_px2);
     out.both = widen(r->both, 0.5 * variance_px2);
-    out.falloff_scale *= sqrt(r->both.across_px * r->both.along_px /
-                              (out.both.across_px * out.both.along_px));
+    out.falloff_scale *=
+        sqrt(r->both.across_px * r->both.along_px / (out.both.across_px * out.both.along_px));
     return out;
 }
 

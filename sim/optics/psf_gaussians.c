@@ -69,9 +69,9 @@ double bst_psf_squared_image(const bst_psf *psf, const float colour[BST_PSF_COLO
             for (int i = 0; i < PARTS; i++) {
                 if (n->gaussian_weight[i] > 0.0) {
                     double own = n->gaussian_px2[i];
-                    sum += weight[k] * share * n->gaussian_weight[i] *
-                           bst_image_squared(sqrt(own + along_px2), sqrt(own + across_px2),
-                                             length_px);
+                    sum +=
+                        weight[k] * share * n->gaussian_weight[i] *
+                        bst_image_squared(sqrt(own + along_px2), sqrt(own + across_px2), length_px);
                 }
             }
         }

@@ -460,7 +460,8 @@ static void hits_come_at_the_detectors_rate(void **state) {
     close_scene(&s);
 }
 
-/* Light of a bright star's wings lifts noise above the threshold where no higher maximum is near. */
+/* Light of a bright star's wings lifts noise above the threshold where no higher maximum is near.
+ */
 static void wings_make_alarms(void **state) {
     (void)state;
     enum { FRAMES = 400 };
@@ -504,9 +505,40 @@ static void wings_make_alarms(void **state) {
     close_scene(&s);
 }
 
+/* With a maximum in 400 pixels and more, background and noise are those of the sky between the
+ * stars, and the threshold is that for its pixels. */
+static void crowded_frames_are_looked_at_twice(void **state) {
+    (void)state;
+    enum { WINDOW = 512 };
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 1.0;
+    start(&s);
+    s.frame.window = (bst_window){0, 0, WINDOW, WINDOW};
+    bst_generator_result r[2];
+    for (int dense = 0; dense < 2; dense++) {
+        int side = dense ? 30 : 22; /* a source in 291 pixels, in 542 */
+        s.truth->count = 0;
+        for (int i = 0; i < side * side; i++) {
+            add_source(&s, (uint32_t)i + 1, (i % side + 0.5) * WINDOW / side,
+                       (i / side + 0.5) * WINDOW / side, electrons_of(&s, 12.0));
+        }
+        r[dense] = run(&s, 0);
+    }
+    const bst_camera *c = &s.camera;
+    double dark =
+        sqrt(36.0 + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0);
+    assert_true(r[0].noise_e > 1.01 * dark && r[0].background_e > 36.1);
+    bst_assert_close(r[1].noise_e, dark, 1e-6 * dark);
+    bst_assert_close(r[1].background_e, 36.0, 1e-6);
+    assert_true(r[1].threshold_snr < r[0].threshold_snr - 0.02);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(wings_make_alarms),
+        cmocka_unit_test(crowded_frames_are_looked_at_twice),
         cmocka_unit_test(detection_follows_the_ideal_law),
         cmocka_unit_test(places_scatter_by_the_bound),
         cmocka_unit_test(errors_and_statements_have_their_own_width),

@@ -30,7 +30,8 @@ static void agrees_with_the_integral_over_frequencies(void **state) {
         {.optics = {.psf = BST_PSF_DIFFRACTION, .q = 1.5, .wavelengths = 6}},
         {.optics = {.psf = BST_PSF_DIFFRACTION, .q = 2.4, .wavelengths = 6}, .obscuration = 0.16},
         {.optics = {.psf = BST_PSF_MOFFAT, .moffat_beta = 2.5}},
-        {.optics = {.psf = BST_PSF_DIFFRACTION, .q = 2.35, .wavelengths = 6, .diffusion_px = 0.13}, .obscuration = 0.088}};
+        {.optics = {.psf = BST_PSF_DIFFRACTION, .q = 2.35, .wavelengths = 6, .diffusion_px = 0.13},
+         .obscuration = 0.088}};
     const double motion[][3] = {
         {0.0, 0.0, 0.0}, {0.16, 0.16, 0.0}, {0.0, 0.0, 3.0}, {0.16, 0.16, 6.0}, {0.0, 0.0, 30.0}};
     const float sun[BST_PSF_COLOURS] = {0.0F};
@@ -49,9 +50,10 @@ static void agrees_with_the_integral_over_frequencies(void **state) {
             const double *v = motion[m];
             double want = integral(psf, v[0], v[1], v[2]);
             double got = bst_psf_squared_image(psf, sun, 128.0, 128.0, v[0], v[1], v[2]);
-            printf("camera %zu, variance %g px^2, length %g px: %.5f, integral %.5f (%+.2f %%)\n", c,
-                   v[0], v[2], got, want, 100.0 * (got / want - 1.0));
-            /* of the square; the SNR goes with its root. The equivalent Gaussian is up to 10 % off */
+            printf("camera %zu, variance %g px^2, length %g px: %.5f, integral %.5f (%+.2f %%)\n",
+                   c, v[0], v[2], got, want, 100.0 * (got / want - 1.0));
+            /* of the square; the SNR goes with its root. The equivalent Gaussian is up to 10 % off
+             */
             bst_assert_close(got, want, 0.03 * want);
         }
         bst_psf_free(psf);

@@ -16,8 +16,8 @@
 
 /* Edges of the bins of SNR; sources below the first are not looked for. */
 static const double edges[] = {3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0, 30.0, 1e9};
-/* A figure that is further off than its margin and so many standard deviations is wrong; one that is
- * nearer, but whose interval is not inside, needs more runs. */
+/* A figure that is further off than its margin and so many standard deviations is wrong; one that
+ * is nearer, but whose interval is not inside, needs more runs. */
 static const double BEYOND_SIGMAS = 2.0;
 enum { BINS = sizeof edges / sizeof *edges - 1, RESAMPLES = 2000, LEAST_TRIALS = 200 };
 
@@ -149,8 +149,8 @@ typedef struct sampling {
     double sigma;     /* standard deviation */
 } sampling;
 
-/* Resamples the runs. Both sides have the same runs in a sample: run i has one seed, and so the same
- * cue, drift, jitter and stars, on both, which their difference does not hold. */
+/* Resamples the runs. Both sides have the same runs in a sample: run i has one seed, and so the
+ * same cue, drift, jitter and stars, on both, which their difference does not hold. */
 static sampling bootstrap(const figure_of *f, const run_sums *image, const run_sums *generator,
                           int seeds, int *chosen) {
     static const double low = 0.025;
