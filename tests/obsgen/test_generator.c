@@ -464,7 +464,7 @@ static void hits_come_at_the_detectors_rate(void **state) {
  */
 static void wings_make_alarms(void **state) {
     (void)state;
-    enum { FRAMES = 400 };
+    enum { FRAMES = 150 };
     scene s;
     open_scene(&s);
     s.settings.false_alarms_per_frame = 1.0;
@@ -497,10 +497,10 @@ static void wings_make_alarms(void **state) {
         }
     }
     /* at 9 to 13 px the light is 3 to 1 of the noise, so that the rate there is up to exp(12) times
-     * that of 1 in 1024^2: a few in a hundred frames at the least; 400 frames, Poisson */
-    assert_true(near[0] < 0.02);
+     * that of 1 in 1024^2: a few in a hundred frames at the least; 150 frames, Poisson */
+    assert_true(near[0] < 0.04); /* 0.0017 expected */
     assert_true(near[1] > 0.05 && near[1] < 3.0);
-    bst_assert_close(far[1], far[0], 0.25);
+    bst_assert_close(far[1], far[0], 0.5);
     bst_psf_free(psf);
     close_scene(&s);
 }

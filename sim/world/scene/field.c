@@ -458,25 +458,6 @@ static bst_image_moments smear_of(const bst_field *field, const bst_source *sour
  * ratio. */
 static const double BENT = 0.12;
 
-/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
- * pixel's own width, widened along and across the way from the first to the last
- * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
- * Returns the variance before that widening. */
-static double blur(const bst_camera *camera, const bst_source *source, const bst_image_moments *m,
-                   double dx, double dy, double *along, double *across) {
-    double psf = bst_camera_psf_sigma_px(camera), sigma;
-    if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
-        psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
-              2.3548200450309493;
-    }
-    double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
-    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
-    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
-    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
-    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
-    return variance;
-}
-
 const bst_skylight_map *bst_field_background(const bst_field *field) {
     return field->map;
 }
@@ -567,8 +548,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
-    double sharp = blur(camera, source, &image, out->x_end_px - out->x_start_px,
-                        out->y_end_px - out->y_start_px, &along, &across);
+    double sharp = bst_image_blur(camera, source, &image, out->x_end_px - out->x_start_px,
+                                  out->y_end_px - out->y_start_px, &along, &across);
     if (isfinite(length) && variance > 0.0) {
         double gauss = bst_image_squared(sqrt(along * along + widened),
                                          sqrt(across * across + widened), length);
