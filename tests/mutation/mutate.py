@@ -48,6 +48,7 @@ UNIT_TESTS = {f"sim/{name}": name for name in (
     "core", "messages", "dynamics", "astro", "device", "catalogue", "optics", "world", "onboard", "io", "link",
     "engine", "eval", "studies", "registry", "cli", "run", "analysis", "export", "report", "study_kinds", "bench")}
 UNIT_TESTS["sim/app"] = "app|bad_input"
+UNIT_TESTS["sim/onboard"] = "onboard|world_cue"  # the cue as the spacecraft and the world have it
 
 AXES = [(r"\.x\b", ".y"), (r"\.y\b", ".x"), (r"\.z\b", ".y"), (r"\[0\]", "[1]"), (r"\[1\]", "[0]"), (r"\[2\]", "[1]"),
         (r"\b(\w+)_x\b", r"\1_y"), (r"\b(\w+)_y\b", r"\1_x"), (r"\bx_px\b", "y_px"), (r"\by_px\b", "x_px"),
