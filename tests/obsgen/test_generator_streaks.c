@@ -171,8 +171,80 @@ static void tops_at_rest_scatter_evenly(void **state) {
     close_scene(&s);
 }
 
+/* Places of streaks scatter by the bound along the path and across it, turned to x and y: with
+ * c and s the direction, xx = c^2 a + s^2 b, xy = c s (a - b), yy = s^2 a + c^2 b, and what is
+ * stated is that. Also of binned pixels, in sensor pixels. */
+static void slanting_streaks_scatter_as_stated(void **state) {
+    (void)state;
+    const double paths[2][2] = {{12.0, 5.0}, {-8.0, 15.0}};
+    scene s;
+    open_scene(&s);
+    s.settings.capacity = 1000;
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        s.calibration.across_factor[i] = s.calibration.along_factor[i] = 1.0;
+    }
+    s.calibration.phase_bias_px = 0.0;
+    start(&s);
+    for (int k = 0; k < 4; k++) {
+        const double *path = paths[k % 2], length = hypot(path[0], path[1]);
+        const int b = 1 + k / 2;
+        static bst_bound bound;
+        bst_bound_init(&bound, s.frame.sigma_px / b);
+        s.frame.binning = b;
+        s.frame.streak_dx_px = path[0];
+        s.frame.streak_dy_px = path[1];
+        fill(&s, 150.0);
+        for (int i = 0; i < s.truth->count; i++) {
+            s.truth->items[i].x_start_px -= 0.5 * path[0];
+            s.truth->items[i].x_end_px += 0.5 * path[0];
+            s.truth->items[i].y_start_px -= 0.5 * path[1];
+            s.truth->items[i].y_end_px += 0.5 * path[1];
+        }
+        double got[3] = {0.0}, told[3] = {0.0}, noise = 0.0, n = 0.0;
+        for (int f = 0; f < 6; f++) {
+            bst_generator_result r = run(&s, 10 * k + f);
+            noise = r.noise_e;
+            bst_assert_close(r.streak_px, length, 1e-9);
+            for (int i = 0; i < r.count; i++, n += 1.0) {
+                const bst_detection *d = &r.items[i].detection;
+                const bst_truth_item *t = &s.truth->items[r.items[i].item];
+                double x = d->x_px - t->x_centroid_px, y = d->y_px - t->y_centroid_px;
+                const double now[3] = {x * x, x * y, y * y};
+                const double says[3] = {d->cov_xx, d->cov_xy, d->cov_yy};
+                for (int a = 0; a < 3; a++) {
+                    got[a] += now[a];
+                    told[a] += says[a];
+                }
+                /* FWHM of the even path's variance and the PSF's; its direction */
+                double wide = 2.3548200450309493 *
+                              sqrt(s.frame.sigma_px * s.frame.sigma_px + length * length / 12.0);
+                bst_assert_close(d->length_px, wide, 1e-9);
+                bst_assert_close(sin(d->angle_rad) * path[0] - cos(d->angle_rad) * path[1], 0.0,
+                                 1e-9);
+            }
+        }
+        assert_true(n > 5300.0);
+        double flux = s.truth->items[0].electrons, c = path[0] / length, e = path[1] / length;
+        bst_bound_at at = bst_bound_of(&bound, flux, noise, length / b);
+        double along = b * b * at.var_along_px2, across = b * b * at.var_across_px2;
+        assert_true(along > 2.0 * across);
+        const double want[3] = {c * c * along + e * e * across, c * e * (along - across),
+                                e * e * along + c * c * across};
+        double product = want[0] * want[2];
+        const double error[3] = {want[0] * sqrt(2.0 / n), sqrt((product + want[1] * want[1]) / n),
+                                 want[2] * sqrt(2.0 / n)};
+        for (int a = 0; a < 3; a++) {
+            /* four standard errors of moments of normal deviates; told for the measured flux */
+            bst_assert_close(got[a] / n, want[a], 4.0 * error[a]);
+            bst_assert_close(told[a] / n, want[a], 0.02 * sqrt(product));
+        }
+    }
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(slanting_streaks_scatter_as_stated),
         cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(the_edge_cuts),
         cmocka_unit_test(long_streaks_are_seen_in_parts),

@@ -341,7 +341,8 @@ static bst_detection see_turned(const scene *of, const seen_case *c, const doubl
         s.frame.streak_dy_px = dy;
     }
     for (int k = 0; k < 5; k++) {
-        double end = k == 4 ? 0.5 : k == 0 ? -0.5 : 0.0;
+        static const double swing[5] = {-0.6, 0.4, -0.1, -0.1, 0.4}; /* of mean 0 */
+        double end = swing[k];
         path_x[k] = (k / 4.0 - 0.5) * s.frame.streak_dx_px + end * ex;
         path_y[k] = (k / 4.0 - 0.5) * s.frame.streak_dy_px + end * ey;
     }
