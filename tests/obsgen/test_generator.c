@@ -504,8 +504,33 @@ static void hits_come_at_the_detectors_rate(void **state) {
     close_scene(&s);
 }
 
+/* A saturated source is placed four times as badly, and says so by its flag. */
+static void saturated_sources_are_placed_worse(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.calibration.phase_bias_px = 0.0;
+    start(&s);
+    double off[2][2];
+    for (int k = 0; k < 2; k++) {
+        s.truth->count = 0;
+        bst_truth_item *item = add_source(&s, 1, 300.25, 200.75, electrons_of(&s, 200.0));
+        item->flags |= k ? BST_TRUTH_SATURATED : 0u;
+        bst_generator_result r = run(&s, 5);
+        assert_int_equal(r.count, 1);
+        const bst_detection *d = &r.items[0].detection;
+        assert_true(((d->flags & BST_DETECTION_SATURATED) != 0) == (k == 1));
+        off[k][0] = d->x_px - 300.25;
+        off[k][1] = d->y_px - 200.75;
+    }
+    bst_assert_close(off[1][0] / off[0][0], 4.0, 1e-6); /* rounding of places */
+    bst_assert_close(off[1][1] / off[0][1], 4.0, 1e-6);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(saturated_sources_are_placed_worse),
         cmocka_unit_test(the_brightest_pixel_of_a_streak),
         cmocka_unit_test(the_faintest_star_is_as_bright_as_its_light),
         cmocka_unit_test(detection_follows_the_ideal_law),

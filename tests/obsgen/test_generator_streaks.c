@@ -242,8 +242,74 @@ static void slanting_streaks_scatter_as_stated(void **state) {
     close_scene(&s);
 }
 
+/* Deviation of a place along x that is fitted by the gradient of a Gaussian of variance m where the
+ * image has variances x2 and y2, over that with the image's own gradient: by sums over a fine grid,
+ * sqrt(sum m'^2 sum q'^2) / sum m' q'. */
+static double wrong_gradient(double m, double x2, double y2) {
+    double mm = 0.0, qq = 0.0, mq = 0.0;
+    for (int i = -60; i <= 60; i++) {
+        for (int j = -60; j <= 60; j++) {
+            double x = 0.1 * i, y = 0.1 * j;
+            double a = x / m * exp(-0.5 * (x * x + y * y) / m);
+            double b = x / x2 * exp(-0.5 * (x * x / x2 + y * y / y2));
+            mm += a * a;
+            qq += b * b;
+            mq += a * b;
+        }
+    }
+    return sqrt(mm * qq) / mq;
+}
+
+/* An object that moves by 3 px while the stars are at rest is too short to be fitted as a streak.
+ * The gradient of a point finds it worse than the bound of its image says, most along the path. */
+static void short_paths_are_placed_with_a_points_gradient(void **state) {
+    (void)state;
+    const double length = 3.0, c = 0.6, e = 0.8;
+    scene s;
+    open_scene(&s);
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        s.calibration.across_factor[i] = s.calibration.along_factor[i] = 1.0;
+    }
+    s.calibration.phase_bias_px = 0.0;
+    start(&s);
+    static bst_bound bound;
+    bst_bound_init(&bound, s.frame.sigma_px);
+    fill(&s, 150.0);
+    for (int i = 0; i < s.truth->count; i++) {
+        bst_truth_item *item = &s.truth->items[i];
+        item->kind = BST_SOURCE_OBJECT;
+        item->x_start_px -= 0.5 * length * c;
+        item->x_end_px += 0.5 * length * c;
+        item->y_start_px -= 0.5 * length * e;
+        item->y_end_px += 0.5 * length * e;
+    }
+    double along = 0.0, across = 0.0, noise = 0.0, n = 0.0;
+    for (int f = 0; f < 8; f++) {
+        bst_generator_result r = run(&s, f);
+        noise = r.noise_e;
+        for (int i = 0; i < r.count; i++, n += 1.0) {
+            const bst_detection *d = &r.items[i].detection;
+            const bst_truth_item *t = &s.truth->items[r.items[i].item];
+            double x = d->x_px - t->x_centroid_px, y = d->y_px - t->y_centroid_px;
+            along += (c * x + e * y) * (c * x + e * y);
+            across += (c * y - e * x) * (c * y - e * x);
+        }
+    }
+    assert_true(n > 7000.0);
+    bst_bound_at at = bst_bound_of(&bound, s.truth->items[0].electrons, noise, length);
+    double point = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
+    double path = point + length * length / 12.0;
+    /* four standard deviations of a root mean square of 7200: 3.3 % */
+    bst_assert_close(sqrt(along / n / at.var_along_px2) / wrong_gradient(point, path, point), 1.0,
+                     0.033);
+    bst_assert_close(sqrt(across / n / at.var_across_px2) / wrong_gradient(point, point, path), 1.0,
+                     0.033);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(short_paths_are_placed_with_a_points_gradient),
         cmocka_unit_test(slanting_streaks_scatter_as_stated),
         cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(the_edge_cuts),

@@ -421,8 +421,75 @@ static void no_side_differs_from_the_others(void **state) {
     close_scene(&s);
 }
 
+/* False alarms lie evenly on a window that is no square, of binned pixels; each says of itself what
+ * the bound says of its shape: along and across the stars' path where it was found by their filter.
+ */
+static void false_alarms_fill_the_window(void **state) {
+    (void)state;
+    const double path[2] = {18.0, -8.0}, length = hypot(path[0], path[1]);
+    const double c = path[0] / length, e = path[1] / length;
+    const int b = 2;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 400.0;
+    s.frame.window = (bst_window){96, 160, 400, 240};
+    s.frame.binning = b;
+    s.frame.streak_dx_px = path[0];
+    s.frame.streak_dy_px = path[1];
+    start(&s);
+    static bst_bound bound;
+    double sigma = s.frame.sigma_px / b;
+    bst_bound_init(&bound, sigma);
+    double n = 0.0, drawn = 0.0, sum[5] = {0.0};
+    for (int f = 0; f < 10; f++) {
+        bst_generator_result r = run(&s, f);
+        for (int i = 0; i < r.count; i++, n += 1.0) {
+            const bst_detection *d = &r.items[i].detection;
+            double u = (d->x_px - 95.5) / 400.0, v = (d->y_px - 159.5) / 240.0;
+            assert_true(u >= 0.0 && u <= 1.0 && v >= 0.0 && v <= 1.0);
+            const double terms[5] = {u - 0.5, v - 0.5, (u - 0.5) * (u - 0.5), (v - 0.5) * (v - 0.5),
+                                     (u - 0.5) * (v - 0.5)};
+            for (int k = 0; k < 5; k++) {
+                sum[k] += terms[k];
+            }
+            bool streak = (d->flags & BST_DETECTION_STREAK) != 0;
+            double own = streak ? length / b : 0.0;
+            drawn += streak;
+            bst_bound_at at = bst_bound_of(&bound, d->flux_e, r.noise_e, own);
+            double along = b * b * at.var_along_px2, across = b * b * at.var_across_px2;
+            double xx = streak ? c * c * along + e * e * across : along;
+            double yy = streak ? e * e * along + c * c * across : across;
+            double xy = streak ? c * e * (along - across) : 0.0;
+            /* rounding */
+            bst_assert_close(d->cov_xx, xx, 1e-9 * along);
+            bst_assert_close(d->cov_yy, yy, 1e-9 * along);
+            bst_assert_close(d->cov_xy, xy, 1e-9 * along);
+            bst_assert_close(d->flux_e * at.norm / r.noise_e, d->snr, 1e-9 * d->snr);
+            double fwhm = 2.3548200450309493 * b;
+            bst_assert_close(d->width_px, fwhm * sigma, 1e-9);
+            bst_assert_close(d->length_px, fwhm * sqrt(sigma * sigma + own * own / 12.0), 1e-9);
+            bst_assert_close(d->angle_rad, streak ? atan2(path[1], path[0]) : 0.0, 1e-9);
+            /* within two sigmas and half its own extent of a side */
+            double near_x = b * (2.0 * sigma + (streak ? 0.5 * own * fabs(c) : 0.0));
+            double near_y = b * (2.0 * sigma + (streak ? 0.5 * own * fabs(e) : 0.0));
+            double to_x = 400.0 * fmin(u, 1.0 - u), to_y = 240.0 * fmin(v, 1.0 - v);
+            bool edge = to_x < near_x || to_y < near_y;
+            assert_true(((d->flags & BST_DETECTION_EDGE) != 0) == edge);
+        }
+    }
+    assert_true(n > 1000.0 && drawn > 100.0 && drawn < n - 100.0);
+    /* of a uniform number: variance 1/12, that of its square's 1/180; four standard deviations */
+    bst_assert_close(sum[0] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+    bst_assert_close(sum[1] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+    bst_assert_close(sum[2] / n, 1.0 / 12.0, 4.0 * sqrt(1.0 / 180.0 / n));
+    bst_assert_close(sum[3] / n, 1.0 / 12.0, 4.0 * sqrt(1.0 / 180.0 / n));
+    bst_assert_close(sum[4] / n, 0.0, 4.0 / 12.0 / sqrt(n));
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(false_alarms_fill_the_window),
         cmocka_unit_test(no_side_differs_from_the_others),
         cmocka_unit_test(places_are_those_of_the_sensor),
         cmocka_unit_test(half_of_the_light_gives_its_root),
