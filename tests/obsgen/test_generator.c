@@ -528,8 +528,59 @@ static void saturated_sources_are_placed_worse(void **state) {
     close_scene(&s);
 }
 
+/* Radiation comes by the sensor's area, whatever pixels are read, for as long as charge is
+ * collected, and from all directions of a half space: a track goes by tan(theta) of the depth,
+ * which exceeds T with probability 1 / (1 + T^2) for a flux that falls on a surface (cosine law).
+ */
+static void hits_on_a_binned_window(void **state) {
+    (void)state;
+    const double depth_um = 40.0, pitch_um = 13.0;
+    enum { FRAMES = 150 };
+    for (int b = 1; b <= 2; b++) {
+        scene s;
+        open_scene(&s);
+        s.camera.detector.hits = (bst_hits_config){.rate_per_cm2_s = 20.0,
+                                                   .pixel_pitch_um = pitch_um,
+                                                   .depth_um = depth_um,
+                                                   .e_per_um = 80.0,
+                                                   .straggling = 0.0,
+                                                   .frame_s = 0.7};
+        s.frame.window = (bst_window){96, 160, 800, 480};
+        s.frame.binning = b;
+        start(&s);
+        double n = 0.0, drawn = 0.0, sum[2] = {0.0}, turned[2] = {0.0};
+        for (int f = 0; f < FRAMES; f++) {
+            bst_generator_result r = run(&s, f);
+            n += r.count;
+            for (int i = 0; i < r.count; i++) {
+                const bst_detection *d = &r.items[i].detection;
+                sum[0] += (d->x_px - 95.5) / 800.0 - 0.5;
+                sum[1] += (d->y_px - 159.5) / 480.0 - 0.5;
+                if (d->flags & BST_DETECTION_STREAK) {
+                    drawn += 1.0;
+                    turned[0] += cos(2.0 * d->angle_rad);
+                    turned[1] += sin(2.0 * d->angle_rad);
+                    assert_true(d->length_px > 1.5 * d->width_px);
+                }
+            }
+        }
+        double expected = 20.0 * 800 * 480 * pitch_um * pitch_um * 1e-8 * (0.5 + 0.7) * FRAMES;
+        /* four standard deviations; one in a hundred has its middle outside */
+        bst_assert_close(n, expected, 4.0 * sqrt(expected) + 0.01 * expected);
+        bst_assert_close(sum[0] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+        bst_assert_close(sum[1] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+        /* longer than 1.5 FWHM of 2 px */
+        double t = 3.0 * pitch_um / depth_um, share = 1.0 / (1.0 + t * t);
+        bst_assert_close(drawn / n, share, 4.0 * sqrt(share * (1.0 - share) / n) + 0.01);
+        bst_assert_close(turned[0] / drawn, 0.0, 4.0 * sqrt(0.5 / drawn));
+        bst_assert_close(turned[1] / drawn, 0.0, 4.0 * sqrt(0.5 / drawn));
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(hits_on_a_binned_window),
         cmocka_unit_test(saturated_sources_are_placed_worse),
         cmocka_unit_test(the_brightest_pixel_of_a_streak),
         cmocka_unit_test(the_faintest_star_is_as_bright_as_its_light),

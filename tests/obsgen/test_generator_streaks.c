@@ -62,11 +62,18 @@ static void the_edge_cuts(void **state) {
     start(&s);
     double light = electrons_of(&s, 400.0);
     bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
+    s.frame.streak_dx_px = 40.0;
+    /* in the middle of the frame first */
+    item->x_start_px = 480.0;
+    item->x_centroid_px = 500.0;
+    item->x_end_px = 520.0;
+    bst_generator_result r = run(&s, 0);
+    assert_int_equal(r.count, 1);
+    double whole = r.items[0].detection.snr;
     item->x_start_px = -20.0;
     item->x_centroid_px = 0.0;
     item->x_end_px = 20.0;
-    s.frame.streak_dx_px = 40.0;
-    bst_generator_result r = run(&s, 0);
+    r = run(&s, 0);
     assert_int_equal(r.count, 1);
     const bst_detection *d = &r.items[0].detection;
     assert_true(d->flags & BST_DETECTION_EDGE);
@@ -81,8 +88,12 @@ static void the_edge_cuts(void **state) {
     assert_int_equal(r.count, 1);
     d = &r.items[0].detection;
     assert_false(d->flags & BST_DETECTION_STREAK);
-    /* -0.5 to 4 are on the frame */
+    /* -0.5 to 4 are on the frame: 4.5 of 40 px of the light, to a sixth of a PSF's width, and the
+     * root of that of the SNR */
     bst_assert_close(d->x_px, 1.75, 1.0);
+    bst_assert_close(d->flux_e / light, 4.5 / 40.0, 0.015);
+    bst_assert_close(d->snr / whole, sqrt(4.5 / 40.0), 0.03);
+    bst_assert_close(d->v_mag, bst_camera_v_mag(&s.camera, d->flux_e / s.frame.exposure_s), 1e-9);
     item->x_start_px = -60.0;
     item->x_centroid_px = -40.0;
     item->x_end_px = -20.0;
