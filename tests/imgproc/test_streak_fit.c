@@ -111,8 +111,8 @@ static void parameters_and_covariance_of_exact_light(void **state) {
         double squares = 0.0;
         for (int i = 0; i < PIXELS; i++) {
             f->signal[i] = (float)f->light[i];
-            /* a corner of the streak, or nothing */
-            f->left_out[i] = n % 2 == 1 && i % WIDTH > p[0] + 5.0 && i / WIDTH > p[1];
+            /* a piece beside its middle, or nothing */
+            f->left_out[i] = n % 2 == 1 && fabs(i % WIDTH - p[0] - 2.0) < 1.6 && i / WIDTH > p[1];
             squares += f->light[i] * f->light[i] / (p[4] * p[4]);
         }
         bst_source s = near_source(p);
