@@ -576,53 +576,6 @@ static int close_device(void **state) {
     return 0;
 }
 
-/* At 2 electrons per number: offsets are given in electrons and added in numbers, columns' and
- * rows' are not each other's, and row noise comes on top of the rows' own offsets. */
-static void offsets_at_another_gain(void **state) {
-    static float frame[PIXELS];
-    enum { FRAMES = 12 };
-    fixture *f = open_with(state, 100.0, 0.0);
-    f->camera.gain_e_per_dn = 2.0;
-    f->camera.detector.column_offset_rms_e = 6.0;
-    f->camera.detector.row_offset_rms_e = 9.0;
-    f->camera.detector.row_noise_e = 5.0;
-    make(f);
-    float columns[SIDE], rows[SIDE];
-    bst_rng_key key = {{21, 22}};
-    bst_pattern_offsets(&f->camera, key, "columns", SIDE, columns);
-    bst_pattern_offsets(&f->camera, key, "rows", SIDE, rows);
-    double c2 = 0.0, r2 = 0.0, both = 0.0, left2 = 0.0, beside = 0.0, column_mean = 0.0;
-    for (int i = 0; i < SIDE; i++) {
-        double c = 2.0 * (double)columns[i], r = 2.0 * (double)rows[i];
-        c2 += c * c / SIDE;
-        r2 += r * r / SIDE;
-        both += c * r / SIDE;
-        column_mean += c / SIDE;
-    }
-    bst_assert_close(sqrt(c2), 6.0, 4.0 * 6.0 / sqrt(2.0 * SIDE));
-    bst_assert_close(sqrt(r2), 9.0, 4.0 * 9.0 / sqrt(2.0 * SIDE));
-    bst_assert_close(both, 0.0, 4.0 * 54.0 / sqrt(SIDE));
-    for (int k = 0; k < FRAMES; k++) {
-        double last = 0.0;
-        expose(f, k, frame);
-        for (int y = 0; y < SIDE; y++) {
-            double row = 0.0;
-            for (int x = 0; x < SIDE; x++) {
-                row += (double)frame[y * SIDE + x] / SIDE;
-            }
-            double left = row - 100.0 - column_mean - 2.0 * (double)rows[y];
-            left2 += left * left / (SIDE * FRAMES);
-            beside += left * last / (SIDE * FRAMES);
-            last = left;
-        }
-    }
-    /* the row noise, and the pixels' own in the mean of a row: 100 + 64 + 4 / 12 */
-    double want = 25.0 + 164.3 / SIDE;
-    bst_assert_close(left2, want, 4.0 * want * sqrt(2.0 / (SIDE * FRAMES)));
-    bst_assert_close(beside, 0.0, 4.0 * want / sqrt(SIDE * FRAMES)); /* of each row its own */
-    f->camera.gain_e_per_dn = 1.0;
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(dark_current_doubles),
@@ -630,7 +583,6 @@ int main(void) {
         cmocka_unit_test(dark_current_differs_from_pixel_to_pixel),
         cmocka_unit_test(maps_come_from_files),
         cmocka_unit_test(offsets_of_columns_and_rows),
-        cmocka_unit_test(offsets_at_another_gain),
         cmocka_unit_test(read_noise_has_a_tail),
         cmocka_unit_test(reads_of_the_tail_are_independent),
         cmocka_unit_test(response_bends),
