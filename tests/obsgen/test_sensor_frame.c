@@ -487,8 +487,40 @@ static void false_alarms_fill_the_window(void **state) {
     close_scene(&s);
 }
 
+/* The truth's SNR of a source tells how sharp its image is. One that says what the PSF alone on the
+ * mean background gives, sqrt(b^2 (background + dark) + read noise^2) a pixel, changes nothing;
+ * half of it widens the errors by two. */
+static void a_plain_image_is_as_sharp_as_it_says(void **state) {
+    (void)state;
+    for (int b = 1; b <= 2; b++) {
+        scene s;
+        open_scene(&s);
+        s.calibration.phase_bias_px = 0.0;
+        s.truth->dark_e = 14.0;
+        s.frame.binning = b;
+        start(&s);
+        static bst_bound bound;
+        bst_bound_init(&bound, s.frame.sigma_px / b);
+        double electrons = electrons_of(&s, 120.0), off[3];
+        double noise = sqrt(b * b * (36.0 + 14.0) + 8.0 * 8.0);
+        for (int k = 0; k < 3; k++) {
+            s.truth->count = 0;
+            bst_truth_item *item = add_source(&s, 3, 300.3, 201.6, electrons);
+            double plain = electrons * bst_bound_norm(&bound, 0.0) / noise;
+            item->snr = k == 0 ? 0.0 : k == 1 ? plain : 0.5 * plain;
+            bst_generator_result r = run(&s, 4);
+            assert_int_equal(r.count, 1);
+            off[k] = r.items[0].detection.x_px - 300.3;
+        }
+        bst_assert_close(off[1] / off[0], 1.0, 1e-6); /* the bound's table is in floats */
+        bst_assert_close(off[2] / off[0], 2.0, 1e-6);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_plain_image_is_as_sharp_as_it_says),
         cmocka_unit_test(false_alarms_fill_the_window),
         cmocka_unit_test(no_side_differs_from_the_others),
         cmocka_unit_test(places_are_those_of_the_sensor),
