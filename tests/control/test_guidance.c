@@ -306,10 +306,29 @@ static void cones_of_the_sky(void **state) {
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(v, b.guidance.nav.velocity_gcrf_mps)), 0.0, 1e-9);
 }
 
+/* In a body that turns at w, what rests among the stars moves by v x w. */
+static void the_body_turns_on(void **state) {
+    (void)state;
+    bench b;
+    open_bench(&b, mount_at(100, 20), (bst_vec3){0, 0, 0});
+    const bst_vec3 w = {2e-3, -1e-3, 3e-3}, star = {0.6, 0.0, 0.8};
+    const bst_quat q = bst_quat_from_rotvec((bst_vec3){0.3, 0.9, -0.4});
+    const bst_mount_status status = {.tick = 500, .q_body_from_gcrf = q, .rate_body_radps = w};
+    bst_guidance_telemetry(&b.guidance, &status);
+    bst_vec3 now = bst_quat_rotate(bst_guidance_body(&b.guidance, 500), star);
+    bst_vec3 then = bst_quat_rotate(bst_guidance_body(&b.guidance, 1500), star);
+    bst_assert_close(bst_vec3_norm(bst_vec3_sub(now, bst_quat_rotate(q, star))), 0.0, 1e-15);
+    bst_vec3 change = bst_vec3_sub(bst_vec3_sub(then, now), bst_vec3_cross(now, w));
+    bst_assert_close(bst_vec3_norm(change), 0.0, 1e-5); /* half of w^2 in a second */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cones_of_the_sky),    cmocka_unit_test(nothing_asked_nothing_changed),
-        cmocka_unit_test(slews_of_least_time), cmocka_unit_test(keeps_out_of_the_sun),
+        cmocka_unit_test(the_body_turns_on),
+        cmocka_unit_test(cones_of_the_sky),
+        cmocka_unit_test(nothing_asked_nothing_changed),
+        cmocka_unit_test(slews_of_least_time),
+        cmocka_unit_test(keeps_out_of_the_sun),
         cmocka_unit_test(occultation_ahead),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
