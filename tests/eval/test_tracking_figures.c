@@ -387,6 +387,11 @@ static void bound_of_a_step_with_everything(void **state) {
     double det = s[0] * s[2] - s[1] * s[1];
     double inverse[2][2] = {{s[2] / det, -s[1] / det}, {-s[1] / det, s[0] / det}};
     assert_true(bst_track_bound_step(&b, dt, w, q, r, factor));
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < i; j++) {
+            assert_true(b.information[i][j] == b.information[j][i]);
+        }
+    }
     assert_true(bst_track_bound_covariance(&b, got));
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 4; j++) {
