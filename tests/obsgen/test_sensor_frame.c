@@ -365,6 +365,7 @@ static bst_detection see_turned(const scene *of, const seen_case *c, const doubl
 static void no_side_differs_from_the_others(void **state) {
     (void)state;
     const seen_case cases[] = {
+        {0, 113, 14, 2, 0, 1, true}, /* beside an edge, along it */
         {10.3, 20.6, 0, 0, 0, 1, true}, {-40, 31, 9, 4, 0, 1, true},
         {150, 118.5, 9, 4, 0, 1, true}, {199.7, 60, 0, 0, 0, 1, true}, /* on the right edge */
         {196, 50, 14, 6, 0, 1, true},                                  /* cut by it */
