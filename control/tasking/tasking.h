@@ -108,6 +108,7 @@ typedef struct bst_tasking_report {
 bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *tasking, const bst_tasking_config *config,
                             const bst_fleet_member *members, int member_count,
                             double tick_rate_hz) BST_MUST_CHECK;
+/* Frees the memory of the tasking and clears the struct, which belongs to the caller. */
 void bst_tasking_free(bst_tasking *tasking);
 
 /* Takes in what a sensor tells (NULL: nothing new). */

@@ -15,6 +15,7 @@ typedef struct bst_bad_rows {
  */
 bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity,
                                bst_bad_rows *out) BST_MUST_CHECK;
+/* Frees the memory of a list of bad pixels and clears the struct, which belongs to the caller. */
 void bst_bad_rows_free(bst_bad_rows *rows);
 
 /* Empties the map; then pixels are added in ascending order of y * width + x, those beyond the

@@ -48,6 +48,7 @@ typedef struct bst_pixel_learner bst_pixel_learner;
 bst_status bst_pixel_learner_create(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_pixel_learner_config *config,
                                     bst_pixel_learner **out) BST_MUST_CHECK;
+/* Frees a pixel learner; NULL is allowed. */
 void bst_pixel_learner_free(bst_pixel_learner *learner);
 
 /* Notes whether an identified star's maximum was sharper than light. */

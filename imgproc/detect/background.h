@@ -34,6 +34,7 @@ typedef void (*bst_imgproc_pixel_fn)(const void *user, int y, int x, int count, 
 /* For loops on up to `threads` threads. */
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  int threads, bst_background *out) BST_MUST_CHECK;
+/* Frees the memory of a background and clears the struct, which belongs to the caller. */
 void bst_background_free(bst_background *background);
 
 /* The digital values of pixels, in electrons: origin_e + step_e n. */

@@ -24,6 +24,7 @@ typedef struct bst_candidates {
 
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height,
                                  bst_candidates *out) BST_MUST_CHECK;
+/* Frees the memory of the candidates and clears the struct, which belongs to the caller. */
 void bst_candidates_free(bst_candidates *candidates);
 
 /* Asked of maxima that a noise peak might have made: whether one at this pixel counts. Called from

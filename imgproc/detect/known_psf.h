@@ -29,6 +29,7 @@ typedef struct bst_known_psf {
  * what is made. BST_ERR_MEMORY. */
 bst_status bst_known_psf_create(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
                                 double blur_px, bst_known_psf **out) BST_MUST_CHECK;
+/* Frees a table; NULL is allowed. */
 void bst_known_psf_free(bst_known_psf *known);
 
 /* Weights of the neighbouring samples of a function at d px from the source, for its value and its

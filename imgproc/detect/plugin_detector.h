@@ -15,6 +15,7 @@ extern const bst_config_desc bst_plugin_detector_table[]; /* of a bst_stage_use 
 bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
                                       const bst_camera *camera, const bst_imgproc_maps *maps,
                                       int capacity, bst_plugin_detector **out) BST_MUST_CHECK;
+/* Destroys the plug-in's stage and frees the detector; NULL is allowed. */
 void bst_plugin_detector_free(bst_plugin_detector *plugged);
 
 /* As bst_imgproc_detect. BST_ERR_STATE, naming the plug-in, for a place, size or noise that is not

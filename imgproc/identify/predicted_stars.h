@@ -19,6 +19,7 @@ typedef struct bst_predicted_stars {
 bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
                                       const bst_stars *stars, double julian_year, int capacity,
                                       bst_predicted_stars *out) BST_MUST_CHECK;
+/* Frees the memory of the predicted stars and clears the struct, which belongs to the caller. */
 void bst_predicted_stars_free(bst_predicted_stars *sky);
 
 /* Fills sky->expected with the stars to v_limit whose apparent places fall within margin_px of the

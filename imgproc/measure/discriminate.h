@@ -26,6 +26,7 @@ typedef struct bst_imgproc_discriminator bst_imgproc_discriminator;
 /* For frames of up to `capacity` detections; `camera` is copied. BST_ERR_MEMORY. */
 bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
                                             bst_imgproc_discriminator **out) BST_MUST_CHECK;
+/* Frees a discriminator; NULL is allowed. */
 void bst_imgproc_discriminator_free(bst_imgproc_discriminator *discriminator);
 
 /* Sets label and label_probability of a frame's detections; frames come in order of time.

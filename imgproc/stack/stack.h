@@ -60,6 +60,7 @@ typedef struct bst_stack bst_stack;
  * alarms not above 0. */
 bst_status bst_stack_create(bst_ctx *ctx, const bst_camera *camera, const bst_stack_config *config,
                             int threads, bst_stack **out) BST_MUST_CHECK;
+/* Frees a stack with its thread pool; NULL is allowed. */
 void bst_stack_free(bst_stack *stack);
 
 /* Takes a frame; returns how many are held. With config->frames of them the stack is full:

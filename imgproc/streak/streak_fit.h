@@ -15,6 +15,7 @@ typedef struct bst_streak_fit {
 
 bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, int max_side,
                                  bst_streak_fit *out) BST_MUST_CHECK;
+/* Frees the memory of a fit and clears the struct, which belongs to the caller. */
 void bst_streak_fit_free(bst_streak_fit *fit);
 
 /* Fits x, y, dx, dy and flux of `source`, which starts near the solution, on a stamp of the frame;

@@ -22,6 +22,7 @@ typedef struct bst_streak_motion {
 
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side,
                                     bst_streak_motion *out) BST_MUST_CHECK;
+/* Frees the memory of a work space and clears the struct, which belongs to the caller. */
 void bst_streak_motion_free(bst_streak_motion *work);
 
 /* Corrects a frame's motion by what up to BST_STREAK_MOTION_STARS bright streaks that stand alone

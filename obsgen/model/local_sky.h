@@ -46,6 +46,7 @@ void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding);
 /* Both at a place, bilinear between the meshes' middles. */
 void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise);
 void bst_local_sky_enter(const bst_local_sky *sky, int column, int row, bst_local_sky_cell *cell);
+/* Frees the memory of a local sky and clears the struct, which belongs to the caller. */
 void bst_local_sky_free(bst_local_sky *sky);
 
 static inline double bst_local_sky_mix(const double cell[2][2], double x, double y) {

@@ -28,6 +28,7 @@ bst_fourier_render_options bst_fourier_render_default_options(void);
 bst_status bst_fourier_render_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                      const bst_psf *psf, const bst_fourier_render_options *options,
                                      bst_fourier_render **out) BST_MUST_CHECK;
+/* Frees a renderer with its kernels and buffers on the device; NULL is allowed. */
 void bst_fourier_render_free(bst_fourier_render *light);
 
 const bst_fourier_band *bst_fourier_render_band(const bst_fourier_render *light);

@@ -42,6 +42,7 @@ typedef struct bst_error_budget_source {
 } bst_error_budget_source;
 
 bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) BST_MUST_CHECK;
+/* Frees an error budget; NULL is allowed. */
 void bst_error_budget_free(bst_error_budget *crowd);
 
 /* Starts a frame. */

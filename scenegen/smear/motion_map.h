@@ -19,6 +19,7 @@ typedef struct bst_smear_star_motion_cell {
 } bst_smear_star_motion_cell;
 
 bst_status bst_motion_map_create(bst_ctx *ctx, bst_motion_map **out) BST_MUST_CHECK;
+/* Frees a motion map; NULL is allowed. */
 void bst_motion_map_free(bst_motion_map *map);
 
 typedef struct bst_motion_map_frame {

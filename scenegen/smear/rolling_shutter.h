@@ -14,6 +14,7 @@ typedef struct bst_rolling bst_rolling;
 bst_status bst_rolling_create(bst_ctx *ctx, const bst_camera *camera, double tolerance_sigma,
                               double peak_sigma_px, bool gaussian,
                               bst_rolling **out) BST_MUST_CHECK;
+/* Frees a rolling shutter; NULL is allowed. */
 void bst_rolling_free(bst_rolling *rolling);
 
 /* Starts a frame; the request (with row_time_s) is needed until its last band. margin_px: distance

@@ -40,6 +40,7 @@ typedef struct bst_smear_options {
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) BST_MUST_CHECK;
+/* Frees a smear; NULL is allowed. */
 void bst_smear_free(bst_smear *smear);
 
 /* What sources are drawn for. */

@@ -46,6 +46,7 @@ void bst_gravity_free(bst_gravity *gravity); /* NULL allowed */
 
 double bst_gravity_gm(const bst_gravity *gravity); /* m^3/s^2 */
 int bst_gravity_degree(const bst_gravity *gravity);
+/* Highest order of the field's coefficients in use. */
 int bst_gravity_order(const bst_gravity *gravity);
 
 /* Acceleration (m/s^2) at a position (m), both in Earth-fixed axes (ITRF), the position outside of

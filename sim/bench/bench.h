@@ -47,6 +47,7 @@ typedef struct bst_bench {
 /* Orbits and catalogue (bench_foundations.c). */
 bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) BST_MUST_CHECK;
+/* Benchmark: star queries in 500 fields over the sky, with the catalogue in the page cache. */
 bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
@@ -93,6 +94,7 @@ bst_status bst_bench_plant_second_order(bst_ctx *ctx, const bst_bench *self,
                                         const bst_bench_options *options,
                                         bst_bench_result *out) BST_MUST_CHECK;
 
+/* Benchmark: the full mount on a drifting platform, with flexible axes and sensor noise. */
 bst_status bst_bench_plant_full(bst_ctx *ctx, const bst_bench *self,
                                 const bst_bench_options *options,
                                 bst_bench_result *out) BST_MUST_CHECK;
@@ -101,6 +103,9 @@ bst_status bst_bench_plant_full(bst_ctx *ctx, const bst_bench *self,
 bst_status bst_bench_plant_spacecraft(bst_ctx *ctx, const bst_bench *self,
                                       const bst_bench_options *options,
                                       bst_bench_result *out) BST_MUST_CHECK;
+
+/* Benchmark: the full mount on a spacecraft, each with all effects, and the reaction between them.
+ */
 bst_status bst_bench_plant_all(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
@@ -124,6 +129,7 @@ typedef struct bst_bench_clock {
     double started_ms, cpu_started_ms, cpu_total_ms;
 } bst_bench_clock;
 
+/* Starts an interval: stores wall time and processor time. */
 void bst_bench_start(bst_bench_clock *clock);
 /* Ends what bst_bench_start began; the time is divided by `calls`. */
 void bst_bench_stop(bst_bench_clock *clock, int calls);
@@ -148,6 +154,10 @@ typedef struct bst_bench_device {
     char description[256], driver[128];
     int threads; /* compute units */
 } bst_bench_device;
+
+/* Describes the OpenCL device of the benchmarks, in a process of its own.
+ *
+ * Errors:    BST_ERR_DEVICE, BST_ERR_IO */
 bst_status bst_bench_describe_device(bst_ctx *ctx, const bst_bench_options *options,
                                      bst_bench_device *out) BST_MUST_CHECK;
 /* Processor, cores, memory, system, compiler, driver, version, revision and date. */

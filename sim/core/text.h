@@ -21,6 +21,11 @@ bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
 
 /* A count with its noun, "1 frame" or "5 frames", in `text`, which is returned. */
 enum { BST_COUNT_TEXT = 64 };
+
+/* Writes a count and its noun: "1 frame", "3 frames".
+ *
+ * Given:     one, many  noun in the singular and in the plural
+ * Returned:  text */
 const char *bst_text_of_count(char text[BST_COUNT_TEXT], int64_t count, const char *one,
                               const char *many);
 

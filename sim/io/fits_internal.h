@@ -73,6 +73,7 @@ void bst_fits_memory_open(bst_fits_memory *memory, bool primary, int *code);
 void bst_fits_memory_hdu(bst_fits_memory *memory, char **bytes, long long *count, int *code);
 /* Closes it, in every case. */
 void bst_fits_memory_close(bst_fits_memory *memory, int *code);
+/* Frees the bytes of a FITS file in memory; the struct itself belongs to the caller. */
 void bst_fits_memory_free(bst_fits_memory *memory);
 
 bool bst_fits_write_at(int fd, const void *data, size_t bytes, long long offset);
@@ -148,6 +149,7 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
                                const uint16_t *pixels, int width, int height) BST_MUST_CHECK;
 /* Writes the table. */
 bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+/* Closes the unlinked file with the rows of a cube's table, if it is open. */
 void bst_fits_cube_free(bst_fits *fits);
 
 #endif

@@ -34,6 +34,7 @@ typedef struct bst_io_box {
 
 bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_io_colour background,
                               bst_picture **out) BST_NOEXCEPT BST_MUST_CHECK;
+/* Frees a picture; NULL is allowed. */
 void bst_picture_free(bst_picture *picture) BST_NOEXCEPT;
 
 /* A stretch from the frame's own histogram: black a little below the median, white far above the

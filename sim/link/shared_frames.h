@@ -25,6 +25,9 @@ bst_status bst_shared_frames_create(bst_ctx *ctx, size_t pixel_bytes,
 /* Opens one that another process made, for reading. */
 bst_status bst_shared_frames_open(bst_ctx *ctx, const char *name, int64_t slot_bytes, int slots,
                                   bst_shared_frames **out) BST_MUST_CHECK;
+
+/* Unmaps the shared memory, removes its name if this side created it, and frees the handle. NULL is
+ * allowed. */
 void bst_shared_frames_free(bst_shared_frames *frames);
 
 const char *bst_shared_frames_name(const bst_shared_frames *frames);

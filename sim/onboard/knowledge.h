@@ -39,6 +39,7 @@ typedef struct bst_onboard_cue {
 typedef struct bst_knowledge_view bst_knowledge_view;
 bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledge,
                                      bst_knowledge_view **out) BST_MUST_CHECK;
+/* Frees a view; the knowledge itself stays; NULL is allowed. */
 void bst_knowledge_view_free(bst_knowledge_view *view);
 
 /* The cue at `seconds` after the epoch. */

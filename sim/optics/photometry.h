@@ -20,6 +20,7 @@ typedef struct bst_optics_photometer {
 /* Room for so many stars of a frame. */
 bst_status bst_optics_photometer_create(bst_ctx *ctx, int capacity,
                                         bst_optics_photometer *out) BST_MUST_CHECK;
+/* Frees the memory of a photometer and clears the struct, which belongs to the caller. */
 void bst_optics_photometer_free(bst_optics_photometer *photometer);
 
 /* A new frame, and a star in it: a detection whose magnitude is by the camera's own figures, and

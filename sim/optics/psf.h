@@ -47,6 +47,7 @@ typedef struct bst_psf_inputs {
 bst_status bst_psf_create(bst_ctx *ctx, const bst_camera *camera, bst_psf **out) BST_MUST_CHECK;
 bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
                                bst_psf **out) BST_MUST_CHECK;
+/* Releases a reference to a PSF; the last one frees it. NULL is allowed. */
 void bst_psf_free(bst_psf *psf);
 
 /* A copy of the camera whose PSF is widened by line-of-sight motion that is fast against the

@@ -35,6 +35,7 @@ enum { BST_GRID_MARGIN = 3 };
 
 bst_status bst_optics_grid_otf_create(bst_ctx *ctx, double step, int reach,
                                       bst_optics_grid_otf *out) BST_MUST_CHECK;
+/* Frees the memory of a table and clears the struct, which belongs to the caller. */
 void bst_optics_grid_otf_free(bst_optics_grid_otf *table);
 /* The node (column kx >= -BST_GRID_MARGIN, row ky) as {real, imaginary}. */
 static inline float *bst_optics_grid_otf_node(const bst_optics_grid_otf *t, int kx, int ky) {

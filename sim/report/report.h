@@ -123,6 +123,7 @@ typedef struct bst_report_sensor {
 bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *scene,
                            const bst_run_sensor *sensor, const struct cJSON *summary,
                            bst_report_sensor *out) BST_MUST_CHECK;
+/* Frees the memory of the series of a sensor and clears the struct, which belongs to the caller. */
 void bst_report_sensor_free(bst_report_sensor *sensor);
 
 /* ---- report_figures.c: the figures of a sensor's loop ---- */

@@ -11,6 +11,7 @@ typedef struct bst_link_host bst_link_host;
  * outlives the host. */
 bst_status bst_link_host_create(bst_ctx *ctx, const bst_scenario *scenario, const char *part,
                                 int threads, bst_link_host **out) BST_MUST_CHECK;
+/* Frees a host with its simulation; NULL is allowed. */
 void bst_link_host_free(bst_link_host *host);
 const char *bst_link_host_instance(const bst_link_host *host);
 

@@ -12,6 +12,7 @@ typedef struct bst_run_pictures bst_run_pictures;
 bst_status bst_run_pictures_create(bst_ctx *ctx, const bst_camera *camera, int64_t tick_rate_hz,
                                    bst_time epoch, int target_object,
                                    bst_run_pictures **out) BST_MUST_CHECK;
+/* Frees the pictures of a run; NULL is allowed. */
 void bst_run_pictures_free(bst_run_pictures *pictures);
 
 /* A message of the pictured sensor. */

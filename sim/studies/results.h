@@ -42,6 +42,7 @@ void bst_results_forget(bst_results *results, int64_t run);
 
 bst_status bst_results_create(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                               bst_results *out) BST_MUST_CHECK;
+/* Frees the memory of the results and clears the struct, which belongs to the caller. */
 void bst_results_free(bst_results *results);
 
 /* Why a run failed; NULL when it did not. */

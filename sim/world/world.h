@@ -81,6 +81,7 @@ bst_quat bst_world_body_attitude(const bst_world *world, int observer, int senso
 
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world,
                                  bst_world_view **out) BST_MUST_CHECK;
+/* Frees a view; the world itself stays; NULL is allowed. */
 void bst_world_view_free(bst_world_view *view);
 
 /* True state of an object or observer `seconds` after the epoch. BST_ERR_NUMERIC when its orbit has

@@ -39,6 +39,7 @@ bst_status bst_world_orbit_build_file(const bst_world_builder *b, const bst_orbi
 /* Reads the files that drive sensors frame by frame. */
 bst_status bst_world_load_updates(const bst_world_builder *b,
                                   const bst_config_list *observers) BST_MUST_CHECK;
+/* Frees the files of updates that a world reads. */
 void bst_world_updates_free(bst_world *world);
 /* The objects of a frame_updates_file as injected states, at the times of the frames of the first
  * sensor that the file drives. */
@@ -54,6 +55,7 @@ bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
                                            const char *name, bst_world_orbit *orbit,
                                            int *norad) BST_MUST_CHECK;
 
+/* Frees what an orbit holds (SGP4, trajectories, gravity field, burns); the struct itself stays. */
 void bst_world_orbit_free(bst_world_orbit *orbit);
 
 /* Fills world->objects from the list of objects and then from the catalogues. */

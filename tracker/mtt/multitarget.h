@@ -216,6 +216,7 @@ typedef struct bst_mtt bst_mtt;
 
 /* The caller frees. All memory is taken here. */
 bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) BST_MUST_CHECK;
+/* Frees a multi-target tracker; NULL is allowed. */
 void bst_mtt_free(bst_mtt *mtt);
 
 /* Takes one frame; frames must come in order of time (later than the one before). At most

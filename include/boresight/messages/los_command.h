@@ -12,8 +12,8 @@
 
 /* los_command (latest): commanded direction of the boresight, by the onboard attitude.
  * The command at tick t is the unit vector along direction + rate * dt + acceleration * dt^2 / 2,
- * dt = (t - tick) / tick rate. Members after the acceleration that are zero: the mount takes the
- * nearest angles. */
+ * dt = (t - tick) / tick rate. All members after the rate zero: constant rate, by the nearest
+ * angles of the mount. */
 typedef struct bst_los_command {
     int64_t tick;                      /* of reference */
     bst_vec3 direction_gcrf;           /* unit, apparent */

@@ -69,8 +69,16 @@ typedef struct bst_engine_hooks {
     bst_ctx *ctx;
 } bst_engine_hooks;
 
+/* Creates an engine without instances.
+ *
+ * Given:     tick_rate_hz  ticks per second, 1 to 1000000
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_CONFIG, BST_ERR_MEMORY
+ * Ownership: free *out with bst_engine_free */
 bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) BST_MUST_CHECK;
+/* Stops the engine's threads and frees it with its modules and channels; NULL is allowed. */
 void bst_engine_free(bst_engine *engine);
+/* Sets the hooks of an engine; they are copied. Not during bst_engine_run or bst_engine_advance. */
 void bst_engine_set_hooks(bst_engine *engine, const bst_engine_hooks *hooks);
 
 /* Adds a module; before bst_engine_load. The spec is copied, its strings too. */
@@ -121,6 +129,10 @@ bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *instanc
 int64_t bst_engine_tick(const bst_engine *engine);
 /* Instance names in the order of stepping. */
 int bst_engine_instance_count(const bst_engine *engine);
+
+/* Name of an instance ("observer/sensor/module"); it belongs to the engine.
+ *
+ * Given:     index  index of the instance */
 const char *bst_engine_instance_name(const bst_engine *engine, int index);
 /* Steps that an instance has made. */
 int64_t bst_engine_instance_steps(const bst_engine *engine, int index);

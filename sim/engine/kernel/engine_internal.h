@@ -132,10 +132,16 @@ struct bst_step {
 
 /* wiring.c */
 bst_status bst_engine_wire(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+
+/* Determines readers and rates of all channels and allocates their slots.
+ *
+ * Errors:    BST_ERR_MEMORY and those of the wiring */
 bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* channel.c */
 bst_status bst_engine_commit(struct bst_step *step) BST_MUST_CHECK;
+/* Releases what the slots of queues own (frames) as soon as all readers have read them. */
 void bst_engine_release_read(bst_engine *engine);
+/* Increments a counter of the run's summary; any thread. Names beyond MAX_COUNTERS are dropped. */
 void bst_engine_count(bst_engine *engine, const char *what);
 /* Passes a hook's status on, with its message in ctx. */
 bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine,
@@ -146,12 +152,22 @@ int64_t bst_engine_newest(const channel *ch, const port_state *port, int64_t tic
 int64_t bst_engine_unread(bst_engine *engine, const channel *ch, port_state *port, int64_t tick);
 /* Whether a message of the trigger has become visible; passes over it. */
 bool bst_engine_pass_trigger(const channel *ch, port_state *port, int64_t tick);
+
+/* A message as a reader gets it; marks and counts it as stale if it is older than the port allows.
+ *
+ * Given:     payload, written_tick, sequence  the message
+ *            port                             port of the reader */
 bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, const void *payload,
                              int64_t written_tick, int64_t sequence);
 /* schedule.c */
 bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Earliest tick at which an instance wants to be stepped. */
 int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
+
+/* Sets the tick of an instance's next step and restores the order of its heap.
+ *
+ * Given:     instance  index of the instance
+ *            due       tick */
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
 
 /* engine.c: one step of an instance, and what it publishes. */
@@ -172,19 +188,35 @@ void bst_pacing_done(const struct bst_step *step, const channel *ch, const void 
 typedef struct bst_pacing_thread {
     unsigned char saved[256];
 } bst_pacing_thread;
+
+/* Gives the calling thread the priority and processor that pacing configures.
+ *
+ * Returned:  *saved  earlier settings, for bst_pacing_thread_give_back
+ * Notes:     warns if the operating system refuses; the run continues. */
 void bst_pacing_thread_take(bst_ctx *ctx, bst_engine *engine, bst_pacing_thread *saved);
+/* Restores the priority and processors of the calling thread. */
 void bst_pacing_thread_give_back(const bst_engine *engine, const bst_pacing_thread *saved);
 
 /* parallel_executor.c */
 void bst_islands_stop(bst_engine *engine);
+
+/* Runs the logical processes in parallel up to a tick, and all hooks due until then.
+ *
+ * Given:     until_tick  exclusive
+ * Errors:    those of modules and hooks; BST_ERR_INTERRUPTED */
 bst_status bst_islands_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
 /* In a step, in place of the hooks. */
 bst_status bst_islands_message(struct bst_step *step, const channel *ch,
                                const void *payload) BST_MUST_CHECK;
+
+/* Logs an event of a step for the hooks, which run later.
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_islands_event(struct bst_step *step, const char *kind,
                              const char *text) BST_MUST_CHECK;
 /* Reads from what was put aside. */
 bst_sample bst_islands_latest(struct bst_step *step, int port);
+/* bst_step_next for a module that serves several sensors: from the log of its inputs. */
 bst_sample bst_islands_next(struct bst_step *step, int port);
 
 /* deferred.c: finds the instances that are apart and puts them last; before channels are allocated
@@ -192,10 +224,15 @@ bst_sample bst_islands_next(struct bst_step *step, int port);
 void bst_engine_set_apart(bst_engine *engine);
 /* pipeline.c */
 bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+/* Ends the pipeline's threads and frees it; without a pipeline it does nothing. */
 void bst_overlap_stop(bst_engine *engine);
 /* The following are called by the stepping thread; they fail with what failed behind it. */
 bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *ch,
                                const void *payload, int64_t tick) BST_MUST_CHECK;
+
+/* Puts an event into the pipeline, for the hooks in its thread.
+ *
+ * Errors:    those of the pipeline, if it has stopped */
 bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, const char *instance,
                              const char *kind, const char *text) BST_MUST_CHECK;
 /* Steps the instances that are apart in the scope of this one, with their inputs as they are now.
@@ -206,7 +243,9 @@ bst_status bst_overlap_step(bst_ctx *ctx, bst_engine *engine, int index,
 bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* In a step behind: reads from what was put aside. */
 bst_sample bst_overlap_latest(struct bst_step *step, int port);
+/* bst_step_next for a deferred step: from the inputs that its job carries. */
 bst_sample bst_overlap_next(struct bst_step *step, int port);
+/* Lane of a job (bst_step_lane). */
 int bst_overlap_lane(const bst_overlap_job *job);
 
 static inline const bst_port *bst_instance_port(const instance *self, int port) {

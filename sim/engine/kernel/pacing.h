@@ -31,7 +31,9 @@ typedef struct bst_pacing_config {
 } bst_pacing_config;
 
 extern const bst_config_desc bst_pacing_config_table[];
+/* Name of a pacing mode, as scenarios write it. */
 const char *bst_pacing_mode_name(int32_t mode);
+/* Name of an overrun policy, as scenarios write it. */
 const char *bst_overrun_name(int32_t overrun);
 
 enum { BST_PACING_BINS = 16 };

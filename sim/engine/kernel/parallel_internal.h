@@ -54,6 +54,7 @@ struct bst_islands {
     bool stop;
 };
 
+/* Frees the message logs of a logical process. */
 void bst_islands_free_notes(island *self);
 
 /* Puts aside what the instance that links islands reads of this one, at the end of a span. */

@@ -81,6 +81,7 @@ extern const bst_config_desc bst_scenario_table[];
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
                              const bst_scenario_registry *registry,
                              bst_scenario *out) BST_MUST_CHECK;
+/* Frees everything that a scenario holds; the struct itself belongs to the caller. */
 void bst_scenario_free(bst_scenario *scenario);
 
 /* The module of a role ("gimbal", "control") that steps for a sensor; NULL: there is none, or

@@ -151,6 +151,7 @@ typedef struct bst_field
 
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                             bst_field **out) BST_MUST_CHECK;
+/* Frees a field query; NULL is allowed. */
 void bst_field_free(bst_field *field);
 /* From the next query on another camera than the sensor's; borrowed. */
 void bst_field_set_camera(bst_field *field, const bst_camera *camera);

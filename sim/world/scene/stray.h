@@ -18,6 +18,7 @@ typedef struct bst_scene_pst bst_scene_pst;
 bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *config,
                                 double optics_pixel_um, const char *base_dir,
                                 bst_scene_pst **out) BST_MUST_CHECK;
+/* Frees a table of point source transmittance; NULL is allowed. */
 void bst_scene_pst_free(bst_scene_pst *pst);
 
 /* Irradiance on the detector over that at the entrance (normal to the light's direction), of a
