@@ -20,6 +20,9 @@ static inline bst_quat bst_control_correction_at(const bst_control *c, int64_t t
 
 /* ---- pointing_reference.c ---- */
 
+/* Cue at a tick.
+ *
+ * Errors:    those of the onboard knowledge */
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,
                               bst_onboard_cue *out) BST_MUST_CHECK;
 
@@ -44,6 +47,10 @@ bool bst_control_moves_with_region(const bst_control *c);
 
 /* ---- search_mode.c ---- */
 
+/* Changes the mode and notes the transition for the record.
+ *
+ * Given:     mode    a bst_mode
+ *            reason  constant text */
 void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reason);
 
 /* Begins a search in BST_MODE_SEARCH or BST_MODE_REACQUIRE. */
@@ -52,6 +59,10 @@ bst_status bst_control_start_search(bst_ctx *ctx, bst_control *c, int mode, int6
 /* Back to the place of the search that a failed candidate interrupted. */
 bst_status bst_control_resume_search(bst_ctx *ctx, bst_control *c, int64_t tick,
                                      const char *reason) BST_MUST_CHECK;
+
+/* Goes on to the next tile of the search; starts the search again from the cue after the last one.
+ *
+ * Notes:     in BST_MODE_REACQUIRE it stays at the predicted position for reacquire_coast_s. */
 bst_status bst_control_next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) BST_MUST_CHECK;
 /* A frame that shows nothing new counts for the dwell. */
 bst_status bst_control_count_frame(bst_ctx *ctx, bst_control *c, int64_t tick,

@@ -119,6 +119,7 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
 /* The response of the frame's filters, after its path was set, and, after its noise was, their
  * thresholds and noise. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
+/* Computes thresholds and noise of the filters for points and streaks, for the present frame. */
 void bst_generator_set_filters(bst_generator *g);
 /* What offsets of columns add to the variance of a pixel, electrons^2: none where image processing
  * takes the columns' levels off. */

@@ -56,6 +56,11 @@ typedef struct bst_target_fit {
     double log_det; /* sum of the logarithms of their covariances' determinants: chi2 + log_det is
                        twice the negative log-likelihood but for a constant */
 } bst_target_fit;
+
+/* Compares a track with the cue.
+ *
+ * Returned:  chi2 INFINITY if there is no cue, or if the track is stationary, tentative, or its
+ *            rate is not known */
 bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
                                  const bst_mtt_track *track);
 

@@ -97,6 +97,7 @@ typedef struct bst_guidance {
     int event_count;
 } bst_guidance;
 
+/* Initialises guidance; configuration and environment are copied. */
 void bst_guidance_init(bst_guidance *guidance, const bst_guidance_config *config,
                        const bst_guidance_env *env);
 

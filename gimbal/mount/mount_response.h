@@ -26,6 +26,11 @@ void bst_mount_linearise(const bst_mount_joints *joints, int axis,
 
 /* Sampled responses of the axis at omega rad/s, from the acceleration asked for. */
 double complex bst_mount_linear_encoder(const bst_mount_linear *linear, double omega_radps);
+
+/* Frequency response from the command to the line of sight, structural flexibility and delay
+ * included.
+ *
+ * Given:     omega_radps  angular frequency, rad/s */
 double complex bst_mount_linear_sight(const bst_mount_linear *linear, double omega_radps);
 
 /* One axis with its servo. At a frequency, all of the sampled signals at the plant's rate, delays

@@ -87,6 +87,7 @@ double bst_spacecraft_body_wheel_load_kgm2(const bst_spacecraft_body *body, int 
 /* Angular momentum in GCRF, N m s, from attitude, rates and modes; kinetic and elastic energy, J.
  */
 bst_vec3 bst_spacecraft_body_momentum(const bst_spacecraft_body *body);
+/* Energy of body, wheels and flexible modes, J; conserved without torques and damping. */
 double bst_spacecraft_body_energy(const bst_spacecraft_body *body);
 
 /* The symmetric matrix of six elements in the order of bst_spacecraft_spec. */

@@ -60,7 +60,9 @@ void bst_pixel_learner_update(bst_pixel_learner *learner, const bst_pixel_frame 
 
 /* Bad pixels; pixels under suspicion; pixels that found no room so far. */
 int bst_pixel_learner_bad_count(const bst_pixel_learner *learner);
+/* Number of pixels that are suspected but not yet declared bad. */
 int bst_pixel_learner_suspects(const bst_pixel_learner *learner);
+/* Number of suspects that were dropped for lack of room. */
 int64_t bst_pixel_learner_lost(const bst_pixel_learner *learner);
 /* Whether pixels of the latest frame showed charge again, but under a sky that had not moved. */
 bool bst_pixel_learner_waits(const bst_pixel_learner *learner);
@@ -71,6 +73,10 @@ typedef struct bst_pixel_map {
     bst_bad_rows rows;
     int64_t turn;
 } bst_pixel_map;
+
+/* Map of bad pixels in one of the slots; it belongs to the learner.
+ *
+ * Given:     slot  0 to BST_STEP_LANES - 1 */
 const bst_pixel_map *bst_pixel_learner_map(const bst_pixel_learner *learner, int slot);
 /* The least of a pixel's sums, at least 0: the logarithm of the odds, against any other cause that
  * is as likely beforehand, that a maximum there is a defect's. 0 where `used`, the map that the

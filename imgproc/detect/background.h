@@ -73,6 +73,10 @@ void bst_background_row(const bst_background *background, int y, float *level,
                         float *inverse_noise);
 /* Noise at a place. */
 double bst_background_level_at(const bst_background *background, double x_px, double y_px);
+
+/* Noise of a pixel, e-, interpolated between the meshes.
+ *
+ * Given:     x_px, y_px  pixel of the frame */
 double bst_background_noise_at(const bst_background *background, double x_px, double y_px);
 
 #endif

@@ -29,7 +29,13 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *plugged
  * bst_plugin_detector), of the latest frame: a Gaussian PSF, smeared along the star streak, in the
  * noise that the plug-in gave. */
 double bst_plugin_detector_v_limit(const bst_plugin_detector *plugged, double snr);
+/* Length of the stars' streaks in the latest frame, px. */
 double bst_plugin_detector_streak_px(const bst_plugin_detector *plugged);
+
+/* Background and noise, which are the same for the whole frame.
+ *
+ * Given:     plugged     a bst_plugin_detector
+ *            x_px, y_px  not used */
 void bst_plugin_detector_ground(const void *plugged, double x_px, double y_px,
                                 bst_psf_wings_ground *out);
 

@@ -85,6 +85,12 @@ int bst_row_maxima(const float *above, const float *row, const float *below, int
  * further than BST_ROW_NEAR from column x is above the limit. On either side of each row as many
  * more floats are read. */
 enum { BST_ROW_NEAR = 2 };
+
+/* See above.
+ *
+ * Given:     rows   [2 BST_ROW_NEAR + 1] rows
+ *            count  elements of out
+ *            out    [count]; elements not set are unchanged */
 void bst_row_mask(const float *const *rows, int count, float limit, float *out);
 
 /* out *= by */

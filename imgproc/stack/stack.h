@@ -77,6 +77,7 @@ const bst_stack_found *bst_stack_search(bst_stack *stack, int *count);
 
 /* Of the latest search: the SNR of the sum that counts, and sums on the grid that were followed. */
 double bst_stack_threshold_snr(const bst_stack *stack);
+/* Number of paths that the stack has followed so far. */
 int64_t bst_stack_followed(const bst_stack *stack);
 
 /* The output that noise alone exceeds `false_alarms` times: maxima over a box of places (side_px)

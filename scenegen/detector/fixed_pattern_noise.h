@@ -9,6 +9,7 @@
 
 /* Whether the camera has such a map. */
 bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera);
+/* True if pixels differ in dark current: DSNU, a map, or hot pixels. */
 bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera);
 
 /* Response to light, [height][stride], stride >= width: 1 + prnu_rms z cut at 0, or prnu_map; 0 in

@@ -31,6 +31,7 @@ bst_status bst_rolling_next(bst_ctx *ctx, bst_rolling *rolling, bst_render_reque
 /* Of the latest band: number in the request of its source `index`, and the predicted error, sigma.
  */
 int bst_rolling_source(const bst_rolling *rolling, int index);
+/* Largest expected error of the latest exposure, in units of the pixel noise. */
 double bst_rolling_error_sigma(const bst_rolling *rolling);
 
 #endif

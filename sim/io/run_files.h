@@ -20,6 +20,7 @@ bool bst_io_study_owns(const char *name);
 
 /* Whether `folder` is that of a run (complete or not), and of a study. */
 bool bst_io_folder_is_run(const char *folder);
+/* True if a folder holds a study (study.sqlite or shards). */
 bool bst_io_folder_is_study(const char *folder);
 
 #ifdef __cplusplus

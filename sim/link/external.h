@@ -15,6 +15,7 @@ bst_link_type bst_external_type(const char *channel);
 /* Whether there is a module of type "external" for a role; whether `boresight serve` can play it.
  */
 bool bst_external_role(const char *role);
+/* True if another program can take the part of a role: imgproc, tracker or control. */
 bool bst_external_serves(const char *role);
 
 /* ---- for modules of this type ---- */

@@ -104,6 +104,14 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tic
  * there is never more, and always room. */
 bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                          bst_link_output *outputs, int output_count, bool *more) BST_MUST_CHECK;
+
+/* True if the peer of a part can take another step; then its inputs should be prepared.
+ *
+ * Given:     part     number of the part
+ *            tick     tick of the step
+ *            outputs  [output_count] where answers are stored
+ * Returned:  *ready  always true with BST_LINK_AWAIT
+ * Errors:    those of bst_link_exchange */
 bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                           const bst_link_output *outputs, int output_count,
                           bool *ready) BST_MUST_CHECK;
@@ -111,10 +119,15 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
 /* Writes what the parts are answered to a file, before the first exchange; bst_link_record_end says
  * whether it all got there. */
 bst_status bst_link_record(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+
+/* Flushes and closes the recording of a link; without one it does nothing.
+ *
+ * Errors:    BST_ERR_IO if anything could not be written */
 bst_status bst_link_record_end(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
 /* Has the parts answered from such a file: nothing is bound, nobody is waited for. An exchange that
  * is not the recorded one is BST_ERR_FORMAT. */
 bst_status bst_link_replay(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+/* True if a link replays a recording. */
 bool bst_link_replays(const bst_link *link);
 /* For those who drop frames by the clock: while recording keeps *dropped of a frame of an instance
  * that is no part, while replaying sets it to what it was. */
@@ -138,6 +151,7 @@ typedef struct bst_link_peer bst_link_peer;
  * that asks for keys (bst_curve_keys_read), else NULL. */
 bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const char *keys_file,
                               const bst_link_hello *hello, bst_link_peer **out) BST_MUST_CHECK;
+/* Closes the peer's side of a link and frees it; NULL is allowed. */
 void bst_link_peer_close(bst_link_peer *peer);
 
 /* A message that came. Pointers are lent until the next bst_link_peer_receive. */

@@ -30,12 +30,19 @@ bst_status bst_shared_frames_open(bst_ctx *ctx, const char *name, int64_t slot_b
  * allowed. */
 void bst_shared_frames_free(bst_shared_frames *frames);
 
+/* Name of the shared memory; it belongs to the handle. */
 const char *bst_shared_frames_name(const bst_shared_frames *frames);
+/* Size of a slot, bytes. */
 int64_t bst_shared_frames_slot_bytes(const bst_shared_frames *frames);
 
 /* Writer: the number of the message that is written next, 0, 1, ...: it lies in slot number %
  * slots. Then that message. */
 int64_t bst_shared_frames_next(const bst_shared_frames *frames);
+
+/* Writes a frame to the next slot; readers see it whole or not at all.
+ *
+ * Given:     header  [header_bytes] FITS header
+ *            pixels  [bytes] */
 void bst_shared_frames_write(bst_shared_frames *frames, const char *header, size_t header_bytes,
                              const void *pixels, size_t bytes);
 
@@ -44,6 +51,7 @@ void bst_shared_frames_write(bst_shared_frames *frames, const char *header, size
  * tells afterwards whether it had. */
 const uint16_t *bst_shared_frames_read(const bst_shared_frames *frames, int64_t number,
                                        int64_t bytes);
+/* True if the slot of frame `number` still holds this frame. */
 bool bst_shared_frames_holds(const bst_shared_frames *frames, int64_t number);
 
 #endif

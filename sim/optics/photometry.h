@@ -26,6 +26,11 @@ void bst_optics_photometer_free(bst_optics_photometer *photometer);
 /* A new frame, and a star in it: a detection whose magnitude is by the camera's own figures, and
  * the catalogue's. Those that are saturated, cut, blended or of an SNR below 10 are left out. */
 void bst_optics_photometer_begin(bst_optics_photometer *photometer);
+
+/* Adds an identified star to the estimate of the zero point.
+ *
+ * Given:     star   its detection; ignored if saturated, at the edge, blended or too faint
+ *            v_mag  catalogue magnitude, V */
 void bst_optics_photometer_add(bst_optics_photometer *photometer, const bst_detection *star,
                                double v_mag);
 

@@ -45,6 +45,14 @@ typedef struct bst_psf_inputs {
  * empty; BST_ERR_MEMORY.
  */
 bst_status bst_psf_create(bst_ctx *ctx, const bst_camera *camera, bst_psf **out) BST_MUST_CHECK;
+
+/* Creates the PSF of a camera from inputs that its configuration does not hold.
+ *
+ * Given:     inputs  samples of a PSF file, spectrum; members may be NULL
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_CONFIG, BST_ERR_MEMORY
+ * Ownership: free *out with bst_psf_free
+ * Notes:     without inputs a camera that has a PSF shares it (a reference is taken). */
 bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
                                bst_psf **out) BST_MUST_CHECK;
 /* Releases a reference to a PSF; the last one frees it. NULL is allowed. */

@@ -29,6 +29,7 @@ bool bst_run_sightings_figures(const bst_run_sightings *sightings, bst_sightings
 
 /* Adds "sightings" to a manifest; prints the same as rows. */
 void bst_run_sightings_add(const bst_run_sightings *sightings, struct cJSON *manifest);
+/* Prints the summary of all objects to stdout, if there are at least two. */
 void bst_run_sightings_print(const bst_run_sightings *sightings);
 
 #endif

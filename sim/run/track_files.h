@@ -23,6 +23,7 @@ bst_status bst_track_write_json(bst_ctx *ctx, FILE *stream, const bst_run_track 
 /* The header row of a CSV of observations, and a row each: utc, track, object, sensor, ra_deg,
  * dec_deg, sigmas and correlation, v_mag, snr, the observer's state (m, m/s). */
 void bst_track_csv_head(FILE *stream);
+/* Writes the observations of a track as CSV rows, without a header. */
 bst_status bst_track_write_csv(bst_ctx *ctx, FILE *stream,
                                const bst_run_track *track) BST_MUST_CHECK;
 

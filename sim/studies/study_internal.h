@@ -44,6 +44,7 @@ void bst_study_populations_free(bst_study_population_list *list);
 /* Reads the study's own, after its axes; `study_file`: its full path. */
 bst_status bst_study_populations_open(bst_ctx *ctx, bst_study *study,
                                       const char *study_file) BST_MUST_CHECK;
+/* Frees the populations of a study and their files. */
 void bst_study_populations_close(bst_study *study);
 /* The populations as the values of a run make them: *out, the study's own or *own, which the caller
  * frees with bst_study_populations_free in both cases. */

@@ -38,8 +38,14 @@ const bst_astro_eop *bst_world_earth_orientation(const bst_world *world);
  * what is predicted from it is known at its end. `scenario` names the file. */
 void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const bst_world *world,
                                       double duration_s);
+/* Star catalogue of a world; it belongs to the world. */
 const bst_stars *bst_world_stars(const bst_world *world);
+/* Number of objects. */
 int bst_world_object_count(const bst_world *world);
+
+/* Description of an object; it belongs to the world.
+ *
+ * Given:     object  index, 0 to one less than the number of objects */
 const bst_world_object_info *bst_world_object(const bst_world *world, int object);
 /* Time from the epoch of a body's element set to the scenario's epoch, s; bodies are numbered
  * objects first, then observers. False: its orbit is no element set. */
@@ -59,8 +65,11 @@ int bst_world_find_object(const bst_world *world, const char *name);
  * there is none that is steered; BST_ERR_ARGUMENT: not later than the state before. */
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
                            const bst_world_state *state) BST_MUST_CHECK;
+/* Number of observers. */
 int bst_world_observer_count(const bst_world *world);
+/* Number of sensors of an observer. */
 int bst_world_sensor_count(const bst_world *world, int observer);
+/* Name of an observer; it belongs to the world. */
 const char *bst_world_observer_name(const bst_world *world, int observer);
 /* The sensor's true camera. */
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);
@@ -79,6 +88,12 @@ const struct bst_exposure_config *bst_world_exposure(const bst_world *world, int
  * The camera has these axes when both gimbal angles are zero. */
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor);
 
+/* Creates a view of a world, with a sky clock of its own; one thread may use it at a time.
+ *
+ * Given:     world  must outlive the view
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_world_view_free */
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world,
                                  bst_world_view **out) BST_MUST_CHECK;
 /* Frees a view; the world itself stays; NULL is allowed. */
@@ -88,6 +103,11 @@ void bst_world_view_free(bst_world_view *view);
  * no state then (decayed). */
 bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int object,
                                        double seconds, bst_world_state *out) BST_MUST_CHECK;
+
+/* State of an observer.
+ *
+ * Given:     seconds  since the epoch
+ * Errors:    those of its orbit (BST_ERR_RANGE outside its data) */
 bst_status bst_world_view_observer_state(bst_ctx *ctx, bst_world_view *view, int observer,
                                          double seconds, bst_world_state *out) BST_MUST_CHECK;
 /* What the onboard side of a sensor believes then: the observer's state with its orbit error, and
@@ -98,6 +118,11 @@ bst_status bst_world_view_nav(bst_ctx *ctx, bst_world_view *view, int observer, 
 /* Rotations and bodies then, interpolated. */
 bst_status bst_world_view_earth_frames(bst_ctx *ctx, bst_world_view *view, double seconds,
                                        bst_astro_earth_frames *out) BST_MUST_CHECK;
+
+/* Sun, Moon and Earth at a time.
+ *
+ * Given:     seconds  since the epoch
+ * Errors:    BST_ERR_RANGE outside the Earth orientation data */
 bst_status bst_world_view_bodies(bst_ctx *ctx, bst_world_view *view, double seconds,
                                  bst_bodies *out) BST_MUST_CHECK;
 
@@ -114,6 +139,11 @@ typedef struct bst_world_sight {
     bst_scene_glow glow;    /* all its light */
     bool occulted;          /* behind the Earth */
 } bst_world_sight;
+
+/* What an observer sees of an object: direction with light time, range, brightness, shadow.
+ *
+ * Given:     seconds  time of reception since the epoch
+ * Errors:    those of the orbits */
 bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer, int object,
                                 double seconds, bst_world_sight *out) BST_MUST_CHECK;
 

@@ -18,6 +18,7 @@ typedef struct bst_world_path {
     char text[1100];
 } bst_world_path;
 
+/* Path of a file of the scenario: relative paths start at the scenario's folder. */
 bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path);
 
 /* Makes an orbit of any source. `path` is its place in the scenario ("/observers/0/orbit"), `name`

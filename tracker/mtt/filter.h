@@ -74,6 +74,13 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
  * More, not with an IMM: up to so many components (at most BST_FILTER_COMPONENTS) live on, so that
  * later detections decide between earlier hypotheses (Salmond 1990). */
 #define BST_FILTER_CANDIDATES 16
+
+/* Updates a state with the candidates of a frame (probabilistic data association).
+ *
+ * Given:     models                   states of the models of an IMM, or components of a mixture
+ *            candidates               [count] detections in the gate with their weights
+ *            miss_weight, hit_weight  weights of a miss and of a hit
+ *            components               most components of a mixture; 1: a single Gaussian */
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
                        bst_filter_models *models, const bst_filter_candidate *candidates, int count,
                        double miss_weight, double hit_weight, int components);

@@ -229,6 +229,7 @@ void bst_mtt_skip(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* Tracks after the latest frame, by ascending id, those at rest among them; lent until the next
  * step. */
 const bst_mtt_track *bst_mtt_tracks(const bst_mtt *mtt, int *count);
+/* Track with an identity; NULL if there is none. It belongs to the tracker. */
 const bst_mtt_track *bst_mtt_find(const bst_mtt *mtt, int64_t id);
 /* What happened in the latest frame; lent until the next step. */
 const bst_mtt_event *bst_mtt_events(const bst_mtt *mtt, int *count);

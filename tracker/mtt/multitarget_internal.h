@@ -138,6 +138,10 @@ void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
  * the hit before. */
 bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
                              const bst_sky_innovation *innovation, double dt_s, double *statistic);
+
+/* The test of bst_mtt_note_innovation for brightness.
+ *
+ * Given:     z  difference of the magnitude from the expected one over its standard deviation */
 bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track, double z,
                              double dt_s, double *statistic);
 

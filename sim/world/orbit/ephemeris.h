@@ -50,6 +50,13 @@ int bst_ephemeris_near(bst_ephemeris *ephemeris, double seconds, const bst_ephem
 /* Geocentric places (m, GCRF) of all objects at the whole multiple of 8 s nearest to `seconds`,
  * which is returned, to BST_EPHEMERIS_PLACES_M. NAN: to be evaluated directly; all 0: no orbit. */
 #define BST_EPHEMERIS_PLACES_M 1e3
+
+/* Positions of all objects at the node of the ephemeris that is nearest to a time.
+ *
+ * Given:     seconds  since the epoch
+ * Returned:  time of the node, s since the epoch
+ *            x_m, y_m, z_m  [number of objects] GCRF, m
+ * Notes:     any thread. */
 double bst_ephemeris_places(bst_ephemeris *ephemeris, double seconds, double *x_m, double *y_m,
                             double *z_m);
 

@@ -25,6 +25,7 @@ void bst_scene_pst_free(bst_scene_pst *pst);
  * source angle_rad from the boresight: log-linear between the table's points (linear next to a
  * zero), its first and last value beyond. */
 double bst_scene_pst_at(const bst_scene_pst *pst, double angle_rad);
+/* Pixel pitch for stray light, m. */
 double bst_scene_pst_pixel_m(const bst_scene_pst *pst);
 
 /* V magnitude of the Moon: -12.73 + 0.026 |a| + 4e-9 a^4, a the phase angle (Sun - Moon - observer)
