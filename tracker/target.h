@@ -49,7 +49,7 @@ typedef struct bst_target {
     bst_vec3 departure_radps;
 } bst_target;
 
-/* Misfit of a track to the cue over direction, rate and brightness. */
+/* Result of bst_target_misfit. */
 typedef struct bst_target_fit {
     double chi2;    /* sum of the parts; INFINITY when any is beyond its limit, the track is not
                        confirmed, or its rate is not known well enough yet */
@@ -57,7 +57,7 @@ typedef struct bst_target_fit {
                        twice the negative log-likelihood but for a constant */
 } bst_target_fit;
 
-/* Compares a track with the cue.
+/* Misfit of a track to the cue over direction, rate and brightness.
  *
  * Returned:  chi2 INFINITY if there is no cue, or if the track is stationary, tentative, or its
  *            rate is not known */

@@ -84,10 +84,9 @@ double bst_spacecraft_body_wheel_radps(const bst_spacecraft_body *body, int whee
 /* Inertia that a motor torque on a wheel turns: its own against the body that gives way. */
 double bst_spacecraft_body_wheel_load_kgm2(const bst_spacecraft_body *body, int wheel);
 
-/* Angular momentum in GCRF, N m s, from attitude, rates and modes; kinetic and elastic energy, J.
- */
+/* Angular momentum of body, wheels and flexible modes, N m s, GCRF. */
 bst_vec3 bst_spacecraft_body_momentum(const bst_spacecraft_body *body);
-/* Energy of body, wheels and flexible modes, J; conserved without torques and damping. */
+/* Kinetic and elastic energy of body, wheels and flexible modes, J. */
 double bst_spacecraft_body_energy(const bst_spacecraft_body *body);
 
 /* The symmetric matrix of six elements in the order of bst_spacecraft_spec. */

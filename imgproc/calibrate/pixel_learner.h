@@ -58,11 +58,11 @@ void bst_pixel_learner_note_star(bst_pixel_learner *learner, bool sharp);
 void bst_pixel_learner_update(bst_pixel_learner *learner, const bst_pixel_frame *frame,
                               const bst_pixel_shows *shows);
 
-/* Bad pixels; pixels under suspicion; pixels that found no room so far. */
+/* Number of bad pixels. */
 int bst_pixel_learner_bad_count(const bst_pixel_learner *learner);
 /* Number of pixels that are suspected but not yet declared bad. */
 int bst_pixel_learner_suspects(const bst_pixel_learner *learner);
-/* Number of suspects that were dropped for lack of room. */
+/* Number of pixels so far that were dropped for lack of room. */
 int64_t bst_pixel_learner_lost(const bst_pixel_learner *learner);
 /* Whether pixels of the latest frame showed charge again, but under a sky that had not moved. */
 bool bst_pixel_learner_waits(const bst_pixel_learner *learner);

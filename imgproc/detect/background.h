@@ -71,10 +71,13 @@ int bst_background_parts(const bst_background *background, int y, bst_row_part *
  * the level goes on as it did, the noise stays. */
 void bst_background_row(const bst_background *background, int y, float *level,
                         float *inverse_noise);
-/* Noise at a place. */
+
+/* Background level at a point, e-, interpolated between the meshes.
+ *
+ * Given:     x_px, y_px  pixel of the frame */
 double bst_background_level_at(const bst_background *background, double x_px, double y_px);
 
-/* Noise of a pixel, e-, interpolated between the meshes.
+/* Noise of a pixel at a point, e-, interpolated between the meshes.
  *
  * Given:     x_px, y_px  pixel of the frame */
 double bst_background_noise_at(const bst_background *background, double x_px, double y_px);

@@ -25,14 +25,17 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *plugged
                                       const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) BST_MUST_CHECK;
 
-/* As bst_imgproc_v_limit, bst_imgproc_streak_px and bst_imgproc_ground (const void *user: the
- * bst_plugin_detector), of the latest frame: a Gaussian PSF, smeared along the star streak, in the
- * noise that the plug-in gave. */
+/* bst_imgproc_v_limit for the latest frame of a plug-in.
+ *
+ * Given:     snr  signal-to-noise ratio of the limit
+ * Returned:  V magnitude, for a Gaussian PSF smeared along the star streak, in the noise that the
+ *            plug-in gave */
 double bst_plugin_detector_v_limit(const bst_plugin_detector *plugged, double snr);
-/* Length of the stars' streaks in the latest frame, px. */
+/* bst_imgproc_streak_px for the latest frame: length of the stars' streaks, px. */
 double bst_plugin_detector_streak_px(const bst_plugin_detector *plugged);
 
-/* Background and noise, which are the same for the whole frame.
+/* bst_imgproc_ground for the latest frame: the plug-in's background and noise, constant over the
+ * frame.
  *
  * Given:     plugged     a bst_plugin_detector
  *            x_px, y_px  not used */

@@ -75,9 +75,9 @@ int bst_stack_add(bst_stack *stack, const bst_stack_frame *frame);
  * half of the frames. */
 const bst_stack_found *bst_stack_search(bst_stack *stack, int *count);
 
-/* Of the latest search: the SNR of the sum that counts, and sums on the grid that were followed. */
+/* SNR of a sum that counts as a detection in the latest search. */
 double bst_stack_threshold_snr(const bst_stack *stack);
-/* Number of paths that the stack has followed so far. */
+/* Number of sums on the grid that the latest search followed to their maximum. */
 int64_t bst_stack_followed(const bst_stack *stack);
 
 /* The output that noise alone exceeds `false_alarms` times: maxima over a box of places (side_px)

@@ -7,7 +7,7 @@
 #include "boresight/camera.h"
 #include "boresight/rng.h"
 
-/* Whether the camera has such a map. */
+/* True if pixels differ in response: PRNU, a map, dead pixels or bad columns. */
 bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera);
 /* True if pixels differ in dark current: DSNU, a map, or hot pixels. */
 bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera);

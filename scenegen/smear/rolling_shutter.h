@@ -28,10 +28,9 @@ bst_status bst_rolling_begin(bst_ctx *ctx, bst_rolling *rolling, const bst_rende
 bst_status bst_rolling_next(bst_ctx *ctx, bst_rolling *rolling, bst_render_request *band,
                             bool *more) BST_MUST_CHECK;
 
-/* Of the latest band: number in the request of its source `index`, and the predicted error, sigma.
- */
+/* Number in the request of source `index` of the latest band. */
 int bst_rolling_source(const bst_rolling *rolling, int index);
-/* Largest expected error of the latest exposure, in units of the pixel noise. */
+/* Predicted error of the latest band, in units of the pixel noise. */
 double bst_rolling_error_sigma(const bst_rolling *rolling);
 
 #endif

@@ -79,10 +79,11 @@ bool bst_smear_single(const bst_smear *smear);
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_scene_source *source,
                             bst_kernel_source_record *out, bool *visible) BST_MUST_CHECK;
 
-/* Largest expected electrons in one pixel of the source given last; and in one that is read, if the
- * window holds it. */
+/* Largest expected electrons that the latest source gives a pixel. */
 double bst_smear_last_peak_e(const bst_smear *smear);
-/* Largest charge that the latest exposure adds while it is read, e-. */
+
+/* Largest expected electrons that the latest source gives a pixel that is read, if the window holds
+ * it. */
 double bst_smear_last_read_e(const bst_smear *smear);
 /* What is left of that source's errors at the window: 1 unless it stays beside it. */
 double bst_smear_last_presence(const bst_smear *smear);

@@ -9,7 +9,7 @@
 
 /* boresight new: writes a scenario for an observer and a target.
  *
- * Given:     argc, argv  argv[0] is the name of the command; so for all commands below
+ * Given:     argc, argv  argv[0] is the name of the command; so for the commands below
  * Returned:  exit status of the program; so for all commands below */
 int bst_cmd_new(int argc, char **argv);
 /* boresight run: runs a scenario and records it. */

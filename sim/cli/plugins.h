@@ -41,12 +41,10 @@ bst_status bst_plugins_scenario_read(bst_ctx *ctx, const bst_json *json,
 bst_status bst_plugins_recorded_read(bst_ctx *ctx, const bst_json *json,
                                      bst_scenario *out) BST_MUST_CHECK;
 
-/* Adds "plugins" to an object, a list of the modules and stages of plug-ins that a scenario uses:
- * where, type, file and its SHA-256; nothing when it uses none. */
 struct cJSON;
 
-/* Adds the plug-ins of a scenario with file and SHA-256 to a JSON object, as "plugins"; without
- * plug-ins nothing. */
+/* Adds "plugins" to a JSON object: the modules and stages of plug-ins that a scenario uses, with
+ * path, type, file and SHA-256. Without plug-ins it adds nothing. */
 void bst_plugins_tell(const bst_scenario *scenario, struct cJSON *to);
 
 #endif

@@ -22,7 +22,9 @@ typedef void (*bst_loop_frame_fn)(void *user, const bst_loop_frame *frame);
 /* Sets the function that gets each frame once it is evaluated; NULL: none. */
 void bst_loop_summary_on_frame(bst_loop_summary *summary, bst_loop_frame_fn fn, void *user);
 
-/* Messages as they are published. */
+/* Adds the truth of an exposure. Messages come as they are published.
+ *
+ * Errors:    those of the world's view */
 bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *summary,
                                   const bst_truth *truth) BST_MUST_CHECK;
 

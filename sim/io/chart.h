@@ -95,7 +95,7 @@ void bst_chart_whiskers(const bst_chart *chart, const double *x, const double *l
 /* A bar from x0 to x1 and y0 to y1. */
 void bst_chart_bar(const bst_chart *chart, double x0, double x1, double y0, double y1, int colour,
                    const char *title);
-/* A line across at y, or down at x. */
+/* A horizontal line at y. */
 void bst_chart_rule(const bst_chart *chart, double y, int colour);
 /* A vertical line at x; nothing if x is outside the axis. */
 void bst_chart_mark(const bst_chart *chart, double x, int colour);

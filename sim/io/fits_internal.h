@@ -106,10 +106,17 @@ bst_status bst_fits_append_hdu(bst_ctx *ctx, bst_fits *fits, const char *hdu,
 /* The same for a header and its pixels. */
 bst_status bst_fits_append_image(bst_ctx *ctx, bst_fits *fits, const char *header, long long bytes,
                                  const uint16_t *pixels, size_t count) BST_MUST_CHECK;
-/* Makes room for `bytes` of data after the complete ones so that readers do not take what is
- * written there for an HDU; then cuts the file at fits->end, when that has been raised or not. */
+
+/* Makes room for data after the last complete HDU, in a way that readers do not take them for an
+ * HDU.
+ *
+ * Given:     bytes  size of the data
+ * Returned:  false on error, with errno */
 bool bst_fits_open_tail(const bst_fits *fits, long long bytes);
-/* Truncates the file to the end of its data; false on error, with errno. */
+
+/* Truncates the file at fits->end, whether that has been raised or not.
+ *
+ * Returned:  false on error, with errno */
 bool bst_fits_close_tail(const bst_fits *fits);
 
 /* Makes and appends the extension of a frame. */

@@ -46,9 +46,9 @@ const char *bst_run_reader_problem(const bst_run_reader *reader, int index);
 /* Adds a problem that a reader of the parts found. The list holds 16; more are dropped. */
 void bst_run_reader_note_problem(bst_run_reader *reader, const char *format, ...) BST_PRINTF(2, 3);
 
-/* manifest.json and scenario.json; NULL when missing or damaged. Borrowed. */
+/* manifest.json of a run; NULL if missing or damaged. It belongs to the reader. */
 const struct cJSON *bst_run_reader_manifest(const bst_run_reader *reader);
-/* Scenario of a run as it was recorded; NULL if missing. It belongs to the reader. */
+/* scenario.json of a run; NULL if missing or damaged. It belongs to the reader. */
 const struct cJSON *bst_run_reader_scenario(const bst_run_reader *reader);
 /* Whether there is a database that could be opened. */
 bool bst_run_reader_has_tables(const bst_run_reader *reader);
@@ -72,8 +72,7 @@ bst_status bst_io_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const ch
                             bst_io_rows **out) BST_MUST_CHECK;
 /* Goes to the next row; *more is false after the last. BST_ERR_FORMAT when the file is damaged. */
 bst_status bst_io_rows_next(bst_ctx *ctx, bst_io_rows *rows, bool *more) BST_MUST_CHECK;
-/* The current row's columns, counted from 0. A NULL is 0, NAN and "". Text lives until the next
- * call of bst_io_rows_next. */
+/* Number of columns of the rows; columns count from 0. */
 int bst_io_rows_columns(const bst_io_rows *rows);
 /* Name of a column, from 0; it belongs to the rows. */
 const char *bst_io_rows_column_name(const bst_io_rows *rows, int column);

@@ -97,20 +97,25 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tic
                              bst_link_output *outputs, int output_count,
                              bool *answered) BST_MUST_CHECK;
 
-/* With BST_LINK_HOLD and BST_LINK_RUSH, answers come when they come: an exchange gives out the
- * oldest one that is there, be it of an earlier step, and *answered false is no failure. These give
- * out the others, and tell whether the peer keeps up: one that has LINK_AHEAD steps to answer is
- * sent no more (counted), and what would have gone to it is not to be prepared. With BST_LINK_AWAIT
- * there is never more, and always room. */
+/* Takes another answer of a part, if there is one, with BST_LINK_HOLD or BST_LINK_RUSH.
+ *
+ * Given:     part  number of the part
+ *            tick  tick of the step
+ * Returned:  outputs  [output_count] the answer
+ *            *more    true if there was one; always false with BST_LINK_AWAIT
+ * Notes:     in these modes answers arrive at any time. bst_link_exchange returns the oldest one,
+ *            even of an earlier step, and *answered false is not a failure there; this function
+ *            returns the others. */
 bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                          bst_link_output *outputs, int output_count, bool *more) BST_MUST_CHECK;
 
-/* True if the peer of a part can take another step; then its inputs should be prepared.
+/* True if the peer of a part can take another step; then the inputs of the step should be prepared.
  *
  * Given:     part     number of the part
  *            tick     tick of the step
- *            outputs  [output_count] where answers are stored
- * Returned:  *ready  always true with BST_LINK_AWAIT
+ *            outputs  [output_count] payloads of the part's outputs
+ * Returned:  *ready  false if LINK_AHEAD steps are unanswered (counted); always true with
+ *                    BST_LINK_AWAIT
  * Errors:    those of bst_link_exchange */
 bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                           const bst_link_output *outputs, int output_count,

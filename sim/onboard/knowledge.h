@@ -93,7 +93,7 @@ bst_quat bst_knowledge_body_attitude(const bst_knowledge *knowledge);
 
 /* ---- the onboard catalogue: the scenario's objects on their orbits as catalogued ---- */
 
-/* Number of objects in the onboard catalogue. */
+/* Onboard catalogue: number of the scenario's objects, on their catalogued orbits. */
 int bst_knowledge_object_count(const bst_knowledge *knowledge);
 
 /* Description of an object of the onboard catalogue; it belongs to the world.

@@ -18,7 +18,10 @@
 void bst_report_page_begin(FILE *out, const char *title);
 /* Ends the HTML page. */
 void bst_report_page_end(FILE *out);
-/* A heading of level 2 or 3 that opens a section, and its end. */
+
+/* Begins a section with a heading.
+ *
+ * Given:     level  2 or 3 */
 void bst_report_page_section(FILE *out, int level, const char *heading);
 /* Ends a section. */
 void bst_report_page_section_end(FILE *out);

@@ -17,7 +17,7 @@ typedef struct bst_tables_job {
     char **texts;
 } bst_tables_job;
 
-/* The column of an axis, and its value there: *text is to be freed after use. */
+/* Description of the column of an axis. */
 bst_io_column bst_study_axis_column(const bst_study_axis *axis);
 
 /* Value of an axis in a run, as a cell of a table.

@@ -133,15 +133,21 @@ double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s);
  * covariance is widened by the manoeuvre's noise of that time. */
 void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
 
-/* Note a hit's innovation, and the difference of its magnitude over its standard deviation; true
- * when the latest ones together are an event, which starts the window anew. dt_s is the time since
- * the hit before. */
+/* Tests the innovations of a track's latest hits for a manoeuvre.
+ *
+ * Given:     innovation  that of the newest hit
+ *            dt_s        time since the hit before, s
+ * Returned:  true if they are an event; then the window starts anew
+ *            *statistic  test statistic of the decision */
 bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
                              const bst_sky_innovation *innovation, double dt_s, double *statistic);
 
-/* The test of bst_mtt_note_innovation for brightness.
+/* Tests the magnitudes of a track's latest hits for a change of brightness.
  *
- * Given:     z  difference of the magnitude from the expected one over its standard deviation */
+ * Given:     z     difference of the newest magnitude over its standard deviation
+ *            dt_s  time since the hit before, s
+ * Returned:  true if they are an event; then the window starts anew
+ *            *statistic  test statistic of the decision */
 bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track, double z,
                              double dt_s, double *statistic);
 

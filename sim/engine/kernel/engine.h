@@ -127,12 +127,12 @@ bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *instanc
 
 /* Tick of the last step, -1 before the first. */
 int64_t bst_engine_tick(const bst_engine *engine);
-/* Instance names in the order of stepping. */
+/* Number of instances. */
 int bst_engine_instance_count(const bst_engine *engine);
 
 /* Name of an instance ("observer/sensor/module"); it belongs to the engine.
  *
- * Given:     index  index of the instance */
+ * Given:     index  position in the order of stepping, from 0 */
 const char *bst_engine_instance_name(const bst_engine *engine, int index);
 /* Steps that an instance has made. */
 int64_t bst_engine_instance_steps(const bst_engine *engine, int index);

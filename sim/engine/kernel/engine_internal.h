@@ -184,7 +184,7 @@ bst_status bst_pacing_wait(bst_ctx *ctx, bst_engine *engine, int64_t tick) BST_M
 bool bst_pacing_frame(struct bst_step *step, int64_t exposure_id);
 /* In the step that publishes on a paced channel. */
 void bst_pacing_done(const struct bst_step *step, const channel *ch, const void *payload);
-/* Priority and processor of the calling thread, as configured; and as they were. */
+/* Scheduling of a thread, for bst_pacing_thread_give_back. */
 typedef struct bst_pacing_thread {
     unsigned char saved[256];
 } bst_pacing_thread;
