@@ -281,7 +281,7 @@ static bst_status take_table(bst_ctx *ctx, const bst_config_list *list, const ch
     static const char *const wavelength[] = {"wavelength_um", NULL};
     static const char *const response[] = {"response", NULL};
     static const char *const transmission[] = {"transmission", NULL};
-    bst_bench_error_curve curve = {0};
+    bst_curve curve = {0};
     if (*file && list->count > 0) {
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: give either the list or %s_file, not both", key,
                         key);

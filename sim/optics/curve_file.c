@@ -11,10 +11,10 @@
 
 enum { MAX_LINE = 4096, MAX_FIELDS = 3 };
 
-void bst_curve_free(bst_bench_error_curve *curve) {
+void bst_curve_free(bst_curve *curve) {
     free(curve->x);
     free(curve->y);
-    *curve = (bst_bench_error_curve){0};
+    *curve = (bst_curve){0};
 }
 
 static bst_status find_name(const bst_text_source *source, const bst_text_line *line,
@@ -46,8 +46,8 @@ static bst_status read_number(const bst_text_source *source, const bst_text_line
 }
 
 static bst_status add_row(const bst_text_source *source, const bst_text_line *line,
-                          const bst_curve_format *f, const bst_text_span *fields,
-                          bst_bench_error_curve *out, int *capacity) {
+                          const bst_curve_format *f, const bst_text_span *fields, bst_curve *out,
+                          int *capacity) {
     double x, y;
     BST_TRY(
         read_number(source, line, fields[0], f->x_names[out->x_column], f->x_min, f->x_max, &x));
@@ -78,7 +78,7 @@ static bst_status add_row(const bst_text_source *source, const bst_text_line *li
 }
 
 static bst_status read_text(const bst_text_source *source, const char *text, size_t bytes,
-                            const bst_curve_format *f, bst_bench_error_curve *out) {
+                            const bst_curve_format *f, bst_curve *out) {
     bst_text_cursor cursor = bst_text_start(text, bytes);
     bst_text_line line;
     char scratch[MAX_LINE];
@@ -115,8 +115,8 @@ static bst_status read_text(const bst_text_source *source, const char *text, siz
 }
 
 bst_status bst_curve_load(bst_ctx *ctx, const char *path, const bst_curve_format *format,
-                          bst_bench_error_curve *out) {
-    *out = (bst_bench_error_curve){0};
+                          bst_curve *out) {
+    *out = (bst_curve){0};
     char *text = NULL;
     size_t bytes = 0;
     BST_TRY(bst_file_read(ctx, path, MAX_FILE_BYTES, format->what, &text, &bytes));
@@ -129,7 +129,7 @@ bst_status bst_curve_load(bst_ctx *ctx, const char *path, const bst_curve_format
     return status;
 }
 
-double bst_curve_at(const bst_bench_error_curve *curve, double x) {
+double bst_curve_at(const bst_curve *curve, double x) {
     int low = 0, high = curve->count - 1;
     if (x <= curve->x[0]) {
         return curve->y[0];

@@ -17,21 +17,21 @@ typedef struct bst_curve_format {
 } bst_curve_format;
 
 /* x ascends strictly. */
-typedef struct bst_bench_error_curve {
+typedef struct bst_curve {
     double *x, *y; /* [count] */
     int count;
     int x_column, y_column; /* index into the format's names */
-} bst_bench_error_curve;
+} bst_curve;
 
 /* Reads a file of 1 to BST_CURVE_POINTS_MAX rows. BST_ERR_NOT_FOUND, BST_ERR_IO, or BST_ERR_FORMAT
  * with file, line, what is wrong and what is expected. The caller frees with bst_curve_free, also
  * after an error. */
 bst_status bst_curve_load(bst_ctx *ctx, const char *path, const bst_curve_format *format,
-                          bst_bench_error_curve *out) BST_MUST_CHECK;
+                          bst_curve *out) BST_MUST_CHECK;
 /* Frees the memory of a curve and clears the struct, which belongs to the caller. */
-void bst_curve_free(bst_bench_error_curve *curve);
+void bst_curve_free(bst_curve *curve);
 
 /* Linear between the points, the first and last value beyond them. */
-double bst_curve_at(const bst_bench_error_curve *curve, double x);
+double bst_curve_at(const bst_curve *curve, double x);
 
 #endif

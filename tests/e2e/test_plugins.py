@@ -60,7 +60,7 @@ class Plugins(unittest.TestCase):
             file.write(text)
         return subprocess.Popen(
             [CC, "-std=c17", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", path,
-             f"-I{ROOT}", f"-L{BUILD}", "-lboresight", f"-Wl,-rpath,{os.path.abspath(BUILD)}", "-lm",
+             f"-I{ROOT}/include", f"-L{BUILD}", "-lboresight", f"-Wl,-rpath,{os.path.abspath(BUILD)}", "-lm",
              "-o", path[:-1] + "so"], stderr=subprocess.PIPE, text=True)
 
     def call(self, *words, code=0, **options):

@@ -8,7 +8,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 
-static void check(const bst_bench_error_curve *curve, const bst_curve_format *f) {
+static void check(const bst_curve *curve, const bst_curve_format *f) {
     for (int i = 0; i < curve->count; i++) {
         double x = curve->x[i], y = curve->y[i];
         if (!(x >= f->x_min && x <= f->x_max && y >= f->y_min && y <= f->y_max) ||
@@ -35,7 +35,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
     const char *path = fuzz_write_file("input.csv", data, bytes);
     for (int i = 0; i < 2; i++) {
         bst_ctx ctx;
-        bst_bench_error_curve curve;
+        bst_curve curve;
         bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
         bst_status status = bst_curve_load(&ctx, path, &formats[i], &curve);
         FUZZ_CHECK_REASON(ctx, status);

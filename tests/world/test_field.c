@@ -457,8 +457,7 @@ static int count_objects(const scene *s) {
     return n;
 }
 
-/* A catalogue has the observer, too: without its burns, 96 m ahead here and brighter than the Sun.
- */
+/* A catalogue holds the observer too: without its burns, 96 m ahead and brighter than the Sun. */
 static void nobody_sees_itself_in_a_catalogue(void **state) {
     (void)state;
     scene s = make_scene_in(

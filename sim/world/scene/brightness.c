@@ -20,7 +20,7 @@ enum { AS_MAGNITUDE, AS_FACTOR };
 
 struct bst_brightness {
     bst_brightness_config config;
-    bst_bench_error_curve curve;
+    bst_curve curve;
 };
 
 bst_status bst_brightness_create(bst_ctx *ctx, const bst_brightness_config *config,
@@ -47,7 +47,7 @@ bst_status bst_brightness_create(bst_ctx *ctx, const bst_brightness_config *conf
         if (status != BST_OK) {
             status = bst_fail_prefix(ctx, BST_ERR_CONFIG, "light_curve_file");
         }
-        const bst_bench_error_curve *c = &b->curve;
+        const bst_curve *c = &b->curve;
         for (int i = 0; i < c->count && status == BST_OK; i++) {
             if (c->y_column == AS_FACTOR && c->y[i] < 0.0) {
                 status =

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/optics/band.h"
 #include "sim/optics/psf.h"
 #include "sim/world/scene/field_image.h"
 #include "sim/world/scene/field_objects.h"
@@ -11,16 +10,14 @@
 #include "sim/world/scene/row_exposure.h"
 #include "sim/world/scene/skylight.h"
 
-/* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
- * catalogue's. */
+/* How far an apparent place lies from the catalogue's, at most: aberration and light deflection. */
 #define APPARENT_SHIFT_RAD (30.0 * BST_ARCSEC_RAD)
 
 /* Statistical stars that a field query keeps for the next one: 40 MiB. */
 #define FAINT_CACHE_STARS 1048576
 
-/* Attitudes and instants at which a position is evaluated to average it over the exposure: the
- * sigma points of the joint first and second moments of (attitude deviation, time), Julier and
- * Uhlmann 1997. Exact to second order; the first, the mean itself, has no weight. */
+/* Sigma points of (attitude deviation, time), over which a position is averaged (Julier and Uhlmann
+ * 1997). Exact to second order; the first one, the mean itself, has no weight. */
 enum { SIGMA_DIMENSIONS = 4, SIGMA_POINTS = 2 * SIGMA_DIMENSIONS + 1 };
 
 struct bst_field {

@@ -12,8 +12,7 @@ struct bst_scene_pst {
     bst_optics_pst_point points[];
 };
 
-static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir,
-                       bst_bench_error_curve *curve) {
+static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst_curve *curve) {
     static const char *const angle[] = {"angle_deg", NULL};
     static const char *const value[] = {"pst", NULL};
     const bst_curve_format format = {
@@ -44,7 +43,7 @@ static bst_status check(bst_ctx *ctx, const bst_scene_pst *pst) {
 bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *config,
                                 double optics_pixel_um, const char *base_dir, bst_scene_pst **out) {
     *out = NULL;
-    bst_bench_error_curve curve = {0};
+    bst_curve curve = {0};
     if (*config->pst_file && config->pst.count > 0) {
         return bst_fail(ctx, BST_ERR_CONFIG, "pst: give either the list or pst_file, not both");
     }
