@@ -83,16 +83,16 @@ typedef struct bst_guidance {
     bst_los_command last;
     bst_guidance_slew slew;
     bst_slew_nodes nodes; /* work space of planning */
-    /* the way of pointing and turn that were chosen */
+    /* the solution and whole turns that were chosen */
     bool near_known;
     double near_rad[BST_MOUNT_AXES];
     bst_vec3 near_body; /* direction in body axes that near_rad was worked out for; zero: none */
-    int reach;          /* bst_pointing_feasibility, as last told */
-    bool no_way;        /* told */
-    int64_t ahead_tick; /* of the next look ahead */
+    int reach;          /* bst_pointing_feasibility, as last reported */
+    bool no_way;        /* reported: no solution within travel */
+    int64_t ahead_tick; /* of the next prediction */
     bool roll_given;    /* the body has been asked for */
     double roll_rad;    /* this roll */
-    double told_from_s, told_until_s; /* the loss ahead that was told; INFINITY: none */
+    double told_from_s, told_until_s; /* predicted loss that was reported; INFINITY: none */
     bst_guidance_event events[BST_GUIDANCE_EVENTS];
     int event_count;
 } bst_guidance;
@@ -101,7 +101,7 @@ typedef struct bst_guidance {
 void bst_guidance_init(bst_guidance *guidance, const bst_guidance_config *config,
                        const bst_guidance_env *env);
 
-/* Takes in the mount's newest status (NULL: nothing new). */
+/* Updates the status of the mount; NULL: no new status. */
 void bst_guidance_telemetry(bst_guidance *guidance, const bst_mount_status *mount);
 
 /* Takes in navigation's newest message: where cones and the Earth are, by an attitude telemetry

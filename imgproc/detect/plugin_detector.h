@@ -1,5 +1,5 @@
-/* A user's own detector in place of bst_imgproc_detect: what comes of its detections is checked,
- * and what identification of stars needs to know of the frame follows from what it says. */
+/* A plug-in's detector in place of bst_imgproc_detect. Its detections are checked; background,
+ * noise and limiting magnitude for the identification of stars follow from its results. */
 #ifndef BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 #define BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 

@@ -26,7 +26,7 @@ enum {
     BST_PORT_OPTIONAL = 1u << 0, /* input: may have no writer; output: yields to another module
                                     that writes the channel (bst_env_writes) */
     BST_PORT_TRIGGER = 1u << 1, /* input: the module steps whenever a new message becomes visible */
-    BST_PORT_FEEDBACK = 1u << 2, /* input: closes a loop; read with a delay of at least one tick */
+    BST_PORT_FEEDBACK = 1u << 2, /* input: closes a loop; delayed by at least one tick */
 };
 
 typedef struct bst_port {
@@ -41,17 +41,16 @@ typedef struct bst_port {
 enum {
     BST_MODULE_READS_TRUTH = 1u << 0, /* gets env->world; onboard modules do not */
     BST_MODULE_NEEDS_DEVICE = 1u << 1,
-    BST_MODULE_APART = 1u << 2,      /* may step in another thread than modules that do not read it:
-                                        shares with them only what is constant or locked, has no period
-                                        and never asks to be woken */
-    BST_MODULE_NEEDS_LINK = 1u << 3, /* gets env->link: another program plays it */
-    BST_MODULE_LINKS = 1u << 4,      /* one for all sensors of a scenario, which names it beside the
-                                        observers: its ports are there once for each sensor
-                                        (bst_member_port), and env->knowledge is NULL */
-    BST_MODULE_PROMISES = 1u << 5,   /* BST_MODULE_LINKS: says how long it will not write
-                                        (bst_step_promise), so that sensors go on meanwhile. It has
-                                        a period, never asks to be woken, and reads its queues to
-                                        the last message in each step */
+    BST_MODULE_APART = 1u << 2, /* deferrable: may step in another thread than modules that do not
+                                   read it. Shares only constant or locked data with them,
+                                   has no period and never requests a wake */
+    BST_MODULE_NEEDS_LINK = 1u << 3, /* gets env->link: another program takes its part */
+    BST_MODULE_LINKS = 1u << 4,      /* multi-sensor: one instance for all sensors, named beside the
+                                        observers. It has each port once per sensor
+                                        (bst_member_port); env->knowledge is NULL */
+    BST_MODULE_PROMISES = 1u << 5, /* BST_MODULE_LINKS with a lookahead (bst_step_promise), so that
+                                      sensors may run ahead. It has a period, never requests a
+                                      wake, and reads its queues to the end in each step */
 };
 
 /* One of the sensors that a BST_MODULE_LINKS module serves. */

@@ -34,8 +34,11 @@ typedef struct bst_world_state {
 bst_time bst_world_time(const bst_world *world, double seconds);
 /* Earth orientation of the scenario; lent. */
 const bst_astro_eop *bst_world_earth_orientation(const bst_world *world);
-/* Logs a warning where a run of `duration_s` goes on after the Earth-orientation table: how well
- * what is predicted from it is known at its end. `scenario` names the file. */
+/* Logs a warning if a run ends after the Earth-orientation table, with the uncertainty of the
+ * predicted orientation at its end.
+ *
+ * Given:     scenario    name of the file, for the message
+ *            duration_s  duration of the run, s */
 void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const bst_world *world,
                                       double duration_s);
 /* Star catalogue of a world; it belongs to the world. */
@@ -50,13 +53,13 @@ const bst_world_object_info *bst_world_object(const bst_world *world, int object
 /* Time from the epoch of a body's element set to the scenario's epoch, s; bodies are numbered
  * objects first, then observers. False: its orbit is no element set. */
 bool bst_world_element_age(const bst_world *world, int body, double *seconds);
-/* The law that an object moves by (not where it is): SGP4 with a drag term, or forces. */
+/* Law of motion of an object, without its state: SGP4 with a drag term, or forces. */
 typedef struct bst_world_motion_law {
     bool sgp4;                     /* an element set */
     double bstar;                  /* of the set, 1 / Earth radii */
     const bst_force_model *forces; /* of an integrated orbit, lent by the world; NULL: none known */
 } bst_world_motion_law;
-/* An object on an orbit relative to another one moves by the law of that one. */
+/* Law of motion of an object; for an orbit relative to another object, the law of that object. */
 bst_world_motion_law bst_world_object_motion(const bst_world *world, int object);
 /* Index of the object with this name, -1 when there is none. */
 int bst_world_find_object(const bst_world *world, const char *name);

@@ -1,9 +1,9 @@
-/* One ephemeris of all objects and observers of a world, shared by all who look.
+/* One ephemeris of all objects and observers of a world, shared by all views.
  *
  * SGP4 orbits without burns are evaluated at knots t = k * step (seconds after the epoch, step a
  * power of two for each orbit), once, and interpolated by the polynomial through the ten knots
- * around t. What is returned is a function of the orbit and the time alone: the same to the bit
- * whatever was asked for before, from however many threads. */
+ * around t. The result depends on the orbit and the time alone: it is the same to the bit for any
+ * earlier queries and any number of threads. */
 #ifndef BST_WORLD_ORBIT_EPHEMERIS_H
 #define BST_WORLD_ORBIT_EPHEMERIS_H
 
