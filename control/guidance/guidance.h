@@ -88,7 +88,7 @@ typedef struct bst_guidance {
     double near_rad[BST_MOUNT_AXES];
     bst_vec3 near_body; /* direction in body axes that near_rad was worked out for; zero: none */
     int reach;          /* bst_pointing_feasibility, as last reported */
-    bool no_way;        /* reported: no solution within travel */
+    bool no_way;        /* reported: keep-out zones block the way to the target */
     int64_t ahead_tick; /* of the next prediction */
     bool roll_given;    /* the body has been asked for */
     double roll_rad;    /* this roll */

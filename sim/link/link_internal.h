@@ -156,7 +156,7 @@ typedef struct link_exchange {
 /* Counts, and keeps the line as a note and in the log. */
 void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...)
     BST_PRINTF(4, 5);
-/* link_record.c */
+/* Closes a recording's file and frees it (link_record.c); NULL is allowed. */
 void bst_link_tape_free(link_tape *tape);
 /* Records the answer of a call. */
 void bst_link_tape_answer(bst_link *link, int part, int64_t tick, const bst_link_output *outputs,
