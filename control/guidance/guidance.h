@@ -120,8 +120,9 @@ void bst_guidance_see_sky(bst_guidance *guidance, const bst_nav_telemetry *nav, 
  * Errors:    those of the aim's function
  * Notes:     the command stays as it is unless keep-out cones are set, slews are planned or mount
  *            angles must be chosen, and the aim is within a cone or farther than slew_above_deg
- * from the last command (at first from the boresight). When due, the function also predicts the
- * reachability of the aim. Events are appended; the caller clears them (event_count = 0). */
+ *            from the last command (at first from the boresight). When due, the function also
+ *            predicts the reachability of the aim. Events are appended; the caller clears them
+ *            (event_count = 0). */
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) BST_MUST_CHECK;
 

@@ -26,12 +26,13 @@ typedef struct bst_camera_motion {
  *            start_tick, end_tick  begin and end of the exposure, ticks
  * Returned:  *out  mean attitude, turn and bend; unchanged if the result is false
  * Notes:     false if the ring is empty.
- * Mean, least-squares slope and bend of the attitude over [start_tick, end_tick]. Attitudes between
- * samples are interpolated linearly; beyond the ring's ends they are extrapolated from the two last
- * samples. With at least 8 samples in the exposure, the variance of the samples' noise is estimated
- * from third differences, which smooth motion does not affect. The bend about x and y is then
- * multiplied by 1 - 2 s^2 / bend^2 (0 if negative), s being the standard deviation that this noise
- * gives the bend. An exposure of length zero gives the attitude at that time, no turn and no bend.
+ *            Mean, least-squares slope and bend of the attitude over [start_tick, end_tick].
+ *            Attitudes between samples are interpolated linearly; beyond the ring's ends they are
+ *            extrapolated from the two last samples. With at least 8 samples in the exposure, the
+ *            variance of the samples' noise is estimated from third differences, which smooth
+ *            motion does not affect. The bend about x and y is then multiplied by 1 - 2 s^2 /
+ *            bend^2 (0 if negative), s being the standard deviation that this noise gives the bend.
+ *            An exposure of length zero gives the attitude at that time, no turn and no bend.
  * Reference: James and Stein 1961 (positive-part shrinkage) */
 bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
                                       int64_t end_tick, bst_camera_motion *out);

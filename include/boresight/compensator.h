@@ -206,10 +206,12 @@ typedef double complex (*bst_dynamics_response_fn)(const void *user, double omeg
  * Notes:     gain_scale and delay_s do not enter the design and are copied. The crossover is the
  *            frequency at which |L| = 1, where L = compensator * plant; there arg L = -180 deg +
  *            phase margin.
- * pi: chooses kp and ki. If a pure integrator already has more phase margin than asked for, it is
- * used. pid: integral corner at integral_ratio times the crossover; chooses gain and derivative,
- * and more integral action if there is phase to spare. lead_lag: as pid, with a lead centred on the
- * crossover whose pole is at most 100 times its zero. */
+ *            pi: chooses kp and ki. If a pure integrator already has more phase margin than asked
+ *            for, it is used.
+ *            pid: integral corner at integral_ratio times the crossover; chooses gain and
+ *            derivative, and more integral action if there is phase to spare.
+ *            lead_lag: as pid, with a lead centred on the crossover whose pole is at most 100 times
+ *            its zero. */
 bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *config, double dt_s,
                                   bst_dynamics_response_fn plant, const void *user,
                                   bst_compensator_config *out) BST_MUST_CHECK;
@@ -222,8 +224,9 @@ bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *co
  *            plant, user  rest of the loop, for a specification; plant NULL: only gains or a
  *                         plug-in are allowed
  * Errors:    BST_ERR_CONFIG for frequencies beyond half the sample rate, a delay of more than 1022
- * samples, gains with coefficients that are not finite, gains beside a specification, a
- * specification without a plant or one that cannot be met; errors of the plug-in's init */
+ *            samples, gains with coefficients that are not finite, gains beside a specification, a
+ *            specification without a plant or one that cannot be met; errors of the plug-in's init
+ */
 bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *compensator,
                                 const bst_compensator_config *config, double dt_s,
                                 bst_dynamics_response_fn plant, const void *user) BST_MUST_CHECK;

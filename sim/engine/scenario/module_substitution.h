@@ -16,7 +16,7 @@ struct cJSON;
  *                      missing is added with its defaults; it takes the settings of those that it
  *                      replaces
  * Errors:    BST_ERR_CONFIG if the substitute's block sets a key of the modules that it replaces,
- * or if a substitute is needed and the registry has none */
+ *            or if a substitute is needed and the registry has none */
 bst_status bst_module_substitution(bst_ctx *ctx, const bst_scenario_registry *registry,
                                    const struct cJSON *block, int observer, int sensor,
                                    bst_scenario *scenario) BST_MUST_CHECK;
