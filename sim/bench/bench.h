@@ -159,7 +159,7 @@ typedef struct bst_bench_device {
 
 /* Describes the OpenCL device that the options choose; opens it in a child process.
  *
- * Errors:    BST_ERR_DEVICE, BST_ERR_IO */
+ * Errors:    those of opening a device and of bst_bench_apart */
 bst_status bst_bench_describe_device(bst_ctx *ctx, const bst_bench_options *options,
                                      bst_bench_device *out) BST_MUST_CHECK;
 /* Processor, cores, memory, system, compiler, driver, version, revision and date. */

@@ -34,9 +34,9 @@ typedef struct bst_io_box {
 
 /* Creates a picture of one colour.
  *
- * Given:     width, height  px
+ * Given:     width, height  px, 1 to 16384
  * Returned:  *out  NULL on error
- * Errors:    BST_ERR_MEMORY
+ * Errors:    BST_ERR_ARGUMENT for the size, BST_ERR_MEMORY
  * Ownership: free *out with bst_picture_free */
 bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_io_colour background,
                               bst_picture **out) BST_NOEXCEPT BST_MUST_CHECK;

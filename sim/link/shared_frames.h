@@ -41,7 +41,7 @@ int64_t bst_shared_frames_next(const bst_shared_frames *frames);
 
 /* Writer: writes the next message to its slot.
  *
- * Given:     header  [header_bytes] header of the frame
+ * Given:     header  [header_bytes] link header of the frame, as text
  *            pixels  [bytes] */
 void bst_shared_frames_write(bst_shared_frames *frames, const char *header, size_t header_bytes,
                              const void *pixels, size_t bytes);

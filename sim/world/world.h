@@ -110,7 +110,7 @@ bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int o
 /* State of an observer.
  *
  * Given:     seconds  since the epoch
- * Errors:    those of its orbit (BST_ERR_RANGE outside its data) */
+ * Errors:    those of bst_world_view_object_state */
 bst_status bst_world_view_observer_state(bst_ctx *ctx, bst_world_view *view, int observer,
                                          double seconds, bst_world_state *out) BST_MUST_CHECK;
 /* What the onboard side of a sensor believes then: the observer's state with its orbit error, and
