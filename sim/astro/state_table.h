@@ -8,7 +8,7 @@
 /* The states of one file; immutable once made, shareable between threads. */
 typedef struct bst_injected bst_injected;
 
-/* Reads a file of comma-separated values with a header row (docs/interfaces.md, "Injected states").
+/* Reads a file of comma-separated values with a header row (docs/reference/file_formats.md, "Injected states").
  * Columns, in any order: object; start_s and end_s (seconds after `epoch`) or start_utc and
  * end_utc; start_x_m, _y_m, _z_m, start_vx_mps, _vy_mps, _vz_mps and the same with end_. One row
  * per object and frame; an object's frames come in the order of time and do not overlap. Blank

@@ -12,7 +12,7 @@ static const char opening[] =
     "\n"
     "This page is made by `boresight icd` from the tables with which the program encodes, decodes "
     "and checks;\n"
-    "a test keeps it current. How to use the link, with examples: [link.md](link.md).\n"
+    "a test keeps it current. How to use the link, with examples: [hardware in the loop](../how-to/hardware_in_the_loop.md).\n"
     "\n";
 
 static const char transport[] =
@@ -110,7 +110,7 @@ static const char transport[] =
     "| `link_repeated` | a second output of a type in a step | not taken: the first one holds |\n"
     "| `link_incomplete` | `done` with another number of outputs than were taken | not taken: the "
     "step goes on |\n"
-    "| `link_held` | nothing in time, where the [pacing](link.md#pacing) does not wait for it | "
+    "| `link_held` | nothing in time, where the [pacing](../how-to/hardware_in_the_loop.md#pacing) does not wait for it | "
     "the "
     "run goes on; the answer counts when it comes |\n"
     "| `link_skipped` | nothing: a peer that has two steps to answer is sent no third one | its "

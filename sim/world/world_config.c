@@ -309,7 +309,7 @@ static const char *const observation_sources[] = {"image", "generator", NULL};
 const bst_config_desc bst_sensor_config_table[] = {
     BST_STRING(bst_sensor_config, name, "\"camera\"", "Name, unique on its observer."),
     BST_PATH(bst_sensor_config, frame_updates_file, "\"\"",
-             "JSON file that drives the sensor frame by frame (docs/interfaces.md, \"Frame "
+             "JSON file that drives the sensor frame by frame (docs/reference/file_formats.md, \"Frame "
              "updates\"), relative to the scenario's folder; empty: none."),
     BST_OBJECT(bst_sensor_config, camera, bst_camera_config, NULL, "Optics and detector."),
     BST_REALS(

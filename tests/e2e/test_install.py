@@ -231,7 +231,7 @@ class Installed(unittest.TestCase):
         self.assertTrue(os.path.exists(work + "/run/manifest.json"))
         for name in ("share/boresight/scenarios/boresight.schema.json",
                      "share/man/man1/boresight.1", "share/doc/boresight/LICENSE",
-                     "share/doc/boresight/docs/user_guide.md",
+                     "share/doc/boresight/docs/reference/run_folder.md",
                      "share/doc/boresight/docs/examples/use_library/first_frames.c"):
             self.assertTrue(os.path.exists(os.path.join(self.stage, name)), name)
         for file in (program, os.path.join(self.libdir, "libboresight.so")):
