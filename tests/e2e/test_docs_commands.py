@@ -28,6 +28,8 @@ import unittest
 ROOT = os.getcwd()
 SECONDS = 5
 LANGUAGES = {"sh", "console", "text", "json", "c", "python", "cmake", "csv", "{toctree}"}
+# variables that later blocks of a page use; not the variables of one command
+SETTING = re.compile(r"""export .*|\w+=(\S*|"[^"]*")""")
 WORDS = re.compile(r"<!-- test: (.*) -->")
 WRAPPER = """#!/usr/bin/env python3
 import os, sys
@@ -136,7 +138,7 @@ class Commands(unittest.TestCase):
             scratch, background, before = Scratch(PROGRAM), [], ""
             for line, _, marks, text in todo:
                 place = f"{path}:{line}"
-                settings = "".join(row + "\n" for row in text.split("\n") if re.fullmatch(r"(export )?\w+=.*", row))
+                settings = "".join(row + "\n" for row in text.split("\n") if SETTING.fullmatch(row))
                 why = left_out(marks)
                 if why:
                     skipped.append(f"{place}: {why}")
