@@ -8,6 +8,7 @@ A fenced block of language sh or console is run, all blocks of a page in one she
 scratch folder that looks like the repository. A comment on the line before a block changes that:
 
     <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 5 s (a command's own --duration is kept)
+                                (a shipped study is only planned: --dry-run)
     <!-- test: exit=1 -->       the block ends with this exit code
     <!-- test: background -->   the block runs beside the next ones of its page and must end with 0 by its end
     <!-- test: needs=ds9 -->    counted and printed as not run where the program ds9 is missing
@@ -27,7 +28,7 @@ import unittest
 
 ROOT = os.getcwd()
 SECONDS = 5
-LANGUAGES = {"sh", "console", "text", "json", "c", "python", "cmake", "csv", "{toctree}"}
+LANGUAGES = {"sh", "console", "text", "json", "c", "python", "cmake", "{toctree}"}
 # variables that later blocks of a page use; not the variables of one command
 SETTING = re.compile(r"""export .*|\w+=(\S*|"[^"]*")""")
 WORDS = re.compile(r"<!-- test: (.*) -->")
@@ -37,7 +38,7 @@ words = sys.argv[1:]
 length = os.environ.get("DOCS_DURATION")
 if "run" in words[:3] and length and "--duration" not in words and "--replay" not in words and "--help" not in words:
     words += ["--duration", length]
-if "study" in words[:1] and length and "--out" in words and "scenarios/" in " ".join(words):
+if words[:1] == ["study"] and length and "--out" in words and "--emit" not in words and "scenarios/" in words[1]:
     words += ["--dry-run"] if "--dry-run" not in words else []
 os.execv({program!r}, [{program!r}] + words)
 """
