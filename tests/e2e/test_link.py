@@ -168,7 +168,7 @@ class Client(unittest.TestCase):
         with open("docs/reference/icd.md", encoding="utf-8") as file:
             text = file.read()
         text = text[text.index("## A message, byte by byte"):]
-        header, dump = re.findall(r"```\n(.*?)\n```", text, re.S)
+        header, dump = re.findall(r"```text\n(.*?)\n```", text, re.S)
         payload = bytes.fromhex("".join(line[4:] for line in dump.splitlines()))
         record = boresight_link.new_record("los_command")
         record["tick"] = 12600
