@@ -13,6 +13,7 @@ scratch folder that looks like the repository. A comment on the line before a bl
     <!-- test: background -->   the block runs beside the next ones of its page and must end with 0 by its end
     <!-- test: needs=ds9 -->    counted and printed as not run where the program ds9 is missing
     <!-- test: slow -->         run by --slow only (./dev slow), at full length
+    <!-- test: tree -->         runs in a copy of the sources without a build folder
     <!-- test: network -->      needs a network or changes the machine: run by --slow when BORESIGHT_TEST_NETWORK is set
     <!-- test: cluster -->      needs Slurm: tests/e2e/slurm/test_slurm.py runs the same command
 """
@@ -98,7 +99,11 @@ class Scratch:
         os.makedirs(home, exist_ok=True)
         environment = dict(os.environ, DOCS_DURATION=length, PATH=self.tools + ":" + os.environ["PATH"],
                            HOME=home, POCL_CACHE_DIR=os.environ.get("POCL_CACHE_DIR", os.path.expanduser("~/.cache/pocl")))
-        return subprocess.Popen(["bash", "-e", "-u", "-o", "pipefail", "-c", text], cwd=self.path, env=environment,
+        folder = self.path
+        if "tree" in marks:
+            folder = os.path.join(self.path, "tree")
+            shutil.copytree(ROOT, folder, symlinks=True, ignore=shutil.ignore_patterns("build", "build-*", "runs", ".git"))
+        return subprocess.Popen(["bash", "-e", "-u", "-o", "pipefail", "-c", text], cwd=folder, env=environment,
                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
