@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Puts the pictures of a run into docs/images, small enough for a README.
+"""Puts the pictures of a run, or of the tutorial, into docs/images, small enough for a README.
 
 usage: docs/make_images.py RUN_FOLDER
+       docs/make_images.py --tutorial RUNS_FOLDER
 
-Writes quicklook.png and pointing.png with a palette of at most 48 colours, the further apart the
-larger the file would be: noise in a picture costs most of its bytes, and its last bits show nothing.
-Needs numpy only.
+RUN_FOLDER is a run of the main scenario: its quicklook.png and pointing.png are taken. RUNS_FOLDER is what
+the commands of docs/tutorial wrote (runs/). The palette has at most 48 colours; the larger the file would be, the
+fewer: noise in a picture costs most of its bytes, and its last bits show nothing. Needs numpy only.
 """
 import pathlib
 import struct
@@ -14,6 +15,9 @@ import zlib
 
 import numpy as np
 
+MAIN = {"quicklook.png": "quicklook.png", "pointing.png": "pointing.png"}
+TUTORIAL = {"iss/quicklook.png": "tutorial_satellite.png", "box_detector.png": "tutorial_detector.png",
+            "aperture.png": "tutorial_study.png"}
 COLOURS = 48
 LARGEST = 290_000  # bytes
 
@@ -97,12 +101,16 @@ def make_png(palette, indices):
 
 
 def main():
-    if len(sys.argv) != 2:
+    words = sys.argv[1:]
+    pictures = TUTORIAL if words[:1] == ["--tutorial"] else MAIN
+    if pictures is TUTORIAL:
+        words = words[1:]
+    if len(words) != 1:
         sys.exit(__doc__)
     folder = pathlib.Path(__file__).resolve().parent / "images"
     folder.mkdir(exist_ok=True)
-    for name in ("quicklook.png", "pointing.png"):
-        image = read_png(pathlib.Path(sys.argv[1]) / name)
+    for source, name in pictures.items():
+        image = read_png(pathlib.Path(words[0]) / source)
         for apart in (14, 20, 28, 40):
             png = make_png(*quantise(image, apart))
             if len(png) <= LARGEST:

@@ -3,7 +3,7 @@
 
 usage: docs/make_loop_figures.py BORESIGHT [SEEDS]
 
-Prints the tables of docs/loops.md: pointing of the main scenario beyond the jitter that no loop
+Prints the tables of docs/results/control_loops.md: pointing of the main scenario beyond the jitter that no loop
 rejects, and the same target under closed loop, open-loop rate track and stare: SNR of a frame, the
 magnitude at which it is 6, and the share of frames in which the target is detected by magnitude.
 Run from the repository root; needs gnuplot.

@@ -1,12 +1,23 @@
 #!/usr/bin/env python3
-"""Turns `boresight schema` into docs/reference.md.
+"""Turns a JSON Schema of the program into pages of key tables.
 
-usage: build/boresight schema | docs/make_reference.py > docs/reference.md
+usage: boresight schema | docs/make_reference.py OUT_FOLDER
+       boresight study --schema | docs/make_reference.py OUT_FOLDER
+
+Writes OUT_FOLDER/index.md and one page for each large block. A block whose keys were listed before
+is not listed again: its section links to the first one.
 """
 import json
+import pathlib
 import sys
 
 SKIPPED = {"description", "$schema"}
+# blocks that get a page of their own: path, file, title
+PAGES = [("/world", "world", "Keys of /world: stars and objects"),
+         ("/observers[]", "observers", "Keys of /observers: orbits and sensors"),
+         ("/observers[]/sensors[]/camera", "camera", "Keys of camera: optics and detector"),
+         ("/observers[]/sensors[]/knowledge", "knowledge", "Keys of knowledge: onboard errors"),
+         ("modules/gimbal/platform", "platform", "Keys of platform: jitter and spacecraft")]
 
 
 def own(node):
@@ -80,14 +91,15 @@ def table(node):
             continue
         if "then" in child:
             below.append((key, "", child))
-            rows.append(f"| `{key}` | object, or a [plug-in](plugins.md) |  |  |  | "
+            rows.append(f"| `{key}` | object, or a [plug-in](../../how-to/plugins.md) |  |  | "
                         f"{cell(child.get('description', ''))} |")
             continue
         doc, unit = split_unit(child.get("description", ""))
         default = f"`{json.dumps(child['default'])}`" if "default" in child else ""
         if key in required:
             default = "required"
-        rows.append(f"| `{key}` | {kind_of(child)} | {cell(unit)} | {range_of(child)} | {cell(default)} | "
+        kind = kind_of(child) + (f" [{cell(unit)}]" if unit else "")
+        rows.append(f"| `{key}` | {kind} | {range_of(child)} | {cell(default)} | "
                     f"{cell(doc)} |")
         if child.get("type") == "array" and child["items"].get("type") == "object":
             below.append((key, "[]", child["items"]))
@@ -96,56 +108,89 @@ def table(node):
     return rows, below
 
 
-def write_modules(role, choices, path):
-    for choice in choices:
-        if choice.get("title"):
-            continue  # what any plug-in may say
-        kind = choice["properties"]["type"]
-        delays = choice["properties"]["delay_s"]["properties"]
-        name = kind.get("const") or kind["enum"][0]
-        print(f"## Module `{role}` of type `{name}`\n\n{kind.get('description', '')}\n")
-        print("Inputs that `delay_s` may name: "
-              + (", ".join(f"`{d}`" for d in delays) or "none") + ".\n")
-        write(choice, path, 3)
+class Writer:
+    """Collects pages; remembers where each set of keys was listed first."""
 
+    def __init__(self, title, intro):
+        self.pages = {"index": [f"# {title}\n\n{intro}\n"]}
+        self.titles = {}
+        self.first = {}
 
-def write(node, path, level):
-    rows, below = table(own(node))
-    if "then" in node:
-        properties = node["then"]["properties"]
-        rows.append(f"| `plugin` | string |  |  |  | {cell(properties['plugin']['description'])} |")
-    modules = [b for b in below if b[0] == "modules"]
-    print("| key | type | unit | allowed | default | meaning |\n|---|---|---|---|---|---|")
-    print("\n".join(rows) + "\n")
-    for key, tail, child in below:
-        if (key, tail, child) in modules:
-            continue
-        here = f"{path}/{key}{tail}"
-        print(f"{'#' * level} `{here}`\n")
-        if "description" in child:
-            print(split_unit(child["description"])[0] + "\n")
-        write(child, here, min(level + 1, 4))
-    for key, _, child in modules:
-        for role, choices in child["properties"].items():
-            write_modules(role, choices["oneOf"], f"modules/{role}")
-    for key, child in node.get("properties", {}).items():
-        if "oneOf" in child:
-            write_modules(key, child["oneOf"], f"{path}/{key}")
+    def open_page(self, name, title):
+        self.pages[name] = [f"# {title}\n"]
+        self.titles[name] = title
+
+    def say(self, page, text):
+        self.pages[page].append(text)
+
+    def modules(self, role, choices, path):
+        for choice in choices:
+            if choice.get("title"):
+                continue  # what any plug-in may say
+            kind = choice["properties"]["type"]
+            delays = choice["properties"]["delay_s"]["properties"]
+            name = kind.get("const") or kind["enum"][0]
+            page = f"module_{role}_{name}"
+            self.open_page(page, f"Keys of module {role}, type {name}")
+            self.say(page, f"{kind.get('description', '')}\n\nInputs that `delay_s` may name: "
+                     + (", ".join(f"`{d}`" for d in delays) or "none") + ".\n")
+            self.block(choice, path, page, 2)
+
+    def block(self, node, path, page, level):
+        rows, below = table(own(node))
+        if "then" in node:
+            properties = node["then"]["properties"]
+            rows.append(f"| `plugin` | string |  |  | {cell(properties['plugin']['description'])} |")
+        self.say(page, "| key | type [unit] | allowed | default | meaning |\n|---|---|---|---|---|\n"
+                 + "\n".join(rows) + "\n")
+        for key, tail, child in below:
+            if key != "modules":
+                self.child(child, f"{path}/{key}{tail}", page, level)
+        for role, choices in node.get("properties", {}).get("modules", {}).get("properties", {}).items():
+            self.modules(role, choices["oneOf"], f"modules/{role}")
+        for key, child in node.get("properties", {}).items():
+            if "oneOf" in child:
+                self.modules(key, child["oneOf"], f"{path}/{key}")
+
+    def child(self, child, here, page, level):
+        keys = json.dumps(own(child).get("properties"), sort_keys=True)
+        text = split_unit(child["description"])[0] + "\n" if "description" in child else ""
+        known = self.first.get(keys)
+        for path, name, title in PAGES:
+            if here == path and not known:
+                self.say(page, f"{'#' * level} `{here}`\n\n{text}\nSee [{title}]({name}.md).\n")
+                self.open_page(name, title)
+                self.first[keys] = (here, name)
+                self.say(name, text)
+                return self.block(child, here, name, 2)
+        self.say(page, f"{'#' * level} `{here}`\n\n{text}")
+        if known:
+            return self.say(page, f"The keys are those of [`{known[0]}`]({known[1]}.md).\n")
+        self.first[keys] = (here, page)
+        return self.block(child, here, page, min(level + 1, 4))
 
 
 def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
     schema = json.load(sys.stdin)
     if schema["title"] == "Boresight study":
-        print("# Reference of the study keys\n\n"
-              "Made from the program's own tables: `build/boresight study --schema | "
-              "docs/make_reference.py > docs/study_reference.md`.\nWhat the keys are for is in "
-              "[studies](studies.md).\n\n## The study\n")
+        writer = Writer("Keys of a study", "Generated from `boresight study --schema`. "
+                        "[Run a study](../../how-to/studies.md) explains how to use the keys.")
     else:
-        print("# Reference of the scenario keys\n\n"
-              "Made from the program's own tables: `build/boresight schema | docs/make_reference.py > "
-              "docs/reference.md`.\nEvery object also takes a `description`, which is ignored. The path of a "
-              "key is what `--set` takes, with\nthe number of the element in place of `[]`.\n\n## The scenario\n")
-    write(schema, "", 2)
+        writer = Writer("Keys of a scenario",
+                        "Generated from `boresight schema`. Every object also takes a `description`, which the "
+                        "program ignores. The path of a key is the JSON pointer that `--set` takes; replace `[]` "
+                        "by the number of the element.")
+    writer.block(schema, "", "index", 2)
+    if writer.titles:
+        links = "\n".join(f"- [{title}]({name}.md)" for name, title in writer.titles.items())
+        toc = "\n".join(writer.titles)
+        writer.pages["index"].insert(1, f"{links}\n\n```{{toctree}}\n:hidden:\n{toc}\n```\n")
+    folder = pathlib.Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, parts in writer.pages.items():
+        (folder / f"{name}.md").write_text("\n".join(parts), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ while the simulation runs elsewhere, in any order::
     boresight run SCENARIO.json --link tcp://127.0.0.1:5555 --external imgproc
 
 `Link.steps` waits for each step of the part and tells the simulation that it is done when the next one
-is asked for; simulated time stands still in between. What messages hold is in docs/icd.md: here each
+is asked for; simulated time stands still in between. What messages hold is in docs/reference/icd.md: here each
 is a NumPy record with the names from there. `read_run` opens the folder of a run.
 
 The simulation checks every message and refuses what is wrong with it, which raises `LinkError` here.
@@ -37,7 +37,7 @@ VERSION = 3
 PIXELS_AT = 4096  # of a slot in shared memory
 
 # Members of each message's record, then of its items: name:type, x for an array. A test compares
-# them with docs/icd.md.
+# them with docs/reference/icd.md.
 _TABLES = {
     "hello": (
         "name:S64 serves:S256 shared_memory:i4",

@@ -42,7 +42,7 @@ const bst_config_desc bst_spacecraft_config_table[] = {
              "attitude_noise_arcsec. `rigid_body`: dynamics, wheels, sensors and controller of the "
              "keys below, and none of those three."),
     BST_ENUM(C, integrator, bst_integrator_names, "\"symplectic\"",
-             "How the attitude is stepped; errors are in docs/spacecraft.md."),
+             "How the attitude is stepped; errors are in docs/how-to/spacecraft.md."),
     BST_REALS(C, inertia_kgm2, "kg m^2", -1e9, 1e9, "[12, 14, 10, 0, 0, 0]",
               "Inertia tensor of all but a full mount, whose reaction has its share, wheels and "
               "appendages with it, about the centre of mass: xx, "

@@ -369,7 +369,8 @@ void bst_filter_set(bst_filter *f, double sigma_px, int binning, double dx_px, d
 }
 
 /* Share of a smooth field's maxima above a threshold that are found: measured, with boresight pd,
- * as 0.95 to 0.99 for PSFs of 1.3 to 3 px FWHM (docs/equations.md, "Threshold", has the command).
+ * as 0.95 to 0.99 for PSFs of 1.3 to 3 px FWHM (docs/explanation/equations/image_processing.md,
+ * "Threshold", has the command).
  */
 static const double SEEN = 0.97;
 

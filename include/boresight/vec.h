@@ -1,8 +1,8 @@
 /* Vectors, 3x3 matrices and quaternions.
  *
- * Conventions (docs/conventions.md): quaternions are scalar last {x, y, z, w}, unit, Hamilton
- * product; q_b_from_a takes the coordinates of a vector in frame a to its coordinates in frame b.
- * Matrices are row-major. */
+ * Conventions (docs/reference/conventions.md): quaternions are scalar last {x, y, z, w}, unit,
+ * Hamilton product; q_b_from_a takes the coordinates of a vector in frame a to its coordinates in
+ * frame b. Matrices are row-major. */
 #ifndef BORESIGHT_VEC_H
 #define BORESIGHT_VEC_H
 

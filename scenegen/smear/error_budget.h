@@ -2,9 +2,9 @@
  *
  * All stars move alike, so that those that may light one pixel have places in one box, as long and
  * wide as the motion and the PSF. Sources are sorted into cells of half a box; the error of three
- * by three cells is that of their worst source and what the others add, see docs/equations.md.
- * Sources within one standard deviation of the PSF count as one, with the sum of their errors. Time
- * and memory go with the number of sources. */
+ * by three cells is that of their worst source and what the others add, see
+ * docs/explanation/equations/image.md. Sources within one standard deviation of the PSF count as
+ * one, with the sum of their errors. Time and memory go with the number of sources. */
 #ifndef BST_SCENEGEN_SMEAR_ERROR_BUDGET_H
 #define BST_SCENEGEN_SMEAR_ERROR_BUDGET_H
 

@@ -244,7 +244,7 @@ static bst_status bench(bst_ctx *ctx, const bst_bench_options *options, const ch
 
 int bst_cmd_bench(int argc, char **argv) {
     bool help = false, markdown = false, curve = false, first_frame = false;
-    const char *json = NULL, *report = "docs";
+    const char *json = NULL, *report = "docs/results";
     int64_t threads = 0;
     char scenario[4096];
     bst_cli_shipped_file("scenarios/neossat_geo_track.json", scenario, sizeof scenario);
@@ -271,7 +271,7 @@ int bst_cmd_bench(int argc, char **argv) {
          .target = &report,
          .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
-         .doc = "where --curve writes speed_error.md and its images (default docs)"},
+         .doc = "where --curve writes speed_error.md and its images (default docs/results)"},
         BST_DEVICE_OPTIONS(options.device, threads),
         {.name = "tle",
          .kind = BST_OPTION_TEXT,

@@ -24,7 +24,7 @@ int bst_cmd_icd(int argc, char **argv) {
             "usage: boresight icd\n\n"
             "Prints the interface control document of the link, in Markdown, from the tables "
             "that the program uses.\n\n"
-            "  boresight icd > docs/icd.md\n\noptions:\n");
+            "  boresight icd > docs/reference/icd.md\n\noptions:\n");
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }

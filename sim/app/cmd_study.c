@@ -410,7 +410,8 @@ static const char help_text[] =
     "usage: boresight study STUDY.json [options]\n"
     "       boresight study FOLDER --resume\n"
     "\n"
-    "Goes through the settings of a study (docs/studies.md), runs each as often as it says, and\n"
+    "Goes through the settings of a study (docs/how-to/studies.md), runs each as often as it says, "
+    "and\n"
     "makes tables of the results: FOLDER/study.sqlite and CSV files. Runs are executed by worker\n"
     "processes, each on cores of its own. What is done is safe: after Ctrl-C or a crash --resume\n"
     "does the rest, and the tables are the same. Every run can be made again by itself.\n"
@@ -507,7 +508,7 @@ int bst_cmd_study(int argc, char **argv) {
         {.name = "slurm",
          .kind = BST_OPTION_FLAG,
          .target = &r.slurm,
-         .doc = "execute on a cluster, as job arrays of Slurm (docs/slurm.md)"},
+         .doc = "execute on a cluster, as job arrays of Slurm (docs/how-to/slurm.md)"},
         {.name = "site",
          .needs = "slurm",
          .kind = BST_OPTION_TEXT,

@@ -76,7 +76,7 @@ static bst_status find_column(const reader *r, const bst_text_line *line, bst_te
                               int *out) {
     char word[64];
     size_t best = SIZE_MAX;
-    const char *nearest = "a column of docs/interfaces.md";
+    const char *nearest = "a column of docs/reference/file_formats.md";
     bst_text_copy(name, word, sizeof word);
     for (int c = 0; c < COLUMNS; c++) {
         if (bst_text_is(name, column_names[c])) {

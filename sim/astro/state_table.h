@@ -8,14 +8,14 @@
 /* The states of one file; immutable once made, shareable between threads. */
 typedef struct bst_state_table bst_state_table;
 
-/* Reads a file of comma-separated values with a header row (docs/interfaces.md, "Injected states").
- * Columns, in any order: object; start_s and end_s (seconds after `epoch`) or start_utc and
- * end_utc; start_x_m, _y_m, _z_m, start_vx_mps, _vy_mps, _vz_mps and the same with end_. One row
- * per object and frame; an object's frames come in the order of time and do not overlap. Blank
- * lines and lines that start with # are left out.
- * *out is freed with bst_state_table_free; NULL on error. Messages start with "path:line: ".
- * BST_ERR_FORMAT for content, also when the file is over 128 MiB; BST_ERR_NOT_FOUND when there is
- * none; BST_ERR_IO when it cannot be read or is no regular file; BST_ERR_MEMORY. */
+/* Reads a file of comma-separated values with a header row (docs/reference/file_formats.md,
+ * "Injected states"). Columns, in any order: object; start_s and end_s (seconds after `epoch`) or
+ * start_utc and end_utc; start_x_m, _y_m, _z_m, start_vx_mps, _vy_mps, _vz_mps and the same with
+ * end_. One row per object and frame; an object's frames come in the order of time and do not
+ * overlap. Blank lines and lines that start with # are left out. *out is freed with
+ * bst_state_table_free; NULL on error. Messages start with "path:line: ". BST_ERR_FORMAT for
+ * content, also when the file is over 128 MiB; BST_ERR_NOT_FOUND when there is none; BST_ERR_IO
+ * when it cannot be read or is no regular file; BST_ERR_MEMORY. */
 bst_status bst_state_table_load(bst_ctx *ctx, const char *path, bst_time epoch,
                                 bst_state_table **out) BST_MUST_CHECK;
 

@@ -31,7 +31,8 @@ typedef struct bst_trajectory_options {
     bst_vec3 position_m, velocity_mps; /* GCRF, before a burn at that very time */
     const bst_astro_thrust *burns;     /* in any order, they may overlap; copied */
     int burn_count;
-    double tolerance; /* of a step, 1e-11 to 1e-3, see docs/equations.md; 0: 1e-9 */
+    double
+        tolerance; /* of a step, 1e-11 to 1e-3, see docs/explanation/equations/orbits.md; 0: 1e-9 */
 } bst_trajectory_options;
 
 /* Makes a trajectory; nothing is integrated yet. BST_ERR_ARGUMENT for values that are not finite,

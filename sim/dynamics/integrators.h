@@ -1,6 +1,6 @@
 /* Fixed-step integrators: Runge and Kutta's for anything, the symplectic one for the attitude of a
- * rigid body with wheels, and exact steps of linear systems. docs/spacecraft.md has their errors
- * against the step. */
+ * rigid body with wheels, and exact steps of linear systems. docs/how-to/spacecraft.md has their
+ * errors against the step. */
 #ifndef BST_DYNAMICS_INTEGRATORS_H
 #define BST_DYNAMICS_INTEGRATORS_H
 

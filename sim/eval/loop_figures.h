@@ -1,5 +1,5 @@
 /* The figures of a sensor's loop: what each means, on one frame and over a run. The summary of a
- * run, its report and studies all take them from here; docs/user_guide.md ("The summary, exactly")
+ * run, its report and studies all take them from here; docs/reference/summary.md
  * says the same in words. */
 #ifndef BST_EVAL_LOOP_FIGURES_H
 #define BST_EVAL_LOOP_FIGURES_H

@@ -12,7 +12,8 @@ static const char opening[] =
     "\n"
     "This page is made by `boresight icd` from the tables with which the program encodes, decodes "
     "and checks;\n"
-    "a test keeps it current. How to use the link, with examples: [link.md](link.md).\n"
+    "a test keeps it current. How to use the link, with examples: [hardware in the "
+    "loop](../how-to/hardware_in_the_loop.md).\n"
     "\n";
 
 static const char transport[] =
@@ -110,7 +111,8 @@ static const char transport[] =
     "| `link_repeated` | a second output of a type in a step | not taken: the first one holds |\n"
     "| `link_incomplete` | `done` with another number of outputs than were taken | not taken: the "
     "step goes on |\n"
-    "| `link_held` | nothing in time, where the [pacing](link.md#pacing) does not wait for it | "
+    "| `link_held` | nothing in time, where the [pacing](../how-to/hardware_in_the_loop.md#pacing) "
+    "does not wait for it | "
     "the "
     "run goes on; the answer counts when it comes |\n"
     "| `link_skipped` | nothing: a peer that has two steps to answer is sent no third one | its "
@@ -252,10 +254,10 @@ static void print_example(FILE *out) {
             "In step 40 of `neossat/camera/control`, at tick 12000, a peer wants the boresight at "
             "(0.6, 0, 0.8) at tick 12600,\n"
             "turning with 7.292115e-5 rad/s towards +y. The header, %zu bytes in one line, whose "
-            "checksum is over its first %zu bytes:\n\n```\n",
+            "checksum is over its first %zu bytes:\n\n```text\n",
             length, length - 20);
     fwrite(text, 1, length, out);
-    fprintf(out, "\n```\n\nThe payload, %zu bytes:\n\n```\n", bytes);
+    fprintf(out, "\n```\n\nThe payload, %zu bytes:\n\n```text\n", bytes);
     print_bytes(out, payload, bytes);
     fputs("```\n\n", out);
     fputs("| offset | bytes | value |\n|---|---|---|\n", out);

@@ -6,7 +6,7 @@
 
 #include "boresight/status.h"
 
-/* Writes docs/icd.md (Markdown). BST_ERR_IO: the stream took less. */
+/* Writes docs/reference/icd.md (Markdown). BST_ERR_IO: the stream took less. */
 bst_status bst_link_icd(bst_ctx *ctx, FILE *out) BST_MUST_CHECK;
 
 #endif

@@ -1,7 +1,7 @@
 /* The simulation's end of the link: parts of a scenario that other programs play. It binds an
  * address of this machine (ZeroMQ ROUTER); peers connect to it (DEALER), say which parts they play,
- * and answer each step of such a part. What the bytes are: docs/icd.md; how it is used:
- * docs/link.md.
+ * and answer each step of such a part. What the bytes are: docs/reference/icd.md; how it is used:
+ * docs/how-to/hardware_in_the_loop.md.
  *
  * Whatever a peer does has an answer that is counted: see bst_link_counter. Nothing waits longer
  * than the time-outs say. One thread uses a link. */

@@ -1,8 +1,8 @@
 /* What peers answered, as a file, and a run that gets its answers from there.
  *
- * Packets as in docs/icd.md, each after the bytes of its header and of its payload (two uint32,
- * little-endian). A call that gave an answer has the outputs and `done`; `step` with attempt 0
- * tells whether a part was ready, with attempt 1 that there was no answer more. */
+ * Packets as in docs/reference/icd.md, each after the bytes of its header and of its payload (two
+ * uint32, little-endian). A call that gave an answer has the outputs and `done`; `step` with
+ * attempt 0 tells whether a part was ready, with attempt 1 that there was no answer more. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -256,7 +256,7 @@ bst_wire_fault bst_link_header_read(bst_ctx *ctx, const char *bytes, size_t coun
     need(&t, '}');
     if (t.bad || t.at != t.end) {
         return fault(ctx, BST_WIRE_BAD_HEADER,
-                     "it is no flat JSON object of the members that docs/icd.md lists");
+                     "it is no flat JSON object of the members that docs/reference/icd.md lists");
     }
     if (!(r.has & HAS_VERSION) || r.version != BST_LINK_VERSION) {
         bst_fail(ctx, BST_ERR_FORMAT, "header: version %lld (allowed: %d)", (long long)r.version,

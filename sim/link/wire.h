@@ -1,6 +1,6 @@
 /* The payloads of the link as bytes: one table for each type of message says which member of its
  * struct lies where, in which unit, and what it may be. Encoding, decoding, the checks and the
- * interface control document (docs/icd.md) all follow from these tables.
+ * interface control document (docs/reference/icd.md) all follow from these tables.
  *
  * A payload is one record, then `count` items. Members are packed in the order of the table,
  * little-endian, without gaps; a record and an item are filled up with zeros to a multiple of 8

@@ -1,6 +1,6 @@
 /* A file that drives a sensor frame by frame: pointing, states of objects, and changes of exposure,
- * period, window, binning and field of view while the run goes on. docs/interfaces.md, "Frame
- * updates". */
+ * period, window, binning and field of view while the run goes on. docs/reference/file_formats.md,
+ * "Frame updates". */
 #ifndef BST_WORLD_FRAME_UPDATES_H
 #define BST_WORLD_FRAME_UPDATES_H
 

@@ -308,9 +308,10 @@ static const char *const observation_sources[] = {"image", "generator", NULL};
 
 const bst_config_desc bst_sensor_config_table[] = {
     BST_STRING(bst_sensor_config, name, "\"camera\"", "Name, unique on its observer."),
-    BST_PATH(bst_sensor_config, frame_updates_file, "\"\"",
-             "JSON file that drives the sensor frame by frame (docs/interfaces.md, \"Frame "
-             "updates\"), relative to the scenario's folder; empty: none."),
+    BST_PATH(
+        bst_sensor_config, frame_updates_file, "\"\"",
+        "JSON file that drives the sensor frame by frame (docs/reference/file_formats.md, \"Frame "
+        "updates\"), relative to the scenario's folder; empty: none."),
     BST_OBJECT(bst_sensor_config, camera, bst_camera_config, NULL, "Optics and detector."),
     BST_REALS(
         bst_sensor_config, x_axis_gcrf, "", -1, 1, "[0, 0, 1]",

@@ -1,6 +1,6 @@
 """The figures of a run's summary, worked out from run.sqlite alone with numpy, ERFA and sgp4.
 
-The definitions are those of docs/user_guide.md, "The summary, exactly". Nothing is taken from the
+The definitions are those of docs/reference/summary.md. Nothing is taken from the
 program but what it recorded: the target's true direction comes from its element set, the stellar
 aberration is ERFA's.
 """

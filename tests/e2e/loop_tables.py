@@ -81,7 +81,7 @@ class LoopTables:
 
     @staticmethod
     def tangent(row):
-        """East and north at a track, by docs/conventions.md."""
+        """East and north at a track, by docs/reference/conventions.md."""
         ra, dec = np.radians(row["ra_deg"]), np.radians(row["dec_deg"])
         return np.array([[-np.sin(ra), np.cos(ra), 0],
                          [-np.sin(dec) * np.cos(ra), -np.sin(dec) * np.sin(ra), np.cos(dec)]])

@@ -1,4 +1,4 @@
-"""Directions and pixels worked out with numpy and ERFA, from docs/conventions.md and a scenario's camera: what the tests
+"""Directions and pixels worked out with numpy and ERFA, from docs/reference/conventions.md and a scenario's camera: what the tests
 compare the program's tables with. Vectors are rows of arrays, quaternions scalar last."""
 import erfa
 import numpy as np

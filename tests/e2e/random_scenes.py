@@ -8,7 +8,7 @@ Usage, from the repository root:
 
 Scene k of seed N is the same whatever --count is. With --boresight each scene has passed
 `boresight check`: one that is refused is drawn anew. --generator leaves out what the observation
-generator does not model (docs/user_guide.md, "Without images"). --catalogue embedded keeps to
+generator does not model (docs/how-to/observation_generator.md). --catalogue embedded keeps to
 fields that the stars in the program suffice for. As a module: scene(), write().
 """
 import argparse

@@ -65,7 +65,7 @@ class SkewedRun(unittest.TestCase):
         return columns(exposure, "velocity_bary", tail="_mps") - columns(exposure, "observer_gcrf", tail="_mps")
 
     def seen_from(self, exposure, place, seconds):
-        """Geometric direction with light time, where and when the light left: docs/conventions.md, Light."""
+        """Geometric direction with light time, where and when the light left: docs/reference/conventions.md, Light."""
         here, delay = columns(exposure, "observer_gcrf", tail="_m"), 0.0
         for _ in range(4):
             there = place(seconds - delay)

@@ -17,7 +17,7 @@ NAV_RTN_M, NAV_RTN_MPS, NAV_GROWTH_MPS = np.array([30, -40, 25.0]), np.array([0.
 THROUGHPUT_ERROR = 0.05  # of the onboard side
 TELEMETRY_HZ, TICKS, EXPOSURE_S, PERIOD_S = 100, 6000, 0.5, 1.0
 FRAME_DELAY_S, TRACKS_DELAY_S, LATENCY_S = 0.15, 0.2, 0.05
-SUN_V_MAG = -26.74  # docs/equations.md
+SUN_V_MAG = -26.74  # docs/explanation/equations/brightness.md
 DURATION_S = 45
 
 

@@ -143,7 +143,7 @@ class Constellation(unittest.TestCase):
         passes, seen = collections.defaultdict(list), collections.defaultdict(list)
 
         def reaches(d, t):
-            """docs/constellation.md: within one FWHM; of a longer path across it, and half the path along."""
+            """docs/how-to/several_observers.md: within one FWHM; of a longer path across it, and half the path along."""
             x, y = d["x_px"] - t["x_centroid_px"], d["y_px"] - t["y_centroid_px"]
             dx, dy = t["x_end_px"] - t["x_start_px"], t["y_end_px"] - t["y_start_px"]
             length = math.hypot(dx, dy)

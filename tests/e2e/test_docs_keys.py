@@ -45,7 +45,7 @@ class Docs(unittest.TestCase):
             properties(json.load(file), {""}, cls.keys)
 
     def words(self):
-        for path in sorted(glob.glob("docs/*.md")) + ["README.md"]:
+        for path in sorted(glob.glob("docs/**/*.md", recursive=True)) + ["README.md"]:
             with open(path, encoding="utf-8") as file:
                 for number, line in enumerate(file, 1):
                     for word in re.findall(r"`([^`]+)`", line):

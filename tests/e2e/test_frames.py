@@ -138,7 +138,7 @@ class Stare(unittest.TestCase):
             print(f"astrometry, {form}: {len(offset)} places of SNR > 20, RMS {rms:.4f} px "
                   f"(both axes), mean {mean[0]:+.4f} {mean[1]:+.4f} px")
             self.assertGreater(len(offset), 200 if form == "cube" else 60)
-            # the figures of README
+            # the figures of docs/results/closed_loop.md
             self.assertLessEqual(rms, 0.1)
             self.assertLessEqual(np.hypot(*mean), 0.03)
 

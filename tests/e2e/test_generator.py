@@ -26,7 +26,7 @@ class Generator(unittest.TestCase):
         for seed in range(1, 6):
             _, summary = self.play(f"seed{seed}", seed=seed, duration=150)
             self.assertEqual(summary["final_mode"], "track", seed)
-            # as the image path does (README): confirmed within a minute, then held
+            # as the image path does (docs/results/closed_loop.md): confirmed within a minute, then held
             self.assertLess(summary["time_to_confirm_s"], 60, seed)
             self.assertGreaterEqual(summary["track_fraction"], 0.95, seed)
             # the image path's is 0.21 px; five seeds of 100 frames scatter by a tenth

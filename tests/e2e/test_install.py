@@ -36,15 +36,15 @@ def only(pattern):
     return found[0]
 
 
-class Readme(unittest.TestCase):
-    def test_names_every_package(self):
+class Packages(unittest.TestCase):
+    def test_docs_name_every_package(self):
         with open("dev", encoding="utf-8") as file:
-            lists = re.findall(r"packages_(?:build|run|test)='([^']*)'", file.read())
-        self.assertEqual(len(lists), 3)
-        with open("README.md", encoding="utf-8") as file:
+            lists = re.findall(r"packages_(?:build|run|test|docs)='([^']*)'", file.read())
+        self.assertEqual(len(lists), 4)
+        with open("docs/how-to/build.md", encoding="utf-8") as file:
             words = set(re.split(r"[\s`.,]+", file.read()))
         missing = set(" ".join(lists).split()) - words
-        self.assertFalse(missing, "packages that ./dev installs and README.md does not name")
+        self.assertFalse(missing, "packages that ./dev installs and docs/how-to/build.md does not name")
 
 
 class Installed(unittest.TestCase):
@@ -223,7 +223,7 @@ class Installed(unittest.TestCase):
         self.assertTrue(os.path.exists(work + "/run/manifest.json"))
         for name in ("share/boresight/scenarios/boresight.schema.json",
                      "share/man/man1/boresight.1", "share/doc/boresight/LICENSE",
-                     "share/doc/boresight/docs/user_guide.md",
+                     "share/doc/boresight/docs/reference/run_folder.md",
                      "share/doc/boresight/docs/examples/use_library/first_frames.c"):
             self.assertTrue(os.path.exists(os.path.join(self.stage, name)), name)
         for file in (program, os.path.join(self.libdir, "libboresight.so")):

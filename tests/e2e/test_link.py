@@ -141,7 +141,7 @@ class Client(unittest.TestCase):
     """python/boresight_link.py against the document, and by itself."""
 
     def test_records_are_those_of_the_document(self):
-        with open("docs/icd.md", encoding="utf-8") as file:
+        with open("docs/reference/icd.md", encoding="utf-8") as file:
             text = file.read()
         text = text[text.index("## Payloads"):text.index("## A message, byte by byte")]
         formats = {"float64": "<f8", "int64": "<i8", "int32": "<i4", "uint32": "<u4"}
@@ -165,10 +165,10 @@ class Client(unittest.TestCase):
         self.assertEqual(seen, set(boresight_link.RECORDS))
 
     def test_the_worked_example_is_made_the_same(self):
-        with open("docs/icd.md", encoding="utf-8") as file:
+        with open("docs/reference/icd.md", encoding="utf-8") as file:
             text = file.read()
         text = text[text.index("## A message, byte by byte"):]
-        header, dump = re.findall(r"```\n(.*?)\n```", text, re.S)
+        header, dump = re.findall(r"```text\n(.*?)\n```", text, re.S)
         payload = bytes.fromhex("".join(line[4:] for line in dump.splitlines()))
         record = boresight_link.new_record("los_command")
         record["tick"] = 12600

@@ -3,7 +3,7 @@ the edge of stability by raising gain and delay; predicted against simulated poi
 shipped scenarios; warnings.
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_loop.py BORESIGHT [--full]
---full (minutes) bisects to the edge and prints the tables of docs/loops.md.
+--full (minutes) bisects to the edge and prints the tables of docs/how-to/control_loops.md.
 """
 import glob
 import json

@@ -6,7 +6,7 @@ Usage, from the repository root:
 
 Without --full: two scenes, few seeds, the embedded star catalogue; each interval must reach into
 twice its margin. With --full: ten scenes, a hundred seeds, the full star catalogue: prints which
-intervals lie inside their margins (docs/user_guide.md, "Without images"), and fails where a figure
+intervals lie inside their margins (docs/how-to/observation_generator.md), and fails where a figure
 is further off than the known differences.
 """
 import json

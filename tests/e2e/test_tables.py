@@ -122,7 +122,7 @@ class Tables(SkewedRun, TruthTables, LoopTables):
     # ---------------------------------------------------------------- who saw what
 
     def sightings_of(self, number):
-        """Passes of an object without a break: what docs/constellation.md says, from truth, detections and tracks."""
+        """Passes of an object without a break: what docs/how-to/several_observers.md says, from truth, detections and tracks."""
         pass_ = dict(frames=0, lit=0, detected=0, tracked=0, target=0, seen=[], snr=0.0, v_mag=None, range_m=np.inf,
                      place=[], track=[], start_s=None, end_s=None)
         others = 1 - number

@@ -1,4 +1,5 @@
-/* Step size against error of the joints' integrators: the table in docs/equations.md. */
+/* Step size against error of the joints' integrators: the table in
+ * docs/explanation/equations/gimbal.md. */
 #include <time.h>
 
 #include "gimbal/mount/mount_joints.h"

@@ -97,7 +97,7 @@ static bst_los_history *make_history(void) {
     return h;
 }
 
-/* Integral of the squared image of a straight streak, see docs/equations.md. */
+/* Integral of the squared image of a straight streak, see docs/explanation/equations/image.md. */
 static double peak_term(double sigma, double length) {
     double a = 0.5 * length / sigma;
     return (erf(a) / length -

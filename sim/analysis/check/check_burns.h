@@ -8,8 +8,9 @@
  * faster than the sensor's tracker follows. With frames every T a model of noise density q follows
  * an even acceleration up to sqrt(gate_chi2 q / T); what goes beyond that of the quiet model is
  * found up to sqrt(gate_chi2 q_m / (3 T)) / 2 and, of a jump of the rate, up to sqrt(gate_chi2 q_m
- * T / 3), q_m that of the manoeuvring model; docs/equations.md, "Accelerations that a filter
- * follows". BST_ERR_NUMERIC when an orbit has no state at its burn; BST_ERR_MEMORY. */
+ * T / 3), q_m that of the manoeuvring model; docs/explanation/equations/tracking.md, "Accelerations
+ * that a filter follows". BST_ERR_NUMERIC when an orbit has no state at its burn; BST_ERR_MEMORY.
+ */
 bst_status bst_check_burns(bst_ctx *ctx, const bst_scenario *scenario,
                            const bst_simulation *simulation) BST_MUST_CHECK;
 

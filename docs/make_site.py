@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""Builds the documentation: copies docs/, adds the generated pages, runs Sphinx.
+
+usage: docs/make_site.py BORESIGHT HEADERS_FOLDER SOURCE_FOLDER [HTML_FOLDER]
+
+HEADERS_FOLDER is the installed include/boresight. SOURCE_FOLDER receives the pages that Sphinx reads.
+Without HTML_FOLDER nothing but these is made. No step needs a network.
+"""
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+DOCS = pathlib.Path(__file__).resolve().parent
+ROOT = DOCS.parent
+TABLES_RUN = "scenarios/neossat_geo_track.json"  # writes every table of run.sqlite
+
+
+def output_of(*words, **more):
+    return subprocess.run(words, check=True, capture_output=True, text=True, cwd=ROOT, **more).stdout
+
+
+def write_commands(program, path):
+    """One section for each command, with its own help text."""
+    overview = output_of(program, "help")
+    listed = overview.split("commands:\n", 1)[1].split("\n\n", 1)[0]
+    parts = ["# Commands\n\nGenerated from `boresight help COMMAND`. "
+             "[Command line](command_line.md) describes what all commands have in common.\n"]
+    for name, purpose in re.findall(r"^  (\S+)\s+(.*)$", listed, re.MULTILINE):
+        parts.append(f"## boresight {name}\n\nPurpose: {purpose}.\n\n```text\n{output_of(program, 'help', name).strip()}\n```\n")
+    path.write_text("\n".join(parts), encoding="utf-8")
+
+
+def write_tables(program, path):
+    with tempfile.TemporaryDirectory() as folder:
+        run = pathlib.Path(folder) / "run"
+        output_of(program, "run", TABLES_RUN, "--duration", "1", "--quiet", "--out", str(run),
+                  "--set", "/record/frames=none", "--set", "/world/star_catalogue=embedded")
+        path.write_text(output_of(sys.executable, str(DOCS / "make_tables.py"), str(run / "run.sqlite")), encoding="utf-8")
+
+
+def generate(program, headers, source):
+    if source.exists():
+        shutil.rmtree(source)
+    shutil.copytree(DOCS, source, ignore=shutil.ignore_patterns("make_*.py", "__pycache__", "*.1"))
+    reference = source / "reference"
+    keys = [sys.executable, str(DOCS / "make_reference.py")]
+    output_of(*keys, str(reference / "scenario_keys"), input=output_of(program, "schema"))
+    output_of(*keys, str(reference / "study_keys"), input=output_of(program, "study", "--schema"))
+    write_commands(program, reference / "commands.md")
+    write_tables(program, reference / "database.md")
+    output_of(sys.executable, str(DOCS / "make_c_api.py"), str(headers), str(reference / "c_api"))
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    (source / "changes.md").write_text(changes.replace("](docs/", "]("), encoding="utf-8")
+
+
+def main():
+    if len(sys.argv) not in (4, 5):
+        sys.exit(__doc__)
+    program, headers, source = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+    generate(str(program), headers, source)
+    if len(sys.argv) == 5:
+        # -W: a warning is an error; -n: so is a link that leads nowhere
+        subprocess.run([sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-n", "-b", "html",
+                        "-d", str(source.with_name(source.name + "-doctrees")), str(source), sys.argv[4]], check=True)
+
+
+if __name__ == "__main__":
+    main()
