@@ -22,6 +22,7 @@ typedef struct make {
     bool lends;       /* a module lends memory to observers */
     bool link_first;  /* in name, so that it steps as early in a tick as it can */
     bool looks;
+    int link_period;  /* 0: of the seed's choice */
     int64_t fails_at; /* tick, -1: never */
     int fails_module;
     int64_t full_at;  /* records until an observer fails, -1: never */
@@ -387,6 +388,7 @@ static void add_modules(bst_ctx *ctx, bst_engine *engine, scene *s, const bst_mo
         spec.period_ticks =
             longest[role] ? 1 + below(&r, longest[role]) + (role == CLOCK ? 10 : 0) : 0;
         spec.offset_ticks = below(&r, 5);
+        spec.period_ticks = link && s->m.link_period ? s->m.link_period : spec.period_ticks;
         if (role == CAMERA || role == SEEING || role == FOLLOWING || role == ROLES) {
             int64_t delay = below(&r, 3) ? below(&r, 30) : 0;
             spec.delays[0] = (bst_input_delay){0, role == FOLLOWING && !s->m.closed ? 0 : delay};
@@ -489,25 +491,52 @@ static void assert_same(const make *m, const scene *serial, const result *expect
 static int engines = 40;
 static uint64_t first_seed = 1;
 
+static void assert_threads_change_nothing(const make *m) {
+    static const int threads[] = {1, 2, 3, 8};
+    make whole = *m;
+    whole.stops_at = -1;
+    scene *serial = new_scene(&whole, false);
+    result expected = play(serial, 0);
+    assert_in_range(serial->count, 20, RECORDS - 1);
+    for (int t = 0; t < 4; t++) {
+        assert_same(m, serial, &expected, threads[t]);
+    }
+    test_free(serial);
+}
+
 static void threads_change_nothing(void **state) {
     (void)state;
-    static const int threads[] = {1, 2, 3, 8};
     for (int k = 0; k < engines; k++) {
-        make m = make_of(first_seed + (uint64_t)k), whole = m;
-        whole.stops_at = -1;
-        scene *serial = new_scene(&whole, false);
-        result expected = play(serial, 0);
-        assert_in_range(serial->count, 20, RECORDS - 1);
-        for (int t = 0; t < 4; t++) {
-            assert_same(&m, serial, &expected, threads[t]);
-        }
-        test_free(serial);
+        make m = make_of(first_seed + (uint64_t)k);
+        assert_threads_change_nothing(&m);
+    }
+}
+
+/* Multi-sensor modules that step before the step that fails, in its tick, are observed. */
+static void failures_leave_what_came_before(void **state) {
+    (void)state;
+    for (int k = 0; k < 12; k++) {
+        make m = {.seed = first_seed + (uint64_t)k,
+                  .sensors = 2,
+                  .links = 1,
+                  .closed = true,
+                  .link_first = true,
+                  .wakes = k % 2,
+                  .fails_at = 200 + k,
+                  .fails_module = k % 3 == 0   ? CAMERA
+                                  : k % 3 == 1 ? SEEING
+                                               : ROLES + FOLLOWING,
+                  .full_at = -1,
+                  .stops_at = -1,
+                  .link_period = 1};
+        assert_threads_change_nothing(&m);
     }
 }
 
 int main(int argc, char **argv) {
     engines = argc > 1 ? atoi(argv[1]) : engines;
     first_seed = argc > 2 ? (uint64_t)atoll(argv[2]) : first_seed;
-    const struct CMUnitTest tests[] = {cmocka_unit_test(threads_change_nothing)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(threads_change_nothing),
+                                       cmocka_unit_test(failures_leave_what_came_before)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
