@@ -239,6 +239,14 @@ static bst_status step_any(fake *base, struct bst_step *step) {
     return BST_OK;
 }
 
+/* Logs are as long as the declared rates ask for: one that wakes itself may step at every tick. */
+static bst_status declare_rate(fake *base, const bst_module_env *env) {
+    if (((module *)base)->s->m.wakes) {
+        bst_env_set_rate(env, (double)env->tick_rate_hz);
+    }
+    return BST_OK;
+}
+
 /* ---- engines ---- */
 
 #define IN(channel_, flags_) \
@@ -378,6 +386,7 @@ static void add_modules(bst_ctx *ctx, bst_engine *engine, scene *s, const bst_mo
                               .members = link ? s->m.sensors : 0,
                               .state = (uint64_t)n};
         pointers[n] = &modules[n].base;
+        modules[n].base.on_create = link ? declare_rate : NULL;
         char name[64];
         snprintf(name, sizeof name, "%s/%s",
                  link ? (s->m.link_first ? "a" : "tasking") : scopes[sensor],
