@@ -6,7 +6,7 @@
 #include "sim/engine/kernel/executor_internal.h"
 
 /* A window ends when this much is noted down for observers, or after this long. */
-static const size_t most_noted = 1 << 20;
+static const size_t most_noted = 1 << 18;
 static const double longest_window_s = 0.02;
 
 /* ---- what other processes read ---- */
@@ -174,6 +174,14 @@ static bst_status step_tick(bst_executor *x, logical_process *self, int64_t tick
     return BST_OK;
 }
 
+/* After a step that failed: whether multi-sensor modules, which step before it in this tick, have
+ * their inputs. */
+static bool fed_link(bst_executor *x, logical_process *self, int64_t tick) {
+    return self->linked && self->link_tick <= tick &&
+           self->failed_instance > x->processes[x->link].members[0] &&
+           copy_inputs(x, self, &x->processes[x->link], tick) == BST_OK;
+}
+
 /* The steps of a deferred process are numbered for the module that looks ahead. */
 static void take_lane(bst_executor *x, const logical_process *self) {
     if (self->kind == BST_PROCESS_DEFERRED && self->looker >= 0) {
@@ -206,7 +214,7 @@ void bst_process_step(bst_executor *x, logical_process *self) {
         bool over = false, long_step = false;
         self->status = step_tick(x, self, tick, &long_step, &over);
         if (self->status != BST_OK) {
-            self->reached = tick;
+            self->reached = fed_link(x, self, tick) ? tick + 1 : tick;
             break;
         }
         size_t noted = self->log.segments[self->log.filled % BST_MOST_SEGMENTS].used;

@@ -133,6 +133,16 @@ void bst_sync_follow(bst_executor *x, const logical_process *source) {
     advance_link(x);
 }
 
+/* The first step of a multi-sensor module at `tick` or later, where it steps by its period alone.
+ */
+static int64_t next_step(const bst_executor *x, const instance *member, int64_t tick) {
+    int64_t period = member->spec.period_ticks, past = tick - member->spec.offset_ticks;
+    if (!x->link_ahead || tick > INT64_MAX - period) {
+        return tick;
+    }
+    return past <= 0 ? member->spec.offset_ticks : tick + (period - past % period) % period;
+}
+
 /* What multi-sensor modules say of their next messages. */
 static void take_lookahead(bst_executor *x, logical_process *self) {
     const bst_engine *engine = x->engine;
@@ -140,7 +150,7 @@ static void take_lookahead(bst_executor *x, logical_process *self) {
     for (int m = 0; m < self->member_count; m++) {
         instance *member = engine->instances[self->members[m]];
         for (int p = 0; p < member->port_count; p++) {
-            member->ports[p].lookahead = member->ports[p].silent_until;
+            member->ports[p].lookahead = next_step(x, member, member->ports[p].silent_until);
         }
     }
 }
