@@ -11,6 +11,7 @@
 
 #include "sim/cli/plugins.h"
 #include "sim/cli/progress.h"
+#include "sim/core/compare.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
 #include "sim/export/orbit_selection.h"
@@ -97,11 +98,6 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
     return BST_OK;
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void add_break(track *t, double seconds) {
     if (seconds > 0.0 && seconds < t->span_s && t->break_count < MOST_BREAKS) {
         t->breaks[t->break_count++] = seconds;
@@ -145,7 +141,7 @@ static void find_breaks(const bst_scenario *scenario, bool czml, track *t) {
         orbit = object ? &object->orbit : NULL;
         burns = object ? &object->burns : NULL;
     }
-    qsort(t->breaks, (size_t)t->break_count, sizeof *t->breaks, ascending);
+    qsort(t->breaks, (size_t)t->break_count, sizeof *t->breaks, bst_compare_doubles);
     t->breaks[t->break_count++] = t->span_s;
 }
 

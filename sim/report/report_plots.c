@@ -9,15 +9,6 @@
 
 /* ------------------------------------------------------------------ helpers */
 
-size_t bst_report_fill(const bst_report_drawing *d, bst_report_quantity quantity, double *series) {
-    size_t numbers = 0;
-    for (size_t i = 0; i < d->sensor->count; i++) {
-        series[i] = quantity(&d->sensor->frames[i]);
-        numbers += isfinite(series[i]);
-    }
-    return numbers;
-}
-
 /* The last mode that began by then; -1: none. *k goes on from call to call. */
 static int mode_at(const bst_report_sensor *s, double seconds, size_t *k) {
     while (*k + 1 < s->mode_count && s->modes[*k + 1].from_s <= seconds) {
@@ -82,36 +73,6 @@ bst_chart bst_report_time_chart(const bst_report_drawing *d, const char *name, c
     bst_chart_begin(&c);
     put_modes(d, &c);
     return c;
-}
-
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* The nearest rank. */
-static double percentile(const double *sorted, size_t n, double share) {
-    size_t rank = (size_t)ceil(share * (double)n);
-    return n > 0 ? sorted[rank > 0 ? rank - 1 : 0] : NAN;
-}
-
-bst_report_statistics bst_report_measure(double *values, size_t n) {
-    bst_report_statistics r = {.count = n, .mean = NAN, .rms = NAN};
-    double sum = 0.0, squares = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        sum += values[i];
-        squares += values[i] * values[i];
-    }
-    if (n > 0) {
-        qsort(values, n, sizeof *values, ascending);
-        r.mean = sum / (double)n;
-        r.rms = sqrt(squares / (double)n);
-    }
-    r.median = percentile(values, n, 0.5);
-    r.p95 = percentile(values, n, 0.95);
-    r.p99 = percentile(values, n, 0.99);
-    r.worst = percentile(values, n, 1.0);
-    return r;
 }
 
 void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
@@ -473,7 +434,7 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
         return;
     }
     bst_report_statistics m = bst_report_measure(d->y, n); /* sorts */
-    double inner = 0.5 * (percentile(d->y, n, 0.8413) - percentile(d->y, n, 0.1587));
+    double inner = 0.5 * (bst_report_percentile(d->y, n, 0.8413) - bst_report_percentile(d->y, n, 0.1587));
     double law[2] = {m.median, fmax(inner, 1e-9)}, half = 5.0 * law[1];
     char caption[160], words[2][32];
     bst_report_page_figure(d->out, BST_PAGE_THIRD);

@@ -42,6 +42,8 @@ typedef struct bst_report_statistics {
     double mean, rms, median, p95, p99, worst;
 } bst_report_statistics;
 bst_report_statistics bst_report_measure(double *values, size_t n);
+/* The value of nearest rank at a share (0 to 1) of n ascending numbers; NAN for none. */
+double bst_report_percentile(const double *sorted, size_t n, double share);
 
 /* A histogram of what is finite among n values, between low and high, with a curve of expected
  * shares per unit of x (NULL: none) over it. `what` is counted. */

@@ -7,6 +7,7 @@
 
 #include "boresight/rng.h"
 #include "sim/astro/tle.h"
+#include "sim/core/compare.h"
 #include "sim/core/text.h"
 #include "sim/studies/study_internal.h"
 
@@ -15,10 +16,6 @@
 enum { MOST_ATTEMPTS = 1 << 16 };
 /* Of the objects of a population: as of a document. */
 static const double MOST_VALUES = 8e6;
-
-bool bst_study_population_pointer(const char *pointer) {
-    return strncmp(pointer, "/populations/", strlen("/populations/")) == 0;
-}
 
 /* ------------------------------------------------------------------ reading */
 
@@ -143,11 +140,6 @@ void bst_study_populations_free(bst_study_population_list *list) {
     *list = (bst_study_population_list){0};
 }
 
-static int compare_numbers(const void *a, const void *b) {
-    int x = *(const int *)a, y = *(const int *)b;
-    return (x > y) - (x < y);
-}
-
 /* The satellites of a population's file; a relative path starts from the folder of `study_file`. */
 static bst_status read_file(bst_ctx *ctx, const bst_study *study, const char *study_file,
                             const bst_study_population *p, bst_study_population_file *out) {
@@ -175,7 +167,7 @@ static bst_status read_file(bst_ctx *ctx, const bst_study *study, const char *st
     if (!out->norad) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study's populations");
     }
-    qsort(out->norad, (size_t)count, sizeof *out->norad, compare_numbers);
+    qsort(out->norad, (size_t)count, sizeof *out->norad, bst_compare_ints);
     for (int i = 0; i < count; i++) {
         if (out->count == 0 || out->norad[out->count - 1] != out->norad[i]) {
             out->norad[out->count++] = out->norad[i];
@@ -325,7 +317,7 @@ static void mark(const cJSON *owner, const bst_study_population_file *file, bool
                  int *left) {
     int number = number_of(cJSON_GetObjectItemCaseSensitive(owner, "orbit"));
     const int *found =
-        bsearch(&number, file->norad, (size_t)file->count, sizeof number, compare_numbers);
+        bsearch(&number, file->norad, (size_t)file->count, sizeof number, bst_compare_ints);
     if (found && !taken[found - file->norad]) {
         taken[found - file->norad] = true;
         (*left)--;

@@ -5,10 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
+#include "sim/core/compare.h"
 
 double bst_study_quantile(const double *sorted, int64_t n, double q) {
     if (n == 0) {
@@ -40,7 +37,7 @@ static void describe(const double *values, int64_t rows, int columns, int column
         square += (scratch[i] - s->mean) * (scratch[i] - s->mean);
     }
     s->std = n > 1 ? sqrt(square / (double)(n - 1)) : NAN;
-    qsort(scratch, (size_t)n, sizeof *scratch, compare);
+    qsort(scratch, (size_t)n, sizeof *scratch, bst_compare_doubles);
     s->minimum = n > 0 ? scratch[0] : NAN;
     s->maximum = n > 0 ? scratch[n - 1] : NAN;
     s->p05 = bst_study_quantile(scratch, n, 0.05);
@@ -87,7 +84,7 @@ static void set_interval(double *means, int64_t n, bst_statistics *s) {
             means[kept++] = means[i];
         }
     }
-    qsort(means, (size_t)kept, sizeof *means, compare);
+    qsort(means, (size_t)kept, sizeof *means, bst_compare_doubles);
     s->low = s->mean + bst_study_quantile(means, kept, 0.025);
     s->high = s->mean + bst_study_quantile(means, kept, 0.975);
 }

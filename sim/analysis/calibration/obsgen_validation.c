@@ -11,6 +11,7 @@
 #include "boresight/rng.h"
 #include "sim/analysis/calibration/pairing.h"
 #include "sim/analysis/calibration/watch.h"
+#include "sim/core/compare.h"
 #include "sim/core/text.h"
 #include "sim/io/manifest.h"
 
@@ -136,11 +137,6 @@ static double value_of(const figure_of *f, const run_sums *runs, const int *chos
     return f->root ? sqrt(value) : value;
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* 95 % interval by resampling the runs of both sides. */
 static void bootstrap(const figure_of *f, const run_sums *image, const run_sums *generator,
                       int seeds, int *chosen, double interval[2]) {
@@ -162,7 +158,7 @@ static void bootstrap(const figure_of *f, const run_sums *image, const run_sums 
             values[n++] = value;
         }
     }
-    qsort(values, (size_t)n, sizeof *values, ascending);
+    qsort(values, (size_t)n, sizeof *values, bst_compare_doubles);
     interval[0] = n > 0 ? values[(int)(low * (n - 1))] : NAN;
     interval[1] = n > 0 ? values[(int)((1.0 - low) * (n - 1))] : NAN;
 }

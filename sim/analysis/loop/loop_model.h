@@ -87,7 +87,7 @@ void bst_loop_model_free(bst_loop_model *model);
  * (bst_loop_verdict); what cannot be analysed is left to those who run it. */
 void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario);
 
-/* ---- what loop_model.c shares with loop_mount.c ---- */
+/* ---- what the files of this folder share ---- */
 
 /* So small a command that no axis meets a limit, rad: the linear regime. */
 #define BST_LOOP_TINY 1e-9
@@ -98,6 +98,12 @@ void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario);
 /* A flat band (a line, where both frequencies are the same); more than there is room for are left
  * out. */
 void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, double variance_px2);
+
+/* The platform's jitter, as what it does to an axis that turns about a camera axis (0 x, 1 y), stepped
+ * every dt_s. */
+bst_status bst_loop_platform_bands(bst_ctx *ctx, const bst_platform_config *platform,
+                                   double pixel_rad, double dt_s, int camera_axis,
+                                   bst_loop_axis *axis) BST_MUST_CHECK;
 
 /* The loops of a rigid_body with an attitude law; nothing of other spacecraft. */
 bst_status bst_loop_build_body(bst_ctx *ctx, const bst_spacecraft_config *config,
