@@ -11,28 +11,15 @@
 #include "sim/app/app.h"
 #include "sim/astro/time.h"
 #include "sim/cli/options.h"
+#include "sim/core/json_member.h"
 #include "sim/core/json_number.h"
 #include "sim/core/text.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/run_reader.h"
 
-static const cJSON *get(const cJSON *node, const char *key) {
-    return cJSON_GetObjectItemCaseSensitive(node, key);
-}
-
-static const char *text_of(const cJSON *node, const char *key, const char *fallback) {
-    const cJSON *item = get(node, key);
-    return cJSON_IsString(item) ? item->valuestring : fallback;
-}
-
-static double number_of(const cJSON *node, const char *key) {
-    const cJSON *item = get(node, key);
-    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
-}
-
 /* Copies a member when it is there, else makes it null. */
 static void copy(cJSON *to, const char *key, const cJSON *from, const char *from_key) {
-    const cJSON *item = get(from, from_key);
+    const cJSON *item = bst_json_member(from, from_key);
     cJSON_AddItemToObject(to, key, item ? cJSON_Duplicate(item, true) : cJSON_CreateNull());
 }
 
@@ -59,10 +46,10 @@ static void each_row(bst_run_reader *run, const char *sql, int64_t parameter,
 
 static void add_span(bst_run_reader *run, cJSON *out) {
     const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
-    const char *epoch = text_of(manifest, "epoch_utc", text_of(scenario, "epoch_utc", ""));
-    double rate = number_of(scenario, "tick_rate_hz");
-    double last = number_of(manifest, "last_tick");
-    double simulated = number_of(scenario, "duration_s");
+    const char *epoch = bst_json_member_text(manifest, "epoch_utc", bst_json_member_text(scenario, "epoch_utc", ""));
+    double rate = bst_json_member_number(scenario, "tick_rate_hz");
+    double last = bst_json_member_number(manifest, "last_tick");
+    double simulated = bst_json_member_number(scenario, "duration_s");
     if (bst_run_reader_state(run) != BST_RUN_COMPLETE) {
         if (isnan(last)) {
             last = (double)bst_run_reader_int(run, "SELECT max(end_tick) FROM frames", 0, -1);
@@ -100,7 +87,7 @@ static void add_identity(bst_run_reader *run, cJSON *out) {
     copy(out, "seed", manifest ? manifest : scenario, "seed");
     copy(out, "run", manifest ? manifest : scenario, "run");
     copy(out, "device", manifest, "device");
-    if (get(manifest, "plugins")) {
+    if (bst_json_member(manifest, "plugins")) {
         copy(out, "plugins", manifest, "plugins");
     }
     copy(out, "star_catalogue", manifest, "star_catalogue");
@@ -131,7 +118,7 @@ static void put_sensor(cJSON *to, const bst_io_rows *rows) {
 
 /* What the sensor's FITS file holds. */
 static void add_file(bst_run_reader *run, cJSON *sensor, int64_t kept) {
-    const char *name = text_of(sensor, "file", "");
+    const char *name = bst_json_member_text(sensor, "file", "");
     char path[4096];
     struct stat info;
     bst_ctx ctx = {0};
@@ -177,7 +164,7 @@ static void add_sensors(bst_run_reader *run, cJSON *out) {
              0, put_sensor, list);
     cJSON *sensor;
     cJSON_ArrayForEach(sensor, list) {
-        int64_t index = (int64_t)number_of(sensor, "sensor");
+        int64_t index = (int64_t)bst_json_member_number(sensor, "sensor");
         int64_t kept = bst_run_reader_int(
             run, "SELECT count(fits_index) FROM frames WHERE sensor = ?1", index, 0);
         cJSON_AddNumberToObject(
@@ -203,7 +190,7 @@ static void put_table(cJSON *to, const bst_io_rows *rows) {
 static void put_column(cJSON *to, const bst_io_rows *rows) {
     cJSON *table;
     cJSON_ArrayForEach(table, to) {
-        if (strcmp(text_of(table, "name", ""), bst_io_rows_text(rows, 0)) == 0) {
+        if (strcmp(bst_json_member_text(table, "name", ""), bst_io_rows_text(rows, 0)) == 0) {
             cJSON *columns = cJSON_GetObjectItemCaseSensitive(table, "columns");
             cJSON *node = cJSON_CreateObject();
             cJSON_AddStringToObject(node, "name", bst_io_rows_text(rows, 1));
@@ -226,7 +213,7 @@ static void add_tables(bst_run_reader *run, cJSON *out) {
     cJSON *table;
     cJSON_ArrayForEach(table, list) {
         char sql[200];
-        const char *name = text_of(table, "name", "");
+        const char *name = bst_json_member_text(table, "name", "");
         /* the writer's names need no quoting; others are not asked for */
         if (!strpbrk(name, "\"'") && strlen(name) < 100) {
             snprintf(sql, sizeof sql, "SELECT count(*) FROM \"%s\"", name);
@@ -278,10 +265,10 @@ static cJSON *gather(bst_run_reader *run) {
         each_row(run, "SELECT program FROM run", 0, put_program, out);
     }
     copy(out, "summary", bst_run_reader_manifest(run), "summary");
-    if (get(bst_run_reader_manifest(run), "sensors")) {
+    if (bst_json_member(bst_run_reader_manifest(run), "sensors")) {
         copy(out, "sensor_summaries", bst_run_reader_manifest(run), "sensors");
     }
-    if (get(bst_run_reader_manifest(run), "sightings")) {
+    if (bst_json_member(bst_run_reader_manifest(run), "sightings")) {
         copy(out, "sightings", bst_run_reader_manifest(run), "sightings");
     }
     copy(out, "counters", bst_run_reader_manifest(run), "counters");
@@ -319,32 +306,32 @@ static void print_bytes(double bytes) {
 
 static void print_identity(const cJSON *info) {
     char text[400];
-    line("scenario", text_of(info, "scenario", ""));
+    line("scenario", bst_json_member_text(info, "scenario", ""));
     snprintf(text, sizeof text, "boresight %s%s%s%s",
-             text_of(info, "version", "of unknown version"),
-             *text_of(info, "git_revision", "") ? " (" : "", text_of(info, "git_revision", ""),
-             *text_of(info, "git_revision", "") ? ")" : "");
+             bst_json_member_text(info, "version", "of unknown version"),
+             *bst_json_member_text(info, "git_revision", "") ? " (" : "", bst_json_member_text(info, "git_revision", ""),
+             *bst_json_member_text(info, "git_revision", "") ? ")" : "");
     line("program", text);
-    snprintf(text, sizeof text, "%s, run %.0f", text_of(info, "seed", "?"), number_of(info, "run"));
+    snprintf(text, sizeof text, "%s, run %.0f", bst_json_member_text(info, "seed", "?"), bst_json_member_number(info, "run"));
     line("seed", text);
-    line("device", text_of(info, "device", ""));
+    line("device", bst_json_member_text(info, "device", ""));
     const cJSON *plugin;
-    cJSON_ArrayForEach(plugin, get(info, "plugins")) {
-        snprintf(text, sizeof text, "%s of %s, SHA-256 %s", text_of(plugin, "type", "?"),
-                 text_of(plugin, "file", "?"), text_of(plugin, "sha256", "?"));
+    cJSON_ArrayForEach(plugin, bst_json_member(info, "plugins")) {
+        snprintf(text, sizeof text, "%s of %s, SHA-256 %s", bst_json_member_text(plugin, "type", "?"),
+                 bst_json_member_text(plugin, "file", "?"), bst_json_member_text(plugin, "sha256", "?"));
         line("plug-in", text);
     }
-    snprintf(text, sizeof text, "%s to %s (%.3f s)", text_of(info, "start_utc", "?"),
-             text_of(info, "end_utc", "?"), number_of(info, "simulated_s"));
+    snprintf(text, sizeof text, "%s to %s (%.3f s)", bst_json_member_text(info, "start_utc", "?"),
+             bst_json_member_text(info, "end_utc", "?"), bst_json_member_number(info, "simulated_s"));
     line("span", text);
-    if (isfinite(number_of(info, "stars"))) {
-        snprintf(text, sizeof text, "%s, %.0f stars", text_of(info, "star_catalogue", ""),
-                 number_of(info, "stars"));
+    if (isfinite(bst_json_member_number(info, "stars"))) {
+        snprintf(text, sizeof text, "%s, %.0f stars", bst_json_member_text(info, "star_catalogue", ""),
+                 bst_json_member_number(info, "stars"));
         line("star catalogue", text);
     }
-    if (isfinite(number_of(info, "wall_time_s"))) {
-        double warnings = number_of(info, "warnings");
-        snprintf(text, sizeof text, "%.2f s, %.0f warning%s", number_of(info, "wall_time_s"),
+    if (isfinite(bst_json_member_number(info, "wall_time_s"))) {
+        double warnings = bst_json_member_number(info, "warnings");
+        snprintf(text, sizeof text, "%.2f s, %.0f warning%s", bst_json_member_number(info, "wall_time_s"),
                  warnings, warnings == 1.0 ? "" : "s");
         line("wall time", text);
     }
@@ -353,30 +340,30 @@ static void print_identity(const cJSON *info) {
 static void print_sensors(const cJSON *info) {
     const cJSON *sensor;
     printf("sensors\n");
-    cJSON_ArrayForEach(sensor, get(info, "sensors")) {
-        double frames = number_of(sensor, "frames");
-        printf("  %s/%s: %.0f frame%s, %.0f x %.0f px", text_of(sensor, "observer", ""),
-               text_of(sensor, "name", ""), frames, frames == 1.0 ? "" : "s",
-               number_of(sensor, "width_px"), number_of(sensor, "height_px"));
-        if (number_of(sensor, "bits") > 0) {
-            printf(", %.0f bit", number_of(sensor, "bits"));
+    cJSON_ArrayForEach(sensor, bst_json_member(info, "sensors")) {
+        double frames = bst_json_member_number(sensor, "frames");
+        printf("  %s/%s: %.0f frame%s, %.0f x %.0f px", bst_json_member_text(sensor, "observer", ""),
+               bst_json_member_text(sensor, "name", ""), frames, frames == 1.0 ? "" : "s",
+               bst_json_member_number(sensor, "width_px"), bst_json_member_number(sensor, "height_px"));
+        if (bst_json_member_number(sensor, "bits") > 0) {
+            printf(", %.0f bit", bst_json_member_number(sensor, "bits"));
         }
-        if (*text_of(sensor, "target", "")) {
-            printf(", target %s", text_of(sensor, "target", ""));
+        if (*bst_json_member_text(sensor, "target", "")) {
+            printf(", target %s", bst_json_member_text(sensor, "target", ""));
         }
         printf("\n");
-        if (!*text_of(sensor, "file", "")) {
+        if (!*bst_json_member_text(sensor, "file", "")) {
             printf("    frames are not kept\n");
-        } else if (*text_of(sensor, "layout", "")) {
-            bool cube = strcmp(text_of(sensor, "layout", ""), "cube") == 0;
-            printf("    %s: %.0f %s, %s, ", text_of(sensor, "file", ""),
-                   number_of(sensor, "frames_in_file"),
+        } else if (*bst_json_member_text(sensor, "layout", "")) {
+            bool cube = strcmp(bst_json_member_text(sensor, "layout", ""), "cube") == 0;
+            printf("    %s: %.0f %s, %s, ", bst_json_member_text(sensor, "file", ""),
+                   bst_json_member_number(sensor, "frames_in_file"),
                    cube ? "planes of a cube" : "image extensions",
-                   strcmp(text_of(sensor, "compression", ""), "rice") == 0 ? "Rice" : "raw");
-            print_bytes(number_of(sensor, "file_bytes"));
-            printf("%s\n", cJSON_IsTrue(get(sensor, "cut_off")) ? ", cut off after these" : "");
+                   strcmp(bst_json_member_text(sensor, "compression", ""), "rice") == 0 ? "Rice" : "raw");
+            print_bytes(bst_json_member_number(sensor, "file_bytes"));
+            printf("%s\n", cJSON_IsTrue(bst_json_member(sensor, "cut_off")) ? ", cut off after these" : "");
         } else {
-            printf("    %s: no whole frame\n", text_of(sensor, "file", ""));
+            printf("    %s: no whole frame\n", bst_json_member_text(sensor, "file", ""));
         }
     }
 }
@@ -402,15 +389,15 @@ static void print_figures(const char *name, const cJSON *summary) {
 static void print_tables(const cJSON *info, bool columns) {
     const cJSON *table, *column;
     printf("tables%s\n", columns ? "" : " (--columns tells what each holds)");
-    cJSON_ArrayForEach(table, get(info, "tables")) {
-        printf("  %-18s %10.0f rows %4d columns  %s\n", text_of(table, "name", ""),
-               number_of(table, "rows"), cJSON_GetArraySize(get(table, "columns")),
-               text_of(table, "doc", ""));
-        const cJSON *list = columns ? get(table, "columns") : NULL;
+    cJSON_ArrayForEach(table, bst_json_member(info, "tables")) {
+        printf("  %-18s %10.0f rows %4d columns  %s\n", bst_json_member_text(table, "name", ""),
+               bst_json_member_number(table, "rows"), cJSON_GetArraySize(bst_json_member(table, "columns")),
+               bst_json_member_text(table, "doc", ""));
+        const cJSON *list = columns ? bst_json_member(table, "columns") : NULL;
         cJSON_ArrayForEach(column, list) {
-            printf("    %-28s %-8s %-10s %s\n", text_of(column, "name", ""),
-                   text_of(column, "type", ""), text_of(column, "unit", ""),
-                   text_of(column, "doc", ""));
+            printf("    %-28s %-8s %-10s %s\n", bst_json_member_text(column, "name", ""),
+                   bst_json_member_text(column, "type", ""), bst_json_member_text(column, "unit", ""),
+                   bst_json_member_text(column, "doc", ""));
         }
     }
 }
@@ -418,26 +405,26 @@ static void print_tables(const cJSON *info, bool columns) {
 static void print_text(const bst_run_reader *run, const cJSON *info, bool columns) {
     const cJSON *item;
     printf("%s: %s%s\n", bst_run_reader_folder(run), bst_run_state_name(bst_run_reader_state(run)),
-           cJSON_GetArraySize(get(info, "problems")) > 0 ? ", damaged" : "");
+           cJSON_GetArraySize(bst_json_member(info, "problems")) > 0 ? ", damaged" : "");
     print_identity(info);
     print_sensors(info);
-    print_figures("summary", get(info, "summary"));
-    const cJSON *sensors = get(info, "sensor_summaries");
+    print_figures("summary", bst_json_member(info, "summary"));
+    const cJSON *sensors = bst_json_member(info, "sensor_summaries");
     cJSON_ArrayForEach(item, sensors) {
         print_figures(item->string, item);
     }
-    print_figures("sightings", get(info, "sightings"));
+    print_figures("sightings", bst_json_member(info, "sightings"));
     print_tables(info, columns);
-    print_figures("events", get(info, "events"));
-    print_figures("counters", get(info, "counters"));
+    print_figures("events", bst_json_member(info, "events"));
+    print_figures("counters", bst_json_member(info, "counters"));
     printf("files\n");
-    cJSON_ArrayForEach(item, get(info, "files")) {
-        printf("  %-26s ", text_of(item, "name", ""));
-        print_bytes(number_of(item, "bytes"));
+    cJSON_ArrayForEach(item, bst_json_member(info, "files")) {
+        printf("  %-26s ", bst_json_member_text(item, "name", ""));
+        print_bytes(bst_json_member_number(item, "bytes"));
         printf("\n");
     }
     printf("  %-26s ", "on disk");
-    print_bytes(number_of(info, "disk_bytes"));
+    print_bytes(bst_json_member_number(info, "disk_bytes"));
     printf("\n");
 }
 

@@ -162,13 +162,12 @@ static bst_status measure(bst_ctx *ctx, const pd_request *r, const bst_scenario 
     return status;
 }
 
-static void print_help(const bst_option *table) {
-    printf(
-        "usage: boresight pd SCENARIO.json [options]\n\n"
+static const char help_text[] =
+    "usage: boresight pd SCENARIO.json [options]\n\n"
         "Measures the detector of a scenario against theory. Frames of the scenario's camera are\n"
         "filled with targets at random places, kept apart, of all SNRs in turn; its image\n"
         "processing finds what it finds. Printed for each SNR: probability of detection with its\n"
-        "95 %% interval and the ideal one, Q(Q^-1(Pfa) - SNR), at the false alarms per frame that\n"
+        "95 % interval and the ideal one, Q(Q^-1(Pfa) - SNR), at the false alarms per frame that\n"
         "were measured without targets; errors of place and flux over the Cramer-Rao bound. The\n"
         "loss is 20 log10 of the SNR needed over the ideal one, at Pd 0.5 and 0.9.\n\n"
         "SNR is sqrt(sum s^2) over the noise of a pixel without the source's own light. A\n"
@@ -178,9 +177,7 @@ static void print_help(const bst_option *table) {
         "pd.png\n"
         "  boresight pd scenarios/neossat_geo_stare.json --streak 20 --known-rate --json "
         "pd.json\n\n"
-        "options:\n");
-    bst_options_print(stdout, table);
-}
+        "options:\n";
 
 #define FIELD(member) .offset = offsetof(pd_request, member)
 
@@ -331,7 +328,8 @@ int bst_cmd_pd(int argc, char **argv) {
         return bst_options_misuse(&ctx, "pd");
     }
     if (r.help) {
-        print_help(table);
+        fputs(help_text, stdout);
+        bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
     if (bst_plot_check_path(&ctx, r.plot) != BST_OK) {
