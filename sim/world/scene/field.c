@@ -412,8 +412,8 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
     double tt1, tt2;
     bst_time_tt(bst_world_time(field->world, q->mid_s), &tt1, &tt2);
     BST_TRY(query_stars(ctx, field, q, 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
-    BST_TRY(bst_world_view_near(ctx, field->view, field->observer, q->start_s, q->end_s, q->centre,
-                                q->radius, field->near, &near_count));
+    const bst_world_view_span span = {field->observer, q->start_s, q->end_s};
+    BST_TRY(bst_world_view_near(ctx, field->view, &span, q->centre, q->radius, field->near, &near_count));
     BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     for (int i = 0; i < star_count; i++) {
         n += make_star(field, q, &field->stars[i], &field->sources[n]);
@@ -421,9 +421,7 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
     BST_TRY(reserve_parts(ctx, field, near_count));
     const bst_scene_object_query objects = {.view = field->view,
                                             .camera = field->camera,
-                                            .observer = field->observer,
-                                            .start_s = q->start_s,
-                                            .end_s = q->end_s,
+                                            .span = span,
                                             .q_mid = field->q_mid,
                                             .window = q->window,
                                             .margin_px = q->margin_px,
