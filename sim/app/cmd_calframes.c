@@ -240,7 +240,10 @@ static const bst_option OPTIONS[] = {
      .doc = "only this one (default all)"},
     BST_LOAD_OPTIONS_AT(FIELD, load),
     BST_DEVICE_OPTIONS_AT(FIELD, device, threads),
-    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(calframes_request, help), .doc = "print this"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(calframes_request, help),
+     .doc = "print this"},
     {.name = NULL},
 };
 

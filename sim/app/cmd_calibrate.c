@@ -164,21 +164,21 @@ static bst_status check(bst_ctx *ctx, const errand *e, int count, char **files, 
 
 static const char help_text[] =
     "usage: boresight calibrate-obsgen SCENARIO.json... --out FILE [options]\n"
-        "       boresight calibrate-obsgen --check SCENARIO.json... [--calibration FILE] "
-        "[options]\n\n"
-        "Runs the image path of scenarios and fits to it what the observation generator takes from "
-        "measurement:\n"
-        "threshold, noise, Pd by SNR and streak length, false alarms, errors of places. The file "
-        "goes into the\n"
-        "scenario's obsgen block as calibration_file. Only the first sensor counts; each run has "
-        "another number.\n\n"
-        "With --check: runs each scenario with images and with the generator and compares them: "
-        "95 % bootstrap\n"
-        "intervals over the runs, against the margins of equivalence. Exit code 1 when an interval "
-        "is not inside.\n\n"
-        "  boresight calibrate-obsgen scenarios/calibration/*.json --out obsgen.json\n"
-        "  boresight calibrate-obsgen --check scenarios/neossat_geo_track.json --calibration "
-        "obsgen.json --seeds 100\n\noptions:\n";
+    "       boresight calibrate-obsgen --check SCENARIO.json... [--calibration FILE] "
+    "[options]\n\n"
+    "Runs the image path of scenarios and fits to it what the observation generator takes from "
+    "measurement:\n"
+    "threshold, noise, Pd by SNR and streak length, false alarms, errors of places. The file "
+    "goes into the\n"
+    "scenario's obsgen block as calibration_file. Only the first sensor counts; each run has "
+    "another number.\n\n"
+    "With --check: runs each scenario with images and with the generator and compares them: "
+    "95 % bootstrap\n"
+    "intervals over the runs, against the margins of equivalence. Exit code 1 when an interval "
+    "is not inside.\n\n"
+    "  boresight calibrate-obsgen scenarios/calibration/*.json --out obsgen.json\n"
+    "  boresight calibrate-obsgen --check scenarios/neossat_geo_track.json --calibration "
+    "obsgen.json --seeds 100\n\noptions:\n";
 
 int bst_cmd_calibrate_obsgen(int argc, char **argv) {
     errand e = {.load = BST_LOAD_DEFAULTS, .seeds = 2};

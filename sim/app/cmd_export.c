@@ -200,9 +200,8 @@ static const bst_option OPTIONS[] = {
      .offset = offsetof(export_request, e.satnet),
      .path = BST_PATH_OUTPUT_FOLDER,
      .argument = "FOLDER",
-     .doc =
-         "a FITS file and a JSON annotation per frame, for training networks: ImageFiles/ and "
-         "Annotations/ in FOLDER, which lies in that of --out where that is given"},
+     .doc = "a FITS file and a JSON annotation per frame, for training networks: ImageFiles/ and "
+            "Annotations/ in FOLDER, which lies in that of --out where that is given"},
     {.name = "coco",
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(export_request, e.coco),
@@ -221,9 +220,8 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_CHOICE,
      .offset = offsetof(export_request, bits),
      .argument = "16|8",
-     .doc =
-         "coco, yolo: images of the counts as they are (16, default), or of grey levels, each "
-         "frame's own (8)"},
+     .doc = "coco, yolo: images of the counts as they are (16, default), or of grey levels, each "
+            "frame's own (8)"},
     {.name = "out",
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(export_request, out),
@@ -306,9 +304,8 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(export_request, e.objects),
      .argument = "A,B|seen|all",
-     .doc =
-         "orbits: of these objects, by name or NORAD number, of those that came into a field "
-         "and the targets, or of all (default all of up to 100 objects, else seen)"},
+     .doc = "orbits: of these objects, by name or NORAD number, of those that came into a field "
+            "and the targets, or of all (default all of up to 100 objects, else seen)"},
     {.name = "split",
      .needs = "satnet",
      .kind = BST_OPTION_TEXT,
@@ -321,9 +318,8 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_REAL,
      .offset = offsetof(export_request, e.box_px),
      .argument = "PX",
-     .doc =
-         "satnet: side of the boxes (default 20); 0: the extent of each track. coco, yolo: the "
-         "way of the light, grown by half of it on each side",
+     .doc = "satnet: side of the boxes (default 20); 0: the extent of each track. coco, yolo: the "
+            "way of the light, grown by half of it on each side",
      .minimum = 0,
      .maximum = 65536},
     {.name = "star-limit",
@@ -334,19 +330,20 @@ static const bst_option OPTIONS[] = {
      .doc = "satnet, coco, yolo: faintest V of the stars that are labelled (default 10)",
      .minimum = -30,
      .maximum = 40},
-    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(export_request, help), .doc = "print this"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(export_request, help),
+     .doc = "print this"},
     {.name = NULL},
 };
 
 int bst_cmd_export(int argc, char **argv) {
-    export_request r = {.e = {.last = INT64_C(9007199254740992),
-                              .every = 1,
-                              .box_px = 20.0,
-                              .star_limit = 10.0},
-                        .frames = NOT_ASKED,
-                        .table = NOT_ASKED,
-                        .orbits = NOT_ASKED,
-                        .observations = NOT_ASKED};
+    export_request r = {
+        .e = {.last = INT64_C(9007199254740992), .every = 1, .box_px = 20.0, .star_limit = 10.0},
+        .frames = NOT_ASKED,
+        .table = NOT_ASKED,
+        .orbits = NOT_ASKED,
+        .observations = NOT_ASKED};
     bst_option options[sizeof OPTIONS / sizeof *OPTIONS];
     bst_options_bind(OPTIONS, &r, options);
     bst_ctx ctx;

@@ -46,7 +46,8 @@ static void each_row(bst_run_reader *run, const char *sql, int64_t parameter,
 
 static void add_span(bst_run_reader *run, cJSON *out) {
     const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
-    const char *epoch = bst_json_member_text(manifest, "epoch_utc", bst_json_member_text(scenario, "epoch_utc", ""));
+    const char *epoch = bst_json_member_text(manifest, "epoch_utc",
+                                             bst_json_member_text(scenario, "epoch_utc", ""));
     double rate = bst_json_member_number(scenario, "tick_rate_hz");
     double last = bst_json_member_number(manifest, "last_tick");
     double simulated = bst_json_member_number(scenario, "duration_s");
@@ -309,30 +310,35 @@ static void print_identity(const cJSON *info) {
     line("scenario", bst_json_member_text(info, "scenario", ""));
     snprintf(text, sizeof text, "boresight %s%s%s%s",
              bst_json_member_text(info, "version", "of unknown version"),
-             *bst_json_member_text(info, "git_revision", "") ? " (" : "", bst_json_member_text(info, "git_revision", ""),
+             *bst_json_member_text(info, "git_revision", "") ? " (" : "",
+             bst_json_member_text(info, "git_revision", ""),
              *bst_json_member_text(info, "git_revision", "") ? ")" : "");
     line("program", text);
-    snprintf(text, sizeof text, "%s, run %.0f", bst_json_member_text(info, "seed", "?"), bst_json_member_number(info, "run"));
+    snprintf(text, sizeof text, "%s, run %.0f", bst_json_member_text(info, "seed", "?"),
+             bst_json_member_number(info, "run"));
     line("seed", text);
     line("device", bst_json_member_text(info, "device", ""));
     const cJSON *plugin;
     cJSON_ArrayForEach(plugin, bst_json_member(info, "plugins")) {
-        snprintf(text, sizeof text, "%s of %s, SHA-256 %s", bst_json_member_text(plugin, "type", "?"),
-                 bst_json_member_text(plugin, "file", "?"), bst_json_member_text(plugin, "sha256", "?"));
+        snprintf(
+            text, sizeof text, "%s of %s, SHA-256 %s", bst_json_member_text(plugin, "type", "?"),
+            bst_json_member_text(plugin, "file", "?"), bst_json_member_text(plugin, "sha256", "?"));
         line("plug-in", text);
     }
     snprintf(text, sizeof text, "%s to %s (%.3f s)", bst_json_member_text(info, "start_utc", "?"),
-             bst_json_member_text(info, "end_utc", "?"), bst_json_member_number(info, "simulated_s"));
+             bst_json_member_text(info, "end_utc", "?"),
+             bst_json_member_number(info, "simulated_s"));
     line("span", text);
     if (isfinite(bst_json_member_number(info, "stars"))) {
-        snprintf(text, sizeof text, "%s, %.0f stars", bst_json_member_text(info, "star_catalogue", ""),
+        snprintf(text, sizeof text, "%s, %.0f stars",
+                 bst_json_member_text(info, "star_catalogue", ""),
                  bst_json_member_number(info, "stars"));
         line("star catalogue", text);
     }
     if (isfinite(bst_json_member_number(info, "wall_time_s"))) {
         double warnings = bst_json_member_number(info, "warnings");
-        snprintf(text, sizeof text, "%.2f s, %.0f warning%s", bst_json_member_number(info, "wall_time_s"),
-                 warnings, warnings == 1.0 ? "" : "s");
+        snprintf(text, sizeof text, "%.2f s, %.0f warning%s",
+                 bst_json_member_number(info, "wall_time_s"), warnings, warnings == 1.0 ? "" : "s");
         line("wall time", text);
     }
 }
@@ -342,9 +348,11 @@ static void print_sensors(const cJSON *info) {
     printf("sensors\n");
     cJSON_ArrayForEach(sensor, bst_json_member(info, "sensors")) {
         double frames = bst_json_member_number(sensor, "frames");
-        printf("  %s/%s: %.0f frame%s, %.0f x %.0f px", bst_json_member_text(sensor, "observer", ""),
+        printf("  %s/%s: %.0f frame%s, %.0f x %.0f px",
+               bst_json_member_text(sensor, "observer", ""),
                bst_json_member_text(sensor, "name", ""), frames, frames == 1.0 ? "" : "s",
-               bst_json_member_number(sensor, "width_px"), bst_json_member_number(sensor, "height_px"));
+               bst_json_member_number(sensor, "width_px"),
+               bst_json_member_number(sensor, "height_px"));
         if (bst_json_member_number(sensor, "bits") > 0) {
             printf(", %.0f bit", bst_json_member_number(sensor, "bits"));
         }
@@ -359,9 +367,11 @@ static void print_sensors(const cJSON *info) {
             printf("    %s: %.0f %s, %s, ", bst_json_member_text(sensor, "file", ""),
                    bst_json_member_number(sensor, "frames_in_file"),
                    cube ? "planes of a cube" : "image extensions",
-                   strcmp(bst_json_member_text(sensor, "compression", ""), "rice") == 0 ? "Rice" : "raw");
+                   strcmp(bst_json_member_text(sensor, "compression", ""), "rice") == 0 ? "Rice"
+                                                                                        : "raw");
             print_bytes(bst_json_member_number(sensor, "file_bytes"));
-            printf("%s\n", cJSON_IsTrue(bst_json_member(sensor, "cut_off")) ? ", cut off after these" : "");
+            printf("%s\n",
+                   cJSON_IsTrue(bst_json_member(sensor, "cut_off")) ? ", cut off after these" : "");
         } else {
             printf("    %s: no whole frame\n", bst_json_member_text(sensor, "file", ""));
         }
@@ -391,12 +401,14 @@ static void print_tables(const cJSON *info, bool columns) {
     printf("tables%s\n", columns ? "" : " (--columns tells what each holds)");
     cJSON_ArrayForEach(table, bst_json_member(info, "tables")) {
         printf("  %-18s %10.0f rows %4d columns  %s\n", bst_json_member_text(table, "name", ""),
-               bst_json_member_number(table, "rows"), cJSON_GetArraySize(bst_json_member(table, "columns")),
+               bst_json_member_number(table, "rows"),
+               cJSON_GetArraySize(bst_json_member(table, "columns")),
                bst_json_member_text(table, "doc", ""));
         const cJSON *list = columns ? bst_json_member(table, "columns") : NULL;
         cJSON_ArrayForEach(column, list) {
             printf("    %-28s %-8s %-10s %s\n", bst_json_member_text(column, "name", ""),
-                   bst_json_member_text(column, "type", ""), bst_json_member_text(column, "unit", ""),
+                   bst_json_member_text(column, "type", ""),
+                   bst_json_member_text(column, "unit", ""),
                    bst_json_member_text(column, "doc", ""));
         }
     }

@@ -532,7 +532,10 @@ static const bst_option OPTIONS[] = {
      .path = BST_PATH_OUTPUT,
      .argument = "FILE",
      .doc = "state, covariance, elements and residuals, as JSON"},
-    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(request, help), .doc = "print this"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(request, help),
+     .doc = "print this"},
     {.name = NULL},
 };
 

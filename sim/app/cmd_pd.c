@@ -164,20 +164,20 @@ static bst_status measure(bst_ctx *ctx, const pd_request *r, const bst_scenario 
 
 static const char help_text[] =
     "usage: boresight pd SCENARIO.json [options]\n\n"
-        "Measures the detector of a scenario against theory. Frames of the scenario's camera are\n"
-        "filled with targets at random places, kept apart, of all SNRs in turn; its image\n"
-        "processing finds what it finds. Printed for each SNR: probability of detection with its\n"
-        "95 % interval and the ideal one, Q(Q^-1(Pfa) - SNR), at the false alarms per frame that\n"
-        "were measured without targets; errors of place and flux over the Cramer-Rao bound. The\n"
-        "loss is 20 log10 of the SNR needed over the ideal one, at Pd 0.5 and 0.9.\n\n"
-        "SNR is sqrt(sum s^2) over the noise of a pixel without the source's own light. A\n"
-        "detection counts within one FWHM of the true place; along a streak within its half\n"
-        "length.\n\n"
-        "  boresight pd scenarios/neossat_geo_stare.json --snr 3:9:0.5 --trials 2000 --plot "
-        "pd.png\n"
-        "  boresight pd scenarios/neossat_geo_stare.json --streak 20 --known-rate --json "
-        "pd.json\n\n"
-        "options:\n";
+    "Measures the detector of a scenario against theory. Frames of the scenario's camera are\n"
+    "filled with targets at random places, kept apart, of all SNRs in turn; its image\n"
+    "processing finds what it finds. Printed for each SNR: probability of detection with its\n"
+    "95 % interval and the ideal one, Q(Q^-1(Pfa) - SNR), at the false alarms per frame that\n"
+    "were measured without targets; errors of place and flux over the Cramer-Rao bound. The\n"
+    "loss is 20 log10 of the SNR needed over the ideal one, at Pd 0.5 and 0.9.\n\n"
+    "SNR is sqrt(sum s^2) over the noise of a pixel without the source's own light. A\n"
+    "detection counts within one FWHM of the true place; along a streak within its half\n"
+    "length.\n\n"
+    "  boresight pd scenarios/neossat_geo_stare.json --snr 3:9:0.5 --trials 2000 --plot "
+    "pd.png\n"
+    "  boresight pd scenarios/neossat_geo_stare.json --streak 20 --known-rate --json "
+    "pd.json\n\n"
+    "options:\n";
 
 #define FIELD(member) .offset = offsetof(pd_request, member)
 
@@ -223,9 +223,8 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_INT,
      .offset = offsetof(pd_request, options.stack),
      .argument = "N",
-     .doc =
-         "search N frames together, in which targets move at rates of their own; SNRs are of "
-         "one frame (default 0: each frame by itself)",
+     .doc = "search N frames together, in which targets move at rates of their own; SNRs are of "
+            "one frame (default 0: each frame by itself)",
      .minimum = 0,
      .maximum = BST_STACK_MAX_FRAMES},
     {.name = "rates",
@@ -308,7 +307,10 @@ static const bst_option OPTIONS[] = {
      .doc = "whose camera and detector (default the first)"},
     BST_LOAD_OPTIONS_AT(FIELD, load),
     BST_DEVICE_OPTIONS_AT(FIELD, options.device, threads),
-    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(pd_request, help), .doc = "print this"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(pd_request, help),
+     .doc = "print this"},
     {.name = NULL},
 };
 

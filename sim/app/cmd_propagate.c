@@ -465,7 +465,10 @@ static const bst_option OPTIONS[] = {
      .path = BST_PATH_OUTPUT,
      .argument = "FILE",
      .doc = "write there instead of to the standard output"},
-    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(request, help), .doc = "this text"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(request, help),
+     .doc = "this text"},
     {.name = NULL},
 };
 

@@ -110,8 +110,14 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, serial),
      .doc = "do not process and record beside the simulation; the results are the same"},
-    {.name = "quiet", .kind = BST_OPTION_FLAG, .offset = offsetof(run_request, quiet), .doc = "no progress line"},
-    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(run_request, help), .doc = "print this"},
+    {.name = "quiet",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, quiet),
+     .doc = "no progress line"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, help),
+     .doc = "print this"},
     {.name = NULL},
 };
 

@@ -193,41 +193,49 @@ static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_st
     }
 }
 
-static bst_status open_pool(bst_ctx *ctx, const study_request *r, const bst_study *study,
-                            const bst_study_kind *kind, const char *out, int lock,
-                            bst_executor *executor) {
+/* A study that is executed. */
+typedef struct work {
+    const study_request *request;
+    const bst_study *study;
+    const bst_study_kind *kind;
+    const char *out; /* the folder */
+    int lock;        /* its lock */
+} work;
+
+static bst_status open_pool(bst_ctx *ctx, const work *w, bst_executor *executor) {
+    const study_request *r = w->request;
     const bst_local_pool_options pool = {.devices = r->devices.list,
                                          .device_count = r->devices.count,
                                          .cores = (int)r->cores,
-                                         .study = study,
-                                         .kind = kind,
-                                         .out = out,
+                                         .study = w->study,
+                                         .kind = w->kind,
+                                         .out = w->out,
                                          .workers = (int)r->workers,
-                                         .lock_fd = lock,
+                                         .lock_fd = w->lock,
                                          .unpinned = r->unpinned};
     return bst_local_pool_open(ctx, &pool, executor);
 }
 
-static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study *study,
-                          const bst_study_kind *kind, const char *out, int lock,
-                          bst_results *results, bst_driver_outcome *outcome) {
+static bst_status execute(bst_ctx *ctx, const work *w, bst_results *results,
+                          bst_driver_outcome *outcome) {
+    const study_request *r = w->request;
     bst_executor executor;
     shown line = {.on = !r->quiet && isatty(STDERR_FILENO) == 1};
     const bst_driver_options options = {
-        .out = out,
-        .kind = kind,
+        .out = w->out,
+        .kind = w->kind,
         .shard_s = r->slurm ? SLURM_SHARD_S : SHARD_S,
         .shard_runs = r->shard_runs,
         .parallel = r->slurm ? 0 : bst_local_workers((int)r->workers, r->devices.count),
         .probe = r->slurm,
         .progress = show,
         .user = &line};
-    BST_TRY(bst_results_load_folder(ctx, results, out, 0, study->runs, true));
-    forget_what_is_gone(ctx, results, kind, out);
+    BST_TRY(bst_results_load_folder(ctx, results, w->out, 0, w->study->runs, true));
+    forget_what_is_gone(ctx, results, w->kind, w->out);
     if (r->slurm) {
-        BST_TRY(bst_study_slurm(ctx, r->site, r->device ? r->device : "", out, &executor));
+        BST_TRY(bst_study_slurm(ctx, r->site, r->device ? r->device : "", w->out, &executor));
     } else {
-        BST_TRY(open_pool(ctx, r, study, kind, out, lock, &executor));
+        BST_TRY(open_pool(ctx, w, &executor));
     }
     bst_status status = bst_driver_run(ctx, results, &executor, &options, outcome);
     executor.close(executor.self);
@@ -253,7 +261,8 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
         status = bst_study_plugins_settle(ctx, kind->user, out);
     }
     if (status == BST_OK) {
-        status = execute(ctx, r, study, kind, out, lock, &results, &outcome);
+        const work w = {r, study, kind, out, lock};
+        status = execute(ctx, &w, &results, &outcome);
     }
     if (status == BST_OK && outcome.missing == 0) {
         bst_results_sort(&results);
@@ -551,8 +560,14 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(study_request, schema),
      .doc = "print the JSON Schema of studies"},
-    {.name = "quiet", .kind = BST_OPTION_FLAG, .offset = offsetof(study_request, quiet), .doc = "no progress line"},
-    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(study_request, help), .doc = "print this"},
+    {.name = "quiet",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, quiet),
+     .doc = "no progress line"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, help),
+     .doc = "print this"},
     {.name = NULL},
 };
 

@@ -183,7 +183,8 @@ bst_status bst_astro_eop_read_buffer(bst_ctx *ctx, const char *name, const char 
     *out = NULL;
     BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     bst_astro_eop *eop = calloc(1, sizeof *eop);
-    bst_status status = eop ? read_rows(ctx, name, data, bytes, eop) : bst_fail(ctx, BST_ERR_MEMORY, "%s", NO_MEMORY);
+    bst_status status = eop ? read_rows(ctx, name, data, bytes, eop)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "%s", NO_MEMORY);
     if (status == BST_OK) {
         status =
             bst_astro_eop_prediction_fit(ctx, eop->first_mjd, eop->count, eop->rows, &eop->after);

@@ -503,7 +503,8 @@ bst_status bst_oem_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     if (r.oem) {
         r.oem->name = strdup(name);
     }
-    bst_status status = r.oem && r.oem->name ? read_lines(&r, data, bytes) : bst_text_fail_memory(&r.source, "states");
+    bst_status status = r.oem && r.oem->name ? read_lines(&r, data, bytes)
+                                             : bst_text_fail_memory(&r.source, "states");
     if (status == BST_OK) {
         status = bst_oem_sort(ctx, r.oem);
     }

@@ -48,11 +48,11 @@ static void solve_kepler(double u, double ax, double ay, double *sin_e, double *
 /* Secular gravity and drag: STR3 section 6; HSG appendix B. *a: semi-major axis. */
 static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, double *a) {
     *x = (bst_sgp4_mean){.n = s->n0,
-                       .e = s->e0,
-                       .i = s->i0,
-                       .m = s->m0 + s->m_rate * t,
-                       .argp = s->argp0 + s->argp_rate * t,
-                       .raan = s->raan0 + t * (s->raan_rate + t * s->raan_drag)};
+                         .e = s->e0,
+                         .i = s->i0,
+                         .m = s->m0 + s->m_rate * t,
+                         .argp = s->argp0 + s->argp_rate * t,
+                         .raan = s->raan0 + t * (s->raan_rate + t * s->raan_drag)};
     double root_a_ratio, e_loss, l_gain;
     if (s->short_drag) {
         root_a_ratio = 1.0 - s->a_drag[0] * t;

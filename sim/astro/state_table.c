@@ -298,7 +298,9 @@ bst_status bst_state_table_create(bst_ctx *ctx, const char *name,
     *out = NULL;
     reader r = {.source = {ctx, name}, .frames = NULL};
     bst_state_table *injected = calloc(1, sizeof *injected);
-    bst_status status = injected && (injected->name = strdup(name)) ? BST_OK : bst_text_fail_memory(&r.source, "states");
+    bst_status status = injected && (injected->name = strdup(name))
+                            ? BST_OK
+                            : bst_text_fail_memory(&r.source, "states");
     if (status == BST_OK && count < 1) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%.400s: holds no states of objects", name);
     }

@@ -370,7 +370,8 @@ bst_status bst_tdm_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     *out = NULL;
     BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     reader r = {.source = {ctx, name}, .tdm = calloc(1, sizeof *r.tdm)};
-    bst_status status = r.tdm ? read_all(&r, data, bytes) : bst_text_fail_memory(&r.source, "angles");
+    bst_status status =
+        r.tdm ? read_all(&r, data, bytes) : bst_text_fail_memory(&r.source, "angles");
     free(r.values);
     if (status != BST_OK) {
         bst_tdm_free(r.tdm);

@@ -49,8 +49,8 @@ typedef struct bst_option {
     bst_option_path path;    /* TEXT, LIST */
 } bst_option;
 
-/* Copies a table of constant data, its last entry too, to *out, and sets each target to the place at
- * the entry's offset in *request. */
+/* Copies a table of constant data, its last entry too, to *out, and sets each target to the place
+ * at the entry's offset in *request. */
 void bst_options_bind(const bst_option *table, void *request, bst_option *out);
 
 /* Reads argv[1] .. argv[argc - 1] into the table's targets. Forms: --name value, --name=value,

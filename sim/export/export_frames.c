@@ -96,8 +96,9 @@ static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
         width = (int)fmax(1.0, round(frame.width * scale));
         height = (int)fmax(1.0, round(frame.height * scale));
     }
-    BST_TRY(bst_frame_picture(ctx, frame.pixels, frame.width, frame.height, stretch,
-                              j->e->annotate ? &overlay : NULL, width, height, &picture));
+    const bst_io_counts counts = {frame.pixels, frame.width, frame.height};
+    BST_TRY(bst_frame_picture(ctx, &counts, stretch, j->e->annotate ? &overlay : NULL, width,
+                              height, &picture));
     bst_status status;
     if (j->e->film) {
         status = bst_picture_copy(ctx, picture, j->bgr);

@@ -112,8 +112,12 @@ static bst_status read_frame_row(bst_ctx *ctx, const job *j, const bst_io_rows *
 /* Along one axis: start, middle and end as fractions of the image. */
 static void put_axis(cJSON *node, char axis, const double v[3], double box) {
     const char *const names[] = {"min", "max", "center", "start", "mid", "end"};
-    const double values[] = {bst_least_of_3(v), bst_greatest_of_3(v), 0.5 * (bst_least_of_3(v) + bst_greatest_of_3(v)),
-                             v[0],       v[1],       v[2]};
+    const double values[] = {bst_least_of_3(v),
+                             bst_greatest_of_3(v),
+                             0.5 * (bst_least_of_3(v) + bst_greatest_of_3(v)),
+                             v[0],
+                             v[1],
+                             v[2]};
     char key[16];
     for (int k = 0; k < 6; k++) {
         snprintf(key, sizeof key, "%c_%s", axis, names[k]);
@@ -147,8 +151,9 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
             return NULL;
         }
     }
-    if (!(electrons > 0.0) || (star && !(v_mag <= j->e->star_limit)) || bst_greatest_of_3(x) < 0.0 ||
-        bst_least_of_3(x) > 1.0 || bst_greatest_of_3(y) < 0.0 || bst_least_of_3(y) > 1.0) {
+    if (!(electrons > 0.0) || (star && !(v_mag <= j->e->star_limit)) ||
+        bst_greatest_of_3(x) < 0.0 || bst_least_of_3(x) > 1.0 || bst_greatest_of_3(y) < 0.0 ||
+        bst_least_of_3(y) > 1.0) {
         return NULL;
     }
     char id[32];

@@ -6,7 +6,7 @@
 #include "sim/io/fits_internal.h"
 
 bst_status bst_fits_sign_hdu(bst_ctx *ctx, const bst_fits *fits, char *hdu, long long bytes,
-                       const uint16_t *pixels, size_t count) {
+                             const uint16_t *pixels, size_t count) {
     bst_fits_sum sum = {0};
     if (!fits->checksums) {
         return BST_OK;
@@ -78,8 +78,8 @@ bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits
 }
 
 bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
-                                const char *name, const void *pixels, int width, int height,
-                                int64_t *index) {
+                                const bst_fits_plane *plane, int64_t *index) {
+    int width = plane->width, height = plane->height;
     if (width < 1 || height < 1 || fits->content == BST_FITS_COUNTS) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: no plane of %d x %d pixels", fits->path, width,
                         height);
@@ -98,7 +98,7 @@ bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_fra
     bst_fits_memory_open(&fits->memory, true, &code);
     fitsfile *file = fits->memory.file;
     fits_create_img(file, images[fits->content], 2, size, &code);
-    fits_write_key_str(file, "EXTNAME", name, "", &code);
+    fits_write_key_str(file, "EXTNAME", plane->name, "", &code);
     fits_write_key_lng(file, "EXTVER", fits->frames + 1, "counted from 1", &code);
     fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
     bst_fits_put_frame_keys(file, &fits->names, frame, &code);
@@ -107,7 +107,7 @@ bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_fra
     bst_fits_put_sums(fits, file, &code);
     /* cfitsio's prototype lacks const; it does not write to the array */
     fits_write_img(file, types[fits->content], 1, (LONGLONG)width * height,
-                   (void *)(uintptr_t)pixels, &code);
+                   (void *)(uintptr_t)plane->pixels, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
     if (status == BST_OK) {

@@ -5,7 +5,7 @@
 #include "sim/io/run_internal.h"
 
 bst_status bst_run_path_join(bst_ctx *ctx, char *buffer, size_t bytes, const char *folder,
-                       const char *name) {
+                             const char *name) {
     int n = snprintf(buffer, bytes, "%s/%s", folder, name);
     if (n < 0 || (size_t)n >= bytes) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s/%s: the path is too long", folder, name);

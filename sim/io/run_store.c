@@ -384,7 +384,8 @@ bst_status bst_run_seal(bst_ctx *ctx, bst_run *run) {
 bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) {
     bst_status status = run->db ? bst_run_seal(ctx, run) : bst_run_check_folder(ctx, run);
     char lock_path[BST_RUN_PATH_BYTES];
-    bool have_lock_path = bst_run_path_join(NULL, lock_path, sizeof lock_path, run->folder, BST_RUN_LOCK) == BST_OK;
+    bool have_lock_path =
+        bst_run_path_join(NULL, lock_path, sizeof lock_path, run->folder, BST_RUN_LOCK) == BST_OK;
     if (status == BST_OK && have_lock_path && unlink(lock_path) != 0) {
         status = fail_errno(ctx, lock_path, "cannot be removed");
     }

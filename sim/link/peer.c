@@ -232,7 +232,7 @@ static bst_status read_message(bst_ctx *ctx, bst_link_peer *peer, bst_link_recei
     size_t items =
         about->items && bytes > record ? (bytes - record) / bst_wire_bytes(about->items) : 0;
     BST_TRY(bst_memory_grow(ctx, "link: no memory", &peer->payload, &peer->payload_room,
-                 about->header_bytes + (items + 1) * about->item_bytes + 64));
+                            about->header_bytes + (items + 1) * about->item_bytes + 64));
     fault = bst_wire_decode(ctx, about, zmq_msg_data(&peer->parts[1]), bytes, peer->payload,
                             (int)items, NULL);
     if (fault != BST_WIRE_GOOD) {

@@ -75,14 +75,14 @@ bst_chart bst_report_time_chart(const bst_report_drawing *d, const char *name, c
     return c;
 }
 
-void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
-                          const double *values, size_t n, double low, double high, int bins,
-                          int colour, double (*density)(double x, const void *user),
-                          const void *user) {
+void bst_report_histogram(FILE *out, const bst_report_histogram_of *h) {
     enum { MOST = 64, CURVE = 120 };
+    const double *values = h->values;
+    double low = h->low, high = h->high;
+    int bins = h->bins;
     double counts[MOST] = {0}, top = 0.0, x[CURVE], y[CURVE], width = (high - low) / bins;
     size_t total = 0;
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < h->n; i++) {
         if (isfinite(values[i])) {
             total++;
             double at = floor((values[i] - low) / width);
@@ -96,22 +96,23 @@ void bst_report_histogram(FILE *out, const char *name, const char *label, const 
     }
     for (int i = 0; i < CURVE; i++) {
         x[i] = low + (high - low) * i / (CURVE - 1);
-        y[i] = density ? density(x[i], user) * width * (double)total : 0.0;
+        y[i] = h->density ? h->density(x[i], h->user) * width * (double)total : 0.0;
         top = fmax(top, y[i]);
     }
     bst_chart c = {.out = out,
-                   .name = name,
+                   .name = h->name,
                    .width = 360.0,
                    .height = 230.0,
-                   .x = {.label = label, .low = low, .high = high},
-                   .y = {.label = what, .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
+                   .x = {.label = h->label, .low = low, .high = high},
+                   .y = {.label = h->what, .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
     bst_chart_begin(&c);
     for (int i = 0; i < bins; i++) {
         if (counts[i] > 0.0) {
-            bst_chart_bar(&c, low + i * width, low + (i + 1) * width, 0.0, counts[i], colour, NULL);
+            bst_chart_bar(&c, low + i * width, low + (i + 1) * width, 0.0, counts[i], h->colour,
+                          NULL);
         }
     }
-    if (density) {
+    if (h->density) {
         bst_chart_line(&c, x, y, CURVE, BST_CHART_RED, false);
     }
     bst_chart_end(&c);
@@ -434,12 +435,23 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
         return;
     }
     bst_report_statistics m = bst_report_measure(d->y, n); /* sorts */
-    double inner = 0.5 * (bst_report_percentile(d->y, n, 0.8413) - bst_report_percentile(d->y, n, 0.1587));
+    double inner =
+        0.5 * (bst_report_percentile(d->y, n, 0.8413) - bst_report_percentile(d->y, n, 0.1587));
     double law[2] = {m.median, fmax(inner, 1e-9)}, half = 5.0 * law[1];
     char caption[160], words[2][32];
     bst_report_page_figure(d->out, BST_PAGE_THIRD);
-    bst_report_histogram(d->out, label, label, "frames", d->y, n, m.median - half, m.median + half,
-                         40, colour, normal, law);
+    const bst_report_histogram_of histogram = {.name = label,
+                                               .label = label,
+                                               .what = "frames",
+                                               .values = d->y,
+                                               .n = n,
+                                               .low = m.median - half,
+                                               .high = m.median + half,
+                                               .bins = 40,
+                                               .colour = colour,
+                                               .density = normal,
+                                               .user = law};
+    bst_report_histogram(d->out, &histogram);
     snprintf(
         caption, sizeof caption, "Mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
         bst_report_page_number(words[0], m.mean, 2), bst_report_page_number(words[1], m.rms, 3));
@@ -454,8 +466,16 @@ static void plot_histograms(const bst_report_drawing *d) {
     size_t n = gather(d->y, d->sensor->count);
     if (n >= 20) {
         bst_report_page_figure(d->out, BST_PAGE_THIRD);
-        bst_report_histogram(d->out, "NEES of the track", "NEES of the track", "frames", d->y, n,
-                             0.0, 12.0, 40, BST_CHART_GREEN, chi_square_2, NULL);
+        const bst_report_histogram_of histogram = {.name = "NEES of the track",
+                                                   .label = "NEES of the track",
+                                                   .what = "frames",
+                                                   .values = d->y,
+                                                   .n = n,
+                                                   .high = 12.0,
+                                                   .bins = 40,
+                                                   .colour = BST_CHART_GREEN,
+                                                   .density = chi_square_2};
+        bst_report_histogram(d->out, &histogram);
         bst_report_page_figure_end(
             d->out, "Frames with a detection; the curve is chi-square with 2 degrees of freedom.");
     }

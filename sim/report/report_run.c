@@ -36,7 +36,8 @@ static const cJSON *summary_of(const page *p, int i) {
 
 static double span_of(const bst_run_reader *run) {
     const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
-    double rate = bst_json_member_number(scenario, "tick_rate_hz"), whole = bst_json_member_number(scenario, "duration_s");
+    double rate = bst_json_member_number(scenario, "tick_rate_hz"),
+           whole = bst_json_member_number(scenario, "duration_s");
     if (bst_run_reader_state(run) == BST_RUN_COMPLETE) {
         return whole;
     }
@@ -134,7 +135,8 @@ static void put_objects(const page *p) {
                             count > 8 ? " ..." : "");
     }
     cJSON_ArrayForEach(catalogue, catalogues) {
-        const char *file = bst_json_member_text(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
+        const char *file = bst_json_member_text(catalogue, "elements_file", "?"),
+                   *slash = strrchr(file, '/');
         bst_report_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
                             slash ? slash + 1 : file);
     }
@@ -145,22 +147,28 @@ static void put_identity(const page *p) {
                 *scenario = bst_run_reader_scenario(p->run);
     bst_report_page_section(p->out, 2, "What was run");
     fputs("<div class=\"scroll\"><table class=\"two\">\n", p->out);
-    bst_report_page_row(p->out, "scenario", "%s",
-                        bst_json_member_text(scenario, "name", bst_json_member_text(manifest, "scenario", "-")));
-    bst_report_page_row(p->out, "scenario file", "%s", bst_json_member_text(manifest, "scenario_file", "-"));
+    bst_report_page_row(
+        p->out, "scenario", "%s",
+        bst_json_member_text(scenario, "name", bst_json_member_text(manifest, "scenario", "-")));
+    bst_report_page_row(p->out, "scenario file", "%s",
+                        bst_json_member_text(manifest, "scenario_file", "-"));
     put_times(p);
     bst_report_page_row(p->out, "program", "Boresight %s",
                         bst_json_member_text(manifest, "version", "(version unknown)"));
-    bst_report_page_row(p->out, "git revision", "%s", bst_json_member_text(manifest, "git_revision", "-"));
+    bst_report_page_row(p->out, "git revision", "%s",
+                        bst_json_member_text(manifest, "git_revision", "-"));
     const cJSON *identity = manifest ? manifest : scenario;
     bst_report_page_row(p->out, "seed", "%s, run %.0f", bst_json_member_text(identity, "seed", "-"),
-                        isfinite(bst_json_member_number(identity, "run")) ? bst_json_member_number(identity, "run") : 0.0);
+                        isfinite(bst_json_member_number(identity, "run"))
+                            ? bst_json_member_number(identity, "run")
+                            : 0.0);
     const char *device = bst_json_member_text(manifest, "device", "");
     bst_report_page_row(p->out, "device", "%s",
                         device[0] || !manifest ? device : "none: no images");
     if (isfinite(bst_json_member_number(manifest, "stars"))) {
         bst_report_page_row(p->out, "star catalogue", "%s, %.0f stars",
-                            bst_json_member_text(manifest, "star_catalogue", ""), bst_json_member_number(manifest, "stars"));
+                            bst_json_member_text(manifest, "star_catalogue", ""),
+                            bst_json_member_number(manifest, "stars"));
     }
     put_objects(p);
     for (int i = 0; i < p->count; i++) {
@@ -171,7 +179,8 @@ static void put_identity(const page *p) {
                             s->sensor.target[0] ? ", target " : "", s->sensor.target);
     }
     if (isfinite(bst_json_member_number(manifest, "wall_time_s"))) {
-        bst_report_page_row(p->out, "wall time", "%.3g s", bst_json_member_number(manifest, "wall_time_s"));
+        bst_report_page_row(p->out, "wall time", "%.3g s",
+                            bst_json_member_number(manifest, "wall_time_s"));
     }
     fputs("</table></div>\n", p->out);
     bst_report_page_section_end(p->out);
@@ -317,8 +326,10 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     char title[200];
     const cJSON *scenario = bst_run_reader_scenario(p->run),
                 *manifest = bst_run_reader_manifest(p->run);
-    snprintf(title, sizeof title, "Run of %.150s",
-             bst_json_member_text(scenario, "name", bst_json_member_text(manifest, "scenario", "an unknown scenario")));
+    snprintf(
+        title, sizeof title, "Run of %.150s",
+        bst_json_member_text(scenario, "name",
+                             bst_json_member_text(manifest, "scenario", "an unknown scenario")));
     bst_report_page_begin(p->out, title);
     put_head(p);
     bst_report_warnings_write(p->out, &p->warnings);

@@ -295,8 +295,16 @@ void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v)
         snprintf(name, sizeof name, "Histogram of %s", m->name);
         bst_report_page_figure(out, BST_PAGE_THIRD);
         /* the greatest value is to lie inside the last bin */
-        bst_report_histogram(out, name, bst_report_study_label(m, label), "runs", values, n, low,
-                             high + 1e-9 * (high - low), 30, BST_CHART_BLUE, NULL, NULL);
+        const bst_report_histogram_of histogram = {.name = name,
+                                                   .label = bst_report_study_label(m, label),
+                                                   .what = "runs",
+                                                   .values = values,
+                                                   .n = n,
+                                                   .low = low,
+                                                   .high = high + 1e-9 * (high - low),
+                                                   .bins = 30,
+                                                   .colour = BST_CHART_BLUE};
+        bst_report_histogram(out, &histogram);
         /* a meaning that refers to the metric before it says nothing here */
         bool refers = strncmp(m->doc, "The same", 8) == 0;
         int used = snprintf(

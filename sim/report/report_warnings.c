@@ -13,7 +13,8 @@
 /* ------------------------------------------------------------------ how it ended */
 
 static void add_end(const bst_run_reader *run, bst_report_warnings *w) {
-    const cJSON *manifest = bst_run_reader_manifest(run), *error = bst_json_member(manifest, "error");
+    const cJSON *manifest = bst_run_reader_manifest(run),
+                *error = bst_json_member(manifest, "error");
     static const char *const words[] = {
         [BST_RUN_INTERRUPTED] =
             "The run was interrupted: it was closed properly before its end. "

@@ -42,7 +42,7 @@ static bst_status check_pointer(bst_ctx *ctx, const bst_study *study, const char
 }
 
 bst_status bst_study_read_axis(bst_ctx *ctx, const bst_study *study, const cJSON *node,
-                            bst_study_axis *axis) {
+                               bst_study_axis *axis) {
     char path[96];
     snprintf(path, sizeof path, "%s/path", axis->where);
     const cJSON *pointer = cJSON_GetObjectItemCaseSensitive(node, "path");
@@ -61,8 +61,8 @@ bst_status bst_study_read_axis(bst_ctx *ctx, const bst_study *study, const cJSON
     return BST_OK;
 }
 
-bst_status bst_study_check_range(bst_ctx *ctx, const bst_study *study, const char *where, double from,
-                              double to, bool log, bool down) {
+bst_status bst_study_check_range(bst_ctx *ctx, const bst_study *study, const char *where,
+                                 double from, double to, bool log, bool down) {
     if (!(from < to) && !(down && from > to)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "%s: %s: from %g to %g is no range (allowed: \"from\" less than \"to\"%s)",
@@ -134,5 +134,5 @@ bst_status bst_study_read_dispersion(bst_ctx *ctx, const bst_study *study, const
                                          study->file, axis->where);
     }
     return bst_study_check_range(ctx, study, axis->where, c->from, c->to,
-                       c->distribution == BST_DISTRIBUTION_LOG_UNIFORM, false);
+                                 c->distribution == BST_DISTRIBUTION_LOG_UNIFORM, false);
 }

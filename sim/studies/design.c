@@ -52,7 +52,8 @@ static bst_study_value at_place(const bst_study_axis *axis, double unit, int ste
         return at_unit(axis, unit);
     }
     double n = axis->value_count;
-    return bst_study_listed(axis, (int64_t)fmin(steps ? round(unit * (n - 1.0)) : unit * n, n - 1.0));
+    return bst_study_listed(axis,
+                            (int64_t)fmin(steps ? round(unit * (n - 1.0)) : unit * n, n - 1.0));
 }
 
 static void factor_values(const bst_study *study, const bst_study_factor *f, int64_t level,

@@ -428,11 +428,22 @@ static bst_status add_object(bst_ctx *ctx, const bst_study_population *p, const 
     return BST_OK;
 }
 
-static bst_status add_population(bst_ctx *ctx, const bst_study *study,
-                                 const bst_study_population *p,
-                                 const bst_study_population_file *file, int number,
-                                 uint64_t counter, const bst_study_population_probe *probe,
+/* A population of a run, and how many of it there are. */
+typedef struct wanted {
+    const bst_study_population *population;
+    const bst_study_population_file *file;
+    int number;
+    uint64_t counter;                        /* of the random numbers: the run's number */
+    const bst_study_population_probe *probe; /* NULL: none */
+} wanted;
+
+static bst_status add_population(bst_ctx *ctx, const bst_study *study, const wanted *w,
                                  bst_json *json) {
+    const bst_study_population *p = w->population;
+    const bst_study_population_file *file = w->file;
+    const bst_study_population_probe *probe = w->probe;
+    int number = w->number;
+    uint64_t counter = w->counter;
     cJSON *objects;
     int left = 0;
     BST_TRY(find_objects(ctx, study, p, json, &objects));
@@ -481,10 +492,9 @@ bst_status bst_study_populations_add(bst_ctx *ctx, const bst_study *study,
             probe && probe->population == i ? probe : NULL;
         int count = number->given ? (int)number->number : 0;
         count = own_probe && count == 0 ? 1 : count;
-        status = count > 0
-                     ? add_population(ctx, study, &list->items[i], &study->population_files[i],
-                                      count, place->run_number, own_probe, json)
-                     : BST_OK;
+        const wanted w = {&list->items[i], &study->population_files[i], count, place->run_number,
+                          own_probe};
+        status = count > 0 ? add_population(ctx, study, &w, json) : BST_OK;
     }
     bst_study_populations_free(&own);
     return status;

@@ -132,7 +132,7 @@ static bst_status add_swept_axis(bst_ctx *ctx, bst_study *study, const cJSON *no
                         study->file, where);
     }
     return bst_study_check_range(ctx, study, where, config->from, config->to,
-                       config->spacing == BST_SPACING_LOG, true);
+                                 config->spacing == BST_SPACING_LOG, true);
 }
 
 static bst_status add_factor(bst_ctx *ctx, bst_study *study, const bst_study_factor *factor) {

@@ -34,8 +34,8 @@ static void put_axis(FILE *stream, char axis, const double v[3], double box) {
     fprintf(stream,
             ",\"%c_min\":%.12g,\"%c_max\":%.12g,\"%c_center\":%.12g,\"%c_start\":%.12g,\"%c_mid\":"
             "%.12g,\"%c_end\":%.12g",
-            axis, bst_least_of_3(v), axis, bst_greatest_of_3(v), axis, 0.5 * (bst_least_of_3(v) + bst_greatest_of_3(v)), axis, v[0],
-            axis, v[1], axis, v[2]);
+            axis, bst_least_of_3(v), axis, bst_greatest_of_3(v), axis,
+            0.5 * (bst_least_of_3(v) + bst_greatest_of_3(v)), axis, v[0], axis, v[1], axis, v[2]);
     put_number(stream, axis == 'y' ? "bbox_height" : "bbox_width",
                box > 0.0 ? box : bst_greatest_of_3(v) - bst_least_of_3(v));
 }
@@ -59,7 +59,8 @@ static bool put_object(bst_study_labels *l, const bst_frame_message *f, double e
         }
     }
     if (!(item->electrons > 0.0) || (star && !(item->v_mag <= l->star_limit_v_mag)) ||
-        bst_greatest_of_3(x) < 0.0 || bst_least_of_3(x) > 1.0 || bst_greatest_of_3(y) < 0.0 || bst_least_of_3(y) > 1.0) {
+        bst_greatest_of_3(x) < 0.0 || bst_least_of_3(x) > 1.0 || bst_greatest_of_3(y) < 0.0 ||
+        bst_least_of_3(y) > 1.0) {
         return false;
     }
     FILE *s = l->stream;

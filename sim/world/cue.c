@@ -17,10 +17,9 @@ bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world,
                                       const bst_world_cue_at *at, bst_vec3 *line_m) {
     int object = world->observers[at->observer].sensors[at->sensor].cue_object;
     *line_m = (bst_vec3){0, 0, 0};
-    return object < 0
-               ? BST_OK
-               : bst_world_object_nominal_line(ctx, world, object, at->clock, at->seconds, at->eye,
-                                               line_m);
+    return object < 0 ? BST_OK
+                      : bst_world_object_nominal_line(ctx, world, object, at->clock, at->seconds,
+                                                      at->eye, line_m);
 }
 
 bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world,

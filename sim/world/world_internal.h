@@ -193,8 +193,7 @@ bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, const bs
                                   bst_vec3 *out) BST_MUST_CHECK;
 double bst_world_region_half_length_rad(const bst_region_config *region);
 bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world,
-                                      const bst_world_cue_at *at,
-                                      bst_vec3 *line_m) BST_MUST_CHECK;
+                                      const bst_world_cue_at *at, bst_vec3 *line_m) BST_MUST_CHECK;
 
 /* The same of any object. */
 bst_status bst_world_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,

@@ -471,8 +471,7 @@ static void light_curves_are_those_of_the_instant_of_emission(void **state) {
         bst_scene_path_light light;
         bst_world_sight mid;
         const bst_world_view_span span = {0, t - 1.0, t + 1.0};
-        bst_assert_ok(
-            &ctx, bst_world_view_path(&ctx, view, &span, 0, &path_of, &light, &mid));
+        bst_assert_ok(&ctx, bst_world_view_path(&ctx, view, &span, 0, &path_of, &light, &mid));
         for (double u = 0.0; u <= 1.0; u += 0.25) {
             bst_world_sight then;
             bst_scene_view_light(view, &span, 0, &path_of, &light, u, &then);

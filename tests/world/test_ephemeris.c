@@ -273,7 +273,9 @@ static void near_objects_are_evaluated_directly(void **state) {
                                                       world->epoch, t, true, &eye));
             bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
             const bst_world_reception at = {&eye, clock, world->epoch, &bodies, t};
-            bst_assert_ok(&ctx, bst_world_orbit_line_of_sight(&ctx, &world->objects[i].orbit, &at, true, &geometric, &target, &emission));
+            bst_assert_ok(&ctx,
+                          bst_world_orbit_line_of_sight(&ctx, &world->objects[i].orbit, &at, true,
+                                                        &geometric, &target, &emission));
             bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, i, t, &sight));
             double off = test_distance(sight.geometric, bst_vec3_unit(geometric));
             same += i == 2 && off == 0;
@@ -415,8 +417,9 @@ static void three_observers_share_it(void **state) {
                 &ctx, bst_world_orbit_state(&ctx, eye_orbit, clock, world->epoch, t, true, &eye));
             bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
             const bst_world_reception at = {&eye, clock, world->epoch, &bodies, t};
-            bst_assert_ok(&ctx, bst_world_orbit_line_of_sight(
-                                    &ctx, &world->objects[n / 3].orbit, &at, true, &geometric, &target, &emission));
+            bst_assert_ok(
+                &ctx, bst_world_orbit_line_of_sight(&ctx, &world->objects[n / 3].orbit, &at, true,
+                                                    &geometric, &target, &emission));
             bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, n % 3, n / 3, t, &sight));
             if (sight.range_m > 0) {
                 bst_assert_close(test_distance(sight.geometric, bst_vec3_unit(geometric)), 0,

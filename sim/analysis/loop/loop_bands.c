@@ -26,7 +26,7 @@ static void table_bands(const bst_jitter_density *table, double scale, double to
 
 bst_status bst_loop_platform_bands(bst_ctx *ctx, const bst_platform_config *platform,
                                    double pixel_rad, double dt_s, int camera_axis,
-                                 bst_loop_axis *axis) {
+                                   bst_loop_axis *axis) {
     bst_jitter_spectrum spectrum;
     BST_TRY(bst_platform_jitter_spectrum(ctx, platform, pixel_rad, &spectrum));
     double per_px2 = 1.0 / (pixel_rad * pixel_rad), top_hz = BST_JITTER_RESOLVED / dt_s;

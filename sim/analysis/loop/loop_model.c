@@ -142,8 +142,9 @@ static bst_status build_second_order(bst_ctx *ctx, const bst_scenario_module_con
         /* the outer axis moves the image along x, as a turn about body y does */
         double drift = config->platform.drift_arcsec_per_s[a == 0 ? 1 : 0] / arcsec_px;
         if (status == BST_OK) {
-            status = bst_loop_close_tracking(ctx, control, &servo, &config->platform,
-                                             a == 0 ? 1 : 0, drift, options, model, axis);
+            const bst_loop_tracked tracked = {control,        &servo, &config->platform,
+                                              a == 0 ? 1 : 0, drift,  options};
+            status = bst_loop_close_tracking(ctx, &tracked, model, axis);
         }
     }
     free((double *)(uintptr_t)servo.step);

@@ -27,14 +27,13 @@ static void predict(bst_loop_axis *axis, double drift_pxps, const bst_loop_optio
     }
 }
 
-bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
-                                   const bst_control_servo_response *servo,
-                                   const bst_platform_config *platform, int camera_axis,
-                                   double drift_pxps, const bst_loop_options *options,
+bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_loop_tracked *tracked,
                                    bst_loop_model *model, bst_loop_axis *axis) {
+    const bst_control_config *control = tracked->control;
+    const bst_platform_config *platform = tracked->platform;
     BST_TRY(bst_loop_platform_bands(ctx, platform, model->pixel_rad, model->timing.gimbal_period_s,
-                           camera_axis, axis));
-    bst_loop_body_bands(&platform->spacecraft, camera_axis, model->pixel_rad, axis);
+                                    tracked->camera_axis, axis));
+    bst_loop_body_bands(&platform->spacecraft, tracked->camera_axis, model->pixel_rad, axis);
     if (!control || !control->compensate_attitude) {
         return BST_OK;
     }
@@ -45,11 +44,12 @@ bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *contr
                                   .arrival_s = arrival,
                                   .effect_s = arrival + control->command_latency_s,
                                   .switch_s = arrival + t->command_delay_s};
-    BST_TRY(bst_tracking_loop_create(ctx, &timing, servo, model->observes ? NULL : &model->gains,
-                                     &model->alpha_beta, &axis->tracking));
+    BST_TRY(bst_tracking_loop_create(ctx, &timing, tracked->servo,
+                                     model->observes ? NULL : &model->gains, &model->alpha_beta,
+                                     &axis->tracking));
     axis->tracked = true;
     axis->loop = bst_tracking_as_loop(axis->tracking);
     BST_TRY(bst_loop_analyse(ctx, &axis->loop, &axis->margins));
-    predict(axis, drift_pxps, options, t->period_s);
+    predict(axis, tracked->drift_pxps, tracked->options, t->period_s);
     return BST_OK;
 }

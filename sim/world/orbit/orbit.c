@@ -155,8 +155,8 @@ bst_status bst_world_orbit_line_of_sight(bst_ctx *ctx, const bst_world_orbit *ob
      * 20 arcsec wrong. Three rounds shrink the error by (v/c)^3. */
     double tau = 0.0;
     for (int i = 0; i < 3; i++) {
-        BST_TRY(bst_world_orbit_state(ctx, object, at->clock, at->epoch, at->seconds - tau, with_burns,
-                                      object_state));
+        BST_TRY(bst_world_orbit_state(ctx, object, at->clock, at->epoch, at->seconds - tau,
+                                      with_burns, object_state));
         bst_vec3 d = bst_vec3_sub(object_state->position_m, at->observer->position_m);
         *geometric_m = bst_vec3_axpy(d, -tau, at->bodies->earth_bary_mps);
         tau = bst_vec3_norm(*geometric_m) / BST_LIGHT_SPEED_MPS;

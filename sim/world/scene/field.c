@@ -239,7 +239,8 @@ typedef struct query {
     bst_quat mean;
     bst_window window;
     double margin_px; /* of the window, with what the attitude moves during the exposure */
-    bst_vec3 centre;  /* cone of directions that holds the window with its margin: axis, half angle */
+    bst_vec3
+        centre; /* cone of directions that holds the window with its margin: axis, half angle */
     double radius;
     bst_world_state eye;
     bst_bodies bodies;
@@ -303,10 +304,10 @@ static void find_cone(const bst_field *field, query *q) {
     q->centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
     q->radius = APPARENT_SHIFT_RAD;
     if (camera->geometry.general) {
-        q->radius += bst_camera_reach_rad(
-            camera, centre_cam, window.x0 - q->margin_px, window.y0 - q->margin_px,
-            window.x0 + window.width + q->margin_px, window.y0 + window.height + q->margin_px,
-            q->margin_px);
+        q->radius +=
+            bst_camera_reach_rad(camera, centre_cam, window.x0 - q->margin_px,
+                                 window.y0 - q->margin_px, window.x0 + window.width + q->margin_px,
+                                 window.y0 + window.height + q->margin_px, q->margin_px);
     } else {
         q->radius += atan(bst_camera_scale_rad(camera) *
                           (0.5 * hypot(window.width, window.height) + sqrt(2.0) * q->margin_px));
@@ -353,8 +354,9 @@ static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, do
                               int *count) {
     int known, drawn = 0;
     for (;;) {
-        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), q->centre, q->radius, q->v_limit,
-                                julian_year, field->stars, field->star_capacity, &known));
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), q->centre, q->radius,
+                                q->v_limit, julian_year, field->stars, field->star_capacity,
+                                &known));
         if (known > field->star_capacity) {
             BST_TRY(reserve_stars(ctx, field, known));
             continue;
@@ -413,7 +415,8 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
     bst_time_tt(bst_world_time(field->world, q->mid_s), &tt1, &tt2);
     BST_TRY(query_stars(ctx, field, q, 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
     const bst_world_view_span span = {field->observer, q->start_s, q->end_s};
-    BST_TRY(bst_world_view_near(ctx, field->view, &span, q->centre, q->radius, field->near, &near_count));
+    BST_TRY(bst_world_view_near(ctx, field->view, &span, q->centre, q->radius, field->near,
+                                &near_count));
     BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     for (int i = 0; i < star_count; i++) {
         n += make_star(field, q, &field->stars[i], &field->sources[n]);

@@ -9,7 +9,10 @@
 
 /* Sigma points of (attitude deviation, time), over which a position is averaged (Julier and Uhlmann
  * 1997). Exact to second order; the first one, the mean itself, has no weight. */
-enum { BST_FIELD_SIGMA_DIMENSIONS = 4, BST_FIELD_SIGMA_POINTS = 2 * BST_FIELD_SIGMA_DIMENSIONS + 1 };
+enum {
+    BST_FIELD_SIGMA_DIMENSIONS = 4,
+    BST_FIELD_SIGMA_POINTS = 2 * BST_FIELD_SIGMA_DIMENSIONS + 1
+};
 
 struct bst_field {
     const bst_world *world;

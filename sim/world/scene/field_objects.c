@@ -130,7 +130,8 @@ static bst_world_sight sight_at(const course *c, const bst_world_sight *mid,
                                 const bst_scene_source *source, int k) {
     bst_world_sight sight = *mid;
     if (source->rate) {
-        bst_scene_view_light(c->query->view, &c->query->span, c->object, c->path, c->light, (k + 0.5) / TIMES, &sight);
+        bst_scene_view_light(c->query->view, &c->query->span, c->object, c->path, c->light,
+                             (k + 0.5) / TIMES, &sight);
     }
     return sight;
 }
@@ -190,7 +191,8 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     bst_world_sight mid;
     bst_scene_path_light light;
     *there = false;
-    bst_status status = bst_world_view_path(ctx, q->view, &q->span, object, &parts->path, &light, &mid);
+    bst_status status =
+        bst_world_view_path(ctx, q->view, &q->span, object, &parts->path, &light, &mid);
     if (status == BST_ERR_NUMERIC) {
         return BST_OK;
     }

@@ -153,8 +153,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         if (excess > BENT * (sharp + widened)) {
             /* a disc's own light widens the path */
             double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
-            double exact = bst_scene_image_squared_path(camera, track, source, u, &path,
-                                                        excess, sharp + widened + disc);
+            double exact = bst_scene_image_squared_path(camera, track, source, u, &path, excess,
+                                                        sharp + widened + disc);
             square = isfinite(exact) ? exact : square;
         }
         out->snr = out->electrons * sqrt(square / variance);

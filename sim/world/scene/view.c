@@ -215,7 +215,8 @@ static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_
     *emitted_m = now_m;
     for (int i = 0; i < 3; i++) {
         if (i > 0) {
-            BST_TRY(place_of(ctx, view, b.object, e->seconds - tau, b.source, emitted_m, &velocity));
+            BST_TRY(
+                place_of(ctx, view, b.object, e->seconds - tau, b.source, emitted_m, &velocity));
         }
         geometric = bst_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
         tau = bst_vec3_norm(geometric) / BST_LIGHT_SPEED_MPS;
@@ -363,8 +364,9 @@ void bst_scene_view_light(const bst_world_view *view, const bst_world_view_span 
 
 bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
                                bst_vec3 axis, double half_angle_rad, int *indices, int *count) {
-    bst_ephemeris_cone cone = {
-        .axis = axis, .half_angle_rad = half_angle_rad, .half_span_s = 0.5 * (span->end_s - span->start_s)};
+    bst_ephemeris_cone cone = {.axis = axis,
+                               .half_angle_rad = half_angle_rad,
+                               .half_span_s = 0.5 * (span->end_s - span->start_s)};
     const eye *e;
     const int middle = BST_PATH_NODES / 2;
     BST_TRY(known_eye(ctx, view, span->observer, node_time(span, middle), middle, &e));
@@ -374,8 +376,7 @@ bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_wor
         bst_vec3 way = bst_vec3_sub(e->state.position_m, cone.apex_m);
         cone.apex_span_m = fmax(cone.apex_span_m, bst_vec3_norm(way));
     }
-    *count = bst_ephemeris_near(view->world->ephemeris, node_time(span, middle), &cone,
-                                indices);
+    *count = bst_ephemeris_near(view->world->ephemeris, node_time(span, middle), &cone, indices);
     return BST_OK;
 }
 
