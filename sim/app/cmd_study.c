@@ -1,29 +1,24 @@
 /* boresight study: expands a study into runs, has them executed, and makes tables of them. */
 #include <cjson/cJSON.h>
-#include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include "sim/core/text.h"
 
 #include "sim/app/app.h"
 #include "sim/cli/options.h"
 #include "sim/cli/stop_signals.h"
-#include "sim/core/folder.h"
+#include "sim/core/text.h"
 #include "sim/core/wall_clock.h"
 #include "sim/io/draft_file.h"
-#include "sim/io/manifest.h"
 #include "sim/io/run_store.h"
 #include "sim/studies/driver.h"
 #include "sim/studies/local_pool.h"
 #include "sim/studies/shard_run.h"
+#include "sim/studies/study_folder.h"
 #include "sim/studies/tables.h"
 #include "sim/study_kinds/study_devices.h"
 #include "sim/study_kinds/study_kinds.h"
@@ -39,87 +34,6 @@ typedef struct study_request {
     bool resume, dry_run, quiet, schema, help, unpinned, slurm;
     bst_study_devices devices; /* of `device` */
 } study_request;
-
-/* ------------------------------------------------------------------ the folder */
-
-/* Locks the folder against another driver; -1 with a message. */
-static int lock_folder(bst_ctx *ctx, const char *out, bool shared) {
-    char path[4200];
-    snprintf(path, sizeof path, "%.4000s/lock", out);
-    int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd < 0) {
-        bst_fail(ctx, BST_ERR_IO, "%s: %s", path, strerror(errno));
-        return -1;
-    }
-    if (flock(fd, (shared ? LOCK_SH : LOCK_EX) | LOCK_NB) != 0) {
-        bst_fail(ctx, BST_ERR_IO,
-                 "%s: another boresight study is at work there; wait for it, or choose another "
-                 "folder with --out",
-                 out);
-        close(fd);
-        return -1;
-    }
-    return fd;
-}
-
-/* The study of the folder is this one, or there is none yet. */
-static bst_status settle_study(bst_ctx *ctx, const bst_study *study, const char *out, bool resume) {
-    char path[4200];
-    bst_study there;
-    snprintf(path, sizeof path, "%.4000s/study.json", out);
-    if (access(path, F_OK) == 0) {
-        bst_ctx quiet = {0};
-        bool same = bst_study_open(&quiet, path, &there) == BST_OK &&
-                    strcmp(there.digest, study->digest) == 0;
-        bst_study_close(&there);
-        if (!same) {
-            return bst_fail(ctx, BST_ERR_STATE,
-                            "%s: holds another study, or this one before it or its scenarios were "
-                            "changed; choose another folder with --out",
-                            out);
-        }
-        return resume ? BST_OK
-                      : bst_fail(ctx, BST_ERR_STATE,
-                                 "%s: holds this study already; go on with --resume, or choose "
-                                 "another folder with --out",
-                                 out);
-    }
-    cJSON *echo = bst_study_echo(study);
-    char *text = echo ? cJSON_Print(echo) : NULL;
-    cJSON_Delete(echo);
-    bst_status status = text ? bst_io_write_file_atomic(ctx, path, text, strlen(text))
-                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
-    free(text);
-    return status;
-}
-
-static bst_status open_folder(bst_ctx *ctx, const bst_study *study, const char *out, bool resume,
-                              bool shared, int *lock) {
-    char shards[4200];
-    *lock = -1;
-    if (!resume) {
-        char path[4200];
-        snprintf(path, sizeof path, "%.4000s/study.json", out);
-        if (access(path, F_OK) != 0 && rmdir(out) != 0 && errno == ENOTEMPTY) {
-            return bst_fail(ctx, BST_ERR_IO,
-                            "%s: is in the way and holds no study; choose another folder with "
-                            "--out",
-                            out);
-        }
-    }
-    snprintf(shards, sizeof shards, "%.4000s/shards", out);
-    BST_TRY(bst_folder_make(ctx, shards));
-    *lock = lock_folder(ctx, out, shared);
-    if (*lock < 0) {
-        return BST_ERR_IO;
-    }
-    bst_status status = settle_study(ctx, study, out, resume || shared);
-    if (status != BST_OK) {
-        close(*lock);
-        *lock = -1;
-    }
-    return status;
-}
 
 /* ------------------------------------------------------------------ execution */
 
@@ -255,7 +169,7 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }
-    bst_status status = open_folder(ctx, study, out, r->resume, false, &lock);
+    bst_status status = bst_study_folder_open(ctx, study, out, r->resume, false, &lock);
     if (status == BST_OK) {
         bst_draft_sweep(out); /* under the lock: a driver's that was killed */
         status = bst_study_plugins_settle(ctx, kind->user, out);
@@ -346,7 +260,7 @@ static int run_shard(bst_ctx *ctx, const study_request *r, const bst_study *stud
     bst_status status = bst_results_create(ctx, study, kind, &results);
     /* a driver that is at work holds the folder's lock, and asks for exact runs */
     if (status == BST_OK && !exact) {
-        status = open_folder(ctx, study, out, true, true, &lock);
+        status = bst_study_folder_open(ctx, study, out, true, true, &lock);
     }
     if (status == BST_OK) {
         status = bst_results_load_folder(ctx, &results, out, part.first, part.count, false);
