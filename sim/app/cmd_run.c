@@ -142,7 +142,7 @@ int bst_cmd_run(int argc, char **argv) {
     }
     ctx.log_level = r.quiet ? BST_LOG_WARNING : BST_LOG_INFO;
     r.simulation.threads = (int)r.threads;
-    r.simulation.overlap = !r.serial;
+    r.simulation.parallel = !r.serial;
     r.simulation.pace = true;
     r.simulation.replay = r.replay != NULL;
     if (bst_load_check(&ctx, &r.load, table) != BST_OK) {

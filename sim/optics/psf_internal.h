@@ -14,6 +14,10 @@ typedef struct bst_optics_radial_otf {
     double *value; /* [BST_RADIAL_NODES] */
 } bst_optics_radial_otf;
 
+/* Allocates a table of a radial OTF.
+ *
+ * Given:     limit  highest frequency of the table
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_optics_radial_create(bst_ctx *ctx, double limit,
                                     bst_optics_radial_otf *out) BST_MUST_CHECK;
 /* Frequency of node i of a table that ends at `limit`. */
@@ -33,8 +37,15 @@ typedef struct bst_optics_grid_otf {
 /* What the interpolation reaches over. */
 enum { BST_GRID_MARGIN = 3 };
 
+/* Allocates a table of an OTF on a half plane of frequencies.
+ *
+ * Given:     step   spacing of the nodes
+ *            reach  nodes on either side of the origin
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free with bst_optics_grid_otf_free */
 bst_status bst_optics_grid_otf_create(bst_ctx *ctx, double step, int reach,
                                       bst_optics_grid_otf *out) BST_MUST_CHECK;
+/* Frees the memory of a table and clears the struct, which belongs to the caller. */
 void bst_optics_grid_otf_free(bst_optics_grid_otf *table);
 /* The node (column kx >= -BST_GRID_MARGIN, row ky) as {real, imaginary}. */
 static inline float *bst_optics_grid_otf_node(const bst_optics_grid_otf *t, int kx, int ky) {
@@ -46,8 +57,13 @@ void bst_optics_grid_otf_mirror(bst_optics_grid_otf *table);
 /* Adds the value at (fx, fy): sextic (six-point Lagrange) along both axes; nothing beyond. */
 void bst_optics_grid_otf_add(const bst_optics_grid_otf *table, double fx, double fy, double out[2]);
 
+/* Gaussians that a node's squared OTF is the sum of. */
+enum { BST_PSF_GAUSSIANS = 8 };
+
 /* One node of the field grid. */
 typedef struct bst_psf_node {
+    /* squared OTF: sum of weight exp(-4 pi^2 variance f^2), of PSFs that are no Gaussians */
+    double gaussian_px2[BST_PSF_GAUSSIANS], gaussian_weight[BST_PSF_GAUSSIANS];
     double equivalent_fwhm_px;
     double centroid_px[2];               /* of a point's image, from its place */
     double sigma_px;                     /* Gaussian part: the profile itself, or 0 */
@@ -97,8 +113,16 @@ static inline int bst_psf_node_count(const bst_psf *psf) {
 /* What fills psf->nodes and psf->cutoff for the models that need more than a formula. */
 bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_psf_spectrum *spectrum, bst_psf *psf) BST_MUST_CHECK;
+
+/* Makes a PSF from samples, one plane per node of the field grid.
+ *
+ * Given:     samples  NULL: an error, as optics/psf_file needs them
+ * Errors:    BST_ERR_CONFIG for sizes or planes that do not fit, BST_ERR_MEMORY */
 bst_status bst_psf_make_sampled(bst_ctx *ctx, const bst_camera *camera,
                                 const bst_psf_samples *samples, bst_psf *psf) BST_MUST_CHECK;
+
+/* Sets the Gaussians of a node. */
+void bst_psf_fit_gaussians(const bst_psf *psf, int node, bst_psf_node *out);
 
 /* OTF of the profile (1 + (r / alpha)^2)^-beta at f >= 0. */
 double bst_optics_moffat_otf(double alpha_px, double beta, double f);

@@ -41,6 +41,11 @@ typedef struct bst_report_statistics {
     size_t count;
     double mean, rms, median, p95, p99, worst;
 } bst_report_statistics;
+
+/* Mean, RMS and percentiles of values.
+ *
+ * Given:     values  [n]; sorted in place
+ * Returned:  NAN for n = 0 */
 bst_report_statistics bst_report_measure(double *values, size_t n);
 /* The value of nearest rank at a share (0 to 1) of n ascending numbers; NAN for none. */
 double bst_report_percentile(const double *sorted, size_t n, double share);

@@ -35,7 +35,11 @@ bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_sce
 /* Notes that a module or stage of it is used at `where`. */
 bst_status bst_scenario_plugin_used(bst_ctx *ctx, bst_scenario *s, const bst_plugin *plugin,
                                     const char *where, const char *type) BST_MUST_CHECK;
-/* For bst_stage_read_config; user: a bst_scenario_stages. */
+
+/* Loads the plug-in of a stage: function `load` of a bst_stage_loader.
+ *
+ * Given:     user  a bst_scenario_stages
+ * Errors:    those of the plug-in's library, with the scenario's file and path */
 bst_status bst_scenario_stage(void *user, bst_ctx *ctx, const bst_json *json, const char *path,
                               const char *plugin, const char *kind, const char *type,
                               const bst_stage_desc **out, char *file, size_t bytes) BST_MUST_CHECK;

@@ -32,26 +32,6 @@ static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_
  * ratio. */
 static const double BENT = 0.12;
 
-/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
- * pixel's own width, widened along and across the way from the first to the last
- * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
- * Returns the variance before that widening. */
-static double blur(const bst_camera *camera, const bst_scene_source *source,
-                   const bst_scene_image_moments *m, double dx, double dy, double *along,
-                   double *across) {
-    double psf = bst_camera_psf_sigma_px(camera), sigma;
-    if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
-        psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
-              2.3548200450309493;
-    }
-    double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
-    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
-    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
-    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
-    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
-    return variance;
-}
-
 /* What a rolling shutter sees of a source: it is exposed while the row where it is. */
 static bst_scene_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
                                              const bst_scene_source *source, bst_window window,
@@ -119,6 +99,44 @@ static bst_scene_image_moments place(const bst_field *field, const bst_los_track
                         : smear_of(field, source);
 }
 
+/* How long and wide an image is, px and px^2. */
+typedef struct image_width {
+    double length;        /* from the first to the last place */
+    double along, across; /* as of bst_image_blur */
+    double sharp;         /* variance of the PSF alone */
+    double widened;       /* variance that adding pixels adds */
+} image_width;
+
+/* The sum of the squared shares of the light in pixels. `path`: without the source's disc. */
+static double squared_light(const bst_camera *camera, const bst_los_track *track,
+                            const bst_scene_source *source, const double u[2],
+                            const bst_scene_image_moments *image,
+                            const bst_scene_image_moments *path, const image_width *w) {
+    double along = w->along, across = w->across, sharp = w->sharp, widened = w->widened;
+    double gauss = bst_optics_image_squared(sqrt(along * along + widened),
+                                            sqrt(across * across + widened), w->length);
+    double square = gauss, sigma;
+    bool plain = !camera->psf || bst_psf_gaussian(camera->psf, &sigma);
+    if (!plain) {
+        /* jitter widens both ways alike; what the path has more along itself is its length */
+        double blurred = across * across - sharp;
+        double drawn = sqrt(12.0 * fmax(image->xx + image->yy - 2.0 * blurred, 0.0));
+        square = bst_psf_squared_image(camera->psf, source->colour, image->x_mean, image->y_mean,
+                                       blurred + widened, blurred + widened, drawn);
+    }
+    double excess = along * along + across * across - 2.0 * sharp;
+    if (excess > BENT * (sharp + widened)) {
+        /* a disc's own light widens the path */
+        double disc = 0.5 * fmax(image->xx + image->yy - path->xx - path->yy, 0.0);
+        double exact = bst_scene_image_squared_path(camera, track, source, u, path, excess,
+                                                    sharp + widened + disc);
+        if (isfinite(exact)) {
+            square = plain ? exact : square * exact / gauss;
+        }
+    }
+    return square;
+}
+
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                           const bst_scene_source *source, bst_window window, int binning,
                           const bst_truth *header, bst_truth_item *out) {
@@ -144,20 +162,12 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
-    double sharp = blur(camera, source, &image, out->x_end_px - out->x_start_px,
-                        out->y_end_px - out->y_start_px, &along, &across);
+    double sharp = bst_image_blur(camera, source, &image, out->x_end_px - out->x_start_px,
+                                  out->y_end_px - out->y_start_px, &along, &across);
     if (isfinite(length) && variance > 0.0) {
-        double square = bst_optics_image_squared(sqrt(along * along + widened),
-                                                 sqrt(across * across + widened), length);
-        double excess = along * along + across * across - 2.0 * sharp;
-        if (excess > BENT * (sharp + widened)) {
-            /* a disc's own light widens the path */
-            double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
-            double exact = bst_scene_image_squared_path(camera, track, source, u, &path, excess,
-                                                        sharp + widened + disc);
-            square = isfinite(exact) ? exact : square;
-        }
-        out->snr = out->electrons * sqrt(square / variance);
+        const image_width w = {length, along, across, sharp, widened};
+        out->snr = out->electrons *
+                   sqrt(squared_light(camera, track, source, u, &image, &path, &w) / variance);
     }
     if (source->occulted) {
         out->flags |= BST_TRUTH_OCCULTED;
