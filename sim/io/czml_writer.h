@@ -45,6 +45,10 @@ typedef struct bst_czml_line {
     const unsigned char *rgba; /* [4] */
     bst_time start, stop;      /* of its availability */
 } bst_czml_line;
+
+/* Writes a line.
+ *
+ * Errors: BST_ERR_IO */
 bst_status bst_czml_write_line(bst_ctx *ctx, FILE *stream,
                                const bst_czml_line *line) BST_MUST_CHECK;
 

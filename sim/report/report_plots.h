@@ -62,6 +62,8 @@ typedef struct bst_report_histogram_of {
                                                       it; NULL: none */
     const void *user;
 } bst_report_histogram_of;
+
+/* Draws a histogram as a chart of 360 by 230 px. */
 void bst_report_histogram(FILE *out, const bst_report_histogram_of *h);
 
 /* Timeline of modes and of what could be seen (report_timeline.c). */
