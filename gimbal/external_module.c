@@ -261,8 +261,8 @@ static bst_status exchange(module *m, struct bst_step *s) {
         }
     }
     if (status == BST_OK) {
-        status = bst_link_exchange(ctx, m->link, m->part, tick, inputs, count, m->outputs, OUTPUTS,
-                                   &answered);
+        const bst_link_messages messages = {inputs, count, m->outputs, OUTPUTS};
+        status = bst_link_exchange(ctx, m->link, m->part, tick, &messages, &answered);
     }
     for (int i = 0; i < frame_count; i++) {
         bst_frame_unmap(mapped[i]);

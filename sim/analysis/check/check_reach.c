@@ -67,6 +67,7 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds,
 /* ---- what was found ---- */
 
 typedef struct found {
+    double duration_s; /* that is examined */
     bst_check_spans spans[BST_REACH_COUNT];
 } found;
 
@@ -87,11 +88,11 @@ static void warn(bst_ctx *ctx, const char *name, const found *f, double examined
 /* What the mount's limits lose about [from_s, until_s]; *until_s: the end of the last loss. */
 static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *problem,
                         double tolerance_rad, int reason, double from_s, double *until_s,
-                        double duration_s, found *f) {
+                        found *f) {
     bst_pointing_feasibility_loss losses[MOST_LOSSES];
     bst_pointing_feasibility middle;
     int count;
-    double end_s = fmin(*until_s + RUN_OUT_S, duration_s);
+    double end_s = fmin(*until_s + RUN_OUT_S, f->duration_s);
     /* on the way to the pole it is the acceleration that is too great first */
     BST_TRY(bst_pointing_feasibility_at(ctx, problem, 0.5 * (from_s + *until_s), &middle));
     reason = middle == BST_REACH_KEYHOLE ? (int)middle : reason;
@@ -107,6 +108,7 @@ static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *pr
 
 static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double tolerance_rad,
                         found *f) {
+    f->duration_s = duration_s;
     const bst_pointing_feasibility_problem problem = {.look = look,
                                                       .user = s,
                                                       .mount = s->mount.axes > 0 ? &s->mount : NULL,
@@ -126,7 +128,7 @@ static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double toler
                                               &back, &until, NULL));
         until = back ? until : duration_s;
         if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
-            BST_TRY(chase(ctx, &problem, tolerance_rad, (int)why, from, &until, duration_s, f));
+            BST_TRY(chase(ctx, &problem, tolerance_rad, (int)why, from, &until, f));
         } else {
             bst_check_spans_add(&f->spans[why], from, until);
         }

@@ -142,8 +142,8 @@ static bst_status find_desc(bst_ctx *ctx, const bst_json *json,
     if (*common->plugin) {
         bst_plugin plugin;
         bool skip;
-        BST_TRY(bst_scenario_plugin(ctx, json, registry, scenario, where, common->plugin, &plugin,
-                                    &skip));
+        const bst_scenario_stages in = {registry, scenario};
+        BST_TRY(bst_scenario_plugin(ctx, json, &in, where, common->plugin, &plugin, &skip));
         if (skip) {
             return BST_OK;
         }
