@@ -38,8 +38,16 @@ static inline double bst_atan2(double y, double x) {
     }
     return atan2(y, x);
 }
+/* The same angle in (-pi, pi], rad. */
+static inline double bst_wrap_angle(double angle_rad) {
+    const double two_pi = 2.0 * BST_PI;
+    return angle_rad - two_pi * ceil(angle_rad / two_pi - 0.5);
+}
 static inline bst_vec3 bst_vec3_make(double x, double y, double z) {
     return (bst_vec3){x, y, z};
+}
+static inline bst_vec3 bst_vec3_from_array(const double v[3]) {
+    return (bst_vec3){v[0], v[1], v[2]};
 }
 static inline bst_vec3 bst_vec3_add(bst_vec3 a, bst_vec3 b) {
     return (bst_vec3){a.x + b.x, a.y + b.y, a.z + b.z};
@@ -152,7 +160,8 @@ static inline bst_mat3 bst_quat_to_mat3(bst_quat q) {
 /* Quaternion of a proper rotation matrix (Shepperd's method: largest component first). */
 bst_quat bst_quat_from_mat3(const bst_mat3 *a);
 /* exp: the quaternion q with bst_quat_rotate(q, v) = v turned by |r| about r (right hand), rad.
- * Note: a *frame* that turns by r has q_new_from_old = bst_quat_from_rotvec(-r). */
+ * Note: a *frame* that turns by r has q_new_from_old = bst_quat_from_rotvec(-r), see
+ * bst_quat_turn_frame. */
 bst_quat bst_quat_from_large_rotvec(bst_vec3 r); /* the same, r not zero */
 static inline bst_quat bst_quat_from_rotvec(bst_vec3 r) {
     double square = 0.25 * bst_vec3_dot(r, r); /* of half the angle */
@@ -166,6 +175,11 @@ static inline bst_quat bst_quat_from_rotvec(bst_vec3 r) {
         1.0 -
         square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0))));
     return (bst_quat){s * r.x, s * r.y, s * r.z, c};
+}
+/* q_new_from_a, given q_old_from_a of a frame that turns by r (right hand, its own axes), rad. Not
+ * brought back to unit length. */
+static inline bst_quat bst_quat_turn_frame(bst_quat q, bst_vec3 r) {
+    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
 }
 /* log: rotation vector of q, |r| in [0, pi]; takes the short way for antipodal representations. */
 bst_vec3 bst_quat_to_rotvec(bst_quat q);
