@@ -65,18 +65,25 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
                          const bst_filter_models *models, const bst_filter_candidate *candidate,
                          bst_filter_fit *out);
 
-/* Update by `count` detections (at most BST_FILTER_CANDIDATES) of which one or none is the
- * object's. A hypothesis weighs miss_weight for none, hit_weight times the likelihood of the
- * innovation for a detection: (0, 1) with one detection is the plain Kalman filter, (1 - PD PG, PD
- * / clutter density) gives the posterior of probabilistic data association (Bar-Shalom and Tse
- * 1975) as a mixture. components = 1: the mixture becomes one Gaussian of the same mean and
- * covariance (for an IMM one per model, whose probability follows the model's total likelihood).
- * More, not with an IMM: up to so many components (at most BST_FILTER_COMPONENTS) live on, so that
- * later detections decide between earlier hypotheses (Salmond 1990). */
 #define BST_FILTER_CANDIDATES 16
+/* `count` detections (at most BST_FILTER_CANDIDATES) of which one or none is the object's. A
+ * hypothesis weighs miss_weight for none, hit_weight times the likelihood of the innovation for a
+ * detection: (0, 1) with one detection is the plain Kalman filter, (1 - PD PG, PD / clutter
+ * density) gives the posterior of probabilistic data association (Bar-Shalom and Tse 1975) as a
+ * mixture. */
+typedef struct bst_filter_evidence {
+    const bst_filter_candidate *candidates;
+    int count;
+    double miss_weight, hit_weight;
+} bst_filter_evidence;
+
+/* Update by a frame's detections. components = 1: the mixture becomes one Gaussian of the same mean
+ * and covariance (for an IMM one per model, whose probability follows the model's total
+ * likelihood). More, not with an IMM: up to so many components (at most BST_FILTER_COMPONENTS) live
+ * on, so that later detections decide between earlier hypotheses (Salmond 1990). */
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
-                       bst_filter_models *models, const bst_filter_candidate *candidates, int count,
-                       double miss_weight, double hit_weight, int components);
+                       bst_filter_models *models, const bst_filter_evidence *evidence,
+                       int components);
 
 /* bst_sky_predict with the covariance, and the mean's shift, from eight sigma points: the unscented
  * transform (Julier and Uhlmann 1997) with kappa = 0, whose weights are all positive, in the
