@@ -116,7 +116,7 @@ void bst_guidance_see_sky(bst_guidance *guidance, const bst_nav_telemetry *nav, 
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) BST_MUST_CHECK;
 
-/* The cones of keep-out at present. */
+/* guidance_state.c: the cones of keep-out at present. */
 int bst_guidance_zones(const bst_guidance *guidance, const bst_nav_telemetry *nav,
                        bst_keep_out_zone zones[BST_ZONE_KINDS]);
 

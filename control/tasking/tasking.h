@@ -123,11 +123,16 @@ bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *tasking, int sensor, int6
 /* A tick before which plans of the sensor change nothing, whatever it tells until then. */
 int64_t bst_tasking_quiet_until(const bst_tasking *tasking, int sensor);
 
-/* Whether an object can be seen by a sensor at a time, by what is known; *sight (may be NULL) and
- * *snr of a frame as far as they were worked out. */
+/* Whether an object can be seen; sight and the SNR of a frame as far as they were worked out. */
+typedef struct bst_tasking_visibility {
+    bst_tasking_why why;
+    bst_world_sight sight;
+    double snr;
+} bst_tasking_visibility;
+
+/* Whether an object can be seen by a sensor at a time, by what is known. */
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *tasking, int sensor, int object,
-                            double seconds, bst_tasking_why *why, bst_world_sight *sight,
-                            double *snr) BST_MUST_CHECK;
+                            double seconds, bst_tasking_visibility *out) BST_MUST_CHECK;
 
 /* Looks from all sensors at all targets of the list. */
 bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *tasking, double seconds,
