@@ -249,7 +249,7 @@ static void the_body_turns_on_after_its_telemetry(void **state) {
     }
     /* nine tenths of an axis' rate may be used: the camera's x along the target's motion, so that
      * one axis makes all of it, the body at rest */
-    bst_tasking_visibility now, later;
+    bst_tasking_visibility now, later, seen;
     bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &now));
     bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 1.0, &later));
     bst_vec3 moved = bst_vec3_sub(later.sight.apparent, now.sight.apparent);
@@ -380,7 +380,7 @@ static void priority_and_waiting_decide(void **state) {
           "\"earth_limb_keep_out_deg\": 0}");
     /* a time at which the low one sees both */
     double t = 4000.0;
-    bst_tasking_visibility a = BST_WHY_EARTH, b = BST_WHY_EARTH;
+    bst_tasking_visibility a, b;
     for (; t < 24000.0; t += 60.0) {
         bst_tasking_visibility later_a, later_b;
         bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, t, &a));
