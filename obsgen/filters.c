@@ -11,14 +11,20 @@
  * the sum of k^2 p for a Gaussian at rest, and for a long line of it. */
 static const double POINT_SHOT = 4.0 / 3.0, LINE_SHOT = 1.1547005383792515;
 
-/* The straight and uniform path nearest to the true one, and the mean square of what the true one
- * is off it, per axis; of a frame whose filter draws streaks, across it. */
-static double straighten(bst_generator *g) {
+/* Mean squares, per axis, of what the true path is off the paths that image processing draws. */
+typedef struct path_residual {
+    double filter_px2; /* off the straight and uniform path; of a filter for streaks, across it */
+    double fit_px2;    /* off what is fitted: a streak has the bend that telemetry knows */
+} path_residual;
+
+/* Sets the straight and uniform path nearest to the true one. */
+static path_residual straighten(bst_generator *g) {
+    path_residual out = {0.0, 0.0};
     g->straight_path = g->whole_path;
     if (g->smeared || g->path.count < 3) {
-        return 0.0;
+        return out;
     }
-    double moment = 0.0, x = 0.0, y = 0.0, sum = 0.0;
+    double moment = 0.0, x = 0.0, y = 0.0;
     int last = g->path.count - 1;
     for (int k = 0; k <= last; k++) {
         double u = (double)k / last - 0.5, weight = k == 0 || k == last ? 0.5 : 1.0;
@@ -28,15 +34,18 @@ static double straighten(bst_generator *g) {
     }
     g->straight_path = (bst_obsgen_path_px){x / moment, y / moment};
     double length = hypot(g->star_path.dx, g->star_path.dy);
-    double c = length > 0.0 ? g->star_path.dx / length : 1.0;
-    double s = length > 0.0 ? g->star_path.dy / length : 0.0;
+    bool drawn = length > 0.0;
+    double c = drawn ? g->star_path.dx / length : 1.0, s = drawn ? g->star_path.dy / length : 0.0;
     for (int k = 0; k <= last; k++) {
         double u = (double)k / last - 0.5, weight = k == 0 || k == last ? 0.5 : 1.0;
         double dx = g->path_x[k] - u * g->straight_path.dx;
         double dy = g->path_y[k] - u * g->straight_path.dy, across = dy * c - dx * s;
-        sum += weight * (length > 0.0 ? across * across : 0.5 * (dx * dx + dy * dy));
+        double bent = drawn ? 6.0 * u * u - 0.5 : 0.0; /* as imgproc's fit draws it */
+        double ex = dx - bent * g->bend_x, ey = dy - bent * g->bend_y;
+        out.filter_px2 += weight * (drawn ? across * across : 0.5 * (dx * dx + dy * dy)) / last;
+        out.fit_px2 += weight * 0.5 * (ex * ex + ey * ey) / last;
     }
-    return sum / last;
+    return out;
 }
 
 static double mean_width(const bst_obsgen_image_width *w) {
@@ -52,8 +61,10 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
         const bst_response_side filter = {NULL, fmax(g->onboard_sigma_px, 0.2 * g->binning)};
         bst_response_set(&response, &source, &filter, g->binning, 0.0, 0.0);
     }
-    g->response = bst_response_widened(&response, straighten(g));
-    g->widening = mean_width(&g->response.source) / mean_width(&response.source);
+    path_residual residual = straighten(g);
+    g->response = bst_response_widened(&response, residual.filter_px2);
+    bst_response fitted = bst_response_widened(&response, residual.fit_px2);
+    g->widening = mean_width(&fitted.source) / mean_width(&response.source);
     g->known_width = mean_width(&g->response.filter) / mean_width(&response.source);
     g->cross_sigma = mean_width(&g->response.both);
     g->bias_sigma = mean_width(&response.both);
@@ -89,8 +100,13 @@ static void set_threshold(bst_generator *g) {
             bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
                                   (double)g->width * g->height, &t->streak_share[step]);
     }
-    g->threshold = fmax(t->threshold[step] + g->calibration.threshold_offset, 1.0);
+    double threshold = t->threshold[step];
     g->streak_share = t->streak_share[step];
+    if (g->open_share < 1.0) { /* noise makes detections only there */
+        threshold = bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
+                                          g->open_share * g->width * g->height, &g->streak_share);
+    }
+    g->threshold = fmax(threshold + g->calibration.threshold_offset, 1.0);
 }
 
 /* Sum over an axis of the squares of the sums across it of a filter of unit norm, drawn along a
@@ -185,4 +201,23 @@ void bst_generator_set_filters(bst_generator *g) {
             break;
         }
     }
+}
+
+/* A frame with more than a maximum in so many pixels is crowded: what image processing takes for
+ * background and noise then, it takes from the pixels that are this far from outputs of stars. */
+static const double CROWDED_PX = 400.0, STAR_SNR = 3.0, LEAST_OPEN = 0.02;
+enum { SPARED_PX = 2 };
+
+double bst_generator_open_share(const bst_generator *g) {
+    double pixels = (double)g->width * g->height, covered = 0.0, maxima = 0.0;
+    for (int i = 0; i < g->source_count; i++) {
+        const generator_source *s = &g->sources[i];
+        maxima += s->amplitude > bst_generator_looks_from(g);
+        if (s->amplitude > STAR_SNR) {
+            /* within the output's outline, a circle, and a square about each pixel of it */
+            double r = 2.0 * g->cross_sigma * sqrt(log(s->amplitude / STAR_SNR)), h = SPARED_PX;
+            covered += BST_PI * r * r + 8.0 * h * r + 4.0 * h * h + 2.0 * (r + h) * s->length;
+        }
+    }
+    return maxima > pixels / CROWDED_PX ? fmax(exp(-covered / pixels), LEAST_OPEN) : 1.0;
 }

@@ -109,7 +109,8 @@ static double sharpness(const bst_generator *g, const bst_generator_frame *f,
                         const bst_truth_item *item, double length) {
     double v = (double)g->binning * g->binning * (f->truth->background_e + f->truth->dark_e) +
                g->camera->read_noise_e * g->camera->read_noise_e;
-    double plain = item->electrons * bst_crlb_table_norm(&g->bound, length) / sqrt(fmax(v, 1e-6));
+    const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
+    double plain = item->electrons * bst_crlb_table_norm(bound, length) / sqrt(fmax(v, 1e-6));
     bool known = item->snr > 0.0 && plain > 0.0;
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
@@ -306,6 +307,26 @@ static void add_crowding(bst_generator *g) {
     }
 }
 
+/* In a crowded frame image processing looks a second time, with background and noise of the open
+ * sky between the stars that it found first: their light is in neither then. */
+static void look_again(bst_generator *g) {
+    g->open_share = bst_generator_open_share(g);
+    if (!(g->open_share < 1.0)) {
+        return;
+    }
+    for (int i = 0; i < g->source_count; i++) {
+        generator_source *s = &g->sources[i];
+        double length = s->as_streak ? g->streak : 0.0;
+        s->amplitude +=
+            g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
+        s->amplitude *= g->noise_e / g->dark_noise_e;
+    }
+    g->background_e -= g->background_bias_e;
+    g->background_bias_e = 0.0;
+    g->noise_e = g->dark_noise_e;
+    bst_generator_set_filters(g);
+}
+
 static bst_status reserve_path(bst_ctx *ctx, bst_generator *g, int count) {
     if (count <= g->path_room) {
         return BST_OK;
@@ -427,7 +448,11 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         g->source_count++;
     }
     add_crowding(g);
+    g->open_share = 1.0;
     bst_generator_set_filters(g);
+    if (!g->smeared) {
+        look_again(g);
+    }
     qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
     return BST_OK;
 }

@@ -72,7 +72,7 @@ struct bst_generator {
     double
         fit_light; /* brightest pixel over the noise's variance, per sqrt(sum p^2) and electron */
     bst_obsgen_path_px straight_path; /* nearest to the true one */
-    double widening;      /* width of the images over the PSF's: the path is not straight */
+    double widening;      /* width of the images over the fitted ones': the path is another */
     double known_width;   /* width of the filters' images over the PSF's */
     double place_ratio2;  /* variance of a place over that of a Gaussian of the PSF's
                                          noise-equivalent             area */
@@ -89,6 +89,7 @@ struct bst_generator {
     bst_streak_centroid_error *wander; /* for `streak`, once it was asked for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
+    double open_share;   /* of a crowded frame: what is no star's; 1: not crowded */
     double dark_noise_e; /* the noise without the light that is part of it */
     double faint_light_e, faint_square_e2, background_bias_e; /* bias: what is too much of it */
     struct generator_thresholds {
@@ -120,6 +121,9 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
  * thresholds and noise. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
 void bst_generator_set_filters(bst_generator *g);
+/* Share of a crowded frame that image processing takes for open sky, by the amplitudes of its
+ * sources; 1 where it is not crowded. */
+double bst_generator_open_share(const bst_generator *g);
 /* What offsets of columns add to the variance of a pixel, electrons^2: none where image processing
  * takes the columns' levels off. */
 double bst_generator_column_variance(const bst_generator *g);
@@ -128,6 +132,8 @@ double bst_generator_output_variance(const bst_generator *g, const generator_sou
 /* What source b adds at source a's place to the output of the filter for a. */
 double bst_generator_overlap(const bst_generator *g, const generator_source *a,
                              const generator_source *b);
+/* The output from which image processing looks at maxima. */
+double bst_generator_looks_from(const bst_generator *g);
 /* Whether image processing would find two maxima: the fainter source beside the brighter one. */
 bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
                              const generator_source *faint);

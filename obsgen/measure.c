@@ -54,15 +54,9 @@ static double misfit(const double image[2], const double model[2]) {
     return sqrt(along * sqrt(along * across));
 }
 
-/* Bound of an image at rest that the camera's path widens, or of a streak: what a path of the
- * stars' own length bends widens it across, not along. */
+/* Bound of an image that is wider by what the camera's true path is off the path that is fitted. */
 static bst_crlb_table_at bound_of_image(const bst_generator *g, double flux_e, double length) {
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
-    if (length > 1.0) {
-        bst_crlb_table_at b = bst_crlb_table_of(bound, flux_e, g->noise_e, length);
-        b.var_across_px2 *= g->widening * g->widening;
-        return b;
-    }
     return bst_crlb_table_wider(bound, flux_e, g->noise_e, length, g->widening);
 }
 
@@ -108,7 +102,8 @@ static void measure_place(const bst_generator *g, const generator_source *s,
         b->widen * g->place_ratio2 / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen * g->place_ratio2 / fmax(s->visible, LEAST_SEEN);
     /* what of `sharp` is not the wider image, which `truth` is for: the background's place */
-    double sharp = s->sharp * bst_crlb_table_norm(&g->bound, s->length) / truth->norm;
+    const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
+    double sharp = s->sharp * bst_crlb_table_norm(bound, s->length) / truth->norm;
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
     double open = b->drawn ? 0.0 : worse;
     /* a point that is fitted to a short streak */

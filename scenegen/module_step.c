@@ -15,7 +15,8 @@
 
 typedef struct fidelity_config {
     double tolerance_sigma;
-    int64_t temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
+    int64_t most_nodes, temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree,
+        fft_taps;
 } fidelity_config;
 
 typedef struct scenegen_config {
@@ -38,6 +39,10 @@ static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
              "Error of the image that is allowed in any pixel, in that pixel's noise. "
              "Nodes and stamps follow from it."),
+    BST_INT(fidelity_config, most_nodes, "", 0, 67108864, "0",
+            "Nodes (weighted points along the smear) that a frame may have beyond 16 for each "
+            "source, 4 times as many where the paths of a slew need them; 0: 16777216. Where the "
+            "tolerance asks for more, sources are drawn coarser (counter nodes_bounded)."),
     BST_INT(fidelity_config, temporal_oversample, "", 0, 100000, "0",
             "Equal parts of the exposure whose middles stand for it, for comparison with other "
             "renderers; 0: as the tolerance needs. The error is not predicted then."),
@@ -185,6 +190,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
     options.motion = (bst_smear_star_motion)c->renderer;
+    options.most_nodes = c->fidelity.most_nodes;
     options.temporal_oversample = (int)c->fidelity.temporal_oversample;
     options.spatial_oversample = (int)c->fidelity.spatial_oversample;
     options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
@@ -341,6 +347,9 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     truth->nodes = stats.nodes;
     if (stats.tolerance_missed && !e->dropped) {
         bst_step_count(step, "tolerance_missed");
+    }
+    if (stats.nodes_bounded && !e->dropped) {
+        bst_step_count(step, "nodes_bounded");
     }
     truth->one_track = stats.single_kernel;
     /* while the device renders */

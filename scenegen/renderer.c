@@ -249,11 +249,13 @@ static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_requ
     const bst_scene_plan_limits limits = {
         .tolerance_sigma = foreseen(r) ? r->tolerance_sigma : INFINITY,
         .margin_px = bst_renderer_margin_px(r),
-        .bytes = r->most_bytes};
+        .bytes = r->most_bytes,
+        .nodes = r->options.most_nodes};
     BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->crowd, r->fft_light,
                                 &limits, q));
     r->stats = (bst_render_stats){.sources = r->plan.count,
                                   .nodes = (long long)r->plan.blocks * BST_BLOCK,
+                                  .nodes_bounded = r->plan.bounded,
                                   .single_kernel = bst_smear_single(r->smear)};
     return BST_OK;
 }
@@ -442,6 +444,7 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
         to.first_row = band.window.y0 - q->window.y0;
         BST_TRY(enqueue_tiles(ctx, r, &band, &to));
         to.first_tile = to.saturated ? r->tiles[r->set] : 0;
+        all.nodes_bounded = all.nodes_bounded || r->stats.nodes_bounded;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
         all.predicted_sigma = fmax(all.predicted_sigma, bst_error_budget_error_sigma(r->crowd) +
                                                             bst_rolling_error_sigma(r->rolling));

@@ -56,14 +56,19 @@ typedef struct planning {
     const bst_fourier_render *fft_light;
     const bst_render_request *request;
     double dark_e2;
-    double beyond;     /* light that a pixel gets of a source beyond the margin, s */
-    int blocks;        /* at most */
+    double beyond; /* light that a pixel gets of a source beyond the margin, s */
+    int blocks;    /* at most */
+    int64_t most_nodes;
     bool fine;         /* with the finer grid */
     double grid_sigma; /* largest error by the grid */
 } planning;
 
 /* Adds a drawn source's error to those of the frame. */
 static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *source) {
+    /* Of two errors of either sign whose greatest values lie on different pixels, the part of the
+     * lesser that meets the greater: as of two sources in error_budget.c. Tried by
+     * tests/scenegen/test_tolerance_sweep.c (slow). */
+    static const double REST = 0.4;
     bst_error_budget_source error = *bst_smear_last_error(m->smear);
     if (m->fft_light) { /* of its grid, on dark pixels too */
         double peak_e = bst_smear_last_read_e(m->smear),
@@ -71,8 +76,9 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
         double grid = bst_fourier_render_error_sigma(m->fft_light, m->fine, presence < 1.0,
                                                      m->request->window, peak_e, m->dark_e2);
         m->grid_sigma = fmax(m->grid_sigma, grid);
-        /* of either sign, as those of nodes */
-        error.nodes_e += (float)(grid * sqrt((double)error.peak_e + m->dark_e2));
+        double nodes_e = (double)error.nodes_e,
+               grid_e = grid * sqrt((double)error.peak_e + m->dark_e2);
+        error.nodes_e = (float)(fmax(nodes_e, grid_e) + REST * fmin(nodes_e, grid_e));
         const float *colour = source->colour;
         if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
             error.excess_e +=
@@ -133,14 +139,15 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
      * worth its refinement */
     static const double LESS = 0.97, GAIN = 0.98, MOST_STEP = 0.2, LEAST_STEP = 0.85,
                         GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
-    m->blocks = blocks_of(BST_SCENE_MOST_NODES, m->request->count, most_blocks);
+    p->bounded = false;
+    m->blocks = blocks_of(m->most_nodes, m->request->count, most_blocks);
     double aim = m->request->count > CROWD ? CROWD_AIM : 1.0, before = INFINITY;
     bool fits, coarse = false;
     bst_smear_restart(m->smear, aim);
     BST_TRY(plan_sources(ctx, p, m, &fits));
     if (!fits) { /* crowds along the paths of a slew, which no tolerance makes shorter */
-        coarse = true;
-        m->blocks = blocks_of(BST_SCENE_SLEW_NODES, m->request->count, most_blocks);
+        coarse = p->bounded = true;
+        m->blocks = blocks_of(BST_SCENE_SLEW * m->most_nodes, m->request->count, most_blocks);
         bst_smear_restart(m->smear, aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
     }
@@ -151,9 +158,11 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
     if (!fits) {
         return bst_fail(ctx, BST_ERR_RANGE,
                         "the sources move too far in one exposure to be drawn: %d of %d need %.0f "
-                        "million points already; expose for a shorter time, turn more slowly, or "
-                        "draw fewer stars (v_limit)",
-                        p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks);
+                        "million points already, %.3g million are allowed; expose for a shorter "
+                        "time, turn more slowly, draw fewer stars (v_limit), or allow more points "
+                        "(fidelity.most_nodes) if the device has the memory",
+                        p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks,
+                        1e-6 * BST_BLOCK * m->blocks);
     }
     /* the errors of very many sources take as long to add up as the frame to draw: at CROWD_AIM the
      * prediction, made when it is asked for, says what came of it */
@@ -173,6 +182,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
         bst_smear_restart(m->smear, aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
         if (!fits) { /* as it was before */
+            p->bounded = true;
             bst_smear_restart(m->smear, last);
             return plan_sources(ctx, p, m, &fits);
         }
@@ -205,6 +215,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                   .fft_light = fft_light,
                   .request = q,
                   .dark_e2 = dark_e2,
+                  .most_nodes = limits->nodes > 0 ? limits->nodes : BST_SCENE_MOST_NODES,
                   .beyond = fft_light ? bst_fourier_render_band(fft_light)->beyond * binning *
                                             binning * q->track->time_s[q->track->count - 1]
                                       : 0.0};

@@ -204,7 +204,8 @@ static double saturation_e(const bst_imgproc *ip, int saturated_dn) {
 }
 
 /* The path of stars on the window's middle, on a grid of half a pixel: small changes of the
- * telemetry leave the filter as it is. 0, 0 when too short or too long to filter for. */
+ * telemetry leave the filter as it is. 0, 0 when too short or, with its bend, too long to filter
+ * for. */
 static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame,
                         const bst_camera_motion *motion, double *dx, double *dy) {
     *dx = *dy = 0.0;
@@ -220,7 +221,7 @@ static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame,
     double length = hypot(*dx, *dy) / frame->binning;
     double bend = hypot(bend_x, bend_y) / frame->binning;
     ip->smeared = length + 2.0 * bend > ip->config.streak_max_px;
-    if (length < ip->config.streak_min_px || length > ip->config.streak_max_px) {
+    if (length < ip->config.streak_min_px || ip->smeared) {
         *dx = *dy = 0.0;
         return;
     }

@@ -22,7 +22,7 @@ double bst_generator_overlap(const bst_generator *g, const generator_source *a,
     double c = a->length > 0.0 ? a->path.dx / a->length : 1.0;
     double s = a->length > 0.0 ? a->path.dy / a->length : 0.0;
     double length = a->as_streak ? g->streak : a->length;
-    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->cross_sigma);
+    return bst_response_falloff(&g->response, dx * c + dy * s, dy * c - dx * s, length);
 }
 
 double bst_generator_output_variance(const bst_generator *g, const generator_source *s) {

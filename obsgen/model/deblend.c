@@ -145,6 +145,12 @@ static void add_noise(const scene *s, const generator_source *faint, const grid_
     }
 }
 
+double bst_generator_looks_from(const bst_generator *g) {
+    /* between the pixels a source between four of them is looked at */
+    double corner = exp(-0.125 / (g->filter_sigma * g->filter_sigma));
+    return fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold;
+}
+
 bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
                              const generator_source *faint) {
     double factor = g->calibration.blend_distance_factor;
@@ -160,11 +166,9 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
     const grid_place ends[2] = {climb(&s, &s.light[0]), climb(&s, &s.light[1])};
     int dx = ends[1].x - ends[0].x, dy = ends[1].y - ends[0].y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
-    /* between the pixels a source between four of them is looked at */
-    double corner = exp(-0.125 / (g->filter_sigma * g->filter_sigma));
     double value = ends[1].value;
-    double least = fmax(value - fmax(SADDLE_SIGMA, SADDLE_SHARE * value),
-                        fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold);
+    double least =
+        fmax(value - fmax(SADDLE_SIGMA, SADDLE_SHARE * value), bst_generator_looks_from(g));
     grid_place between[MOST_PIXELS];
     int count = 0;
     double lowest = INFINITY;

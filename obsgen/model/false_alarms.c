@@ -5,7 +5,13 @@
 #include "obsgen/generator_internal.h"
 
 /* Draws of clutter begin beyond those of sources, whose names have 33 bits. */
-static const uint64_t FALSE_ALARM = (uint64_t)1 << 40, HIT = (uint64_t)1 << 41;
+static const uint64_t FALSE_ALARM = (uint64_t)1 << 40, HIT = (uint64_t)1 << 41,
+                      WING_ALARM = (uint64_t)1 << 42;
+/* Light of wings below this, SNR, makes no alarms to speak of; maxima above LEAST_OUTPUT are as
+ * rare as the law for high ones says. */
+static const double LEAST_WING = 0.3, LEAST_OUTPUT = 1.5;
+/* Places of independent noise between two maxima that are near. */
+static const double WAY_PLACES = 2.0;
 /* Image processing takes a source for an artefact whose brightest pixel stands so far above its
  * peak: HOT_SHARE of it and HOT_SIGMA. */
 static const double HOT_SHARE = 1.1, HOT_SIGMA = 2.5;
@@ -63,6 +69,66 @@ static double more_alarms(const bst_generator *g) {
     return more;
 }
 
+/* The output's deviation on light that gives an output of `light`, over that without. */
+static double wing_noise(const bst_generator *g, double light) {
+    return sqrt(1.0 + light * bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e);
+}
+
+/* How many more of the noise's maxima on such light are seen: they exceed the threshold, and a
+ * place on the way to a higher one nearby is below what image processing looks at. */
+static double wing_gain(const bst_generator *g, double light) {
+    double t = g->filters[0].threshold, noise = wing_noise(g, light);
+    double u = fmax((t - light) / noise, LEAST_OUTPUT);
+    double above = 0.5 * erfc((bst_generator_looks_from(g) - light) / (noise * sqrt(2.0)));
+    double alone = 1.0 - pow(above, WAY_PLACES);
+    return fmax(alone * u / t * exp(0.5 * (t * t - u * u)) - 1.0, 0.0);
+}
+
+/* Output so far from a source. Image and filter have the same wings, and far out their correlation
+ * is the sum of both; but image processing's kernel ends before. */
+static double wing_light(const bst_generator *g, const generator_source *s, double distance_px) {
+    return 0.5 * s->amplitude * bst_response_falloff(&g->response, distance_px, 0.0, 0.0);
+}
+
+/* Alarms on the wings of one source: noise that its light lifts. Within the box in which image
+ * processing looks for a higher maximum the source itself is one, and its flank is a ridge. */
+static void draw_wing_alarms(bst_generator *g, const generator_source *s, double per_px) {
+    enum { RINGS = 64 };
+    double reach = ceil(6.0 * g->fitted_sigma + g->streak) + 2.5;
+    double end = (BST_FALLOFF_DISTANCES - 1.0) / BST_FALLOFF_PER_PX, step = (end - reach) / RINGS;
+    if (!(step > 0.0) || wing_light(g, s, reach) < LEAST_WING) {
+        return;
+    }
+    uint64_t draw = WING_ALARM | s->name << 8;
+    double arrival = -log(uniform(g, draw++));
+    for (int i = 0; i < RINGS; i++) {
+        double r = reach + (i + 0.5) * step;
+        double light = wing_light(g, s, r);
+        if (!(light > 0.0)) {
+            continue;
+        }
+        arrival -= per_px * wing_gain(g, light) * 2.0 * BST_PI * r * step;
+        while (arrival < 0.0) {
+            double angle = 2.0 * BST_PI * uniform(g, draw);
+            double energy = -log(uniform(g, draw + 1)), noise = wing_noise(g, light);
+            arrival -= log(uniform(g, draw + 2));
+            draw += 3;
+            double dx = r * cos(angle), dy = r * sin(angle), x = s->x + dx, y = s->y + dy;
+            if (x < -0.5 || y < -0.5 || x > g->width - 0.5 || y > g->height - 0.5) {
+                continue;
+            }
+            double least = (g->filters[0].threshold - light) / noise;
+            double above =
+                sqrt(fmax(least, 0.0) * fmax(least, 0.0) + 2.0 * energy) - fmax(least, 0.0);
+            bst_obsgen_generated item = {.detection = bst_false_alarms_point(
+                                             g, x, y, g->filters[0].threshold + noise * above, 0.0),
+                                         .item = -1};
+            item.detection.label = BST_LABEL_ARTEFACT;
+            bst_generator_keep(g, &item);
+        }
+    }
+}
+
 void bst_false_alarms_draw(bst_generator *g) {
     double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
     /* background that is found too bright takes from noise */
@@ -75,6 +141,12 @@ void bst_false_alarms_draw(bst_generator *g) {
             g->background_bias_e / (bst_crlb_table_norm(&g->bound, 0.0) * g->dark_noise_e);
         least /= sqrt(g->filters[0].variance);
         expected = bst_matched_pixel_maxima(g->filter_sigma, least) * g->width * g->height;
+    }
+    for (int i = 0; i < g->source_count && g->response.falloff.tabulated && !g->smeared; i++) {
+        if (g->sources[i].found) {
+            double share = g->streak > 0.0 ? 1.0 - g->streak_share : 1.0;
+            draw_wing_alarms(g, &g->sources[i], share * expected / ((double)g->width * g->height));
+        }
     }
     double arrival = 0.0;
     for (uint64_t i = 0; i < 1000000; i++) {

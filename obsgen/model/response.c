@@ -1,3 +1,4 @@
+#define _XOPEN_SOURCE 700 /* j0 */
 #include "obsgen/model/response.h"
 
 #include <math.h>
@@ -10,6 +11,8 @@ static const double PIXEL_VARIANCE = 1.0 / 12.0;
 enum { REACH_PX = 24 };
 /* OTF without the pixel below which frequencies count for nothing. */
 static const double LEAST_OTF = 1e-4;
+/* Cycles per sensor pixel beyond which no OTF with its pixel counts. */
+static const double MOST_FREQUENCY = 3.0;
 
 /* Sums over frequencies of the products of source and filter: at rest, and on a line. */
 typedef struct spectral_sums {
@@ -77,7 +80,7 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
     const bst_response_side *const sides[2] = {source, filter};
     int node[2][4] = {{0}}, nodes[2] = {0, 0};
     double weight[2][4] = {{0.0}}, step = 0.5 / (REACH_PX * binning);
-    double limit = fmin(fmax(cutoff(source), cutoff(filter)), 3.0);
+    double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
     for (int k = 0; k < 2; k++) {
         if (sides[k]->psf) {
             nodes[k] = bst_psf_weights(sides[k]->psf, x_px, y_px, node[k], weight[k]);
@@ -118,6 +121,69 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
     s->filtered = s->point[1];
 }
 
+/* The correlation's mean over all directions: the Hankel transform of its spectrum's, in steps so
+ * fine that the cusp at 0, which makes the wings, is resolved. */
+static void tabulate_falloff(const bst_response_side *source, const bst_response_side *filter,
+                             int binning, double x_px, double y_px, bst_falloff *out) {
+    enum { RINGS = 768, DIRECTIONS = 12 }; /* of the half plane */
+    const bst_response_side *const sides[2] = {source, filter};
+    bst_response_nodes nodes[2];
+    double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
+    double spectrum[RINGS], sum[BST_FALLOFF_DISTANCES] = {0.0};
+    for (int k = 0; k < 2; k++) {
+        bst_response_nodes_at(sides[k], x_px, y_px, &nodes[k]);
+    }
+    for (int i = 0; i < RINGS; i++) {
+        double f = limit * (i + 0.5) / RINGS;
+        spectrum[i] = 0.0;
+        for (int a = 0; a < DIRECTIONS; a++) {
+            double angle = BST_PI * (a + 0.5) / DIRECTIONS, p[2], q[2];
+            bst_response_otf(source, &nodes[0], binning, f * cos(angle), f * sin(angle), p);
+            bst_response_otf(filter, &nodes[1], binning, f * cos(angle), f * sin(angle), q);
+            spectrum[i] += f * (p[0] * q[0] + p[1] * q[1]);
+        }
+    }
+    for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
+        double turn = 2.0 * BST_PI * n / BST_FALLOFF_PER_PX * limit * binning / RINGS;
+        for (int i = 0; i < RINGS; i++) {
+            sum[n] += spectrum[i] * j0(turn * (i + 0.5));
+        }
+        out->value[n] = (float)(sum[n] / sum[0]);
+    }
+    out->tabulated = true;
+}
+
+static double falloff_at(const bst_response *r, double distance_px) {
+    double at = distance_px * r->falloff_scale * BST_FALLOFF_PER_PX;
+    int i = (int)at;
+    if (i >= BST_FALLOFF_DISTANCES - 1) {
+        return 0.0;
+    }
+    double low = (double)r->falloff.value[i], high = (double)r->falloff.value[i + 1];
+    return low + (at - i) * (high - low);
+}
+
+double bst_response_falloff(const bst_response *r, double along_px, double across_px,
+                            double length_px) {
+    if (!r->falloff.tabulated) {
+        double sigma_px = sqrt(r->both.across_px * r->both.along_px);
+        return bst_matched_falloff(along_px, across_px, length_px, sigma_px);
+    }
+    if (length_px < 0.5) {
+        return falloff_at(r, hypot(along_px, across_px));
+    }
+    /* places of the path and of the filter's differ by a triangle's distribution */
+    enum { MOST = 64 };
+    int half = (int)fmin(ceil(1.5 * length_px), MOST);
+    double sum = 0.0, own = 0.0;
+    for (int k = 1 - half; k < half; k++) {
+        double weight = 1.0 - fabs((double)k) / half, at = length_px * k / half;
+        sum += weight * falloff_at(r, hypot(along_px - at, across_px));
+        own += weight * falloff_at(r, fabs(at));
+    }
+    return sum / own;
+}
+
 static bst_obsgen_image_width width_of(double point, double line) {
     bst_obsgen_image_width w = {.across_px = 1.0 / (2.0 * sqrt(BST_PI) * line)};
     w.along_px = 1.0 / (4.0 * BST_PI * point * w.across_px);
@@ -134,7 +200,11 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         double scale = 1.0 / ((double)binning * binning);
         double s = source->sigma_px * source->sigma_px * scale + PIXEL_VARIANCE;
         double f = filter->sigma_px * filter->sigma_px * scale + PIXEL_VARIANCE;
-        *out = (bst_response){even(s), even(f), even(0.5 * (s + f)), sqrt(f)};
+        *out = (bst_response){.source = even(s),
+                              .filter = even(f),
+                              .both = even(0.5 * (s + f)),
+                              .maxima_sigma_px = sqrt(f),
+                              .falloff_scale = 1.0};
         return;
     }
     spectral_sums sums;
@@ -146,6 +216,8 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         sqrt(fmax(sums.gradient[0] * sums.gradient[2] - sums.gradient[1] * sums.gradient[1], 0.0)) /
         sums.filtered;
     out->maxima_sigma_px = sqrt(0.5 / fmax(steep, 1e-6));
+    out->falloff_scale = 1.0;
+    tabulate_falloff(source, filter, binning, x_px, y_px, &out->falloff);
 }
 
 static bst_obsgen_image_width widen(bst_obsgen_image_width w, double variance_px2) {
@@ -157,6 +229,8 @@ bst_response bst_response_widened(const bst_response *r, double variance_px2) {
     bst_response out = *r;
     out.source = widen(r->source, variance_px2);
     out.both = widen(r->both, 0.5 * variance_px2);
+    out.falloff_scale *=
+        sqrt(r->both.across_px * r->both.along_px / (out.both.across_px * out.both.along_px));
     return out;
 }
 

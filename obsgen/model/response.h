@@ -3,6 +3,8 @@
 #ifndef BST_OBSGEN_MODEL_RESPONSE_H
 #define BST_OBSGEN_MODEL_RESPONSE_H
 
+#include <stdbool.h>
+
 #include "obsgen/model/matched_filter_theory.h"
 #include "sim/optics/psf.h"
 
@@ -13,10 +15,22 @@ typedef struct bst_obsgen_image_width {
     double across_px, along_px;
 } bst_obsgen_image_width;
 
+/* Distances of a falloff: this many a pixel, as far as the sums over an OTF hold. */
+enum { BST_FALLOFF_PER_PX = 6, BST_FALLOFF_DISTANCES = 24 * BST_FALLOFF_PER_PX };
+
+/* Output of the filter for points beside a point, over that at its place, by distance in pixels
+ * that are read: the mean over all directions. */
+typedef struct bst_falloff {
+    bool tabulated; /* false: a Gaussian, which bst_matched_falloff has */
+    float value[BST_FALLOFF_DISTANCES];
+} bst_falloff;
+
 typedef struct bst_response {
     bst_obsgen_image_width source, filter,
         both;               /* image by image, filter by filter, image by filter */
     double maxima_sigma_px; /* of the Gaussian whose filtered noise has as many maxima */
+    bst_falloff falloff;    /* of both, as bst_response_set has it */
+    double falloff_scale;   /* distances in it per px: 1, less where the image is wider */
 } bst_response;
 
 /* One side of it: a PSF at the middle of the field, in sensor pixels, widened by a Gaussian. */
@@ -62,6 +76,11 @@ double bst_response_product(const bst_obsgen_image_width *width, bst_obsgen_path
  * of the filter for the image itself. */
 double bst_response_efficiency(const bst_response *response, bst_obsgen_path_px source,
                                bst_obsgen_path_px filter);
+
+/* Output of the filter for an image that moved by length_px, at a place beside it along and across
+ * its path, over that at its place. */
+double bst_response_falloff(const bst_response *response, double along_px, double across_px,
+                            double length_px);
 
 /* sqrt(sum p^2) of a real image of unit flux that moved by length_px, over that of a Gaussian of
  * the same noise-equivalent area at rest: 1 for a Gaussian. */

@@ -20,10 +20,6 @@ static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 3e-7, LEAST_DENSITY = 0.25
 /* Derivatives of order 2, 4 and 6 of a Gaussian at sigma 1, over its peak. */
 static const double GAUSSIAN[3] = {1.0, 3.0, 15.0};
 
-/* Sums of moduli bound the derivatives; what was measured of 200 random scenes
- * (tests/scenegen/test_tolerance_sweep.c) is at most 0.65 of it. */
-static const double BOUND = 0.85;
-
 static double modulus(const bst_psf *psf, int node, double fx, double fy) {
     double v[2];
     bst_psf_otf(psf, node, fx, fy, v);
@@ -107,7 +103,7 @@ static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
     for (int b = 0; b < BST_PIXEL_PARTS; b++) {
         for (int d = 0; d < DIRECTIONS; d++) {
             for (int k = 0; k < 3; k++) {
-                double part = BOUND * along[b][d][k] / along[0][d][k] * top[0] / top[b];
+                double part = along[b][d][k] / along[0][d][k] * top[0] / top[b];
                 out->pixel_part[b][k] = fmax(out->pixel_part[b][k], part);
             }
         }

@@ -1,8 +1,10 @@
 #include "scenegen/smear/error_budget.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Parts of the others' errors that meet where the worst source's error is greatest: of an error
  * that is told by its greatest value, and of a border's length that passes within its own thickness
@@ -13,6 +15,9 @@
 /* Cells as far as two stamps' radii, four standard deviations of the PSF each and more, go; and up
  * to how many cells are searched for crossings of borders. */
 enum { REACH = 5, MOST_CROSSINGS = 1000 };
+
+/* So many spots, on cells of which one in so many has light or more, are worth a field of cells. */
+enum { MANY = 256, SPARSE = 32 };
 
 /* Sources in one place. */
 typedef struct spot {
@@ -37,6 +42,11 @@ struct bst_error_budget {
     cell *cells;
     int *used; /* the frame's spots, then its cells */
     unsigned frame, mask;
+    /* Where the cells lie close enough, they have places in the order of `used`, and the field of
+     * all places has their numbers from 1 on, 0 where there is none; else columns is 0 and they
+     * have places by their keys. */
+    int *field, field_capacity;
+    int first_u, first_v, rows, columns;
     double missing_e; /* everywhere */
     double error;     /* negative: not known yet */
 };
@@ -53,6 +63,7 @@ void bst_error_budget_free(bst_error_budget *c) {
         free(c->spots);
         free(c->cells);
         free(c->used);
+        free(c->field);
         free(c);
     }
 }
@@ -128,6 +139,11 @@ bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
     return BST_OK;
 }
 
+/* As fmaxf where `so_far` is a number, in one instruction. */
+static inline float greater(float so_far, float x) {
+    return x > so_far ? x : so_far;
+}
+
 static int64_t key_of(int u, int v) {
     return (int64_t)((uint64_t)(uint32_t)u << 32 | (uint32_t)v);
 }
@@ -145,12 +161,43 @@ static int find_spot(const bst_error_budget *c, int64_t key) {
     return (int)i;
 }
 
-static int find_cell(const bst_error_budget *c, int64_t key) {
+/* Place of the cell (u, v), or of an empty one in its stead. */
+static int find_cell(const bst_error_budget *c, int u, int v) {
+    int64_t key = key_of(u, v);
     unsigned i = place_of(key) & c->mask;
     while (c->cells[i].frame == c->frame && c->cells[i].key != key) {
         i = (i + 1) & c->mask;
     }
     return (int)i;
+}
+
+static int *field_at(const bst_error_budget *c, int u, int v) {
+    return &c->field[(v - c->first_v) * c->columns + u - c->first_u];
+}
+
+/* The cell (u, v), NULL where there is no light. Within REACH of one that has some. */
+static const cell *look_up(const bst_error_budget *c, int u, int v) {
+    if (c->columns > 0) {
+        int n = *field_at(c, u, v);
+        return n > 0 ? &c->cells[n - 1] : NULL;
+    }
+    const cell *p = &c->cells[find_cell(c, u, v)];
+    return p->frame == c->frame ? p : NULL;
+}
+
+/* The same cell, made where there is none; *cells: how many there are. */
+static cell *make_cell(bst_error_budget *c, int u, int v, int *cells) {
+    int n = c->columns > 0 ? *field_at(c, u, v) - 1 : find_cell(c, u, v);
+    if (n >= 0 && c->cells[n].frame == c->frame) {
+        return &c->cells[n];
+    }
+    if (c->columns > 0) {
+        n = *cells;
+        *field_at(c, u, v) = n + 1;
+    }
+    c->cells[n] = (cell){.key = key_of(u, v), .frame = c->frame, .u = u, .v = v};
+    c->used[(*cells)++] = n;
+    return &c->cells[n];
 }
 
 /* Sources into spots; returns how many. *apart: the worst of those that move by themselves. */
@@ -181,33 +228,82 @@ static int fill_spots(bst_error_budget *c, float *apart) {
     return spots;
 }
 
+/* Half a box: its numbers per px along the motion and across. */
+typedef struct lattice {
+    float dx, dy, per_u, per_v;
+} lattice;
+
+static lattice lattice_of(const bst_error_budget_motion *m) {
+    float psf = 3.0f * (float)m->sigma_px + 1.0f;
+    return (lattice){.dx = (float)m->direction[0],
+                     .dy = (float)m->direction[1],
+                     .per_u = 2.0f / ((float)m->length_px + psf),
+                     .per_v = 2.0f / ((float)m->width_px + psf)};
+}
+
+/* The cell of a spot. */
+static void cell_of(const lattice *l, const spot *s, int *u, int *v) {
+    *u = (int)floorf((s->x * l->dx + s->y * l->dy) * l->per_u);
+    *v = (int)floorf((s->y * l->dx - s->x * l->dy) * l->per_v);
+}
+
+/* Makes the field of cells, with empty ones about it as far as is looked, where there are many
+ * spots on few enough cells: neighbours are then beside each other in memory. */
+static void make_field(bst_error_budget *c, const lattice *l, int spots) {
+    int low[2] = {INT_MAX, INT_MAX}, high[2] = {INT_MIN, INT_MIN};
+    c->columns = c->rows = 0;
+    if (spots < MANY) {
+        return;
+    }
+    for (int i = 0; i < spots; i++) {
+        int at[2];
+        cell_of(l, &c->spots[c->used[i]], &at[0], &at[1]);
+        for (int a = 0; a < 2; a++) {
+            low[a] = at[a] < low[a] ? at[a] : low[a];
+            high[a] = at[a] > high[a] ? at[a] : high[a];
+        }
+    }
+    int64_t most = (int64_t)SPARSE * spots, columns = (int64_t)high[0] - low[0] + 1 + 2 * REACH,
+            rows = (int64_t)high[1] - low[1] + 1 + 2 * REACH;
+    if (columns > most || rows > most || columns * rows > most || most > INT_MAX) {
+        return;
+    }
+    int places = (int)(columns * rows);
+    if (places > c->field_capacity) {
+        free(c->field);
+        c->field = malloc((size_t)places * sizeof *c->field);
+        c->field_capacity = c->field ? places : 0;
+        if (!c->field) { /* it is only for speed */
+            return;
+        }
+    }
+    memset(c->field, 0, (size_t)places * sizeof *c->field);
+    c->first_u = low[0] - REACH;
+    c->first_v = low[1] - REACH;
+    c->columns = (int)columns;
+    c->rows = (int)rows;
+}
+
 /* Spots into cells, whose numbers take the spots' place in `used`; returns how many. */
 static int fill_cells(bst_error_budget *c, int spots) {
-    const bst_error_budget_motion *m = &c->motion;
-    float psf = 3.0f * (float)m->sigma_px + 1.0f, dark = (float)m->dark_variance_e2;
-    float per_u = 2.0f / ((float)m->length_px + psf), per_v = 2.0f / ((float)m->width_px + psf);
-    float dx = (float)m->direction[0], dy = (float)m->direction[1], quiet = 1.0f / sqrtf(dark);
+    const lattice l = lattice_of(&c->motion);
+    float dark = (float)c->motion.dark_variance_e2, quiet = 1.0f / sqrtf(dark);
     int cells = 0;
+    make_field(c, &l, spots);
     for (int i = 0; i < spots; i++) {
         const spot *s = &c->spots[c->used[i]];
-        int u = (int)floorf((s->x * dx + s->y * dy) * per_u);
-        int v = (int)floorf((s->y * dx - s->x * dy) * per_v);
-        int64_t key = key_of(u, v);
-        int n = find_cell(c, key);
-        cell *p = &c->cells[n];
-        if (p->frame != c->frame) {
-            *p = (cell){.key = key, .frame = c->frame, .u = u, .v = v};
-            c->used[cells++] = n;
-        }
+        int u, v;
+        cell_of(&l, s, &u, &v);
+        cell *p = make_cell(c, u, v, &cells);
         float lit = 1.0f / sqrtf(s->peak + dark), nodes = s->nodes * lit;
         p->squares += nodes * nodes;
-        p->second = fmaxf(p->second, fminf(p->worst, nodes));
-        p->worst = fmaxf(p->worst, nodes);
+        p->second = greater(p->second, nodes < p->worst ? nodes : p->worst);
+        p->worst = greater(p->worst, nodes);
         p->shared += s->shared * lit;
         p->excess += s->excess * lit;
-        p->worst_excess = fmaxf(p->worst_excess, s->excess * lit);
+        p->worst_excess = greater(p->worst_excess, s->excess * lit);
         p->border += s->border * quiet;
-        p->worst_border = fmaxf(p->worst_border, s->border * quiet);
+        p->worst_border = greater(p->worst_border, s->border * quiet);
     }
     return cells;
 }
@@ -217,18 +313,17 @@ static float box_error(const bst_error_budget *c, const cell *middle) {
     cell sum = {.key = 0};
     for (int u = -1; u <= 1; u++) {
         for (int v = -1; v <= 1; v++) {
-            const cell *p = u == 0 && v == 0
-                                ? middle
-                                : &c->cells[find_cell(c, key_of(middle->u + u, middle->v + v))];
-            if (p->frame == c->frame) {
+            const cell *p = u == 0 && v == 0 ? middle : look_up(c, middle->u + u, middle->v + v);
+            if (p) {
                 sum.squares += p->squares;
-                sum.second = fmaxf(fmaxf(sum.second, p->second), fminf(sum.worst, p->worst));
-                sum.worst = fmaxf(sum.worst, p->worst);
+                float less = p->worst < sum.worst ? p->worst : sum.worst;
+                sum.second = greater(greater(sum.second, p->second), less);
+                sum.worst = greater(sum.worst, p->worst);
                 sum.shared += p->shared;
                 sum.excess += p->excess;
-                sum.worst_excess = fmaxf(sum.worst_excess, p->worst_excess);
+                sum.worst_excess = greater(sum.worst_excess, p->worst_excess);
                 sum.border += p->border;
-                sum.worst_border = fmaxf(sum.worst_border, p->worst_border);
+                sum.worst_border = greater(sum.worst_border, p->worst_border);
             }
         }
     }
@@ -245,8 +340,8 @@ static float crossing_error(const bst_error_budget *c, const cell *middle) {
     float other = fminf(middle->border - middle->worst_border, middle->worst_border);
     for (int u = -REACH; u <= REACH; u++) {
         for (int v = -REACH; v <= REACH; v++) {
-            const cell *p = &c->cells[find_cell(c, key_of(middle->u + u, middle->v + v))];
-            if (p->frame == c->frame && (u != 0 || v != 0)) {
+            const cell *p = look_up(c, middle->u + u, middle->v + v);
+            if (p && (u != 0 || v != 0)) {
                 other = fmaxf(other, p->worst_border);
             }
         }
@@ -259,17 +354,23 @@ double bst_error_budget_error_sigma(bst_error_budget *c) {
         float worst = 0.0f, apart = 0.0f, border = 0.0f;
         c->frame++;
         int cells = fill_cells(c, fill_spots(c, &apart));
-        for (int i = 0; i < cells; i++) {
-            const cell *p = &c->cells[c->used[i]];
-            worst = fmaxf(worst, box_error(c, p));
-            border = fmaxf(border, p->worst_border);
+        /* in the order of the field, if there is one */
+        int places = c->columns > 0 ? c->columns * c->rows : cells;
+        for (int i = 0; i < places; i++) {
+            int n = c->columns > 0 ? c->field[i] - 1 : c->used[i];
+            if (n >= 0) {
+                worst = greater(worst, box_error(c, &c->cells[n]));
+                border = greater(border, c->cells[n].worst_border);
+            }
         }
         if (cells > MOST_CROSSINGS) { /* some of the worst do */
             worst = fmaxf(worst, 2.0f * border);
         }
+        /* both cells of a pair find it: the one with the greater border, which is at least half of
+         * the pair's error, is enough */
         for (int i = 0; i < cells && 2.0f * border > worst; i++) {
             const cell *p = &c->cells[c->used[i]];
-            worst = p->worst_border + border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;
+            worst = 2.0f * p->worst_border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;
         }
         c->error = fmaxf(worst, apart) + REST * fminf(worst, apart) +
                    c->missing_e / sqrt(c->motion.dark_variance_e2);

@@ -15,11 +15,18 @@ enum { FEW_CELLS = 6, MANY_CELLS = 96, ANCHORS = 48, FEW_SOURCES = 256 };
 #define UNLIKE_MANY 0.06
 /* Nodes that are nearer to each other than this, in sigma, give no scale. */
 #define LEAST_STEP 0.02
+/* Of a node's light at a place, exp(-MOST_EXPONENT) is left out. */
+#define MOST_EXPONENT 20.0
+/* Bounds that only save work are wider by this than rounding makes them wrong. */
+#define SAFELY 1e-9
 
 /* A node as the map needs it. */
 typedef struct turn {
     double m[9]; /* as in the table */
-    double weight, roll_rad, tilt_px, p[3];
+    double weight, roll_rad, p[3];
+    /* to the next node: length in the path's px, and the other motion of a star 1 px away */
+    double step_px, other_step;
+    double other_still; /* the same from the reference attitude */
 } turn;
 
 /* Place of the present cell's middle at a node. */
@@ -35,6 +42,7 @@ struct bst_motion_map {
     int count, capacity;
     int side; /* cells per axis */
     double cell_px;
+    double other; /* between any two nodes at most, of a star 1 px away */
     unsigned frame, filled[MANY_CELLS * MANY_CELLS];
     bst_smear_star_motion_cell cells[MANY_CELLS * MANY_CELLS];
 };
@@ -52,13 +60,28 @@ void bst_motion_map_free(bst_motion_map *map) {
     }
 }
 
-/* By how much a star's motion between two nodes differs, at most, from that of a star `apart_px`
- * from it: the field turns, and a tilt stretches the tangent plane. */
-static double other_motion(const bst_motion_map *map, const turn *a, const turn *b,
-                           double apart_px) {
+/* By how much a star's motion between two nodes differs, at most, from that of a star 1 px from it:
+ * the field turns, and a tilt stretches the tangent plane. */
+static double other_motion(const bst_motion_map *map, const turn *a, const turn *b) {
     double tangent = map->f.reach_px * map->f.scale_rad;
     double tilt = hypot(a->p[0] - b->p[0], a->p[1] - b->p[1]) / map->f.tilt_px;
-    return apart_px * (fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad);
+    return fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad;
+}
+
+/* What of the nodes' motion is the same in all cells. */
+static void measure_steps(bst_motion_map *map) {
+    const turn still = {.weight = 0.0};
+    for (int n = 0; n < map->count; n++) {
+        turn *a = &map->turns[n];
+        a->other_still = other_motion(map, &still, a);
+        if (n + 1 < map->count) {
+            const turn *b = a + 1;
+            a->step_px = sqrt((a->p[0] - b->p[0]) * (a->p[0] - b->p[0]) +
+                              (a->p[1] - b->p[1]) * (a->p[1] - b->p[1]) +
+                              (a->p[2] - b->p[2]) * (a->p[2] - b->p[2]));
+            a->other_step = other_motion(map, a, b);
+        }
+    }
 }
 
 bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
@@ -87,7 +110,6 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
         memcpy(out->p, node->p, sizeof out->p);
         out->weight = node->weight;
         out->roll_rad = frame->roll_px > 0.0 ? node->p[2] / frame->roll_px : 0.0;
-        out->tilt_px = hypot(node->p[0], node->p[1]) / frame->tilt_px;
         for (int i = 0; i < 3; i++) {
             low[i] = n == 0 ? node->p[i] : fmin(low[i], node->p[i]);
             high[i] = n == 0 ? node->p[i] : fmax(high[i], node->p[i]);
@@ -101,8 +123,10 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
     double length =
         sqrt((high[0] - low[0]) * (high[0] - low[0]) + (high[1] - low[1]) * (high[1] - low[1]) +
              (high[2] - low[2]) * (high[2] - low[2]));
+    map->other = other_motion(map, &from, &to);
+    measure_steps(map);
     double side =
-        sqrt(2.0) * other_motion(map, &from, &to, frame->reach_px) /
+        sqrt(2.0) * (frame->reach_px * map->other) /
         ((frame->sources <= FEW_SOURCES ? UNLIKE : UNLIKE_MANY) * fmax(length, map->f.sigma_px));
     map->side = (int)fmin(fmax(ceil(side), FEW_CELLS), MANY_CELLS);
     map->cell_px = 2.0 * frame->reach_px / map->side;
@@ -130,16 +154,24 @@ double bst_motion_pixel_share(double sigma_px, int binning, double *spread_px) {
 static double cell_share(const bst_motion_map *map, int binning, double radius_px) {
     double spread, line = bst_motion_pixel_share(map->f.sigma_px, binning, &spread);
     double per = 1.0 / (spread * sqrt(2.0)), best = 0.0;
+    /* nodes further than this share no pixel */
+    double reach =
+        (1.0 + SAFELY) * (sqrt(MOST_EXPONENT) / per + map->other * radius_px) / map->f.shrink;
+    double reach2 = reach * reach;
     int stride = map->count / ANCHORS + 1;
     for (int a = 0; a < map->count; a += stride) {
         const place *at = &map->places[a];
         double sum = 0.0;
         for (int n = 0; n < map->count && at->front; n++) {
             const place *p = &map->places[n];
-            double dx = p->x - at->x, dy = p->y - at->y, d = sqrt(dx * dx + dy * dy);
-            d = d * map->f.shrink - other_motion(map, &map->turns[a], &map->turns[n], radius_px);
+            double dx = p->x - at->x, dy = p->y - at->y, d2 = dx * dx + dy * dy;
+            if (d2 > reach2 || !p->front) {
+                continue;
+            }
+            double other = radius_px * other_motion(map, &map->turns[a], &map->turns[n]);
+            double d = sqrt(d2) * map->f.shrink - other;
             double q = d > 0.0 ? d * d * per * per : 0.0;
-            sum += p->front && q < 20.0 ? map->turns[n].weight * exp(-q) : 0.0;
+            sum += q < MOST_EXPONENT ? map->turns[n].weight * exp(-q) : 0.0;
         }
         best = fmax(best, sum);
     }
@@ -149,19 +181,24 @@ static double cell_share(const bst_motion_map *map, int binning, double radius_p
 /* Largest motion of a star of the cell over the path's, from node to node. */
 static double cell_scale(const bst_motion_map *map, double radius_px) {
     double worst = 0.0, far = map->f.sensor_px + radius_px;
+    double least = LEAST_STEP * map->f.sigma_px, near2 = (1.0 - SAFELY) * far * far;
     bool any = false;
     for (int n = 0; n + 1 < map->count; n++) {
         const place *p = &map->places[n], *q = p + 1;
-        const turn *a = &map->turns[n], *b = a + 1;
-        double step = sqrt((a->p[0] - b->p[0]) * (a->p[0] - b->p[0]) +
-                           (a->p[1] - b->p[1]) * (a->p[1] - b->p[1]) +
-                           (a->p[2] - b->p[2]) * (a->p[2] - b->p[2]));
-        if (!p->front || !q->front || step < LEAST_STEP * map->f.sigma_px ||
+        const turn *a = &map->turns[n];
+        if (!p->front || !q->front || a->step_px < least) {
+            continue;
+        }
+        double dx = p->x - q->x, dy = p->y - q->y, other = radius_px * a->other_step;
+        double most = (sqrt(dx * dx + dy * dy) + other) * map->f.stretch * (1.0 + SAFELY);
+        if (any && most <= worst * a->step_px) {
+            continue;
+        }
+        if (p->x * p->x + p->y * p->y > near2 && q->x * q->x + q->y * q->y > near2 &&
             fmin(hypot(p->x, p->y), hypot(q->x, q->y)) > far) {
             continue;
         }
-        double moved = hypot(p->x - q->x, p->y - q->y) + other_motion(map, a, b, radius_px);
-        worst = fmax(worst, moved * map->f.stretch / step);
+        worst = fmax(worst, (hypot(dx, dy) + other) * map->f.stretch / a->step_px);
         any = true;
     }
     return any ? worst : 1.0;
@@ -175,20 +212,24 @@ static void fill_cell(bst_motion_map *map, bst_smear_star_motion_cell *cell, dou
         cell->read_share = cell_share(map, map->f.binning, radius);
     }
     cell->scale = cell_scale(map, radius);
-    turn still = {.weight = 0.0};
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int n = 0; n < map->count; n++) {
         const place *p = &map->places[n];
-        double other = other_motion(map, &still, &map->turns[n], radius);
-        double way[2] = {p->x - x, p->y - y};
+        double other = radius * map->turns[n].other_still;
+        double way[2] = {p->front ? p->x - x : 0.0, p->front ? p->y - y : 0.0};
         for (int i = 0; i < 2; i++) {
-            way[i] = p->front ? way[i] : 0.0;
-            cell->low[i] = n == 0 ? way[i] - other : fmin(cell->low[i], way[i] - other);
-            cell->high[i] = n == 0 ? way[i] + other : fmax(cell->high[i], way[i] + other);
+            low[i] = way[i] - other < low[i] ? way[i] - other : low[i];
+            high[i] = way[i] + other > high[i] ? way[i] + other : high[i];
         }
+    }
+    memcpy(cell->low, low, sizeof low);
+    memcpy(cell->high, high, sizeof high);
+    for (int k = 0; k < BST_MOTION_ERRORS; k++) {
+        cell->error[k] = -1.0;
     }
 }
 
-const bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y) {
+bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y) {
     double per = 1.0 / map->cell_px, most = map->side - 1.0;
     double i = fmin(fmax(floor((x + map->f.reach_px) * per), 0.0), most);
     double j = fmin(fmax(floor((y + map->f.reach_px) * per), 0.0), most);

@@ -10,12 +10,17 @@
 
 typedef struct bst_motion_map bst_motion_map;
 
+enum { BST_MOTION_ERRORS = 16 };
+
 /* What holds for all stars of a cell. */
 typedef struct bst_smear_star_motion_cell {
     double share;           /* at most, of a star's light on one pixel */
     double read_share;      /* the same of a pixel that is read, binned from the sensor's */
     double scale;           /* at most, of its motion over the path's */
     double low[2], high[2]; /* box of its places about the place at the reference attitude, px */
+    /* room for errors that follow from `scale`, of the caller's choice; negative when the cell is
+     * new */
+    double error[BST_MOTION_ERRORS];
 } bst_smear_star_motion_cell;
 
 bst_status bst_motion_map_create(bst_ctx *ctx, bst_motion_map **out) BST_MUST_CHECK;
@@ -46,6 +51,6 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
 
 /* The cell of a star at (x, y) px from the boresight, undistorted, at the reference attitude. Valid
  * until the next frame. */
-const bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y);
+bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y);
 
 #endif

@@ -17,6 +17,9 @@
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
 
+_Static_assert((int)BST_SMEAR_LEVELS <= (int)BST_MOTION_ERRORS,
+               "a cell keeps an error of each level");
+
 enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
@@ -421,15 +424,28 @@ int bst_smear_choose_level(const bst_smear *s, double scale) {
     return n;
 }
 
+/* A level's error for stars of a cell (NULL: of all), which keeps it: it is the same whenever the
+ * level is made in this frame. */
+static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *cell) {
+    if (!cell) {
+        return bst_smear_level_error(&s->levels[n], 1.0);
+    }
+    if (cell->error[n] < 0.0) {
+        cell->error[n] = bst_smear_level_error(&s->levels[n], cell->scale);
+    }
+    return cell->error[n];
+}
+
 /* The level for a star: from the one that its tolerance promises on, the first that keeps it. */
-static bst_status star_level(bst_ctx *ctx, bst_smear *s, double scale,
-                             const bst_smear_level **out) {
+static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_cell *cell,
+                             const bst_smear_level **out, double *error) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
-    int n = bst_smear_choose_level(s, scale);
+    int n = bst_smear_choose_level(s, cell ? cell->scale : 1.0);
     BST_TRY(make_level(ctx, s, n));
-    while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 &&
-           bst_smear_level_error(&s->levels[n], scale) > allowed) {
+    *error = star_error(s, n, cell);
+    while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 && *error > allowed) {
         BST_TRY(make_level(ctx, s, ++n));
+        *error = star_error(s, n, cell);
     }
     *out = &s->levels[n];
     return BST_OK;
@@ -475,13 +491,12 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     if (!*visible) {
         return BST_OK;
     }
-    double scale = 1.0;
+    bst_smear_star_motion_cell *cell = NULL;
     double low[2] = {s->low[0], s->low[1]}, high[2] = {s->high[0], s->high[1]};
     if (!moving) {
         double share = s->star_share, read_share = s->read_share;
         if (!s->single) {
-            const bst_smear_star_motion_cell *cell = bst_motion_map_at(s->map, x, y);
-            scale = cell->scale;
+            cell = bst_motion_map_at(s->map, x, y);
             share = cell->share;
             read_share = cell->read_share;
             memcpy(low, cell->low, sizeof low);
@@ -496,7 +511,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     }
     bst_smear_level own;
     const bst_smear_level *used;
-    double travel_px = s->travel_px;
+    double travel_px = s->travel_px, error;
     if (moving) {
         /* nodes are kept as small floats relative to a place on the sensor */
         double far = s->far_px;
@@ -515,17 +530,13 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
         bst_smear_nodes_box(s, low, high);
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
+        error = bst_smear_level_error(used, 1.0);
     } else {
-        BST_TRY(star_level(ctx, s, scale, &used));
+        BST_TRY(star_level(ctx, s, cell, &used, &error));
     }
     int radius = choose_radius(s, s->last_peak_e * s->binning);
-    bst_smear_drawn drawn = {.x = x,
-                             .y = y,
-                             .scale = scale,
-                             .travel_px = travel_px,
-                             .level = used,
-                             .radius = radius,
-                             .moving = moving};
+    bst_smear_drawn drawn = {
+        .x = x, .y = y, .travel_px = travel_px, .error = error, .radius = radius, .moving = moving};
     memcpy(drawn.low, low, sizeof low);
     memcpy(drawn.high, high, sizeof high);
     bst_smear_set_error(s, &drawn);

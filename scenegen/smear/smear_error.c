@@ -49,7 +49,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     int radius = d->radius;
     double travel_px = d->travel_px;
     double lost = bst_stamp_excess(&s->stamp, radius), peak_e = s->last_read_e;
-    double error = bst_smear_level_error(d->level, d->scale) + s->chord_error;
+    double error = d->error + s->chord_error;
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
     /* places in parts of a pixel, the way to the node in float, and some additions of light */
     double rounded = 0.86 / s->sigma_px * (1.0 / s->place_parts + 0x1p-24 * travel_px) + 0x1p-22;

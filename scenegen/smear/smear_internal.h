@@ -114,10 +114,10 @@ double bst_smear_single_error(const bst_smear *s, double peak_e, double from_bor
 
 /* The last source's drawing: its place (px from the boresight), nodes, and motion over theirs. */
 typedef struct bst_smear_drawn {
-    double x, y, scale, travel_px;
+    double x, y, travel_px;
     double low[2], high[2]; /* box of its places about (x, y) */
-    const bst_smear_level *level;
-    int radius; /* of the stamp */
+    double error;           /* of its nodes and profiles, over the peak */
+    int radius;             /* of the stamp */
     bool moving;
 } bst_smear_drawn;
 

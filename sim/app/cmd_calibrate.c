@@ -99,11 +99,8 @@ static void print_calibration(const bst_obsgen_calibration *c, const bst_calibra
         "seen: %ld frames, %ld stars near the limit, %ld detected, %ld false alarms, %ld "
         "places\n",
         n->frames, n->sources, n->detected, n->false_alarms, n->places);
-    printf(
-        "threshold %+.3f, noise x %.4f, background share %.2f, crowding %.2f, slope %.2f, blends x "
-        "%.2f\n",
-        c->threshold_offset, c->noise_factor, c->background_share, c->crowding, c->slope,
-        c->blend_distance_factor);
+    printf("threshold %+.3f, noise x %.4f, background share %.2f, crowding %.2f, slope %.2f\n",
+           c->threshold_offset, c->noise_factor, c->background_share, c->crowding, c->slope);
     printf("gain at 0, 5, 20, 60 px: %.4f %.4f %.4f %.4f (loss %.2f %.2f %.2f %.2f dB)\n",
            c->gain[0], c->gain[1], c->gain[2], c->gain[3], -20.0 * log10(c->gain[0]),
            -20.0 * log10(c->gain[1]), -20.0 * log10(c->gain[2]), -20.0 * log10(c->gain[3]));

@@ -80,7 +80,7 @@ int bst_cmd_run(int argc, char **argv) {
     }
     ctx.log_level = quiet ? BST_LOG_WARNING : BST_LOG_INFO;
     sim_options.threads = (int)threads;
-    sim_options.overlap = !serial;
+    sim_options.parallel = !serial;
     sim_options.pace = true;
     sim_options.replay = replay != NULL;
     if (bst_load_check(&ctx, &load, table) != BST_OK) {

@@ -1,6 +1,7 @@
 #include "sim/device/device.h"
 
 #include <ctype.h>
+#include <pthread.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,6 +29,7 @@ struct bst_device {
     char description[4 * NAME_BYTES];
     time_t opened;
     bool pocl;
+    pthread_mutex_t lock; /* over what follows: cameras that change build programs in any thread */
     const bst_device_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
     int built_count;
     kept_program programs[MAX_PROGRAMS];
@@ -213,9 +215,11 @@ bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads, bst_
     bst_device *device = calloc(1, sizeof *device);
     bst_status status = BST_OK;
     if (!list || !device) {
-        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the OpenCL device");
-        goto exit;
+        free(list);
+        free(device);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the OpenCL device");
     }
+    pthread_mutex_init(&device->lock, NULL);
     int count = 0;
     device->opened = time(NULL);
     if ((status = bst_kernel_cache_prepare(ctx)) != BST_OK ||
@@ -294,6 +298,7 @@ void bst_device_close(bst_device *device) {
     if (device->pocl && device->built_count > 0) {
         bst_kernel_cache_settle(device->opened);
     }
+    pthread_mutex_destroy(&device->lock);
     free(device);
 }
 
@@ -386,9 +391,9 @@ static const char no_abi_warnings[] =
     "#pragma clang diagnostic ignored \"-Wpsabi\"\n"
     "#endif\n";
 
-bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
-                            const bst_device_kernel_source *const *sources, int count,
-                            const char *options, cl_program *out) {
+static bst_status build(bst_ctx *ctx, bst_device *device,
+                        const bst_device_kernel_source *const *sources, int count,
+                        const char *options, cl_program *out) {
     *out = find_program(device, sources, count, options ? options : "");
     if (*out) {
         clRetainProgram(*out);
@@ -435,5 +440,14 @@ exit:
     }
     free(texts);
     free(lines);
+    return status;
+}
+
+bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
+                            const bst_device_kernel_source *const *sources, int count,
+                            const char *options, cl_program *out) {
+    pthread_mutex_lock(&device->lock);
+    bst_status status = build(ctx, device, sources, count, options, out);
+    pthread_mutex_unlock(&device->lock);
     return status;
 }

@@ -324,12 +324,6 @@ static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
     return bst_link_create(ctx, &scenario->link, &run, &sim->link);
 }
 
-/* Whether modules of different sensors share only what is constant or locked: no device, no link,
- * and no cells of statistical stars that are drawn when first looked at. */
-static bool may_part(const bst_scenario *scenario, const bst_simulation *sim) {
-    return !sim->device && !sim->link && scenario->world.faint_stars == BST_FAINT_NONE;
-}
-
 static int processors(int threads) {
     long online = sysconf(_SC_NPROCESSORS_ONLN);
     return threads > 0 ? threads : online > 1 ? (int)online : 1;
@@ -368,18 +362,13 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
-    bool paced = options->pace && scenario->pacing.mode != BST_PACING_LOCKSTEP;
-    bool parted = false;
-    if (status == BST_OK && options->overlap && !paced && may_part(scenario, sim)) {
-        status = bst_engine_part(ctx, sim->engine, processors(options->threads), &parted);
-    }
-    if (status == BST_OK && options->overlap && !parted) {
-        status = bst_engine_overlap(ctx, sim->engine);
-    }
-    if (status == BST_OK && paced) {
+    if (status == BST_OK && options->pace && scenario->pacing.mode != BST_PACING_LOCKSTEP) {
         bst_pacing_config pacing = scenario->pacing;
         pacing.replay = options->replay;
         status = bst_engine_pace(ctx, sim->engine, &pacing);
+    }
+    if (status == BST_OK && options->parallel) {
+        status = bst_engine_parallel(ctx, sim->engine, processors(options->threads));
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
 }

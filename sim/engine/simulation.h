@@ -12,7 +12,7 @@ typedef struct bst_simulation_options {
     int threads;               /* 0: all */
     bool pace;                 /* by the scenario's "pacing"; else as lockstep */
     bool replay;               /* answers of peers will be those of a recording: no clock */
-    bool overlap;              /* as bst_engine_overlap: hooks are called by a second thread */
+    bool parallel;             /* as bst_engine_parallel: hooks are called by another thread */
     struct bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
     /* NULL, or the one module ("observer/sensor/module") that steps; in place of all others the
      * module `source`, called "observer/sensor/source", writes its inputs, which are seen at once

@@ -257,6 +257,9 @@ static void widen(bst_psf *psf, double sigma_px) {
     for (int k = 0; k < bst_psf_nodes(psf); k++) {
         psf->nodes[k].equivalent_fwhm_px =
             gaussian ? FWHM_PER_SIGMA * sigma : equivalent_fwhm(psf, k);
+        if (!gaussian) {
+            bst_psf_fit_gaussians(psf, k, &psf->nodes[k]);
+        }
     }
 }
 

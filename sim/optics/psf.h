@@ -131,4 +131,13 @@ double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px);
 double bst_psf_coloured_fwhm_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS],
                                 double x_px, double y_px);
 
+/* Integral of the squared image, 1/px^2, at a pixel place: of light of a colour that is widened by
+ * Gaussian variances along a direction and across it (px^2, >= 0) and drawn along the first by
+ * length_px, the pixel's own width included. Without either 1 / bst_psf_noise_area_px2. Of a PSF
+ * that is no Gaussian; mean over the directions of the PSF, within 3 % of the integral of
+ * |OTF|^2 exp(-4 pi^2 sigma^2 f^2) sinc^2 over the frequencies (tests/optics/test_psf_gaussians.c).
+ */
+double bst_psf_squared_image(const bst_psf *psf, const float colour[BST_PSF_COLOURS], double x_px,
+                             double y_px, double along_px2, double across_px2, double length_px);
+
 #endif

@@ -46,8 +46,13 @@ void bst_optics_grid_otf_mirror(bst_optics_grid_otf *table);
 /* Adds the value at (fx, fy): sextic (six-point Lagrange) along both axes; nothing beyond. */
 void bst_optics_grid_otf_add(const bst_optics_grid_otf *table, double fx, double fy, double out[2]);
 
+/* Gaussians that a node's squared OTF is the sum of. */
+enum { BST_PSF_GAUSSIANS = 8 };
+
 /* One node of the field grid. */
 typedef struct bst_psf_node {
+    /* squared OTF: sum of weight exp(-4 pi^2 variance f^2), of PSFs that are no Gaussians */
+    double gaussian_px2[BST_PSF_GAUSSIANS], gaussian_weight[BST_PSF_GAUSSIANS];
     double equivalent_fwhm_px;
     double centroid_px[2];               /* of a point's image, from its place */
     double sigma_px;                     /* Gaussian part: the profile itself, or 0 */
@@ -95,6 +100,9 @@ bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_psf_spectrum *spectrum, bst_psf *psf) BST_MUST_CHECK;
 bst_status bst_psf_make_sampled(bst_ctx *ctx, const bst_camera *camera,
                                 const bst_psf_samples *samples, bst_psf *psf) BST_MUST_CHECK;
+
+/* Sets the Gaussians of a node. */
+void bst_psf_fit_gaussians(const bst_psf *psf, int node, bst_psf_node *out);
 
 /* OTF of the profile (1 + (r / alpha)^2)^-beta at f >= 0. */
 double bst_optics_moffat_otf(double alpha_px, double beta, double f);

@@ -45,6 +45,9 @@ class Scenes(unittest.TestCase):
             path = random_scenes.write(folder, SEED, number, runs.BORESIGHT, "embedded", True)
             for f in self.figures(path, 4, 6):
                 middle = 1.0 if "ratio" in f else 0.0
+                # a figure is never both shown to be right and shown to be wrong
+                self.assertFalse(f["inside"] and f["beyond"], (number, f))
+                self.assertGreaterEqual(f["sigma"], 0.0, (number, f))
                 # twice the margin: with four seeds resampling finds too small an interval
                 wide = 2.0 * f["margin"]
                 self.assertLess(f["low"], middle + wide, (number, f))

@@ -248,9 +248,7 @@ static bst_status play(heard *h, int threads, const int64_t fails[4], const fake
     fake_add(&ctx, engine, spec);
     bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
     if (threads > 1) {
-        bool parted;
-        bst_assert_ok(&ctx, bst_engine_part(&ctx, engine, threads, &parted));
-        assert_true(parted);
+        bst_assert_ok(&ctx, bst_engine_parallel(&ctx, engine, threads));
     }
     const bst_engine_hooks hooks = {.user = h, .message = hear_message, .event = hear_event};
     bst_engine_set_hooks(engine, &hooks);

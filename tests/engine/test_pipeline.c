@@ -187,7 +187,7 @@ static bst_status run(scene *s, bst_ctx *ctx, bool overlap, bool awaited) {
     bst_engine_set_hooks(
         engine, &(bst_engine_hooks){.user = s, .message = keep, .event = hear, .ctx = &s->hooks});
     if (overlap) {
-        bst_assert_ok(ctx, bst_engine_overlap(ctx, engine));
+        bst_assert_ok(ctx, bst_engine_parallel(ctx, engine, 1));
     }
     bst_status status = bst_engine_run(ctx, engine, 1000);
     if (status == BST_OK) {
@@ -307,7 +307,7 @@ static void pixels_are_shown_to_who_looks_at_them(void **state) {
         bst_engine_set_hooks(
             engine, &(bst_engine_hooks){.user = &g, .message = look_at, .wants = wants_pixels});
         if (overlap) {
-            bst_assert_ok(&ctx, bst_engine_overlap(&ctx, engine));
+            bst_assert_ok(&ctx, bst_engine_parallel(&ctx, engine, 1));
         }
         bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, 1000));
         bst_engine_free(engine);

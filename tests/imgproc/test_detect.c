@@ -173,6 +173,12 @@ static void bent_path_keeps_its_mean(void **state) {
     motion = synthetic_motion(&f.s, 70, 0);
     process(&f, &motion);
     assert_true(bst_imgproc_smeared(f.ip));
+    /* one that is too long with its bend alone: no straight streak is filtered for */
+    motion = synthetic_motion(&f.s, 45, 0);
+    motion.bend_cam_rad = (bst_vec3){0, 12.0 * bst_camera_scale_rad(&f.s.camera), 0};
+    process(&f, &motion);
+    assert_true(bst_imgproc_smeared(f.ip));
+    bst_assert_close(bst_imgproc_streak_px(f.ip), 0.0, 0.0);
     end(&f);
 }
 

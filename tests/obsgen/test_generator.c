@@ -460,8 +460,85 @@ static void hits_come_at_the_detectors_rate(void **state) {
     close_scene(&s);
 }
 
+/* Light of a bright star's wings lifts noise above the threshold where no higher maximum is near.
+ */
+static void wings_make_alarms(void **state) {
+    (void)state;
+    enum { FRAMES = 150 };
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 1.0;
+    start(&s);
+    bst_camera camera = s.camera;
+    camera.optics = (bst_optics_config){.psf = BST_PSF_DIFFRACTION, .q = 1.9, .wavelengths = 4};
+    camera.optics.band_nm[0] = 500.0;
+    camera.optics.band_nm[1] = 800.0;
+    bst_psf *psf;
+    bst_assert_ok(&s.ctx, bst_psf_create(&s.ctx, &camera, &psf));
+    bst_response response;
+    const bst_response_side side = {psf, 0.0};
+    bst_response_set(&response, &side, &side, 1, 512.0, 512.0);
+    s.frame.response = &response;
+    double near[2] = {0.0, 0.0}, far[2] = {0.0, 0.0};
+    for (int bright = 0; bright < 2; bright++) {
+        for (int f = 0; f < FRAMES; f++) {
+            s.truth->count = 0;
+            add_source(&s, 1, 512.0, 512.0, electrons_of(&s, bright ? 4000.0 : 40.0));
+            bst_generator_result r = run(&s, f);
+            for (int i = 0; i < r.count; i++) {
+                const bst_detection *d = &r.items[i].detection;
+                double away = hypot(d->x_px - 512.0, d->y_px - 512.0);
+                if (r.items[i].item < 0) {
+                    (away < 24.0 ? near : far)[bright] += 1.0 / FRAMES;
+                    /* within the box in which maxima are compared the star is the higher one */
+                    assert_true(!bright || away > 7.0);
+                }
+            }
+        }
+    }
+    /* at 9 to 13 px the light is 3 to 1 of the noise, so that the rate there is up to exp(12) times
+     * that of 1 in 1024^2: a few in a hundred frames at the least; 150 frames, Poisson */
+    assert_true(near[0] < 0.04); /* 0.0017 expected */
+    assert_true(near[1] > 0.05 && near[1] < 3.0);
+    bst_assert_close(far[1], far[0], 0.5);
+    bst_psf_free(psf);
+    close_scene(&s);
+}
+
+/* With a maximum in 400 pixels and more, background and noise are those of the sky between the
+ * stars, and the threshold is that for its pixels. */
+static void crowded_frames_are_looked_at_twice(void **state) {
+    (void)state;
+    enum { WINDOW = 512 };
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 1.0;
+    start(&s);
+    s.frame.window = (bst_window){0, 0, WINDOW, WINDOW};
+    bst_generator_result r[2];
+    for (int dense = 0; dense < 2; dense++) {
+        int side = dense ? 30 : 22; /* a source in 291 pixels, in 542 */
+        s.truth->count = 0;
+        for (int i = 0; i < side * side; i++) {
+            add_source(&s, (uint32_t)i + 1, (i % side + 0.5) * WINDOW / side,
+                       (i / side + 0.5) * WINDOW / side, electrons_of(&s, 12.0));
+        }
+        r[dense] = run(&s, 0);
+    }
+    const bst_camera *c = &s.camera;
+    double dark =
+        sqrt(36.0 + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0);
+    assert_true(r[0].noise_e > 1.01 * dark && r[0].background_e > 36.1);
+    bst_assert_close(r[1].noise_e, dark, 1e-6 * dark);
+    bst_assert_close(r[1].background_e, 36.0, 1e-6);
+    assert_true(r[1].threshold_snr < r[0].threshold_snr - 0.02);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(wings_make_alarms),
+        cmocka_unit_test(crowded_frames_are_looked_at_twice),
         cmocka_unit_test(detection_follows_the_ideal_law),
         cmocka_unit_test(places_scatter_by_the_bound),
         cmocka_unit_test(errors_and_statements_have_their_own_width),

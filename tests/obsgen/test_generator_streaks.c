@@ -171,8 +171,80 @@ static void tops_at_rest_scatter_evenly(void **state) {
     close_scene(&s);
 }
 
+/* RMS errors along and across of stars of SNR 30 that moved by 8 px along x on a path with a bend
+ * across it, which telemetry knows, and that trembled. */
+static void errors_of(scene *s, double bend, double tremble, double rms[2]) {
+    enum { STEPS = 400 };
+    double x[STEPS + 1], y[STEPS + 1], sum[2] = {0.0, 0.0}, mean[2], count = 0.0;
+    for (int k = 0; k <= STEPS; k++) {
+        double u = 2.0 * k / STEPS - 1.0, phase = 2.0 * BST_PI * k / STEPS;
+        x[k] = 4.0 * u + sqrt(2.0) * tremble * sin(37.0 * phase);
+        y[k] = 0.5 * bend * (3.0 * u * u - 1.0) + sqrt(2.0) * tremble * cos(53.0 * phase);
+    }
+    s->frame.streak_dx_px = 8.0;
+    s->frame.bend_y_px = bend;
+    s->frame.path_x_px = x;
+    s->frame.path_y_px = y;
+    s->frame.path_count = STEPS + 1;
+    fill(s, 60.0);
+    for (int i = 0; i < s->truth->count; i++) {
+        s->truth->items[i].x_start_px -= 4.0;
+        s->truth->items[i].x_end_px += 4.0;
+    }
+    for (int n = 0; n < 6; n++) {
+        bst_generator_result r = run(s, n);
+        double more[2] = {0.0, 0.0}, all = 0.0;
+        mean[0] = mean[1] = 0.0;
+        for (int pass = 0; pass < 2; pass++) { /* what all have in common is no part of it */
+            for (int i = 0; i < r.count; i++) {
+                const bst_truth_item *t = &s->truth->items[r.items[i].item];
+                double dx = r.items[i].detection.x_px - t->x_centroid_px;
+                double dy = r.items[i].detection.y_px - t->y_centroid_px;
+                if (pass == 0) {
+                    mean[0] += dx / r.count;
+                    mean[1] += dy / r.count;
+                } else {
+                    more[0] += (dx - mean[0]) * (dx - mean[0]);
+                    more[1] += (dy - mean[1]) * (dy - mean[1]);
+                    all += 1.0;
+                }
+            }
+        }
+        sum[0] += more[0];
+        sum[1] += more[1];
+        count += all;
+    }
+    assert_true(count > 5000.0);
+    rms[0] = sqrt(sum[0] / count);
+    rms[1] = sqrt(sum[1] / count);
+}
+
+/* A bend that telemetry knows is drawn by what is fitted and makes no place worse; trembling, which
+ * it does not know, widens the image on both axes. */
+static void places_widen_by_what_is_not_known_of_the_path(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    double straight[2], bent[2], trembling[2], rms = 0.4;
+    errors_of(&s, 0.0, 0.0, straight);
+    errors_of(&s, 1.5, 0.0, bent);
+    errors_of(&s, 0.0, rms, trembling);
+    double sigma2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
+    double wider = sqrt((sigma2 + rms * rms) / sigma2);
+    /* 5400 errors each: 1 % */
+    bst_assert_close(bent[0] / straight[0], 1.0, 0.04);
+    bst_assert_close(bent[1] / straight[1], 1.0, 0.04);
+    /* of a line in noise: along by its ends, the product of both widths; across by the width of its
+     * flank and the noise in it, the 3/2 power; counted light makes it less */
+    bst_assert_close(trembling[0] / straight[0], wider, 0.06);
+    bst_assert_close(trembling[1] / straight[1], pow(wider, 1.5), 0.06);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(places_widen_by_what_is_not_known_of_the_path),
         cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(the_edge_cuts),
         cmocka_unit_test(long_streaks_are_seen_in_parts),

@@ -84,6 +84,17 @@ static void squares_of(const fine_image *m, double length, double out[3]) {
     free(row);
 }
 
+/* Sum of the products of an image with itself, moved by so many fine pixels. */
+static double correlation(const fine_image *m, int dx, int dy) {
+    double sum = 0.0;
+    for (int j = dy; j < m->side; j++) {
+        for (int i = dx; i < m->side; i++) {
+            sum += m->share[j * m->side + i] * m->share[(j - dy) * m->side + i - dx];
+        }
+    }
+    return sum / ((double)m->per_px * m->per_px);
+}
+
 static void a_psf_goes_by_its_own_image(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -132,6 +143,20 @@ static void a_psf_goes_by_its_own_image(void **state) {
                          0.015 * plain);
         assert_true(plain > 1.025 * sqrt(squares[0]));
     }
+    /* beside its place the output is the correlation of the image with itself, which falls off
+     * faster than a Gaussian's of the same area */
+    squares_of(&m, 0.0, squares);
+    const int steps[][2] = {{4, 0}, {3, 3}, {8, 0}, {6, 6}, {14, 0}, {10, 10}};
+    for (int n = 0; n < 6; n++) {
+        double x = (double)steps[n][0] / m.per_px, y = (double)steps[n][1] / m.per_px;
+        double expected = correlation(&m, steps[n][0], steps[n][1]) / squares[0];
+        /* of the mean over the directions along the pixels and across them are 0.01 off */
+        bst_assert_close(bst_response_falloff(&r, x, y, 0.0), expected, 0.012);
+    }
+    double sigma = sqrt(r.both.across_px * r.both.along_px);
+    assert_true(bst_response_falloff(&r, 3.5, 0.0, 0.0) <
+                bst_matched_falloff(3.5, 0.0, 0.0, sigma) - 0.01);
+    bst_assert_close(bst_response_falloff(&r, 0.0, 0.0, 6.0), 1.0, 1e-6);
     free(m.share);
     bst_psf_free(psf);
 }

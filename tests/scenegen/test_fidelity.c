@@ -3,6 +3,7 @@
 
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
+#include "scenegen/scene_plan.h"
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
@@ -356,8 +357,39 @@ static void places_far_from_the_origin(void **state) {
     bst_renderer_free(r);
 }
 
+/* Where a frame may have few nodes, sources are coarser, and the statistics show both: that nodes
+ * were bounded, and, of such an image, that the tolerance was missed. */
+static void few_nodes_are_flagged(void **state) {
+    fixture *f = *state;
+    const scene_motion fast = {.x_px = 100, .y_px = 20, .duration_s = 1, .samples = 201};
+    scene s = open_scene(f, scene_camera(128, 64), &fast, 6, 3.0);
+    bst_renderer_options options = bst_renderer_default_options();
+    outcome free_of_bounds = render(f, &s, &options);
+    assert_false(free_of_bounds.stats.nodes_bounded);
+    assert_false(free_of_bounds.stats.tolerance_missed);
+    options.most_nodes = free_of_bounds.stats.nodes;
+    assert_false(render(f, &s, &options).stats.nodes_bounded);
+    long long before = free_of_bounds.stats.nodes;
+    for (int most = 256; most >= 128; most /= 2) {
+        options.most_nodes = most;
+        outcome o = render(f, &s, &options);
+        assert_true(o.stats.nodes_bounded);
+        assert_true(o.stats.nodes <= BST_SCENE_SLEW * most + (long long)BST_BLOCK * s.count);
+        assert_true(o.stats.nodes <= before);
+        assert_true(o.stats.predicted_sigma >= o.sigma);
+        assert_true(o.stats.tolerance_missed ==
+                    (o.stats.predicted_sigma > options.tolerance_sigma));
+        before = o.stats.nodes;
+    }
+    /* 38 blocks of 16 nodes for 6 sources */
+    assert_true(before < free_of_bounds.stats.nodes);
+    assert_true(render(f, &s, &options).stats.tolerance_missed);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(few_nodes_are_flagged),
         cmocka_unit_test(predicted_errors_hold),
         cmocka_unit_test(predicted_errors_of_crowds_hold),
         cmocka_unit_test(auto_takes_the_cheaper_motion),

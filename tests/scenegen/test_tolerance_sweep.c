@@ -1,10 +1,11 @@
 /* The tolerance is a promise about the image: random scenes of all kinds of motion and PSF.
  *
  * In every scene: measured error <= predicted error <= tolerance. A scene that cannot be drawn to
- * the tolerance with the nodes that a frame may have says so, and its prediction still holds. The
+ * the tolerance, with the nodes that a frame may have or on the grid of the Fourier path, is
+ * flagged, and its prediction still holds: at most one in thirty. The
  * median of predicted over measured error is at most 3, and no scene has more than
  * BST_SCENE_MOST_NODES nodes and a block for each source. Usage: test_tolerance_sweep [slow]
- * [scenes [first scene]]. */
+ * [scenes [first scene [seed]]]; slow: 200 scenes of each of two seeds. */
 #include <string.h>
 
 #include "scenegen/reference.h"
@@ -16,6 +17,8 @@
 #include "tests/test_support.h"
 
 static int scenes = 12, first_scene = 0, stride = 7; /* all motions and PSFs */
+static uint64_t seed = 0;
+enum { SCENES_OF_A_SEED = 200 };
 
 typedef enum motion_kind {
     STARE,
@@ -232,7 +235,9 @@ static void make_sources(scene *s) {
 static void open_scene(fixture *f, scene *s, int index) {
     static const double tolerances[] = {0.02, 0.05, 0.05, 0.2};
     memset(s, 0, sizeof *s);
-    s->key = bst_rng_make_key((uint64_t)index, 0, "test", "tolerance sweep");
+    uint64_t own_seed = seed + (uint64_t)(index / SCENES_OF_A_SEED);
+    index %= SCENES_OF_A_SEED;
+    s->key = bst_rng_make_key((uint64_t)index, own_seed, "test", "tolerance sweep");
     s->motion = (motion_kind)(index % MOTIONS);
     s->psf_kind = (psf_kind)(index / MOTIONS * 2 + index % MOTIONS) % PSFS;
     s->camera = scene_camera(WIDTH, HEIGHT);
@@ -277,7 +282,7 @@ static double largest_error(const scene *s, const float *fast, const double *ref
 typedef struct outcome {
     double measured, predicted;
     long long nodes;
-    bool missed;
+    bool missed, bounded;
 } outcome;
 
 static outcome render(fixture *f, scene *s) {
@@ -302,7 +307,8 @@ static outcome render(fixture *f, scene *s) {
     outcome o = {.measured = largest_error(s, fast, reference),
                  .predicted = stats.predicted_sigma,
                  .nodes = stats.nodes,
-                 .missed = stats.tolerance_missed};
+                 .missed = stats.tolerance_missed,
+                 .bounded = stats.nodes_bounded};
     free(fast);
     free(reference);
     bst_renderer_free(r);
@@ -335,17 +341,19 @@ static void the_tolerance_is_kept(void **state) {
             s.window.width, s.tolerance_sigma, o.measured, o.predicted, o.predicted / o.measured,
             o.nodes, bad ? " MEASURED > PREDICTED" : "", over ? " PREDICTED > TOLERANCE" : "");
         broken += bad;
-        above += over && !o.missed;
+        /* only the grid and the bound of nodes excuse it */
+        above += over && !(o.missed && (o.bounded || s.psf_kind != GAUSSIAN));
         missed += o.missed;
         close_scene(&s);
     }
     qsort(ratio, (size_t)lit, sizeof *ratio, ascending);
     print_message(
-        "%d scenes: %d above the prediction, %d predicted above the tolerance, %d said "
-        "so; predicted / measured: least %.2f, median %.2f, largest %.2f\n",
+        "%d scenes: %d above the prediction, %d predicted above the tolerance unexcused, %d "
+        "flagged; predicted / measured: least %.2f, median %.2f, largest %.2f\n",
         scenes, broken, above, missed, ratio[0], ratio[lit / 2], ratio[lit - 1]);
     assert_int_equal(broken, 0);
     assert_int_equal(above, 0);
+    assert_true(30 * missed <= scenes);
     if (scenes >= 100) { /* enough for a median */
         assert_true(ratio[lit / 2] <= 3.0);
     }
@@ -355,12 +363,13 @@ static void the_tolerance_is_kept(void **state) {
 int main(int argc, char **argv) {
     int next = 1;
     if (argc > next && strcmp(argv[next], "slow") == 0) {
-        scenes = 200;
+        scenes = 2 * SCENES_OF_A_SEED;
         stride = 1;
         next++;
     }
     scenes = argc > next ? atoi(argv[next]) : scenes;
     first_scene = argc > next + 1 ? atoi(argv[next + 1]) : first_scene;
+    seed = argc > next + 2 ? strtoull(argv[next + 2], NULL, 10) : seed;
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_tolerance_is_kept)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

@@ -8,8 +8,6 @@
 /* SNR about the threshold in which Pd is fitted, stars whose mean place is one, grid of places. */
 static const double PD_REACH = 4.0;
 enum { LEAST_COMMON = 8, GRID = 48, CAPACITY = 4096 };
-/* Sources that count for blends. */
-static const double BLEND_SNR = 10.0;
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 bst_status bst_calibration_fitter_create(bst_ctx *ctx, bst_calibration_fitter **out) {
@@ -20,12 +18,7 @@ bst_status bst_calibration_fitter_create(bst_ctx *ctx, bst_calibration_fitter **
 void bst_calibration_fitter_free(bst_calibration_fitter *c) {
     if (c) {
         bst_generator_free(c->theory);
-        for (int i = 0; i < CALIBRATE_BLENDS; i++) {
-            bst_generator_free(c->blended[i]);
-        }
-        free(c->made);
         bst_pairing_free(&c->pairing);
-        bst_pairing_free(&c->blend_pairing);
         free(c->trials);
         free(c->alarm_energy);
         free(c);
@@ -48,21 +41,8 @@ bst_status bst_calibration_fitter_begin(bst_ctx *ctx, bst_calibration_fitter *c,
     c->sigma_px = hypot(bst_camera_psf_sigma_px(path->camera), path->jitter_px);
     bst_crlb_table_init(&c->bound, c->sigma_px);
     bst_rng_key key = bst_rng_make_key(1, 0, "calibration", "observations");
-    BST_TRY(
-        bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key, &c->theory));
-    bst_obsgen_calibration_theory(&theory);
-    for (int i = 0; i < CALIBRATE_BLENDS; i++) {
-        bst_generator_free(c->blended[i]);
-        c->blended[i] = NULL;
-        theory.blend_distance_factor = calibrate_blend_factors[i];
-        BST_TRY(bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key,
-                                     &c->blended[i]));
-    }
-    if (!c->made) {
-        c->made = malloc(sizeof *c->made + CAPACITY * sizeof c->made->items[0]);
-    }
-    return c->made ? BST_OK
-                   : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", CAPACITY);
+    return bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key,
+                                &c->theory);
 }
 
 static bst_status grow(bst_ctx *ctx, void **items, long count, long *room, size_t bytes) {
@@ -278,46 +258,6 @@ static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_tr
     return BST_OK;
 }
 
-/* Whether a source that would be seen alone has a brighter one so near that both may be one. */
-static bool is_beside(const bst_truth *truth, int i, double reach) {
-    const bst_truth_item *t = &truth->items[i];
-    if (!(t->snr >= BLEND_SNR) || !(t->flags & BST_TRUTH_IN_FIELD) ||
-        (t->flags & BST_TRUTH_OCCULTED)) {
-        return false;
-    }
-    for (int k = 0; k < truth->count; k++) {
-        const bst_truth_item *o = &truth->items[k];
-        if (k != i && o->snr > t->snr && fabs(o->x_centroid_px - t->x_centroid_px) < reach &&
-            fabs(o->y_centroid_px - t->y_centroid_px) < reach) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* Counts what is told apart in the image and at each distance of blends, paired alike. */
-static bst_status add_blends(bst_ctx *ctx, bst_calibration_fitter *c,
-                             const bst_generator_frame *frame, double fwhm) {
-    const bst_truth *truth = frame->truth;
-    double reach = 4.0 * fwhm;
-    for (int n = 0; n < CALIBRATE_BLENDS; n++) {
-        bst_generator_result made;
-        BST_TRY(bst_generator_run(ctx, c->blended[n], frame, &made));
-        c->made->count = made.count;
-        for (int i = 0; i < made.count; i++) {
-            c->made->items[i] = made.items[i].detection;
-        }
-        BST_TRY(bst_pairing_make(ctx, &c->blend_pairing, truth, c->made, fwhm));
-        for (int i = 0; i < truth->count; i++) {
-            bool beside =
-                (n == 0 || c->blend_pairing.detection_of[i] >= 0) && is_beside(truth, i, reach);
-            c->beside[CALIBRATE_BLENDS] += n == 0 && beside && c->pairing.detection_of[i] >= 0;
-            c->beside[n] += beside && c->blend_pairing.detection_of[i] >= 0;
-        }
-    }
-    return BST_OK;
-}
-
 bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *c,
                                       const bst_truth *truth, const bst_detections *detections,
                                       double exposure_s) {
@@ -341,7 +281,6 @@ bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *c,
     add_noise(c, detections, &theory);
     double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
-    BST_TRY(add_blends(ctx, c, &frame, fwhm));
     /* first what all have in common, then each */
     common_error common = {0.0, 0.0, 0.0, 0};
     for (int pass = 0; pass < 2; pass++) {

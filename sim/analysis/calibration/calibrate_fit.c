@@ -99,23 +99,6 @@ static void fit_detection(const bst_calibration_fitter *c, bst_obsgen_calibratio
     }
 }
 
-/* The distance at which the generator tells as many apart as the image path; fewer, the further. */
-static double fit_blends(const bst_calibration_fitter *c) {
-    double image = (double)c->beside[CALIBRATE_BLENDS];
-    if (c->beside[CALIBRATE_BLENDS] < LEAST_SOURCES) {
-        return 1.0;
-    }
-    for (int n = 1; n < CALIBRATE_BLENDS; n++) {
-        double near = (double)c->beside[n - 1], far = (double)c->beside[n];
-        if (image >= far && near > far) {
-            double part = fmin((near - image) / (near - far), 1.0);
-            return calibrate_blend_factors[n - 1] +
-                   fmax(part, 0.0) * (calibrate_blend_factors[n] - calibrate_blend_factors[n - 1]);
-        }
-    }
-    return calibrate_blend_factors[CALIBRATE_BLENDS - 1];
-}
-
 /* Standard deviation of normal errors of which those beyond CALIBRATE_MOST_SIGMAS were left out,
  * from the mean square of the rest: f^2 (1 - 2 c phi(c) / (2 Phi(c) - 1)), c =
  * CALIBRATE_MOST_SIGMAS / f. */
@@ -155,7 +138,6 @@ bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *c,
                         c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
     }
     fit_detection(c, out);
-    out->blend_distance_factor = fit_blends(c);
     fit_places(c->across, out->across_factor);
     fit_places(c->along, out->along_factor);
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {

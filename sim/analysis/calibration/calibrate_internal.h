@@ -6,9 +6,6 @@
 #include "sim/analysis/calibration/calibrate.h"
 #include "sim/analysis/calibration/pairing.h"
 
-/* Distances of blends that are tried, over theory's. */
-enum { CALIBRATE_BLENDS = 5 };
-static const double calibrate_blend_factors[CALIBRATE_BLENDS] = {0.7, 0.9, 1.1, 1.3, 1.5};
 /* Errors of places over the bound that count. */
 static const double CALIBRATE_MOST_SIGMAS = 2.5;
 
@@ -27,13 +24,10 @@ typedef struct calibrate_mean {
 
 struct bst_calibration_fitter {
     bst_calibration_path path;
-    bst_generator *theory, *blended[CALIBRATE_BLENDS];
-    bst_detections *made; /* of one of them */
-    long beside[CALIBRATE_BLENDS +
-                1]; /* sources beside a brighter one that were found: in images, by each */
+    bst_generator *theory;
     double sigma_px;
     bst_crlb_table bound;
-    bst_pairing pairing, blend_pairing;
+    bst_pairing pairing;
     calibrate_trial *trials;
     long trial_count, trial_room;
     double *alarm_energy; /* (u^2 - T^2) / 2 */

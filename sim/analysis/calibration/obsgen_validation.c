@@ -16,6 +16,9 @@
 
 /* Edges of the bins of SNR; sources below the first are not looked for. */
 static const double edges[] = {3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0, 30.0, 1e9};
+/* A figure that is further off than its margin and so many standard deviations is wrong; one that
+ * is nearer, but whose interval is not inside, needs more runs. */
+static const double BEYOND_SIGMAS = 2.0;
 enum { BINS = sizeof edges / sizeof *edges - 1, RESAMPLES = 2000, LEAST_TRIALS = 200 };
 
 /* Sums of one run: what a figure is the ratio of. */
@@ -141,30 +144,39 @@ static int ascending(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* 95 % interval by resampling the runs of both sides. */
-static void bootstrap(const figure_of *f, const run_sums *image, const run_sums *generator,
-                      int seeds, int *chosen, double interval[2]) {
+/* What resampling says of a figure. */
+typedef struct sampling {
+    double low, high; /* 95 % interval */
+    double sigma;     /* standard deviation */
+} sampling;
+
+/* Resamples the runs. Both sides have the same runs in a sample: run i has one seed, and so the
+ * same cue, drift, jitter and stars, on both, which their difference does not hold. */
+static sampling bootstrap(const figure_of *f, const run_sums *image, const run_sums *generator,
+                          int seeds, int *chosen) {
     static const double low = 0.025;
-    double values[RESAMPLES];
+    double values[RESAMPLES], sum = 0.0, square = 0.0;
     int n = 0;
     bst_rng_key key = bst_rng_make_key(1, 0, "equivalence", f->name);
     for (int r = 0; r < RESAMPLES; r++) {
-        double side[2];
-        for (int g = 0; g < 2; g++) {
-            for (int i = 0; i < seeds; i++) {
-                double u = bst_rng_uniform(key, (uint64_t)(2 * r + g), (uint64_t)i);
-                chosen[i] = (int)(u * seeds);
-            }
-            side[g] = value_of(f, g ? generator : image, chosen, seeds);
+        for (int i = 0; i < seeds; i++) {
+            chosen[i] = (int)(bst_rng_uniform(key, (uint64_t)r, (uint64_t)i) * seeds);
         }
-        double value = f->ratio ? side[1] / side[0] : side[1] - side[0];
+        double a = value_of(f, image, chosen, seeds), b = value_of(f, generator, chosen, seeds);
+        double value = f->ratio ? b / a : b - a;
         if (isfinite(value)) {
             values[n++] = value;
+            sum += value;
+            square += value * value;
         }
     }
+    if (n == 0) {
+        return (sampling){NAN, NAN, NAN};
+    }
     qsort(values, (size_t)n, sizeof *values, ascending);
-    interval[0] = n > 0 ? values[(int)(low * (n - 1))] : NAN;
-    interval[1] = n > 0 ? values[(int)((1.0 - low) * (n - 1))] : NAN;
+    double mean = sum / n;
+    return (sampling){values[(int)(low * (n - 1))], values[(int)((1.0 - low) * (n - 1))],
+                      sqrt(fmax(square / n - mean * mean, 0.0))};
 }
 
 static bool judge(const figure_of *f, const run_sums *image, const run_sums *generator, int seeds,
@@ -173,21 +185,26 @@ static bool judge(const figure_of *f, const run_sums *image, const run_sums *gen
     if (!isfinite(a) || !isfinite(b) || a == 0.0) {
         return true;
     }
-    double interval[2], middle = f->ratio ? 1.0 : 0.0;
-    bootstrap(f, image, generator, seeds, chosen, interval);
-    bool inside = interval[0] >= middle - f->margin && interval[1] <= middle + f->margin;
+    double middle = f->ratio ? 1.0 : 0.0, value = f->ratio ? b / a : b - a;
+    sampling s = bootstrap(f, image, generator, seeds, chosen);
+    bool inside = s.low >= middle - f->margin && s.high <= middle + f->margin;
+    bool beyond = fabs(value - middle) > f->margin + BEYOND_SIGMAS * s.sigma;
     printf("  %-22s %9.4f %9.4f  %s %7.4f  [%7.4f, %7.4f]  within %.2f: %s\n", f->name, a, b,
-           f->ratio ? "ratio     " : "difference", f->ratio ? b / a : b - a, interval[0],
-           interval[1], f->margin, inside ? "yes" : "no");
+           f->ratio ? "ratio     " : "difference", value, s.low, s.high, f->margin,
+           inside   ? "yes"
+           : beyond ? "no"
+                    : "not shown");
     cJSON *item = cJSON_CreateObject();
     cJSON_AddStringToObject(item, "name", f->name);
     cJSON_AddNumberToObject(item, "image", a);
     cJSON_AddNumberToObject(item, "generator", b);
-    cJSON_AddNumberToObject(item, f->ratio ? "ratio" : "difference", f->ratio ? b / a : b - a);
-    cJSON_AddNumberToObject(item, "low", interval[0]);
-    cJSON_AddNumberToObject(item, "high", interval[1]);
+    cJSON_AddNumberToObject(item, f->ratio ? "ratio" : "difference", value);
+    cJSON_AddNumberToObject(item, "low", s.low);
+    cJSON_AddNumberToObject(item, "high", s.high);
+    cJSON_AddNumberToObject(item, "sigma", s.sigma);
     cJSON_AddNumberToObject(item, "margin", f->margin);
     cJSON_AddBoolToObject(item, "inside", inside);
+    cJSON_AddBoolToObject(item, "beyond", beyond);
     cJSON_AddItemToArray(list, item);
     return inside;
 }

@@ -34,13 +34,19 @@ double bst_step_seconds(const struct bst_step *step) {
 }
 
 int bst_step_lane(const struct bst_step *step) {
-    return step->job ? bst_overlap_lane(step->job) : 0;
+    return step->lane;
 }
 
-bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, const void *payload,
-                             int64_t written_tick, int64_t sequence) {
-    bst_sample sample = {payload, written_tick, sequence, false};
-    if (port->max_age_ticks > 0 && step->tick - written_tick > port->max_age_ticks) {
+static const bst_sample no_sample = {NULL, 0, -1, true};
+
+/* The message at a position of a port's log, -1: none. */
+static bst_sample sample_at(struct bst_step *step, const port_state *port, int64_t position) {
+    if (position < 0) {
+        return no_sample;
+    }
+    const slot *s = bst_log_slot(port->log, position);
+    bst_sample sample = {s->payload, s->written_tick, s->sequence, false};
+    if (port->max_age_ticks > 0 && step->tick - s->written_tick > port->max_age_ticks) {
         sample.stale = true;
         if (!step->ahead) {
             bst_engine_count(step->engine, "stale_input");
@@ -49,85 +55,31 @@ bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, cons
     return sample;
 }
 
-static bst_sample sample_at(struct bst_step *step, const channel *ch, const port_state *port,
-                            int64_t sequence) {
-    const bst_sample none = {NULL, 0, -1, true};
-    if (sequence < 0) {
-        return none;
-    }
-    const slot *s = bst_engine_slot(ch, sequence);
-    return bst_engine_sample(step, port, s->payload, s->written_tick, sequence);
-}
-
-int64_t bst_engine_newest(const channel *ch, const port_state *port, int64_t tick) {
-    int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
-    for (int64_t sequence = ch->written - 1; sequence >= oldest; sequence--) {
-        if (bst_engine_slot(ch, sequence)->written_tick + port->delay_ticks <= tick) {
-            return sequence;
-        }
-    }
-    return -1;
-}
-
-int64_t bst_engine_unread(bst_engine *engine, const channel *ch, port_state *port, int64_t tick) {
-    int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
-    while (port->cursor < oldest) {
-        port->cursor++;
-        bst_engine_count(engine, "queue_overflow");
-    }
-    return port->cursor < ch->written &&
-                   bst_engine_slot(ch, port->cursor)->written_tick + port->delay_ticks <= tick
-               ? port->cursor
-               : -1;
-}
-
-bool bst_engine_pass_trigger(const channel *ch, port_state *port, int64_t tick) {
-    int64_t before = port->trigger_cursor;
-    if (port->trigger_cursor < ch->written - ch->depth) {
-        port->trigger_cursor = ch->written - ch->depth;
-    }
-    while (port->trigger_cursor < ch->written &&
-           bst_engine_slot(ch, port->trigger_cursor)->written_tick + port->delay_ticks <= tick) {
-        port->trigger_cursor++;
-    }
-    return port->trigger_cursor > before;
-}
-
 bst_sample bst_step_latest(struct bst_step *step, int port_index) {
-    port_state *port = &step->self->ports[port_index];
-    if (port->channel < 0) {
-        return (bst_sample){NULL, 0, -1, true};
+    const port_state *port = &step->self->ports[port_index];
+    if (!port->log) {
+        return no_sample;
     }
-    const channel *ch = &step->engine->channels[port->channel];
-    if (step->job && !ch->apart) {
-        return bst_overlap_latest(step, port_index);
-    }
-    if (step->self->reads_aside) {
-        return bst_islands_latest(step, port_index);
-    }
-    const slot *s = bst_engine_slot(ch, ch->written - 1);
-    if (ch->written > 0 && port->max_age_ticks == 0 &&
-        s->written_tick + port->delay_ticks <= step->tick) {
-        return (bst_sample){s->payload, s->written_tick, ch->written - 1, false}; /* as mostly */
-    }
-    return sample_at(step, ch, port, bst_engine_newest(ch, port, step->tick));
+    bst_log_lock(port->log);
+    bst_sample sample =
+        sample_at(step, port, bst_log_newest(port->log, port->delay_ticks, step->tick));
+    bst_log_unlock(port->log);
+    return sample;
 }
 
 bst_sample bst_step_next(struct bst_step *step, int port_index) {
     port_state *port = &step->self->ports[port_index];
-    if (port->channel < 0) {
-        return (bst_sample){NULL, 0, -1, true};
+    if (!port->log) {
+        return no_sample;
     }
-    const channel *ch = &step->engine->channels[port->channel];
-    if (step->job && !ch->apart) {
-        return bst_overlap_next(step, port_index);
-    }
-    if (step->self->reads_aside) {
-        return bst_islands_next(step, port_index);
-    }
-    int64_t sequence = bst_engine_unread(step->engine, ch, port, step->tick);
-    port->cursor += sequence >= 0;
-    return sample_at(step, ch, port, sequence);
+    int64_t *cursor = step->ahead ? &step->ahead[port_index] : &port->cursor;
+    bst_log_lock(port->log);
+    int64_t position =
+        bst_log_unread(step->engine, port->log, cursor, port->delay_ticks, step->tick);
+    *cursor += position >= 0;
+    bst_sample sample = sample_at(step, port, position);
+    bst_log_unlock(port->log);
+    return sample;
 }
 
 bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine, bst_status status) {
@@ -161,15 +113,12 @@ void bst_step_promise(struct bst_step *step, int port_index, int64_t tick) {
 /* Of a message that is shown without what it owns. */
 enum { BARE_BYTES = 256 };
 
-/* Shows a message to the hooks. */
-static bst_status tell(struct bst_step *step, channel *ch, const void *payload) {
+/* Shows a message to the observers, or notes it down for them. */
+static bst_status notify(struct bst_step *step, channel *ch, const void *payload) {
     bst_engine *engine = step->engine;
     const bst_engine_hooks *hooks = &engine->hooks;
-    if (!hooks->message || step->tick < ch->mark.unwanted_before) {
-        return BST_OK;
-    }
-    if (hooks->wants &&
-        !hooks->wants(hooks->user, ch->scope, ch->type->name, payload, step->tick, &ch->mark)) {
+    if (!hooks->message || step->tick < ch->mark.unwanted_before ||
+        (hooks->wants && !bst_observers_want(engine, ch, payload, step->tick))) {
         return BST_OK;
     }
     _Alignas(max_align_t) char bare[BARE_BYTES];
@@ -179,41 +128,49 @@ static bst_status tell(struct bst_step *step, channel *ch, const void *payload) 
         ch->type->release(bare); /* the copy's */
         payload = bare;
     }
-    if (engine->islands) {
-        return bst_islands_message(step, ch, payload);
+    if (engine->executor) {
+        return bst_observers_message(step, ch, payload);
     }
-    return engine->overlap && !step->job
-               ? bst_overlap_message(step->ctx, engine, ch, payload, step->tick)
-               : bst_engine_heard(
-                     step->ctx, engine,
-                     hooks->message(hooks->user, ch->scope, ch->type->name, payload, step->tick));
+    return bst_engine_heard(
+        step->ctx, engine,
+        hooks->message(hooks->user, ch->scope, ch->type->name, payload, step->tick));
+}
+
+/* Has an input's instance step when a message becomes visible to it. */
+static bst_status reach(struct bst_step *step, const channel *ch, const slot *s,
+                        channel_reader reader) {
+    bst_engine *engine = step->engine;
+    const instance *other = engine->instances[reader.instance];
+    const port_state *port = &other->ports[reader.port];
+    if (port->copies != BST_COPY_NONE) {
+        return bst_process_reach(step, ch, s, reader);
+    }
+    if (bst_instance_port(other, reader.port)->flags & BST_PORT_TRIGGER) {
+        int64_t visible = step->tick + port->delay_ticks;
+        if (visible < engine->due[reader.instance]) {
+            bst_engine_set_due(engine, reader.instance, visible);
+        }
+    }
+    return BST_OK;
 }
 
 static bst_status publish(struct bst_step *step, int port_index) {
     bst_engine *engine = step->engine;
     channel *ch = &engine->channels[step->self->ports[port_index].channel];
-    slot *s = &ch->slots[ch->head];
+    slot *s = &ch->log.slots[ch->log.head];
     s->written_tick = step->tick;
+    s->sequence = ch->log.written;
     s->owned = ch->type->release != NULL;
-    ch->written++;
-    ch->head = ch->head + 1 == ch->depth ? 0 : ch->head + 1;
+    bst_log_advance(&ch->log);
     step->self->ports[port_index].writing = false;
     step->writing--;
     if (ch->paced) {
         bst_pacing_done(step, ch, s->payload);
     }
-    for (int r = 0; ch->triggers && r < ch->reader_count; r++) {
-        int index = ch->readers[r].instance, p = ch->readers[r].port;
-        const instance *other = engine->instances[index];
-        /* a step behind the stepping thread sees to its own readers */
-        if (!step->job && (bst_instance_port(other, p)->flags & BST_PORT_TRIGGER)) {
-            int64_t visible = step->tick + other->ports[p].delay_ticks;
-            if (visible < engine->due[index]) {
-                bst_engine_set_due(engine, index, visible);
-            }
-        }
+    for (int r = 0; (ch->triggers || ch->crosses) && r < ch->reader_count; r++) {
+        BST_TRY(reach(step, ch, s, ch->readers[r]));
     }
-    return tell(step, ch, s->payload);
+    return notify(step, ch, s->payload);
 }
 
 bst_status bst_engine_commit(struct bst_step *step) {
@@ -239,10 +196,10 @@ void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
             step->hook_status = status;
         }
     }
-    slot *s = &ch->slots[ch->head];
+    slot *s = &ch->log.slots[ch->log.head];
     release_slot(ch, s);
-    if (ch->type->kind == BST_CHANNEL_LATEST && ch->depth > 1 && ch->written > 0) {
-        memcpy(s->payload, bst_engine_slot(ch, ch->written - 1)->payload, ch->payload_bytes);
+    if (ch->type->kind == BST_CHANNEL_LATEST && ch->log.depth > 1 && ch->log.written > 0) {
+        memcpy(s->payload, bst_log_slot(&ch->log, ch->log.written - 1)->payload, ch->payload_bytes);
     }
     port->writing = true;
     step->writing++;
@@ -258,35 +215,35 @@ void *bst_step_modify(struct bst_step *step, int port_index) {
         return NULL;
     }
     const channel *ch = &step->engine->channels[port->channel];
-    if (ch->written == 0) {
+    if (ch->log.written == 0) {
         return NULL;
     }
-    slot *s = bst_engine_slot(ch, ch->written - 1);
+    slot *s = bst_log_slot(&ch->log, ch->log.written - 1);
     return s->written_tick == step->tick ? s->payload : NULL;
 }
 
-/* Frames go back to their pool as soon as every reader has read them. */
-void bst_engine_release_read(bst_engine *engine) {
+/* Frames go back to their pool as soon as every reader has read them, or has a copy. */
+void bst_engine_release_read(bst_engine *engine, int process) {
     for (int k = 0; k < engine->releasable_count; k++) {
         channel *ch = &engine->channels[engine->releasable[k]];
-        if (ch->released == ch->written) {
+        if (ch->process != process || ch->released == ch->log.written) {
             continue;
         }
-        int64_t read_by_all = ch->written;
+        int64_t read_by_all = ch->log.written;
         for (int r = 0; r < ch->reader_count; r++) {
             const instance *other = engine->instances[ch->readers[r].instance];
             int p = ch->readers[r].port;
-            if (bst_instance_port(other, p)->direction == BST_PORT_IN &&
-                other->ports[p].cursor < read_by_all) {
-                read_by_all = other->ports[p].cursor;
+            const port_state *port = &other->ports[p];
+            int64_t read = port->copies == BST_COPY_NONE ? port->cursor : port->copied;
+            if (bst_instance_port(other, p)->direction == BST_PORT_IN && read < read_by_all) {
+                read_by_all = read;
             }
         }
-        int64_t oldest = ch->written - ch->depth;
-        if (ch->released < oldest) {
-            ch->released = oldest; /* writing over them has let them go */
+        if (ch->released < ch->log.oldest) {
+            ch->released = ch->log.oldest; /* writing over them has let them go */
         }
         for (; ch->released < read_by_all; ch->released++) {
-            release_slot(ch, bst_engine_slot(ch, ch->released));
+            release_slot(ch, bst_log_slot(&ch->log, ch->released));
         }
     }
 }
@@ -309,13 +266,11 @@ void bst_step_event(struct bst_step *step, const char *kind, const char *format,
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    bst_status status =
-        engine->islands ? bst_islands_event(step, kind, text)
-        : engine->overlap && !step->job
-            ? bst_overlap_event(step->ctx, engine, step->tick, step->self->name, kind, text)
-            : bst_engine_heard(step->ctx, engine,
-                               engine->hooks.event(engine->hooks.user, step->tick, step->self->name,
-                                                   kind, text));
+    bst_status status = engine->executor
+                            ? bst_observers_event(step, kind, text)
+                            : bst_engine_heard(step->ctx, engine,
+                                               engine->hooks.event(engine->hooks.user, step->tick,
+                                                                   step->self->name, kind, text));
     if (step->hook_status == BST_OK) {
         step->hook_status = status;
     }

@@ -38,19 +38,11 @@ void bst_engine_free(bst_engine *engine) {
     if (!engine) {
         return;
     }
-    bst_overlap_stop(engine);
-    bst_islands_stop(engine);
+    bst_executor_free(engine);
     bst_pacing_free(engine->pacing);
     /* what the channels own goes back to its makers before they are destroyed */
     for (int c = 0; c < engine->channel_count; c++) {
-        channel *ch = &engine->channels[c];
-        for (int s = 0; ch->slots && s < ch->depth; s++) {
-            if (ch->slots[s].owned && ch->type->release) {
-                ch->type->release(ch->slots[s].payload);
-            }
-            free(ch->slots[s].payload);
-        }
-        free(ch->slots);
+        bst_log_free(engine->channels[c].type, &engine->channels[c].log);
     }
     free(engine->channels);
     free(engine->readers);
@@ -160,16 +152,14 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
             self->wake = spec->offset_ticks;
         }
     }
-    bst_engine_set_apart(engine);
+    bst_engine_set_deferred(engine);
     BST_TRY(bst_engine_allocate_channels(ctx, engine));
     return bst_engine_make_schedule(ctx, engine);
 }
 
-bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
+/* One step of an instance, and what it publishes. */
+static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
     instance *self = engine->instances[index];
-    if (engine->overlap && self->apart) {
-        return bst_overlap_step(ctx, engine, index, tick);
-    }
     if (self->next_period <= tick) {
         self->next_period += self->spec.period_ticks;
     }
@@ -178,9 +168,12 @@ bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t 
     }
     for (int t = 0; t < self->trigger_count; t++) {
         port_state *port = &self->ports[self->triggers[t]];
-        (void)bst_engine_pass_trigger(&engine->channels[port->channel], port, tick);
+        bst_log_lock(port->log);
+        (void)bst_log_pass(port->log, &port->trigger_cursor, port->delay_ticks, tick);
+        bst_log_unlock(port->log);
     }
-    struct bst_step step = {.engine = engine, .self = self, .ctx = ctx, .tick = tick};
+    struct bst_step step = {
+        .engine = engine, .self = self, .ctx = ctx, .tick = tick, .lane = self->lane};
     self->steps++;
     bst_status status = self->spec.desc->step(self->self, &step);
     if (status != BST_OK) {
@@ -188,7 +181,18 @@ bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t 
                                (double)tick / (double)engine->tick_rate_hz);
     }
     BST_TRY(bst_engine_commit(&step)); /* a hook's failure is not the instance's */
-    bst_engine_set_due(engine, index, bst_engine_earliest(engine, self));
+    bst_engine_set_due(engine, index, bst_engine_earliest(self));
+    return BST_OK;
+}
+
+bst_status bst_engine_step_tick(bst_ctx *ctx, bst_engine *engine, bst_heap *heap, int64_t tick,
+                                bool *long_step, int *failed) {
+    while (engine->due[heap->items[0]] <= tick) {
+        int index = heap->items[0];
+        *long_step |= engine->instances[index]->spec.period_ticks == 0;
+        *failed = index;
+        BST_TRY(step_instance(ctx, engine, index, tick));
+    }
     return BST_OK;
 }
 
@@ -206,12 +210,9 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
         }
         engine->tick = tick;
         bool long_step = false;
-        while (engine->due[engine->heap.items[0]] <= tick) {
-            int index = engine->heap.items[0];
-            long_step |= engine->instances[index]->spec.period_ticks == 0;
-            BST_TRY(bst_engine_step(ctx, engine, index, tick));
-        }
-        bst_engine_release_read(engine);
+        int failed;
+        BST_TRY(bst_engine_step_tick(ctx, engine, &engine->heap, tick, &long_step, &failed));
+        bst_engine_release_read(engine, 0);
         /* reading the clock costs as much as a plant step: only now and then, or after a step that
          * may be long */
         if (engine->hooks.interrupted && (++since_clock >= 256 || long_step)) {
@@ -244,13 +245,6 @@ static bst_status finish_instances(bst_ctx *ctx, bst_engine *engine) {
     return BST_OK;
 }
 
-bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) {
-    if (!engine->loaded || engine->overlap) {
-        return bst_fail(ctx, BST_ERR_STATE, "an engine overlaps once, after loading");
-    }
-    return bst_overlap_start(ctx, engine);
-}
-
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
     if (!engine->loaded) {
         return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
@@ -259,19 +253,10 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
     if (engine->pacing) {
         bst_pacing_thread_take(ctx, engine, &thread);
     }
-    bst_status status = engine->islands ? bst_islands_run(ctx, engine, until_tick)
-                                        : run_until(ctx, engine, until_tick);
+    bst_status status = engine->executor ? bst_executor_run(ctx, engine, until_tick)
+                                         : run_until(ctx, engine, until_tick);
     if (engine->pacing) {
         bst_pacing_thread_give_back(engine, &thread);
-    }
-    if (engine->overlap) {
-        /* what failed behind the stepping thread came before what failed in it */
-        bst_ctx before = *ctx;
-        bst_status behind = bst_overlap_drain(ctx, engine);
-        if (behind != BST_OK) {
-            return behind;
-        }
-        memcpy(ctx->message, before.message, sizeof ctx->message);
     }
     if (status == BST_OK || status == BST_ERR_INTERRUPTED) {
         bst_ctx counting = *ctx;
@@ -285,8 +270,9 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
 }
 
 bst_status bst_engine_advance(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
-    if (!engine->loaded || engine->overlap) {
-        return bst_fail(ctx, BST_ERR_STATE, "an engine advances once loaded, and not overlapping");
+    if (!engine->loaded || engine->executor) {
+        return bst_fail(ctx, BST_ERR_STATE,
+                        "an engine advances tick by tick once loaded, and on one thread");
     }
     return run_until(ctx, engine, until_tick);
 }
@@ -296,7 +282,7 @@ bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *name, i
         instance *self = engine->instances[i];
         if (strcmp(self->name, name) == 0) {
             self->wake = tick < self->wake ? tick : self->wake;
-            bst_engine_set_due(engine, i, bst_engine_earliest(engine, self));
+            bst_engine_set_due(engine, i, bst_engine_earliest(self));
             return BST_OK;
         }
     }

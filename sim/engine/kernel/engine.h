@@ -49,8 +49,8 @@ typedef struct bst_hook_mark {
 } bst_hook_mark;
 
 /* Sees what happens; any member may be NULL. `message` and `event` are called by one thread at a
- * time in the order in which things happen: the stepping one, or when overlapping the one behind
- * it. The others are called by the stepping thread. */
+ * time in the order in which things happen: by tick, then by the order of stepping; with
+ * bst_engine_parallel by any thread. `interrupted` is called by the calling thread. */
 typedef struct bst_engine_hooks {
     void *user;
     /* A message was published (before any MODIFY port touches it). */
@@ -61,11 +61,11 @@ typedef struct bst_engine_hooks {
     /* Asked about every 20 ms of wall time; true ends the run with BST_ERR_INTERRUPTED. */
     bool (*interrupted)(void *user, int64_t tick);
     /* False spares `message` one that it would ignore. Asked at every message from the mark's tick
-     * on, before `message` and always by the thread that steps. */
+     * on, before `message`, by the thread that steps its writer and one thread at a time. */
     bool (*wants)(void *user, const char *scope, const char *channel, const void *payload,
                   int64_t tick, bst_hook_mark *mark);
-    /* Where `message` and `event` leave why they failed. NULL: in the context of the run; when
-     * overlapping, give them one of their own. */
+    /* Where `message` and `event` leave why they failed. NULL: in the context of the run; with
+     * bst_engine_parallel, give them one of their own. */
     bst_ctx *ctx;
 } bst_engine_hooks;
 
@@ -83,25 +83,18 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine,
  * of one name. */
 bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 
-/* Has bst_engine_run do in a second thread, in the order in which it would have been done, what
- * nothing else waits for: the hooks `message` and `event`, and the steps of modules that are
- * BST_MODULE_APART with no other reader than such modules. Messages that are needed there are
- * copied, as many as a bounded memory holds; then stepping waits. Results do not depend on it.
- * After bst_engine_load. */
-bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
-
-/* Has bst_engine_run step sensors, which share nothing but what BST_MODULE_LINKS modules link, by
- * so many threads, the calling one among them. In between they do the hooks `message` and `event`,
- * one at a time and in the order of a run without, whichever thread is free. Then `wants` is called
- * by several threads, one at a time for each scope. In place of bst_engine_overlap, after
- * bst_engine_load. *parted false, and nothing changed: there is one sensor only or one thread, or
- * messages own what threads would share (frames). Modules of different sensors may share only what
- * is constant or locked. */
-bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads,
-                           bool *parted) BST_MUST_CHECK;
+/* Has bst_engine_run use `threads` threads, the calling one among them, by
+ * docs/explanation/executor.md: sensors that share nothing but what multi-sensor modules link are
+ * stepped at the same time (with one thread, or with pacing, the calling thread steps all of
+ * them); deferred modules (BST_MODULE_APART that no other waits for), and the hooks `message` and
+ * `event`, have a thread besides in any case, and a second one where a module looks ahead. Results
+ * are those of one thread, to the bit. Modules of different sensors may share only what is constant
+ * or locked. After bst_engine_load, and bst_engine_pace if it is called, and before the engine
+ * runs. */
+bst_status bst_engine_parallel(bst_ctx *ctx, bst_engine *engine, int threads) BST_MUST_CHECK;
 
 /* Has bst_engine_run keep to the wall clock (BST_PACING_REALTIME), or only watch how long frames
- * take (the other modes). After bst_engine_load; not with bst_engine_part. */
+ * take (the other modes). After bst_engine_load, before bst_engine_parallel. */
 bst_status bst_engine_pace(bst_ctx *ctx, bst_engine *engine,
                            const bst_pacing_config *config) BST_MUST_CHECK;
 /* How the clock has been kept so far; false when the engine is not paced. */

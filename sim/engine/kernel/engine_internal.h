@@ -6,50 +6,75 @@
 
 #include "sim/engine/kernel/engine.h"
 
+/* A message as a log keeps it. */
 typedef struct slot {
-    int64_t written_tick;
+    int64_t written_tick, sequence; /* sequence: the channel's count of messages */
     void *payload;
     bool owned; /* the payload holds what type->release lets go of */
 } slot;
+
+/* message_log.c: messages by the tick at which they were written. Positions count from 0. The log
+ * of a channel is a ring: it keeps the last `depth` messages, and positions are sequences. A copy,
+ * which an input across logical processes has, keeps what is not yet trimmed, and grows. */
+typedef struct message_log {
+    slot *slots;
+    int depth;
+    int head;        /* slot of the next message */
+    int64_t written; /* positions so far */
+    int64_t oldest;  /* first position that is kept */
+    bool copied;     /* written by another logical process: `lock` is over all of the log */
+    int *frames;     /* of a copy: counts messages that own something; atomic */
+    pthread_mutex_t lock;
+} message_log;
 
 /* A port that reads a channel. */
 typedef struct channel_reader {
     int instance, port;
 } channel_reader;
 
-/* A channel of one scope: a ring of slots that holds the last `depth` messages. */
+/* A channel of one scope. */
 typedef struct channel {
     const bst_channel_type *type;
     const char *scope; /* borrowed from an instance or a member */
     int writer;        /* instance */
     int writer_port;
-    slot *slots;
-    int depth;
-    int head;        /* slot of the next message */
-    int64_t written; /* messages so far */
+    message_log log;
     size_t payload_bytes;
     int capacity;     /* items */
     double rate_hz;   /* about how often it is written */
     int64_t released; /* sequences below have been let go */
-    bool apart;       /* its writer is */
+    int process;      /* logical process of its writer; 0 without an executor */
     bst_hook_mark mark;
     channel_reader *readers; /* BST_PORT_IN and BST_PORT_MODIFY ports, part of engine->readers */
     int reader_count;
     bool triggers; /* one of them is stepped for its messages */
+    bool crosses;  /* one of them belongs to another logical process */
     bool paced;    /* pacing.c: its messages show that a frame has been dealt with */
 } channel;
+
+/* How an input gets messages of another logical process. */
+typedef enum port_copies {
+    BST_COPY_NONE,    /* it reads its channel's log */
+    BST_COPY_EACH,    /* every message is copied when it is published */
+    BST_COPY_SAMPLED, /* the writer's process copies what is visible whenever the reader's steps */
+} port_copies;
 
 /* What an instance needs to know about one of its ports. */
 typedef struct port_state {
     int channel; /* -1: optional and absent */
     int64_t delay_ticks;
     int64_t max_age_ticks;  /* 0: none */
-    int64_t cursor;         /* next sequence to read */
-    int64_t trigger_cursor; /* next sequence to be stepped for */
+    message_log *log;       /* that an input reads, by positions; NULL: none */
+    int64_t cursor;         /* next position to read */
+    int64_t trigger_cursor; /* next position to be stepped for */
     int capacity;
     bool writing;         /* its payload was handed out and not yet published */
-    int64_t silent_until; /* promised not to be written before */
-    int island; /* parallel_executor.c: an output across islands: the one that it is for */
+    int64_t silent_until; /* an output: promised not to be written before */
+    /* an input across logical processes; `copied` and `announced` are the writer's process's */
+    port_copies copies;
+    int64_t copied;    /* next message of the channel that is to be copied */
+    int64_t announced; /* next message of the channel that makes the reader step */
+    int64_t lookahead; /* an output: silent_until as other processes know it */
 } port_state;
 
 typedef struct instance {
@@ -57,19 +82,19 @@ typedef struct instance {
     char *scope, *name;
     void *self;
     bool created;
-    bool apart; /* no other instance waits for what it writes: steps last in a tick, and beside the
-                   others when overlapping */
+    bool deferred;  /* no other instance waits for what it writes: steps last in a tick, and may do
+                       so  in a logical process of its own */
     int port_count; /* the descriptor's; of one that links sensors, those for each */
     port_state *ports;
     int *triggers; /* ports whose messages make it step */
     int trigger_count;
     int64_t next_period, wake; /* INT64_MAX: none */
     struct bst_heap *heap;     /* that it waits in */
-    int island, order;         /* parallel_executor.c: its number; place in the stepping order */
-    bool reads_aside;          /* parallel_executor.c: what was put aside at the end of a span */
+    int order;                 /* place in the stepping order */
+    int process;               /* partition.c: its logical process */
+    int lane;                  /* of the step under way */
     int64_t steps;
-    int64_t jobs, jobs_done; /* put aside and made behind the stepping thread */
-    double own_rate_hz;      /* set by bst_env_set_rate */
+    double own_rate_hz; /* set by bst_env_set_rate */
     double rate_hz;
 } instance;
 
@@ -86,11 +111,8 @@ typedef struct counter {
 
 enum { MAX_COUNTERS = 64 };
 
-/* pipeline.c: what one thread does behind the stepping one */
-typedef struct bst_overlap bst_overlap;
-typedef struct bst_overlap_job bst_overlap_job;
-/* parallel_executor.c: sensors stepped by several threads */
-typedef struct bst_islands bst_islands;
+/* executor.c: logical processes stepped by several threads */
+typedef struct bst_executor bst_executor;
 /* pacing.c: the wall clock */
 typedef struct bst_pacing bst_pacing;
 
@@ -113,9 +135,8 @@ struct bst_engine {
     pthread_mutex_t counting;
     counter counters[MAX_COUNTERS]; /* by name */
     int counter_count;
-    bst_overlap *overlap; /* NULL: everything is done by the stepping thread... */
-    bst_islands *islands; /* ...unless sensors are stepped by several */
-    bst_pacing *pacing;   /* NULL: simulated time is free of the wall clock */
+    bst_executor *executor; /* NULL: the calling thread does all, in the order of tick and step */
+    bst_pacing *pacing;     /* NULL: simulated time is free of the wall clock */
 };
 
 /* What a module's step sees. */
@@ -126,8 +147,8 @@ struct bst_step {
     int64_t tick;
     int writing;            /* ports whose payload was handed out and not yet published */
     bst_status hook_status; /* first failure of a hook during this step */
-    bst_overlap_job *job;   /* inputs of a step behind the stepping thread, else NULL */
-    bool ahead;             /* of that step, and none itself */
+    int lane;
+    int64_t *ahead; /* [port] cursors of a module's `ahead`; NULL: it is a step */
 };
 
 /* wiring.c */
@@ -135,28 +156,41 @@ bst_status bst_engine_wire(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* channel.c */
 bst_status bst_engine_commit(struct bst_step *step) BST_MUST_CHECK;
-void bst_engine_release_read(bst_engine *engine);
+/* Lets go of what all readers have read, on channels that a logical process writes. */
+void bst_engine_release_read(bst_engine *engine, int process);
 void bst_engine_count(bst_engine *engine, const char *what);
 /* Passes a hook's status on, with its message in ctx. */
 bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine,
                             bst_status status) BST_MUST_CHECK;
-/* Newest visible sequence of a port, -1 when there is none. */
-int64_t bst_engine_newest(const channel *ch, const port_state *port, int64_t tick);
-/* Next unread visible sequence, -1 when there is none; counts those that were overwritten. */
-int64_t bst_engine_unread(bst_engine *engine, const channel *ch, port_state *port, int64_t tick);
-/* Whether a message of the trigger has become visible; passes over it. */
-bool bst_engine_pass_trigger(const channel *ch, port_state *port, int64_t tick);
-bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, const void *payload,
-                             int64_t written_tick, int64_t sequence);
+
+/* message_log.c; with the log locked where it is a copy */
+/* Newest position that is visible at `tick` through a delay, -1: none. */
+int64_t bst_log_newest(const message_log *log, int64_t delay, int64_t tick);
+/* First visible position from *cursor on, -1: none; counts those that are no longer kept. */
+int64_t bst_log_unread(bst_engine *engine, const message_log *log, int64_t *cursor, int64_t delay,
+                       int64_t tick);
+/* Whether a message from *cursor on has become visible; passes over all that have. */
+bool bst_log_pass(const message_log *log, int64_t *cursor, int64_t delay, int64_t tick);
+/* When the first message from `cursor` on becomes visible, INT64_MAX: there is none. */
+int64_t bst_log_next_visible(const message_log *log, int64_t cursor, int64_t delay);
+/* These lock the copy themselves. */
+bst_status bst_log_copy(bst_ctx *ctx, message_log *to, const channel *ch,
+                        const slot *from) BST_MUST_CHECK;
+/* Drops from a port's copy what no step after `tick` can see. */
+void bst_log_trim(const channel *ch, port_state *port, int64_t tick);
+void bst_log_free(const bst_channel_type *type, message_log *log);
+/* Of a message: what its readers may look at. */
+size_t bst_log_used_bytes(const channel *ch, const void *payload);
+
 /* schedule.c */
 bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Earliest tick at which an instance wants to be stepped. */
-int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
+int64_t bst_engine_earliest(const instance *self);
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
 
-/* engine.c: one step of an instance, and what it publishes. */
-bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index,
-                           int64_t tick) BST_MUST_CHECK;
+/* engine.c: the steps of one tick in a heap; *failed: the instance whose step failed. */
+bst_status bst_engine_step_tick(bst_ctx *ctx, bst_engine *engine, bst_heap *heap, int64_t tick,
+                                bool *long_step, int *failed) BST_MUST_CHECK;
 
 /* pacing.c */
 void bst_pacing_free(bst_pacing *pacing);
@@ -175,39 +209,23 @@ typedef struct bst_pacing_thread {
 void bst_pacing_thread_take(bst_ctx *ctx, bst_engine *engine, bst_pacing_thread *saved);
 void bst_pacing_thread_give_back(const bst_engine *engine, const bst_pacing_thread *saved);
 
-/* parallel_executor.c */
-void bst_islands_stop(bst_engine *engine);
-bst_status bst_islands_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
-/* In a step, in place of the hooks. */
-bst_status bst_islands_message(struct bst_step *step, const channel *ch,
-                               const void *payload) BST_MUST_CHECK;
-bst_status bst_islands_event(struct bst_step *step, const char *kind,
-                             const char *text) BST_MUST_CHECK;
-/* Reads from what was put aside. */
-bst_sample bst_islands_latest(struct bst_step *step, int port);
-bst_sample bst_islands_next(struct bst_step *step, int port);
+/* deferred.c: finds the instances that may be deferred and puts them last; before channels are
+ * allocated */
+void bst_engine_set_deferred(bst_engine *engine);
 
-/* deferred.c: finds the instances that are apart and puts them last; before channels are allocated
- */
-void bst_engine_set_apart(bst_engine *engine);
-/* pipeline.c */
-bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
-void bst_overlap_stop(bst_engine *engine);
-/* The following are called by the stepping thread; they fail with what failed behind it. */
-bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *ch,
-                               const void *payload, int64_t tick) BST_MUST_CHECK;
-bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, const char *instance,
-                             const char *kind, const char *text) BST_MUST_CHECK;
-/* Steps the instances that are apart in the scope of this one, with their inputs as they are now.
- */
-bst_status bst_overlap_step(bst_ctx *ctx, bst_engine *engine, int index,
-                            int64_t tick) BST_MUST_CHECK;
-/* Waits until all is done. */
-bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
-/* In a step behind: reads from what was put aside. */
-bst_sample bst_overlap_latest(struct bst_step *step, int port);
-bst_sample bst_overlap_next(struct bst_step *step, int port);
-int bst_overlap_lane(const bst_overlap_job *job);
+/* executor.c */
+void bst_executor_free(bst_engine *engine);
+bst_status bst_executor_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
+/* logical_process.c: a message was published that an input of another logical process reads. */
+bst_status bst_process_reach(struct bst_step *step, const channel *ch, const slot *s,
+                             channel_reader reader) BST_MUST_CHECK;
+/* observers.c: in a step, in place of calling the hooks. */
+bst_status bst_observers_message(struct bst_step *step, const channel *ch,
+                                 const void *payload) BST_MUST_CHECK;
+bst_status bst_observers_event(struct bst_step *step, const char *kind,
+                               const char *text) BST_MUST_CHECK;
+/* `wants` of the hooks, by one thread at a time. */
+bool bst_observers_want(bst_engine *engine, channel *ch, const void *payload, int64_t tick);
 
 static inline const bst_port *bst_instance_port(const instance *self, int port) {
     return &self->spec.desc->ports[port % self->spec.desc->port_count];
@@ -220,10 +238,30 @@ static inline const char *bst_instance_port_scope(const instance *self, int port
                : self->scope;
 }
 
-/* The slot of a message among the last `depth`, or of the next one (sequence == written). */
-static inline slot *bst_engine_slot(const channel *ch, int64_t sequence) {
-    int back = (int)(ch->written - sequence);
-    return &ch->slots[ch->head >= back ? ch->head - back : ch->head - back + ch->depth];
+/* The slot of a position that is kept, or of the next one (position == written). */
+static inline slot *bst_log_slot(const message_log *log, int64_t position) {
+    int back = (int)(log->written - position);
+    return &log->slots[log->head >= back ? log->head - back : log->head - back + log->depth];
+}
+
+/* The message in the slot at the head is complete. */
+static inline void bst_log_advance(message_log *log) {
+    log->written++;
+    log->head = log->head + 1 == log->depth ? 0 : log->head + 1;
+    if (log->written - log->oldest > log->depth) {
+        log->oldest = log->written - log->depth;
+    }
+}
+
+static inline void bst_log_lock(message_log *log) {
+    if (log->copied) {
+        pthread_mutex_lock(&log->lock);
+    }
+}
+static inline void bst_log_unlock(message_log *log) {
+    if (log->copied) {
+        pthread_mutex_unlock(&log->lock);
+    }
 }
 
 #endif

@@ -1,205 +1,136 @@
-/* What islands leave for others: messages and events for the hooks, which whoever is free does in
- * the order in which a run on one thread would have done them; and inputs for the module that links
- * them, which reads them as they were at the end of a span while islands are at later ones. */
-#include <stdio.h>
+/* Messages by the tick at which they were written: what inputs read, whichever thread reads. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/engine/kernel/parallel_internal.h"
+#include "sim/engine/kernel/engine_internal.h"
 
-enum { ALIGN = 16, KIND_BYTES = 48 };
-
-/* Before the content of each message, event or input. */
-typedef struct note {
-    size_t bytes; /* with the content */
-    int64_t tick;
-    int instance;
-    const channel *ch; /* NULL: an event */
-    /* of an input */
-    int port;
-    bool unread; /* one of a queue; else the newest */
-    int64_t sequence;
-} note;
-
-typedef struct event_text {
-    char kind[KIND_BYTES], text[400];
-} event_text;
-
-enum { NOTE_BYTES = (sizeof(note) + ALIGN - 1) / ALIGN * ALIGN };
-
-static bst_status take_note(bst_ctx *ctx, notes *n, const note *head, const void *content,
-                            size_t bytes) {
-    size_t whole = NOTE_BYTES + (bytes + ALIGN - 1) / ALIGN * ALIGN;
-    if (n->used + whole > n->room) {
-        size_t room = 2 * (n->room + whole) + 65536;
-        char *more = aligned_alloc(ALIGN, room / ALIGN * ALIGN);
-        if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu bytes of messages", room);
-        }
-        memcpy(more, n->bytes ? n->bytes : more, n->used);
-        free(n->bytes);
-        n->bytes = more;
-        n->room = room / ALIGN * ALIGN;
-    }
-    note *to = (note *)(void *)(n->bytes + n->used);
-    *to = *head;
-    to->bytes = whole;
-    memcpy(n->bytes + n->used + NOTE_BYTES, content, bytes);
-    n->used += whole;
-    return BST_OK;
-}
-
-static note *first_note(const notes *n) {
-    return n->read < n->used ? (note *)(void *)(n->bytes + n->read) : NULL;
-}
-
-static const void *content_of(const note *n) {
-    return (const char *)n + NOTE_BYTES;
-}
-
-static size_t content_bytes(const channel *ch, const void *payload) {
+size_t bst_log_used_bytes(const channel *ch, const void *payload) {
     const bst_channel_type *type = ch->type;
     return type->count ? type->header_bytes + type->item_bytes * (size_t)type->count(payload)
                        : ch->payload_bytes;
 }
 
-void bst_islands_free_notes(island *self) {
-    for (int k = 0; k < BST_ISLAND_SPANS; k++) {
-        free(self->notes[k].bytes);
-        free(self->inputs[k].bytes);
-    }
-}
+/* ---- reading ---- */
 
-/* ---- for the hooks ---- */
-
-static notes *notes_of(bst_engine *engine, const instance *self) {
-    island *own = &engine->islands->islands[self->island];
-    return &own->notes[own->span % BST_ISLAND_SPANS];
-}
-
-bst_status bst_islands_message(struct bst_step *step, const channel *ch, const void *payload) {
-    note head = {.tick = step->tick, .instance = step->self->order, .ch = ch};
-    return take_note(step->ctx, notes_of(step->engine, step->self), &head, payload,
-                     content_bytes(ch, payload));
-}
-
-bst_status bst_islands_event(struct bst_step *step, const char *kind, const char *text) {
-    event_text e;
-    memset(&e, 0, sizeof e);
-    snprintf(e.kind, sizeof e.kind, "%s", kind);
-    snprintf(e.text, sizeof e.text, "%s", text);
-    note head = {.tick = step->tick, .instance = step->self->order};
-    return take_note(step->ctx, notes_of(step->engine, step->self), &head, &e, sizeof e);
-}
-
-/* The notes of a span with the next one to be heard; NULL: none is left. */
-static notes *next_notes(const bst_islands *s, int64_t span) {
-    notes *from = NULL;
-    const note *next = NULL;
-    for (int i = 0; i <= s->count; i++) {
-        notes *own = &s->islands[i].notes[span % BST_ISLAND_SPANS];
-        const note *n = first_note(own);
-        if (n && (!next || bst_islands_before(n->tick, n->instance, next->tick, next->instance))) {
-            next = n;
-            from = own;
+int64_t bst_log_newest(const message_log *log, int64_t delay, int64_t tick) {
+    for (int64_t position = log->written - 1; position >= log->oldest; position--) {
+        if (bst_log_slot(log, position)->written_tick + delay <= tick) {
+            return position;
         }
     }
-    return from;
+    return -1;
 }
 
-bst_status bst_islands_do_hooks(bst_ctx *ctx, bst_engine *engine, int64_t span, int most,
-                                int64_t last_tick, int last_instance, bool *all) {
-    bst_islands *s = engine->islands;
-    const bst_engine_hooks *hooks = &engine->hooks;
-    bst_status status = BST_OK;
-    *all = false;
-    for (int done = 0; done < most && status == BST_OK && !*all; done++) {
-        notes *from = next_notes(s, span);
-        const note *next = from ? first_note(from) : NULL;
-        if (!next || bst_islands_before(last_tick, last_instance, next->tick, next->instance)) {
-            *all = true;
-            break;
-        }
-        if (next->ch) {
-            status = hooks->message(hooks->user, next->ch->scope, next->ch->type->name,
-                                    content_of(next), next->tick);
-        } else {
-            const event_text *e = content_of(next);
-            status = hooks->event(hooks->user, next->tick, engine->instances[next->instance]->name,
-                                  e->kind, e->text);
-        }
-        status = bst_engine_heard(ctx, engine, status);
-        from->read += next->bytes;
+int64_t bst_log_unread(bst_engine *engine, const message_log *log, int64_t *cursor, int64_t delay,
+                       int64_t tick) {
+    while (*cursor < log->oldest) {
+        (*cursor)++;
+        bst_engine_count(engine, "queue_overflow");
     }
-    for (int i = 0; i <= s->count && (*all || status != BST_OK); i++) {
-        notes *n = &s->islands[i].notes[span % BST_ISLAND_SPANS];
-        n->used = n->read = 0;
-    }
-    return status;
+    return bst_log_next_visible(log, *cursor, delay) <= tick ? *cursor : -1;
 }
 
-/* ---- for what links the islands ---- */
-
-static bst_status put_message(bst_ctx *ctx, notes *n, const channel *ch, int port, int64_t sequence,
-                              bool unread) {
-    const slot *s = bst_engine_slot(ch, sequence);
-    note head = {
-        .tick = s->written_tick, .ch = ch, .port = port, .unread = unread, .sequence = sequence};
-    return take_note(ctx, n, &head, s->payload, content_bytes(ch, s->payload));
+bool bst_log_pass(const message_log *log, int64_t *cursor, int64_t delay, int64_t tick) {
+    int64_t before = *cursor;
+    if (*cursor < log->oldest) {
+        *cursor = log->oldest;
+    }
+    while (bst_log_next_visible(log, *cursor, delay) <= tick) {
+        (*cursor)++;
+    }
+    return *cursor > before;
 }
 
-bst_status bst_islands_put_aside(bst_ctx *ctx, bst_engine *engine, island *self) {
-    const bst_islands *s = engine->islands;
-    instance *link = engine->instances[s->link];
-    int slot_ = (int)(self->span % BST_ISLAND_SPANS);
-    int64_t tick = s->until_tick[slot_] - 1;
-    notes *n = &self->inputs[slot_];
-    n->used = n->read = 0;
-    for (int p = 0; p < link->port_count; p++) {
-        port_state *port = &link->ports[p];
-        if (bst_instance_port(link, p)->direction != BST_PORT_IN || port->channel < 0) {
-            continue;
-        }
-        const channel *ch = &engine->channels[port->channel];
-        if (&s->islands[engine->instances[ch->writer]->island] != self) {
-            continue;
-        }
-        int64_t newest = bst_engine_newest(ch, port, tick);
-        if (newest >= 0) {
-            BST_TRY(put_message(ctx, n, ch, p, newest, false));
-        }
-        int64_t next =
-            ch->type->kind == BST_CHANNEL_QUEUE ? bst_engine_unread(engine, ch, port, tick) : -1;
-        while (next >= 0) {
-            port->cursor++;
-            BST_TRY(put_message(ctx, n, ch, p, next, true));
-            next = bst_engine_unread(engine, ch, port, tick);
-        }
+int64_t bst_log_next_visible(const message_log *log, int64_t cursor, int64_t delay) {
+    int64_t next = cursor > log->oldest ? cursor : log->oldest;
+    return next < log->written ? bst_log_slot(log, next)->written_tick + delay : INT64_MAX;
+}
+
+/* ---- copies ---- */
+
+/* Doubles the room of a copy that is full. */
+static bst_status grow(bst_ctx *ctx, message_log *log) {
+    int depth = log->depth > 0 ? 2 * log->depth : 4;
+    slot *slots = calloc((size_t)depth, sizeof *slots);
+    if (!slots) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d messages", depth);
     }
+    int kept = 0;
+    for (int64_t position = log->oldest; position < log->written; position++) {
+        slots[kept++] = *bst_log_slot(log, position);
+    }
+    free(log->slots);
+    log->slots = slots;
+    log->depth = depth;
+    log->head = kept;
     return BST_OK;
 }
 
-static bst_sample read_input(struct bst_step *step, int port_index, bool unread) {
-    const bst_islands *s = step->engine->islands;
-    const port_state *port = &step->self->ports[port_index];
-    const channel *ch = &step->engine->channels[port->channel];
-    island *from = &s->islands[step->engine->instances[ch->writer]->island];
-    notes *n = &from->inputs[s->islands[s->count].span % BST_ISLAND_SPANS];
-    for (size_t at = 0; at < n->used;) {
-        note *one = (note *)(void *)(n->bytes + at);
-        if (one->port == port_index && one->unread == unread) {
-            one->port = unread ? -1 : one->port; /* read */
-            return bst_engine_sample(step, port, content_of(one), one->tick, one->sequence);
-        }
-        at += one->bytes;
+bst_status bst_log_copy(bst_ctx *ctx, message_log *to, const channel *ch, const slot *from) {
+    bst_status status = BST_OK;
+    pthread_mutex_lock(&to->lock);
+    if (to->written - to->oldest == to->depth) {
+        status = grow(ctx, to);
     }
-    return (bst_sample){NULL, 0, -1, true};
+    slot *s = status == BST_OK ? &to->slots[to->head] : NULL;
+    if (s && !s->payload && !(s->payload = calloc(1, ch->payload_bytes))) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a copy of %s/%s", ch->scope,
+                          ch->type->name);
+    }
+    if (status == BST_OK) {
+        memcpy(s->payload, from->payload, bst_log_used_bytes(ch, from->payload));
+        s->written_tick = from->written_tick;
+        s->sequence = from->sequence;
+        s->owned = from->owned;
+        if (s->owned) {
+            ch->type->retain(s->payload);
+            __atomic_fetch_add(to->frames, 1, __ATOMIC_RELAXED);
+        }
+        bst_log_advance(to);
+    }
+    pthread_mutex_unlock(&to->lock);
+    return status;
 }
 
-bst_sample bst_islands_latest(struct bst_step *step, int port) {
-    return read_input(step, port, false);
+/* First position that a step after `tick` may see. */
+static int64_t first_needed(const channel *ch, const port_state *port, int64_t tick) {
+    const message_log *log = port->log;
+    int64_t newest = bst_log_newest(log, port->delay_ticks, tick);
+    if (newest < 0) {
+        return log->oldest;
+    }
+    if (ch->type->release) {
+        return newest + 1; /* frames are held for no reader that leaves them in the queue */
+    }
+    bool queue = ch->type->kind == BST_CHANNEL_QUEUE;
+    int64_t needed = queue && port->cursor < newest ? port->cursor : newest;
+    return needed > newest - ch->log.depth ? needed : newest - ch->log.depth;
 }
 
-bst_sample bst_islands_next(struct bst_step *step, int port) {
-    return read_input(step, port, true);
+void bst_log_trim(const channel *ch, port_state *port, int64_t tick) {
+    message_log *log = port->log;
+    pthread_mutex_lock(&log->lock);
+    int64_t needed = first_needed(ch, port, tick);
+    for (; log->oldest < needed; log->oldest++) {
+        slot *s = bst_log_slot(log, log->oldest);
+        if (s->owned) {
+            ch->type->release(s->payload);
+            __atomic_fetch_sub(log->frames, 1, __ATOMIC_RELAXED);
+        }
+        s->owned = false;
+    }
+    pthread_mutex_unlock(&log->lock);
+}
+
+void bst_log_free(const bst_channel_type *type, message_log *log) {
+    for (int s = 0; log->slots && s < log->depth; s++) {
+        if (log->slots[s].owned && type->release) {
+            type->release(log->slots[s].payload);
+        }
+        free(log->slots[s].payload);
+    }
+    free(log->slots);
+    if (log->copied) {
+        pthread_mutex_destroy(&log->lock);
+    }
 }

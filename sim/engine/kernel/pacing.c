@@ -100,7 +100,7 @@ static void warn_of_rates(bst_ctx *ctx, const bst_engine *engine, const bst_paci
 }
 
 bst_status bst_engine_pace(bst_ctx *ctx, bst_engine *engine, const bst_pacing_config *config) {
-    if (!engine->loaded || engine->pacing || engine->islands) {
+    if (!engine->loaded || engine->pacing || engine->executor) {
         return bst_fail(ctx, BST_ERR_STATE, "an engine is paced once, after loading");
     }
     bst_pacing *p = calloc(1, sizeof *p);

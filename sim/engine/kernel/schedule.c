@@ -20,25 +20,19 @@ bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) {
         engine->place[i] = i;
     }
     for (int i = 0; i < engine->instance_count; i++) {
-        bst_engine_set_due(engine, i, bst_engine_earliest(engine, engine->instances[i]));
+        bst_engine_set_due(engine, i, bst_engine_earliest(engine->instances[i]));
     }
     return BST_OK;
 }
 
-int64_t bst_engine_earliest(const bst_engine *engine, const instance *self) {
+int64_t bst_engine_earliest(const instance *self) {
     int64_t due = self->next_period < self->wake ? self->next_period : self->wake;
     for (int t = 0; t < self->trigger_count; t++) {
         const port_state *port = &self->ports[self->triggers[t]];
-        const channel *ch = &engine->channels[port->channel];
-        if (engine->overlap && ch->apart) {
-            continue; /* seen to behind the stepping thread */
-        }
-        if (port->trigger_cursor < ch->written) {
-            int64_t oldest = ch->written - ch->depth;
-            int64_t next = port->trigger_cursor > oldest ? port->trigger_cursor : oldest;
-            int64_t visible = bst_engine_slot(ch, next)->written_tick + port->delay_ticks;
-            due = visible < due ? visible : due;
-        }
+        bst_log_lock(port->log);
+        int64_t visible = bst_log_next_visible(port->log, port->trigger_cursor, port->delay_ticks);
+        bst_log_unlock(port->log);
+        due = visible < due ? visible : due;
     }
     return due;
 }

@@ -328,14 +328,18 @@ static bst_status allocate_channel(bst_ctx *ctx, const bst_engine *engine, chann
     }
     /* delay / period + 1, and one more each for the message being written and for one more
      * writer's step in the tick */
-    ch->depth = ch->type->in_place ? 1 : (int)ceil(waiting) + 3;
+    ch->log.depth = ch->type->in_place ? 1 : (int)ceil(waiting) + 3;
     ch->capacity = engine->instances[ch->writer]->ports[ch->writer_port].capacity;
     ch->payload_bytes = ch->type->header_bytes + ch->type->item_bytes * (size_t)ch->capacity;
-    ch->slots = calloc((size_t)ch->depth, sizeof *ch->slots);
-    bool enough = ch->slots != NULL;
-    for (int s = 0; enough && s < ch->depth; s++) {
-        ch->slots[s].payload = calloc(1, ch->payload_bytes);
-        enough = ch->slots[s].payload != NULL;
+    ch->log.slots = calloc((size_t)ch->log.depth, sizeof *ch->log.slots);
+    bool enough = ch->log.slots != NULL;
+    for (int s = 0; enough && s < ch->log.depth; s++) {
+        ch->log.slots[s].payload = calloc(1, ch->payload_bytes);
+        enough = ch->log.slots[s].payload != NULL;
+    }
+    for (int r = 0; r < ch->reader_count; r++) {
+        const channel_reader *reader = &ch->readers[r];
+        engine->instances[reader->instance]->ports[reader->port].log = &ch->log;
     }
     return enough ? BST_OK
                   : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the channel %s/%s", ch->scope,

@@ -457,26 +457,6 @@ static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_
  * ratio. */
 static const double BENT = 0.12;
 
-/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
- * pixel's own width, widened along and across the way from the first to the last
- * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
- * Returns the variance before that widening. */
-static double blur(const bst_camera *camera, const bst_scene_source *source,
-                   const bst_scene_image_moments *m, double dx, double dy, double *along,
-                   double *across) {
-    double psf = bst_camera_psf_sigma_px(camera), sigma;
-    if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
-        psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
-              2.3548200450309493;
-    }
-    double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
-    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
-    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
-    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
-    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
-    return variance;
-}
-
 const bst_skylight_map *bst_field_background(const bst_field *field) {
     return field->map;
 }
@@ -568,18 +548,29 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
-    double sharp = blur(camera, source, &image, out->x_end_px - out->x_start_px,
-                        out->y_end_px - out->y_start_px, &along, &across);
+    double sharp = bst_image_blur(camera, source, &image, out->x_end_px - out->x_start_px,
+                                  out->y_end_px - out->y_start_px, &along, &across);
     if (isfinite(length) && variance > 0.0) {
-        double square = bst_optics_image_squared(sqrt(along * along + widened),
-                                                 sqrt(across * across + widened), length);
+        double gauss = bst_optics_image_squared(sqrt(along * along + widened),
+                                                sqrt(across * across + widened), length);
+        double square = gauss, sigma;
+        bool plain = !camera->psf || bst_psf_gaussian(camera->psf, &sigma);
+        if (!plain) {
+            /* jitter widens both ways alike; what the path has more along itself is its length */
+            double blurred = across * across - sharp;
+            double drawn = sqrt(12.0 * fmax(image.xx + image.yy - 2.0 * blurred, 0.0));
+            square = bst_psf_squared_image(camera->psf, source->colour, image.x_mean, image.y_mean,
+                                           blurred + widened, blurred + widened, drawn);
+        }
         double excess = along * along + across * across - 2.0 * sharp;
         if (excess > BENT * (sharp + widened)) {
             /* a disc's own light widens the path */
             double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
             double exact = bst_scene_image_squared_path(camera, track, source, u[0], u[1], &path,
                                                         excess, sharp + widened + disc);
-            square = isfinite(exact) ? exact : square;
+            if (isfinite(exact)) {
+                square = plain ? exact : square * exact / gauss;
+            }
         }
         out->snr = out->electrons * sqrt(square / variance);
     }

@@ -193,3 +193,19 @@ double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_trac
     }
     return norm * sum / (4.0 * BST_PI * variance_px2);
 }
+
+double bst_image_blur(const bst_camera *camera, const bst_scene_source *source,
+                      const bst_scene_image_moments *m, double dx, double dy, double *along,
+                      double *across) {
+    double psf = bst_camera_psf_sigma_px(camera), sigma;
+    if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
+        psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
+              2.3548200450309493;
+    }
+    double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
+    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
+    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
+    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
+    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
+    return variance;
+}

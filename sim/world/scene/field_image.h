@@ -41,4 +41,12 @@ double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_trac
                                     const bst_scene_image_moments *moments, double excess_px2,
                                     double variance_px2);
 
+/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
+ * pixel's own width, widened along and across the way from the first to the last
+ * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
+ * Returns the variance before that widening. */
+double bst_image_blur(const bst_camera *camera, const bst_scene_source *source,
+                      const bst_scene_image_moments *m, double dx, double dy, double *along,
+                      double *across);
+
 #endif

@@ -1,0 +1,296 @@
+/* Threads that step logical processes and call observers. Which thread does what is left to chance;
+ * what comes out is not. See docs/explanation/executor.md. */
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/parallel.h"
+#include "sim/core/wall_clock.h"
+#include "sim/engine/kernel/executor_internal.h"
+
+/* ---- choice of work; with the lock held ---- */
+
+/* Whether a thread may step a process. */
+static bool may_step(const bst_executor *x, const logical_process *self, bool caller) {
+    return !x->caller_only || caller == (self->kind == BST_PROCESS_SENSORS);
+}
+
+static double expected_s(const logical_process *self) {
+    return self->took_s[0] > self->took_s[1] ? self->took_s[0] : self->took_s[1];
+}
+
+/* The process to be stepped next: the multi-sensor modules, which others wait for, or the one that
+ * is farthest behind, or of these the one that took longest; NULL: none can be. */
+static logical_process *next_process(bst_executor *x, bool caller) {
+    logical_process *best = NULL;
+    for (int k = 0; k < x->count; k++) {
+        logical_process *self = &x->processes[k];
+        if (!may_step(x, self, caller) || !bst_sync_can_step(x, self)) {
+            continue;
+        }
+        if (self->kind == BST_PROCESS_LINK) {
+            return self;
+        }
+        if (!best || self->clock < best->clock ||
+            (self->clock == best->clock && expected_s(self) > expected_s(best))) {
+            best = self;
+        }
+    }
+    return best;
+}
+
+/* A sample that a module may look at ahead of its step. */
+static sample_point *next_look(bst_executor *x, logical_process **of) {
+    for (int k = 0; k < x->count; k++) {
+        sample_point *sample = bst_sync_next_look(&x->processes[k]);
+        if (sample) {
+            *of = &x->processes[k];
+            return sample;
+        }
+    }
+    return NULL;
+}
+
+static void step_process(bst_executor *x, logical_process *self) {
+    self->busy = true;
+    pthread_mutex_unlock(&x->lock);
+    bst_process_step(x, self);
+    pthread_mutex_lock(&x->lock);
+    bst_sync_end_window(x, self);
+}
+
+static void look_ahead(bst_executor *x, logical_process *self, sample_point *sample) {
+    sample_point copy = *sample;
+    sample->look = BST_LOOK_BUSY;
+    x->looking++;
+    pthread_mutex_unlock(&x->lock);
+    bst_process_look(x, self, &copy);
+    pthread_mutex_lock(&x->lock);
+    sample->look = BST_LOOK_DONE;
+    x->looking--;
+    bst_sync_wake(x);
+}
+
+/* Does one thing that there is to do; false: there is none for this thread. */
+static bool do_something(bst_executor *x, bool caller) {
+    if (!x->running || x->heard != BST_OK) {
+        return false;
+    }
+    bool others = !(x->caller_only && caller); /* the caller has its process alone */
+    if (others && bst_observers_behind(x) && bst_observers_ready(x)) {
+        bst_observers_work(x);
+        return true;
+    }
+    logical_process *self = next_process(x, caller);
+    if (self) {
+        step_process(x, self);
+        return true;
+    }
+    if (others && bst_observers_ready(x)) {
+        bst_observers_work(x);
+        return true;
+    }
+    sample_point *sample = others ? next_look(x, &self) : NULL;
+    if (sample) {
+        look_ahead(x, self, sample);
+    }
+    return sample != NULL;
+}
+
+static void await_change(bst_executor *x) {
+    x->sleeping++;
+    pthread_cond_wait(&x->changed, &x->lock);
+    x->sleeping--;
+}
+
+static void *work(void *user) {
+    bst_executor *x = user;
+    pthread_mutex_lock(&x->lock);
+    while (!x->stop) {
+        if (!do_something(x, false)) {
+            await_change(x);
+        }
+    }
+    pthread_mutex_unlock(&x->lock);
+    return NULL;
+}
+
+/* Whether nothing is under way, and nothing can begin. */
+static bool finished(bst_executor *x) {
+    bool busy = x->observing || x->looking > 0;
+    for (int k = 0; k < x->count && !busy; k++) {
+        busy = x->processes[k].busy;
+    }
+    return !busy && (x->heard != BST_OK || (!next_process(x, true) && !next_process(x, false) &&
+                                            !bst_observers_ready(x)));
+}
+
+/* ---- a run ---- */
+
+/* What is under way is brought to its end, and all processes to one tick. */
+static void interrupt(bst_executor *x) {
+    int64_t end = 0;
+    for (int k = 0; k < x->count; k++) {
+        const logical_process *self = &x->processes[k];
+        int64_t tick = self->busy ? self->limit : self->clock;
+        end = tick > end ? tick : end;
+    }
+    x->end = end < x->end ? end : x->end;
+    x->interrupted = true;
+}
+
+/* The calling thread's part, until all is done. */
+static void work_to_end(bst_executor *x) {
+    const bst_engine_hooks *hooks = &x->engine->hooks;
+    double asked = bst_wall_seconds();
+    while (!finished(x)) {
+        double now = bst_wall_seconds();
+        if (hooks->interrupted && !x->interrupted && now - asked > 0.02) {
+            asked = now;
+            int64_t tick = x->engine->tick;
+            pthread_mutex_unlock(&x->lock);
+            bool interrupted = hooks->interrupted(hooks->user, tick);
+            pthread_mutex_lock(&x->lock);
+            if (interrupted) {
+                interrupt(x);
+            }
+        } else if (!do_something(x, true)) {
+            await_change(x);
+        }
+    }
+}
+
+/* The process whose step failed first, in the order of a run on one thread; NULL: none. */
+static const logical_process *first_failure(const bst_executor *x) {
+    const logical_process *first = NULL;
+    for (int k = 0; k < x->count; k++) {
+        const logical_process *one = &x->processes[k];
+        if (one->status != BST_OK &&
+            (!first || bst_before(one->failed_tick, one->failed_instance, first->failed_tick,
+                                  first->failed_instance))) {
+            first = one;
+        }
+    }
+    return first;
+}
+
+/* Why a run ended, in the order in which a run on one thread would have come upon it. */
+static bst_status outcome(bst_ctx *ctx, const bst_executor *x) {
+    bst_engine *engine = x->engine;
+    const logical_process *failed = first_failure(x);
+    if (x->heard != BST_OK) {
+        return bst_engine_heard(ctx, engine, x->heard);
+    }
+    if (failed) {
+        engine->tick = failed->failed_tick;
+        return bst_fail(ctx, failed->status, "%s", failed->ctx.message);
+    }
+    for (int k = 0; k < x->count; k++) {
+        if (x->processes[k].clock < x->end) {
+            return bst_fail(ctx, BST_ERR_STATE,
+                            "the executor stands still at tick %lld of %lld (a fault of the "
+                            "program; --serial runs without it)",
+                            (long long)x->processes[k].clock, (long long)x->end);
+        }
+    }
+    return x->interrupted ? bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted at %.3f s",
+                                     (double)engine->tick / (double)engine->tick_rate_hz)
+                          : BST_OK;
+}
+
+bst_status bst_executor_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
+    bst_executor *x = engine->executor;
+    pthread_mutex_lock(&x->lock);
+    const logical_process *failed = first_failure(x);
+    x->end = failed && failed->failed_tick < until_tick ? failed->failed_tick + 1 : until_tick;
+    x->interrupted = false;
+    x->running = true;
+    for (int k = 0; k < x->count; k++) {
+        bst_sync_follow(x, &x->processes[k]);
+    }
+    bst_sync_wake(x);
+    work_to_end(x);
+    x->running = false;
+    bst_status status = outcome(ctx, x);
+    pthread_mutex_unlock(&x->lock);
+    for (int k = 0; k < x->count; k++) {
+        ctx->warnings += x->processes[k].ctx.warnings;
+        x->processes[k].ctx.warnings = 0;
+    }
+    return status;
+}
+
+/* ---- making it ---- */
+
+/* Threads besides the calling one that can have something to do. */
+static int helpers_wanted(const bst_executor *x, int threads) {
+    int tasks = 1, least = 1; /* observers */
+    for (int k = 0; k < x->count; k++) {
+        const logical_process *self = &x->processes[k];
+        bool looks = self->looker >= 0;
+        tasks += looks + !(x->caller_only && self->kind == BST_PROCESS_SENSORS);
+        least = looks ? 2 : least;
+    }
+    tasks -= !x->caller_only; /* the calling thread does one of them */
+    int wanted = threads - 1 > least ? threads - 1 : least;
+    return wanted < tasks ? wanted : tasks;
+}
+
+static bst_status start_threads(bst_ctx *ctx, bst_executor *x, int wanted) {
+    x->threads = calloc((size_t)wanted + 1, sizeof *x->threads);
+    if (!x->threads) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d threads", wanted);
+    }
+    sigset_t all, before; /* signals are the main thread's */
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    int error = 0;
+    while (x->thread_count < wanted && !error) {
+        error = bst_core_thread_start(&x->threads[x->thread_count], work, x);
+        x->thread_count += !error;
+    }
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    return x->thread_count > 0
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_MEMORY, "cannot start a thread: %s", strerror(error));
+}
+
+bst_status bst_engine_parallel(bst_ctx *ctx, bst_engine *engine, int threads) {
+    if (!engine->loaded || engine->executor || engine->tick >= 0) {
+        return bst_fail(ctx, BST_ERR_STATE,
+                        "an engine gets its threads once, after loading and before it runs");
+    }
+    bst_executor *x = calloc(1, sizeof *x);
+    if (!x) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the executor");
+    }
+    x->engine = engine;
+    pthread_mutex_init(&x->lock, NULL);
+    pthread_mutex_init(&x->asking, NULL);
+    pthread_cond_init(&x->changed, NULL);
+    engine->executor = x; /* freed with the engine, whatever happens */
+    bst_status status = bst_partition_make(ctx, x, threads);
+    return status == BST_OK ? start_threads(ctx, x, helpers_wanted(x, threads)) : status;
+}
+
+void bst_executor_free(bst_engine *engine) {
+    bst_executor *x = engine->executor;
+    if (!x) {
+        return;
+    }
+    pthread_mutex_lock(&x->lock);
+    x->stop = true;
+    bst_sync_wake(x);
+    pthread_mutex_unlock(&x->lock);
+    for (int i = 0; i < x->thread_count; i++) {
+        pthread_join(x->threads[i], NULL);
+    }
+    bst_observers_discard(x);
+    bst_partition_free(x);
+    pthread_cond_destroy(&x->changed);
+    pthread_mutex_destroy(&x->asking);
+    pthread_mutex_destroy(&x->lock);
+    free(x->threads);
+    free(x);
+    engine->executor = NULL;
+}

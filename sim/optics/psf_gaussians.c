@@ -1,0 +1,80 @@
+/* The squared image of a PSF that is no Gaussian as a sum of Gaussians: what widens and smears it
+ * acts on each of them in closed form. */
+#include <math.h>
+
+#include "sim/optics/psf_internal.h"
+#include "sim/optics/streak_image.h"
+
+enum { PARTS = BST_PSF_GAUSSIANS, RADII = 128, DIRECTIONS = 12, SWEEPS = 1000 };
+/* Widths, over that of the Gaussian of the same noise-equivalent area: the first, and from one to
+ * the next. */
+static const double FIRST_WIDTH = 0.5, NEXT_WIDTH = 1.35;
+
+/* Least squares with weights >= 0 (coordinate descent) over the plane of frequencies: by Parseval
+ * those of the image's autocorrelation over the plane of shifts. */
+static void solve(double a[PARTS][PARTS], const double b[PARTS], double x[PARTS]) {
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        for (int i = 0; i < PARTS; i++) {
+            double rest = b[i];
+            for (int k = 0; k < PARTS; k++) {
+                rest -= k == i ? 0.0 : a[i][k] * x[k];
+            }
+            x[i] = fmax(rest / a[i][i], 0.0);
+        }
+    }
+}
+
+void bst_psf_fit_gaussians(const bst_psf *psf, int node, bst_psf_node *out) {
+    double width = sqrt(bst_psf_noise_area_px2(psf, node) / (4.0 * BST_PI)) * FIRST_WIDTH;
+    double a[PARTS][PARTS] = {{0.0}}, b[PARTS] = {0.0}, squared = 0.0;
+    for (int i = 0; i < PARTS; i++, width *= NEXT_WIDTH) {
+        out->gaussian_px2[i] = width * width;
+        out->gaussian_weight[i] = 0.0;
+    }
+    for (int n = 0; n < RADII; n++) {
+        /* beyond the cutoff too, where there is nothing */
+        double f = 2.0 * psf->cutoff * (n + 0.5) / RADII, mean = 0.0, basis[PARTS];
+        for (int d = 0; d < DIRECTIONS; d++) { /* half the plane: the image is real */
+            double angle = BST_PI * (d + 0.5) / DIRECTIONS, h[2];
+            bst_psf_otf(psf, node, f * cos(angle), f * sin(angle), h);
+            mean += (h[0] * h[0] + h[1] * h[1]) / DIRECTIONS;
+        }
+        for (int i = 0; i < PARTS; i++) {
+            basis[i] = exp(-4.0 * BST_PI * BST_PI * out->gaussian_px2[i] * f * f);
+            b[i] += f * basis[i] * mean;
+            for (int k = 0; k <= i; k++) {
+                a[i][k] += f * basis[i] * basis[k];
+                a[k][i] = a[i][k];
+            }
+        }
+    }
+    solve(a, b, out->gaussian_weight);
+    for (int i = 0; i < PARTS; i++) {
+        squared += out->gaussian_weight[i] / (4.0 * BST_PI * out->gaussian_px2[i]);
+    }
+    for (int i = 0; i < PARTS; i++) {
+        out->gaussian_weight[i] /= squared * bst_psf_noise_area_px2(psf, node);
+    }
+}
+
+double bst_psf_squared_image(const bst_psf *psf, const float colour[BST_PSF_COLOURS], double x_px,
+                             double y_px, double along_px2, double across_px2, double length_px) {
+    int node[4], fields = psf->columns * psf->rows;
+    double weight[4], sum = 0.0;
+    int nodes = bst_psf_weights(psf, x_px, y_px, node, weight);
+    for (int k = 0; k < nodes; k++) {
+        for (int s = 0; s < psf->spectra; s++) {
+            double share = psf->spectra > 1 ? bst_psf_share(colour, s) : 1.0;
+            const bst_psf_node *n = &psf->nodes[s * fields + node[k]];
+            for (int i = 0; i < PARTS; i++) {
+                if (n->gaussian_weight[i] > 0.0) {
+                    double own = n->gaussian_px2[i];
+                    sum += weight[k] * share * n->gaussian_weight[i] *
+                           bst_optics_image_squared(sqrt(own + along_px2), sqrt(own + across_px2),
+                                                    length_px);
+                }
+            }
+        }
+    }
+    return sum;
+}
