@@ -17,11 +17,11 @@ typedef enum bst_control_strategy {
     BST_CONTROL_TRACK = 0, /* closed loop */
     BST_CONTROL_STARE,     /* where the cue is at stare_time_s, inertially */
     BST_CONTROL_RATE,      /* along the cue */
-    BST_CONTROL_FIXED,     /* a direction held, in inertial space or in the body */
+    BST_CONTROL_FIXED,     /* a fixed direction, in inertial space or in the body */
     BST_CONTROL_SCAN,      /* along the middle of the cue's region at a constant rate */
 } bst_control_strategy;
 
-/* How the boresight moves while it dwells on a place of a region. */
+/* Motion of the boresight while it dwells on a point of a region. */
 typedef enum bst_control_dwell_rate {
     BST_CONTROL_RATE_BELT = 0,
     BST_CONTROL_RATE_SIDEREAL,
@@ -65,23 +65,23 @@ extern const bst_config_desc bst_control_config_table[];
 /* The cue `seconds` after the epoch. */
 typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double seconds,
                                          bst_onboard_cue *out);
-/* Its direction alone. */
+/* The direction of the cue alone. */
 typedef bst_status (*bst_control_cue_direction_fn)(void *user, bst_ctx *ctx, double seconds,
                                                    bool *valid, bst_vec3 *direction);
 
-/* The range of the cue's object, and 0 where that is not known. */
+/* Range of the cue's object, m; 0: unknown. */
 typedef bst_status (*bst_control_cue_range_fn)(void *user, bst_ctx *ctx, double seconds,
                                                double *range_m);
 
-/* The direction of a place of the region (bst_knowledge_region_direction_at). */
+/* Direction of a point of the region (bst_knowledge_region_direction_at). */
 typedef bst_status (*bst_control_region_fn)(void *user, bst_ctx *ctx, double seconds,
                                             double along_rad, double across_rad,
                                             bst_vec3 *direction);
-/* From where the belt is seen (bst_knowledge_belt_eye_at). */
+/* Observer's position for the belt (bst_knowledge_belt_eye_at). */
 typedef bst_status (*bst_control_belt_eye_fn)(void *user, bst_ctx *ctx, double seconds, bool *known,
                                               bst_belt_eye *eye);
 
-/* What a controller knows besides its messages. */
+/* Environment of a controller: its inputs besides messages. */
 typedef struct bst_control_env {
     double tick_rate_hz;
     double pixel_rad;
@@ -102,37 +102,36 @@ typedef struct bst_control_transition {
     const char *reason;
 } bst_control_transition;
 
-/* A track as last heard of. */
+/* A track as of its latest message. */
 typedef struct bst_control_held {
     int64_t id, tick;
     bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
     bst_onboard_cue cue;                      /* at that time */
 } bst_control_held;
 
-/* The cue as it was when it was looked at last. */
+/* The latest cues, to detect its end and jumps. */
 typedef struct bst_control_watch {
     int count; /* of the directions below, the newest first: 0 to 2 */
     int64_t tick, tick_before;
     bst_vec3 direction, direction_before;
-    bool ended;        /* it has been there, and is no more */
-    int64_t jump_tick; /* when it was suddenly elsewhere, last */
+    bool ended;        /* it was valid and is no longer */
+    int64_t jump_tick; /* tick of its latest jump */
 } bst_control_watch;
 
 #define BST_CONTROL_TRANSITIONS 4 /* greatest number in one observe and one update */
 
-/* An aim that was worked out: each tick is asked for several times, as a command's own and as those
- * that its rate is taken between. */
+/* A cached aim: each tick is needed several times, for a command and for the differences that give
+ * its rate. */
 typedef struct bst_control_aimed {
     bool known, valid;
     int64_t tick;
-    int64_t nav_tick;        /* of the navigation telemetry, whose velocity it is aberrated by */
+    int64_t nav_tick;        /* of the navigation telemetry that gave the velocity for aberration */
     bst_vec3 boresight_gcrf; /* bst_control_boresight_at */
 } bst_control_aimed;
 
 #define BST_CONTROL_AIMED 128
 
-/* The boresight's way over rate_half_ticks by the quintic through six aims that lie so far apart.
- */
+/* Path of the boresight over rate_half_ticks: the quintic through six aims with this spacing. */
 typedef struct bst_control_piece {
     bool made, smooth;
     int64_t index; /* it begins at this times rate_half_ticks */

@@ -12,7 +12,7 @@ static inline int64_t bst_control_ticks(const bst_control *c, double seconds) {
     return (int64_t)llround(seconds * c->env.tick_rate_hz);
 }
 
-/* The rotation that takes a direction among the stars to where telemetry's boresight has to be. */
+/* Rotation from a direction among the stars to the boresight of the telemetry that points there. */
 static inline bst_quat bst_control_correction_at(const bst_control *c, int64_t tick) {
     return bst_model_error_correction(&c->model_error, &c->pointing_error, tick,
                                       c->env.tick_rate_hz);
@@ -20,56 +20,74 @@ static inline bst_quat bst_control_correction_at(const bst_control *c, int64_t t
 
 /* ---- pointing_reference.c ---- */
 
+/* Cue at a tick.
+ *
+ * Errors:    those of the onboard knowledge */
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,
                               bst_onboard_cue *out) BST_MUST_CHECK;
 
-/* Geometric to apparent with what navigation knows. */
+/* Apparent direction of a geometric one, with the velocity of the navigation telemetry. */
 bst_vec3 bst_control_apparent(const bst_control *c, bst_vec3 geometric);
 
-/* After a change of anything that bst_control_aim or the pointing error rests on. */
+/* Clears the cached aims; call it after any change that affects the aim or the pointing error. */
 void bst_control_forget_aims(bst_control *c);
 
-/* Where the telemetry's boresight has to be for the true one to be on the aim. */
+/* Direction that the telemetry's boresight must have for the true one to be on the aim.
+ *
+ * Returned:  *valid     false: there is no aim
+ *            *direction  unit vector, apparent */
 bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
                                     bst_vec3 *direction) BST_MUST_CHECK;
 
-/* The rate (rad/s) of what the cue expects in a direction: the cue's own, or that of the belt there
- * when it gives a region; *known false: there is none. */
+/* Rate that the cue expects in a direction: that of the cue, or that of the belt for a region.
+ *
+ * Returned:  *known       false: there is no cue
+ *            *rate_radps  rad/s */
 bst_status bst_control_expected_rate(bst_ctx *ctx, const bst_control *c, int64_t tick,
                                      bst_vec3 direction, bool *known,
                                      bst_vec3 *rate_radps) BST_MUST_CHECK;
 
-/* Whether the boresight dwells on places of the region as they move. */
+/* True if the boresight follows the motion of the region's points while it dwells. */
 bool bst_control_moves_with_region(const bst_control *c);
 
 /* ---- search_mode.c ---- */
 
+/* Changes the mode and notes the transition for the record.
+ *
+ * Given:     mode    a bst_mode
+ *            reason  constant text */
 void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reason);
 
 /* Begins a search in BST_MODE_SEARCH or BST_MODE_REACQUIRE. */
 bst_status bst_control_start_search(bst_ctx *ctx, bst_control *c, int mode, int64_t tick,
                                     const char *reason) BST_MUST_CHECK;
-/* Back to the place of the search that a failed candidate interrupted. */
+/* Returns to the tile of the search that a failed candidate interrupted. */
 bst_status bst_control_resume_search(bst_ctx *ctx, bst_control *c, int64_t tick,
                                      const char *reason) BST_MUST_CHECK;
+
+/* Goes on to the next tile of the search; starts the search again from the cue after the last one.
+ *
+ * Notes:     in BST_MODE_REACQUIRE it stays at the predicted position for reacquire_coast_s. */
 bst_status bst_control_next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) BST_MUST_CHECK;
-/* A frame that shows nothing new counts for the dwell. */
+/* Counts a frame without a new candidate for the dwell. */
 bst_status bst_control_count_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
                                    const bst_tracks *tracks) BST_MUST_CHECK;
-/* The best track that moves as the target should, NULL when there is none. */
+/* Best track whose motion agrees with the expected one; *out NULL: none. */
 bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const bst_tracks *tracks,
                                       const bst_track **out) BST_MUST_CHECK;
 
 /* ---- modes.c ---- */
 
-/* The first mode, out of BST_MODE_IDLE. */
+/* Leaves BST_MODE_IDLE for the first mode. */
 bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) BST_MUST_CHECK;
 
-/* Transitions that time or telemetry bring about; arrived: the servo is at rest on the aim. */
+/* Makes the transitions that time or telemetry causes.
+ *
+ * Given:     arrived  the servo has settled on the aim */
 bst_status bst_control_advance(bst_ctx *ctx, bst_control *c, int64_t tick,
                                bool arrived) BST_MUST_CHECK;
 
-/* Transitions that the tracker's message about one frame brings about. */
+/* Makes the transitions that the tracks of a frame cause. */
 bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
                                   const bst_tracks *tracks) BST_MUST_CHECK;
 

@@ -49,8 +49,9 @@ bst_status bst_gimbal_create(const bst_module_env *env, size_t bytes, bst_gimbal
                              void (*destroy)(void *self), const void *config,
                              void **self) BST_MUST_CHECK;
 
-/* Nominal attitude of the body, and angle of a pixel, of the instance's sensor. */
+/* Nominal attitude of the body of the module's observer. */
 bst_quat bst_gimbal_nominal(const bst_module_env *env);
+/* Pixel scale of the module's sensor, rad. */
 double bst_gimbal_pixel_rad(const bst_module_env *env);
 
 /* bst_platform_init for the instance's platform, with its random streams; base->platform is that

@@ -77,6 +77,7 @@ typedef struct bst_imgproc bst_imgproc;
 bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
                               const bst_imgproc_config *config, const bst_imgproc_maps *maps,
                               bst_imgproc **out) BST_MUST_CHECK;
+/* Frees an image processor; NULL is allowed. */
 void bst_imgproc_free(bst_imgproc *ip);
 
 /* Finds and measures the sources of one frame.

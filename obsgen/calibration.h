@@ -38,6 +38,10 @@ void bst_obsgen_calibration_theory(bst_obsgen_calibration *out);
  * another version: that the command writes a new one. */
 bst_status bst_obsgen_calibration_read(bst_ctx *ctx, const char *path,
                                        bst_obsgen_calibration *out) BST_MUST_CHECK;
+
+/* Writes a calibration as JSON, the whole file or nothing.
+ *
+ * Errors:    BST_ERR_IO, BST_ERR_MEMORY */
 bst_status bst_obsgen_calibration_write(bst_ctx *ctx, const char *path,
                                         const bst_obsgen_calibration *calibration) BST_MUST_CHECK;
 

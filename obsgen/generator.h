@@ -36,6 +36,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
                                 const bst_generator_settings *settings,
                                 const bst_obsgen_calibration *calibration, bst_rng_key key,
                                 bst_generator **out) BST_MUST_CHECK;
+/* Frees a generator; NULL is allowed. */
 void bst_generator_free(bst_generator *generator);
 
 /* Takes the memory that frames with long streaks need up to this many pixels that are read; without

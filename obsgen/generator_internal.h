@@ -117,9 +117,9 @@ struct bst_generator {
 
 /* Share of the frame that a Gaussian's light at (x, y) has. */
 double bst_generator_inside(const bst_generator *g, double x, double y, double sigma);
-/* The response of the frame's filters, after its path was set, and, after its noise was, their
- * thresholds and noise. */
+/* Computes the response of the frame's filters, once its path is set. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
+/* Computes thresholds and noise of the frame's filters, once its noise is set. */
 void bst_generator_set_filters(bst_generator *g);
 /* Share of a crowded frame that image processing takes for open sky, by the amplitudes of its
  * sources; 1 where it is not crowded. */

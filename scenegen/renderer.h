@@ -36,6 +36,7 @@ typedef struct bst_renderer_options {
                                            work-items per group; 0: chosen for the device */
 } bst_renderer_options;
 
+/* Options with their defaults: error tolerance 0.05 sigma, pool of 4 frames. */
 bst_renderer_options bst_renderer_default_options(void);
 
 /* Builds the kernels and allocates. `options` may be NULL. BST_ERR_ARGUMENT for a camera that

@@ -24,6 +24,10 @@ typedef enum bst_upload_ring_part {
     BST_STAGE_PARTS
 } bst_upload_ring_part;
 
+/* Creates the ring of buffers for uploads to a device.
+ *
+ * Returned:  *out  to be freed, after an error too, if it is not NULL
+ * Errors:    BST_ERR_MEMORY, BST_ERR_DEVICE */
 bst_status bst_upload_ring_create(bst_ctx *ctx, bst_device *device,
                                   bst_upload_ring **out) BST_MUST_CHECK;
 /* Waits for the device. */

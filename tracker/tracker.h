@@ -105,6 +105,7 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
                               const bst_camera *camera, int64_t tick_rate_hz,
                               bst_tracker_star_fn star, void *star_user,
                               bst_tracker **out) BST_MUST_CHECK;
+/* Frees a tracker; NULL is allowed. */
 void bst_tracker_free(bst_tracker *tracker);
 
 /* What bst_tracker_step would answer before it looks at the content: BST_TRACKER_USED, or why the

@@ -60,11 +60,18 @@ typedef struct bst_tracker_frame_view {
     double threshold_snr;
 } bst_tracker_frame_view;
 
-/* Hooks of bst_mtt_frame; user is a bst_tracker_frame_view. */
+/* Callback of bst_mtt_frame: true if a direction is in the field.
+ *
+ * Given:     user  a bst_tracker_frame_view; so for the callbacks below */
 bool bst_tracker_frame_in_field(const void *user, bst_vec3 direction);
+
+/* Callback: true if the cue expects the motion of a track. */
 bool bst_tracker_frame_is_expected(const void *user, const bst_mtt_track *track);
+/* Callback: rate that the cue expects in a direction, rad/s; false without a cue. */
 bool bst_tracker_frame_expected_rate(const void *user, bst_vec3 direction, bst_vec3 *rate_radps);
+/* Callback: range and range rate to assume for a track; false if nothing is known. */
 bool bst_tracker_frame_range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
+/* Callback: visibility of a track's object by its estimated orbit. */
 bst_mtt_sight bst_tracker_frame_sight_of(const void *user, const bst_mtt_track *track,
                                          bst_mtt_light *light);
 

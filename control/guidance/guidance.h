@@ -1,4 +1,5 @@
-/* Guidance: how the boresight gets to where control wants it, and what it can expect there. */
+/* Guidance: slews of the boresight to its aim, and prediction of whether the aim stays reachable.
+ */
 #ifndef BST_CONTROL_GUIDANCE_GUIDANCE_H
 #define BST_CONTROL_GUIDANCE_GUIDANCE_H
 
@@ -9,7 +10,7 @@
 #include "control/guidance/slew.h"
 
 typedef enum bst_guidance_slews {
-    BST_SLEWS_MOUNT = 0, /* the mount gets there by itself */
+    BST_SLEWS_MOUNT = 0, /* left to the mount's servo */
     BST_SLEWS_PLANNED,
 } bst_guidance_slews;
 
@@ -26,10 +27,10 @@ typedef struct bst_guidance_config {
 
 extern const bst_config_desc bst_guidance_config_table[];
 
-/* What is to be pointed at, at any tick: unit, apparent, as the attitude telemetry sees it. */
+/* Direction of the aim at a tick: unit, apparent, in the frame of the attitude telemetry. */
 typedef bst_status (*bst_guidance_aim_fn)(void *user, bst_ctx *ctx, int64_t tick, bool *valid,
                                           bst_vec3 *direction);
-/* Its range; 0: not known. */
+/* Range of the aim at a tick, m; 0: unknown. */
 typedef bst_status (*bst_guidance_range_fn)(void *user, bst_ctx *ctx, int64_t tick,
                                             double *range_m);
 
@@ -41,13 +42,13 @@ typedef struct bst_guidance_env {
 } bst_guidance_env;
 
 typedef enum bst_guidance_event_kind {
-    BST_GUIDANCE_UNREACHABLE, /* what is to be pointed at cannot be, now */
-    BST_GUIDANCE_REACHABLE,   /* it can be again */
-    BST_GUIDANCE_AHEAD,       /* it will not be reachable */
-    BST_GUIDANCE_LOSS,        /* it will be lost for a while by the mount's limits */
-    BST_GUIDANCE_DETOUR,      /* a slew goes round keep-out cones */
-    BST_GUIDANCE_NO_WAY,      /* keep-out cones leave no way there */
-    BST_GUIDANCE_ROLL,        /* the body rolls out of the way of the pole */
+    BST_GUIDANCE_UNREACHABLE, /* the aim cannot be reached now */
+    BST_GUIDANCE_REACHABLE,   /* the aim can be reached again */
+    BST_GUIDANCE_AHEAD,       /* the aim will become unreachable */
+    BST_GUIDANCE_LOSS,        /* limits of the mount will lose the aim for a while */
+    BST_GUIDANCE_DETOUR,      /* a slew avoids keep-out cones */
+    BST_GUIDANCE_NO_WAY,      /* keep-out cones block every path to the aim */
+    BST_GUIDANCE_ROLL,        /* the body rolls to keep the aim away from the mount's pole */
 } bst_guidance_event_kind;
 
 typedef struct bst_guidance_event {
@@ -59,7 +60,7 @@ typedef struct bst_guidance_event {
 
 #define BST_GUIDANCE_EVENTS 4 /* greatest number in one command */
 
-/* A slew under way. */
+/* A slew in progress. */
 typedef struct bst_guidance_slew {
     bool active, along_path; /* else by axis */
     int64_t start_tick;
@@ -75,7 +76,7 @@ typedef struct bst_guidance {
     bst_guidance_env env;
     bst_mount_status mount;
     bool mount_known;
-    bst_nav_telemetry nav;                   /* as the attitude telemetry sees it */
+    bst_nav_telemetry nav;                   /* in the frame of the attitude telemetry */
     bst_keep_out_zone zones[BST_ZONE_KINDS]; /* of nav, WIDER_RAD wider */
     int zone_count;
     bool nav_known;
@@ -83,60 +84,75 @@ typedef struct bst_guidance {
     bst_los_command last;
     bst_guidance_slew slew;
     bst_slew_nodes nodes; /* work space of planning */
-    /* the way of pointing and turn that were chosen */
+    /* the solution and whole turns that were chosen */
     bool near_known;
     double near_rad[BST_MOUNT_AXES];
     bst_vec3 near_body; /* direction in body axes that near_rad was worked out for; zero: none */
-    int reach;          /* bst_pointing_feasibility, as last told */
-    bool no_way;        /* told */
-    int64_t ahead_tick; /* of the next look ahead */
+    int reach;          /* bst_pointing_feasibility, as last reported */
+    bool no_way;        /* reported: keep-out zones block the way to the target */
+    int64_t ahead_tick; /* of the next prediction */
     bool roll_given;    /* the body has been asked for */
     double roll_rad;    /* this roll */
-    double told_from_s, told_until_s; /* the loss ahead that was told; INFINITY: none */
+    double told_from_s, told_until_s; /* predicted loss that was reported; INFINITY: none */
     bst_guidance_event events[BST_GUIDANCE_EVENTS];
     int event_count;
 } bst_guidance;
 
+/* Initialises guidance; configuration and environment are copied. */
 void bst_guidance_init(bst_guidance *guidance, const bst_guidance_config *config,
                        const bst_guidance_env *env);
 
-/* Takes in the mount's newest status (NULL: nothing new). */
+/* Updates the status of the mount; NULL: no new status. */
 void bst_guidance_telemetry(bst_guidance *guidance, const bst_mount_status *mount);
 
-/* Takes in navigation's newest message: where cones and the Earth are, by an attitude telemetry
- * with this error (as bst_pointing_error has it). They hardly move between two messages. */
+/* Updates keep-out cones and the Earth's direction from navigation.
+ *
+ * Given:     nav    newest message; the cones hardly move until the next one
+ *            error  error of the attitude telemetry, as in bst_pointing_error */
 void bst_guidance_see_sky(bst_guidance *guidance, const bst_nav_telemetry *nav, bst_quat error);
 
-/* Turns the command that would put the boresight on the aim at command->tick into the one to give:
- * itself, unless keep-out cones are set, slews planned or turns to be chosen, and it is farther
- * than slew_above_deg from the last command (at first: from the present boresight) or within a
- * cone. `boresight`: unit, the telemetry's, NULL when there is none yet: then a slew cannot be
- * planned, and *give is false: there is to be no command. Looks ahead when that is due; what is
- * found is in events, which the caller empties (event_count = 0). */
+/* Replaces the command for the aim by the next command of a slew, if a slew is needed.
+ *
+ * Given:     boresight  unit vector by telemetry; NULL: unknown
+ *            command    points the boresight to the aim at command->tick
+ * Returned:  command  the command to send
+ *            *give    false: send none, because a slew is needed and the boresight is unknown
+ * Errors:    those of the aim's function
+ * Notes:     the command stays as it is unless keep-out cones are set, slews are planned or mount
+ *            angles must be chosen, and the aim is within a cone or farther than slew_above_deg
+ *            from the last command (at first from the boresight). When due, the function also
+ *            predicts the reachability of the aim. Events are appended; the caller clears them
+ *            (event_count = 0). */
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) BST_MUST_CHECK;
 
-/* guidance_state.c: the cones of keep-out at present. */
+/* Keep-out cones at the time of `nav` (guidance_state.c).
+ *
+ * Returned:  number of zones */
 int bst_guidance_zones(const bst_guidance *guidance, const bst_nav_telemetry *nav,
                        bst_keep_out_zone zones[BST_ZONE_KINDS]);
 
-/* Body attitude by the mount's status carried to a tick: at its rate, the roll that it was asked
- * for within its limits. */
+/* Body attitude at a tick: the mount's status propagated at its rate, with the commanded roll
+ * within its limits. */
 bst_quat bst_guidance_body(const bst_guidance *guidance, int64_t tick);
 
-/* guidance_roll.c: the body `seconds` after the mount's status, on its way to a roll. */
+/* Body attitude during a roll, `seconds` after the mount's status (guidance_roll.c). */
 bst_quat bst_guidance_rolled(const bst_guidance *guidance, double seconds, double roll_rad);
-/* Chooses the least roll of the body by which what `problem` expects (seconds from now) can be
- * followed up to horizon_s without loss; *found false: there is none. */
+/* Chooses the smallest roll of the body that lets the mount follow the aim without loss.
+ *
+ * Given:     problem    the aim and the mount, times in seconds from now
+ *            horizon_s  time up to which the aim must be followed, s
+ * Returned:  *found  false: no roll does */
 bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *guidance,
                                     const bst_pointing_feasibility_problem *problem,
                                     double horizon_s, bool *found) BST_MUST_CHECK;
 
-/* guidance_ahead.c: looks look_ahead_s ahead of `tick` and notes what changes as events. */
+/* Predicts the reachability of the aim for look_ahead_s and appends its changes to the events
+ * (guidance_ahead.c). */
 bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *guidance,
                                    int64_t tick) BST_MUST_CHECK;
 
-/* The event in words: "unreachable until 12.3 s: behind the Earth". */
+/* Writes an event in words: "unreachable until 12.3 s: behind the Earth". */
 void bst_guidance_describe(const bst_guidance_event *event, char *text, size_t bytes);
 
 #endif

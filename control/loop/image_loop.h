@@ -43,17 +43,24 @@ bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
                                const bst_compensator_config *config,
                                const bst_image_loop_env *env) BST_MUST_CHECK;
 
-/* Remembers what is commanded for effect_tick: the corrected directions then and half_ticks later
- * and earlier. `arrived`: telemetry says, of arrived_tick, that the mount is on its aim. When
- * frames have failed to come or the aim has jumped, what the compensators gave for the latest error
- * is taken back, and the correction goes on at what their integrators hold. Returns whether it was
- * changed. */
+/* Stores the command that takes effect at a tick.
+ *
+ * Given:     effect_tick   tick at which the command takes effect
+ *            corrected     corrected directions at effect_tick, half_ticks later and half_ticks
+ *                          earlier
+ *            arrived       the mount is on its aim, by the telemetry of arrived_tick
+ * Returned:  true if the correction was changed
+ * Notes:     if frames are missing or the aim has jumped, the compensators' response to the latest
+ *            error is removed; the correction continues from the state of their integrators. */
 bool bst_image_loop_commanded(bst_image_loop *loop, bst_pointing_error *correction,
                               int64_t effect_tick, int64_t half_ticks, const bst_vec3 corrected[3],
                               bool arrived, int64_t arrived_tick);
 
-/* Takes a frame's attitude at `tick` (now), and sets error and rate of the correction. Returns
- * whether it was used. */
+/* Updates error and rate of the correction from the attitude of a frame.
+ *
+ * Given:     tick  now
+ *            fix   attitude from the frame's stars
+ * Returned:  true if the fix was used */
 bool bst_image_loop_update(bst_image_loop *loop, bst_pointing_error *correction, int64_t tick,
                            const bst_attitude_fix *fix);
 

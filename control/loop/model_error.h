@@ -42,6 +42,7 @@ typedef struct bst_model_error_env {
     double jump_rad; /* an aim that moves by more between two commands starts a slew */
 } bst_model_error_env;
 
+/* Initialises a model error: a wrong gain or a late model. Inactive for gain 1 and no delay. */
 void bst_model_error_init(bst_model_error *error, const bst_model_error_env *env);
 
 /* Takes in a commanded direction, as bst_pointing_error_uncorrect. */

@@ -1,11 +1,11 @@
 /* Which sensor looks for which object: a rule of priority, visibility and keep-out angles.
  *
- * It knows what is known on board: the catalogue, where the spacecraft believe to be, their mounts,
- * and what their trackers tell. A target is due once it has not been seen for as long as its line
- * of the list wishes. A sensor that is free takes, of all targets that are due and that nobody else
- * has, the one with the greatest
+ * Its inputs are those known on board: the catalogue, the spacecraft's estimated positions, their
+ * mounts, and their tracks. A target is due when the revisit time of its line of the list has
+ * passed since it was last seen. A free sensor takes, of all due targets that no other sensor has,
+ * the one with the greatest
  *
- *   priority * min(time since seen / revisit wish, 4) / (slew + settling + frames to be taken)
+ *   priority * min(time since seen / revisit time, 4) / (slew + settling + frames to be taken)
  *
  * that it can see from its arrival until the frames are taken. */
 #ifndef BST_CONTROL_TASKING_TASKING_H
@@ -68,7 +68,7 @@ typedef struct bst_tasking_sensor {
     double zone_cosines[BST_ZONE_KINDS];
     int zone_count;
     /* the task */
-    bst_task task; /* as told; object -1: the own cue */
+    bst_task task; /* as published; object -1: the sensor's own cue */
     bool pointed;
     bst_vec3 direction;            /* of the last target, when it was given */
     double given_s, arrival_s;     /* when it was given; when the sensor should be there */
@@ -89,15 +89,15 @@ typedef struct bst_tasking {
     int sensor_count;
     int object_count;
     int16_t *line;      /* [object] of config.targets, -1: none */
-    double *seen_s;     /* [object] when it was seen last; below 0: not yet */
-    int *holder;        /* [object] the sensor that has it, -1: none */
-    float *not_before;  /* [sensor][object] s: it is not to be tried before */
+    double *seen_s;     /* [object] time of the latest sighting; below 0: none */
+    int *holder;        /* [object] index of the sensor whose task it is, -1: none */
+    float *not_before;  /* [sensor][object] s: earliest time of the next attempt */
     double *place_m[3]; /* [object] */
     bst_tasking_choice *choices;
     double next_report_s;
 } bst_tasking;
 
-/* A summary of what cannot be seen by any sensor. */
+/* Number of targets that sensors can see, and the reasons for the others. */
 typedef struct bst_tasking_report {
     int targets, seen, visible; /* of the list; seen so far; those that some sensor can see now */
     int why[BST_WHY_COUNT];     /* of the others, the least of the sensors' reasons' order */
@@ -108,33 +108,43 @@ typedef struct bst_tasking_report {
 bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *tasking, const bst_tasking_config *config,
                             const bst_fleet_member *members, int member_count,
                             double tick_rate_hz) BST_MUST_CHECK;
+/* Frees the memory of the tasking and clears the struct, which belongs to the caller. */
 void bst_tasking_free(bst_tasking *tasking);
 
-/* Takes in what a sensor tells (NULL: nothing new). */
+/* Updates navigation and mount of a sensor; NULL: no new message. */
 void bst_tasking_telemetry(bst_tasking *tasking, int sensor, const bst_nav_telemetry *nav,
                            const bst_mount_status *mount);
-/* A frame's tracks. */
+/* Updates what a sensor has seen, from the tracks of a frame. */
 void bst_tasking_tracks(bst_tasking *tasking, int sensor, const bst_tracks *tracks);
 
-/* Ends the sensor's task when that is due, and gives the next. *given: the task has changed. */
+/* Ends the task of a sensor if it is due, and gives it the next one.
+ *
+ * Given:     sensor  index of the sensor
+ *            tick    now
+ * Returned:  *given  true if the task has changed
+ * Errors:    those of the onboard knowledge */
 bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *tasking, int sensor, int64_t tick,
                             bool *given) BST_MUST_CHECK;
 
-/* A tick before which plans of the sensor change nothing, whatever it tells until then. */
+/* Lookahead of a sensor: tick before which its task will not change, for any messages until then.
+ */
 int64_t bst_tasking_quiet_until(const bst_tasking *tasking, int sensor);
 
-/* Whether an object can be seen; sight and the SNR of a frame as far as they were worked out. */
+/* Visibility of an object from a sensor at a time. */
 typedef struct bst_tasking_visibility {
-    bst_tasking_why why;
-    bst_world_sight sight;
-    double snr;
+    bst_tasking_why why;   /* BST_WHY_NOT: it can be seen; or the first reason why not */
+    bst_world_sight sight; /* as far as it was computed */
+    double snr;            /* of a frame, as far as it was computed */
 } bst_tasking_visibility;
 
-/* Whether an object can be seen by a sensor at a time, by what is known. */
+/* Computes the visibility of an object from a sensor by the onboard knowledge.
+ *
+ * Given:     seconds  since the epoch
+ * Errors:    those of the onboard knowledge */
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *tasking, int sensor, int object,
                             double seconds, bst_tasking_visibility *out) BST_MUST_CHECK;
 
-/* Looks from all sensors at all targets of the list. */
+/* Checks the visibility of all targets of the list from all sensors. */
 bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *tasking, double seconds,
                               bst_tasking_report *out) BST_MUST_CHECK;
 

@@ -28,6 +28,7 @@ typedef struct bst_jitter_spectrum {
 bst_status bst_jitter_spectrum_create(bst_ctx *ctx, const bst_jitter_spec *flat,
                                       const bst_jitter_psd_config *config, double pixel_rad,
                                       bst_jitter_spectrum *out) BST_MUST_CHECK;
+/* Frees the memory of a spectrum and clears the struct, which belongs to the caller. */
 void bst_jitter_spectrum_free(bst_jitter_spectrum *spectrum);
 
 /* Whether there is anything besides the flat bands. */

@@ -16,6 +16,8 @@ typedef struct bst_jitter_density {
     int count;                              /* 0: nothing */
 } bst_jitter_density;
 
+/* One-sided spectral density at a frequency, between the points as the table interpolates; 0
+ * outside. */
 double bst_jitter_density_at(const bst_jitter_density *density, double frequency_hz);
 /* Integral from low_hz to high_hz, closed form. */
 double bst_jitter_density_integral(const bst_jitter_density *density, double low_hz,

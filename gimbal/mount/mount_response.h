@@ -24,8 +24,16 @@ void bst_mount_linearise(const bst_mount_joints *joints, int axis,
                          const double angle_rad[BST_CHAIN_MOST], double dt_s, int delay_steps,
                          double line_of_sight_share, bst_mount_linear *out);
 
-/* Sampled responses of the axis at omega rad/s, from the acceleration asked for. */
+/* Sampled frequency response of the axis from the commanded acceleration to the encoder angle.
+ *
+ * Given:     omega_radps  angular frequency, rad/s
+ * Returned:  rad per rad/s^2, with the delay */
 double complex bst_mount_linear_encoder(const bst_mount_linear *linear, double omega_radps);
+
+/* Sampled frequency response of the axis from the commanded acceleration to the line of sight.
+ *
+ * Given:     omega_radps  angular frequency, rad/s
+ * Returned:  rad per rad/s^2, with the delay and the line of sight's share of the flex angle */
 double complex bst_mount_linear_sight(const bst_mount_linear *linear, double omega_radps);
 
 /* One axis with its servo. At a frequency, all of the sampled signals at the plant's rate, delays

@@ -45,6 +45,13 @@ bst_vec3 bst_attitude_filter_error(bst_quat q, bst_quat estimate);
 typedef struct bst_attitude_steady {
     double before_rad, after_rad, bias_radps;
 } bst_attitude_steady;
+
+/* Steady standard deviations (see bst_attitude_steady).
+ *
+ * Given:     angle_walk  angle random walk of the gyro, rad/sqrt(s)
+ *            rate_walk   rate random walk of the gyro, rad/s/sqrt(s)
+ *            noise_rad   noise of a measurement, 1 sigma per axis
+ *            dt_s        time between measurements, s */
 bst_attitude_steady bst_attitude_steady_state(double angle_walk, double rate_walk, double noise_rad,
                                               double dt_s);
 

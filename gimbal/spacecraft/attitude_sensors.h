@@ -43,6 +43,9 @@ typedef struct bst_spacecraft_star_tracker {
     bst_rng_key key;
 } bst_spacecraft_star_tracker;
 
+/* Initialises a star tracker from its configuration.
+ *
+ * Given:     key  key of its noise */
 void bst_spacecraft_star_tracker_init(bst_spacecraft_star_tracker *tracker,
                                       const bst_spacecraft_star_tracker_config *config,
                                       bst_rng_key key);

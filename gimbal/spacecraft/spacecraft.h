@@ -51,10 +51,12 @@ typedef struct bst_spacecraft_now {
     double unresolved_rad2; /* variance of the body's shake about one axis, the mean of
                                the three, that is not between the steps */
 } bst_spacecraft_now;
+/* Present state of the spacecraft; it belongs to the spacecraft. */
 const bst_spacecraft_now *bst_spacecraft_at(const bst_spacecraft *craft);
 
-/* Lends the dynamics and the filter, for who examines them. */
+/* Dynamics of the spacecraft, for tests and analysis; they belong to the spacecraft. */
 const bst_spacecraft_body *bst_spacecraft_dynamics(const bst_spacecraft *craft);
+/* Attitude filter of the spacecraft, for tests and analysis; it belongs to the spacecraft. */
 const bst_attitude_filter *bst_spacecraft_filter(const bst_spacecraft *craft);
 /* True bias of its gyro, rad/s. */
 bst_vec3 bst_spacecraft_gyro_bias(const bst_spacecraft *craft);

@@ -80,13 +80,17 @@ void bst_spacecraft_body_step(bst_spacecraft_body *body, bst_vec3 torque_nm,
 
 bst_quat bst_spacecraft_body_attitude(const bst_spacecraft_body *body); /* q_body_from_gcrf */
 bst_vec3 bst_spacecraft_body_rate(const bst_spacecraft_body *body);     /* body axes */
+
+/* Speed of a wheel relative to the body, rad/s.
+ *
+ * Given:     wheel  index of the wheel */
 double bst_spacecraft_body_wheel_radps(const bst_spacecraft_body *body, int wheel);
 /* Inertia that a motor torque on a wheel turns: its own against the body that gives way. */
 double bst_spacecraft_body_wheel_load_kgm2(const bst_spacecraft_body *body, int wheel);
 
-/* Angular momentum in GCRF, N m s, from attitude, rates and modes; kinetic and elastic energy, J.
- */
+/* Angular momentum of body, wheels and flexible modes, N m s, GCRF. */
 bst_vec3 bst_spacecraft_body_momentum(const bst_spacecraft_body *body);
+/* Kinetic and elastic energy of body, wheels and flexible modes, J. */
 double bst_spacecraft_body_energy(const bst_spacecraft_body *body);
 
 /* The symmetric matrix of six elements in the order of bst_spacecraft_spec. */

@@ -40,9 +40,16 @@ typedef struct bst_spacecraft_config {
 
 extern const bst_config_desc bst_spacecraft_config_table[];
 
-/* Wheels and star trackers of a configuration, those that it has when it lists none included; lent.
- */
+/* Reaction wheels of a configuration; the default set if none are given.
+ *
+ * Returned:  *count  number of wheels
+ *            the array, which belongs to the configuration or is constant */
 const bst_wheel_config *bst_spacecraft_wheels(const bst_spacecraft_config *config, int *count);
+
+/* Star trackers of a configuration; the default pair if none are given.
+ *
+ * Returned:  *count  number of trackers
+ *            the array, which belongs to the configuration or is constant */
 const bst_spacecraft_star_tracker_config *bst_spacecraft_trackers(
     const bst_spacecraft_config *config, int *count);
 

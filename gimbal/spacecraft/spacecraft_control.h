@@ -18,6 +18,7 @@ typedef struct bst_spacecraft_attitude_control {
     bst_vec3 error_rad; /* of the step before: which way round was taken */
 } bst_spacecraft_attitude_control;
 
+/* Initialises the attitude controller at rest; its integrators are zero. */
 void bst_spacecraft_attitude_control_init(bst_spacecraft_attitude_control *control,
                                           const bst_spacecraft_attitude_control_spec *spec);
 

@@ -29,6 +29,11 @@ bst_spacecraft_response bst_spacecraft_response_at(const bst_spacecraft_config *
 typedef struct bst_spacecraft_noise {
     double knowledge, pointing;
 } bst_spacecraft_noise;
+
+/* Spectral densities of bst_spacecraft_noise at one frequency.
+ *
+ * Given:     axis          body axis, 0 to 2
+ *            frequency_hz  above 0 */
 bst_spacecraft_noise bst_spacecraft_noise_at(const bst_spacecraft_config *config, int axis,
                                              double frequency_hz);
 

@@ -15,12 +15,18 @@ typedef struct bst_bad_rows {
  */
 bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity,
                                bst_bad_rows *out) BST_MUST_CHECK;
+/* Frees the memory of a list of bad pixels and clears the struct, which belongs to the caller. */
 void bst_bad_rows_free(bst_bad_rows *rows);
 
-/* Empties the map; then pixels are added in ascending order of y * width + x, those beyond the
- * capacity are left out; bst_bad_rows_end completes it. */
+/* Empties the map. Then come bst_bad_rows_add for each pixel and bst_bad_rows_end. */
 void bst_bad_rows_begin(bst_bad_rows *rows);
+
+/* Adds a pixel; pixels come in ascending order of y * width + x. Those beyond the capacity are
+ * dropped.
+ *
+ * Given:     pixel  y * width + x */
 void bst_bad_rows_add(bst_bad_rows *rows, int32_t pixel);
+/* Completes the map: computes where each row begins. */
 void bst_bad_rows_end(bst_bad_rows *rows);
 
 /* Whether pixel y * width + x of the sensor is in the map. */

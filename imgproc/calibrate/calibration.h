@@ -19,6 +19,7 @@ bst_status bst_calibration_load(bst_ctx *ctx, const bst_imgproc_config *config,
  */
 bst_status bst_calibration_psf(bst_ctx *ctx, const bst_knowledge *knowledge, bst_camera *camera,
                                bst_imgproc_maps *maps) BST_MUST_CHECK;
+/* Frees the maps, releases the measured PSF and clears the struct, which belongs to the caller. */
 void bst_calibration_free(bst_imgproc_maps *maps);
 
 #endif

@@ -16,6 +16,7 @@ typedef struct bst_columns {
 
 /* Room for a frame of `width` columns. BST_ERR_MEMORY. */
 bst_status bst_columns_create(bst_ctx *ctx, int width, bst_columns *out) BST_MUST_CHECK;
+/* Frees the memory of the columns' levels and clears the struct, which belongs to the caller. */
 void bst_columns_free(bst_columns *columns);
 
 /* Measures the columns of a whole frame: the median of 31 rows, then twice the mean of up to 1024

@@ -29,6 +29,7 @@ typedef struct bst_pixel_shows {
 
 /* Room for `capacity` of each. BST_ERR_MEMORY. */
 bst_status bst_pixel_shows_create(bst_ctx *ctx, int capacity, bst_pixel_shows *out) BST_MUST_CHECK;
+/* Frees the memory of the evidence and clears the struct, which belongs to the caller. */
 void bst_pixel_shows_free(bst_pixel_shows *shows);
 
 /* Adds the maxima of a frame, or of a window of one, before charge is removed from its signal. Each

@@ -1,5 +1,4 @@
-/* The bad-pixel map that the onboard side learns: pixels that go on showing a maximum while the sky
- * moves over them.
+/* Bad-pixel map learned on board: pixels that show a maximum again and again while the sky moves.
  *
  * A defective pixel is distinguished from three other causes of a maximum by sequential likelihood
  * ratios, one against each: light of the sky, which leaves the pixel when the camera turns; a
@@ -21,7 +20,7 @@
  * 3:12). A bad pixel is looked at again while it is left out; it is good again when the sum of
  * those looks falls to 0.
  *
- * A sky at rest says nothing: a map is not learned then. */
+ * While the sky is at rest nothing is learned. */
 #ifndef BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_H
 #define BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_H
 
@@ -29,13 +28,13 @@
 #include "imgproc/calibrate/pixel_evidence.h"
 #include "imgproc/calibrate/pixel_learner_config.h"
 
-/* A frame as far as its pixels' evidence needs it. */
+/* Properties of a frame that its pixels' evidence depends on. */
 typedef struct bst_pixel_frame {
     bst_quat q_cam_from_gcrf; /* mid-exposure */
     double time_s;
     bst_window window;
     int binning;
-    const bst_window *windows;    /* that were looked at */
+    const bst_window *windows;    /* regions of interest that were searched */
     int window_count;             /* 0: all of `window` */
     const double (*predicted)[3]; /* x, y, radius of predicted tracks, px */
     int predicted_count;
@@ -43,25 +42,35 @@ typedef struct bst_pixel_frame {
 
 typedef struct bst_pixel_learner bst_pixel_learner;
 
-/* Makes a learner for a sensor; `camera` is copied. Memory is what config->capacity asks for.
- * BST_ERR_MEMORY. */
+/* Creates a learner for a sensor.
+ *
+ * Given:     camera  copied
+ *            config  its capacity determines the memory
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_pixel_learner_free */
 bst_status bst_pixel_learner_create(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_pixel_learner_config *config,
                                     bst_pixel_learner **out) BST_MUST_CHECK;
+/* Frees a pixel learner; NULL is allowed. */
 void bst_pixel_learner_free(bst_pixel_learner *learner);
 
-/* Notes whether an identified star's maximum was sharper than light. */
+/* Counts an identified star; sharp: its maximum was sharper than the PSF allows. */
 void bst_pixel_learner_note_star(bst_pixel_learner *learner, bool sharp);
 
-/* Takes the evidence of the next frame; `shows` is in order of pixel. */
+/* Updates the learner with the evidence of the next frame.
+ *
+ * Given:     shows  in ascending order of pixel */
 void bst_pixel_learner_update(bst_pixel_learner *learner, const bst_pixel_frame *frame,
                               const bst_pixel_shows *shows);
 
-/* Bad pixels; pixels under suspicion; pixels that found no room so far. */
+/* Number of bad pixels. */
 int bst_pixel_learner_bad_count(const bst_pixel_learner *learner);
+/* Number of pixels that are suspected but not yet declared bad. */
 int bst_pixel_learner_suspects(const bst_pixel_learner *learner);
+/* Number of pixels so far that were dropped for lack of room. */
 int64_t bst_pixel_learner_lost(const bst_pixel_learner *learner);
-/* Whether pixels of the latest frame showed charge again, but under a sky that had not moved. */
+/* True if pixels of the latest frame showed charge again while the sky had not moved. */
 bool bst_pixel_learner_waits(const bst_pixel_learner *learner);
 
 /* The map in `slot`, 0 to BST_STEP_LANES - 1; its `turn` picks the pixels that are looked at again.
@@ -70,6 +79,10 @@ typedef struct bst_pixel_map {
     bst_bad_rows rows;
     int64_t turn;
 } bst_pixel_map;
+
+/* Map of bad pixels in one of the slots; it belongs to the learner.
+ *
+ * Given:     slot  0 to BST_STEP_LANES - 1 */
 const bst_pixel_map *bst_pixel_learner_map(const bst_pixel_learner *learner, int slot);
 /* The least of a pixel's sums, at least 0: the logarithm of the odds, against any other cause that
  * is as likely beforehand, that a maximum there is a defect's. 0 where `used`, the map that the

@@ -34,6 +34,7 @@ typedef void (*bst_imgproc_pixel_fn)(const void *user, int y, int x, int count, 
 /* For loops on up to `threads` threads. */
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  int threads, bst_background *out) BST_MUST_CHECK;
+/* Frees the memory of a background and clears the struct, which belongs to the caller. */
 void bst_background_free(bst_background *background);
 
 /* The pixels of a frame and what their noise is made of. */
@@ -71,8 +72,15 @@ int bst_background_parts(const bst_background *background, int y, bst_row_part *
  * the level goes on as it did, the noise stays. */
 void bst_background_row(const bst_background *background, int y, float *level,
                         float *inverse_noise);
-/* Noise at a place. */
+
+/* Background level at a point, e-, interpolated between the meshes.
+ *
+ * Given:     x_px, y_px  pixel of the frame */
 double bst_background_level_at(const bst_background *background, double x_px, double y_px);
+
+/* Noise of a pixel at a point, e-, interpolated between the meshes.
+ *
+ * Given:     x_px, y_px  pixel of the frame */
 double bst_background_noise_at(const bst_background *background, double x_px, double y_px);
 
 #endif

@@ -22,8 +22,13 @@ typedef struct bst_candidates {
     uint32_t *key, *key_swap;
 } bst_candidates;
 
+/* Allocates candidates for frames of up to max_width x max_height pixels.
+ *
+ * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
+ * Ownership: free with bst_candidates_free */
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height,
                                  bst_candidates *out) BST_MUST_CHECK;
+/* Frees the memory of the candidates and clears the struct, which belongs to the caller. */
 void bst_candidates_free(bst_candidates *candidates);
 
 /* Asked of maxima that a noise peak might have made: whether one at this pixel counts. Called from

@@ -86,6 +86,7 @@ typedef struct bst_filter {
 bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_width,
                              int max_height, double streak_max_px, int threads,
                              bst_filter *out) BST_MUST_CHECK;
+/* Frees the memory of a matched filter and clears the struct, which belongs to the caller. */
 void bst_filter_free(bst_filter *filter);
 
 /* Prepares the kernels: the known PSF, mean of the field, in pixels of binning x binning; else a

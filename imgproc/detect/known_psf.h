@@ -29,11 +29,19 @@ typedef struct bst_known_psf {
  * what is made. BST_ERR_MEMORY. */
 bst_status bst_known_psf_create(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
                                 double blur_px, bst_known_psf **out) BST_MUST_CHECK;
+/* Frees a table; NULL is allowed. */
 void bst_known_psf_free(bst_known_psf *known);
 
 /* Weights of the neighbouring samples of a function at d px from the source, for its value and its
  * first and second derivative by d. Returns the first sample's number, -1: it is 0 there. */
 typedef double bst_known_psf_taps[3][BST_KNOWN_PSF_POINTS];
+
+/* Interpolation weights for value, slope and curvature of the profile.
+ *
+ * Given:     d  distance along an axis, px
+ * Returned:  index of the first point; -1 if d is beyond the profile
+ *            out  [0], [1], [2]: weights of the value and of its first and second derivative by px
+ */
 int bst_known_psf_taps_at(const bst_known_psf *known, double d, bst_known_psf_taps out);
 
 /* Share of the light in a pixel of `binning` x `binning` sensor pixels whose centre lies (dx, dy)

@@ -1,5 +1,5 @@
-/* A user's own detector in place of bst_imgproc_detect: what comes of its detections is checked,
- * and what identification of stars needs to know of the frame follows from what it says. */
+/* A plug-in's detector in place of bst_imgproc_detect. Its detections are checked; background,
+ * noise and limiting magnitude for the identification of stars follow from its results. */
 #ifndef BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 #define BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 
@@ -15,6 +15,7 @@ extern const bst_config_desc bst_plugin_detector_table[]; /* of a bst_stage_use 
 bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
                                       const bst_camera *camera, const bst_imgproc_maps *maps,
                                       int capacity, bst_plugin_detector **out) BST_MUST_CHECK;
+/* Destroys the plug-in's stage and frees the detector; NULL is allowed. */
 void bst_plugin_detector_free(bst_plugin_detector *plugged);
 
 /* As bst_imgproc_detect. BST_ERR_STATE, naming the plug-in, for a place, size or noise that is not
@@ -24,11 +25,20 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *plugged
                                       const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) BST_MUST_CHECK;
 
-/* As bst_imgproc_v_limit, bst_imgproc_streak_px and bst_imgproc_ground (const void *user: the
- * bst_plugin_detector), of the latest frame: a Gaussian PSF, smeared along the star streak, in the
- * noise that the plug-in gave. */
+/* bst_imgproc_v_limit for the latest frame of a plug-in.
+ *
+ * Given:     snr  signal-to-noise ratio of the limit
+ * Returned:  V magnitude, for a Gaussian PSF smeared along the star streak, in the noise that the
+ *            plug-in gave */
 double bst_plugin_detector_v_limit(const bst_plugin_detector *plugged, double snr);
+/* bst_imgproc_streak_px for the latest frame: length of the stars' streaks, px. */
 double bst_plugin_detector_streak_px(const bst_plugin_detector *plugged);
+
+/* bst_imgproc_ground for the latest frame: the plug-in's background and noise, constant over the
+ * frame.
+ *
+ * Given:     plugged     a bst_plugin_detector
+ *            x_px, y_px  not used */
 void bst_plugin_detector_ground(const void *plugged, double x_px, double y_px,
                                 bst_psf_wings_ground *out);
 

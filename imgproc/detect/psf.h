@@ -34,6 +34,7 @@ typedef struct bst_imgproc_stamp {
     int x0, y0, width, height;
 } bst_imgproc_stamp;
 
+/* Computes the tables of the normal distribution and of Gauss-Legendre rules; needed once. */
 void bst_imgproc_gauss_init(bst_imgproc_gauss *psf);
 
 /* Writes the share of the source's light in each pixel of the stamp and its derivatives, each

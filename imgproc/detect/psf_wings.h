@@ -17,6 +17,7 @@ typedef struct bst_psf_wings bst_psf_wings;
  * widened by a Gaussian of blur_px. BST_ERR_MEMORY. */
 bst_status bst_psf_wings_create(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
                                 double blur_px, bst_psf_wings **out) BST_MUST_CHECK;
+/* Frees a work space; NULL is allowed. */
 void bst_psf_wings_free(bst_psf_wings *wings);
 
 /* The flux, e-, from which the wings of a star in noise of noise_e per sensor pixel are to be

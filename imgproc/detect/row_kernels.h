@@ -87,10 +87,14 @@ void bst_row_streak(float *out, float *copy, int count, const float *const *in, 
 int bst_row_maxima(const float *above, const float *row, const float *below, int count,
                    float threshold, int32_t *x, float *value);
 
-/* Sets out[x] to BST_PIXEL_BAD where one of the elements of the 2 BST_ROW_NEAR + 1 rows that are no
- * further than BST_ROW_NEAR from column x is above the limit. On either side of each row as many
- * more floats are read. */
+/* Half width of the neighbourhood of bst_row_mask. */
 enum { BST_ROW_NEAR = 2 };
+
+/* Sets out[x] to BST_PIXEL_BAD where a neighbour exceeds a limit.
+ *
+ * Given:     rows   [2 BST_ROW_NEAR + 1] rows; BST_ROW_NEAR more floats are read on either side
+ *            count  elements of out
+ *            out    [count]; elements not set are unchanged */
 void bst_row_mask(const float *const *rows, int count, float limit, float *out);
 
 /* out *= by */

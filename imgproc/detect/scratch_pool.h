@@ -19,7 +19,7 @@ static inline void bst_scratch_pool_init(bst_scratch_pool *b, int count) {
     }
 }
 
-/* Index of a work space that nobody else has. */
+/* Takes a free work space; waits actively until there is one. Returns its index. */
 static inline int bst_scratch_pool_take(bst_scratch_pool *b) {
     for (int i = 0;; i = i + 1 < b->count ? i + 1 : 0) {
         if (!atomic_flag_test_and_set_explicit(&b->taken[i], memory_order_acquire)) {
@@ -28,6 +28,7 @@ static inline int bst_scratch_pool_take(bst_scratch_pool *b) {
     }
 }
 
+/* Returns a work space to the pool. */
 static inline void bst_scratch_pool_give(bst_scratch_pool *b, int index) {
     atomic_flag_clear_explicit(&b->taken[index], memory_order_release);
 }

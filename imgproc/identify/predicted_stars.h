@@ -16,9 +16,17 @@ typedef struct bst_predicted_stars {
     bst_imgproc_expected_star *expected; /* [capacity] */
 } bst_predicted_stars;
 
+/* Allocates the prediction of catalogue stars in a frame.
+ *
+ * Given:     camera, stars  must outlive it
+ *            julian_year    epoch for proper motion, Julian year
+ *            capacity       most stars of a frame
+ * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
+ * Ownership: free with bst_predicted_stars_free */
 bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
                                       const bst_stars *stars, double julian_year, int capacity,
                                       bst_predicted_stars *out) BST_MUST_CHECK;
+/* Frees the memory of the predicted stars and clears the struct, which belongs to the caller. */
 void bst_predicted_stars_free(bst_predicted_stars *sky);
 
 /* The stars to v_limit whose apparent places fall within margin_px of a window, for a camera at

@@ -30,6 +30,7 @@ typedef struct bst_starid bst_starid;
 /* Work space for up to max_stars and max_detections and shifts up to max_radius_px. */
 bst_status bst_starid_create(bst_ctx *ctx, int max_stars, int max_detections, double max_radius_px,
                              bst_starid **out) BST_MUST_CHECK;
+/* Frees a star identification; NULL is allowed. */
 void bst_starid_free(bst_starid *starid);
 
 /* Matches detections to stars that are shifted and slightly turned together.

@@ -26,24 +26,31 @@ typedef struct bst_imgproc_discriminator bst_imgproc_discriminator;
 /* For frames of up to `capacity` detections; `camera` is copied. BST_ERR_MEMORY. */
 bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
                                             bst_imgproc_discriminator **out) BST_MUST_CHECK;
+/* Frees a discriminator; NULL is allowed. */
 void bst_imgproc_discriminator_free(bst_imgproc_discriminator *discriminator);
 
-/* Sets label and label_probability of a frame's detections; frames come in order of time.
+/* Sets label and label_probability of a frame's detections. Frames come in order of time.
  *
- * Given: label STAR with star_id (identified), HOT_PIXEL or HIT (charge, by shape), ARTEFACT,
- * UNKNOWN. Charge is a HOT_PIXEL where the same sensor pixel held charge in an earlier frame, a HIT
- * where it did not although an earlier frame covered it; a source below SNR 8 on a pixel that held
- * charge in two frames is a HOT_PIXEL too, and so is a source on a pixel that learning suspects
- * with odds of 200 (pixel_learner.h). Of the rest, in this order: cut by the edge, an ARTEFACT; at
- * a moving track's predicted place, an OBJECT; drawn as the stars are in a frame that follows
- * something else, a STAR, and a point there an OBJECT; three times as long as wide where stars are
- * points, and not at rest there before, an OBJECT; where earlier frames had a source of its
- * brightness at the same place of the sky, a STAR without star_id, or an OBJECT once it has left
- * the place where it was seen first; else new: of the new sources of like brightness in earlier
- * frames some stayed where they were (stars near the limit of detection that show in some frames
- * only) and some did not, and their share is the probability. Without earlier frames ten objects
- * are expected in a frame and the others are stars. Nothing is said without orientation, except of
- * charge. */
+ * Given:     frame       orientation, predictions and motion of the frame
+ *            detections  with a label: STAR with star_id (identified), HOT_PIXEL or HIT (charge, by
+ *                        shape), ARTEFACT, UNKNOWN
+ * Notes:     charge is a HOT_PIXEL if the same sensor pixel held charge in an earlier frame. It is
+ *            a HIT if an earlier frame covered the pixel and found no charge. A source is a
+ *            HOT_PIXEL if its pixel held charge in two frames and its SNR is below 8. So is a
+ *            source on a pixel that learning suspects with odds of 200 (pixel_learner.h).
+ *            For the others the first rule that applies counts:
+ *            1. cut by the edge: ARTEFACT;
+ *            2. at the predicted position of a moving track: OBJECT;
+ *            3. in a frame that does not follow the stars: a streak like the stars' is a STAR, a
+ *            point is an OBJECT;
+ *            4. stars are points, and the source is three times as long as wide and was not at rest
+ *            there before: OBJECT;
+ *            5. earlier frames had a source of its brightness at the same position of the sky: STAR
+ *            without star_id, or OBJECT once it has left its first position;
+ *            6. new. The probability of a star is the share of new sources of like brightness in
+ *            earlier frames that stayed at rest. Without earlier frames ten objects are expected in
+ *            a frame, and the others are stars.
+ *            Without orientation only charge is labelled. */
 void bst_imgproc_discriminator_label(bst_imgproc_discriminator *discriminator,
                                      const bst_imgproc_frame_knowledge *frame,
                                      bst_detections *detections);

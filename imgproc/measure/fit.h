@@ -38,9 +38,15 @@ typedef struct bst_fit {
     float *scratch;
 } bst_fit;
 
+/* Allocates a fit on stamps of up to max_side x max_side pixels.
+ *
+ * Given:     psf, profiles  must outlive the fit
+ * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
+ * Ownership: free with bst_fit_free */
 bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
                           const bst_source_profiles *profiles, int max_side,
                           bst_fit *out) BST_MUST_CHECK;
+/* Frees the memory of a fit and clears the struct, which belongs to the caller. */
 void bst_fit_free(bst_fit *fit);
 
 /* The stamp that holds a source with `reach_px` around its path, cut to the frame; width or height

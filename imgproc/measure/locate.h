@@ -109,6 +109,7 @@ typedef struct bst_imgproc_locator_limits {
 bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
                                       const bst_imgproc_locator_limits *limits,
                                       bst_imgproc_locator *out) BST_MUST_CHECK;
+/* Frees the memory of a locator and clears the struct, which belongs to the caller. */
 void bst_imgproc_locator_free(bst_imgproc_locator *locator);
 
 /* SNR of a source of one electron in noise of one, as a point or drawn as stars are. */

@@ -33,6 +33,7 @@ typedef struct bst_source_profiles {
 /* known: lent, NULL for a Gaussian. */
 bst_status bst_source_profiles_create(bst_ctx *ctx, const bst_known_psf *known,
                                       bst_source_profiles *out) BST_MUST_CHECK;
+/* Frees the memory of the profiles and clears the struct, which belongs to the caller. */
 void bst_source_profiles_free(bst_source_profiles *profiles);
 /* Where on the sensor the sources of a frame are. */
 void bst_source_profiles_on(bst_source_profiles *profiles, double origin_x_px, double origin_y_px,

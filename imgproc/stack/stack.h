@@ -60,22 +60,29 @@ typedef struct bst_stack bst_stack;
  * alarms not above 0. */
 bst_status bst_stack_create(bst_ctx *ctx, const bst_camera *camera, const bst_stack_config *config,
                             int threads, bst_stack **out) BST_MUST_CHECK;
+/* Frees a stack with its thread pool; NULL is allowed. */
 void bst_stack_free(bst_stack *stack);
 
-/* Takes a frame; returns how many are held. With config->frames of them the stack is full:
- * bst_stack_search is next. A frame of other size, place or binning than those before, or not
- * later than they are, begins anew. */
+/* Adds a frame. A stack with config->frames frames is full: bst_stack_search is next.
+ *
+ * Given:     frame  a frame of other size, position or binning, or one that is not later, starts a
+ *                   new stack
+ * Returned:  number of frames in the stack */
 int bst_stack_add(bst_stack *stack, const bst_stack_frame *frame);
 
-/* Searches a full stack and empties it. Returns what it found, the strongest first, lent until the
- * next call: objects in motion that exceed the threshold, then sources at rest that do and are
- * below SNR 4.5 in a frame: others a frame shows by itself. Pixels with charge at the same place of
- * the sensor in all frames, and sources at rest, are left out of the search for motion. Paths need
- * half of the frames. */
+/* Searches a full stack and empties it.
+ *
+ * Returned:  detections, the strongest first, valid until the next call: first moving objects above
+ *            the threshold, then sources at rest that are above it and below SNR 4.5 in a single
+ *            frame
+ *            *count  number of detections
+ * Notes:     pixels with charge at the same position of the sensor in all frames, and sources at
+ *            rest, are excluded from the search for motion. A path needs half of the frames. */
 const bst_stack_found *bst_stack_search(bst_stack *stack, int *count);
 
-/* Of the latest search: the SNR of the sum that counts, and sums on the grid that were followed. */
+/* SNR of a sum that counts as a detection in the latest search. */
 double bst_stack_threshold_snr(const bst_stack *stack);
+/* Number of sums on the grid that the latest search followed to their maximum. */
 int64_t bst_stack_followed(const bst_stack *stack);
 
 /* The output that noise alone exceeds `false_alarms` times: maxima over a box of places (side_px)

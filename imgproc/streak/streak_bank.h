@@ -30,6 +30,7 @@ typedef struct bst_streak_bank {
 /* For streaks of up to max_px along their longer axis; workers: loops' parts that run at a time. */
 bst_status bst_streak_bank_create(bst_ctx *ctx, int max_width, int max_height, double max_px,
                                   int workers, bst_streak_bank *out) BST_MUST_CHECK;
+/* Frees the memory of a bank and clears the struct, which belongs to the caller. */
 void bst_streak_bank_free(bst_streak_bank *bank);
 /* The most hits that a frame can give. */
 int bst_streak_bank_capacity(const bst_streak_bank *bank);

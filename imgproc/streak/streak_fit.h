@@ -13,8 +13,14 @@ typedef struct bst_streak_fit {
     double *spare; /* [3][max_side^2] */
 } bst_streak_fit;
 
+/* Allocates a fit of streaks on stamps of up to max_side x max_side pixels.
+ *
+ * Given:     psf  must outlive the fit
+ * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
+ * Ownership: free with bst_streak_fit_free */
 bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, int max_side,
                                  bst_streak_fit *out) BST_MUST_CHECK;
+/* Frees the memory of a fit and clears the struct, which belongs to the caller. */
 void bst_streak_fit_free(bst_streak_fit *fit);
 
 /* Fits x, y, dx, dy and flux of `source`, which starts near the solution, on a stamp of the frame;

@@ -24,6 +24,7 @@ typedef struct bst_streak_locator_limits {
 bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, bst_parallel *pool,
                                      const bst_streak_locator_limits *limits,
                                      bst_streak_locator *out) BST_MUST_CHECK;
+/* Frees the memory of a locator and clears the struct, which belongs to the caller. */
 void bst_streak_locator_free(bst_streak_locator *locator);
 
 /* Searches the frame that `found` was located in (bst_locate) for streaks and adds each to `found`

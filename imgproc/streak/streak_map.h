@@ -33,6 +33,7 @@ typedef struct bst_streak_map {
 /* turned: with the second plane. */
 bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height, bool turned,
                                  bst_streak_map *out) BST_MUST_CHECK;
+/* Frees the memory of a map and clears the struct, which belongs to the caller. */
 void bst_streak_map_free(bst_streak_map *map);
 
 /* A frame. */

@@ -20,8 +20,14 @@ typedef struct bst_streak_motion {
     double ex, ey, binning, sigma_px; /* the path's direction; sensor pixels per pixel; PSF */
 } bst_streak_motion;
 
+/* Allocates the work space of the fit of the camera's motion.
+ *
+ * Given:     max_side  largest side of a stamp, px
+ * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
+ * Ownership: free with bst_streak_motion_free */
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side,
                                     bst_streak_motion *out) BST_MUST_CHECK;
+/* Frees the memory of a work space and clears the struct, which belongs to the caller. */
 void bst_streak_motion_free(bst_streak_motion *work);
 
 /* Corrects a frame's motion by what up to BST_STREAK_MOTION_STARS bright streaks that stand alone
@@ -38,8 +44,12 @@ void bst_streak_motion_free(bst_streak_motion *work);
  * frame->motion, which is corrected; `profiles` are made for the frame's sigma. False, and nothing
  * changed, when no streak was bright enough. */
 bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *frame);
+/* Adds bright isolated streaks of the frame, or of a part of it, in order of their SNR. */
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *frame,
                            const bst_candidates *candidates);
+
+/* Fits the motion jointly to all streaks added; the comment above gives the arguments. False, with
+ * *motion unchanged, if the fit is not possible. */
 bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *psf,
                              bst_source_profiles *profiles, const bst_camera *camera,
                              double length_px, double bend_px, bst_camera_motion *motion);

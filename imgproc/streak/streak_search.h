@@ -22,6 +22,7 @@ typedef struct bst_streak_search {
 /* pool is kept; NULL: the caller's thread alone. */
 bst_status bst_streak_search_create(bst_ctx *ctx, bst_parallel *pool, int max_width, int max_height,
                                     double max_px, bst_streak_search *out) BST_MUST_CHECK;
+/* Frees the memory of a search and clears the struct, which belongs to the caller. */
 void bst_streak_search_free(bst_streak_search *search);
 
 /* The SNR that noise alone exceeds `false_alarms` times in a frame, over all places, directions and

@@ -25,12 +25,12 @@ typedef struct bst_camera_distortion {
     double p1, p2;     /* tangential */
 } bst_camera_distortion;
 
-/* What bst_camera_prepare works out. */
+/* Computed by bst_camera_prepare. */
 typedef struct bst_camera_geometry {
     bool general; /* rotated or distorted: the general formulae are needed */
     double cos_rotation, sin_rotation;
     double domain;       /* tangent radius, undistorted, within which the map is one to one */
-    double image_radius; /* tangent radius, distorted, within which every place has an original */
+    double image_radius; /* tangent radius, distorted, within which every point has an original */
     double stretch, shrink; /* bounds of the local scale over that of the boresight, in the field */
     double curvature;       /* bound of the map's second derivative in the field */
 } bst_camera_geometry;
@@ -71,46 +71,75 @@ typedef struct bst_camera {
 extern const bst_config_desc bst_camera_config[];
 extern const bst_config_desc bst_distortion_config[];
 
-/* What a configuration leaves open (NAN) of pixel scale, focal length, focal ratio and pixel pitch,
- * from what it gives; the scale is that of a gnomonic projection, pitch over focal length. Where
- * more is given than is needed the scale counts. BST_ERR_CONFIG, with the keys but without their
- * place, when the scale does not follow, or when keys contradict each other by more than a
- * thousandth, those of the blocks `optics` and `background` too. */
+/* Fills in those of pixel scale, focal length, focal ratio and pixel pitch that are NAN (not
+ * given).
+ *
+ * Given:     camera  as read from a configuration; all but the four members are unchanged
+ * Errors:    BST_ERR_CONFIG if the scale does not follow from the given values, is outside 0.001 to
+ *            600 arcsec, or if values differ by more than one part in 1000; the message names the
+ *            keys, without their path
+ * Notes:     scale = pitch / focal length (gnomonic projection). If values are redundant, the given
+ *            scale is kept. f_number and pixel_um of the blocks `optics` and `background` are
+ *            compared too. */
 bst_status bst_camera_resolve_scale(bst_ctx *ctx, bst_camera *camera) BST_MUST_CHECK;
 
-/* Makes `geometry` from rotation and distortion; to be called once they are set, and again when
- * they or the sensor's size or scale change. A camera with neither needs no call.
- * BST_ERR_CONFIG when the distortion folds the image inside the sensor, so that two directions
- * would meet in one pixel: the map must be one to one on a disc about the boresight whose image
- * holds the sensor (the smallest eigenvalue of the Jacobian, bounded below by min(d(r L)/dr, L) - 6
- * |p| r with L = 1 + k1 r^2 + k2 r^4 + k3 r^6, stays positive there). */
+/* Computes `geometry` from rotation and distortion.
+ *
+ * Given:     camera  with rotation, distortion, size, boresight offset and scale set
+ * Errors:    BST_ERR_CONFIG if the distortion folds the image inside the sensor, so that two
+ *            directions fall on one pixel
+ * Notes:     call it again when one of these members changes. A camera with neither rotation nor
+ *            distortion needs no call. The map must be one to one on a disc about the boresight
+ *            whose image contains the sensor. Criterion: the Jacobian's smallest eigenvalue stays
+ *            positive there. Its lower bound is min(d(r L)/dr, L) - 6 |p| r, with L = 1 + k1 r^2 +
+ *            k2 r^4 + k3 r^6. */
 bst_status bst_camera_prepare(bst_ctx *ctx, bst_camera *camera) BST_MUST_CHECK;
 
-/* Position of the boresight on the focal plane, px: the sensor's centre ((N-1)/2) plus the offset.
- */
+/* Column of the boresight, px: the sensor's centre (width_px - 1) / 2 plus the offset. */
 static inline double bst_camera_centre_x(const bst_camera *c) {
     return 0.5 * (double)(c->width_px - 1) + c->boresight_offset_px[0];
 }
+/* Row of the boresight, px: the sensor's centre (height_px - 1) / 2 plus the offset. */
 static inline double bst_camera_centre_y(const bst_camera *c) {
     return 0.5 * (double)(c->height_px - 1) + c->boresight_offset_px[1];
 }
+/* Angle that a pixel spans at the boresight, rad. */
 static inline double bst_camera_scale_rad(const bst_camera *c) {
     return c->pixel_scale_arcsec * BST_ARCSEC_RAD;
 }
-/* Of the Gaussian profile with charge diffusion, before integration over the pixel. */
+
+/* Standard deviation of the Gaussian PSF with charge diffusion, px, before integration over the
+ * pixel. */
 static inline double bst_camera_psf_sigma_px(const bst_camera *c) {
     double sigma = c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
     return c->optics.diffusion_px > 0.0 ? hypot(sigma, c->optics.diffusion_px) : sigma;
 }
-/* Angle from the boresight to the sensor's farthest corner (outer edge of the pixel), rad. */
+
+/* Largest angle from the boresight to a corner of the sensor (outer edge of the corner pixel), rad.
+ */
 double bst_camera_half_diagonal_rad(const bst_camera *c);
 
-/* The general forms of the two functions below. */
+/* bst_camera_project for a camera that is rotated or distorted (geometry.general).
+ *
+ * Given:     v_cam  direction in the camera frame, any length
+ * Returned:  x_px, y_px  full-sensor pixel coordinates; unchanged if the result is false
+ * Notes:     false if v_cam.z <= 0 or the direction lies beyond the fold of the distortion. */
 bool bst_camera_project_general(const bst_camera *c, bst_vec3 v_cam, double *x_px, double *y_px);
+
+/* bst_camera_unproject for a camera that is rotated or distorted (geometry.general).
+ *
+ * Given:     x_px, y_px  full-sensor pixel coordinates
+ * Returned:  unit direction in the camera frame
+ * Notes:     inverts the distortion by Newton's method. A point without an original gives the
+ *            direction at the border of the domain. */
 bst_vec3 bst_camera_unproject_general(const bst_camera *c, double x_px, double y_px);
 
-/* Camera-frame direction (any length) to pixel; false and untouched outputs when it is not in front
- * of the camera, or so far out that the distortion has folded. */
+/* Projects a direction onto the sensor.
+ *
+ * Given:     v_cam  direction in the camera frame, any length
+ * Returned:  x_px, y_px  full-sensor pixel coordinates; unchanged if the result is false
+ * Notes:     false if the direction does not point to the front (v_cam.z <= 0) or lies beyond the
+ *            fold of the distortion. True does not mean that the pixel is on the sensor. */
 static inline bool bst_camera_project(const bst_camera *c, bst_vec3 v_cam, double *x_px,
                                       double *y_px) {
     if (c->geometry.general) {
@@ -124,8 +153,13 @@ static inline bool bst_camera_project(const bst_camera *c, bst_vec3 v_cam, doubl
     *y_px = bst_camera_centre_y(c) + v_cam.y * f;
     return true;
 }
-/* Pixel to unit direction in the camera frame. A place outside the sensor that has no original
- * gives the direction at the border of what has one. */
+
+/* Direction that falls on a point of the sensor.
+ *
+ * Given:     x_px, y_px  full-sensor pixel coordinates; may lie outside the sensor
+ * Returned:  unit direction in the camera frame
+ * Notes:     a point outside the sensor that no direction reaches gives the direction at the border
+ *            of the domain. */
 static inline bst_vec3 bst_camera_unproject(const bst_camera *c, double x_px, double y_px) {
     if (c->geometry.general) {
         return bst_camera_unproject_general(c, x_px, y_px);
@@ -135,68 +169,105 @@ static inline bst_vec3 bst_camera_unproject(const bst_camera *c, double x_px, do
         (bst_vec3){(x_px - bst_camera_centre_x(c)) * s, (y_px - bst_camera_centre_y(c)) * s, 1.0});
 }
 
-/* Whether a direction has no image because it lies beyond the fold of the distortion, but by no
- * more than margin_px of undistorted pixels. */
+/* True if a direction lies beyond the fold of the distortion, but by no more than a margin.
+ *
+ * Given:     v_cam      direction in the camera frame, any length
+ *            margin_px  margin, in undistorted pixels */
 bool bst_camera_beyond_fold(const bst_camera *c, bst_vec3 v_cam, double margin_px);
 
-/* Derivative of the pixel by the direction's tangent coordinates in camera axes, a = v.x / v.z and
- * b = v.y / v.z, times the pixel scale: d(x, y) / d(a, b) = k / bst_camera_scale_rad.
- * Dimensionless; the identity without rotation and distortion. */
+/* Derivative of the pixel coordinates with respect to the direction's tangent coordinates.
+ *
+ * Given:     v_cam  direction in the camera frame, v_cam.z > 0
+ * Returned:  k  d(x, y) / d(a, b) times the pixel scale in rad, a = v.x / v.z, b = v.y / v.z;
+ *               dimensionless
+ * Notes:     the identity for a camera with neither rotation nor distortion. */
 void bst_camera_jacobian(const bst_camera *c, bst_vec3 v_cam, double k[2][2]);
 
-/* Angle from `centre` (unit, camera frame) within which all directions lie that fall into the
- * rectangle of pixel places [x0, x1] x [y0, y1], or may move into it by margin_px from beyond the
- * fold. For rotated or distorted cameras; includes what lies between the places of the border that
- * are tried. */
+/* Radius of a cone that contains all directions whose image lies in a rectangle.
+ *
+ * Given:     centre          axis of the cone, unit vector, camera frame
+ *            x0, y0, x1, y1  rectangle [x0, x1] x [y0, y1], full-sensor pixel coordinates
+ *            margin_px       motion across the fold of the distortion to allow for, px
+ * Returned:  angle from `centre`, rad
+ * Notes:     samples the border of the rectangle at 64 points and adds the largest gap between
+ *            neighbours. margin_px is added only if the rectangle reaches the fold. Meant for
+ *            rotated or distorted cameras. */
 double bst_camera_reach_rad(const bst_camera *c, bst_vec3 centre, double x0, double y0, double x1,
                             double y1, double margin_px);
 
-/* Sides of a rectangle about the boresight, in undistorted pixels along the focal plane's axes, all
- * of which the sensor sees: what a search may count on. */
+/* Size of a rectangle about the boresight that lies wholly on the sensor, for planning searches.
+ *
+ * Returned:  width_px, height_px  sides along the focal plane's axes, in undistorted pixels */
 void bst_camera_field_px(const bst_camera *c, double *width_px, double *height_px);
 
+/* True if a coefficient of the lens distortion is not zero. */
 static inline bool bst_camera_distorted(const bst_camera *c) {
     const bst_camera_distortion *d = &c->distortion;
     return d->k1 != 0.0 || d->k2 != 0.0 || d->k3 != 0.0 || d->p1 != 0.0 || d->p2 != 0.0;
 }
 
-/* Largest (at least 1) and smallest (at most 1) scale of the image in the field, over that at the
- * boresight, from distortion alone. */
+/* Upper bound of the local image scale in the field over that at the boresight, at least 1.
+ * Distortion alone; 1 for a camera with neither rotation nor distortion. */
 static inline double bst_camera_stretch(const bst_camera *c) {
     return c->geometry.general ? c->geometry.stretch : 1.0;
 }
+
+/* Lower bound of the local image scale in the field over that at the boresight, at most 1.
+ * Distortion alone; 1 for a camera with neither rotation nor distortion. */
 static inline double bst_camera_shrink(const bst_camera *c) {
     return c->geometry.general ? c->geometry.shrink : 1.0;
 }
 
-/* Share of the light, of sources and of the sky, that vignetting leaves on a pixel: at least 0; 1
- * without. r is the distance from the boresight: (1 + (r scale)^2)^-2 for the fourth power of the
- * cosine, and the polynomial in half diagonals. As a flat field has it, the pixel counts, not the
- * place of the source. */
+/* Fraction of the light that vignetting leaves on a pixel, for sources and sky alike.
+ *
+ * Given:     x_px, y_px  full-sensor pixel coordinates
+ * Returned:  0 or more; 1 without vignetting
+ * Notes:     with r the distance from the boresight: (1 + (r scale)^2)^-2 for the fourth power of
+ *            the cosine; the polynomial takes r in half diagonals of the sensor. The factor belongs
+ *            to the pixel, as in a flat field, not to the position of the source. */
 double bst_camera_illumination(const bst_camera *c, double x_px, double y_px);
 
-/* Detected electrons per second of a source of magnitude v_mag, pi/4 D^2 (1 - obscuration) *
- * throughput * QE times: photon_flux_v0 10^(-0.4 V); with a spectrum bst_band_sun 10^(-0.4 (V -
- * BST_SUN_V_MAG)), that is of a source that reflects sunlight and is as bright as V says. */
+/* Detected electrons per second of a source of a given V magnitude.
+ *
+ * Given:     v_mag  V magnitude
+ * Returned:  e-/s: area * throughput * QE * photon flux, with area = pi/4 D^2 (1 - obscuration)
+ * Notes:     without a spectrum the flux is photon_flux_v0 10^(-0.4 V). With a spectrum it is
+ *            bst_band_sun 10^(-0.4 (V - BST_SUN_V_MAG)): the source reflects sunlight. */
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag);
-/* The inverse: V of a rate of detected electrons. */
+
+/* V magnitude of a source from its detected electrons per second; inverse of
+ * bst_camera_electrons_per_s. */
 double bst_camera_v_mag(const bst_camera *c, double electrons_per_s);
-/* The same of a star of colour B-V (NAN: unknown), as bst_band_star; without a spectrum the colour
- * does not matter. */
+
+/* Detected electrons per second of a star.
+ *
+ * Given:     v_mag      V magnitude
+ *            b_minus_v  colour index B-V, mag; NAN: unknown
+ * Returned:  e-/s
+ * Notes:     the flux is that of bst_band_star. Without a spectrum the colour has no effect. */
 double bst_camera_star_electrons_per_s(const bst_camera *c, double v_mag, double b_minus_v);
-/* Of a black body of temperature_k that fills solid_angle_sr, times its emissivity; 0 without a
- * spectrum. */
+
+/* Detected electrons per second of a black body (emissivity 1).
+ *
+ * Given:     temperature_k   temperature, K
+ *            solid_angle_sr  solid angle of the body, sr
+ * Returned:  e-/s; 0 without a spectrum */
 double bst_camera_thermal_electrons_per_s(const bst_camera *c, double temperature_k,
                                           double solid_angle_sr);
-/* The optics' own emission, electrons per second and pixel: emissivity * radiance * pupil * the
- * pixel's solid angle * optics_beam_factor * QE (area times solid angle is the same at the detector
- * as at the pupil); 0 without a spectrum. */
+
+/* Thermal emission of the optics, electrons per second and pixel.
+ *
+ * Returned:  emissivity * radiance * pupil area * solid angle of a pixel * optics_beam_factor * QE;
+ *            0 without a spectrum
+ * Notes:     area times solid angle (etendue) is the same at the detector and at the pupil. */
 double bst_camera_optics_e_per_s(const bst_camera *c);
-/* Electrons per second and pixel of the sky and the optics: those of the pixel at the boresight.
- * They are the same all over the sensor, whatever solid angle gnomonic projection and distortion
- * give a pixel there, as after a flat field. */
+
+/* Electrons per second and pixel of the uniform sky and of the optics, at the boresight.
+ *
+ * Notes:     the value holds for all pixels, as after flat-fielding: the solid angle of a pixel off
+ *            axis is not taken into account. */
 double bst_camera_background_e_per_s(const bst_camera *c);
-/* Mean dark current at the detector's temperature, e-/s, without hot pixels and maps. */
+/* Mean dark current of a pixel at the detector's temperature, e-/s, without hot pixels and maps. */
 double bst_camera_dark_e_per_s(const bst_camera *c);
 
 #pragma GCC visibility pop

@@ -1,4 +1,4 @@
-/* How the camera moved during one exposure, as pointing telemetry tells it. */
+/* Motion of the camera during one exposure, estimated from pointing telemetry. */
 #ifndef BORESIGHT_CAMERA_MOTION_H
 #define BORESIGHT_CAMERA_MOTION_H
 
@@ -14,36 +14,59 @@ typedef struct bst_camera_motion {
     bst_vec3 turn_cam_rad;    /* rotation vector, camera axes: the attitude at the exposure's end is
                                  bst_quat_from_rotvec(turn / 2) * q_cam_from_gcrf, at its start with
                                  -turn / 2 */
-    bst_vec3 bend_cam_rad; /* coefficient of (3 u^2 - 1) / 2, u from -1 to 1 over the exposure: how
-                              far the motion departs from a uniform one */
+    bst_vec3 bend_cam_rad; /* coefficient of (3 u^2 - 1) / 2, u from -1 to 1 over the exposure: the
+                              departure from uniform motion */
     double bend_sigma_rad; /* 1 sigma per axis of the bend, from the telemetry's noise; 0 where
-                              there are too few samples to tell it */
+                              there are too few samples */
 } bst_camera_motion;
 
-/* Mean, least-squares slope and bend of the telemetry attitude over [start_tick, end_tick];
- * attitudes between samples are interpolated and beyond the ring's ends extrapolated from the two
- * last samples there. With at least 8 samples in the exposure their noise is told from their third
- * differences, which smooth motion leaves alone, and the bend about x and y is shrunk by 2 s^2 over
- * its square, s the sigma that such noise gives it (James and Stein 1961, positive part). A
- * zero-length exposure gives the attitude then, no turn and no bend. False, and *out untouched,
- * when the ring is empty. */
+/* Estimates the camera's motion during one exposure from pointing telemetry.
+ *
+ * Given:     telemetry             ring of attitude samples
+ *            start_tick, end_tick  begin and end of the exposure, ticks
+ * Returned:  *out  mean attitude, turn and bend; unchanged if the result is false
+ * Notes:     false if the ring is empty.
+ *            Mean, least-squares slope and bend of the attitude over [start_tick, end_tick].
+ *            Attitudes between samples are interpolated linearly; beyond the ring's ends they are
+ *            extrapolated from the two last samples. With at least 8 samples in the exposure, the
+ *            variance of the samples' noise is estimated from third differences, which smooth
+ *            motion does not affect. The bend about x and y is then multiplied by 1 - 2 s^2 /
+ *            bend^2 (0 if negative), s being the standard deviation that this noise gives the bend.
+ *            An exposure of length zero gives the attitude at that time, no turn and no bend.
+ * Reference: James and Stein 1961 (positive-part shrinkage) */
 bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
                                       int64_t end_tick, bst_camera_motion *out);
 
-/* Path of a star that is at (x_px, y_px) in mid-exposure: end minus start, px. */
+/* Displacement of a star's image during the exposure.
+ *
+ * Given:     x_px, y_px  position at mid-exposure, full-sensor pixel coordinates
+ * Returned:  dx_px, dy_px  position at the end minus position at the start, px; 0 if one of them
+ *                          has no image */
 void bst_camera_motion_streak(const bst_camera_motion *motion, const bst_camera *camera,
                               double x_px, double y_px, double *dx_px, double *dy_px);
-/* The bend of a star's path near the boresight, px. */
+
+/* Bend of a star's path near the boresight.
+ *
+ * Returned:  x_px, y_px  coefficient of (3 u^2 - 1) / 2, px (bst_camera_motion, bend_cam_rad) */
 void bst_camera_motion_bend(const bst_camera_motion *motion, const bst_camera *camera, double *x_px,
                             double *y_px);
-/* Widens the covariance of a detection's place, which stands for the mean of its path: a fit that
- * does not follow the camera's uneven turn (bend, px) finds the place where the source dwelt, half
- * the bend away when most of the path is there. followed: the bend that the fit had; a quadratic
- * does not tell all of a start or a stop, and 5 % of it are left. */
+
+/* Adds the error that the bend of the motion causes to the covariance of a detection's position.
+ *
+ * Given:     bend_x_px, bend_y_px          bend of the path, px
+ *            followed_x_px, followed_y_px  bend that the fit used, px; 0: a straight path
+ *            detection                     its cov_xx, cov_xy and cov_yy are increased
+ * Notes:     the position is to be the mean of the path. A fit that ignores the bend is biased
+ *            towards the part of the path where the source moves slowly, by up to half the bend. 5
+ *            % of the bend that the fit used are added as well, because a quadratic does not
+ *            describe a start or a stop completely. */
 void bst_camera_motion_widen(double bend_x_px, double bend_y_px, double followed_x_px,
                              double followed_y_px, bst_detection *detection);
-/* Adds to the motion what makes paths near the boresight longer by (dx_px, dy_px) and bends them by
- * (bend_x_px, bend_y_px) more. */
+
+/* Adds a displacement and a bend of the image near the boresight to the motion.
+ *
+ * Given:     dx_px, dy_px          displacement to add (end minus start), px
+ *            bend_x_px, bend_y_px  bend to add, px */
 void bst_camera_motion_add(bst_camera_motion *motion, const bst_camera *camera, double dx_px,
                            double dy_px, double bend_x_px, double bend_y_px);
 

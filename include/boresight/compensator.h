@@ -16,15 +16,24 @@ typedef struct bst_dynamics_biquad {
     double b0, b1, b2, a1, a2;
 } bst_dynamics_biquad;
 
-/* Tustin's rule with prewarping: (num[0] + num[1] s + num[2] s^2) / (den[0] + den[1] s + den[2]
- * s^2) with s = k (z - 1) / (z + 1), k = w / tan(w dt / 2) at w = 2 pi prewarp_hz, where the two
- * agree; prewarp_hz 0: k = 2 / dt. Powers that neither polynomial has are left out, so that a
- * first-order section gets no pole at z = -1. prewarp_hz < 0.5 / dt_s; den not zero. (Franklin,
- * Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., section 6.1.) */
+/* Discretises a second-order section by Tustin's rule with prewarping.
+ *
+ * Given:     num, den    coefficients of s^0, s^1, s^2; den not all zero
+ *            dt_s        sample time, s
+ *            prewarp_hz  frequency at which both responses agree, 0 to below 0.5 / dt_s; 0: no
+ *                        prewarping
+ * Returned:  the biquad of s = k (z - 1) / (z + 1), k = w / tan(w dt / 2) with w = 2 pi prewarp_hz,
+ *            or k = 2 / dt without prewarping
+ * Notes:     powers that both polynomials lack are left out, so that a first-order section gets no
+ *            pole at z = -1.
+ * Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems, 3rd ed., section 6.1
+ */
 bst_dynamics_biquad bst_dynamics_biquad_tustin(const double num[3], const double den[3],
                                                double dt_s, double prewarp_hz);
 
-/* Response at omega rad per sample. */
+/* Frequency response of a biquad.
+ *
+ * Given:     omega_per_sample  angular frequency, rad per sample */
 double complex bst_dynamics_biquad_response(const bst_dynamics_biquad *biquad,
                                             double omega_per_sample);
 
@@ -65,8 +74,8 @@ typedef struct bst_compensator_config {
 
 enum { BST_COMPENSATOR_STATE_BYTES = 4096 };
 
-/* The functions of a compensator of a user's own, one state for each axis. Limits, feed-forward and
- * what else a "compensator" block sets are its own business. */
+/* Functions of a plug-in's compensator; each axis has a state. The plug-in implements its own
+ * limits and delay: those of the block "compensator" do not apply to it. */
 typedef struct bst_compensator_stage {
     size_t state_bytes; /* at most BST_COMPENSATOR_STATE_BYTES, of plain data: copies of it are
                            independent compensators */
@@ -81,8 +90,8 @@ typedef struct bst_compensator_stage {
     double complex (*response)(const void *state, double omega_per_sample);
 } bst_compensator_stage;
 
-/* Whether margins can be worked out: gains, a specification, or a plug-in that says its response.
- */
+/* True if stability margins can be computed: for gains, a specification, or a plug-in with a
+ * response. */
 static inline bool bst_compensator_is_linear(const bst_compensator_config *config) {
     const bst_compensator_stage *stage =
         config->plug.desc ? (const bst_compensator_stage *)config->plug.desc->functions : NULL;
@@ -180,44 +189,72 @@ typedef struct bst_compensator {
     _Alignas(16) unsigned char plug_state[BST_COMPENSATOR_STATE_BYTES];
 } bst_compensator;
 
-/* Frequency response of what the loop holds besides the compensator, from its output to the
- * (negative of the) error, at omega rad/s: for a sampled loop that of the sampled signals, holds
- * and delays in it. */
+/* Frequency response of the loop without its compensator, from the compensator's output to minus
+ * the error, at omega rad/s. For a sampled loop: of the sampled signals, with holds and delays. */
 typedef double complex (*bst_dynamics_response_fn)(const void *user, double omega_radps);
 
-/* The configuration with the gains that meet its specification in its place (unchanged when it has
- * none); *out shares the list of notches. gain_scale and delay_s are left out of the design and
- * kept. The crossover is where |L| = 1, L = compensator * plant sampled
- * at dt_s, and arg L = -180 deg + phase margin there. pi chooses kp and ki; where even a pure
- * integrator has more phase margin than asked, it takes that. pid has its integral corner at
- * integral_ratio of the crossover and chooses gain and derivative (more integral when it has phase
- * to give away); lead_lag the same with a lead centred on the crossover, poles at most 100 times
- * its zero. BST_ERR_CONFIG, saying the best that can be had, when it cannot be met. */
+/* Computes the gains that meet a specification (bandwidth_hz or crossover_hz, and
+ * phase_margin_deg).
+ *
+ * Given:     config       copied to *out unchanged if it has no specification
+ *            dt_s         sample time, s
+ *            plant, user  frequency response of the rest of the loop, and its first argument
+ * Returned:  *out  the configuration with gains instead of the specification; shares the list of
+ *                  notches with config
+ * Errors:    BST_ERR_CONFIG if the specification cannot be met; the message gives the best that can
+ *            be achieved
+ * Notes:     gain_scale and delay_s do not enter the design and are copied. The crossover is the
+ *            frequency at which |L| = 1, where L = compensator * plant; there arg L = -180 deg +
+ *            phase margin.
+ *            pi: chooses kp and ki. If a pure integrator already has more phase margin than asked
+ *            for, it is used.
+ *            pid: integral corner at integral_ratio times the crossover; chooses gain and
+ *            derivative, and more integral action if there is phase to spare.
+ *            lead_lag: as pid, with a lead centred on the crossover whose pole is at most 100 times
+ *            its zero. */
 bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *config, double dt_s,
                                   bst_dynamics_response_fn plant, const void *user,
                                   bst_compensator_config *out) BST_MUST_CHECK;
 
-/* A compensator at rest, stepped every dt_s, by gains or, designed against `plant`, by its
- * specification; `plant` may be NULL when gains are given. BST_ERR_CONFIG: frequencies beyond half
- * the rate, gains whose coefficients are not finite, both gains and a specification, a
- * specification without a plant or that cannot be met. */
+/* Initialises a compensator at rest.
+ *
+ * Given:     config       gains, or a specification that bst_compensator_design meets first, or a
+ *                         plug-in
+ *            dt_s         sample time, s
+ *            plant, user  rest of the loop, for a specification; plant NULL: only gains or a
+ *                         plug-in are allowed
+ * Errors:    BST_ERR_CONFIG for frequencies beyond half the sample rate, a delay of more than 1022
+ *            samples, gains with coefficients that are not finite, gains beside a specification, a
+ *            specification without a plant or one that cannot be met; errors of the plug-in's init
+ */
 bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *compensator,
                                 const bst_compensator_config *config, double dt_s,
                                 bst_dynamics_response_fn plant, const void *user) BST_MUST_CHECK;
 
-/* The output for this sample's error: cascade, plus feed_forward times its share, limited in value
- * and rate. What the limits cut goes back into the last stage's state (in direct form II transposed
- * by feeding back y + back * excess for y: for pi that is back-calculation with the time constant
- * dt / back; Astrom and Wittenmark, Computer-Controlled Systems, 3rd ed., section 9.4). */
+/* Output for one sample.
+ *
+ * Given:     error         error at this sample
+ *            feed_forward  input that is multiplied by the compensator's feed_forward and added
+ * Returned:  output, limited in value and rate and delayed; its unit follows from the gains
+ * Notes:     the part that the limits cut off is fed back into the last stage's state
+ *            (anti-windup). In direct form II transposed, y + back * excess takes the place of y in
+ *            the feedback. For pi this is back-calculation with the time constant dt / back. A
+ *            plug-in's output has neither a rate limit nor a delay.
+ * Reference: Astrom and Wittenmark, Computer-Controlled Systems, 3rd ed., section 9.4 */
 double bst_compensator_step(bst_compensator *compensator, double error, double feed_forward);
 
-/* Bumpless transfer: sets the states so that the next step with the same error and feed-forward
- * gives `output` (within the limits) and the integrator goes on from there. */
+/* Bumpless transfer: sets the states so that the next step with the same inputs returns `output`.
+ *
+ * Given:     error, feed_forward  inputs of the next step
+ *            output               desired output; limited as in bst_compensator_step
+ * Notes:     the integrator continues from there. A plug-in without `set` keeps its state. */
 void bst_compensator_set(bst_compensator *compensator, double error, double feed_forward,
                          double output);
 
-/* Response from error to output at omega rad/s, gain_scale and delay in it, limits not. At the pole
- * of an integrator it is infinite. */
+/* Frequency response from error to output, with gain_scale and delay, without the limits.
+ *
+ * Given:     omega_radps  angular frequency, rad/s
+ * Returned:  infinite at the pole of an integrator; NAN for a plug-in without a response */
 double complex bst_compensator_response(const bst_compensator *compensator, double omega_radps);
 
 #pragma GCC visibility pop

@@ -27,8 +27,8 @@ typedef enum bst_config_type {
     BST_CONFIG_STAGE,   /* bst_stage_use of include/boresight/stage.h; choices: the stage's kind */
 } bst_config_type;
 
-/* Where a LIST lands: `items` is one allocation of count * item_bytes, owned by the config object,
- * NULL when it is empty. */
+/* Member for a LIST. `items` is one allocation of count * item_bytes that belongs to the config
+ * object; NULL if the list is empty. */
 typedef struct bst_config_list {
     void *items;
     int count;
@@ -126,65 +126,150 @@ typedef struct bst_config_desc {
 typedef struct bst_json bst_json;
 struct cJSON;
 
-/* Reads a file (at most 64 MiB) or a text; `name` is used in messages. */
+/* Reads and checks a JSON file.
+ *
+ * Given:     path  file of at most 64 MiB; also the document's name in messages
+ * Returned:  *out  the document; NULL on error
+ * Errors:    BST_ERR_IO, BST_ERR_NOT_FOUND, BST_ERR_FORMAT, BST_ERR_CONFIG (a key given twice),
+ *            BST_ERR_MEMORY
+ * Ownership: free *out with bst_json_free */
 bst_status bst_json_load(bst_ctx *ctx, const char *path, bst_json **out) BST_MUST_CHECK;
+
+/* Parses and checks JSON text.
+ *
+ * Given:     name   name of the document in messages; copied
+ *            text   [bytes] UTF-8, with or without a byte order mark; no terminator is needed
+ *            bytes  length of text
+ * Returned:  *out  the document; NULL on error
+ * Errors:    BST_ERR_FORMAT with line and column, BST_ERR_CONFIG (a key given twice or with a
+ *            control character), BST_ERR_MEMORY
+ * Ownership: free *out with bst_json_free */
 bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size_t bytes,
                           bst_json **out) BST_MUST_CHECK;
+/* Frees a document with all of its values; NULL is allowed. */
 void bst_json_free(bst_json *json);
-/* A deep copy, with the file of each value (bst_json_file); the caller frees it. BST_ERR_MEMORY. */
+
+/* Makes a deep copy of a document, with the source file of each value (bst_json_file).
+ *
+ * Returned:  *out  the copy; NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_json_free */
 bst_status bst_json_copy(bst_ctx *ctx, const bst_json *json, bst_json **out) BST_MUST_CHECK;
+/* Root value of a document; it belongs to the document, and the caller may change it in place. */
 struct cJSON *bst_json_root(const bst_json *json);
+/* Name of a document as messages give it (its path); it belongs to the document. */
 const char *bst_json_name(const bst_json *json);
 
-/* Reads a file that may say "extends": FILE, relative to its own folder: then the values are those
- * of FILE, read in the same way, with what this one has at its top level in their place, and after
- * that with what its object "set" lists, {"/json/pointer": value}. Both keys are gone from the
- * result, whose name is `path`. BST_ERR_CONFIG: one extends itself, by way of at most 16 files. */
+/* Reads a JSON file that may change another one.
+ *
+ * Given:     path  file whose value is an object with the optional keys "extends" and "set"
+ * Returned:  *out  the merged document, named `path`, without the two keys; NULL on error
+ * Errors:    those of bst_json_load; BST_ERR_CONFIG for a file that extends itself, for more than
+ *            16 files, for a key that is given both beside "set" and in it, and for a bad pointer
+ *            in "set"
+ * Ownership: free *out with bst_json_free
+ * Notes:     "extends": FILE, relative to the folder of the file that names it, gives the values to
+ *            start from; FILE may extend a third one. The file's other top-level keys replace those
+ *            values. The object "set", {"/json/pointer": value}, is applied last. */
 bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out) BST_MUST_CHECK;
-/* The file that gave the value at a JSON pointer, or the latest that changed something in it; lent.
- */
+
+/* File that gave the value at a JSON pointer, or the last file that changed something inside it.
+ *
+ * Given:     pointer  JSON pointer ("/record/frames")
+ * Returned:  path of the file; it belongs to the document */
 const char *bst_json_file(const bst_json *json, const char *pointer);
-/* The files that gave values, in the order in which they were applied, with repeats; NULL after the
- * last one, and for a document that extends no other; lent. */
+
+/* Files that gave values to a document, in the order in which they were applied, with repeats.
+ *
+ * Given:     index  0, 1, ...
+ * Returned:  path of the file, which belongs to the document; NULL after the last one, and for a
+ *            document that extends no other */
 const char *bst_json_origin_file(const bst_json *json, int index);
-/* Makes the message in ctx, when it begins "NAME: /json/pointer:", name bst_json_file instead of
- * the document. */
+
+/* Corrects the file in an error message about a document that several files gave values to.
+ *
+ * Given:     ctx  a message "NAME: /json/pointer: ..." gets bst_json_file(pointer) instead of NAME;
+ *                 other messages stay as they are */
 void bst_json_name_file(bst_ctx *ctx, const bst_json *json);
 
-/* Whether an override has the form "/json/path=value"; BST_ERR_ARGUMENT when not. */
+/* Checks that an override has the form "/json/path=value".
+ *
+ * Errors:    BST_ERR_ARGUMENT if it has not */
 bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_MUST_CHECK;
-/* Applies one override "/json/path=value" (JSON pointer; value is JSON text, or a bare word taken
- * as a string). Objects on the way are made when missing; array elements must exist. */
+
+/* Applies one override "/json/path=value" to a document.
+ *
+ * Given:     assignment  JSON pointer, "=", and a value: JSON text, or a bare word that is taken as
+ *                        a string
+ * Errors:    BST_ERR_ARGUMENT for a wrong form or an array element that does not exist,
+ *            BST_ERR_MEMORY
+ * Notes:     missing objects on the path are created; array elements must exist. */
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BST_MUST_CHECK;
 
-/* Puts `value`, which it takes, at a JSON pointer. Objects on the way are made when missing; array
- * elements must exist. The value counts as given by the document's own file (bst_json_file). */
+/* Puts a value at a JSON pointer.
+ *
+ * Given:     pointer  JSON pointer to an existing or a new value
+ *            value    replaces what is there; NULL (a failed allocation): BST_ERR_MEMORY
+ * Errors:    BST_ERR_ARGUMENT for an array element that does not exist or a path nested too deep,
+ *            BST_ERR_MEMORY
+ * Ownership: the document owns `value` from now on; it is freed on error
+ * Notes:     missing objects on the path are created. bst_json_file gives the document's own file
+ *            for this value. */
 bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
                            struct cJSON *value) BST_MUST_CHECK;
 
-/* Fills `object` (zeroed by the callee) from `node` by `table`. `path` is the JSON pointer of node,
- * for messages: FILE: PATH: what is wrong (found VALUE; allowed ...) Unknown keys suggest the
- * nearest known one. Keys "$schema" and "description" are allowed everywhere. */
+/* Fills a struct from a JSON object by a table of keys.
+ *
+ * Given:     json   document of the node, for messages
+ *            node   JSON object; NULL: all keys at their defaults
+ *            path   JSON pointer of node, for messages
+ *            table  keys, types, ranges and defaults of the struct
+ * Returned:  object  the struct, zeroed first; free its lists with bst_config_free
+ * Errors:    BST_ERR_CONFIG "FILE: PATH: what is wrong (found VALUE; allowed: ...)",
+ *            BST_ERR_MEMORY; then `object` holds nothing to free
+ * Notes:     for an unknown key the message suggests the nearest known one. "$schema" and
+ *            "description" are allowed in every object. A plug-in is refused: use
+ *            bst_stage_read_config. */
 bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
                            const char *path, const bst_config_desc *table,
                            void *object) BST_MUST_CHECK;
-/* Says what is wrong with a value, in the words of bst_config_read: "FILE: PATH: WHAT (found VALUE;
- * allowed: ALLOWED)". BST_ERR_CONFIG. */
+
+/* Reports a wrong value in the form of bst_config_read: "FILE: PATH: WHAT (found VALUE; allowed:
+ * ALLOWED)".
+ *
+ * Given:     file, path  file and JSON pointer of the value
+ *            value       the value found
+ *            what        what is wrong
+ *            allowed     what is allowed
+ * Returned:  BST_ERR_CONFIG */
 bst_status bst_config_fail(bst_ctx *ctx, const char *file, const char *path,
                            const struct cJSON *value, const char *what, const char *allowed);
-/* Frees the lists inside an object that bst_config_read filled. */
+
+/* Frees the lists and plug-in configurations inside an object that bst_config_read filled. The
+ * object itself stays. */
 void bst_config_free(const bst_config_desc *table, void *object);
-/* Fills `object` with the table's defaults (every key must have one); for tests and typed callers.
- */
+
+/* Fills a struct with the defaults of its table.
+ *
+ * Given:     table  every key must have a default
+ * Returned:  object  the struct, zeroed first; free its lists with bst_config_free
+ * Errors:    BST_ERR_CONFIG if a key has no default, BST_ERR_MEMORY */
 bst_status bst_config_defaults(bst_ctx *ctx, const bst_config_desc *table,
                                void *object) BST_MUST_CHECK;
 
-/* Whether a key may be null. */
+/* True if a key may be null, which is NAN in the struct (BST_OPEN_REAL). */
 bool bst_config_is_open(const bst_config_desc *desc);
-/* The object as JSON with every default written out; the caller frees with cJSON_Delete. NULL when
- * out of memory. For printing: numbers are raw items whose text reads back as the same bits. */
+
+/* Writes a struct as a JSON object with every default spelled out.
+ *
+ * Returned:  JSON object; NULL if out of memory
+ * Ownership: free it with cJSON_Delete
+ * Notes:     for printing: numbers are raw items, whose text reads back as the same bits. */
 struct cJSON *bst_config_echo(const bst_config_desc *table, const void *object);
-/* The JSON Schema (draft 2020-12) of a table as an object node; caller frees. */
+
+/* JSON Schema (draft 2020-12) of a table, as an object node.
+ *
+ * Ownership: free it with cJSON_Delete */
 struct cJSON *bst_config_schema(const bst_config_desc *table);
 
 #pragma GCC visibility pop

@@ -51,21 +51,30 @@ typedef struct bst_detector_config {
 
 extern const bst_config_desc bst_detector_table[];
 
-/* Factor of the dark current at `temperature_c` over that at the reference temperature: it doubles
- * with every dark_doubling_k; 1 for a block of zeros. */
+/* Dark current at `temperature_c` over that at the reference temperature. It doubles with every
+ * dark_doubling_k; 1 for a block of zeros. */
 double bst_detector_dark_factor(const bst_detector_config *d);
 
-/* Whether frames need whole columns (blooming, frame transfer), and so the light of them all. */
+/* True if rendering needs whole columns of the sensor, because of blooming or frame transfer. */
 bool bst_detector_config_whole_columns(const bst_detector_config *d);
 
-/* BST_ERR_CONFIG, with the key, for effects that exclude each other. */
+/* Checks for effects that exclude each other.
+ *
+ * Errors:    BST_ERR_CONFIG, with the key: a rolling shutter beside frame transfer or blooming */
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
 
-/* Rolling shutter: time from the middle row of a window of `rows` rows to its first or last one.
- * Row n of the window (0, 1, ...) is exposed (n - (rows - 1) / 2) row_time_s later than the
- * exposure's ticks say. */
+/* Rolling shutter: time from the exposure of a window's middle row to that of its first or last
+ * row, s.
+ *
+ * Given:     rows  rows of the window, 1 or more
+ * Notes:     row n = 0, 1, ... of the window is exposed (n - (rows - 1) / 2) row_time_s after the
+ *            times that the exposure's ticks give. */
 double bst_detector_lead_s(const bst_detector_config *d, int rows);
-/* The same in ticks, rounded up. */
+
+/* bst_detector_lead_s in ticks, rounded up.
+ *
+ * Given:     rows          rows of the window, 1 or more
+ *            tick_rate_hz  ticks per second */
 int64_t bst_detector_lead_ticks(const bst_detector_config *d, int rows, double tick_rate_hz);
 
 #pragma GCC visibility pop

@@ -1,5 +1,5 @@
-/* A focal-plane frame: an opaque, reference-counted handle. Whoever renders makes it (usually on an
- * OpenCL device); whoever reads maps it. */
+/* A focal-plane frame: an opaque, reference-counted handle. The renderer creates it (usually on an
+ * OpenCL device); readers map it. */
 #ifndef BORESIGHT_FRAME_H
 #define BORESIGHT_FRAME_H
 
@@ -9,11 +9,10 @@
 
 typedef struct bst_frame bst_frame;
 
-/* Frames that may be under way behind the thread that steps the modules, besides those in queues.
- */
+/* Frames that deferred steps may hold at a time, besides those in queues. */
 enum { BST_OVERLAP_FRAMES = 9 };
 
-/* What a maker of frames supplies. All functions get the maker's own pointer. */
+/* Functions of a frame's owner. Their first argument is the owner's pointer. */
 typedef struct bst_frame_ops {
     /* Called from any thread. Makes the pixels readable: row-major uint16 [height][width], in
      * digital numbers. */
@@ -21,27 +20,36 @@ typedef struct bst_frame_ops {
     void (*unmap)(void *owner);
     /* The device buffer (cl_mem) that holds the same pixels, or NULL. */
     void *(*device_buffer)(void *owner);
-    /* The last reference is gone: take the buffer back into the pool. */
+    /* Called when the last reference is released: returns the buffer to the pool. */
     void (*recycle)(void *owner);
 } bst_frame_ops;
 
-/* The maker embeds this in its own frame object (no allocation per frame). */
+/* The owner embeds this in its own frame object (no allocation per frame). */
 struct bst_frame {
     const bst_frame_ops *ops;
     void *owner;
     int width, height;
-    int references, maps; /* atomic: readers may be in other threads than the maker */
+    int references, maps; /* atomic: readers may be in other threads than the owner */
 };
 
+/* Takes a reference to a frame. Any thread. */
 static inline void bst_frame_retain(bst_frame *frame) {
     __atomic_fetch_add(&frame->references, 1, __ATOMIC_RELAXED);
 }
+
+/* Releases a reference to a frame; the last one returns it to its owner. NULL is allowed. Any
+ * thread. */
 static inline void bst_frame_release(bst_frame *frame) {
     if (frame && __atomic_sub_fetch(&frame->references, 1, __ATOMIC_ACQ_REL) == 0) {
         frame->ops->recycle(frame->owner);
     }
 }
-/* Pixels stay valid until the matching unmap; maps nest. */
+
+/* Makes the pixels of a frame readable.
+ *
+ * Returned:  *pixels  [height][width], row-major, DN; valid until the matching bst_frame_unmap
+ * Errors:    those of the owner's map (BST_ERR_DEVICE)
+ * Notes:     maps nest. Any thread. */
 static inline bst_status bst_frame_map(bst_frame *frame, bst_ctx *ctx, const uint16_t **pixels) {
     bst_status status = frame->ops->map(frame->owner, ctx, pixels);
     if (status == BST_OK) {
@@ -49,11 +57,15 @@ static inline bst_status bst_frame_map(bst_frame *frame, bst_ctx *ctx, const uin
     }
     return status;
 }
+/* Ends a bst_frame_map; the last one releases the mapping. */
 static inline void bst_frame_unmap(bst_frame *frame) {
     if (__atomic_sub_fetch(&frame->maps, 1, __ATOMIC_ACQ_REL) == 0) {
         frame->ops->unmap(frame->owner);
     }
 }
+
+/* OpenCL buffer (cl_mem) with the pixels of a frame; NULL if there is none. It belongs to the
+ * frame. */
 static inline void *bst_frame_device_buffer(bst_frame *frame) {
     return frame->ops->device_buffer ? frame->ops->device_buffer(frame->owner) : NULL;
 }

@@ -40,17 +40,23 @@ typedef struct bst_channel_type {
     size_t item_bytes; /* 0: no items */
     bool in_place;     /* a ring that its writer extends in place: cannot be read with a delay */
     void (*release)(
-        void *payload); /* lets go of what a slot owns before it is written again; may be NULL */
-    void (*retain)(void *payload); /* makes a copy of the payload own the same; with release */
+        void *payload); /* frees what a slot owns before it is overwritten; may be NULL */
+    void (*retain)(
+        void *payload); /* takes references for a copy of the payload; set if release is */
     bool lends; /* the payload points to memory of its writer that the next message overwrites */
     int (*count)(const void *payload); /* items in use, the first ones; NULL: any may be */
 } bst_channel_type;
 
-/* The type of a channel by its unscoped name; NULL when there is none. */
+/* Type of a channel.
+ *
+ * Given:     name  unscoped name ("detections")
+ * Returned:  NULL if there is no such channel */
 const bst_channel_type *bst_channel_type_find(const char *name);
 
-/* Which modules write a channel, for messages: "gimbal", "imgproc or obsgen"; NULL for channels
- * that every sensor has, and for unknown names. */
+/* Names the modules that write a channel, for messages: "gimbal", "imgproc or obsgen".
+ *
+ * Given:     name  unscoped name
+ * Returned:  NULL for channels that every sensor has, and for unknown names */
 const char *bst_channel_writers(const char *name);
 
 #pragma GCC visibility pop

@@ -26,7 +26,7 @@ enum {
     BST_PORT_OPTIONAL = 1u << 0, /* input: may have no writer; output: yields to another module
                                     that writes the channel (bst_env_writes) */
     BST_PORT_TRIGGER = 1u << 1, /* input: the module steps whenever a new message becomes visible */
-    BST_PORT_FEEDBACK = 1u << 2, /* input: closes a loop; read with a delay of at least one tick */
+    BST_PORT_FEEDBACK = 1u << 2, /* input: closes a loop; delayed by at least one tick */
 };
 
 typedef struct bst_port {
@@ -41,20 +41,19 @@ typedef struct bst_port {
 enum {
     BST_MODULE_READS_TRUTH = 1u << 0, /* gets env->world; onboard modules do not */
     BST_MODULE_NEEDS_DEVICE = 1u << 1,
-    BST_MODULE_APART = 1u << 2,      /* may step in another thread than modules that do not read it:
-                                        shares with them only what is constant or locked, has no period
-                                        and never asks to be woken */
-    BST_MODULE_NEEDS_LINK = 1u << 3, /* gets env->link: another program plays it */
-    BST_MODULE_LINKS = 1u << 4,      /* one for all sensors of a scenario, which names it beside the
-                                        observers: its ports are there once for each sensor
-                                        (bst_member_port), and env->knowledge is NULL */
-    BST_MODULE_PROMISES = 1u << 5,   /* BST_MODULE_LINKS: says how long it will not write
-                                        (bst_step_promise), so that sensors go on meanwhile. It has
-                                        a period, never asks to be woken, and reads its queues to
-                                        the last message in each step */
+    BST_MODULE_APART = 1u << 2, /* deferrable: may step in another thread than modules that do not
+                                   read it. Shares only constant or locked data with them,
+                                   has no period and never requests a wake */
+    BST_MODULE_NEEDS_LINK = 1u << 3, /* gets env->link: another program takes its part */
+    BST_MODULE_LINKS = 1u << 4,      /* multi-sensor: one instance for all sensors, named beside the
+                                        observers. It has each port once per sensor
+                                        (bst_member_port); env->knowledge is NULL */
+    BST_MODULE_PROMISES = 1u << 5, /* BST_MODULE_LINKS with a lookahead (bst_step_promise), so that
+                                      sensors may run ahead. It has a period, never requests a
+                                      wake, and reads its queues to the end in each step */
 };
 
-/* A sensor as a module sees it that links several. */
+/* One of the sensors that a BST_MODULE_LINKS module serves. */
 typedef struct bst_fleet_member {
     const char *scope;    /* "observer/sensor" */
     int observer, sensor; /* indices in the world */
@@ -62,12 +61,17 @@ typedef struct bst_fleet_member {
     double frame_exposure_s, frame_period_s, frame_latency_s; /* as in bst_module_env */
 } bst_fleet_member;
 
-/* The port of a module that links sensors: `port` of its descriptor for one of the members. */
+/* Port number of a module that serves several sensors: port `port` of its descriptor for sensor
+ * `member`.
+ *
+ * Given:     port_count  number of ports of the descriptor
+ *            member      index in bst_module_env.members
+ *            port        index in desc->ports */
 static inline int bst_member_port(int port_count, int member, int port) {
     return member * port_count + port;
 }
 
-/* What create gets. Pointers outlive the module. */
+/* Arguments of create. Pointers outlive the module. */
 typedef struct bst_module_env {
     bst_ctx *ctx;
     const char *instance; /* "observer/sensor/module" */
@@ -109,36 +113,52 @@ typedef struct bst_module_desc {
     bst_status (*create)(const bst_module_env *env, const void *config, void **self);
     bst_status (*step)(void *self, struct bst_step *step);
     void (*destroy)(void *self);
-    /* May be NULL. At the end of a run: counts what was still under way; publishes nothing. */
+    /* May be NULL. Called at the end of a run to count unfinished work; publishes nothing. */
     bst_status (*finish)(void *self, struct bst_step *step);
-    /* May be NULL; of a BST_MODULE_APART one. May be called before a step, on another thread, while
-     * earlier steps or their `ahead` are under way, to do what depends on nothing but that step's
-     * inputs from modules that are not apart. It reads those alone, publishes and counts nothing,
-     * and keeps what it made by bst_step_lane for the step, which does it itself where nothing is
-     * kept: what fails here fails there again. */
+    /* May be NULL; only for BST_MODULE_APART. The engine may call it before a step, on another
+     * thread, while earlier steps or their `ahead` are running. It does the work that depends only
+     * on that step's inputs from modules that are not BST_MODULE_APART, and reads no others. It
+     * publishes and counts nothing, and stores its results by bst_step_lane for the step. The step
+     * does the work itself if there is no stored result, so that an error here occurs there again.
+     */
     bst_status (*ahead)(void *self, struct bst_step *step);
-    /* May be NULL. Roles, NULL-terminated, in whose place this module steps where the sensor's
-     * observation_source is "generator"; otherwise it does not step. Keys of its table that theirs
-     * have too take their values. Its last trigger is delayed by what passes between them. */
+    /* May be NULL. Roles, NULL-terminated, that this module replaces if the sensor's
+     * observation_source is "generator"; otherwise it does not step. Keys that its table shares
+     * with theirs take their values. Its last trigger is delayed by the sum of the delays between
+     * them. */
     const char *const *stands_for;
     const char *also; /* another name that a scenario may write as "type"; NULL: none */
 } bst_module_desc;
 
-/* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */
+/* In create: sets the number of items that an output's payload holds.
+ *
+ * Given:     port   index in desc->ports
+ *            items  1 or more */
 void bst_env_set_capacity(const bst_module_env *env, int port, int items);
-/* In create: whether an output that yields is this module's to write. */
+
+/* In create: true if this module writes an output; false for an optional output that another module
+ * writes. */
 bool bst_env_writes(const bst_module_env *env, int port);
-/* In create of a module that wakes itself (bst_step_wake_at): about how often it will step at most.
- * Queues behind it are sized by that. */
+
+/* In create: declares how often a module that wakes itself (bst_step_wake_at) steps at most.
+ *
+ * Given:     rate_hz  steps per second, approximately
+ * Notes:     sizes the queues that this module writes. */
 void bst_env_set_rate(const bst_module_env *env, double rate_hz);
-/* In create: this input will not be read, so that nothing waits for who writes it. */
+
+/* In create: declares that an input is not read, so that no writer of it is waited for.
+ *
+ * Given:     port  index in desc->ports */
 void bst_env_ignore(const bst_module_env *env, int port);
-/* In create: a key of a random stream of this instance. */
+
+/* In create: key of a random stream of this instance.
+ *
+ * Given:     stream  name of the stream, distinct within the module */
 static inline bst_rng_key bst_env_rng(const bst_module_env *env, const char *stream) {
     return bst_rng_make_key(env->seed, env->run, env->instance, stream);
 }
 
-/* One message as a reader sees it. payload is NULL when nothing valid is there yet. */
+/* One message as a reader gets it. payload is NULL if there is none. */
 typedef struct bst_sample {
     const void *payload;
     int64_t written_tick; /* when its writer wrote it; it became visible `delay` later */
@@ -147,34 +167,74 @@ typedef struct bst_sample {
                    better */
 } bst_sample;
 
-/* In step. Port numbers index desc->ports. */
+/* In step: context for messages, log and warnings of this step. */
 bst_ctx *bst_step_ctx(struct bst_step *step);
+/* In step: tick of this step, counted from the scenario's epoch. */
 int64_t bst_step_tick(const struct bst_step *step);
+/* In step: time of this step, seconds since the scenario's epoch (tick over tick rate). */
 double bst_step_seconds(const struct bst_step *step); /* tick / rate, since the scenario's epoch */
-/* Steps of an instance whose `ahead` may have been called take turns in BST_STEP_LANES lanes, 0 the
- * first: no two with one lane are under way. 0 for all others. */
+/* Number of work spaces (lanes) that steps of an instance with `ahead` use in turn. */
 enum { BST_STEP_LANES = 3 };
+
+/* In step and ahead: work space that this step uses.
+ *
+ * Returned:  0 to BST_STEP_LANES - 1; always 0 for instances without `ahead`
+ * Notes:     no two steps of an instance that run at the same time have the same lane. */
 int bst_step_lane(const struct bst_step *step);
-/* The newest visible message of an input. Queue messages stay unread. */
+
+/* In step: newest visible message of an input.
+ *
+ * Given:     port  index in desc->ports
+ * Returned:  payload NULL if there is none; the payload is valid for this step
+ * Notes:     leaves the messages of a queue unread. */
 bst_sample bst_step_latest(struct bst_step *step, int port);
-/* The next unread visible message of a queue input; payload NULL when there is none. */
+
+/* In step: next unread message of a queue input; marks it read.
+ *
+ * Given:     port  index in desc->ports
+ * Returned:  payload NULL if there is none; the payload is valid for this step */
 bst_sample bst_step_next(struct bst_step *step, int port);
-/* The payload to fill; visible to readers when the step returns BST_OK. A latest channel's payload
- * keeps what was written last; a queue slot holds an old message to overwrite. *capacity (may be
- * NULL): number of items there is room for. */
+
+/* In step: payload of an output to fill; readers see it when the step returns BST_OK.
+ *
+ * Given:     port  index in desc->ports
+ * Returned:  *capacity  number of items that fit; capacity may be NULL
+ * Notes:     the payload of a latest channel holds the last message written; that of a queue holds
+ *            an old message. A second call in a step publishes the first message and starts
+ *            another. */
 void *bst_step_write(struct bst_step *step, int port, int *capacity);
-/* MODIFY port: the message written at this tick, NULL when none was. */
+
+/* In step: message that was written at this tick to a MODIFY port, to be changed in place.
+ *
+ * Given:     port  index in desc->ports
+ * Returned:  NULL if no message was written at this tick */
 void *bst_step_modify(struct bst_step *step, int port);
-/* Asks to be stepped at an absolute tick (later than now) besides the period and the triggers. One
- * wish is kept, the earliest, until it comes true. */
+
+/* In step: requests a step at an absolute tick, besides the period and the triggers.
+ *
+ * Given:     tick  later than now; earlier ticks are ignored
+ * Notes:     one request is kept, the earliest, until it is due. */
 void bst_step_wake_at(struct bst_step *step, int64_t tick);
-/* BST_MODULE_PROMISES: this output will not be written in steps before an absolute tick. To write
- * it all the same is an error. */
+
+/* In step: declares a lookahead: this output will not be written before an absolute tick.
+ *
+ * Given:     port  index in desc->ports
+ *            tick  absolute; an earlier one than declared before has no effect
+ * Errors:    the step fails with BST_ERR_STATE if the module lacks BST_MODULE_PROMISES, or writes
+ *            earlier after all
+ * Reference: Fujimoto, Parallel and Distributed Simulation Systems, 2000, chapter 3 (lookahead) */
 void bst_step_promise(struct bst_step *step, int port, int64_t tick);
-/* An event for the record: kind is a short fixed word, text free. */
+
+/* In step: records an event.
+ *
+ * Given:     kind    short fixed word
+ *            format  printf-style text, cut at 399 bytes */
 void bst_step_event(struct bst_step *step, const char *kind, const char *format, ...)
     BST_PRINTF(3, 4);
-/* Counts a condition of the data ("saturated", "queue_overflow", ...) for the run summary. */
+
+/* In step: counts a condition of the data ("saturated", ...) for the summary of the run.
+ *
+ * Given:     what  name of the counter */
 void bst_step_count(struct bst_step *step, const char *what);
 
 #pragma GCC visibility pop

@@ -17,6 +17,10 @@ typedef struct bst_philox_words {
     bst_u32 w[4];
 } bst_philox_words;
 
+/* Philox4x32-10: encrypts a counter to four uniform 32-bit words.
+ *
+ * Given:     key0, key1      key
+ *            c0, c1, c2, c3  counter */
 static inline bst_philox_words bst_philox4x32(bst_u32 key0, bst_u32 key1, bst_u32 c0, bst_u32 c1,
                                               bst_u32 c2, bst_u32 c3) {
     for (int round = 0; round < 10; round++) {

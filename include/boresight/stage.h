@@ -1,6 +1,5 @@
-/* A stage: a part of a module that a user's plug-in can take the place of, the rest of the module
- * staying as it is. Which kinds there are, and what functions each has: include/boresight/stages.h.
- */
+/* A stage: a part of a module that a plug-in can replace. The kinds of stages and their functions
+ * are in include/boresight/stages.h. */
 #ifndef BORESIGHT_STAGE_H
 #define BORESIGHT_STAGE_H
 
@@ -20,10 +19,10 @@ typedef struct bst_stage_desc {
     const void *functions; /* struct of the kind */
 } bst_stage_desc;
 
-/* What a module's configuration holds where a stage may be a plug-in's: in a table
- * BST_STAGE(my_config, plugin, kinds, "..."), kinds a list of the kind's name and NULL. The object
- * that has this key takes, where it is given, "type" and the plug-in's own keys besides, and its
- * other members keep their defaults. */
+/* Member of a module's configuration for a stage that a plug-in may replace. Its entry in the table
+ * is BST_STAGE(my_config, plugin, kinds, "..."), where kinds is {name of the kind, NULL}. If the
+ * key is given, the object may also contain "type" and the plug-in's own keys; its other members
+ * keep their defaults. */
 typedef struct bst_stage_use {
     char plugin[512];           /* path of the library; "": no plug-in */
     const bst_stage_desc *desc; /* NULL: no plug-in */
@@ -43,19 +42,23 @@ typedef struct bst_stage_use {
         .size = sizeof(bst_stage_use)                                                          \
     }
 
-/* Who opens libraries for bst_stage_read_config. */
+/* Opens libraries for bst_stage_read_config. */
 typedef struct bst_stage_loader {
     void *user;
-    /* The stage `type` (NULL: the only one) of `kind` of the library that the text `plugin` at the
-     * JSON pointer `path` names, in *out, and the library's full path in `file`. *out NULL: leave
-     * the block unread. Messages name `path`. */
+    /* Finds the stage `type` (NULL: the only one) of `kind` in the library `plugin`, the text at
+     * the JSON pointer `path`. Stores it in *out, and the library's full path in file[bytes]. *out
+     * NULL: the block is not read. Messages name `path`. */
     bst_status (*load)(void *user, bst_ctx *ctx, const bst_json *json, const char *path,
                        const char *plugin, const char *kind, const char *type,
                        const bst_stage_desc **out, char *file, size_t bytes);
 } bst_stage_loader;
 
-/* bst_config_read of a table in which there may be stages; bst_config_read itself refuses
- * plug-ins. */
+/* bst_config_read for a table that may contain stages of plug-ins.
+ *
+ * Given:     json, node, path, table  as bst_config_read
+ *            loader                   opens the libraries of plug-ins; NULL: a plug-in is an error
+ * Returned:  object  the struct, zeroed first; free its lists with bst_config_free
+ * Errors:    those of bst_config_read and of the loader */
 bst_status bst_stage_read_config(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
                                  const char *path, const bst_config_desc *table,
                                  const bst_stage_loader *loader, void *object) BST_MUST_CHECK;

@@ -1,8 +1,8 @@
-/* Stages that a plug-in can take the place of: what their functions are given and give back. A
- * stage's descriptor (include/boresight/stage.h) points to one of these structs. Onboard stages
- * know the camera as the onboard side does; nobody knows the truth. `config` is the filled struct
- * of the descriptor's own table and outlives the stage. Errors are told by bst_fail and end the
- * run. Results are to depend on nothing but what is given, so that a run can be repeated. */
+/* Stages that a plug-in can replace, and their functions. A stage's descriptor
+ * (include/boresight/stage.h) points to one of these structs. Onboard stages get the onboard model
+ * of the camera, never the truth. `config` is the filled struct of the descriptor's own table and
+ * outlives the stage. Functions report errors with bst_fail; an error ends the run. Results must
+ * depend on the arguments alone, so that a run can be repeated. */
 #ifndef BORESIGHT_STAGES_H
 #define BORESIGHT_STAGES_H
 
@@ -20,8 +20,8 @@
 
 extern const char *const bst_stage_kinds[]; /* these, then NULL */
 
-/* ---- detector: what is in a frame. Identification of stars, photometry by them, labels and what
- * follows stay imgproc's. */
+/* ---- detector: finds the sources in a frame. imgproc then identifies stars, calibrates photometry
+ * and assigns labels. */
 
 typedef struct bst_detector_env {
     const bst_camera *camera;  /* as the onboard side knows it; outlives the stage */
@@ -39,8 +39,7 @@ typedef struct bst_detector_frame {
     bst_window window;      /* full-sensor pixels */
     int binning, bits;
     double exposure_s;
-    const bst_camera_motion
-        *motion; /* how the camera turned, as telemetry tells it; NULL: not known */
+    const bst_camera_motion *motion; /* motion of the camera by telemetry; NULL: unknown */
 } bst_detector_frame;
 
 typedef struct bst_detector_stage {
@@ -49,13 +48,14 @@ typedef struct bst_detector_stage {
     /* Fills background_e and noise_e (per pixel), threshold_snr, count (at most env->capacity),
      * lost, and of each item x_px and y_px in full-sensor coordinates, cov_xx, cov_xy, cov_yy,
      * flux_e, flux_sigma_e, snr, length_px, width_px, angle_rad and flags; label: UNKNOWN, or
-     * ARTEFACT for what is no source. The rest is zero. Frames come in the order of time. */
+     * ARTEFACT for a detection that is not a source. Other members are zero. Frames come in
+     * order of time. */
     bst_status (*detect)(void *self, bst_ctx *ctx, const bst_detector_frame *frame,
                          bst_detections *out);
     void (*destroy)(void *self);
 } bst_detector_stage;
 
-/* ---- frame_stage: changes a rendered frame before anyone sees it, the recorder included. */
+/* ---- frame_stage: changes a rendered frame before any module or the recorder reads it. */
 
 typedef struct bst_frame_stage_env {
     const bst_camera *camera; /* the true one; outlives the stage */
@@ -74,8 +74,8 @@ typedef struct bst_frame_stage_frame {
 typedef struct bst_frame_stage {
     bst_status (*create)(bst_ctx *ctx, const void *config, const bst_frame_stage_env *env,
                          void **self);
-    /* Changes pixels[height][width], DN, in place; at most 2^bits - 1. Frames come in the order of
-     * time. */
+    /* Changes pixels[height][width], DN, in place; at most 2^bits - 1. Frames come in order
+     * of time. */
     bst_status (*apply)(void *self, bst_ctx *ctx, const bst_frame_stage_frame *frame,
                         uint16_t *pixels);
     void (*destroy)(void *self);

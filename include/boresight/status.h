@@ -58,22 +58,38 @@ typedef struct bst_ctx {
     unsigned warnings;       /* number of BST_LOG_WARNING lines so far */
 } bst_ctx;
 
-/* Prepares a context with the given log sink (may be NULL). */
+/* Initialises a context.
+ *
+ * Given:     log       receives the log lines; NULL: they are dropped
+ *            log_user  first argument of log
+ *            level     lines above this level are dropped */
 void bst_ctx_init(bst_ctx *ctx, bst_log_fn log, void *log_user, bst_log_level level);
 
-/* Stores a printf-style message in ctx (NULL allowed: the message is dropped) and returns status.
- * Control characters but the newline become '?'. */
+/* Stores an error message and returns a status: return bst_fail(ctx, BST_ERR_IO, "...", ...);
+ *
+ * Given:     ctx     NULL: the message is dropped
+ *            status  returned unchanged
+ *            format  printf-style; arguments may point to ctx->message
+ * Notes:     control characters become '?'; newlines are kept if the format itself contains some.
+ *            The message is cut at BST_MESSAGE_BYTES - 1 bytes. */
 bst_status bst_fail(bst_ctx *ctx, bst_status status, const char *format, ...) BST_PRINTF(3, 4);
 
-/* Puts "prefix: " before the message already stored, for callers that know more, and returns
- * status. */
+/* Puts "prefix: " before the stored message and returns a status, for callers that know more.
+ *
+ * Given:     ctx     NULL: nothing is stored
+ *            status  returned unchanged
+ *            format  printf-style text of the prefix */
 bst_status bst_fail_prefix(bst_ctx *ctx, bst_status status, const char *format, ...)
     BST_PRINTF(3, 4);
 
-/* Sends a line to the context's log. */
+/* Sends a line to the log of a context.
+ *
+ * Given:     ctx     NULL: the line is dropped
+ *            level   lines above ctx->log_level are dropped; warnings are counted in any case
+ *            format  printf-style */
 void bst_log(bst_ctx *ctx, bst_log_level level, const char *format, ...) BST_PRINTF(3, 4);
 
-/* A short English name of a status, for example "bad format". Never NULL. */
+/* Short English name of a status ("bad format"); never NULL. */
 const char *bst_status_name(bst_status status);
 
 /* Returns from the calling function when expr is not BST_OK. */

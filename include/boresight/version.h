@@ -8,9 +8,9 @@
 extern "C" {
 #endif
 
-/* "0.1.0": major, minor and patch by semantic versioning. Never NULL. */
+/* Version of the library, "major.minor.patch" by semantic versioning; never NULL. */
 const char *bst_version(void);
-/* The revision of the sources as `git describe` names it; "" when they were no git tree. */
+/* Revision of the sources as `git describe` names it; "" if they were not built in a git tree. */
 const char *bst_version_git_revision(void);
 
 #ifdef __cplusplus

@@ -9,6 +9,7 @@ typedef struct bst_blend_weights {
     float weight[BST_BLEND_LIGHTS][BST_BLEND_DISTANCES];
 } bst_blend_weights;
 
+/* Computes the table of weights; needed once. */
 void bst_blend_weights_init(bst_blend_weights *weights);
 
 /* The weight of a source beside the fitted one, in the mean that a least-squares fit of one source

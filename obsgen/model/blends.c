@@ -30,7 +30,8 @@ double bst_generator_output_variance(const bst_generator *g, const generator_sou
     return filter->variance + filter->shot * fmax(s->amplitude, 0.0);
 }
 
-/* Calls for every other source whose light reaches number i. */
+/* Index of the first source whose row is at most `reach` px before that of source i; sources are in
+ * order of y. */
 static int first_near(const bst_generator *g, int i, double reach) {
     int k = i;
     while (k > 0 && g->sources[k - 1].y >= g->sources[i].y - reach) {

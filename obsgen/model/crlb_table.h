@@ -33,7 +33,10 @@ bst_crlb_table_at bst_crlb_table_of(const bst_crlb_table *bound, double flux_e, 
  * lengths in units of it, a pixel small beside it. */
 bst_crlb_table_at bst_crlb_table_wider(const bst_crlb_table *bound, double flux_e, double noise_e,
                                        double length_px, double wider);
-/* Only `norm`. */
+
+/* bst_crlb_table_of, member `norm` only.
+ *
+ * Given:     length_px  length of the streak, px */
 double bst_crlb_table_norm(const bst_crlb_table *bound, double length_px);
 
 #endif

@@ -45,7 +45,12 @@ void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double l
 void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding);
 /* Both at a place, bilinear between the meshes' middles. */
 void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise);
+
+/* Loads the corner values of a cell, for bst_local_sky_next.
+ *
+ * Given:     column, row  of the cell's upper left mesh */
 void bst_local_sky_enter(const bst_local_sky *sky, int column, int row, bst_local_sky_cell *cell);
+/* Frees the memory of a local sky and clears the struct, which belongs to the caller. */
 void bst_local_sky_free(bst_local_sky *sky);
 
 static inline double bst_local_sky_mix(const double cell[2][2], double x, double y) {

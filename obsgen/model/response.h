@@ -45,6 +45,9 @@ typedef struct bst_response_nodes {
     double weight[4];
 } bst_response_nodes;
 
+/* Nodes of the PSF's field grid about a position, with weights; none for a PSF that does not vary.
+ *
+ * Given:     x_px, y_px  full-sensor pixel coordinates */
 void bst_response_nodes_at(const bst_response_side *side, double x_px, double y_px,
                            bst_response_nodes *out);
 

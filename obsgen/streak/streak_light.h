@@ -51,6 +51,7 @@ typedef struct bst_streak_light {
 
 /* Begins a frame. by_row: most ways run more along y. */
 void bst_streak_light_begin(bst_streak_light *light, int width, int height, bool by_row);
+/* Frees the memory of a work space and clears the struct, which belongs to the caller. */
 void bst_streak_light_free(bst_streak_light *light);
 
 /* Begins a run. */

@@ -31,6 +31,7 @@ typedef struct bst_streak_noise {
     float normals[BST_STREAK_NORMALS];   /* at the middles of equal shares of probability */
 } bst_streak_noise;
 
+/* Computes the table of normal quantiles, scaled to variance 1; needed once. */
 void bst_streak_noise_init(bst_streak_noise *noise);
 
 /* Makes the taps of a filter of this width, px. */

@@ -24,6 +24,7 @@ typedef struct bst_cosmic_rays bst_cosmic_rays;
 bst_status bst_cosmic_rays_create(bst_ctx *ctx, const bst_detector_cosmic_ray_config *config,
                                   int width, int height, int stride,
                                   bst_cosmic_rays **out) BST_MUST_CHECK;
+/* Frees a generator of radiation hits; NULL is allowed. */
 void bst_cosmic_rays_free(bst_cosmic_rays *hits);
 
 /* The hits of one exposure, keyed by it; *pixels are borrowed until the next call, each index once,

@@ -20,6 +20,7 @@ typedef struct bst_detector bst_detector;
  * BST_ERR_CONFIG for a map or a table of codes that cannot be used, naming the key. */
 bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                bst_rng_key pattern, bst_detector **out) BST_MUST_CHECK;
+/* Frees a detector with its buffers on the device; NULL is allowed. */
 void bst_detector_free(bst_detector *detector);
 
 /* Key of a sensor's fixed patterns; `name`: "observer/sensor". The same in all runs of a study. */

@@ -7,8 +7,9 @@
 #include "boresight/camera.h"
 #include "boresight/rng.h"
 
-/* Whether the camera has such a map. */
+/* True if pixels differ in response: PRNU, a map, dead pixels or bad columns. */
 bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera);
+/* True if pixels differ in dark current: DSNU, a map, or hot pixels. */
 bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera);
 
 /* Response to light, [height][stride], stride >= width: 1 + prnu_rms z cut at 0, or prnu_map; 0 in

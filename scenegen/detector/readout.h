@@ -9,8 +9,16 @@
 
 typedef struct bst_readout bst_readout;
 
+/* Creates the read-out of a camera with the kernels that its effects need.
+ *
+ * Given:     camera   copied
+ *            program  built detector kernels
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY, BST_ERR_DEVICE
+ * Ownership: free *out with bst_readout_free */
 bst_status bst_readout_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                               cl_program program, bst_readout **out) BST_MUST_CHECK;
+/* Frees a read-out with its kernels and buffers on the device; NULL is allowed. */
 void bst_readout_free(bst_readout *readout);
 
 /* The part of the sensor whose light a frame of `window` takes: whole columns where charge or light

@@ -28,6 +28,7 @@ bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spe
                                        const bst_alias_correction_axis *x,
                                        const bst_alias_correction_axis *y, bst_parallel *pool,
                                        bst_alias_correction **out) BST_MUST_CHECK;
+/* Frees an alias correction with its FFT plans; NULL is allowed. */
 void bst_alias_correction_free(bst_alias_correction *wrap);
 
 /* light: electrons per cell, [y cells][x cells]; replaced by what is to be added to a pixel at each

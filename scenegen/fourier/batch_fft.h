@@ -25,6 +25,7 @@ double bst_batch_fft_cost(int n);
 
 /* For such an n. BST_ERR_MEMORY. */
 bst_status bst_batch_fft_create(bst_ctx *ctx, int n, bst_batch_fft **out) BST_MUST_CHECK;
+/* Frees a transform; NULL is allowed. */
 void bst_batch_fft_free(bst_batch_fft *fft);
 
 /* order[k], 0 <= k < n: where run leaves X[k]. */

@@ -22,14 +22,17 @@ typedef struct bst_fourier_render_options {
     int spatial_oversample; /* as the renderer's */
 } bst_fourier_render_options;
 
+/* Options with their defaults: 8 taps, tolerance 3e-5 of the PSF's peak. */
 bst_fourier_render_options bst_fourier_render_default_options(void);
 
 /* Measures the PSF and builds the kernel. The PSF is borrowed. `options` may be NULL. */
 bst_status bst_fourier_render_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                      const bst_psf *psf, const bst_fourier_render_options *options,
                                      bst_fourier_render **out) BST_MUST_CHECK;
+/* Frees a renderer with its kernels and buffers on the device; NULL is allowed. */
 void bst_fourier_render_free(bst_fourier_render *light);
 
+/* Band of the PSF's frequencies; it belongs to the renderer. */
 const bst_fourier_band *bst_fourier_render_band(const bst_fourier_render *light);
 
 /* Pixels outside the window from which a source's light is still drawn. */

@@ -12,6 +12,9 @@ typedef struct bst_nufft_kernel {
     double beta;
 } bst_nufft_kernel;
 
+/* Value phi(t) of the kernel; 0 outside half its taps.
+ *
+ * Given:     t  distance, samples of the grid */
 double bst_nufft_kernel_value(const bst_nufft_kernel *spread, double t);
 
 /* Integral of phi(t) cos(2 pi nu t) dt, nu in cycles per sample. */
@@ -41,6 +44,10 @@ typedef struct bst_nufft_kernel_shape {
  * light is kept exactly). Returns the error relative to the PSF's peak. */
 double bst_nufft_kernel_widen(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
                               double density, double variance, bst_nufft_kernel_shape *out);
+
+/* Value of the widening kernel, phi(t) (c0 + c1 z^2 + c2 z^4) with z = 2 t / taps.
+ *
+ * Given:     t  distance, samples of the grid */
 double bst_nufft_kernel_shape_value(const bst_nufft_kernel *spread,
                                     const bst_nufft_kernel_shape *shape, double t);
 

@@ -27,8 +27,10 @@ typedef struct bst_otf_convolve_layout {
 bst_status bst_otf_convolve_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
                                    const bst_otf_convolve_layout *shape, bst_parallel *pool,
                                    bst_otf_convolve **out) BST_MUST_CHECK;
+/* Frees a convolution with its buffers; NULL is allowed. */
 void bst_otf_convolve_free(bst_otf_convolve *fft);
 
+/* Layout of the grids; it belongs to the convolution. */
 const bst_otf_convolve_layout *bst_otf_convolve_shape(const bst_otf_convolve *fft);
 
 /* Floats of the memory that holds the grid and then the image, 64-byte aligned. */

@@ -41,11 +41,21 @@ typedef struct bst_error_budget_source {
     bool apart;       /* moves further than the stars do */
 } bst_error_budget_source;
 
+/* Creates an empty error budget.
+ *
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_error_budget_free */
 bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) BST_MUST_CHECK;
+/* Frees an error budget; NULL is allowed. */
 void bst_error_budget_free(bst_error_budget *crowd);
 
 /* Starts a frame. */
 void bst_error_budget_begin(bst_error_budget *crowd, const bst_error_budget_motion *motion);
+
+/* Adds a source of the frame; it is copied.
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *crowd,
                                 const bst_error_budget_source *source) BST_MUST_CHECK;
 

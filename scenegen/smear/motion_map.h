@@ -23,7 +23,13 @@ typedef struct bst_smear_star_motion_cell {
     double error[BST_MOTION_ERRORS];
 } bst_smear_star_motion_cell;
 
+/* Creates an empty motion map.
+ *
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_motion_map_free */
 bst_status bst_motion_map_create(bst_ctx *ctx, bst_motion_map **out) BST_MUST_CHECK;
+/* Frees a motion map; NULL is allowed. */
 void bst_motion_map_free(bst_motion_map *map);
 
 typedef struct bst_motion_map_frame {

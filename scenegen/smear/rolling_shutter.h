@@ -14,6 +14,7 @@ typedef struct bst_rolling bst_rolling;
 bst_status bst_rolling_create(bst_ctx *ctx, const bst_camera *camera, double tolerance_sigma,
                               double peak_sigma_px, bool gaussian,
                               bst_rolling **out) BST_MUST_CHECK;
+/* Frees a rolling shutter; NULL is allowed. */
 void bst_rolling_free(bst_rolling *rolling);
 
 /* Starts a frame; the request (with row_time_s) is needed until its last band. margin_px: distance
@@ -27,9 +28,9 @@ bst_status bst_rolling_begin(bst_ctx *ctx, bst_rolling *rolling, const bst_rende
 bst_status bst_rolling_next(bst_ctx *ctx, bst_rolling *rolling, bst_render_request *band,
                             bool *more) BST_MUST_CHECK;
 
-/* Of the latest band: number in the request of its source `index`, and the predicted error, sigma.
- */
+/* Number in the request of source `index` of the latest band. */
 int bst_rolling_source(const bst_rolling *rolling, int index);
+/* Predicted error of the latest band, in units of the pixel noise. */
 double bst_rolling_error_sigma(const bst_rolling *rolling);
 
 #endif

@@ -38,8 +38,15 @@ typedef struct bst_smear_options {
     double widest;        /* widening of nodes, PSF variances; 0: as much as nodes may be */
 } bst_smear_options;
 
+/* Creates the smear of a camera.
+ *
+ * Given:     camera   copied
+ *            options  copied; zero members are the defaults
+ * Returned:  *out  to be freed with bst_smear_free, after an error too, if it is not NULL
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) BST_MUST_CHECK;
+/* Frees a smear; NULL is allowed. */
 void bst_smear_free(bst_smear *smear);
 
 /* What sources are drawn for. */
@@ -53,6 +60,10 @@ typedef struct bst_smear_frame {
     double brightest_e_per_s;   /* of the stars */
 } bst_smear_frame;
 
+/* Begins an exposure: attitude track, window and sources.
+ *
+ * Given:     frame  its arrays must outlive the exposure
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear,
                            const bst_smear_frame *frame) BST_MUST_CHECK;
 
@@ -68,9 +79,11 @@ bool bst_smear_single(const bst_smear *smear);
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_scene_source *source,
                             bst_kernel_source_record *out, bool *visible) BST_MUST_CHECK;
 
-/* Largest expected electrons in one pixel of the source given last; and in one that is read, if the
- * window holds it. */
+/* Largest expected electrons that the latest source gives a pixel. */
 double bst_smear_last_peak_e(const bst_smear *smear);
+
+/* Largest expected electrons that the latest source gives a pixel that is read, if the window holds
+ * it. */
 double bst_smear_last_read_e(const bst_smear *smear);
 /* What is left of that source's errors at the window: 1 unless it stays beside it. */
 double bst_smear_last_presence(const bst_smear *smear);

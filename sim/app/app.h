@@ -7,24 +7,46 @@
 #include "sim/cli/cli.h"
 #include "sim/registry/registry.h"
 
+/* boresight new: writes a scenario for an observer and a target.
+ *
+ * Given:     argc, argv  argv[0] is the name of the command; so for the commands below
+ * Returned:  exit status of the program; so for all commands below */
 int bst_cmd_new(int argc, char **argv);
+/* boresight run: runs a scenario and records it. */
 int bst_cmd_run(int argc, char **argv);
+/* boresight info: describes a run folder. */
 int bst_cmd_info(int argc, char **argv);
+/* boresight export: writes pictures, tables, orbits or observations of a run. */
 int bst_cmd_export(int argc, char **argv);
+/* boresight report: writes an HTML page about a run or study. */
 int bst_cmd_report(int argc, char **argv);
+/* boresight orbit: determines an orbit from the angles of a track. */
 int bst_cmd_orbit(int argc, char **argv);
+/* boresight check: checks a scenario without running it. */
 int bst_cmd_check(int argc, char **argv);
+/* boresight loop: margins and predicted pointing of the control loops. */
 int bst_cmd_loop(int argc, char **argv);
+/* boresight schema: prints the JSON Schema of scenarios. */
 int bst_cmd_schema(int argc, char **argv);
+/* boresight serve: takes part in a run over the link. */
 int bst_cmd_serve(int argc, char **argv);
+/* boresight icd: prints the interface control document of the link. */
 int bst_cmd_icd(int argc, char **argv);
+/* boresight link-keys: writes new keys of the link to a file. */
 int bst_cmd_link_keys(int argc, char **argv);
+/* boresight stars: fetches, imports or describes a star catalogue. */
 int bst_cmd_stars(int argc, char **argv);
+/* boresight propagate: propagates element sets. */
 int bst_cmd_propagate(int argc, char **argv);
+/* boresight calframes: renders bias, dark and flat frames. */
 int bst_cmd_calframes(int argc, char **argv);
+/* boresight bench: measures the speed of the program. */
 int bst_cmd_bench(int argc, char **argv);
+/* boresight pd: measures the probability of detection of a sensor. */
 int bst_cmd_pd(int argc, char **argv);
+/* boresight calibrate-obsgen: fits the observation generator to rendered images. */
 int bst_cmd_calibrate_obsgen(int argc, char **argv);
+/* boresight study: runs a study, or one of its shards. */
 int bst_cmd_study(int argc, char **argv);
 
 #endif

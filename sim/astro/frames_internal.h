@@ -41,6 +41,10 @@ bst_status bst_astro_earth_parts_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_
 /* The instant nearest to t that the table covers, a second inside its ends. */
 bst_status bst_astro_eop_nearest(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
                                  bst_time *out) BST_MUST_CHECK;
+
+/* Rotations from GCRF to TEME and ITRF from their parts.
+ *
+ * Given:     parts  polar motion, Earth rotation angle, CIRS rotation and turn to TEME */
 bst_astro_earth_frames bst_astro_earth_frames_from_parts(const bst_astro_earth_parts *parts);
 /* Linear between two instants at most an hour apart: 1e-10 rad. f: 0 at a, 1 at b. */
 bst_astro_earth_parts bst_astro_earth_parts_between(const bst_astro_earth_parts *a,

@@ -45,7 +45,9 @@ bst_status bst_gravity_read_buffer(bst_ctx *ctx, const char *name, const char *d
 void bst_gravity_free(bst_gravity *gravity); /* NULL allowed */
 
 double bst_gravity_gm(const bst_gravity *gravity); /* m^3/s^2 */
+/* Highest degree of the field's coefficients in use. */
 int bst_gravity_degree(const bst_gravity *gravity);
+/* Highest order of the field's coefficients in use. */
 int bst_gravity_order(const bst_gravity *gravity);
 
 /* Acceleration (m/s^2) at a position (m), both in Earth-fixed axes (ITRF), the position outside of

@@ -34,7 +34,15 @@ void bst_oem_free(bst_oem *oem); /* NULL allowed */
 
 /* Objects are told apart by name and identifier, and numbered as they come first in the file. */
 int bst_oem_object_count(const bst_oem *oem);
+
+/* OBJECT_NAME of an object; it belongs to the ephemeris.
+ *
+ * Given:     object  index, 0 to one less than the number of objects */
 const char *bst_oem_object_name(const bst_oem *oem, int object);
+
+/* OBJECT_ID of an object (international designator); it belongs to the ephemeris.
+ *
+ * Given:     object  index, 0 to one less than the number of objects */
 const char *bst_oem_object_id(const bst_oem *oem, int object);
 
 /* The object whose OBJECT_NAME or OBJECT_ID is `name`; with "" the only one. BST_ERR_NOT_FOUND

@@ -19,6 +19,7 @@ typedef struct bst_radau {
     double newton_from_power[BST_RADAU_TERMS][BST_RADAU_TERMS];
 } bst_radau;
 
+/* Computes the tables of an integrator from its nodes; needed once, before the first step. */
 void bst_radau_init(bst_radau *radau);
 
 /* Motion inside of one step; h may be negative. */

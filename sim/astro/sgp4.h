@@ -32,7 +32,7 @@ typedef struct bst_sgp4 bst_sgp4;
  * node of the operational code. */
 bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
                            bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
-/* NULL allowed. */
+/* Frees a propagator; NULL is allowed. */
 void bst_sgp4_free(bst_sgp4 *sgp4);
 
 /* State at `minutes` after the element epoch (UTC taken as uniform, as the theory does): TEME, km

@@ -45,6 +45,13 @@ typedef struct bst_astro_kepler_elements {
     double inclination_rad, raan_rad, arg_perigee_rad;
     double mean_anomaly_rad; /* of a hyperbola the hyperbolic one */
 } bst_astro_kepler_elements;
+
+/* Osculating Kepler elements of a state.
+ *
+ * Given:     mu                        gravitational parameter, m^3/s^2
+ *            position_m, velocity_mps  state in an inertial frame, m and m/s
+ * Notes:     for inclination 0 the node is +x; for eccentricity 0 the argument of perigee is 0. A
+ *            negative semi-major axis is a hyperbola. */
 bst_astro_kepler_elements bst_astro_kepler_elements_of(double mu, bst_vec3 position_m,
                                                        bst_vec3 velocity_mps);
 

@@ -18,6 +18,12 @@ typedef struct bst_sky_clock bst_sky_clock;
 /* The grid's values for several clocks, which then work each out once between them. Its memory is
  * fixed too. Clocks on it may run in different threads. eop is borrowed and must outlive it. */
 typedef struct bst_sky_clock_grid bst_sky_clock_grid;
+
+/* Creates a grid of values that several sky clocks share; its functions lock it.
+ *
+ * Given:     eop  Earth orientation; must outlive the grid
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_sky_clock_grid_create(bst_ctx *ctx, const bst_astro_eop *eop,
                                      bst_sky_clock_grid **out) BST_MUST_CHECK;
 void bst_sky_clock_grid_free(bst_sky_clock_grid *grid); /* NULL allowed; after its clocks */

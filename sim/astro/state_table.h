@@ -41,7 +41,12 @@ bst_status bst_state_table_create(bst_ctx *ctx, const char *name,
 
 void bst_state_table_free(bst_state_table *injected); /* NULL allowed */
 
+/* Number of objects of a table. */
 int bst_state_table_object_count(const bst_state_table *injected);
+
+/* Name of an object; it belongs to the table.
+ *
+ * Given:     object  index, 0 to one less than the number of objects */
 const char *bst_state_table_object_name(const bst_state_table *injected, int object);
 
 /* The object of this name; with "" the only one. BST_ERR_NOT_FOUND when there is none, or several,

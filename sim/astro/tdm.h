@@ -43,6 +43,7 @@ bst_status bst_tdm_read_buffer(bst_ctx *ctx, const char *name, const char *data,
 
 void bst_tdm_free(bst_tdm *tdm); /* NULL allowed */
 
+/* Number of pairs of angles of a TDM. */
 int bst_tdm_pair_count(const bst_tdm *tdm);
 /* Lent; index from 0, in the order of the file. */
 const bst_tdm_pair *bst_tdm_pair_at(const bst_tdm *tdm, int index);

@@ -54,6 +54,7 @@ bool bst_text_next_line(bst_text_cursor *cursor, bst_text_line *line);
  */
 bool bst_text_next_word(bst_text_span *rest, bst_text_span *word);
 
+/* True if a span of text equals a word. */
 bool bst_text_is(bst_text_span span, const char *word);
 /* Without blanks and tabs at both ends. */
 bst_text_span bst_text_trimmed(bst_text_span span);

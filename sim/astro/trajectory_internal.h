@@ -23,6 +23,7 @@ typedef struct bst_trajectory_edges {
 /* Sorts burns into edges; freed with bst_trajectory_edges_free. */
 bst_status bst_trajectory_edges_make(bst_ctx *ctx, const bst_astro_thrust *burns, int count,
                                      bst_trajectory_edges *out) BST_MUST_CHECK;
+/* Frees the memory of a list of edges and clears the struct, which belongs to the caller. */
 void bst_trajectory_edges_free(bst_trajectory_edges *edges);
 
 enum { BST_CHAIN_WINDOW = 64, BST_CHAIN_WAY_POINTS = 32 };
@@ -64,6 +65,12 @@ typedef struct bst_trajectory_chain_context {
     double tolerance;
 } bst_trajectory_chain_context;
 
+/* Starts the integration of a trajectory at a state.
+ *
+ * Given:     context                   forces and edges (burns, shadow); must outlive the chain
+ *            direction                 +1: forwards in time, -1: backwards
+ *            at_s                      time of the state, s
+ *            position_m, velocity_mps  GCRF, m and m/s */
 void bst_trajectory_chain_start(bst_trajectory_chain *chain,
                                 const bst_trajectory_chain_context *context, double direction,
                                 double at_s, bst_vec3 position_m, bst_vec3 velocity_mps);

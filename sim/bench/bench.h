@@ -44,9 +44,12 @@ typedef struct bst_bench {
                       bst_bench_result *out);
 } bst_bench;
 
-/* Orbits and catalogue (bench_foundations.c). */
+/* Benchmark: SGP4 propagation (bench_foundations.c). */
 bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) BST_MUST_CHECK;
+
+/* Benchmark: star queries in 500 fields over the sky, with the catalogue in the page cache
+ * (bench_foundations.c). */
 bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
@@ -88,19 +91,23 @@ bst_status bst_bench_loop_obsgen(bst_ctx *ctx, const bst_bench *self,
                                  const bst_bench_options *options,
                                  bst_bench_result *out) BST_MUST_CHECK;
 
-/* Steps of a gimbal's plant, 1 kHz (bench_plant.c). */
+/* Benchmark: steps of the second-order mount at 1 kHz (bench_plant.c). */
 bst_status bst_bench_plant_second_order(bst_ctx *ctx, const bst_bench *self,
                                         const bst_bench_options *options,
                                         bst_bench_result *out) BST_MUST_CHECK;
 
+/* Benchmark: steps of the full mount on a drifting platform at 1 kHz (bench_plant.c). */
 bst_status bst_bench_plant_full(bst_ctx *ctx, const bst_bench *self,
                                 const bst_bench_options *options,
                                 bst_bench_result *out) BST_MUST_CHECK;
 
-/* Of a spacecraft, and of it with a full mount (bench_spacecraft.c). */
+/* Benchmark: steps of a spacecraft (bench_spacecraft.c). */
 bst_status bst_bench_plant_spacecraft(bst_ctx *ctx, const bst_bench *self,
                                       const bst_bench_options *options,
                                       bst_bench_result *out) BST_MUST_CHECK;
+
+/* Benchmark: steps of a full mount on a spacecraft, with the reaction between them
+ * (bench_spacecraft.c). */
 bst_status bst_bench_plant_all(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
@@ -124,6 +131,7 @@ typedef struct bst_bench_clock {
     double started_ms, cpu_started_ms, cpu_total_ms;
 } bst_bench_clock;
 
+/* Starts an interval: stores wall time and processor time. */
 void bst_bench_start(bst_bench_clock *clock);
 /* Ends what bst_bench_start began; the time is divided by `calls`. */
 void bst_bench_stop(bst_bench_clock *clock, int calls);
@@ -143,11 +151,15 @@ typedef bst_status (*bst_bench_task)(bst_ctx *ctx, void *user, void *out);
 bst_status bst_bench_apart(bst_ctx *ctx, bst_bench_task task, void *user, void *out,
                            size_t bytes) BST_MUST_CHECK;
 
-/* The device that the options choose, opened in a process apart. */
+/* OpenCL device that the options choose. */
 typedef struct bst_bench_device {
     char description[256], driver[128];
     int threads; /* compute units */
 } bst_bench_device;
+
+/* Describes the OpenCL device that the options choose; opens it in a child process.
+ *
+ * Errors:    those of opening a device and of bst_bench_apart */
 bst_status bst_bench_describe_device(bst_ctx *ctx, const bst_bench_options *options,
                                      bst_bench_device *out) BST_MUST_CHECK;
 /* Processor, cores, memory, system, compiler, driver, version, revision and date. */

@@ -44,8 +44,13 @@ typedef struct bst_bench_view {
     bst_render_request request; /* of the frame that was set last */
 } bst_bench_view;
 
+/* Creates camera, attitude track and sources of a benchmark scene.
+ *
+ * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
+ * Ownership: free with bst_bench_view_close */
 bst_status bst_bench_view_open(bst_ctx *ctx, const bst_bench_scene *scene,
                                bst_bench_view *out) BST_MUST_CHECK;
+/* Frees the arrays of a view and clears it. */
 void bst_bench_view_close(bst_bench_view *view);
 /* Pointing, jitter, targets and noise of frame n; fills `request`. */
 void bst_bench_view_set(bst_bench_view *view, int frame);
@@ -70,8 +75,14 @@ typedef struct bst_bench_truth {
     } * moments;
 } bst_bench_truth;
 
+/* Renders the reference image of a view.
+ *
+ * Given:     view  must outlive the result
+ * Errors:    BST_ERR_MEMORY, and those of bst_reference_render
+ * Ownership: free with bst_bench_truth_free */
 bst_status bst_bench_truth_make(bst_ctx *ctx, bst_bench_view *view,
                                 bst_bench_truth *out) BST_MUST_CHECK;
+/* Frees the memory of a reference image and clears the struct, which belongs to the caller. */
 void bst_bench_truth_free(bst_bench_truth *truth);
 /* Errors of the renderer's image of those sources; of them only those of at least
  * `faintest_e_per_s` are drawn. */

@@ -50,6 +50,10 @@ static inline uint32_t faint_cells(const bst_faint_sky *sky) {
     return sky->first_cell[FAINT_BANDS];
 }
 
+/* Geometry of a cell of the faint sky: limits, centre, radius and area.
+ *
+ * Given:     band  band of declination, 0 to FAINT_BANDS - 1
+ *            cell  number of the cell, within the band's */
 faint_cell bst_faint_cell(const bst_faint_sky *sky, int band, uint32_t cell);
 
 /* Zone of a direction (ICRS). */

@@ -35,6 +35,7 @@ typedef struct bst_faint_stars bst_faint_stars;
  * statistical stars together follow the table. */
 bst_status bst_faint_sky_create(bst_ctx *ctx, const bst_stars *stars, uint64_t seed,
                                 bst_faint_sky **out) BST_MUST_CHECK;
+/* Frees the model of the faint sky; NULL is allowed. */
 void bst_faint_sky_free(bst_faint_sky *sky);
 
 /* Light of the statistical stars fainter than v_limit towards `icrs` (unit), in units of one star
@@ -51,6 +52,7 @@ double bst_faint_sky_undrawn(const bst_faint_sky *sky, bst_vec3 icrs, double v_l
  * only where a single query needs more. */
 bst_status bst_faint_stars_create(bst_ctx *ctx, const bst_faint_sky *sky, int cache_stars,
                                   bst_faint_stars **out) BST_MUST_CHECK;
+/* Frees a cache of faint stars; NULL is allowed. */
 void bst_faint_stars_free(bst_faint_stars *faint);
 
 /* Statistical stars within radius_rad (0 to pi) of `centre` (unit, ICRS) that are not fainter than

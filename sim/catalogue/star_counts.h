@@ -17,6 +17,7 @@ typedef struct bst_star_counts {
 /* ICRS unit vector to galactic axes: x to the galactic centre, z to the north galactic pole (ESA
  * SP-1200, The Hipparcos and Tycho Catalogues, 1997, vol. 1, eq. 1.5.11). */
 bst_vec3 bst_catalogue_galactic_from_icrs(bst_vec3 icrs);
+/* ICRS coordinates of a vector given in galactic coordinates. */
 bst_vec3 bst_catalogue_icrs_from_galactic(bst_vec3 galactic);
 
 /* The counts towards `icrs` (unit): bilinear in |b| and |l| between the table's nodes.

@@ -12,6 +12,10 @@
 /* Environment variable: when set, scenarios that name plug-ins are refused; those of the command
  * line are loaded. `boresight --no-plugins` sets it, so that child processes do the same. */
 #define BST_NO_PLUGINS_VARIABLE "BORESIGHT_NO_PLUGINS"
+
+/* Refuses plug-ins from now on, in this process and its children (--no-plugins).
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_plugins_refuse(bst_ctx *ctx) BST_MUST_CHECK;
 
 /* Adds a library to the variable's list. BST_ERR_ARGUMENT for a path with ':' in it. */
@@ -22,6 +26,7 @@ bst_status bst_plugins_add(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
  * cannot be loaded, BST_ERR_CONFIG for one that is no plugin, of another version, or whose module
  * has the role and type of another. */
 bst_status bst_plugins_registry(bst_ctx *ctx, bst_scenario_registry *out) BST_MUST_CHECK;
+/* Frees the lists of a registry and clears it; the modules themselves stay loaded. */
 void bst_plugins_free(bst_scenario_registry *registry);
 
 /* Adds the libraries that a scenario file names to the registry. */
@@ -36,9 +41,10 @@ bst_status bst_plugins_scenario_read(bst_ctx *ctx, const bst_json *json,
 bst_status bst_plugins_recorded_read(bst_ctx *ctx, const bst_json *json,
                                      bst_scenario *out) BST_MUST_CHECK;
 
-/* Adds "plugins" to an object, a list of the modules and stages of plug-ins that a scenario uses:
- * where, type, file and its SHA-256; nothing when it uses none. */
 struct cJSON;
+
+/* Adds "plugins" to a JSON object: the modules and stages of plug-ins that a scenario uses, with
+ * path, type, file and SHA-256. Without plug-ins it adds nothing. */
 void bst_plugins_tell(const bst_scenario *scenario, struct cJSON *to);
 
 #endif

@@ -18,6 +18,10 @@ typedef struct bst_progress {
 /* Nothing is shown for commands shorter than two seconds. Where the standard error is no terminal,
  * a line is added every ten seconds. */
 void bst_progress_start(bst_progress *progress, const char *what, const char *unit, int64_t total);
+
+/* Prints the progress to stderr if enough time has passed since the last line.
+ *
+ * Given:     done  units done so far */
 void bst_progress_update(bst_progress *progress, int64_t done);
 /* Removes the line. */
 void bst_progress_end(bst_progress *progress);

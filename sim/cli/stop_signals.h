@@ -8,6 +8,7 @@
 /* From here on SIGINT, SIGTERM and SIGHUP are requests to stop; a second one ends the process. */
 void bst_stop_catch_signals(void);
 
+/* True if a signal has asked the program to stop. */
 bool bst_stop_requested(void);
 
 #endif

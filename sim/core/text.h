@@ -19,8 +19,13 @@ size_t bst_text_distance(const char *a, const char *b);
  * unit ("rate" for "rate_hz") counts as 1. */
 bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
 
-/* A count with its noun, "1 frame" or "5 frames", in `text`, which is returned. */
+/* Bytes of the text of bst_text_of_count. */
 enum { BST_COUNT_TEXT = 64 };
+
+/* Writes a count and its noun: "1 frame", "3 frames".
+ *
+ * Given:     one, many  noun in the singular and in the plural
+ * Returned:  text */
 const char *bst_text_of_count(char text[BST_COUNT_TEXT], int64_t count, const char *one,
                               const char *many);
 

@@ -15,10 +15,14 @@ typedef struct bst_device bst_device;
  * is in the message. */
 bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads,
                            bst_device **out) BST_MUST_CHECK;
+/* Waits for the queue and frees a device with its programs; NULL is allowed. */
 void bst_device_close(bst_device *device);
 
+/* OpenCL context of a device; it belongs to the device. */
 cl_context bst_device_context(const bst_device *device);
+/* OpenCL command queue of a device; it belongs to the device. */
 cl_command_queue bst_device_queue(const bst_device *device);
+/* OpenCL identity of a device; it belongs to the device. */
 cl_device_id bst_device_id(const bst_device *device);
 /* "PoCL 3.1: cpu-..., 2 compute units" for the manifest. */
 const char *bst_device_description(const bst_device *device);

@@ -28,9 +28,12 @@ typedef struct bst_simulation_options {
 bst_status bst_simulation_create(bst_ctx *ctx, const bst_scenario *scenario,
                                  const bst_simulation_options *options,
                                  bst_simulation **out) BST_MUST_CHECK;
+/* Frees a simulation with its engine and worlds; NULL is allowed. */
 void bst_simulation_free(bst_simulation *simulation);
 
+/* Engine of a simulation; it belongs to the simulation. */
 bst_engine *bst_simulation_engine(bst_simulation *simulation);
+/* World of a simulation; it belongs to the simulation. */
 const struct bst_world *bst_simulation_world(const bst_simulation *simulation);
 /* NULL when no module is of type "external". */
 struct bst_link *bst_simulation_link(bst_simulation *simulation);

@@ -82,6 +82,7 @@ bool bst_loop_settles(bool acquired, int mode, double error_px);
  * Tracks play no part: an error of the tracker shows. */
 bool bst_loop_frame_is_pointing(const bst_loop_frame *frame);
 
+/* Adds a frame to the counts. */
 void bst_loop_tally_add(bst_loop_tally *tally, const bst_loop_frame *frame);
 /* Sets the figures that follow from the frames; the times, final_mode and wrong_target_frames stay
  * as they are. */

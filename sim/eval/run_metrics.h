@@ -42,18 +42,28 @@ typedef struct bst_run_metric_figures {
 /* target_object: as of bst_loop_summary_create. The world must outlive the metrics. */
 bst_status bst_run_metrics_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                                   int target_object, bst_run_metrics **out) BST_MUST_CHECK;
+/* Frees the metrics of a run; NULL is allowed. */
 void bst_run_metrics_free(bst_run_metrics *metrics);
 
-/* Messages as they are published, and verdicts of the loop summary on frames. */
+/* Adds the truth of an exposure. Messages come as they are published.
+ *
+ * Errors:    BST_ERR_MEMORY and those of the world's view */
 bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *metrics,
                                  const bst_truth *truth) BST_MUST_CHECK;
+/* Counts the detections of a frame and whether the target is among them. */
 void bst_run_metrics_detections(bst_run_metrics *metrics, const bst_detections *detections);
+
+/* Pairs the tracks of a frame with the nearest objects and adds their errors.
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *metrics,
                                   const bst_tracks *tracks) BST_MUST_CHECK;
+/* Counts a frame, as evaluated by the loop summary, that has the target in the field. */
 void bst_run_metrics_frame(bst_run_metrics *metrics, const bst_loop_frame *frame);
 /* The target is another one from now on, -1: none. */
 void bst_run_metrics_retarget(bst_run_metrics *metrics, int target_object);
 
+/* Computes the figures of the run so far; NAN where there are no data. */
 void bst_run_metrics_figures(const bst_run_metrics *metrics, bst_run_metric_figures *out);
 
 #endif

@@ -69,15 +69,28 @@ typedef bst_status (*bst_sighting_fn)(void *user, bst_ctx *ctx, const bst_sighti
 bst_status bst_sightings_create(bst_ctx *ctx, const bst_world *world, int64_t tick_rate_hz,
                                 double custody_s, bst_eval_pass_fn pass, void *user,
                                 bst_sightings **out) BST_MUST_CHECK;
+/* Frees the record of sightings; NULL is allowed. */
 void bst_sightings_free(bst_sightings *sightings);
 
-/* Messages as they are published; `sensor` counts from 0 over all observers. Truth comes before
- * the detections of its frame, these before its tracks. */
+/* Adds the truth of an exposure. It comes before the detections of its frame, and these before its
+ * tracks.
+ *
+ * Given:     sensor  index of the sensor, from 0 over all observers
+ * Errors:    BST_ERR_MEMORY and those of the world */
 bst_status bst_sightings_truth(bst_ctx *ctx, bst_sightings *sightings, int sensor,
                                const bst_truth *truth) BST_MUST_CHECK;
+
+/* Counts which objects of a frame were detected.
+ *
+ * Given:     sensor  index of the sensor, from 0 over all observers */
 void bst_sightings_detections(bst_sightings *sightings, int sensor,
                               const bst_detections *detections);
+
+/* Counts which objects of a frame were tracked, and adds the errors of directions.
+ *
+ * Given:     sensor  index of the sensor, from 0 over all observers */
 void bst_sightings_tracks(bst_sightings *sightings, int sensor, const bst_tracks *tracks);
+/* Counts a new task and the end of the one before it. */
 void bst_sightings_task(bst_sightings *sightings, const bst_task *task);
 
 /* Ends all passes, at end_s. */
@@ -86,6 +99,7 @@ bst_status bst_sightings_finish(bst_ctx *ctx, bst_sightings *sightings,
 /* After that: by object, for each first of all sensors together, then of those that had it. */
 bst_status bst_sightings_each(bst_ctx *ctx, const bst_sightings *sightings, bst_sighting_fn fn,
                               void *user) BST_MUST_CHECK;
+/* Computes the figures of all objects together. */
 void bst_sightings_summary(const bst_sightings *sightings, bst_sightings_figures *out);
 
 #endif

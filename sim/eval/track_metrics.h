@@ -30,6 +30,7 @@ typedef struct bst_track_figures {
  * one frame. A pair is nearer than cutoff_rad. The caller frees. */
 bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, int max_tracks, int max_at_once,
                                     double cutoff_rad, bst_track_metrics **out) BST_MUST_CHECK;
+/* Frees the metrics of tracks; NULL is allowed. */
 void bst_track_metrics_free(bst_track_metrics *metrics);
 
 /* One frame, later than the one before: true directions (unit) of all objects with who is visible,
@@ -40,6 +41,7 @@ bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *metrics, dou
                                    const int64_t *track_ids, const bst_vec3 *track_directions,
                                    int tracks) BST_MUST_CHECK;
 
+/* Computes the figures of tracks over all frames so far; NAN without frames. */
 void bst_track_metrics_figures(const bst_track_metrics *metrics, bst_track_figures *out);
 
 #endif

@@ -42,9 +42,18 @@ typedef struct bst_export {
     const char *split;       /* "80,10,10": shares of training, validation and test; NULL: none */
 } bst_export;
 
+/* Writes the selected frames as pictures or as a video.
+ *
+ * Given:     e  the checked request
+ * Errors:    BST_ERR_MEMORY, and those of reading the run and writing the files */
 bst_status bst_export_frames(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 /* `tables` is a list "a,b"; NULL: all. */
 bst_status bst_export_tables(bst_ctx *ctx, const bst_export *e, const char *tables) BST_MUST_CHECK;
+
+/* Writes the true orbits of the selected objects.
+ *
+ * Given:     e  the checked request
+ * Errors:    BST_ERR_MEMORY, and those of reading the run and writing the files */
 bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 /* The sensors' fields of view, as packets of a CZML document that holds their observers. */
 bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,

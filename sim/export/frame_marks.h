@@ -12,6 +12,7 @@ typedef struct bst_frame_marks bst_frame_marks;
  * Tables that were not recorded give no marks. */
 bst_status bst_frame_marks_create(bst_ctx *ctx, const bst_run_reader *run, int64_t sensor,
                                   const char *target, bst_frame_marks **out) BST_MUST_CHECK;
+/* Frees the marks of a frame and closes their rows; NULL is allowed. */
 void bst_frame_marks_free(bst_frame_marks *marks);
 
 /* Number of the exposure of plane or extension `fits_index`, -1 when the tables do not say. Ask in

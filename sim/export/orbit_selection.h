@@ -23,6 +23,7 @@ typedef struct bst_orbit_selection {
  * error. */
 bst_status bst_orbit_selection_make(bst_ctx *ctx, const bst_run_reader *run, const bst_world *world,
                                     const char *text, bst_orbit_selection *out) BST_MUST_CHECK;
+/* Frees the memory of a selection and clears the struct, which belongs to the caller. */
 void bst_orbit_selection_free(bst_orbit_selection *selection);
 
 #endif

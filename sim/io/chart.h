@@ -70,7 +70,11 @@ typedef struct bst_chart_point {
 size_t bst_chart_thin(const double *x, const double *y, size_t n, double low, double high,
                       int columns, bst_chart_point *out);
 
+/* Begins a chart: opens the SVG element and draws the axes.
+ *
+ * Given:     chart  with output, name, size and axes set; its layout members are filled in */
 void bst_chart_begin(bst_chart *chart);
+/* Ends a chart: draws its frame and closes the SVG element. */
 void bst_chart_end(bst_chart *chart);
 
 /* Grounds from from[i] to to[i], the whole height. `title` is shown under the pointer; NULL for
@@ -91,8 +95,9 @@ void bst_chart_whiskers(const bst_chart *chart, const double *x, const double *l
 /* A bar from x0 to x1 and y0 to y1. */
 void bst_chart_bar(const bst_chart *chart, double x0, double x1, double y0, double y1, int colour,
                    const char *title);
-/* A line across at y, or down at x. */
+/* A horizontal line at y. */
 void bst_chart_rule(const bst_chart *chart, double y, int colour);
+/* A vertical line at x; nothing if x is outside the axis. */
 void bst_chart_mark(const bst_chart *chart, double x, int colour);
 /* A word at a place of the axes, dx and dy beside it; anchor "start", "middle" or "end". */
 void bst_chart_word(const bst_chart *chart, double x, double y, double dx, double dy,
@@ -108,6 +113,11 @@ typedef enum bst_chart_key {
     BST_KEY_DOT,
     BST_KEY_GROUND
 } bst_chart_key;
+
+/* Writes one entry of the legend, as an HTML list item.
+ *
+ * Given:     colour  number of the colour
+ *            text    plain text; escaped here */
 void bst_chart_legend(FILE *out, bst_chart_key key, int colour, const char *text);
 
 #endif

@@ -73,8 +73,14 @@ void bst_fits_memory_open(bst_fits_memory *memory, bool primary, int *code);
 void bst_fits_memory_hdu(bst_fits_memory *memory, char **bytes, long long *count, int *code);
 /* Closes it, in every case. */
 void bst_fits_memory_close(bst_fits_memory *memory, int *code);
+/* Frees the bytes of a FITS file in memory; the struct itself belongs to the caller. */
 void bst_fits_memory_free(bst_fits_memory *memory);
 
+/* Writes bytes at an offset of a file, all of them.
+ *
+ * Given:     data    [bytes]
+ *            offset  bytes from the start of the file
+ * Returned:  false on error, with errno */
 bool bst_fits_write_at(int fd, const void *data, size_t bytes, long long offset);
 /* Writes pixels as FITS wants them, and zeros up to the end of the block. */
 bool bst_fits_write_pixels(bst_fits *fits, const uint16_t *pixels, size_t count, long long offset,
@@ -100,9 +106,17 @@ bst_status bst_fits_append_hdu(bst_ctx *ctx, bst_fits *fits, const char *hdu,
 /* The same for a header and its pixels. */
 bst_status bst_fits_append_image(bst_ctx *ctx, bst_fits *fits, const char *header, long long bytes,
                                  const uint16_t *pixels, size_t count) BST_MUST_CHECK;
-/* Makes room for `bytes` of data after the complete ones so that readers do not take what is
- * written there for an HDU; then cuts the file at fits->end, when that has been raised or not. */
+
+/* Makes room for data after the last complete HDU, in a way that readers do not take them for an
+ * HDU.
+ *
+ * Given:     bytes  size of the data
+ * Returned:  false on error, with errno */
 bool bst_fits_open_tail(const bst_fits *fits, long long bytes);
+
+/* Truncates the file at fits->end, whether that has been raised or not.
+ *
+ * Returned:  false on error, with errno */
 bool bst_fits_close_tail(const bst_fits *fits);
 
 /* Makes and appends the extension of a frame. */
@@ -112,9 +126,20 @@ bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits
 
 /* The thread that compresses and writes extensions. */
 bst_status bst_fits_queue_create(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+
+/* Queues a frame for the thread that writes; waits while the queue is full.
+ *
+ * Given:     frame   header values; copied
+ *            pixels  [height][width], DN; copied
+ *            number  number of the frame in the file
+ * Errors:    those of an earlier frame that could not be written; BST_ERR_MEMORY */
 bst_status bst_fits_queue_put(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                               const uint16_t *pixels, int width, int height,
                               int64_t number) BST_MUST_CHECK;
+
+/* Waits until all queued frames are written.
+ *
+ * Errors:    those of the thread that writes */
 bst_status bst_fits_queue_drain(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
 /* Ends the thread after what waits has been written. NULL queue allowed. */
 void bst_fits_queue_free(bst_fits *fits);
@@ -135,6 +160,11 @@ void bst_fits_put_sip(fitsfile *file, const bst_sip *sip, int *code);
 void bst_fits_put_lens(fitsfile *file, const bst_camera *camera, int *code);
 /* A cube's table: columns for the polynomials of each row's WCS, and the values of a row. */
 void bst_fits_sip_columns(fitsfile *file, int *code);
+
+/* Writes the SIP coefficients of a frame to a row of a cube's table.
+ *
+ * Given:     row   row, from 1
+ *            code  CFITSIO status; nothing is written if it is not 0 */
 void bst_fits_sip_row(fitsfile *file, long long row, const bst_sip *sip, int *code);
 
 typedef enum bst_fits_moment { BST_FITS_BEGIN, BST_FITS_MIDDLE, BST_FITS_END } bst_fits_moment;
@@ -143,11 +173,21 @@ double bst_fits_date(const bst_fits_frame *frame, bst_fits_moment moment, char t
 /* DN at which a pixel of this camera is full, at this many bits. */
 double bst_fits_saturation_dn(const bst_camera *camera, int bits);
 
+/* Opens the unlinked file that keeps the rows of a cube's table until the file is closed.
+ *
+ * Errors:    BST_ERR_IO */
 bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+
+/* Appends a frame as a plane of the cube.
+ *
+ * Given:     frame   header values
+ *            pixels  [height][width], DN; the size of the first frame
+ * Errors:    BST_ERR_ARGUMENT for another size, BST_ERR_IO */
 bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                                const uint16_t *pixels, int width, int height) BST_MUST_CHECK;
 /* Writes the table. */
 bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+/* Closes the unlinked file with the rows of a cube's table, if it is open. */
 void bst_fits_cube_free(bst_fits *fits);
 
 #endif

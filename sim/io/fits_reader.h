@@ -32,6 +32,7 @@ bst_status bst_fits_reader_open_buffer(bst_ctx *ctx, const char *name, const voi
                                        uint64_t bytes, bst_fits_reader **out) BST_MUST_CHECK;
 /* NULL is allowed. */
 void bst_fits_reader_close(bst_fits_reader *reader);
+/* Description of the open file; it belongs to the reader. */
 const bst_fits_file_info *bst_fits_reader_info(const bst_fits_reader *reader);
 
 /* A frame as read. */

@@ -11,6 +11,11 @@
  * BST_ERR_IO. Format: ISO/IEC 15948. */
 bst_status bst_grey_png_write16(bst_ctx *ctx, const char *path, const uint16_t *pixels, int width,
                                 int height) BST_MUST_CHECK;
+
+/* Writes an 8-bit grey PNG.
+ *
+ * Given:     pixels  [height][width], row 0 at the top
+ * Errors:    BST_ERR_IO, BST_ERR_MEMORY */
 bst_status bst_grey_png_write8(bst_ctx *ctx, const char *path, const uint8_t *pixels, int width,
                                int height) BST_MUST_CHECK;
 

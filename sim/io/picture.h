@@ -32,8 +32,15 @@ typedef struct bst_io_box {
     int x, y, width, height;
 } bst_io_box;
 
+/* Creates a picture of one colour.
+ *
+ * Given:     width, height  px, 1 to 16384
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_ARGUMENT for the size, BST_ERR_MEMORY
+ * Ownership: free *out with bst_picture_free */
 bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_io_colour background,
                               bst_picture **out) BST_NOEXCEPT BST_MUST_CHECK;
+/* Frees a picture; NULL is allowed. */
 void bst_picture_free(bst_picture *picture) BST_NOEXCEPT;
 
 /* A stretch from the frame's own histogram: black a little below the median, white far above the
@@ -52,18 +59,24 @@ bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_io_box to,
  * pixels. What lies outside the picture, or outside the box last given to bst_picture_clip, is cut.
  */
 void bst_picture_clip(bst_picture *picture, bst_io_box box) BST_NOEXCEPT;
+/* Ends the clipping of bst_picture_clip: shapes may cover the whole picture. */
 void bst_picture_unclip(bst_picture *picture) BST_NOEXCEPT;
+/* Draws a line from (x0, y0) to (x1, y1). */
 void bst_picture_line(bst_picture *picture, double x0, double y0, double x1, double y1,
                       bst_io_colour colour, double thickness) BST_NOEXCEPT;
+/* Draws a circle about (x, y); radius in px. */
 void bst_picture_circle(bst_picture *picture, double x, double y, double radius,
                         bst_io_colour colour, double thickness) BST_NOEXCEPT;
+/* Draws the outline of a rectangle whose upper left corner is (x, y). */
 void bst_picture_rectangle(bst_picture *picture, double x, double y, double width, double height,
                            bst_io_colour colour, double thickness) BST_NOEXCEPT;
+/* Fills a box with a colour. */
 void bst_picture_fill(bst_picture *picture, bst_io_box box, bst_io_colour colour) BST_NOEXCEPT;
 /* Text (ASCII; other bytes are shown as '?') with its base line's left end at (x, y); `height` is
  * that of a capital letter, px. Returns the width, px. */
 double bst_picture_text(bst_picture *picture, double x, double y, double height,
                         bst_io_colour colour, bool bold, const char *text) BST_NOEXCEPT;
+/* Width that bst_picture_text would return, px, without drawing. */
 double bst_picture_text_width(double height, bool bold, const char *text) BST_NOEXCEPT;
 
 /* Copies the picture to `bgr`: height x width pixels of three bytes, blue first, no padding. */

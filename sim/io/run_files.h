@@ -18,8 +18,9 @@ bool bst_run_owns(const char *name);
 /* The same of a study's folder: tables, CSV files, description, lock, shards and kept runs. */
 bool bst_io_study_owns(const char *name);
 
-/* Whether `folder` is that of a run (complete or not), and of a study. */
+/* True if a folder holds a run, complete or not. */
 bool bst_io_folder_is_run(const char *folder);
+/* True if a folder holds a study (study.sqlite or shards). */
 bool bst_io_folder_is_study(const char *folder);
 
 #ifdef __cplusplus

@@ -37,6 +37,9 @@ struct bst_run {
 /* Fails when the folder was removed, moved or replaced while the run writes it. */
 bst_status bst_run_check_folder(bst_ctx *ctx, const bst_run *run) BST_MUST_CHECK;
 
+/* Creates the run's SQLite database with the tables that describe all others.
+ *
+ * Errors:    BST_ERR_IO */
 bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 /* Commits, folds the journal in and closes. Closes in every case; nothing is done when closed. */
 bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;

@@ -34,7 +34,9 @@ bst_status bst_run_reader_open_study(bst_ctx *ctx, const char *path,
 /* NULL is allowed. */
 void bst_run_reader_close(bst_run_reader *reader);
 
+/* Folder of a run; it belongs to the reader. */
 const char *bst_run_reader_folder(const bst_run_reader *reader);
+/* State of a run: complete or not. */
 bst_run_state bst_run_reader_state(const bst_run_reader *reader);
 /* "complete", "interrupted", "still running", "left over from a killed run". */
 const char *bst_run_state_name(bst_run_state state);
@@ -44,8 +46,9 @@ const char *bst_run_reader_problem(const bst_run_reader *reader, int index);
 /* Adds a problem that a reader of the parts found. The list holds 16; more are dropped. */
 void bst_run_reader_note_problem(bst_run_reader *reader, const char *format, ...) BST_PRINTF(2, 3);
 
-/* manifest.json and scenario.json; NULL when missing or damaged. Borrowed. */
+/* manifest.json of a run; NULL if missing or damaged. It belongs to the reader. */
 const struct cJSON *bst_run_reader_manifest(const bst_run_reader *reader);
+/* scenario.json of a run; NULL if missing or damaged. It belongs to the reader. */
 const struct cJSON *bst_run_reader_scenario(const bst_run_reader *reader);
 /* Whether there is a database that could be opened. */
 bool bst_run_reader_has_tables(const bst_run_reader *reader);
@@ -69,13 +72,17 @@ bst_status bst_io_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const ch
                             bst_io_rows **out) BST_MUST_CHECK;
 /* Goes to the next row; *more is false after the last. BST_ERR_FORMAT when the file is damaged. */
 bst_status bst_io_rows_next(bst_ctx *ctx, bst_io_rows *rows, bool *more) BST_MUST_CHECK;
-/* The current row's columns, counted from 0. A NULL is 0, NAN and "". Text lives until the next
- * call of bst_io_rows_next. */
+/* Number of columns of the rows; columns count from 0. */
 int bst_io_rows_columns(const bst_io_rows *rows);
+/* Name of a column, from 0; it belongs to the rows. */
 const char *bst_io_rows_column_name(const bst_io_rows *rows, int column);
+/* True if a cell of the current row is NULL. */
 bool bst_io_rows_is_null(const bst_io_rows *rows, int column);
+/* Cell of the current row as an integer; 0 if NULL. */
 int64_t bst_io_rows_int(const bst_io_rows *rows, int column);
+/* Cell of the current row as a number; NAN if NULL. */
 double bst_io_rows_real(const bst_io_rows *rows, int column);
+/* Cell of the current row as text; "" if NULL. Valid until the next row. */
 const char *bst_io_rows_text(const bst_io_rows *rows, int column);
 typedef enum bst_io_cell_kind {
     BST_CELL_NULL,
@@ -83,7 +90,9 @@ typedef enum bst_io_cell_kind {
     BST_CELL_REAL,
     BST_CELL_TEXT
 } bst_io_cell_kind;
+/* Kind of a cell of the current row. */
 bst_io_cell_kind bst_io_rows_kind(const bst_io_rows *rows, int column);
+/* Ends a query; NULL is allowed. */
 void bst_io_rows_close(bst_io_rows *rows);
 
 /* First integer of a query's only row; `fallback` when it has none or fails. */

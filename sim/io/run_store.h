@@ -114,6 +114,15 @@ static inline bst_io_value bst_io_null_value(bst_io_column_type type) {
 /* Creates a table of `count` columns (1 to BST_TABLE_COLUMNS) and notes it in "tables" and
  * "columns". Names are ASCII letters, digits and underscores. The handle is owned by the run. */
 #define BST_TABLE_COLUMNS 64
+
+/* Creates a table of the run's database and describes its columns there.
+ *
+ * Given:     name     letters, digits and underscores, at most 63
+ *            doc      one sentence
+ *            columns  [count]
+ *            count    1 to BST_TABLE_COLUMNS
+ * Returned:  *out  NULL on error; it belongs to the run
+ * Errors:    BST_ERR_ARGUMENT, BST_ERR_IO, BST_ERR_MEMORY */
 bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
                                const bst_io_column *columns, int count,
                                bst_io_table **out) BST_MUST_CHECK;
@@ -130,6 +139,7 @@ bst_status bst_run_commit(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 /* Has `before` called before each commit, so that files that rows speak of hold it first; when it
  * fails the batch is rolled back and the commit fails with it. NULL: none. */
 typedef bst_status (*bst_run_before_commit)(bst_ctx *ctx, void *user);
+/* Sets the function that runs before each commit of the database; NULL: none. */
 void bst_run_set_before_commit(bst_run *run, bst_run_before_commit before, void *user);
 
 #ifdef __cplusplus

@@ -38,6 +38,11 @@ bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_l
 /* (U, V) of (u, v), and back; the inverse is that of the first polynomials, which the second ones
  * only approximate. */
 void bst_sip_undistort(const bst_sip *sip, double u, double v, double *big_u, double *big_v);
+
+/* Distorted pixel offsets from undistorted ones: inverse polynomial, then refined by iteration.
+ *
+ * Given:     big_u, big_v  undistorted offsets from the reference pixel, px
+ * Returned:  u, v  distorted offsets, px */
 void bst_sip_distort(const bst_sip *sip, double big_u, double big_v, double *u, double *v);
 
 /* The same polynomials for pixels that are `binning` times as large. */

@@ -12,9 +12,9 @@ extern const bst_module_desc bst_external_control_module;
 
 /* The message of a channel; BST_LINK_TYPES where the link has none. */
 bst_link_type bst_external_type(const char *channel);
-/* Whether there is a module of type "external" for a role; whether `boresight serve` can play it.
- */
+/* True if a role has a module of type "external". */
 bool bst_external_role(const char *role);
+/* True if `boresight serve` can play a role: imgproc, tracker or control. */
 bool bst_external_serves(const char *role);
 
 /* ---- for modules of this type ---- */

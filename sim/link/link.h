@@ -97,13 +97,26 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tic
                              bst_link_output *outputs, int output_count,
                              bool *answered) BST_MUST_CHECK;
 
-/* With BST_LINK_HOLD and BST_LINK_RUSH, answers come when they come: an exchange gives out the
- * oldest one that is there, be it of an earlier step, and *answered false is no failure. These give
- * out the others, and tell whether the peer keeps up: one that has LINK_AHEAD steps to answer is
- * sent no more (counted), and what would have gone to it is not to be prepared. With BST_LINK_AWAIT
- * there is never more, and always room. */
+/* Takes another answer of a part, if there is one, with BST_LINK_HOLD or BST_LINK_RUSH.
+ *
+ * Given:     part  number of the part
+ *            tick  tick of the step
+ * Returned:  outputs  [output_count] the answer
+ *            *more    true if there was one; always false with BST_LINK_AWAIT
+ * Notes:     in these modes answers arrive at any time. bst_link_exchange returns the oldest one,
+ *            even of an earlier step, and *answered false is not a failure there; this function
+ *            returns the others. */
 bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                          bst_link_output *outputs, int output_count, bool *more) BST_MUST_CHECK;
+
+/* True if the peer of a part can take another step; then the inputs of the step should be prepared.
+ *
+ * Given:     part     number of the part
+ *            tick     tick of the step
+ *            outputs  [output_count] payloads of the part's outputs
+ * Returned:  *ready  false if LINK_AHEAD steps are unanswered (counted); always true with
+ *                    BST_LINK_AWAIT
+ * Errors:    those of bst_link_exchange */
 bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                           const bst_link_output *outputs, int output_count,
                           bool *ready) BST_MUST_CHECK;
@@ -111,10 +124,15 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
 /* Writes what the parts are answered to a file, before the first exchange; bst_link_record_end says
  * whether it all got there. */
 bst_status bst_link_record(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+
+/* Flushes and closes the recording of a link; without one it does nothing.
+ *
+ * Errors:    BST_ERR_IO if anything could not be written */
 bst_status bst_link_record_end(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
 /* Has the parts answered from such a file: nothing is bound, nobody is waited for. An exchange that
  * is not the recorded one is BST_ERR_FORMAT. */
 bst_status bst_link_replay(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+/* True if a link replays a recording. */
 bool bst_link_replays(const bst_link *link);
 /* For those who drop frames by the clock: while recording keeps *dropped of a frame of an instance
  * that is no part, while replaying sets it to what it was. */
@@ -138,6 +156,7 @@ typedef struct bst_link_peer bst_link_peer;
  * that asks for keys (bst_curve_keys_read), else NULL. */
 bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const char *keys_file,
                               const bst_link_hello *hello, bst_link_peer **out) BST_MUST_CHECK;
+/* Closes the peer's side of a link and frees it; NULL is allowed. */
 void bst_link_peer_close(bst_link_peer *peer);
 
 /* A message that came. Pointers are lent until the next bst_link_peer_receive. */

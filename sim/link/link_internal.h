@@ -156,17 +156,30 @@ typedef struct link_exchange {
 /* Counts, and keeps the line as a note and in the log. */
 void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...)
     BST_PRINTF(4, 5);
-/* link_record.c */
+/* Closes a recording's file and frees it (link_record.c); NULL is allowed. */
 void bst_link_tape_free(link_tape *tape);
-/* While recording: the answer of a call, and what it tells without one. */
+/* Records the answer of a call. */
 void bst_link_tape_answer(bst_link *link, int part, int64_t tick, const bst_link_output *outputs,
                           int count);
+/* Records the results of bst_link_ready and bst_link_more of a step without an answer. */
 void bst_link_tape_note(bst_link *link, int part, int64_t tick, bool ready, bool more);
-/* While replaying. */
+
+/* Replays the answer of a call.
+ *
+ * Errors:    BST_ERR_FORMAT if the recording does not fit the run */
 bst_status bst_link_tape_read(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                               bst_link_output *outputs, int count) BST_MUST_CHECK;
+
+/* bst_link_more from a recording.
+ *
+ * Returned:  *more  true if an answer was stored in outputs
+ * Errors:    BST_ERR_FORMAT if the recording does not fit the run */
 bst_status bst_link_tape_read_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                                    bst_link_output *outputs, int count, bool *more) BST_MUST_CHECK;
+
+/* bst_link_ready from a recording.
+ *
+ * Errors:    BST_ERR_FORMAT if the recording does not fit the run */
 bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                                     bool *ready) BST_MUST_CHECK;
 /* link_send.c */
@@ -179,10 +192,15 @@ bool bst_link_send_end(bst_link *link, int peer, uint8_t *room);
 void bst_link_reply(bst_link *link, const link_id *id, link_peer *peer, const char *fault,
                     int64_t sequence, const char *text);
 /* link_flow.c */
-/* Connections come and go; a part is taken; and the one that sends too much is closed. */
+/* Starts counting the bytes of a new connection. */
 void bst_link_flow_open(bst_link *link, int fd);
+/* Forgets the connection of a file descriptor that was closed. */
 void bst_link_flow_close(bst_link *link, int fd);
+/* Counts a received message part as read from its connection. */
 void bst_link_flow_take(bst_link *link, zmq_msg_t *part);
+
+/* Closes the connection with most bytes waiting if a limit is exceeded; checks at intervals only.
+ */
 void bst_link_flow_check(bst_link *link, bst_ctx *ctx);
 /* Whether there are connections to be looked at while waiting. */
 bool bst_link_flow_watched(const bst_link *link);

@@ -25,22 +25,37 @@ bst_status bst_shared_frames_create(bst_ctx *ctx, size_t pixel_bytes,
 /* Opens one that another process made, for reading. */
 bst_status bst_shared_frames_open(bst_ctx *ctx, const char *name, int64_t slot_bytes, int slots,
                                   bst_shared_frames **out) BST_MUST_CHECK;
+
+/* Unmaps the shared memory, removes its name if this side created it, and frees the handle. NULL is
+ * allowed. */
 void bst_shared_frames_free(bst_shared_frames *frames);
 
+/* Name of the shared memory; it belongs to the handle. */
 const char *bst_shared_frames_name(const bst_shared_frames *frames);
+/* Size of a slot, bytes. */
 int64_t bst_shared_frames_slot_bytes(const bst_shared_frames *frames);
 
-/* Writer: the number of the message that is written next, 0, 1, ...: it lies in slot number %
- * slots. Then that message. */
+/* Writer: number of the message that is written next, 0, 1, ...; its slot is this number modulo
+ * slots. */
 int64_t bst_shared_frames_next(const bst_shared_frames *frames);
+
+/* Writer: writes the next message to its slot.
+ *
+ * Given:     header  [header_bytes] link header of the frame, as text
+ *            pixels  [bytes] */
 void bst_shared_frames_write(bst_shared_frames *frames, const char *header, size_t header_bytes,
                              const void *pixels, size_t bytes);
 
-/* Reader: the pixels of a message by its number; NULL when its slot holds another one or is
- * shorter. They stay as they are until the writer has gone round the ring; bst_shared_frames_holds
- * tells afterwards whether it had. */
+/* Reader: pixels of a message.
+ *
+ * Given:     number  number of the message
+ *            bytes   size of its pixels
+ * Returned:  NULL if its slot holds another message or is shorter
+ * Notes:     the writer may overwrite them at any time; after use, bst_shared_frames_holds says if
+ *            they were valid. */
 const uint16_t *bst_shared_frames_read(const bst_shared_frames *frames, int64_t number,
                                        int64_t bytes);
+/* Reader: true if the slot of message `number` still holds it. */
 bool bst_shared_frames_holds(const bst_shared_frames *frames, int64_t number);
 
 #endif

@@ -80,8 +80,9 @@ typedef struct bst_wire_message {
     const char *doc;
 } bst_wire_message;
 
-/* The table of a type, and the type of a name; BST_LINK_TYPES when there is none. */
+/* Table of a message type. */
 const bst_wire_message *bst_wire_message_of(bst_link_type type);
+/* Type of a message by its name; BST_LINK_TYPES if there is none. */
 bst_link_type bst_wire_type_of(const char *name);
 
 /* Bytes on the wire of one record of a table. */

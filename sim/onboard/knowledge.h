@@ -20,6 +20,7 @@ const struct bst_psf *bst_knowledge_psf(const bst_knowledge *knowledge);
 /* The FITS image of the PSF that is known on board ("": none, the camera's psf_fwhm_px holds), and
  * its samples per pixel (0: the file says). */
 const char *bst_knowledge_psf_file(const bst_knowledge *knowledge, double *oversampling);
+/* Star catalogue on board; it belongs to the knowledge or its world. */
 const bst_stars *bst_knowledge_stars(const bst_knowledge *knowledge);
 double bst_knowledge_julian_year(
     const bst_knowledge *knowledge); /* at the epoch, for proper motion */
@@ -37,8 +38,17 @@ typedef struct bst_onboard_cue {
 
 /* A cheap per-user window, as bst_world_view is for the world. */
 typedef struct bst_knowledge_view bst_knowledge_view;
+
+/* Creates a view of onboard knowledge, with a sky clock of its own; one thread may use it at a
+ * time.
+ *
+ * Given:     knowledge  must outlive the view
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_knowledge_view_free */
 bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledge,
                                      bst_knowledge_view **out) BST_MUST_CHECK;
+/* Frees a view; the knowledge itself stays; NULL is allowed. */
 void bst_knowledge_view_free(bst_knowledge_view *view);
 
 /* The cue at `seconds` after the epoch. */
@@ -83,7 +93,12 @@ bst_quat bst_knowledge_body_attitude(const bst_knowledge *knowledge);
 
 /* ---- the onboard catalogue: the scenario's objects on their orbits as catalogued ---- */
 
+/* Onboard catalogue: number of the scenario's objects, on their catalogued orbits. */
 int bst_knowledge_object_count(const bst_knowledge *knowledge);
+
+/* Description of an object of the onboard catalogue; it belongs to the world.
+ *
+ * Given:     object  index, 0 to one less than the number of objects */
 const bst_world_object_info *bst_knowledge_object(const bst_knowledge *knowledge, int object);
 /* -1: there is no object of this name. */
 int bst_knowledge_find_object(const bst_knowledge *knowledge, const char *name);

@@ -24,6 +24,7 @@ typedef struct bst_band bst_band;
  * files as of bst_file_read and BST_ERR_FORMAT with the line. */
 bst_status bst_band_create(bst_ctx *ctx, const bst_band_config *config, const char *base_dir,
                            bst_band **out) BST_MUST_CHECK;
+/* Frees a band; NULL is allowed. */
 void bst_band_free(bst_band *band);
 
 /* A star of V = 0 and colour B-V (NAN: that of the Sun), 1/s/m2. Its spectrum is a black body's at

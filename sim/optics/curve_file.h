@@ -28,6 +28,7 @@ typedef struct bst_curve {
  * after an error. */
 bst_status bst_curve_load(bst_ctx *ctx, const char *path, const bst_curve_format *format,
                           bst_curve *out) BST_MUST_CHECK;
+/* Frees the memory of a curve and clears the struct, which belongs to the caller. */
 void bst_curve_free(bst_curve *curve);
 
 /* Linear between the points, the first and last value beyond them. */

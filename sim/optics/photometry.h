@@ -20,11 +20,17 @@ typedef struct bst_optics_photometer {
 /* Room for so many stars of a frame. */
 bst_status bst_optics_photometer_create(bst_ctx *ctx, int capacity,
                                         bst_optics_photometer *out) BST_MUST_CHECK;
+/* Frees the memory of a photometer and clears the struct, which belongs to the caller. */
 void bst_optics_photometer_free(bst_optics_photometer *photometer);
 
-/* A new frame, and a star in it: a detection whose magnitude is by the camera's own figures, and
- * the catalogue's. Those that are saturated, cut, blended or of an SNR below 10 are left out. */
+/* Begins a frame: forgets the stars added. */
 void bst_optics_photometer_begin(bst_optics_photometer *photometer);
+
+/* Adds an identified star to the estimate of the zero point.
+ *
+ * Given:     star   detection with the magnitude by the camera's nominal figures; ignored if
+ *                   saturated, cut by the edge, blended or of an SNR below 10
+ *            v_mag  catalogue magnitude, V */
 void bst_optics_photometer_add(bst_optics_photometer *photometer, const bst_detection *star,
                                double v_mag);
 

@@ -38,15 +38,25 @@ typedef struct bst_psf_inputs {
                                          band_nm; each entry becomes a wavelength of the average */
 } bst_psf_inputs;
 
-/* Makes the PSF, or gives the one that the camera carries (camera->psf) once more: a PSF is freed
- * by as many calls as gave it. BST_ERR_CONFIG, naming the key of `optics`, for what cannot be:
- * defocus without a focal ratio, a field list of the wrong length, an obstruction without rest,
- * aberrations of more than 64 waves per aperture diameter of slope, samples that are missing or
- * empty; BST_ERR_MEMORY.
- */
+/* Creates the PSF of a camera, or takes a reference to the one that it has (camera->psf).
+ *
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_CONFIG, with the key of `optics`: defocus without a focal ratio, a field list
+ *            of the wrong length, a completely obstructed aperture, aberrations of a slope above 64
+ *            waves per aperture diameter, samples that are missing or empty; BST_ERR_MEMORY
+ * Ownership: release *out with bst_psf_free */
 bst_status bst_psf_create(bst_ctx *ctx, const bst_camera *camera, bst_psf **out) BST_MUST_CHECK;
+
+/* bst_psf_create with samples or a spectrum from the caller.
+ *
+ * Given:     inputs  samples of a PSF file and spectrum; NULL members: not given
+ * Returned:  *out  NULL on error
+ * Errors:    those of bst_psf_create
+ * Ownership: release *out with bst_psf_free
+ * Notes:     with neither samples nor spectrum, a camera that has a PSF shares it. */
 bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
                                bst_psf **out) BST_MUST_CHECK;
+/* Releases a reference to a PSF; the last one frees it. NULL is allowed. */
 void bst_psf_free(bst_psf *psf);
 
 /* A copy of the camera whose PSF is widened by line-of-sight motion that is fast against the

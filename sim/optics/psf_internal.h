@@ -14,6 +14,10 @@ typedef struct bst_optics_radial_otf {
     double *value; /* [BST_RADIAL_NODES] */
 } bst_optics_radial_otf;
 
+/* Allocates a table of a radial OTF.
+ *
+ * Given:     limit  highest frequency of the table
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_optics_radial_create(bst_ctx *ctx, double limit,
                                     bst_optics_radial_otf *out) BST_MUST_CHECK;
 /* Frequency of node i of a table that ends at `limit`. */
@@ -33,8 +37,15 @@ typedef struct bst_optics_grid_otf {
 /* What the interpolation reaches over. */
 enum { BST_GRID_MARGIN = 3 };
 
+/* Allocates a table of an OTF on a half plane of frequencies.
+ *
+ * Given:     step   spacing of the nodes
+ *            reach  nodes on either side of the origin
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free with bst_optics_grid_otf_free */
 bst_status bst_optics_grid_otf_create(bst_ctx *ctx, double step, int reach,
                                       bst_optics_grid_otf *out) BST_MUST_CHECK;
+/* Frees the memory of a table and clears the struct, which belongs to the caller. */
 void bst_optics_grid_otf_free(bst_optics_grid_otf *table);
 /* The node (column kx >= -BST_GRID_MARGIN, row ky) as {real, imaginary}. */
 static inline float *bst_optics_grid_otf_node(const bst_optics_grid_otf *t, int kx, int ky) {
@@ -98,6 +109,11 @@ struct bst_psf {
 /* What fills psf->nodes and psf->cutoff for the models that need more than a formula. */
 bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_psf_spectrum *spectrum, bst_psf *psf) BST_MUST_CHECK;
+
+/* Makes a PSF from samples, one plane per node of the field grid.
+ *
+ * Given:     samples  NULL: an error, as optics/psf_file needs them
+ * Errors:    BST_ERR_CONFIG for sizes or planes that do not fit, BST_ERR_MEMORY */
 bst_status bst_psf_make_sampled(bst_ctx *ctx, const bst_camera *camera,
                                 const bst_psf_samples *samples, bst_psf *psf) BST_MUST_CHECK;
 

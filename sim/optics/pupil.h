@@ -20,6 +20,7 @@ typedef struct bst_pupil_work bst_pupil_work;
 /* Work space for apertures of at most `cells` grid cells across; single precision, as the tables.
  */
 bst_status bst_pupil_work_create(bst_ctx *ctx, int cells, bst_pupil_work **out) BST_MUST_CHECK;
+/* Frees a work space with its FFT plans; NULL is allowed. */
 void bst_pupil_work_free(bst_pupil_work *work);
 
 /* Share of each cell of size `cell` (in diameters) that the aperture leaves open, [side][side] with

@@ -16,17 +16,24 @@
 
 /* Head of the page; `title` is its first heading. */
 void bst_report_page_begin(FILE *out, const char *title);
+/* Ends the HTML page. */
 void bst_report_page_end(FILE *out);
-/* A heading of level 2 or 3 that opens a section, and its end. */
+
+/* Begins a section with a heading.
+ *
+ * Given:     level  2 or 3 */
 void bst_report_page_section(FILE *out, int level, const char *heading);
+/* Ends a section. */
 void bst_report_page_section_end(FILE *out);
 typedef enum bst_page_width { BST_PAGE_WIDE, BST_PAGE_HALF, BST_PAGE_THIRD } bst_page_width;
 /* A grid of figures of half or a third of the page, as many beside each other as there is room for.
  */
 void bst_report_page_grid(FILE *out, bst_page_width width);
+/* Ends a grid of figures. */
 void bst_report_page_grid_end(FILE *out);
 /* A figure round a chart. */
 void bst_report_page_figure(FILE *out, bst_page_width width);
+/* Ends a figure with its caption, plain text. */
 void bst_report_page_figure_end(FILE *out, const char *caption);
 /* A box with a figure that is to be seen at once; `unit` and `note` may be "". */
 void bst_report_page_card(FILE *out, const char *value, const char *unit, const char *name,
@@ -49,6 +56,9 @@ typedef struct bst_report_warnings {
     int more; /* that found no room */
 } bst_report_warnings;
 
+/* Adds a warning; those beyond BST_REPORT_WARNINGS are only counted.
+ *
+ * Given:     format  printf-style */
 void bst_report_warnings_add(bst_report_warnings *warnings, bst_run_severity severity,
                              const char *format, ...) BST_PRINTF(3, 4);
 /* The section "Warnings": the worst first, otherwise in their order. */
@@ -123,6 +133,7 @@ typedef struct bst_report_sensor {
 bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *scene,
                            const bst_run_sensor *sensor, const struct cJSON *summary,
                            bst_report_sensor *out) BST_MUST_CHECK;
+/* Frees the memory of the series of a sensor and clears the struct, which belongs to the caller. */
 void bst_report_sensor_free(bst_report_sensor *sensor);
 
 /* ---- report_figures.c: the figures of a sensor's loop ---- */

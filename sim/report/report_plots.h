@@ -41,6 +41,11 @@ typedef struct bst_report_statistics {
     size_t count;
     double mean, rms, median, p95, p99, worst;
 } bst_report_statistics;
+
+/* Mean, RMS and percentiles of values.
+ *
+ * Given:     values  [n]; sorted in place
+ * Returned:  NAN for n = 0 */
 bst_report_statistics bst_report_measure(double *values, size_t n);
 
 /* A histogram of what is finite among n values, between low and high, with a curve of expected

@@ -51,6 +51,7 @@ typedef struct bst_report_study_view {
  * bst_report_study_view_free, also after an error. */
 bst_status bst_report_study_view_read(bst_ctx *ctx, bst_run_reader *tables,
                                       bst_report_study_view *out) BST_MUST_CHECK;
+/* Frees the arrays of a view; the struct itself belongs to the caller. */
 void bst_report_study_view_free(bst_report_study_view *view);
 
 /* Text of an axis' value. */

@@ -11,7 +11,9 @@ typedef struct bst_link_host bst_link_host;
  * outlives the host. */
 bst_status bst_link_host_create(bst_ctx *ctx, const bst_scenario *scenario, const char *part,
                                 int threads, bst_link_host **out) BST_MUST_CHECK;
+/* Frees a host with its simulation; NULL is allowed. */
 void bst_link_host_free(bst_link_host *host);
+/* Name of the instance that the host runs; it belongs to the host. */
 const char *bst_link_host_instance(const bst_link_host *host);
 
 /* Keys of a link that asks for them; the path is lent for as long as the host is. */

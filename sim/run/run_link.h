@@ -14,7 +14,16 @@ bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation,
 /* Records what peers answer into a run's folder; nothing without a link, or while replaying. */
 bst_status bst_run_link_record(bst_ctx *ctx, bst_simulation *simulation,
                                const char *folder) BST_MUST_CHECK;
+
+/* Closes the recording of the simulation's link, if there is one.
+ *
+ * Errors:    BST_ERR_IO */
 bst_status bst_run_link_recorded(bst_ctx *ctx, bst_simulation *simulation) BST_MUST_CHECK;
+
+/* Sets the reason for the end of the run that peers will receive.
+ *
+ * Given:     status   result of the run
+ *            message  why it failed; not used for BST_OK */
 void bst_run_link_end(bst_simulation *simulation, bst_status status, const char *message);
 
 #endif

@@ -22,6 +22,7 @@ typedef struct bst_run_scene {
  * closed with bst_run_scene_close, also after an error. */
 bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run,
                               bst_run_scene *out) BST_MUST_CHECK;
+/* Frees the world, view and scenario of a scene; the struct itself belongs to the caller. */
 void bst_run_scene_close(bst_run_scene *scene);
 /* Indices of a sensor of the run's tables in the scenario. BST_ERR_FORMAT when it is not there. */
 bst_status bst_run_scene_find(bst_ctx *ctx, const bst_run_scene *scene,

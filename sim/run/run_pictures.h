@@ -9,9 +9,16 @@
 
 typedef struct bst_run_pictures bst_run_pictures;
 
+/* Prepares the pictures of a sensor's first and last frame.
+ *
+ * Given:     target_object  index of the target in the world
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_run_pictures_free */
 bst_status bst_run_pictures_create(bst_ctx *ctx, const bst_camera *camera, int64_t tick_rate_hz,
                                    bst_time epoch, int target_object,
                                    bst_run_pictures **out) BST_MUST_CHECK;
+/* Frees the pictures of a run; NULL is allowed. */
 void bst_run_pictures_free(bst_run_pictures *pictures);
 
 /* A message of the pictured sensor. */

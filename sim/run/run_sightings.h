@@ -27,8 +27,9 @@ bst_status bst_run_sightings_finish(bst_ctx *ctx, bst_run_sightings *sightings,
 /* After that: the summary; false and all zero when there is none. */
 bool bst_run_sightings_figures(const bst_run_sightings *sightings, bst_sightings_figures *out);
 
-/* Adds "sightings" to a manifest; prints the same as rows. */
+/* Adds "sightings" to a manifest. */
 void bst_run_sightings_add(const bst_run_sightings *sightings, struct cJSON *manifest);
+/* Prints the summary of all objects to stdout, if there are at least two. */
 void bst_run_sightings_print(const bst_run_sightings *sightings);
 
 #endif

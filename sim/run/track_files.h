@@ -20,9 +20,12 @@ bst_status bst_track_write_tdm(bst_ctx *ctx, FILE *stream, const bst_run_track *
 bst_status bst_track_write_json(bst_ctx *ctx, FILE *stream, const bst_run_track *track, int norad,
                                 bool first) BST_MUST_CHECK;
 
-/* The header row of a CSV of observations, and a row each: utc, track, object, sensor, ra_deg,
- * dec_deg, sigmas and correlation, v_mag, snr, the observer's state (m, m/s). */
+/* Writes the header row of a CSV of observations.
+ *
+ * Notes:     columns: utc, track, object, sensor, ra_deg, dec_deg, sigmas and correlation, v_mag,
+ *            snr, and the observer's state (m, m/s). */
 void bst_track_csv_head(FILE *stream);
+/* Writes the observations of a track, one CSV row each; see bst_track_csv_head. */
 bst_status bst_track_write_csv(bst_ctx *ctx, FILE *stream,
                                const bst_run_track *track) BST_MUST_CHECK;
 

@@ -40,8 +40,14 @@ typedef struct bst_results {
 /* Forgets the row of a run: it is to be made again. */
 void bst_results_forget(bst_results *results, int64_t run);
 
+/* Allocates empty results for all runs of a study.
+ *
+ * Given:     study, kind  must outlive the results
+ * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
+ * Ownership: free with bst_results_free */
 bst_status bst_results_create(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                               bst_results *out) BST_MUST_CHECK;
+/* Frees the memory of the results and clears the struct, which belongs to the caller. */
 void bst_results_free(bst_results *results);
 
 /* Why a run failed; NULL when it did not. */
@@ -60,6 +66,10 @@ typedef struct bst_study_shard_draft {
     const bst_study_kind *kind;
 } bst_study_shard_draft;
 
+/* Begins the file of a shard in memory: writes its header.
+ *
+ * Given:     first  number of the shard's first run
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_study_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                                  int64_t first, bst_study_shard_draft *out) BST_MUST_CHECK;
 /* The next run's row. `error`: NULL when it did what it should. */
@@ -69,6 +79,7 @@ void bst_study_shard_add(bst_study_shard_draft *draft, const bst_study_result *r
  * there yet (then what is there stands). Without rows: nothing. Frees the draft in every case. */
 bst_status bst_study_shard_publish(bst_ctx *ctx, bst_study_shard_draft *draft,
                                    const char *out) BST_MUST_CHECK;
+/* Frees a draft without writing it, and clears it. */
 void bst_study_shard_drop(bst_study_shard_draft *draft);
 
 /* Path of the file of runs first .. first + count - 1. */

@@ -30,6 +30,7 @@ bst_status bst_shard_run_one(bst_ctx *ctx, bst_shard_worker *worker, int64_t run
 bst_status bst_shard_execute(bst_ctx *ctx, bst_shard_worker *worker, const bst_study_shard_job *job,
                              bst_shard_report report, void *user,
                              bst_study_shard_news *out) BST_MUST_CHECK;
+/* Ends the worker's state; the struct itself belongs to the caller. */
 void bst_shard_worker_close(bst_shard_worker *worker);
 
 #endif

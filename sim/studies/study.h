@@ -106,6 +106,7 @@ typedef struct bst_study_place {
 /* Reads a study and the scenarios that it names. Errors name file, JSON path and what is allowed.
  * Nothing is written. Free with bst_study_close, also after an error. */
 bst_status bst_study_open(bst_ctx *ctx, const char *file, bst_study *out) BST_MUST_CHECK;
+/* Frees everything that a study holds and clears it. */
 void bst_study_close(bst_study *study);
 
 /* Run `run`, 0 <= run < study->runs: runs of a setting are neighbours. */

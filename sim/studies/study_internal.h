@@ -39,10 +39,12 @@ bool bst_study_population_pointer(const char *pointer);
 /* Reads the populations of a document; free with bst_study_populations_free. */
 bst_status bst_study_populations_read(bst_ctx *ctx, const bst_study *study, const bst_json *json,
                                       bst_study_population_list *out) BST_MUST_CHECK;
+/* Frees the memory of a list of populations and clears the struct, which belongs to the caller. */
 void bst_study_populations_free(bst_study_population_list *list);
 /* Reads the study's own, after its axes; `study_file`: its full path. */
 bst_status bst_study_populations_open(bst_ctx *ctx, bst_study *study,
                                       const char *study_file) BST_MUST_CHECK;
+/* Frees the populations of a study and their files. */
 void bst_study_populations_close(bst_study *study);
 /* The populations as the values of a run make them: *out, the study's own or *own, which the caller
  * frees with bst_study_populations_free in both cases. */

@@ -24,6 +24,9 @@ typedef struct bst_table_out {
     char name[80];
 } bst_table_out;
 
+/* Begins the tables of a study: a draft of study.sqlite in a folder.
+ *
+ * Errors:    BST_ERR_ARGUMENT for too long a path, BST_ERR_IO */
 bst_status bst_tables_begin(bst_ctx *ctx, const char *folder, bst_tables_out *out) BST_MUST_CHECK;
 /* With BST_OK: puts the database in its place. With another status, or when that fails: removes it.
  */
@@ -34,8 +37,18 @@ bst_status bst_tables_end(bst_ctx *ctx, bst_tables_out *tables, bst_status statu
 bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *name, const char *doc,
                            const bst_io_column *columns, int count, bool csv,
                            bst_table_out *out) BST_MUST_CHECK;
+
+/* Appends a row to a table and to its CSV file.
+ *
+ * Given:     values  one for each column
+ * Errors:    BST_ERR_IO */
 bst_status bst_table_row(bst_ctx *ctx, bst_table_out *table,
                          const bst_io_value *values) BST_MUST_CHECK;
+
+/* Ends a table.
+ *
+ * Given:     status  result so far; an error drops the CSV file
+ * Returned:  status, or the error of closing the CSV file */
 bst_status bst_table_end(bst_ctx *ctx, bst_table_out *table, bst_status status) BST_MUST_CHECK;
 
 #endif

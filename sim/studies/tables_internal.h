@@ -17,8 +17,14 @@ typedef struct bst_tables_job {
     char **texts;
 } bst_tables_job;
 
-/* The column of an axis, and its value there: *text is to be freed after use. */
+/* Description of the column of an axis. */
 bst_io_column bst_study_axis_column(const bst_study_axis *axis);
+
+/* Value of an axis in a run, as a cell of a table.
+ *
+ * Given:     axis  index of the axis
+ *            base  index of the base scenario, for a value that is not varied
+ * Returned:  *text  memory that the cell points to, or NULL; the caller frees it after use */
 bst_io_value bst_study_axis_value(const bst_study *study, int axis, const bst_study_value *value,
                                   int base, char **text);
 

@@ -29,9 +29,17 @@ void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, in
 /* As `check` of bst_study_kind, of the scenario. `user`: a bst_study_plugins that takes what the
  * scenario uses, or NULL. */
 bst_status bst_study_check_scenario(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep);
+
+/* Creates a worker that keeps device and star catalogue open from run to run.
+ *
+ * Given:     place  device and threads of the worker
+ * Returned:  *worker  to be freed with bst_study_warm_close
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_study_warm_open(bst_ctx *ctx, void *user, const bst_study_worker_place *place,
                                void **worker);
+/* Frees a worker with its device and catalogue. */
 void bst_study_warm_close(void *worker);
+/* True if a signal has asked the program to stop; `user` is not used. */
 bool bst_study_stop_requested(void *user);
 /* Opens the worker's device unless it is open. */
 bst_status bst_study_warm_device(bst_ctx *ctx, bst_study_warm *warm) BST_MUST_CHECK;

@@ -17,6 +17,7 @@ typedef struct bst_study_plugins {
  * do so. */
 bst_status bst_study_plugins_take(bst_ctx *ctx, bst_study_plugins *plugins,
                                   const bst_scenario *scenario) BST_MUST_CHECK;
+/* Frees the memory of a list of plug-ins and clears the struct, which belongs to the caller. */
 void bst_study_plugins_free(bst_study_plugins *plugins);
 
 /* Writes OUT/plugins.json, or compares with the one that is there. BST_ERR_STATE: a library has

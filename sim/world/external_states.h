@@ -9,6 +9,10 @@
 /* The latest few thousand states; may be used by several threads. */
 typedef struct bst_external_states bst_external_states;
 
+/* Creates the states of an object that another program commands; its functions lock them.
+ *
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_external_states_create(bst_ctx *ctx, bst_external_states **out) BST_MUST_CHECK;
 void bst_external_states_free(bst_external_states *steering); /* NULL allowed */
 

@@ -51,7 +51,9 @@ bst_status bst_frame_updates_parse(bst_ctx *ctx, const char *name, const char *t
 /* NULL is allowed. */
 void bst_frame_updates_free(bst_frame_updates *updates);
 
+/* Name of the file; it belongs to the updates. */
 const char *bst_frame_updates_name(const bst_frame_updates *updates);
+/* Number of updates. */
 int bst_frame_updates_count(const bst_frame_updates *updates);
 /* In the order of frames. */
 const bst_frame_update *bst_frame_updates_item(const bst_frame_updates *updates, int index);

@@ -34,23 +34,32 @@ typedef struct bst_world_state {
 bst_time bst_world_time(const bst_world *world, double seconds);
 /* Earth orientation of the scenario; lent. */
 const bst_astro_eop *bst_world_earth_orientation(const bst_world *world);
-/* Logs a warning where a run of `duration_s` goes on after the Earth-orientation table: how well
- * what is predicted from it is known at its end. `scenario` names the file. */
+/* Logs a warning if a run ends after the Earth-orientation table, with the uncertainty of the
+ * predicted orientation at its end.
+ *
+ * Given:     scenario    name of the file, for the message
+ *            duration_s  duration of the run, s */
 void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const bst_world *world,
                                       double duration_s);
+/* Star catalogue of a world; it belongs to the world. */
 const bst_stars *bst_world_stars(const bst_world *world);
+/* Number of objects. */
 int bst_world_object_count(const bst_world *world);
+
+/* Description of an object; it belongs to the world.
+ *
+ * Given:     object  index, 0 to one less than the number of objects */
 const bst_world_object_info *bst_world_object(const bst_world *world, int object);
 /* Time from the epoch of a body's element set to the scenario's epoch, s; bodies are numbered
  * objects first, then observers. False: its orbit is no element set. */
 bool bst_world_element_age(const bst_world *world, int body, double *seconds);
-/* The law that an object moves by (not where it is): SGP4 with a drag term, or forces. */
+/* Law of motion of an object, without its state: SGP4 with a drag term, or forces. */
 typedef struct bst_world_motion_law {
     bool sgp4;                     /* an element set */
     double bstar;                  /* of the set, 1 / Earth radii */
     const bst_force_model *forces; /* of an integrated orbit, lent by the world; NULL: none known */
 } bst_world_motion_law;
-/* An object on an orbit relative to another one moves by the law of that one. */
+/* Law of motion of an object; for an orbit relative to another object, the law of that object. */
 bst_world_motion_law bst_world_object_motion(const bst_world *world, int object);
 /* Index of the object with this name, -1 when there is none. */
 int bst_world_find_object(const bst_world *world, const char *name);
@@ -59,8 +68,11 @@ int bst_world_find_object(const bst_world *world, const char *name);
  * there is none that is steered; BST_ERR_ARGUMENT: not later than the state before. */
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
                            const bst_world_state *state) BST_MUST_CHECK;
+/* Number of observers. */
 int bst_world_observer_count(const bst_world *world);
+/* Number of sensors of an observer. */
 int bst_world_sensor_count(const bst_world *world, int observer);
+/* Name of an observer; it belongs to the world. */
 const char *bst_world_observer_name(const bst_world *world, int observer);
 /* The sensor's true camera. */
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);
@@ -79,14 +91,26 @@ const struct bst_exposure_config *bst_world_exposure(const bst_world *world, int
  * The camera has these axes when both gimbal angles are zero. */
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor);
 
+/* Creates a view of a world, with a sky clock of its own; one thread may use it at a time.
+ *
+ * Given:     world  must outlive the view
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_world_view_free */
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world,
                                  bst_world_view **out) BST_MUST_CHECK;
+/* Frees a view; the world itself stays; NULL is allowed. */
 void bst_world_view_free(bst_world_view *view);
 
 /* True state of an object or observer `seconds` after the epoch. BST_ERR_NUMERIC when its orbit has
  * no state then (decayed). */
 bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int object,
                                        double seconds, bst_world_state *out) BST_MUST_CHECK;
+
+/* State of an observer.
+ *
+ * Given:     seconds  since the epoch
+ * Errors:    those of bst_world_view_object_state */
 bst_status bst_world_view_observer_state(bst_ctx *ctx, bst_world_view *view, int observer,
                                          double seconds, bst_world_state *out) BST_MUST_CHECK;
 /* What the onboard side of a sensor believes then: the observer's state with its orbit error, and
@@ -97,6 +121,11 @@ bst_status bst_world_view_nav(bst_ctx *ctx, bst_world_view *view, int observer, 
 /* Rotations and bodies then, interpolated. */
 bst_status bst_world_view_earth_frames(bst_ctx *ctx, bst_world_view *view, double seconds,
                                        bst_astro_earth_frames *out) BST_MUST_CHECK;
+
+/* Sun, Moon and Earth at a time.
+ *
+ * Given:     seconds  since the epoch
+ * Errors:    BST_ERR_RANGE outside the Earth orientation data */
 bst_status bst_world_view_bodies(bst_ctx *ctx, bst_world_view *view, double seconds,
                                  bst_bodies *out) BST_MUST_CHECK;
 
@@ -113,6 +142,11 @@ typedef struct bst_world_sight {
     bst_scene_glow glow;    /* all its light */
     bool occulted;          /* behind the Earth */
 } bst_world_sight;
+
+/* What an observer sees of an object: direction with light time, range, brightness, shadow.
+ *
+ * Given:     seconds  time of reception since the epoch
+ * Errors:    those of the orbits */
 bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer, int object,
                                 double seconds, bst_world_sight *out) BST_MUST_CHECK;
 

@@ -18,6 +18,7 @@ typedef struct bst_world_path {
     char text[1100];
 } bst_world_path;
 
+/* Path of a file of the scenario: relative paths start at the scenario's folder. */
 bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path);
 
 /* Makes an orbit of any source. `path` is its place in the scenario ("/observers/0/orbit"), `name`
@@ -39,6 +40,7 @@ bst_status bst_world_orbit_build_file(const bst_world_builder *b, const bst_orbi
 /* Reads the files that drive sensors frame by frame. */
 bst_status bst_world_load_updates(const bst_world_builder *b,
                                   const bst_config_list *observers) BST_MUST_CHECK;
+/* Frees the files of updates that a world reads. */
 void bst_world_updates_free(bst_world *world);
 /* The objects of a frame_updates_file as injected states, at the times of the frames of the first
  * sensor that the file drives. */
@@ -54,6 +56,7 @@ bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
                                            const char *name, bst_world_orbit *orbit,
                                            int *norad) BST_MUST_CHECK;
 
+/* Frees what an orbit holds (SGP4, trajectories, gravity field, burns); the struct itself stays. */
 void bst_world_orbit_free(bst_world_orbit *orbit);
 
 /* Fills world->objects from the list of objects and then from the catalogues. */

@@ -229,6 +229,7 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
  * A clock that is wrong shows other times: those are needed, too. */
 bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struct bst_world *world,
                                  double duration_s) BST_MUST_CHECK;
+/* Frees a world; NULL is allowed. */
 void bst_world_free(struct bst_world *world);
 
 struct bst_psf_samples;
@@ -246,6 +247,7 @@ bst_status bst_world_prepare(bst_ctx *ctx, struct bst_world *world, int threads)
 /* The onboard knowledge of one sensor; equal to the truth where the scenario says nothing else. */
 bst_status bst_knowledge_create(bst_ctx *ctx, const struct bst_world *world, int observer,
                                 int sensor, struct bst_knowledge **out) BST_MUST_CHECK;
+/* Frees onboard knowledge; NULL is allowed. */
 void bst_knowledge_free(struct bst_knowledge *knowledge);
 
 #endif

@@ -172,7 +172,14 @@ bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, int obse
                                   bst_sky_clock *clock, double seconds, const bst_world_state *eye,
                                   double along_rad, double across_rad,
                                   bst_vec3 *out) BST_MUST_CHECK;
+/* Half the length of a region's arc, rad; 0 for regions that are not an arc. */
 double bst_world_region_half_length_rad(const bst_region_config *region);
+
+/* Vector from an observer to the cued object on its nominal orbit, m; zero without an object.
+ *
+ * Given:     seconds  since the epoch
+ *            eye      state of the observer
+ * Errors:    those of the orbit */
 bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer,
                                       int sensor, bst_sky_clock *clock, double seconds,
                                       const bst_world_state *eye, bst_vec3 *line_m) BST_MUST_CHECK;

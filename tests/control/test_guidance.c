@@ -25,6 +25,8 @@ typedef struct bench {
     double nearest_rad; /* least distance to the Sun's direction, after `leaving` */
     int told[8];
     bst_guidance_event last[8];
+    bst_los_command before; /* of the slew under way, the latest */
+    int followed;           /* commands of slews whose rates have been judged */
 } bench;
 
 static bst_vec3 aim_of(const bench *b, int64_t tick) {
@@ -70,6 +72,28 @@ static void open_bench(bench *b, bst_vec3 from, bst_vec3 rate) {
     b->arrival_s = INFINITY;
 }
 
+/* A slew's commands tell the rates at which their directions and angles change: half the sum of two
+ * rates 50 ms apart, but for a change of the acceleration in between, 2 x 3.8 deg/s^2 of it at
+ * most. */
+static void judge_rates(bench *b, const bst_los_command *now) {
+    const bst_los_command *before = &b->before;
+    double dt = (double)(now->tick - before->tick) / TICKS, most = 0.5 * 7.6 * DEG * dt;
+    if (b->guidance.slew.active && before->near_given && now->near_given && dt == 0.05) {
+        bst_vec3 moved =
+            bst_vec3_scale(bst_vec3_sub(now->direction_gcrf, before->direction_gcrf), 1.0 / dt);
+        bst_vec3 told =
+            bst_vec3_scale(bst_vec3_add(now->rate_gcrf_radps, before->rate_gcrf_radps), 0.5);
+        assert_true(bst_vec3_norm(bst_vec3_sub(moved, told)) < most);
+        for (int i = 0; i < 2; i++) {
+            double turned = (now->near_rad[i] - before->near_rad[i]) / dt;
+            bst_assert_close(0.5 * (now->near_radps[i] + before->near_radps[i]), turned, most);
+        }
+        b->followed++;
+    }
+    b->before = *now;
+    b->before.near_given = now->near_given && b->guidance.slew.active;
+}
+
 /* Commands at 20 Hz with a latency of 50 ms, telemetry at 100 Hz. */
 static void run(bench *b, double seconds) {
     bst_los_command waiting = {0}, active = {0};
@@ -93,6 +117,7 @@ static void run(bench *b, double seconds) {
             bst_assert_ok(&b->ctx,
                           bst_guidance_command(&b->ctx, &b->guidance, n > 0 ? &boresight : NULL,
                                                &waiting, &give));
+            judge_rates(b, &waiting);
             first = first && !give;
             for (int i = 0; i < b->guidance.event_count; i++) {
                 b->told[b->guidance.events[i].kind]++;
@@ -157,6 +182,7 @@ static void slews_of_least_time(void **state) {
                       b.arrival_s, bound);
         if (planned) {
             bst_assert_close(b.arrival_s, bound, 0.01 * bound);
+            assert_true(b.followed > 1500); /* of 95 s at 20 Hz */
         }
         assert_true(b.arrival_s < 1.02 * bound);
     }
@@ -244,8 +270,62 @@ static void occultation_ahead(void **state) {
     assert_non_null(strstr(text, "behind the Earth"));
 }
 
+/* Cones as the spacecraft's own reckoning turns them, each about its own body and 0.05 degree wider
+ * than asked: the Earth's by its radius and 80 km of air, seen from 8000 km, and 3 degrees more. */
+static void cones_of_the_sky(void **state) {
+    (void)state;
+    bench b;
+    open_bench(&b, mount_at(100, 20), (bst_vec3){0, 0, 0});
+    bst_guidance_config *c = &b.guidance.config;
+    c->sun_keep_out_deg = 30.0;
+    c->moon_keep_out_deg = 7.0;
+    c->earth_keep_out = true;
+    c->earth_limb_keep_out_deg = 3.0;
+    c->earth_limb_altitude_km = 80.0;
+    const bst_quat error = bst_quat_from_rotvec((bst_vec3){0.2, -0.1, 0.3});
+    const bst_nav_telemetry nav = {.position_gcrf_m = {0, 8000e3, 0},
+                                   .velocity_gcrf_mps = {7000, 0, 100},
+                                   .sun_m = {1.5e11, 0, 0},
+                                   .moon_m = {0, 0, 3.8e8}};
+    bst_guidance_see_sky(&b.guidance, &nav, error);
+    assert_int_equal(b.guidance.zone_count, 3);
+    bool seen[3] = {false, false, false};
+    for (int i = 0; i < 3; i++) {
+        const bst_keep_out_zone *zone = &b.guidance.zones[i];
+        int kind = zone->kind == BST_ZONE_SUN ? 0 : zone->kind == BST_ZONE_MOON ? 1 : 2;
+        const bst_vec3 to[3] = {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};
+        double earth = asin((BST_EARTH_RADIUS_M + 80e3) / 8000e3) + 3.0 * DEG;
+        const double half[3] = {30.0 * DEG, 7.0 * DEG, earth};
+        bst_vec3 axis = bst_quat_rotate(error, to[kind]);
+        bst_assert_close(bst_vec3_angle(zone->axis, axis), 0.0, 1e-7); /* cosine's rounding */
+        bst_assert_close(zone->half_angle_rad, half[kind] + 0.05 * DEG, 1e-12);
+        seen[kind] = true;
+    }
+    assert_true(seen[0] && seen[1] && seen[2]);
+    bst_vec3 v = bst_quat_rotate(error, nav.velocity_gcrf_mps);
+    bst_assert_close(bst_vec3_norm(bst_vec3_sub(v, b.guidance.nav.velocity_gcrf_mps)), 0.0, 1e-9);
+}
+
+/* In a body that turns at w, what rests among the stars moves by v x w. */
+static void the_body_turns_on(void **state) {
+    (void)state;
+    bench b;
+    open_bench(&b, mount_at(100, 20), (bst_vec3){0, 0, 0});
+    const bst_vec3 w = {2e-3, -1e-3, 3e-3}, star = {0.6, 0.0, 0.8};
+    const bst_quat q = bst_quat_from_rotvec((bst_vec3){0.3, 0.9, -0.4});
+    const bst_mount_status status = {.tick = 500, .q_body_from_gcrf = q, .rate_body_radps = w};
+    bst_guidance_telemetry(&b.guidance, &status);
+    bst_vec3 now = bst_quat_rotate(bst_guidance_body(&b.guidance, 500), star);
+    bst_vec3 then = bst_quat_rotate(bst_guidance_body(&b.guidance, 1500), star);
+    bst_assert_close(bst_vec3_norm(bst_vec3_sub(now, bst_quat_rotate(q, star))), 0.0, 1e-15);
+    bst_vec3 change = bst_vec3_sub(bst_vec3_sub(then, now), bst_vec3_cross(now, w));
+    bst_assert_close(bst_vec3_norm(change), 0.0, 1e-5); /* half of w^2 in a second */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_body_turns_on),
+        cmocka_unit_test(cones_of_the_sky),
         cmocka_unit_test(nothing_asked_nothing_changed),
         cmocka_unit_test(slews_of_least_time),
         cmocka_unit_test(keeps_out_of_the_sun),

@@ -240,11 +240,75 @@ static void test_bumpless(void **state) {
     assert_true(r.worst_kick_rad < 3e-7);
 }
 
+/* One frame by hand, with a proportional law of 2 per second. The aim rests; the frame shows the
+ * boresight short of it by a turn of 3e-4 rad about an axis across. The correction turns by twice
+ * that rate from the time at which the command acts on; frames that began before the mount was at
+ * rest say nothing; and 90 + 25 + 150 ms after the middle of the latest exposure it coasts. */
+static void test_one_frame_by_hand(void **state) {
+    (void)state;
+    const bst_compensator_config law = {
+        .type = BST_COMPENSATOR_PI, .proportional = 2.0, .gain_scale = 1.0};
+    const bst_image_loop_env env = {.tick_rate_hz = TICKS,
+                                    .frame_period_s = 0.1,
+                                    .frame_exposure_s = 0.05,
+                                    .frame_latency_s = 0.09,
+                                    .command_latency_s = 0.01,
+                                    .jump_rad = 5e-4};
+    const bst_vec3 aim = bst_vec3_unit((bst_vec3){0.3, -0.4, 1.0});
+    const bst_vec3 axes[2] = {bst_vec3_unit(bst_vec3_cross(aim, (bst_vec3){1, 0, 0})),
+                              bst_vec3_unit(bst_vec3_cross(aim, (bst_vec3){0.2, 1, 0.5}))};
+    for (int n = 0; n < 2; n++) {
+        bst_ctx ctx = {0};
+        bst_pointing_error c;
+        bst_assert_ok(&ctx, bst_image_loop_init(&ctx, &loop, &law, &env));
+        bst_pointing_error_init(&c, 1e-6, 0.05, 1e-7, 1e-3, 1e-4);
+        const bst_vec3 d[3] = {aim, aim, aim};
+        for (int64_t tick = 10; tick <= 610; tick += 50) {
+            /* seen to have arrived at 60, the first time after the jump of the first command */
+            assert_false(bst_image_loop_commanded(&loop, &c, tick, 100, d, true, tick));
+        }
+        bst_vec3 short_of =
+            bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(axes[n], -3e-4)), aim);
+        bst_attitude_fix fix = {.valid = true,
+                                .tick = 84,
+                                .q_cam_from_gcrf = bst_quat_look(short_of, (bst_vec3){0, 1, 0})};
+        assert_false(bst_image_loop_update(&loop, &c, 200, &fix)); /* began at 59, moving */
+        fix.tick = 500;
+        assert_true(bst_image_loop_update(&loop, &c, 640, &fix));
+        assert_false(bst_image_loop_update(&loop, &c, 640, &fix)); /* not twice */
+        assert_int_equal(c.tick, 650);
+        bst_vec3 rate = bst_vec3_scale(axes[n], 2.0 * 3e-4);
+        /* rounding of quaternions over 3e-4 */
+        bst_assert_close(c.rate_gcrf_radps.x, rate.x, 1e-13);
+        bst_assert_close(c.rate_gcrf_radps.y, rate.y, 1e-13);
+        bst_assert_close(c.rate_gcrf_radps.z, rate.z, 1e-13);
+        bst_vec3 turned = bst_quat_to_rotvec(bst_pointing_error_at(&c, 700, TICKS));
+        bst_assert_close(bst_vec3_dot(turned, axes[n]), 0.05 * 6e-4, 1e-13);
+        for (int64_t tick = 660; tick <= 860; tick += 5) {
+            bst_vec3 told[3];
+            const int64_t when[3] = {tick, tick + 100, tick - 100};
+            for (int i = 0; i < 3; i++) {
+                told[i] = bst_quat_rotate(bst_pointing_error_at(&c, when[i], TICKS), aim);
+            }
+            /* commands act 10 ticks later */
+            assert_true(bst_image_loop_commanded(&loop, &c, tick, 100, told, true, tick - 10) ==
+                        (tick == 780));
+        }
+        bst_assert_close(bst_vec3_norm(c.rate_gcrf_radps), 0.0, 1e-15); /* no integrator */
+        turned = bst_quat_to_rotvec(bst_pointing_error_at(&c, 2000, TICKS));
+        bst_assert_close(bst_vec3_dot(turned, axes[n]), 0.13 * 6e-4, 1e-12);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_bias_and_drift), cmocka_unit_test(test_late),
-        cmocka_unit_test(test_dropped),        cmocka_unit_test(test_silence),
-        cmocka_unit_test(test_saturated),      cmocka_unit_test(test_bumpless),
+        cmocka_unit_test(test_one_frame_by_hand),
+        cmocka_unit_test(test_bias_and_drift),
+        cmocka_unit_test(test_late),
+        cmocka_unit_test(test_dropped),
+        cmocka_unit_test(test_silence),
+        cmocka_unit_test(test_saturated),
+        cmocka_unit_test(test_bumpless),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

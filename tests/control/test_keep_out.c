@@ -310,10 +310,41 @@ static void against_brute_force(void **state) {
     assert_true(least > 0.94);
 }
 
+/* Tangent and bend are the first and the second derivative of the path by its length, on great
+ * circles and along a cone's edge. */
+static void tangent_and_bend_are_derivatives(void **state) {
+    (void)state;
+    const bst_keep_out_zone zone = {BST_ZONE_SUN, {0, 0, 1}, 0.4};
+    bst_keep_out_route path;
+    bst_vec3 from = bst_vec3_unit((bst_vec3){1.0, 0.05, 0.9}),
+             to = bst_vec3_unit((bst_vec3){-1.0, 0.1, 1.0});
+    assert_true(bst_keep_out_path(&zone, 1, from, to, &path));
+    assert_true(path.count == 3);
+    double passed = 0.0;
+    for (int i = 0; i < path.count; i++) {
+        double s = passed + 0.4 * path.arcs[i].length_rad;
+        const double h = 1e-4;
+        bst_vec3 tangent, bend, none, unused;
+        bst_vec3 here = bst_keep_out_route_at(&path, s, &tangent, &bend);
+        bst_vec3 before = bst_keep_out_route_at(&path, s - h, &none, &unused);
+        bst_vec3 after = bst_keep_out_route_at(&path, s + h, &none, &unused);
+        bst_vec3 slope = bst_vec3_scale(bst_vec3_sub(after, before), 0.5 / h);
+        bst_vec3 curve = bst_vec3_scale(
+            bst_vec3_sub(bst_vec3_add(after, before), bst_vec3_scale(here, 2.0)), 1.0 / (h * h));
+        /* h^2, and rounding of 1e-16 over h^2 */
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(slope, tangent)), 0.0, 1e-6);
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(curve, bend)), 0.0, 1e-5);
+        passed += path.arcs[i].length_rad;
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(zones_of_navigation), cmocka_unit_test(round_one_cone),
-        cmocka_unit_test(nothing_in_the_way),  cmocka_unit_test(inside_of_cones),
+        cmocka_unit_test(tangent_and_bend_are_derivatives),
+        cmocka_unit_test(zones_of_navigation),
+        cmocka_unit_test(round_one_cone),
+        cmocka_unit_test(nothing_in_the_way),
+        cmocka_unit_test(inside_of_cones),
         cmocka_unit_test(against_brute_force),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

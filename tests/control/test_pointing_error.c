@@ -190,8 +190,78 @@ static void nothing_known_is_no_error(void **state) {
     assert_true(difference(bst_pointing_error_at(&e, 12345, TICKS), BST_QUAT_IDENTITY) == 0.0);
 }
 
+/* The filter of an angle and its rate, written as Kalman's matrices: F = (1 dt; 0 1), white
+ * acceleration of density q, variance of a fix the mean of those across the boresight, at fixes at
+ * uneven times. The boresight lies along x, so that the angle's parts are about y and z. */
+static void uneven_fixes_go_by_kalmans_matrices(void **state) {
+    (void)state;
+    const int64_t ticks[] = {0, 700, 2000, 2150, 4000};
+    const double sx[] = {0.03, 0.05, 0.02, 0.04, 0.03}, sy[] = {0.04, 0.02, 0.06, 0.04, 0.09};
+    const double off[] = {0.5, 0.9, 1.7, 1.4, 3.0}; /* about y; a third of it about z */
+    bst_pointing_error e;
+    make(&e);
+    bst_quat telemetry = bst_quat_look((bst_vec3){1, 0, 0}, (bst_vec3){0, 0, 1});
+    double w = 2.0 * BST_PI * 0.05, q = 0.5 * PX * 0.5 * PX * w * w * w / 8.0;
+    double rate0 = 10.0 * BST_ARCSEC_RAD, angle = 0.0, rate = 0.0;
+    double p[2][2] = {{0.0}};
+    for (int k = 0; k < 5; k++) {
+        bst_vec3 turn = {0.0, off[k] * PX, off[k] * PX / 3.0};
+        bst_attitude_fix fix = fix_of(ticks[k], telemetry, bst_quat_from_rotvec(turn), 0.0);
+        fix.sigma_rad[0] = sx[k] * PX;
+        fix.sigma_rad[1] = sy[k] * PX;
+        fix.sigma_rad[2] = 7.0 * PX;
+        assert_true(bst_pointing_error_update(&e, &fix, TICKS));
+        double r = 0.5 * (sx[k] * sx[k] + sy[k] * sy[k]) * PX * PX, z = off[k] * PX;
+        if (k == 0) {
+            angle = z;
+            p[0][0] = r;
+            p[1][1] = rate0 * rate0;
+        } else {
+            double dt = (double)(ticks[k] - ticks[k - 1]) / TICKS;
+            const double f[2][2] = {{1.0, dt}, {0.0, 1.0}};
+            double m[2][2] = {{q * dt * dt * dt / 3.0, q * dt * dt / 2.0},
+                              {q * dt * dt / 2.0, q * dt}};
+            for (int i = 0; i < 2; i++) {
+                for (int j = 0; j < 2; j++) {
+                    for (int a = 0; a < 2; a++) {
+                        for (int b = 0; b < 2; b++) {
+                            m[i][j] += f[i][a] * p[a][b] * f[j][b];
+                        }
+                    }
+                }
+            }
+            angle += rate * dt;
+            double gain[2] = {m[0][0] / (m[0][0] + r), m[1][0] / (m[0][0] + r)};
+            double miss = z - angle;
+            angle += gain[0] * miss;
+            rate += gain[1] * miss;
+            for (int i = 0; i < 2; i++) {
+                for (int j = 0; j < 2; j++) {
+                    p[i][j] = m[i][j] - gain[i] * m[0][j];
+                }
+            }
+        }
+        /* rounding; turns of 1e-4 rad commute to 1e-9 of each other */
+        bst_assert_close(e.p_ee / p[0][0], 1.0, 1e-9);
+        bst_assert_close(e.p_er, p[0][1], 1e-9 * sqrt(p[0][0] * p[1][1]));
+        bst_assert_close(e.p_rr / p[1][1], 1.0, 1e-9);
+        bst_vec3 got = bst_quat_to_rotvec(e.error);
+        bst_assert_close(got.y / PX, angle / PX, 1e-6);
+        bst_assert_close(got.z / PX, angle / PX / 3.0, 1e-6);
+        bst_assert_close(e.rate_gcrf_radps.y / PX, rate / PX, 1e-6);
+        bst_assert_close(e.rate_gcrf_radps.z / PX, rate / PX / 3.0, 1e-6);
+        bst_vec3 later = bst_quat_to_rotvec(bst_pointing_error_at(&e, ticks[k] + 300, TICKS));
+        bst_assert_close(later.y / PX, (angle + 0.3 * rate) / PX, 1e-6);
+    }
+    /* a roll about the boresight, which stars tell badly, is no reason to leave a fix out */
+    bst_vec3 rolled = {400.0 * PX, 3.0 * PX, PX};
+    bst_attitude_fix fix = fix_of(5000, telemetry, bst_quat_from_rotvec(rolled), 0.03 * PX);
+    assert_true(bst_pointing_error_update(&e, &fix, TICKS));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(uneven_fixes_go_by_kalmans_matrices),
         cmocka_unit_test(constant_drift_is_followed_without_lag),
         cmocka_unit_test(error_may_grow_past_half_a_turn),
         cmocka_unit_test(gains_settle_where_the_riccati_equation_says),

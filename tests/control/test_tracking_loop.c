@@ -286,10 +286,106 @@ static void test_observer_gains(void **state) {
     bst_assert_close(beta, 0.21, 0.005);
 }
 
+/* An alpha-beta filter stepped frame by frame: its state after each measurement. */
+typedef struct filter {
+    double complex angle, rate;
+} filter;
+
+static void step_filter(filter *f, double alpha, double beta, double period, double complex z) {
+    double complex ahead = f->angle + f->rate * period, miss = z - ahead;
+    f->angle = ahead + alpha * miss;
+    f->rate += beta / period * miss;
+}
+
+/* A mount that does at once what is asked, from the switch on: the error at any time is the
+ * disturbance less what the newest frame in force says of then. A disturbance exp(i w t) through
+ * the filter, stepped until it is steady; exposures average it by sin(x) / x, x half their phase.
+ */
+static void an_ideal_mount_leaves_what_the_filter_misses(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double period = timing.period_s, alpha = 0.55, beta = 0.2;
+    const bst_control_servo_response ideal = {.delay_s = 0.0};
+    const bst_tracking_observer observer = {alpha, beta, 1.0, 0.0};
+    const double switches[] = {0.03, 0.15}, offsets[] = {0.0, 0.022, 0.071, -0.034};
+    for (int k = 0; k < 2; k++) {
+        bst_tracking_timing when = timing;
+        when.switch_s = switches[k];
+        when.effect_s = switches[k] + 0.02;
+        bst_tracking_loop *loop;
+        bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &when, &ideal, NULL, &observer, &loop));
+        for (double hz = 0.3; hz < 5.0; hz += 0.9) {
+            double w = 2.0 * BST_PI * hz, half = 0.5 * w * when.exposure_s;
+            enum { FRAMES = 300 };
+            static filter states[FRAMES];
+            filter f = {0.0, 0.0};
+            for (int j = 0; j < FRAMES; j++) {
+                step_filter(&f, alpha, beta, period, sin(half) / half * cexp(I * w * j * period));
+                states[j] = f;
+            }
+            for (int o = 0; o < 4; o++) {
+                double t = (FRAMES - 2) * period + offsets[o];
+                int j = (int)floor((t - when.switch_s) / period);
+                double complex known = states[j].angle + states[j].rate * (t - j * period);
+                double complex error =
+                    (cexp(I * w * t) - known) / cexp(I * w * (FRAMES - 2) * period);
+                double complex got = bst_tracking_rejection(loop, w, offsets[o]);
+                bst_assert_close(creal(got), creal(error), 1e-9); /* rounding */
+                bst_assert_close(cimag(got), cimag(error), 1e-9);
+                double complex noise = bst_tracking_noise(loop, w, offsets[o]);
+                double complex apart = (error - cexp(I * w * offsets[o])) * half / sin(half);
+                bst_assert_close(creal(noise), creal(apart), 1e-9);
+                bst_assert_close(cimag(noise), cimag(apart), 1e-9);
+            }
+        }
+        /* white noise: the squares of the answer to one measurement of 1, at the middles to come */
+        double sum = 0.0;
+        filter f = {0.0, 0.0}, past[400];
+        for (int j = 0; j < 400; j++) {
+            step_filter(&f, alpha, beta, period, j == 0 ? 1.0 : 0.0);
+            past[j] = f;
+        }
+        for (int n = 0; n < 390; n++) {
+            int j = (int)floor((n * period - when.switch_s) / period);
+            double e = j < 0 ? 0.0 : creal(past[j].angle + past[j].rate * (n - j) * period);
+            sum += e * e;
+        }
+        bst_assert_close(bst_tracking_noise_gain(loop) / sum, 1.0, 1e-6); /* Parseval, midpoints */
+        bst_tracking_loop_free(loop);
+    }
+}
+
+/* Gains at rest by Kalman's equations in seconds and radians, for frames at other periods. */
+static void gains_at_any_period(void **state) {
+    (void)state;
+    const double periods[] = {0.1, 0.5, 3.0};
+    for (int k = 0; k < 3; k++) {
+        const double dt = periods[k], q = 2e-13, r = 1e-12;
+        double p[3] = {1e-9, 0.0, 1e-9}, gain[2] = {0.0}; /* angle, both, rate */
+        for (int i = 0; i < 20000; i++) {
+            double ee = p[0] + 2.0 * dt * p[1] + dt * dt * p[2] + q * dt * dt * dt / 3.0;
+            double er = p[1] + dt * p[2] + q * dt * dt / 2.0, rr = p[2] + q * dt;
+            gain[0] = ee / (ee + r);
+            gain[1] = er / (ee + r);
+            p[0] = ee - gain[0] * ee;
+            p[1] = er - gain[0] * er;
+            p[2] = rr - gain[1] * er;
+        }
+        double alpha, beta;
+        bst_tracking_observer_gains(q, sqrt(r), dt, &alpha, &beta);
+        bst_assert_close(alpha, gain[0], 1e-9); /* both have settled to rounding */
+        bst_assert_close(beta, gain[1] * dt, 1e-9);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rejection),        cmocka_unit_test(test_margins),
-        cmocka_unit_test(test_observer_margins), cmocka_unit_test(test_variance),
+        cmocka_unit_test(an_ideal_mount_leaves_what_the_filter_misses),
+        cmocka_unit_test(gains_at_any_period),
+        cmocka_unit_test(test_rejection),
+        cmocka_unit_test(test_margins),
+        cmocka_unit_test(test_observer_margins),
+        cmocka_unit_test(test_variance),
         cmocka_unit_test(test_observer_gains),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -80,6 +80,9 @@ static void streak_limit(void **state) {
             double snr2 = b.snr * b.snr;
             bst_assert_close(out[1] * snr2 / (2 * width2), 1, 1e-3); /* the pixel's shape */
             bst_assert_close(out[0] * snr2 / (square / slope), 1, 1e-3);
+            /* without a direction: along x and y */
+            bst_location_bound_along(&b, 0.0, 0.0, out);
+            assert_true(out[0] == b.covariance[0][0] && out[1] == b.covariance[1][1]);
         }
     }
 }

@@ -107,8 +107,61 @@ static void what_is_not_reached_is_not_told(void **state) {
                      1e-9); /* order of summation */
 }
 
+/* Counts whose probit is 1.1 u - 0.06 u^2, u = snr - 6, which three terms fit exactly. The
+ * deviation is what the trials' scatter makes of the place found, by moving each point's count in
+ * turn. */
+static void the_deviation_of_a_bent_curve(void **state) {
+    (void)state;
+    const int64_t trials = 1000000;
+    bst_pd_point points[16];
+    int count = 0;
+    for (double u = -2.0; u <= 3.01; u += 0.5) {
+        double pd = bst_eval_normal_tail(-(1.1 * u - 0.06 * u * u));
+        points[count++] = (bst_pd_point){6.0 + u, trials, (int64_t)llround(pd * (double)trials)};
+    }
+    bst_pd_needed needed = bst_pd_snr_at(points, count, 0.0, 0.9);
+    /* 1.1 u - 0.06 u^2 = 1.2815516 at u = 1.25053: counts are rounded to 1e-6 */
+    double at = (1.1 - sqrt(1.21 - 0.24 * 1.2815516)) / 0.12;
+    bst_assert_close(needed.snr, 6.0 + at, 1e-4);
+    double variance = 0.0;
+    for (int i = 0; i < count; i++) {
+        double pd = (double)points[i].detected / (double)trials, place[2];
+        for (int side = 0; side < 2; side++) {
+            bst_pd_point moved[16];
+            memcpy(moved, points, sizeof moved);
+            moved[i].detected += side ? -1000 : 1000;
+            place[side] = bst_pd_snr_at(moved, count, 0.0, 0.9).snr;
+        }
+        double slope = (place[0] - place[1]) / 2000.0;
+        if (pd > 0.02 && pd < 0.98) {
+            variance += slope * slope * (double)trials * pd * (1.0 - pd);
+        }
+    }
+    /* differences over a thousandth of the trials: second order, and the fit's own tolerance */
+    bst_assert_close(needed.sigma / sqrt(variance), 1.0, 0.01);
+}
+
+/* Points end at Pd 0.6 and go on six sigmas farther: where Pd is 0.9, one sigma beyond the last
+ * point that tells, nothing was counted within half a step. */
+static void no_crossing_far_beyond_the_points(void **state) {
+    (void)state;
+    bst_pd_point points[8];
+    int count = 0;
+    for (double u = -1.5; u <= 0.26; u += 0.25) {
+        double pd = bst_eval_normal_tail(-u);
+        points[count++] = (bst_pd_point){6.0 + u, 100000, (int64_t)llround(1e5 * pd)};
+    }
+    points[count - 1] = (bst_pd_point){12.0, 100000, 100000};
+    assert_true(isnan(bst_pd_snr_at(points, count, 0.0, 0.9).snr));
+    /* within half a step: u = 0 is the last point, 0.1 is found */
+    double pd = bst_eval_normal_tail(-0.1);
+    bst_assert_close(bst_pd_snr_at(points, count, 0.0, pd).snr, 6.1, 1e-3); /* rounded counts */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_deviation_of_a_bent_curve),
+        cmocka_unit_test(no_crossing_far_beyond_the_points),
         cmocka_unit_test(a_known_loss_is_found),
         cmocka_unit_test(chance_is_taken_off),
         cmocka_unit_test(the_deviation_is_as_told),

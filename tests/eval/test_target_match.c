@@ -60,6 +60,12 @@ static void one_detection_counts_once(void **state) {
     assert_int_equal(match(t, 2, 2.0, 1, between), 1);
     assert_int_equal(of_target[0], 0);
     assert_int_equal(of_target[1], -1);
+    /* 2 from the first target and 1 from the second: the nearer one has it */
+    const double nearer[][2] = {{12.0, 10}};
+    assert_int_equal(match(t, 2, 2.0, 1, nearer), 1);
+    assert_int_equal(of_detection[0], 1);
+    assert_int_equal(of_target[0], -1);
+    assert_int_equal(of_target[1], 0);
     /* the nearest of several, whatever their order; the other is the target's too */
     const double several[][2] = {{11.5, 10}, {10.2, 10}, {9, 10}, {13.1, 10}, {40, 40}};
     assert_int_equal(match(t, 2, 2.0, 5, several), 2);

@@ -305,8 +305,154 @@ static void track_metrics_by_hand(void **state) {
     bst_track_metrics_free(m);
 }
 
+/* Two correlated measurements of a place that moves evenly but for noise of acceleration: the
+ * second is the place, their difference over dt the rate, whose variance has q dt^3 / 3 of the
+ * first one's way back in it. */
+static void bound_of_two_correlated_measurements(void **state) {
+    (void)state;
+    const double dt = 0.5, q = 3e-13;
+    const double r1[3] = {4e-14, -1e-14, 1e-14}, r2[3] = {1e-14, 2e-14, 9e-14};
+    const double sum[2][2] = {{5e-14, 1e-14}, {1e-14, 10e-14}}; /* r1 + r2 */
+    const double second[2][2] = {{1e-14, 2e-14}, {2e-14, 9e-14}};
+    bst_track_bound b;
+    double p[4][4];
+    assert_true(bst_track_bound_start(&b, r1, r2, dt, q));
+    assert_true(bst_track_bound_covariance(&b, p));
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            double noise = i == j ? q * dt * dt * dt / 3.0 : 0.0;
+            /* two inversions of condition 100 */
+            bst_assert_close(p[i][j] / second[i][j], 1.0, 1e-10);
+            bst_assert_close(p[i][j + 2] / (second[i][j] / dt), 1.0, 1e-10);
+            bst_assert_close(p[i + 2][j] / (second[i][j] / dt), 1.0, 1e-10);
+            bst_assert_close(p[i + 2][j + 2] / ((sum[i][j] + noise) / (dt * dt)), 1.0, 1e-10);
+        }
+    }
+}
+
+/* out = f p f^T */
+static void carried(const double f[4][4], const double p[4][4], double out[4][4]) {
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            out[i][j] = 0.0;
+            for (int k = 0; k < 4; k++) {
+                for (int l = 0; l < 4; l++) {
+                    out[i][j] += f[i][k] * p[k][l] * f[j][l];
+                }
+            }
+        }
+    }
+}
+
+/* A step from a full covariance along a great circle. Along it the deviation x obeys x'' = 0,
+ * across it x'' = -w^2 x: the transition by the exponential series of [[0, 1], [-w^2, 0]] dt. The
+ * update by Kalman's formula for the covariance, of the noise of which `factor` is the
+ * information's share. */
+static void bound_of_a_step_with_everything(void **state) {
+    (void)state;
+    const double dt = 2.0, w = 0.4, q = 2e-15, factor = 0.6;
+    const double r1[3] = {4e-14, -1e-14, 1e-14}, r2[3] = {1e-14, 2e-14, 9e-14};
+    const double r[3] = {3e-14, 1e-14, 1e-14};
+    bst_track_bound b;
+    double was[4][4], got[4][4], p[4][4], f[4][4] = {{0}}, rate[2] = {0.0, w};
+    assert_true(bst_track_bound_start(&b, r1, r2, 1.0, 0.0));
+    assert_true(bst_track_bound_covariance(&b, was));
+    for (int axis = 0; axis < 2; axis++) {
+        double a[2][2] = {{0.0, dt}, {-rate[axis] * rate[axis] * dt, 0.0}};
+        double term[2][2] = {{1, 0}, {0, 1}}, sum[2][2] = {{1, 0}, {0, 1}};
+        for (int n = 1; n <= 30; n++) { /* 0.8^30 / 30! is nothing */
+            double next[2][2];
+            for (int i = 0; i < 2; i++) {
+                for (int j = 0; j < 2; j++) {
+                    next[i][j] = (term[i][0] * a[0][j] + term[i][1] * a[1][j]) / n;
+                    sum[i][j] += next[i][j];
+                }
+            }
+            memcpy(term, next, sizeof term);
+        }
+        for (int i = 0; i < 2; i++) {
+            for (int j = 0; j < 2; j++) {
+                f[axis + 2 * i][axis + 2 * j] = sum[i][j];
+            }
+        }
+    }
+    carried((const double(*)[4])f, (const double(*)[4])was, p);
+    for (int i = 0; i < 2; i++) {
+        p[i][i] += q * dt * dt * dt / 3.0;
+        p[i][i + 2] += q * dt * dt / 2.0;
+        p[i + 2][i] += q * dt * dt / 2.0;
+        p[i + 2][i + 2] += q * dt;
+    }
+    double s[3] = {p[0][0] + r[0] / factor, p[0][1] + r[1] / factor, p[1][1] + r[2] / factor};
+    double det = s[0] * s[2] - s[1] * s[1];
+    double inverse[2][2] = {{s[2] / det, -s[1] / det}, {-s[1] / det, s[0] / det}};
+    assert_true(bst_track_bound_step(&b, dt, w, q, r, factor));
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < i; j++) {
+            assert_true(b.information[i][j] == b.information[j][i]);
+        }
+    }
+    assert_true(bst_track_bound_covariance(&b, got));
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            double want = p[i][j];
+            for (int k = 0; k < 2; k++) {
+                for (int l = 0; l < 2; l++) {
+                    want -= p[i][k] * inverse[k][l] * p[l][j];
+                }
+            }
+            /* inversions of condition 1e3 */
+            bst_assert_close(got[i][j], want, 1e-10 * sqrt(p[i][i] * p[j][j]));
+        }
+    }
+}
+
+/* Steps with fewer runs have bounds of their own. chi-square of two degrees of freedom: -2
+ * ln(0.975) = 0.0506 and -2 ln(0.025) = 7.378; of four: 0.484 and 11.143 (Abramowitz and
+ * Stegun, 26.8). */
+static void fewer_runs_have_wider_bounds(void **state) {
+    (void)state;
+    enum { RUNS = 2, STEPS = 6 };
+    const double values[RUNS * STEPS] = {0.3, 8.0,         2.0, 6.0, 0.2, NAN, /* first run */
+                                         NAN, (double)NAN, 1.0, 2.0, 0.2, NAN};
+    bst_consistency c;
+    bst_consistency_check(values, RUNS, STEPS, 2, 0.95, &c);
+    assert_int_equal(c.runs, 2);
+    assert_int_equal(c.steps, 6);
+    assert_int_equal(c.steps_judged, 5);
+    bst_assert_close(c.inside, 3.0 / 5.0, 1e-15); /* 0.3 of two, 3 and 8 of four */
+    bst_assert_close(c.above, 1.0 / 5.0, 1e-15);  /* 8 of two */
+    bst_assert_close(c.below, 1.0 / 5.0, 1e-15);  /* 0.4 of four */
+    bst_assert_close(c.mean_over_dof, (0.3 + 8.0 + 3.0 + 8.0 + 0.4) / 8.0 / 2.0, 1e-15);
+}
+
+/* A track is false when it is with an object in less than half of its frames. */
+static void half_of_its_frames_make_a_track_true(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_track_metrics *m;
+    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 1, 4, 3, 1e-4, &m));
+    const bst_vec3 truth = bst_vec3_from_radec(0.0, 0.0), far = bst_vec3_from_radec(0.2, 0.3);
+    const bool visible = true;
+    /* of six frames, track 1 has the object in two, 2 in three: 1 is false */
+    for (int k = 0; k < 6; k++) {
+        const int64_t ids[2] = {1, 2};
+        const bst_vec3 d[2] = {k < 2 ? truth : far, k >= 3 ? truth : far};
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, k, &truth, &visible, ids, d, 2));
+    }
+    bst_track_figures f;
+    bst_track_metrics_figures(m, &f);
+    assert_int_equal(f.tracks, 2);
+    assert_int_equal(f.false_tracks, 1);
+    bst_track_metrics_free(m);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(quantiles_of_the_tables),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(bound_of_two_correlated_measurements),
+                                       cmocka_unit_test(bound_of_a_step_with_everything),
+                                       cmocka_unit_test(fewer_runs_have_wider_bounds),
+                                       cmocka_unit_test(half_of_its_frames_make_a_track_true),
+                                       cmocka_unit_test(quantiles_of_the_tables),
                                        cmocka_unit_test(true_covariances_are_inside),
                                        cmocka_unit_test(bound_of_a_straight_line),
                                        cmocka_unit_test(information_left_in_clutter),

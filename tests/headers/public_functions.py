@@ -35,7 +35,12 @@ def is_documented(text, code, start, end):
     if re.match(r"[ \t]*/\*", text[end + 1:]):
         return True
     above = text[:start].rstrip(" \t")
-    return above.endswith("*/\n") and not code[:start].rstrip(" \t\n").endswith("\\")
+    if not above.endswith("*/\n") or code[:start].rstrip(" \t\n").endswith("\\"):
+        return False
+    opening = above.rindex("/*")
+    behind = above[above.rfind("\n", 0, opening) + 1:opening].strip()  # it is of the declaration before it
+    heading = re.fullmatch(r"/\*[\s-]*(\w+\.c|[^/]*----)\s*\*/\n", above[opening:])
+    return not behind and not heading
 
 
 def declarations(path):

@@ -28,6 +28,8 @@ typedef struct scene {
     body star[1024], body[MOST];
     double hot_x[MOST], hot_y[MOST], hot_e[MOST];
     double drift_px[2], roll_rad; /* of the camera, per frame */
+    int width, height;            /* of a frame, in its own pixels */
+    double origin_x, origin_y, binning;
 } scene;
 
 static void open_scene(scene *s, int side, double rate, double false_alarms, int threads) {
@@ -40,6 +42,8 @@ static void open_scene(scene *s, int side, double rate, double false_alarms, int
     s->image = malloc((size_t)side * (size_t)side * sizeof(float));
     assert_non_null(s->image);
     s->key = bst_rng_make_key(7, 0, "test", "stack");
+    s->width = s->height = side;
+    s->binning = 1.0;
 }
 
 static void close_scene(scene *s) {
@@ -56,7 +60,7 @@ static double share(double d) {
 /* A point of this SNR in noise of 1. */
 static void draw(scene *s, double x, double y, double snr) {
     enum { REACH = 7 };
-    int side = (int)s->camera.width_px, cx = (int)floor(x + 0.5), cy = (int)floor(y + 0.5);
+    int cx = (int)floor(x + 0.5), cy = (int)floor(y + 0.5);
     double px[2 * REACH + 1], py[2 * REACH + 1], square_x = 0.0, square_y = 0.0;
     for (int i = -REACH; i <= REACH; i++) {
         px[i + REACH] = share(cx + i - x);
@@ -67,8 +71,9 @@ static void draw(scene *s, double x, double y, double snr) {
     double flux = snr / sqrt(square_x * square_y);
     for (int j = -REACH; j <= REACH; j++) {
         for (int i = -REACH; i <= REACH; i++) {
-            if (cx + i >= 0 && cy + j >= 0 && cx + i < side && cy + j < side) {
-                s->image[(cy + j) * side + cx + i] += (float)(flux * px[i + REACH] * py[j + REACH]);
+            if (cx + i >= 0 && cy + j >= 0 && cx + i < s->width && cy + j < s->height) {
+                s->image[(cy + j) * s->width + cx + i] +=
+                    (float)(flux * px[i + REACH] * py[j + REACH]);
             }
         }
     }
@@ -80,11 +85,14 @@ static bst_quat attitude(const scene *s, int frame) {
                                            s->drift_px[0] * scale * frame, s->roll_rad * frame});
 }
 
-/* Where a place of the first frame is in another. */
+/* Where a place of the first frame is in another, both in pixels of the frames. */
 static void seen_in(const scene *s, int frame, double x, double y, double *u, double *v) {
     bst_quat turn = bst_quat_mul(attitude(s, frame), bst_quat_conj(attitude(s, 0)));
-    assert_true(bst_camera_project(
-        &s->camera, bst_quat_rotate(turn, bst_camera_unproject(&s->camera, x, y)), u, v));
+    bst_vec3 seen = bst_camera_unproject(&s->camera, s->origin_x + s->binning * x,
+                                         s->origin_y + s->binning * y);
+    assert_true(bst_camera_project(&s->camera, bst_quat_rotate(turn, seen), u, v));
+    *u = (*u - s->origin_x) / s->binning;
+    *v = (*v - s->origin_y) / s->binning;
 }
 
 static void draw_body(scene *s, const body *b, int frame) {
@@ -94,7 +102,7 @@ static void draw_body(scene *s, const body *b, int frame) {
 }
 
 static void make_frame(scene *s, int block, int frame) {
-    int side = (int)s->camera.width_px, pixels = side * side;
+    int pixels = s->width * s->height;
     uint64_t number = (uint64_t)(block * FRAMES + frame);
     for (int i = 0; i < pixels; i += 2) {
         double two[2];
@@ -109,7 +117,7 @@ static void make_frame(scene *s, int block, int frame) {
         draw_body(s, &s->body[i], frame);
     }
     for (int i = 0; i < s->hot; i++) {
-        s->image[(int)s->hot_y[i] * side + (int)s->hot_x[i]] += (float)s->hot_e[i];
+        s->image[(int)s->hot_y[i] * s->width + (int)s->hot_x[i]] += (float)s->hot_e[i];
     }
     for (int i = 0; i < s->hits; i++) { /* charge in two pixels side by side */
         double u = bst_rng_uniform(s->key, number, (uint64_t)(pixels + 3 * i));
@@ -121,25 +129,27 @@ static void make_frame(scene *s, int block, int frame) {
 }
 
 static const bst_stack_found *search(scene *s, int block, int *count) {
-    int side = (int)s->camera.width_px;
+    int width = s->width, height = s->height;
     for (int i = 0; i < FRAMES; i++) {
         make_frame(s, block, i);
-        bst_background_estimate(&s->background, s->image, side, side, 1e-3f);
+        bst_background_estimate(&s->background, s->image, width, height, 1e-3f);
         float level[SIDE], inverse[SIDE];
-        for (int y = 0; y < side; y++) {
+        for (int y = 0; y < height; y++) {
             bst_background_row(&s->background, y, level, inverse);
-            for (int x = 0; x < side; x++) {
-                s->image[y * side + x] -= level[x];
+            for (int x = 0; x < width; x++) {
+                s->image[y * width + x] -= level[x];
             }
         }
         bst_stack_frame frame = {.signal = s->image,
                                  .background = &s->background,
-                                 .width = side,
-                                 .height = side,
+                                 .width = width,
+                                 .height = height,
                                  .sigma_px = SIGMA_PX,
                                  .time_s = 2.0 * i,
                                  .q_cam_from_gcrf = attitude(s, i),
-                                 .binning = 1.0};
+                                 .origin_x_px = s->origin_x,
+                                 .origin_y_px = s->origin_y,
+                                 .binning = s->binning};
         assert_int_equal(bst_stack_add(s->stack, &frame), i + 1);
     }
     return bst_stack_search(s->stack, count);
@@ -151,7 +161,9 @@ static int find(const scene *s, const bst_stack_found *found, int count, const b
     double u, v, t = 0.5 * (FRAMES - 1);
     seen_in(s, FRAMES - 1, b->x + b->vx * t, b->y + b->vy * t, &u, &v);
     for (int i = 0; i < count; i++) {
-        if (hypot(found[i].x_px - u, found[i].y_px - v) < FWHM_PX) {
+        double x = (found[i].x_px - s->origin_x) / s->binning;
+        double y = (found[i].y_px - s->origin_y) / s->binning;
+        if (hypot(x - u, y - v) < FWHM_PX) {
             return i;
         }
     }
@@ -426,8 +438,69 @@ static void bad_arguments(void **state) {
     }
 }
 
+/* A window of binned pixels under a camera that drifts and rolls: places and rates come in sensor
+ * pixels, those of the last frame, and are as wrong as they say. */
+static void places_of_a_binned_window(void **state) {
+    (void)state;
+    for (int b = 1; b <= 2; b++) {
+        scene *s = new_scene();
+        s->width = 208;
+        s->height = 144;
+        s->binning = b;
+        s->origin_x = 40.0 + 0.5 * (b - 1);
+        s->origin_y = 160.0 + 0.5 * (b - 1);
+        s->drift_px[0] = 0.9 * b;
+        s->drift_px[1] = -0.4 * b;
+        s->roll_rad = 1e-3;
+        for (int i = 0; i < 12; i++) {
+            s->body[i] = (body){36.3 + 45.1 * (i % 4), 30.2 + 41.7 * (i / 4), 0.5 * (i % 5) - 1.1,
+                                0.7 - 0.4 * (i % 4), 3.5};
+        }
+        s->bodies = 12;
+        int count, matched = 0;
+        double chi_place = 0.0, chi_rate = 0.0, light = 0.0;
+        const bst_stack_found *found = search(s, b, &count);
+        for (int i = 0; i < s->bodies; i++) {
+            const body *o = &s->body[i];
+            int k = find(s, found, count, o);
+            if (k < 0 || found[k].frames < FRAMES) { /* light of others is taken out beside it */
+                continue;
+            }
+            matched++;
+            double last[2], before[2], t = 0.5 * (FRAMES - 1);
+            seen_in(s, FRAMES - 1, o->x + o->vx * t, o->y + o->vy * t, &last[0], &last[1]);
+            seen_in(s, FRAMES - 1, o->x + o->vx * (t - 1), o->y + o->vy * (t - 1), &before[0],
+                    &before[1]);
+            const bst_stack_found *f = &found[k];
+            double x = f->x_px - (s->origin_x + b * last[0]);
+            double y = f->y_px - (s->origin_y + b * last[1]);
+            assert_true(f->cov_xy == 0.0);
+            chi_place += x * x / f->cov_xx + y * y / f->cov_yy;
+            x = f->rate_x_pxps - 0.5 * b * (last[0] - before[0]); /* 2 s between frames */
+            y = f->rate_y_pxps - 0.5 * b * (last[1] - before[1]);
+            chi_rate += (x * x + y * y) / (f->rate_sigma_pxps * f->rate_sigma_pxps);
+            /* SNR 3.5 in noise of 1: the light is that over the norm of its image, sum of squares
+             * 1 / (4 pi (sigma^2 + 1/12)) */
+            double wide = SIGMA_PX * SIGMA_PX + 1.0 / 12.0;
+            light += f->flux_e / (3.5 * sqrt(4.0 * BST_PI * wide));
+            bst_assert_close(f->flux_sigma_e / f->flux_e, 1.0 / f->snr, 1e-9);
+        }
+        print_message("%d places %.2f rates %.2f light %.3f\n", matched, chi_place / (2 * matched),
+                      chi_rate / (2 * matched), light / matched);
+        assert_in_range(matched, 8, 12);
+        /* chi-square of 2 matched degrees of freedom, 16 at least: its mean 1 +- 0.35 each;
+         * interpolation and the bytes of the maps add a little */
+        assert_true(chi_place / (2 * matched) > 0.3 && chi_place / (2 * matched) < 2.4);
+        assert_true(chi_rate / (2 * matched) > 0.3 && chi_rate / (2 * matched) < 2.4);
+        bst_assert_close(light / matched, 1.0, 0.1); /* SNR 14 each, 3 % in all; maps */
+        close_scene(s);
+        free(s);
+    }
+}
+
 int main(int argc, char **argv) {
     const struct CMUnitTest quick[] = {
+        cmocka_unit_test(places_of_a_binned_window),
         cmocka_unit_test(threshold_in_closed_form),
         cmocka_unit_test(false_alarms_as_asked),
         cmocka_unit_test(faint_bodies_found),

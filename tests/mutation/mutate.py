@@ -13,8 +13,9 @@ file equals that of the sound source cannot be noticed and does not count. A bug
 crashes or exceeds its time. Tests run in the order of their last duration, and the first failure ends a bug's trial.
 With --work the copy is kept, and the next call takes over only what has changed since.
 
-The unit suite judges a file by the unit tests of its own folder. The command line, sim/app, has few of those: its tests
-are the e2e suite. The unit suite therefore leaves sim/app out (--files still takes its files).
+The unit suite judges a file by the unit tests of its own part of the tree: sim/world/orbit/… by world_…, tracker/… by
+tracker_…. The command line, sim/app, has few of those: its tests are the e2e suite. The unit suite therefore leaves
+sim/app out (--files still takes its files).
 
 --coverage names a folder for a build with gcov (made there, kept up to date): every unit test runs once in it, and a
 bug is judged only by the tests that execute its line; where none does, by all of its folder.
@@ -47,6 +48,7 @@ UNIT_TESTS = {f"sim/{name}": name for name in (
     "core", "messages", "dynamics", "astro", "device", "catalogue", "optics", "world", "onboard", "io", "link",
     "engine", "eval", "studies", "registry", "cli", "run", "analysis", "export", "report", "study_kinds", "bench")}
 UNIT_TESTS["sim/app"] = "app|bad_input"
+UNIT_TESTS["sim/onboard"] = "onboard|world_cue"  # the cue as the spacecraft and the world have it
 
 AXES = [(r"\.x\b", ".y"), (r"\.y\b", ".x"), (r"\.z\b", ".y"), (r"\[0\]", "[1]"), (r"\[1\]", "[0]"), (r"\[2\]", "[1]"),
         (r"\b(\w+)_x\b", r"\1_y"), (r"\b(\w+)_y\b", r"\1_x"), (r"\bx_px\b", "y_px"), (r"\by_px\b", "x_px"),
@@ -217,17 +219,26 @@ class Tree:
         return run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *targets]).returncode == 0
 
     def object_of(self, path):
-        folder, name = os.path.split(path)
-        inside = [o for o in self.objects if o.startswith(folder + "/CMakeFiles/") and o.endswith("/" + name + ".o")]
-        return inside[0] if inside else None
+        """The object of a source, by itself or in a unity build of the nearest folder above with a library of its own."""
+        folder = os.path.dirname(path)
+        while folder:
+            rest = re.escape(os.path.relpath(path, folder))
+            made = [o for o in self.objects if re.fullmatch(rf"{re.escape(folder)}/CMakeFiles/[^/]+\.dir/{rest}\.o", o)]
+            for together in [o for o in self.objects if o.startswith(folder + "/CMakeFiles/") and "/Unity/" in o]:
+                with open(os.path.join(self.build, together[:-len(".o")]), encoding="utf-8") as file:
+                    made += [together] if f'/{path}"' in file.read() else []
+            if made:
+                return made[0]
+            folder = os.path.dirname(folder)
+        return None
 
     def tests_for(self, path, suite):
         """Names of the tests that judge a file: those of its folder, or those of the program."""
         if suite == "e2e":
             return e2e_suite.concerned(path, [n for n, (labels, _, _) in self.tests.items() if "e2e" in labels])
         else:
-            folder = os.path.dirname(path)
-            prefix = UNIT_TESTS.get(folder, folder.split("/")[0])
+            top = "/".join(path.split("/")[:2])
+            prefix = UNIT_TESTS.get(top, path.split("/")[0])
             names = [n for n, (labels, _, _) in self.tests.items()
                      if re.match(rf"(?:{prefix})_", n) and "unit" in labels and "slow" not in labels]
         return sorted(set(names) - self.unsound, key=lambda n: self.costs.get(n, 1.0))

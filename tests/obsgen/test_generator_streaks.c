@@ -62,11 +62,18 @@ static void the_edge_cuts(void **state) {
     start(&s);
     double light = electrons_of(&s, 400.0);
     bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
+    s.frame.streak_dx_px = 40.0;
+    /* in the middle of the frame first */
+    item->x_start_px = 480.0;
+    item->x_centroid_px = 500.0;
+    item->x_end_px = 520.0;
+    bst_generator_result r = run(&s, 0);
+    assert_int_equal(r.count, 1);
+    double whole = r.items[0].detection.snr;
     item->x_start_px = -20.0;
     item->x_centroid_px = 0.0;
     item->x_end_px = 20.0;
-    s.frame.streak_dx_px = 40.0;
-    bst_generator_result r = run(&s, 0);
+    r = run(&s, 0);
     assert_int_equal(r.count, 1);
     const bst_detection *d = &r.items[0].detection;
     assert_true(d->flags & BST_DETECTION_EDGE);
@@ -81,8 +88,12 @@ static void the_edge_cuts(void **state) {
     assert_int_equal(r.count, 1);
     d = &r.items[0].detection;
     assert_false(d->flags & BST_DETECTION_STREAK);
-    /* -0.5 to 4 are on the frame */
+    /* -0.5 to 4 are on the frame: 4.5 of 40 px of the light, to a sixth of a PSF's width, and the
+     * root of that of the SNR */
     bst_assert_close(d->x_px, 1.75, 1.0);
+    bst_assert_close(d->flux_e / light, 4.5 / 40.0, 0.015);
+    bst_assert_close(d->snr / whole, sqrt(4.5 / 40.0), 0.03);
+    bst_assert_close(d->v_mag, bst_camera_v_mag(&s.camera, d->flux_e / s.frame.exposure_s), 1e-9);
     item->x_start_px = -60.0;
     item->x_centroid_px = -40.0;
     item->x_end_px = -20.0;
@@ -239,12 +250,151 @@ static void places_widen_by_what_is_not_known_of_the_path(void **state) {
      * flank and the noise in it, the 3/2 power; counted light makes it less */
     bst_assert_close(trembling[0] / straight[0], wider, 0.06);
     bst_assert_close(trembling[1] / straight[1], pow(wider, 1.5), 0.06);
+}
+
+/* Places of streaks scatter by the bound along the path and across it, turned to x and y: with
+ * c and s the direction, xx = c^2 a + s^2 b, xy = c s (a - b), yy = s^2 a + c^2 b, and what is
+ * stated is that. Also of binned pixels, in sensor pixels. */
+static void slanting_streaks_scatter_as_stated(void **state) {
+    (void)state;
+    const double paths[2][2] = {{12.0, 5.0}, {-8.0, 15.0}};
+    scene s;
+    open_scene(&s);
+    s.settings.capacity = 1000;
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        s.calibration.across_factor[i] = s.calibration.along_factor[i] = 1.0;
+    }
+    s.calibration.phase_bias_px = 0.0;
+    start(&s);
+    for (int k = 0; k < 4; k++) {
+        const double *path = paths[k % 2], length = hypot(path[0], path[1]);
+        const int b = 1 + k / 2;
+        static bst_crlb_table bound;
+        bst_crlb_table_init(&bound, s.frame.sigma_px / b);
+        s.frame.binning = b;
+        s.frame.streak_dx_px = path[0];
+        s.frame.streak_dy_px = path[1];
+        fill(&s, 150.0);
+        for (int i = 0; i < s.truth->count; i++) {
+            s.truth->items[i].x_start_px -= 0.5 * path[0];
+            s.truth->items[i].x_end_px += 0.5 * path[0];
+            s.truth->items[i].y_start_px -= 0.5 * path[1];
+            s.truth->items[i].y_end_px += 0.5 * path[1];
+        }
+        double got[3] = {0.0}, told[3] = {0.0}, noise = 0.0, n = 0.0;
+        for (int f = 0; f < 6; f++) {
+            bst_generator_result r = run(&s, 10 * k + f);
+            noise = r.noise_e;
+            bst_assert_close(r.streak_px, length, 1e-9);
+            for (int i = 0; i < r.count; i++, n += 1.0) {
+                const bst_detection *d = &r.items[i].detection;
+                const bst_truth_item *t = &s.truth->items[r.items[i].item];
+                double x = d->x_px - t->x_centroid_px, y = d->y_px - t->y_centroid_px;
+                const double now[3] = {x * x, x * y, y * y};
+                const double says[3] = {d->cov_xx, d->cov_xy, d->cov_yy};
+                for (int a = 0; a < 3; a++) {
+                    got[a] += now[a];
+                    told[a] += says[a];
+                }
+                /* FWHM of the even path's variance and the PSF's; its direction */
+                double wide = 2.3548200450309493 *
+                              sqrt(s.frame.sigma_px * s.frame.sigma_px + length * length / 12.0);
+                bst_assert_close(d->length_px, wide, 1e-9);
+                bst_assert_close(sin(d->angle_rad) * path[0] - cos(d->angle_rad) * path[1], 0.0,
+                                 1e-9);
+            }
+        }
+        assert_true(n > 5300.0);
+        double flux = s.truth->items[0].electrons, c = path[0] / length, e = path[1] / length;
+        bst_crlb_table_at at = bst_crlb_table_of(&bound, flux, noise, length / b);
+        double along = b * b * at.var_along_px2, across = b * b * at.var_across_px2;
+        assert_true(along > 2.0 * across);
+        const double want[3] = {c * c * along + e * e * across, c * e * (along - across),
+                                e * e * along + c * c * across};
+        double product = want[0] * want[2];
+        const double error[3] = {want[0] * sqrt(2.0 / n), sqrt((product + want[1] * want[1]) / n),
+                                 want[2] * sqrt(2.0 / n)};
+        for (int a = 0; a < 3; a++) {
+            /* four standard errors of moments of normal deviates; told for the measured flux */
+            bst_assert_close(got[a] / n, want[a], 4.0 * error[a]);
+            bst_assert_close(told[a] / n, want[a], 0.02 * sqrt(product));
+        }
+    }
+    close_scene(&s);
+}
+
+/* Deviation of a place along x that is fitted by the gradient of a Gaussian of variance m where the
+ * image has variances x2 and y2, over that with the image's own gradient: by sums over a fine grid,
+ * sqrt(sum m'^2 sum q'^2) / sum m' q'. */
+static double wrong_gradient(double m, double x2, double y2) {
+    double mm = 0.0, qq = 0.0, mq = 0.0;
+    for (int i = -60; i <= 60; i++) {
+        for (int j = -60; j <= 60; j++) {
+            double x = 0.1 * i, y = 0.1 * j;
+            double a = x / m * exp(-0.5 * (x * x + y * y) / m);
+            double b = x / x2 * exp(-0.5 * (x * x / x2 + y * y / y2));
+            mm += a * a;
+            qq += b * b;
+            mq += a * b;
+        }
+    }
+    return sqrt(mm * qq) / mq;
+}
+
+/* An object that moves by 3 px while the stars are at rest is too short to be fitted as a streak.
+ * The gradient of a point finds it worse than the bound of its image says, most along the path. */
+static void short_paths_are_placed_with_a_points_gradient(void **state) {
+    (void)state;
+    const double length = 3.0, c = 0.6, e = 0.8;
+    scene s;
+    open_scene(&s);
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        s.calibration.across_factor[i] = s.calibration.along_factor[i] = 1.0;
+    }
+    s.calibration.phase_bias_px = 0.0;
+    start(&s);
+    static bst_crlb_table bound;
+    bst_crlb_table_init(&bound, s.frame.sigma_px);
+    fill(&s, 150.0);
+    for (int i = 0; i < s.truth->count; i++) {
+        bst_truth_item *item = &s.truth->items[i];
+        item->kind = BST_SOURCE_OBJECT;
+        item->x_start_px -= 0.5 * length * c;
+        item->x_end_px += 0.5 * length * c;
+        item->y_start_px -= 0.5 * length * e;
+        item->y_end_px += 0.5 * length * e;
+    }
+    double along = 0.0, across = 0.0, noise = 0.0, n = 0.0;
+    for (int f = 0; f < 8; f++) {
+        bst_generator_result r = run(&s, f);
+        noise = r.noise_e;
+        for (int i = 0; i < r.count; i++, n += 1.0) {
+            const bst_detection *d = &r.items[i].detection;
+            const bst_truth_item *t = &s.truth->items[r.items[i].item];
+            double x = d->x_px - t->x_centroid_px, y = d->y_px - t->y_centroid_px;
+            along += (c * x + e * y) * (c * x + e * y);
+            across += (c * y - e * x) * (c * y - e * x);
+        }
+    }
+    assert_true(n > 7000.0);
+    bst_crlb_table_at at = bst_crlb_table_of(&bound, s.truth->items[0].electrons, noise, length);
+    double point = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
+    double path = point + length * length / 12.0;
+    const double ratio[2] = {
+        sqrt(along / n / at.var_along_px2) / wrong_gradient(point, path, point),
+        sqrt(across / n / at.var_across_px2) / wrong_gradient(point, point, path)};
+    /* four standard deviations of a root mean square of 7200, 3.3 %, and of both */
+    bst_assert_close(ratio[0], 1.0, 0.033);
+    bst_assert_close(ratio[1], 1.0, 0.033);
+    bst_assert_close(0.5 * (ratio[0] + ratio[1]), 1.0, 0.023);
     close_scene(&s);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(places_widen_by_what_is_not_known_of_the_path),
+        cmocka_unit_test(short_paths_are_placed_with_a_points_gradient),
+        cmocka_unit_test(slanting_streaks_scatter_as_stated),
         cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(the_edge_cuts),
         cmocka_unit_test(long_streaks_are_seen_in_parts),

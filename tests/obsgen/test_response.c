@@ -161,8 +161,79 @@ static void a_psf_goes_by_its_own_image(void **state) {
     bst_psf_free(psf);
 }
 
+static double sinc(double x) {
+    return x == 0.0 ? 1.0 : sin(BST_PI * x) / (BST_PI * x);
+}
+
+/* A Gaussian PSF by its OTF, in pixels of b x b sensor pixels: there it is a Gaussian of sigma / b
+ * on a whole pixel, whose products are sums of error functions. */
+static void binned_pixels_have_their_own_products(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = {.width_px = 64,
+                         .height_px = 64,
+                         .pixel_scale_arcsec = 2.0,
+                         .aperture_m = 0.1,
+                         .psf_fwhm_px = 2.8};
+    const double sigma = 2.8 / 2.3548200450309493, more = 0.9, wide = hypot(sigma, more);
+    bst_psf *psf;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    const bst_response_side source = {psf, more}, filter = {psf, 0.0};
+    for (int b = 1; b <= 4; b *= 2) {
+        bst_response r;
+        bst_response_set(&r, &source, &filter, b, 31.5, 31.5);
+        const bst_obsgen_image_width *const widths[3] = {&r.source, &r.filter, &r.both};
+        const double want[3] = {product_of(wide / b, wide / b), product_of(sigma / b, sigma / b),
+                                product_of(wide / b, sigma / b)};
+        for (int k = 0; k < 3; k++) {
+            double area = 4.0 * BST_PI * widths[k]->across_px * widths[k]->along_px;
+            bst_assert_close(area * want[k], 1.0, 0.003); /* steps of the sums, eight phases */
+        }
+        bst_response_nodes nodes;
+        bst_response_nodes_at(&source, 31.5, 31.5, &nodes);
+        for (int k = 0; k < 9; k++) {
+            double fx = 0.1 * (k % 3), fy = 0.07 * (k / 3), otf[2];
+            bst_response_otf(&source, &nodes, b, fx, fy, otf);
+            double blur = exp(-2.0 * BST_PI * BST_PI * wide * wide * (fx * fx + fy * fy));
+            bst_assert_close(otf[0], blur * sinc(b * fx) * sinc(b * fy), 1e-9);
+            bst_assert_close(otf[1], 0.0, 1e-12);
+        }
+    }
+    bst_psf_free(psf);
+}
+
+/* Products depend on the paths' lengths and the angle between them alone; where the longer one is
+ * straight along x, the width along it counts along x. */
+static void products_turn_with_the_paths(void **state) {
+    (void)state;
+    const bst_obsgen_image_width w = {0.8, 1.1};
+    const bst_obsgen_path_px p = {6.0, 0.0}, q = {2.0, 1.0};
+    /* by sums: Gaussians of variance 2 x 1.1^2 and 2 x 0.8^2 for the difference of two places */
+    enum { PARTS = 200 };
+    double sum = 0.0;
+    for (int i = 0; i < PARTS; i++) {
+        for (int k = 0; k < PARTS; k++) {
+            double u = (i + 0.5) / PARTS - 0.5, v = (k + 0.5) / PARTS - 0.5;
+            double x = u * p.dx - v * q.dx, y = u * p.dy - v * q.dy;
+            sum += exp(-0.25 * (x * x / (1.1 * 1.1) + y * y / (0.8 * 0.8))) /
+                   (4.0 * BST_PI * 1.1 * 0.8) / PARTS / PARTS;
+        }
+    }
+    double straight = bst_response_product(&w, p, q);
+    bst_assert_close(straight / sum, 1.0, 4e-3); /* bst_matched_product takes sums itself */
+    for (int n = 1; n < 12; n++) {
+        double c = cos(0.5 * n), s = sin(0.5 * n);
+        const bst_obsgen_path_px a = {c * p.dx - s * p.dy, s * p.dx + c * p.dy};
+        const bst_obsgen_path_px b = {c * q.dx - s * q.dy, s * q.dx + c * q.dy};
+        bst_assert_close(bst_response_product(&w, a, b) / straight, 1.0, 1e-12);
+        bst_assert_close(bst_response_product(&w, b, a) / straight, 1.0, 1e-12);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(binned_pixels_have_their_own_products),
+        cmocka_unit_test(products_turn_with_the_paths),
         cmocka_unit_test(gaussians_of_other_widths_lose_by_their_product),
         cmocka_unit_test(a_psf_goes_by_its_own_image),
     };

@@ -307,8 +307,223 @@ static void what_is_fitted_as_a_point_has_the_bend(void **state) {
     close_scene(&s);
 }
 
+/* What is seen, from the middle of the window. */
+typedef struct seen_case {
+    double x, y, dx, dy; /* middle and path, sensor px from the window's middle */
+    double tremble;      /* of the path's ends, along (1, 2), px */
+    int binning;
+    bool star; /* the stars' path is its own, else they are at rest */
+} seen_case;
+
+/* A case with everything turned or mirrored by t, and the window with it. */
+static bst_detection see_turned(const scene *of, const seen_case *c, const double t[2][2],
+                                double electrons, int *count) {
+    scene s = *of;
+    s.truth->count = 0;
+    bool upright = t[0][0] != 0.0;
+    int width = upright ? 400 : 240, height = upright ? 240 : 400;
+    s.frame.window = (bst_window){96, 160, width, height};
+    s.frame.binning = c->binning;
+    double x0 = 96 + 0.5 * (width - 1), y0 = 160 + 0.5 * (height - 1);
+    double x = x0 + t[0][0] * c->x + t[0][1] * c->y, y = y0 + t[1][0] * c->x + t[1][1] * c->y;
+    double dx = t[0][0] * c->dx + t[0][1] * c->dy, dy = t[1][0] * c->dx + t[1][1] * c->dy;
+    double ex = c->tremble * (t[0][0] + 2.0 * t[0][1]);
+    double ey = c->tremble * (t[1][0] + 2.0 * t[1][1]);
+    bst_truth_item *item = add_source(&s, 7, x, y, electrons);
+    item->kind = c->star ? BST_SOURCE_STAR : BST_SOURCE_OBJECT;
+    item->x_start_px = x - 0.5 * (dx + ex);
+    item->y_start_px = y - 0.5 * (dy + ey);
+    item->x_end_px = x + 0.5 * (dx + ex);
+    item->y_end_px = y + 0.5 * (dy + ey);
+    double path_x[5], path_y[5];
+    if (c->star) {
+        s.frame.streak_dx_px = dx;
+        s.frame.streak_dy_px = dy;
+    }
+    for (int k = 0; k < 5; k++) {
+        static const double swing[5] = {-0.6, 0.4, -0.1, -0.1, 0.4}; /* of mean 0 */
+        double end = swing[k];
+        path_x[k] = (k / 4.0 - 0.5) * s.frame.streak_dx_px + end * ex;
+        path_y[k] = (k / 4.0 - 0.5) * s.frame.streak_dy_px + end * ey;
+    }
+    s.frame.path_x_px = path_x;
+    s.frame.path_y_px = path_y;
+    s.frame.path_count = c->tremble != 0.0 ? 5 : 0;
+    bst_generator_result r = run(&s, 3);
+    bst_detection d = {0};
+    *count = r.count;
+    if (r.count > 0) {
+        d = r.items[0].detection;
+        d.x_px -= x0;
+        d.y_px -= y0;
+    }
+    return d;
+}
+
+/* Draws go by names, so that a scene that is turned by right angles or mirrored shows the same,
+ * turned or mirrored: no axis and no side of the window differs from the others. */
+static void no_side_differs_from_the_others(void **state) {
+    (void)state;
+    const seen_case cases[] = {
+        {0, 113, 14, 2, 0, 1, true}, /* beside an edge, along it */
+        {10.3, 20.6, 0, 0, 0, 1, true}, {-40, 31, 9, 4, 0, 1, true},
+        {150, 118.5, 9, 4, 0, 1, true}, {199.7, 60, 0, 0, 0, 1, true}, /* on the right edge */
+        {196, 50, 14, 6, 0, 1, true},                                  /* cut by it */
+        {203, 50, 14, 6, 0, 1, true},                                  /* its middle is outside */
+        {60, -123, 5, 14, 0, 1, true},  {-40, 31, 9, 4, 0.9, 1, true},
+        {-40, 31, 9, 4, 0, 1, false},   {-40, 31, 2.5, -1.5, 0, 1, false},
+        {10.3, 20.6, 0, 0, 0, 2, true}, {30, -119, 0, 0, 0, 2, true},
+        {-40, 31, 18, -8, 0, 2, true},  {-40, 31, 18, -8, 0.9, 2, true},
+        {60, -123, 6, 28, 0, 2, true},
+    };
+    const double turns[8][2][2] = {{{1, 0}, {0, 1}},  {{0, -1}, {1, 0}}, {{-1, 0}, {0, -1}},
+                                   {{0, 1}, {-1, 0}}, {{-1, 0}, {0, 1}}, {{1, 0}, {0, -1}},
+                                   {{0, 1}, {1, 0}},  {{0, -1}, {-1, 0}}};
+    scene s;
+    open_scene(&s);
+    s.calibration.phase_bias_px = 0.0;
+    start(&s);
+    const double electrons = electrons_of(&s, 120.0);
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
+        int found, now;
+        const bst_detection a = see_turned(&s, &cases[n], turns[0], electrons, &found);
+        assert_int_equal(found, 1);
+        for (int k = 1; k < 8; k++) {
+            const double(*t)[2] = turns[k];
+            const bst_detection b = see_turned(&s, &cases[n], t, electrons, &now);
+            assert_int_equal(now, 1);
+            /* rounding; the table of the bound is in single precision */
+            bst_assert_close(b.snr / a.snr, 1.0, 1e-6);
+            bst_assert_close(b.flux_e / a.flux_e, 1.0, 1e-6);
+            bst_assert_close(b.flux_sigma_e / a.flux_sigma_e, 1.0, 1e-6);
+            bst_assert_close(b.v_mag, a.v_mag, 1e-6);
+            bst_assert_close(b.length_px, a.length_px, 1e-6);
+            bst_assert_close(b.width_px, a.width_px, 1e-6);
+            assert_int_equal(b.flags, a.flags);
+            assert_int_equal(b.label, a.label);
+            double size = a.cov_xx + a.cov_yy;
+            double xx = t[0][0] * t[0][0] * a.cov_xx + t[0][1] * t[0][1] * a.cov_yy;
+            double yy = t[1][0] * t[1][0] * a.cov_xx + t[1][1] * t[1][1] * a.cov_yy;
+            double xy = (t[0][0] * t[1][1] + t[0][1] * t[1][0]) * a.cov_xy;
+            bst_assert_close(b.cov_xx, xx, 1e-6 * size);
+            bst_assert_close(b.cov_yy, yy, 1e-6 * size);
+            bst_assert_close(b.cov_xy, xy, 1e-6 * size);
+            double c = t[0][0] * cos(a.angle_rad) + t[0][1] * sin(a.angle_rad);
+            double e = t[1][0] * cos(a.angle_rad) + t[1][1] * sin(a.angle_rad);
+            if (cases[n].dx != 0.0) { /* a direction, either way */
+                bst_assert_close(sin(b.angle_rad) * c - cos(b.angle_rad) * e, 0.0, 1e-9);
+            }
+            if (k < 4 && cases[n].dx != 0.0) { /* errors are drawn along and across the path */
+                bst_assert_close(b.x_px, t[0][0] * a.x_px + t[0][1] * a.y_px, 1e-5);
+                bst_assert_close(b.y_px, t[1][0] * a.x_px + t[1][1] * a.y_px, 1e-5);
+            }
+        }
+    }
+    close_scene(&s);
+}
+
+/* False alarms lie evenly on a window that is no square, of binned pixels; each says of itself what
+ * the bound says of its shape: along and across the stars' path where it was found by their filter.
+ */
+static void false_alarms_fill_the_window(void **state) {
+    (void)state;
+    const double path[2] = {18.0, -8.0}, length = hypot(path[0], path[1]);
+    const double c = path[0] / length, e = path[1] / length;
+    const int b = 2;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 400.0;
+    s.frame.window = (bst_window){96, 160, 400, 240};
+    s.frame.binning = b;
+    s.frame.streak_dx_px = path[0];
+    s.frame.streak_dy_px = path[1];
+    start(&s);
+    static bst_crlb_table bound;
+    double sigma = s.frame.sigma_px / b;
+    bst_crlb_table_init(&bound, sigma);
+    double n = 0.0, drawn = 0.0, sum[5] = {0.0};
+    for (int f = 0; f < 10; f++) {
+        bst_generator_result r = run(&s, f);
+        for (int i = 0; i < r.count; i++, n += 1.0) {
+            const bst_detection *d = &r.items[i].detection;
+            double u = (d->x_px - 95.5) / 400.0, v = (d->y_px - 159.5) / 240.0;
+            assert_true(u >= 0.0 && u <= 1.0 && v >= 0.0 && v <= 1.0);
+            const double terms[5] = {u - 0.5, v - 0.5, (u - 0.5) * (u - 0.5), (v - 0.5) * (v - 0.5),
+                                     (u - 0.5) * (v - 0.5)};
+            for (int k = 0; k < 5; k++) {
+                sum[k] += terms[k];
+            }
+            bool streak = (d->flags & BST_DETECTION_STREAK) != 0;
+            double own = streak ? length / b : 0.0;
+            drawn += streak;
+            bst_crlb_table_at at = bst_crlb_table_of(&bound, d->flux_e, r.noise_e, own);
+            double along = b * b * at.var_along_px2, across = b * b * at.var_across_px2;
+            double xx = streak ? c * c * along + e * e * across : along;
+            double yy = streak ? e * e * along + c * c * across : across;
+            double xy = streak ? c * e * (along - across) : 0.0;
+            /* rounding */
+            bst_assert_close(d->cov_xx, xx, 1e-9 * along);
+            bst_assert_close(d->cov_yy, yy, 1e-9 * along);
+            bst_assert_close(d->cov_xy, xy, 1e-9 * along);
+            bst_assert_close(d->flux_e * at.norm / r.noise_e, d->snr, 1e-9 * d->snr);
+            double fwhm = 2.3548200450309493 * b;
+            bst_assert_close(d->width_px, fwhm * sigma, 1e-9);
+            bst_assert_close(d->length_px, fwhm * sqrt(sigma * sigma + own * own / 12.0), 1e-9);
+            bst_assert_close(d->angle_rad, streak ? atan2(path[1], path[0]) : 0.0, 1e-9);
+            /* within two sigmas and half its own extent of a side */
+            double near_x = b * (2.0 * sigma + (streak ? 0.5 * own * fabs(c) : 0.0));
+            double near_y = b * (2.0 * sigma + (streak ? 0.5 * own * fabs(e) : 0.0));
+            double to_x = 400.0 * fmin(u, 1.0 - u), to_y = 240.0 * fmin(v, 1.0 - v);
+            bool edge = to_x < near_x || to_y < near_y;
+            assert_true(((d->flags & BST_DETECTION_EDGE) != 0) == edge);
+        }
+    }
+    assert_true(n > 1000.0 && drawn > 100.0 && drawn < n - 100.0);
+    /* of a uniform number: variance 1/12, that of its square's 1/180; four standard deviations */
+    bst_assert_close(sum[0] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+    bst_assert_close(sum[1] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+    bst_assert_close(sum[2] / n, 1.0 / 12.0, 4.0 * sqrt(1.0 / 180.0 / n));
+    bst_assert_close(sum[3] / n, 1.0 / 12.0, 4.0 * sqrt(1.0 / 180.0 / n));
+    bst_assert_close(sum[4] / n, 0.0, 4.0 / 12.0 / sqrt(n));
+    close_scene(&s);
+}
+
+/* The truth's SNR of a source tells how sharp its image is. One that says what the PSF alone on the
+ * mean background gives, sqrt(b^2 (background + dark) + read noise^2) a pixel, changes nothing;
+ * half of it widens the errors by two. */
+static void a_plain_image_is_as_sharp_as_it_says(void **state) {
+    (void)state;
+    for (int b = 1; b <= 2; b++) {
+        scene s;
+        open_scene(&s);
+        s.calibration.phase_bias_px = 0.0;
+        s.truth->dark_e = 14.0;
+        s.frame.binning = b;
+        start(&s);
+        static bst_crlb_table bound;
+        bst_crlb_table_init(&bound, s.frame.sigma_px / b);
+        double electrons = electrons_of(&s, 120.0), off[3];
+        double noise = sqrt(b * b * (36.0 + 14.0) + 8.0 * 8.0);
+        for (int k = 0; k < 3; k++) {
+            s.truth->count = 0;
+            bst_truth_item *item = add_source(&s, 3, 300.3, 201.6, electrons);
+            double plain = electrons * bst_crlb_table_norm(&bound, 0.0) / noise;
+            item->snr = k == 0 ? 0.0 : k == 1 ? plain : 0.5 * plain;
+            bst_generator_result r = run(&s, 4);
+            assert_int_equal(r.count, 1);
+            off[k] = r.items[0].detection.x_px - 300.3;
+        }
+        bst_assert_close(off[1] / off[0], 1.0, 1e-6); /* the bound's table is in floats */
+        bst_assert_close(off[2] / off[0], 2.0, 1e-6);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_plain_image_is_as_sharp_as_it_says),
+        cmocka_unit_test(false_alarms_fill_the_window),
+        cmocka_unit_test(no_side_differs_from_the_others),
         cmocka_unit_test(places_are_those_of_the_sensor),
         cmocka_unit_test(half_of_the_light_gives_its_root),
         cmocka_unit_test(unknown_jitter_costs_what_the_filter_misses),

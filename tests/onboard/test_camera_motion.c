@@ -196,8 +196,34 @@ static void places_are_as_wrong_as_the_bend(void **state) {
     bst_assert_close(d.cov_yy, 2.09, 1e-14);
 }
 
+/* Samples that alternate by +-e about x have third differences of 8 e, as noise whose variance is
+ * 64 e^2 / 20, half of it on each axis: of 50 samples a bend's variance is 5 / 50 of 1.6 e^2. With
+ * a bend b of twice that deviation, 1 - 2 / 4 of it is believed (James and Stein's shrinkage), and
+ * its deviation is sqrt(1/2) of the noise's. */
+static void a_bend_near_the_noise_is_half_believed(void **state) {
+    (void)state;
+    for (int axis = 0; axis < 2; axis++) {
+        const double e = 1e-6, sigma = e * sqrt(1.6 * 5.0 / 50.0), bend = 2.0 * sigma;
+        bst_pointing_telemetry *t = telemetry(60, 60, (bst_vec3){0, 0, 0});
+        for (int n = 0; n < 60; n++) {
+            double u = ((double)(n * 60) - 1800.0) / 1500.0;
+            double off = (n % 2 ? e : -e) + bend * (1.5 * u * u - 0.5);
+            t->items[n].q_cam_from_gcrf =
+                bst_quat_from_rotvec(axis ? (bst_vec3){0, off, 0} : (bst_vec3){off, 0, 0});
+        }
+        bst_camera_motion m;
+        assert_true(bst_camera_motion_from_telemetry(t, 300, 3300, &m));
+        /* what the alternation leaves of a bend, and the chords of the bend: 1 % */
+        bst_assert_close((axis ? m.bend_cam_rad.y : m.bend_cam_rad.x) / bend, 0.5, 0.02);
+        bst_assert_close(axis ? m.bend_cam_rad.x : m.bend_cam_rad.y, 0.0, 1e-12);
+        bst_assert_close(m.bend_sigma_rad / sigma, sqrt(0.5), 0.02);
+        free(t);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_bend_near_the_noise_is_half_believed),
         cmocka_unit_test(noise_is_no_bend),
         cmocka_unit_test(constant_rate),
         cmocka_unit_test(accelerated),

@@ -196,8 +196,61 @@ static void scales_that_contradict(void **state) {
     }
 }
 
+/* 1000 x 600 pixels, boresight 40 px right of and 25 px above the middle, 600 arcsec a pixel. */
+static void light_falls_off_from_the_boresight(void **state) {
+    (void)state;
+    bst_camera c = {.width_px = 1000,
+                    .height_px = 600,
+                    .pixel_scale_arcsec = 600,
+                    .boresight_offset_px = {40.0, -25.0}};
+    const double x0 = 539.5, y0 = 274.5, scale = 600.0 * BST_PI / 648000.0;
+    assert_true(bst_camera_illumination(&c, 0.0, 0.0) == 1.0);
+    /* cos^4 of the angle that the pixel's centre has from the boresight */
+    c.optics.vignetting.model = BST_VIGNETTING_COS4;
+    bst_assert_close(bst_camera_illumination(&c, x0, y0), 1.0, 1e-15);
+    bst_assert_close(bst_camera_illumination(&c, x0 + 300, y0), pow(cos(atan(300 * scale)), 4),
+                     1e-14); /* rounding */
+    bst_assert_close(bst_camera_illumination(&c, x0, y0 - 250), pow(cos(atan(250 * scale)), 4),
+                     1e-14);
+    bst_assert_close(bst_camera_illumination(&c, x0 - 300, y0 + 160),
+                     pow(cos(atan(340 * scale)), 4), 1e-14);
+    /* nothing beyond the limit, all of the model within */
+    c.optics.vignetting.limit_px = 200.0;
+    assert_true(bst_camera_illumination(&c, x0, y0 + 200.01) == 0.0);
+    assert_true(bst_camera_illumination(&c, x0 - 200.01, y0) == 0.0);
+    bst_assert_close(bst_camera_illumination(&c, x0, y0 + 199.99),
+                     pow(cos(atan(199.99 * scale)), 4), 1e-14);
+    c.optics.vignetting.model = BST_VIGNETTING_NONE;
+    assert_true(bst_camera_illumination(&c, x0, y0 + 199.99) == 1.0);
+    assert_true(bst_camera_illumination(&c, x0, y0 + 200.01) == 0.0);
+    /* s = r^2 over half the diagonal's, 500^2 + 300^2 = 340000: at (300, 160) off 0.34, so that
+     * 1 - 0.5 s + 0.3 s^2 - 0.1 s^3 = 1 - 0.17 + 0.03468 - 0.0039304 */
+    c.optics.vignetting = (bst_optics_vignetting){.model = BST_VIGNETTING_POLYNOMIAL,
+                                                  .coefficients = {-0.5, 0.3, -0.1}};
+    bst_assert_close(bst_camera_illumination(&c, x0 + 300, y0 + 160), 0.8607496, 1e-12);
+    bst_assert_close(bst_camera_illumination(&c, x0 - 160, y0 - 300), 0.8607496, 1e-12);
+    c.optics.vignetting.coefficients[0] = -10.0; /* never below none */
+    assert_true(bst_camera_illumination(&c, x0 + 300, y0 + 160) == 0.0);
+}
+
+/* The field that is symmetric about the boresight: twice the way to the nearer edge. */
+static void field_about_a_boresight_off_the_centre(void **state) {
+    (void)state;
+    bst_camera c = {.width_px = 1000, .height_px = 600, .pixel_scale_arcsec = 3};
+    double w, h;
+    for (int side = -1; side <= 1; side += 2) {
+        c.boresight_offset_px[0] = side * 100.0;
+        c.boresight_offset_px[1] = side * -50.0;
+        bst_camera_field_px(&c, &w, &h);
+        bst_assert_close(w, 2.0 * (500 - 100), 1e-12);
+        bst_assert_close(h, 2.0 * (300 - 50), 1e-12);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(light_falls_off_from_the_boresight),
+        cmocka_unit_test(field_about_a_boresight_off_the_centre),
         cmocka_unit_test(scale_from_focal_length_and_pitch),
         cmocka_unit_test(scales_that_contradict),
         cmocka_unit_test(projection_is_gnomonic),

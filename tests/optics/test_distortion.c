@@ -241,8 +241,88 @@ static void reach_holds_the_field(void **state) {
     assert_true(w_px == 10 && h_px == 20);
 }
 
+/* Coefficients of one sign: the second derivative of r (1 + k1 r^2 + k2 r^4 + k3 r^6) is
+ * 6 k1 r + 20 k2 r^3 + 42 k3 r^5, greatest where the bound ends, a tenth beyond the corner; the
+ * tangential terms bend by 6 |p| at most. Corner of 1024 x 768 pixels of 200 arcsec: 640 px. */
+static void curvature_is_bounded_by_the_second_derivative(void **state) {
+    (void)state;
+    const bst_camera_distortion d = {0.2, 0.3, 0.4, 0.03, -0.04};
+    const bst_camera c = make(200, 0, d);
+    double r = 0.0;
+    for (int i = 0; i < 4; i++) {
+        bst_vec3 v = bst_camera_unproject(&c, i & 1 ? 1023.5 : -0.5, i & 2 ? 767.5 : -0.5);
+        r = fmax(r, hypot(v.x, v.y) / v.z);
+    }
+    r *= 1.1;
+    double want = 6 * 0.2 * r + 20 * 0.3 * pow(r, 3) + 42 * 0.4 * pow(r, 5) + 6 * 0.05;
+    bst_assert_close(c.geometry.curvature, want, 1e-9); /* rounding, and the inverse's 1e-10 px */
+}
+
+/* Within image_radius every place has an original: it is how near the image of the domain's edge
+ * comes to the boresight, found here by walking round it. */
+static void image_radius_is_the_nearest_of_the_border(void **state) {
+    (void)state;
+    const bst_camera_distortion cases[] = {{.k1 = -0.3, .p1 = 0.02}, {.k1 = -0.3, .p2 = -0.03}};
+    for (int i = 0; i < 2; i++) {
+        const bst_camera c = make(100, 0, cases[i]);
+        double least = INFINITY, domain = c.geometry.domain * (1 - 1e-9);
+        double scale = bst_camera_scale_rad(&c);
+        for (int k = 0; k < 3600; k++) {
+            double a = 2 * BST_PI * k / 3600, x, y;
+            assert_true(
+                bst_camera_project(&c, (bst_vec3){domain * cos(a), domain * sin(a), 1}, &x, &y));
+            least = fmin(least, scale * hypot(x - 511.5, y - 383.5));
+        }
+        bst_assert_close(c.geometry.image_radius, least, 1e-6); /* 0.05 degrees squared, 1e-9 */
+    }
+}
+
+/* Without turn and tangential terms the fold lies at r = 1 / sqrt(-3 k1). */
+static void beyond_the_fold_by_a_margin(void **state) {
+    (void)state;
+    bst_camera c = make(3, 0, (bst_camera_distortion){0});
+    c.distortion.k1 = k1_that_folds_at(&c, 1.2);
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &c));
+    double fold = 1 / sqrt(-3 * c.distortion.k1), scale = bst_camera_scale_rad(&c);
+    const double off[] = {-1, 1, 9, 11};
+    for (int i = 0; i < 4; i++) {
+        double r = fold + off[i] * scale;
+        assert_true(bst_camera_beyond_fold(&c, (bst_vec3){0.6 * r, 0.8 * r, 1}, 10) ==
+                    (off[i] > 0 && off[i] < 10));
+    }
+    assert_false(bst_camera_beyond_fold(&c, (bst_vec3){0, -fold - scale, -1}, 10));
+}
+
+/* What is beyond the fold is reckoned with where the rectangle reaches beyond its image, 700 px
+ * from (511.5, 383.5): downwards from y = 1083.5 on, upwards from -316.5, to the sides likewise. */
+static void reach_beyond_the_fold(void **state) {
+    (void)state;
+    bst_camera c = make(3, 0, (bst_camera_distortion){0});
+    c.distortion.k1 = k1_that_folds_at(&c, 700.0 / 640.0);
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &c));
+    const struct {
+        double window[4];
+        bool folds;
+    } cases[] = {{{500, 300, 520, 1080}, false}, {{500, 300, 520, 1090}, true},
+                 {{500, -310, 520, 400}, false}, {{500, -330, 520, 400}, true},
+                 {{400, 380, 1208, 390}, false}, {{400, 380, 1218, 390}, true},
+                 {{-185, 380, 600, 390}, false}, {{-195, 380, 600, 390}, true}};
+    for (int i = 0; i < 8; i++) {
+        const double *w = cases[i].window;
+        double with = bst_camera_reach_rad(&c, (bst_vec3){0, 0, 1}, w[0], w[1], w[2], w[3], 50);
+        double plain = bst_camera_reach_rad(&c, (bst_vec3){0, 0, 1}, w[0], w[1], w[2], w[3], 0);
+        bst_assert_close(with - plain, cases[i].folds ? 50 * bst_camera_scale_rad(&c) : 0, 1e-12);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(curvature_is_bounded_by_the_second_derivative),
+        cmocka_unit_test(image_radius_is_the_nearest_of_the_border),
+        cmocka_unit_test(beyond_the_fold_by_a_margin),
+        cmocka_unit_test(reach_beyond_the_fold),
         cmocka_unit_test(convention_is_brown_s_as_opencv_writes_it),
         cmocka_unit_test(rotation_turns_the_focal_plane),
         cmocka_unit_test(unproject_inverts_project),

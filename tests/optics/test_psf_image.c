@@ -85,8 +85,47 @@ static void pixels_hold_the_light_and_its_place(void **state) {
     bst_psf_free(psf);
 }
 
+/* A PSF with coma and astigmatism is its own mirror image in no way. Its image against the sum over
+ * the frequencies that a period of 64 px tells apart, written out. */
+static void an_aberrated_image_is_the_transform_of_its_otf(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = {.width_px = 64,
+                         .height_px = 64,
+                         .pixel_scale_arcsec = 2.0,
+                         .aperture_m = 0.1,
+                         .psf_fwhm_px = 2.0,
+                         .optics = {.psf = BST_PSF_DIFFRACTION, .q = 1.5, .wavelengths = 1}};
+    /* Noll's 5 to 8: astigmatism and coma along both axes */
+    const double waves[] = {0.03, 0.05, 0.12, 0.07};
+    memcpy(camera.optics.zernike_waves.waves + 5 - 2, waves, sizeof waves);
+    bst_psf *psf = psf_of(&camera);
+    static double image[SIDE * SIDE];
+    bst_assert_ok(&ctx, bst_psf_image(&ctx, psf, 0, 0.0, PER_PX, REACH_PX, image));
+    const int places[][2] = {{24, 24}, {27, 24}, {21, 24}, {24, 27}, {24, 21}, {28, 19}, {19, 28}};
+    for (int n = 0; n < 7; n++) {
+        double dx = (double)places[n][0] / PER_PX - REACH_PX;
+        double dy = (double)places[n][1] / PER_PX - REACH_PX, sum = 0.0;
+        for (int ky = -64; ky <= 64; ky++) {
+            for (int kx = -64; kx <= 64; kx++) {
+                double fx = kx / 64.0, fy = ky / 64.0, h[2];
+                bst_psf_otf(psf, 0, fx, fy, h);
+                double a = 2.0 * BST_PI * (fx * dx + fy * dy);
+                sum += (h[0] * cos(a) - h[1] * sin(a)) / (64.0 * 64.0);
+            }
+        }
+        /* light of 4e-9 lies beyond the cut-off in the table of the OTF */
+        bst_assert_close(image[places[n][1] * SIDE + places[n][0]], sum, 1e-8);
+    }
+    /* no mirror images: coma tells left from right and up from down */
+    assert_true(fabs(image[24 * SIDE + 28] - image[24 * SIDE + 20]) > 1e-3);
+    assert_true(fabs(image[28 * SIDE + 24] - image[20 * SIDE + 24]) > 1e-3);
+    bst_psf_free(psf);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_aberrated_image_is_the_transform_of_its_otf),
         cmocka_unit_test(a_gaussian_is_its_closed_form),
         cmocka_unit_test(pixels_hold_the_light_and_its_place),
     };

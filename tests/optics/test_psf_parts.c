@@ -340,8 +340,37 @@ static void jitter_widens_any_psf(void **state) {
     }
 }
 
+/* Two single samples beside each other slantwise: the OTF of samples repeats at the sampling
+ * frequency, and its table goes beyond the half of it. Up to half a cycle per pixel. */
+static void the_table_goes_on_beyond_half_the_sampling(void **state) {
+    (void)state;
+    enum { N = 32 };
+    static float samples[N * N];
+    memset(samples, 0, sizeof samples);
+    samples[16 * N + 16] = 3.0f;
+    samples[17 * N + 15] = 1.0f;
+    bst_camera camera = camera_of(BST_PSF_FILE);
+    camera.optics.file_centre = BST_PSF_CENTROID;
+    const bst_psf_samples given = {samples, N, N, 1, 1.0};
+    const bst_psf_inputs inputs = {.samples = &given};
+    bst_ctx ctx = {0};
+    bst_psf *psf;
+    bst_assert_ok(&ctx, bst_psf_create_from(&ctx, &camera, &inputs, &psf));
+    for (int k = 0; k <= 20; k++) {
+        double fx = 0.49 - 0.002 * (k % 5), fy = -0.48 + 0.048 * k, h[2];
+        bst_psf_otf(psf, 0, fx, fy, h);
+        double a = -2.0 * BST_PI * (0.25 * fx - 0.25 * fy), b = a + 2.0 * BST_PI * (fx - fy);
+        double pixel = sinc(fx) * sinc(fy) / 4.0;
+        /* six nodes of a table of at least 32 per period: 1e-6, and floats */
+        bst_assert_close(h[0], pixel * (3.0 * cos(a) + cos(b)), 1e-5);
+        bst_assert_close(h[1], pixel * (3.0 * sin(a) + sin(b)), 1e-5);
+    }
+    bst_psf_free(psf);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_table_goes_on_beyond_half_the_sampling),
         cmocka_unit_test(a_sampled_psf_has_its_own_otf),
         cmocka_unit_test(what_cannot_be_is_said),
         cmocka_unit_test(a_band_is_the_mean_of_its_wavelengths),

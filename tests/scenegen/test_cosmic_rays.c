@@ -175,8 +175,49 @@ static void windows_agree_with_every_effect(void **state) {
     bst_device_close(device);
 }
 
+/* On a sensor that is no square, with rows longer than it is wide in memory: hits lie evenly, and a
+ * track crosses depth / pitch columns and as many rows on average (2 mu of the cosine law times the
+ * tangent is pi / 2, times 2 / pi of an axis), so that it touches 1 + 2 depth / pitch pixels. */
+static void tracks_cross_columns_and_rows(void **state) {
+    (void)state;
+    enum { WIDTH = 300, HEIGHT = 500, STRIDE = 320, EXPOSURES = 1500 };
+    bst_ctx ctx = {0};
+    bst_cosmic_rays *hits;
+    bst_assert_ok(&ctx, bst_cosmic_rays_create(&ctx, &example, WIDTH, HEIGHT, STRIDE, &hits));
+    double n = 0.0, sum[2] = {0.0}, across = 0.0, down = 0.0;
+    for (int k = 0; k < EXPOSURES; k++) {
+        const bst_cosmic_rays_pixel *pixels;
+        bst_cosmic_rays_summary s;
+        bst_assert_ok(&ctx,
+                      bst_cosmic_rays_draw(&ctx, hits, (bst_rng_key){{3, 4}}, k, 2.0, &pixels, &s));
+        n += s.pixels;
+        for (int i = 0; i < s.pixels; i++) {
+            int x = pixels[i].index % STRIDE, y = pixels[i].index / STRIDE;
+            assert_true(x < WIDTH && y < HEIGHT);
+            sum[0] += (x + 0.5) / WIDTH - 0.5;
+            sum[1] += (y + 0.5) / HEIGHT - 0.5;
+            for (int j = i + 1; j < s.pixels && pixels[j].index <= pixels[i].index + STRIDE; j++) {
+                across += pixels[j].index == pixels[i].index + 1 && x + 1 < WIDTH;
+                down += pixels[j].index == pixels[i].index + STRIDE;
+            }
+        }
+    }
+    double entered = EXPOSURES * 5.0 * 2.0 * WIDTH * HEIGHT * 13e-4 * 13e-4;
+    double ratio = 15.0 / 13.0;
+    /* beyond 20 depths beside the sensor no track is drawn: 1 / 20 of the rows and columns that
+     * they would cross, part of which lie there; the scatter is of long tracks */
+    bst_assert_close(n / entered, 1.0 + 2.0 * ratio, 0.15);
+    bst_assert_close(across / entered, ratio, 0.09);
+    bst_assert_close(down / entered, ratio, 0.09);
+    /* tracks are the independent ones: some 3 pixels each, long ones more */
+    bst_assert_close(sum[0] / n, 0.0, 4.0 * 3.0 * sqrt(1.0 / 12.0 / n));
+    bst_assert_close(sum[1] / n, 0.0, 4.0 * 3.0 * sqrt(1.0 / 12.0 / n));
+    bst_cosmic_rays_free(hits);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(tracks_cross_columns_and_rows),
         cmocka_unit_test(hits_have_their_rate_and_charge),
         cmocka_unit_test(too_many_hits_are_refused),
         cmocka_unit_test(frames_hold_the_hits_of_their_exposure),

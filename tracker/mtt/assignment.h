@@ -10,6 +10,7 @@ typedef struct bst_assignment bst_assignment; /* work space */
 /* Work space for at most `rows` rows and `columns` columns. The caller frees it. */
 bst_status bst_assignment_create(bst_ctx *ctx, int rows, int columns,
                                  bst_assignment **out) BST_MUST_CHECK;
+/* Frees a work space; NULL is allowed. */
 void bst_assignment_free(bst_assignment *work);
 
 /* Row i has candidates first[i] .. first[i + 1] - 1 with edge_columns[] and costs[] (any finite

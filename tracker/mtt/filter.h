@@ -65,22 +65,28 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
                          const bst_filter_models *models, const bst_filter_candidate *candidate,
                          bst_filter_fit *out);
 
+/* Most candidates of bst_filter_update. */
 #define BST_FILTER_CANDIDATES 16
-/* `count` detections (at most BST_FILTER_CANDIDATES) of which one or none is the object's. A
- * hypothesis weighs miss_weight for none, hit_weight times the likelihood of the innovation for a
- * detection: (0, 1) with one detection is the plain Kalman filter, (1 - PD PG, PD / clutter
- * density) gives the posterior of probabilistic data association (Bar-Shalom and Tse 1975) as a
- * mixture. */
+
+/* The candidates of a frame, of which at most one is the object's, and the weights of hypotheses.
+ */
 typedef struct bst_filter_evidence {
-    const bst_filter_candidate *candidates;
-    int count;
-    double miss_weight, hit_weight;
+    const bst_filter_candidate *candidates; /* [count] detections */
+    int count;                              /* 0 to BST_FILTER_CANDIDATES */
+    double miss_weight;                     /* of the hypothesis of a miss */
+    double hit_weight; /* factor on the likelihood of the innovation for that of a detection */
 } bst_filter_evidence;
 
-/* Update by a frame's detections. components = 1: the mixture becomes one Gaussian of the same mean
- * and covariance (for an IMM one per model, whose probability follows the model's total
- * likelihood). More, not with an IMM: up to so many components (at most BST_FILTER_COMPONENTS) live
- * on, so that later detections decide between earlier hypotheses (Salmond 1990). */
+/* Updates a state with the candidates of a frame.
+ *
+ * Given:     models      models of an IMM, or components of a mixture
+ *            components  most components that are kept, 1 to BST_FILTER_COMPONENTS
+ * Notes:     weights (0, 1) with one detection give the Kalman filter. (1 - PD PG, PD / clutter
+ *            density) give the posterior of probabilistic data association as a mixture.
+ *            components = 1 merges the mixture to one Gaussian of the same mean and covariance
+ *            (for an IMM one per model, whose probability follows the model's total likelihood).
+ *            More components, not for an IMM, let later detections decide between hypotheses.
+ * Reference: Bar-Shalom and Tse 1975 (PDA); Salmond 1990 (mixture reduction) */
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
                        bst_filter_models *models, const bst_filter_evidence *evidence,
                        int components);

@@ -6,12 +6,12 @@
  * (Blackman and Popoli 1999, section 6.2) is high enough, so that dense clutter asks for more hits.
  * Frames in which a track lies outside the field count neither for nor against it.
  *
- * Stars that no catalogue has are told by their rate. A track is at rest while its rate is
- * compatible with none, or it has not yet moved by the length of its own image (blends and streaks
- * cut short displace a centroid by so much), and it is not what the cue expects: it is not
- * confirmed, and a pair of detections at one place is taken for such a track before any other
- * pairing. Once its rate is known to be less than any object's it is a star: a fixed direction that
- * keeps its detections from everything else. What is at rest has room of its own.
+ * Stars that are in no catalogue are recognised by their rate. A track is stationary while its rate
+ * is compatible with zero, or while it has not moved by the length of its image (blends and cut
+ * streaks displace a centroid by as much), unless the cue expects it. A stationary track is not
+ * confirmed; a pair of detections at one position starts one before any other pairing. Once its
+ * rate is known to be less than any object's the track is a star: a fixed direction whose
+ * detections no other track gets. Stationary tracks have a capacity of their own.
  *
  * On a sensor with bad pixels a track is confirmed when its detections prefer its motion to one
  * fixed place of the sensor, by a likelihood ratio of at least the number of bad pixels known. */
@@ -61,22 +61,22 @@ typedef struct bst_mtt_params {
     double merge_floor_rad;       /* 1 sigma per axis added to a shared detection */
     int max_merged;               /* frames in a row that a track may live on shared detections */
     double feed_forward_rad;      /* tracks this close to the cue follow the cue's acceleration */
-    double star_rate_radps;       /* the slowest object's; 0: nothing is taken for a star */
-    double motion_chi2; /* of a rate against none that proves motion, 2 degrees of freedom */
+    double star_rate_radps;       /* rate of the slowest object; 0: no track is taken for a star */
+    double motion_chi2; /* chi2 of a rate above which a track moves, 2 degrees of freedom */
     int max_stars;      /* room for tracks at rest */
     double brightness_floor_mag; /* 1 sigma added to every magnitude */
     double brightness_walk_mag;  /* 1 sigma by which an object's brightness changes per frame */
-    /* Manoeuvres and changes of brightness are told by the innovations of the latest event_window
-     * hits (at most BST_MTT_EVENT_WINDOW), with at most so many false events per hour and track of
-     * either kind; 0: none are told. */
+    /* Manoeuvres and changes of brightness are detected in the innovations of the latest
+     * event_window hits (at most BST_MTT_EVENT_WINDOW). false_events_per_hour bounds the false
+     * events of either kind per track; 0: no detection of events. */
     int event_window;
     double false_events_per_hour;
-    /* Deleted tracks that had been confirmed are remembered; what is confirmed where and as one of
-     * them should be by now takes over its identity. */
-    int max_memory;          /* room for them; 0: none is remembered */
-    double memory_s;         /* for so long */
-    double memory_sigma_rad; /* and while the place is known to this, 1 sigma */
-    double memory_chi2;      /* largest misfit of place and rate, 4 degrees of freedom */
+    /* Deleted tracks that had been confirmed are kept. A new confirmed track whose direction and
+     * rate fit the prediction of a kept one takes over its identity. */
+    int max_memory;          /* most tracks kept; 0: none */
+    double memory_s;         /* time that they are kept, s */
+    double memory_sigma_rad; /* and while their direction is known to this, 1 sigma */
+    double memory_chi2;      /* largest misfit of direction and rate, 4 degrees of freedom */
 } bst_mtt_params;
 
 #define BST_MTT_EVENT_WINDOW 16
@@ -216,6 +216,7 @@ typedef struct bst_mtt bst_mtt;
 
 /* The caller frees. All memory is taken here. */
 bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) BST_MUST_CHECK;
+/* Frees a multi-target tracker; NULL is allowed. */
 void bst_mtt_free(bst_mtt *mtt);
 
 /* Takes one frame; frames must come in order of time (later than the one before). At most
@@ -228,6 +229,7 @@ void bst_mtt_skip(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* Tracks after the latest frame, by ascending id, those at rest among them; lent until the next
  * step. */
 const bst_mtt_track *bst_mtt_tracks(const bst_mtt *mtt, int *count);
+/* Track with an identity; NULL if there is none. It belongs to the tracker. */
 const bst_mtt_track *bst_mtt_find(const bst_mtt *mtt, int64_t id);
 /* What happened in the latest frame; lent until the next step. */
 const bst_mtt_event *bst_mtt_events(const bst_mtt *mtt, int *count);

@@ -78,12 +78,14 @@ struct bst_mtt {
     double (*extra)[3];      /* widening of a shared detection, tangent axes of the track */
     bst_mtt_sharing *shared;
     bool *observable;
-    double *departed_chi2; /* of a manoeuvre that the wider gate tells in this frame; 0: none */
+    double
+        *departed_chi2; /* chi2 of a manoeuvre found in this frame with the wider gate; 0: none */
 };
 
 /* A pool with room for `capacity` detections; false without memory. Either way freed by
  * bst_mtt_pool_free. */
 bool bst_mtt_pool_create(bst_mtt_pool *pool, int capacity);
+/* Frees what bst_mtt_pool_create made. */
 void bst_mtt_pool_free(bst_mtt_pool *pool);
 /* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
  * library sort that may allocate. */
@@ -113,35 +115,53 @@ void bst_mtt_look(bst_mtt *mtt, int t, const bst_mtt_frame *frame);
 /* After a detection: notes what the track looks like in full light, if it is in that. */
 void bst_mtt_note_light(bst_mtt_track *track);
 
-/* Carries the memory to a frame; forgets what is too old or too vague. */
+/* Predicts the kept tracks to a frame; drops those that are too old or too uncertain. */
 void bst_mtt_predict_memory(bst_mtt *mtt, const bst_mtt_frame *frame);
-/* A track that has an orbit follows it to a frame; false: it has none, or the frame does not say
- * where the observer is. */
+/* Predicts a track to a frame by its orbit.
+ *
+ * Returned:  false if it has no orbit, or if the frame has no observer position */
 bool bst_mtt_predict_orbit(const bst_mtt *mtt, bst_mtt_track *track, const bst_mtt_frame *frame);
-/* Hands on to the orbits what the frame's detections told, and starts new ones. */
+/* Updates the orbits of tracks with the frame's detections, and starts new orbits. */
 void bst_mtt_update_orbits(bst_mtt *mtt, const bst_mtt_frame *frame);
-/* Remembers a confirmed track that is deleted. */
+/* Keeps a confirmed track that is deleted, for bst_mtt_resume. */
 void bst_mtt_remember(bst_mtt *mtt, const bst_mtt_track *track);
-/* Gives a confirmed track the identity of what it is: of a remembered one, when it has been
- * confirmed `anew`, or of a sleeping one that was not seen any more when it began, and that is then
- * `replaced`. False when it is none of them. */
+/* Gives a confirmed track the identity of an earlier track of the same object.
+ *
+ * Given:     anew  the track has just been confirmed: kept (deleted) tracks are considered too
+ * Returned:  false if no earlier track fits, or if two fit about equally well
+ * Notes:     a dormant track that had no detection since the track began is marked `replaced`. */
 bool bst_mtt_resume(bst_mtt *mtt, bst_mtt_track *track, bool anew);
 
-/* Probability that one test of a track's events may call a false one, dt_s after the test before;
- * 0: none are told. Tests come once per hit and for windows of 1, 2, 4, ... hits; the chance that
- * any of them is wrong is at most the sum of theirs. */
+/* Largest false-alarm probability of one test for events of a track.
+ *
+ * Given:     dt_s  time since the test before, s
+ * Returned:  0: events are not detected
+ * Notes:     tests run at each hit, for windows of 1, 2, 4, ... hits; the probability that any of
+ *            them is false is at most the sum of theirs. */
 double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s);
 
-/* Gives confirmed tracks that have no detection the likeliest one that a manoeuvre begun since
- * their latest would bring, if that is likelier than a miss and clutter together; such a track's
- * covariance is widened by the manoeuvre's noise of that time. */
+/* Gates the detections that are left for a manoeuvre of confirmed tracks without a detection.
+ *
+ * Notes:     the manoeuvre began after the track's latest detection. A track gets the likeliest
+ *            detection if that is likelier than a miss and clutter together; then its covariance
+ *            is increased by the manoeuvre's process noise over that time. */
 void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
 
-/* Note a hit's innovation, and the difference of its magnitude over its standard deviation; true
- * when the latest ones together are an event, which starts the window anew. dt_s is the time since
- * the hit before. */
+/* Tests the innovations of a track's latest hits for a manoeuvre.
+ *
+ * Given:     innovation  that of the newest hit
+ *            dt_s        time since the hit before, s
+ * Returned:  true if they are an event; then the window starts anew
+ *            *statistic  test statistic of the decision */
 bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
                              const bst_sky_innovation *innovation, double dt_s, double *statistic);
+
+/* Tests the magnitudes of a track's latest hits for a change of brightness.
+ *
+ * Given:     z     difference of the newest magnitude over its standard deviation
+ *            dt_s  time since the hit before, s
+ * Returned:  true if they are an event; then the window starts anew
+ *            *statistic  test statistic of the decision */
 bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track, double z,
                              double dt_s, double *statistic);
 

@@ -64,6 +64,12 @@ typedef struct bst_od_sight {
     bst_vec3 rate_radps; /* d(direction)/dt, perpendicular to direction */
     double range_m, range_rate_mps;
 } bst_od_sight;
+
+/* Direction, range and rates of an object, with light time.
+ *
+ * Given:     state     geocentric state of the object at the time of reception
+ *            observer  state of the observer then
+ * Notes:     the object moves in the Earth's central field during the light time. */
 void bst_od_see(const bst_od_state *state, const bst_od_observer *observer, bst_od_sight *out);
 
 /* The state and covariance (GCRF, m and m/s, order r, v) at `time_s` from those at another time:

@@ -26,11 +26,14 @@ void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *obse
 bool bst_orbit_track_predict(bst_orbit_track *track, double noise_m2ps3,
                              const bst_od_observer *observer);
 
-/* Takes what detections made of track->sky: with G = cov(orbit, sky) cov(sky)^-1 the orbit becomes
- * x + G (sky' - sky) and its covariance P + G (S' - S) G^T (the sky state being all that detections
- * tell of, this is the Kalman update; Anderson and Moore 1979, ch. 5). Any filter or association
- * may have made `posterior`. False, and the orbit no longer valid, when the covariances do not
- * allow it. */
+/* Updates the orbit from the updated sky state of its track.
+ *
+ * Given:     posterior  track->sky after the frame's detections, by any filter and association
+ * Returned:  false, and the orbit is no longer valid, if a covariance is singular
+ * Notes:     with G = cov(orbit, sky) cov(sky)^-1 the orbit becomes x + G (sky' - sky) and its
+ *            covariance P + G (S' - S) G^T. This is the Kalman update, as detections depend on the
+ *            sky state alone.
+ * Reference: Anderson and Moore 1979, chapter 5 */
 bool bst_orbit_track_update(bst_orbit_track *track, const bst_sky_state *posterior);
 
 /* The mean of two independent estimates of the same sky state, in place of the first; false when

@@ -29,10 +29,10 @@ typedef struct bst_control_status {
     int32_t mode; /* bst_mode */
     int64_t target_id;
     int32_t search_step;
-    double aim_error_px[2]; /* as control believes: where the target is from the boresight */
+    double aim_error_px[2]; /* target minus boresight, as control estimates it */
 } bst_control_status;
 
-/* "track" for BST_MODE_TRACK, and so on. */
+/* Name of a bst_mode ("track" for BST_MODE_TRACK); "unknown" for other numbers. Never NULL. */
 const char *bst_mode_name(int mode);
 
 #pragma GCC visibility pop

@@ -10,9 +10,9 @@
 
 typedef enum bst_label {
     BST_LABEL_UNKNOWN = 0,
-    BST_LABEL_STAR,   /* identified in the onboard catalogue; without star_id: at rest among them */
+    BST_LABEL_STAR,   /* identified in the onboard catalogue; without star_id: moves like a star */
     BST_LABEL_OBJECT, /* not a star: moves, or no catalogue star is there */
-    BST_LABEL_ARTEFACT,  /* cut by the edge, spike of a bright star, no source's shape */
+    BST_LABEL_ARTEFACT,  /* cut by the edge, spike of a bright star, or no source by its shape */
     BST_LABEL_HOT_PIXEL, /* sharper than the PSF, at the same pixel again, or one pixel alone */
     BST_LABEL_HIT,       /* radiation: sharper than the PSF, in this frame only */
 } bst_label;
@@ -56,9 +56,9 @@ typedef struct bst_detections {
     double zero_point_mag, zero_point_sigma_mag;
     int32_t zero_point_stars;
     int32_t stars_identified;
-    int32_t windows; /* of the frame that were looked at, round predicted places; 0: all of it */
-    int32_t count, lost; /* items; detections that found no room */
-    int32_t bad_pixels;  /* of the sensor, that image processing has learned so far */
+    int32_t windows;     /* regions of interest about predictions that were searched; 0: all */
+    int32_t count, lost; /* items; detections beyond the capacity */
+    int32_t bad_pixels;  /* on the sensor, learned by image processing so far */
     bst_detection items[];
 } bst_detections;
 

@@ -15,8 +15,7 @@ typedef struct bst_exposure {
     int64_t start_tick, end_tick; /* rolling shutter: of the window's middle row */
     bst_window window;
     int binning;
-    bool dropped; /* the frame will be lost on its way: rendered truth is kept, no frame is
-                     delivered */
+    bool dropped;              /* the frame is lost in transfer: truth is written, but no frame */
     double pixel_scale_arcsec; /* 0: the camera's */
 } bst_exposure;
 

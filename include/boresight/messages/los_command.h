@@ -10,19 +10,20 @@
 
 #define BST_CHANNEL_LOS_COMMAND "los_command"
 
-/* los_command (latest): where the boresight shall be, as the onboard attitude knowledge sees it.
+/* los_command (latest): commanded direction of the boresight, by the onboard attitude.
  * The command at tick t is the unit vector along direction + rate * dt + acceleration * dt^2 / 2,
- * dt = (t - tick) / tick rate. All zero after the rate: straight on, by the nearest way round. */
+ * dt = (t - tick) / tick rate. All members after the rate zero: constant rate, by the nearest
+ * angles of the mount. */
 typedef struct bst_los_command {
     int64_t tick;                      /* of reference */
     bst_vec3 direction_gcrf;           /* unit, apparent */
     bst_vec3 rate_gcrf_radps;          /* d(direction)/dt, perpendicular to direction */
     bst_vec3 accel_gcrf_radps2;        /* d2(direction)/dt2 */
-    bool near_given;                   /* which of the angles that point alike are meant is told: */
-    double near_rad[BST_MOUNT_AXES];   /* those next to these (by axis of mount_status), at `tick`;
-                                          else those next to the present angles */
+    bool near_given;                   /* if several angles give this direction: */
+    double near_rad[BST_MOUNT_AXES];   /* those nearest to these (by axis of mount_status), at
+                                          `tick`; else those nearest to the present angles */
     double near_radps[BST_MOUNT_AXES]; /* their rates */
-    bool roll_given;                   /* the body is to go to this angle of bst_body_roll: */
+    bool roll_given;                   /* the body goes to this angle of bst_body_roll: */
     double roll_rad;
 } bst_los_command;
 

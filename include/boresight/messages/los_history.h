@@ -18,8 +18,8 @@ typedef struct bst_los_sample {
 typedef struct bst_los_history {
     int64_t written;
     int32_t capacity;
-    double jitter_rad2; /* variance of the true line of sight, per axis, about the straight way
-                           between samples: motion too fast for them, which widens the PSF */
+    double jitter_rad2; /* variance of the true line of sight, per axis, about linear
+                           interpolation between samples: fast jitter, which widens the PSF */
     bst_los_sample items[];
 } bst_los_history;
 

@@ -17,21 +17,21 @@ enum {
     BST_AXIS_AT_STOP = 1u << 2,   /* held by the end of its travel */
 };
 
-/* One axis of a mount. Limits are what the mount allows a command to ask of it. */
+/* One axis of a mount. Limits are those for commands. */
 typedef struct bst_mount_axis {
-    bst_vec3 axis_body; /* unit: what it turns about, right-handed, when all angles are zero */
+    bst_vec3 axis_body; /* unit: axis of rotation, right-handed, when all angles are zero */
     double angle_rad;   /* encoder, with whole turns: a cable is wound by as much */
     double rate_radps;
     double rate_limit_radps, accel_limit_radps2; /* 0: none */
     double min_rad, max_rad; /* travel; both 0: turns without end, and angle_rad in (-pi, pi] */
     bool redundant; /* not needed to reach a direction: the mount follows its axis_near_rad, or
-                       moves it as it sees fit */
+                       chooses its angle */
     uint32_t flags; /* BST_AXIS_... */
 } bst_mount_axis;
 
-/* A turn of the body about the axis of its pointing law, which the spacecraft makes on command. */
+/* Rotation of the body about the axis of its pointing law, on command. */
 typedef struct bst_body_roll {
-    bst_vec3 axis_body; /* unit; zero: it makes none */
+    bst_vec3 axis_body; /* unit; zero: no such rotation */
     double angle_rad, rate_radps;
     double rate_limit_radps, accel_limit_radps2;
 } bst_body_roll;

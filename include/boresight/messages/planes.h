@@ -6,7 +6,7 @@
 
 #define BST_CHANNEL_PLANES "planes"
 
-/* Images of a frame that no detector took. */
+/* Images of a frame before the detector's effects, and masks. */
 typedef enum bst_plane {
     BST_PLANE_STARS = 0,
     BST_PLANE_TARGETS,
@@ -16,10 +16,10 @@ typedef enum bst_plane {
     BST_PLANE_COUNT
 } bst_plane;
 
-/* planes (latest): expected electrons per pixel of the frame written in the same step, from stars,
- * from objects, and from sky and dark current; who each pixel belongs to; and whether it is
- * saturated. Only for hooks of the engine: the images are their writer's, and are written over in
- * its next step. */
+/* planes (latest): of the frame written in the same step, the expected electrons per pixel from
+ * stars, from objects, and from sky and dark current; the brightest source of each pixel; and its
+ * saturation. For hooks of the engine only: the images belong to their writer, which overwrites
+ * them in its next step. */
 typedef struct bst_planes {
     int64_t exposure_id;
     int width, height;                              /* of the frame: its window over its binning */

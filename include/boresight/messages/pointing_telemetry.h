@@ -9,7 +9,7 @@
 
 #define BST_CHANNEL_POINTING_TELEMETRY "pointing_telemetry"
 
-/* pointing_telemetry (latest, written in place): ring of what encoders and attitude sensors say. */
+/* pointing_telemetry (latest, written in place): ring of measured attitudes. */
 typedef struct bst_pointing_sample {
     int64_t tick;
     bst_quat q_cam_from_gcrf; /* measured: attitude estimate and encoders */
@@ -19,7 +19,7 @@ typedef struct bst_pointing_sample {
 typedef struct bst_pointing_telemetry {
     int64_t written;
     int32_t capacity;
-    bst_quat q_body_from_gcrf; /* newest body attitude as the spacecraft believes it */
+    bst_quat q_body_from_gcrf; /* newest estimate of the body attitude */
     bool settled;              /* the servo is within its settling tolerance of the command */
     bool limited;              /* an axis is at a rate, acceleration or travel limit */
     bst_pointing_sample items[];

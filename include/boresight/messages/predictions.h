@@ -17,7 +17,7 @@ typedef struct bst_prediction {
     bool target_of_interest;
 } bst_prediction;
 
-/* predictions (latest): the tracker's help for image processing of later frames. */
+/* predictions (latest): predictions of the tracker for image processing of later frames. */
 typedef struct bst_predictions {
     int64_t tick; /* of validity */
     bool attitude_valid;

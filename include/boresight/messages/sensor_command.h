@@ -6,8 +6,8 @@
 
 #define BST_CHANNEL_SENSOR_COMMAND "sensor_command"
 
-/* sensor_command (latest): what control asks of the exposure clock; latched at the next exposure's
- * start. */
+/* sensor_command (latest): settings that control requests from the exposure clock; they apply from
+ * the next start of an exposure. */
 typedef struct bst_sensor_command {
     double exposure_s;         /* <= 0: keep */
     double period_s;           /* <= 0: keep */

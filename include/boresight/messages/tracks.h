@@ -15,13 +15,13 @@ typedef enum bst_track_status {
     BST_TRACK_COASTING, /* confirmed, no detection in the latest frames */
 } bst_track_status;
 
-/* What keeps a track's object from being seen, as its believed orbit has it. */
+/* Why the object of a track cannot be seen, by its estimated orbit. */
 typedef enum bst_track_hidden {
     BST_HIDDEN_NOT = 0,
     BST_HIDDEN_SHADOW,  /* in the Earth's shadow */
     BST_HIDDEN_EARTH,   /* behind the Earth */
-    BST_HIDDEN_AWAITED, /* nothing any more, but it has not been seen again yet */
-    BST_HIDDEN_DIM,     /* nothing, but it is too dim: far away, or lit from behind */
+    BST_HIDDEN_AWAITED, /* visible again, but not detected again yet */
+    BST_HIDDEN_DIM,     /* visible, but too dim: far away, or lit from behind */
 } bst_track_hidden;
 
 typedef struct bst_track {
@@ -39,7 +39,7 @@ typedef struct bst_track {
     int32_t hits, misses_in_row;
     int64_t first_tick, last_update_tick;
     double x_px, y_px; /* latest detection, full-sensor coordinates */
-    bool uncorrelated; /* confirmed, and neither the target nor what the cue expects */
+    bool uncorrelated; /* confirmed, and neither the target nor the object of the cue */
     int32_t hidden;    /* bst_track_hidden; other than 0: coasting, and no detection is taken for it
                           before one of its place and motion has been confirmed on its own */
 } bst_track;
@@ -64,7 +64,7 @@ typedef struct bst_tracks {
     int64_t tick;
     bst_attitude_fix attitude;
     int64_t target_id; /* track of interest, 0 when none */
-    int32_t at_rest;   /* followed but not told: at rest among the stars, as a star is */
+    int32_t at_rest;   /* tracks that do not move against the stars; not in items */
     int32_t count, lost;
     bst_track items[];
 } bst_tracks;

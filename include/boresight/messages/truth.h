@@ -57,12 +57,12 @@ typedef struct bst_truth {
                                                            cover, 0 to 1 */
     double hits_e;      /* charge of the radiation hits on the sensor, electrons */
     int32_t hits;       /* radiation hits */
-    double error_sigma; /* largest error of the image expected in any pixel, in its noise; NAN: not
-                           foreseen */
-    int64_t nodes;      /* points that the sources' tracks became */
+    double error_sigma; /* largest expected rendering error of a pixel, in units of its noise; NAN:
+                           unknown */
+    int64_t nodes;      /* quadrature points of the sources' tracks */
     bool one_track;     /* the stars followed one track */
     double pixel_scale_arcsec; /* of this exposure */
-    int32_t count, lost;       /* items; sources that found no room */
+    int32_t count, lost;       /* items; sources beyond the capacity */
     bst_truth_item items[];
 } bst_truth;
 

@@ -8,7 +8,13 @@
 
 typedef struct bst_calibration_fitter bst_calibration_fitter;
 
+/* Creates a fitter without data.
+ *
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_calibration_fitter_free */
 bst_status bst_calibration_fitter_create(bst_ctx *ctx, bst_calibration_fitter **out) BST_MUST_CHECK;
+/* Frees a fitter; NULL is allowed. */
 void bst_calibration_fitter_free(bst_calibration_fitter *calibrator);
 
 /* Settings of the image path from here on, which theory goes by: of the frames that follow. */
@@ -17,6 +23,12 @@ typedef struct bst_calibration_path {
     double jitter_px;         /* of the line of sight, per axis, that widens the true PSF */
     double false_alarms_per_frame, streak_min_px, streak_max_px;
 } bst_calibration_path;
+
+/* Starts the data of one image path: sets up the generators that its frames are compared with.
+ *
+ * Given:     path  camera and settings of the path; copied, its camera must outlive the fitter's
+ *                  use of it
+ * Errors:    those of bst_generator_create */
 bst_status bst_calibration_fitter_begin(bst_ctx *ctx, bst_calibration_fitter *calibrator,
                                         const bst_calibration_path *path) BST_MUST_CHECK;
 

@@ -17,6 +17,7 @@ typedef struct bst_pairing {
  * none. BST_ERR_MEMORY. */
 bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *pairing, const bst_truth *truth,
                             const bst_detections *detections, double fwhm_px) BST_MUST_CHECK;
+/* Frees the memory of a pairing and clears the struct, which belongs to the caller. */
 void bst_pairing_free(bst_pairing *pairing);
 
 #endif

@@ -17,6 +17,9 @@ typedef struct bst_check_span_words {
                      * examined; often "" */
 } bst_check_span_words;
 
+/* Adds an interval of time, in order of time; only the first one is kept, and the sum of lengths.
+ *
+ * Given:     from_s, until_s  seconds since the scenario's epoch */
 void bst_check_spans_add(bst_check_spans *spans, double from_s, double until_s);
 
 /* Words for a warning.

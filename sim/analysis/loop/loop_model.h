@@ -122,6 +122,7 @@ bst_status bst_loop_build_mount(bst_ctx *ctx, int type, const bst_mount_config *
 
 /* ---- loop_report.c ---- */
 
+/* Prints the loops of a sensor, their margins and predicted pointing to stdout. */
 void bst_loop_print(const bst_loop_model *model);
 struct cJSON;
 /* The object of one sensor; NULL when out of memory. */

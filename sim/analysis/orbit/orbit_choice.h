@@ -29,6 +29,9 @@ typedef struct bst_orbit_choice {
  * bst_tdm_observations. */
 bst_status bst_orbit_choose(bst_ctx *ctx, const bst_orbit_request *request, const char *path,
                             bst_orbit_choice *out) BST_MUST_CHECK;
+
+/* Frees the tracks of a choice and closes its run and scene; the struct itself belongs to the
+ * caller. */
 void bst_orbit_choice_free(bst_orbit_choice *choice);
 
 #endif

@@ -93,6 +93,7 @@ typedef struct bst_pd_scene {
 /* Opens world, camera, device and renderer of the scenario's sensor. Errors name what to change. */
 bst_status bst_pd_scene_open(bst_ctx *ctx, const bst_scenario *scenario,
                              const bst_pd_options *options, bst_pd_scene *out) BST_MUST_CHECK;
+/* Frees everything that a scene holds and clears it; a device that the caller lent stays open. */
 void bst_pd_scene_close(bst_pd_scene *scene);
 /* Targets per full frame. */
 int bst_pd_scene_room(const bst_pd_scene *scene);
@@ -137,8 +138,16 @@ typedef struct bst_pd_result {
  * and with room for all targets; another module of the role "imgproc" (or that one, with by_module)
  * is stepped as in a run. */
 typedef struct bst_pd_detector bst_pd_detector;
+
+/* Opens the sensor's image processing as a detector: as a function if possible, else as a module.
+ *
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_ARGUMENT for options that a plug-in or another module does not support,
+ *            BST_ERR_MEMORY, and those of image processing
+ * Ownership: free *out with bst_pd_detector_close */
 bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *scene,
                                 bst_pd_detector **out) BST_MUST_CHECK;
+/* Frees a detector; NULL is allowed. */
 void bst_pd_detector_close(bst_pd_detector *detector);
 /* What it finds in one frame, at most `capacity`. */
 bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *detector, const bst_pd_scene *scene,
@@ -160,16 +169,32 @@ typedef struct bst_pd_figures {
     /* against a matched filter, whose output has the target's own photon noise too */
     double own_light_db_pd50, own_light_db_pd90;
 } bst_pd_figures;
+
+/* Computes the figures of a measurement: SNR at Pd 0.5 and 0.9, losses against the matched filter,
+ * and false alarms with 95 % intervals.
+ *
+ * Given:     scene, result  the measured scene and its counts; at least one empty frame */
 void bst_pd_figures_of(const bst_pd_scene *scene, const bst_pd_result *result, bst_pd_figures *out);
 
 /* What the detector needs in one frame by itself: fills in gain_over_single of a stack's figures.
  */
 void bst_pd_compare_single(const bst_pd_figures *single, bst_pd_figures *stack);
 
+/* Prints the table of a measurement to stdout. */
 void bst_pd_print(const bst_pd_scene *scene, const bst_pd_result *result,
                   const bst_pd_figures *figures);
+
+/* A measurement as a JSON object.
+ *
+ * Returned:  NULL if out of memory
+ * Ownership: free it with cJSON_Delete */
 struct cJSON *bst_pd_json(const bst_pd_scene *scene, const bst_pd_result *result,
                           const bst_pd_figures *figures);
+
+/* Plots the probability of detection over the SNR.
+ *
+ * Given:     path  PNG or SVG file to write
+ * Errors:    those of bst_plot_begin and bst_plot_end (gnuplot is needed) */
 bst_status bst_pd_plot(bst_ctx *ctx, const char *path, const bst_pd_scene *scene,
                        const bst_pd_result *result, const bst_pd_figures *figures) BST_MUST_CHECK;
 

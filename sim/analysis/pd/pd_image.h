@@ -12,6 +12,7 @@ typedef struct bst_pd_image bst_pd_image;
  * outlive them. BST_ERR_MEMORY. */
 bst_status bst_pd_image_create(bst_ctx *ctx, const bst_psf *psf, double longest_px,
                                bst_pd_image **out) BST_MUST_CHECK;
+/* Frees an image of the PSF; NULL is allowed. */
 void bst_pd_image_free(bst_pd_image *image);
 
 /* Sums of share^2 and share^3 over the pixels of a target of unit flux, at its own place in the

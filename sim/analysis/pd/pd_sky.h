@@ -21,6 +21,7 @@ typedef struct bst_pd_sky bst_pd_sky;
 /* Opens the sky that the scenario's sensor sees at the epoch, where it is cued to look. */
 bst_status bst_pd_sky_open(bst_ctx *ctx, const struct bst_pd_scene *scene,
                            bst_pd_sky **out) BST_MUST_CHECK;
+/* Frees a sky; NULL is allowed. */
 void bst_pd_sky_close(bst_pd_sky *sky);
 /* Attitude in which the camera looks there, turned about the boresight by `roll_rad`. */
 bst_quat bst_pd_sky_attitude(const bst_pd_sky *sky, double roll_rad);
@@ -31,10 +32,14 @@ bst_status bst_pd_sky_look(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *t
 bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
                             const bst_scene_source *stars, int count,
                             bst_pd_stars *out) BST_MUST_CHECK;
+/* Frees the memory of a list of stars and clears the struct, which belongs to the caller. */
 void bst_pd_stars_free(bst_pd_stars *stars);
-/* Expected electrons of sky in a pixel of the latest look, and its map (NULL: the same all over).
- */
+
+/* Expected electrons of sky in a pixel at the latest time of the sky.
+ *
+ * Given:     x_px, y_px  full-sensor pixel coordinates */
 double bst_pd_sky_e(const bst_pd_sky *sky, double x_px, double y_px);
+/* Map of the sky at its latest time; NULL if the sky is uniform. It belongs to the sky. */
 const struct bst_skylight_map *bst_pd_sky_map(const bst_pd_sky *sky);
 
 /* Whether a detection may be a star: it lies within reach_px of one, of a streak as targets are

@@ -41,16 +41,16 @@ typedef struct bst_instance_spec {
     uint64_t seed, run;
 } bst_instance_spec;
 
-/* What the hook `wants` keeps about a channel; zero at first. */
+/* State of the hook `wants` for a channel; zero at first. */
 typedef struct bst_hook_mark {
     void *of;
-    int64_t unwanted_before; /* tick: earlier messages are not asked for */
+    int64_t unwanted_before; /* tick; `wants` is not called for earlier messages */
     bool bare; /* `message` gets this one without what it owns: a frame's message without frame */
 } bst_hook_mark;
 
-/* Sees what happens; any member may be NULL. `message` and `event` are called by one thread at a
- * time in the order in which things happen: by tick, then by the order of stepping; with
- * bst_engine_parallel by any thread. `interrupted` is called by the calling thread. */
+/* Observers of a run; any member may be NULL. One thread at a time calls `message` and `event`, in
+ * order of tick and then of stepping; with bst_engine_parallel it may be any thread. The calling
+ * thread calls `interrupted`. */
 typedef struct bst_engine_hooks {
     void *user;
     /* A message was published (before any MODIFY port touches it). */
@@ -58,19 +58,27 @@ typedef struct bst_engine_hooks {
                           int64_t tick);
     bst_status (*event)(void *user, int64_t tick, const char *instance, const char *kind,
                         const char *text);
-    /* Asked about every 20 ms of wall time; true ends the run with BST_ERR_INTERRUPTED. */
+    /* Called about every 20 ms of wall time; true ends the run with BST_ERR_INTERRUPTED. */
     bool (*interrupted)(void *user, int64_t tick);
-    /* False spares `message` one that it would ignore. Asked at every message from the mark's tick
-     * on, before `message`, by the thread that steps its writer and one thread at a time. */
+    /* False: `message` is not called for this message. Called before `message`, for every message
+     * from the mark's tick on, by the thread that steps the writer, one thread at a time. */
     bool (*wants)(void *user, const char *scope, const char *channel, const void *payload,
                   int64_t tick, bst_hook_mark *mark);
-    /* Where `message` and `event` leave why they failed. NULL: in the context of the run; with
-     * bst_engine_parallel, give them one of their own. */
+    /* Context for errors of `message` and `event`. NULL: that of the run; bst_engine_parallel needs
+     * a separate one. */
     bst_ctx *ctx;
 } bst_engine_hooks;
 
+/* Creates an engine without instances.
+ *
+ * Given:     tick_rate_hz  ticks per second, 1 to 1000000
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_CONFIG, BST_ERR_MEMORY
+ * Ownership: free *out with bst_engine_free */
 bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) BST_MUST_CHECK;
+/* Stops the engine's threads and frees it with its modules and channels; NULL is allowed. */
 void bst_engine_free(bst_engine *engine);
+/* Sets the hooks of an engine; they are copied. Not during bst_engine_run or bst_engine_advance. */
 void bst_engine_set_hooks(bst_engine *engine, const bst_engine_hooks *hooks);
 
 /* Adds a module; before bst_engine_load. The spec is copied, its strings too. */
@@ -97,7 +105,7 @@ bst_status bst_engine_parallel(bst_ctx *ctx, bst_engine *engine, int threads) BS
  * take (the other modes). After bst_engine_load, before bst_engine_parallel. */
 bst_status bst_engine_pace(bst_ctx *ctx, bst_engine *engine,
                            const bst_pacing_config *config) BST_MUST_CHECK;
-/* How the clock has been kept so far; false when the engine is not paced. */
+/* Timing of a paced run so far; false if the engine is not paced. */
 bool bst_engine_pacing(const bst_engine *engine, bst_pacing_figures *out);
 
 /* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */
@@ -112,8 +120,12 @@ bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *instanc
 
 /* Tick of the last step, -1 before the first. */
 int64_t bst_engine_tick(const bst_engine *engine);
-/* Instance names in the order of stepping. */
+/* Number of instances. */
 int bst_engine_instance_count(const bst_engine *engine);
+
+/* Name of an instance ("observer/sensor/module"); it belongs to the engine.
+ *
+ * Given:     index  position in the order of stepping, from 0 */
 const char *bst_engine_instance_name(const bst_engine *engine, int index);
 /* Steps that an instance has made. */
 int64_t bst_engine_instance_steps(const bst_engine *engine, int index);

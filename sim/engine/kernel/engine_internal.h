@@ -151,13 +151,25 @@ struct bst_step {
     int64_t *ahead; /* [port] cursors of a module's `ahead`; NULL: it is a step */
 };
 
-/* wiring.c */
+/* Connects ports to channels and puts the instances into the order of stepping (wiring.c).
+ *
+ * Errors:    BST_ERR_CONFIG for two instances of one name, missing or double writers, undeclared
+ *            cycles; BST_ERR_MEMORY */
 bst_status bst_engine_wire(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+
+/* Determines readers and rates of all channels and allocates their slots.
+ *
+ * Errors:    BST_ERR_MEMORY and those of the wiring */
 bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
-/* channel.c */
+
+/* Publishes what a step has written (channel.c).
+ *
+ * Errors:    the first error of a hook during the step, and those of hooks that observe the
+ *            messages */
 bst_status bst_engine_commit(struct bst_step *step) BST_MUST_CHECK;
 /* Lets go of what all readers have read, on channels that a logical process writes. */
 void bst_engine_release_read(bst_engine *engine, int process);
+/* Increments a counter of the run's summary; any thread. Names beyond MAX_COUNTERS are dropped. */
 void bst_engine_count(bst_engine *engine, const char *what);
 /* Passes a hook's status on, with its message in ctx. */
 bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine,
@@ -178,21 +190,29 @@ bst_status bst_log_copy(bst_ctx *ctx, message_log *to, const channel *ch,
                         const slot *from) BST_MUST_CHECK;
 /* Drops from a port's copy what no step after `tick` can see. */
 void bst_log_trim(const channel *ch, port_state *port, int64_t tick);
+/* Releases what the slots of a log own and frees the log's memory. */
 void bst_log_free(const bst_channel_type *type, message_log *log);
 /* Of a message: what its readers may look at. */
 size_t bst_log_used_bytes(const channel *ch, const void *payload);
 
-/* schedule.c */
+/* Allocates the heap of instances and sets their first ticks (schedule.c).
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Earliest tick at which an instance wants to be stepped. */
 int64_t bst_engine_earliest(const instance *self);
+
+/* Sets the tick of an instance's next step and restores the order of its heap.
+ *
+ * Given:     instance  index of the instance
+ *            due       tick */
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
 
 /* engine.c: the steps of one tick in a heap; *failed: the instance whose step failed. */
 bst_status bst_engine_step_tick(bst_ctx *ctx, bst_engine *engine, bst_heap *heap, int64_t tick,
                                 bool *long_step, int *failed) BST_MUST_CHECK;
 
-/* pacing.c */
+/* Frees the pacing of an engine (pacing.c); NULL is allowed. */
 void bst_pacing_free(bst_pacing *pacing);
 /* Whether ticks wait for their time. */
 bool bst_pacing_by_clock(const bst_engine *engine);
@@ -202,26 +222,44 @@ bst_status bst_pacing_wait(bst_ctx *ctx, bst_engine *engine, int64_t tick) BST_M
 bool bst_pacing_frame(struct bst_step *step, int64_t exposure_id);
 /* In the step that publishes on a paced channel. */
 void bst_pacing_done(const struct bst_step *step, const channel *ch, const void *payload);
-/* Priority and processor of the calling thread, as configured; and as they were. */
+/* Scheduling of a thread, for bst_pacing_thread_give_back. */
 typedef struct bst_pacing_thread {
     unsigned char saved[256];
 } bst_pacing_thread;
+
+/* Gives the calling thread the priority and processor that pacing configures.
+ *
+ * Returned:  *saved  earlier settings, for bst_pacing_thread_give_back
+ * Notes:     warns if the operating system refuses; the run continues. */
 void bst_pacing_thread_take(bst_ctx *ctx, bst_engine *engine, bst_pacing_thread *saved);
+/* Restores the priority and processors of the calling thread. */
 void bst_pacing_thread_give_back(const bst_engine *engine, const bst_pacing_thread *saved);
 
 /* deferred.c: finds the instances that may be deferred and puts them last; before channels are
  * allocated */
 void bst_engine_set_deferred(bst_engine *engine);
 
-/* executor.c */
+/* Ends the executor's threads and frees it (executor.c); without an executor it does nothing. */
 void bst_executor_free(bst_engine *engine);
+
+/* Runs the logical processes up to a tick, and all hooks due until then.
+ *
+ * Given:     until_tick  exclusive
+ * Errors:    those of modules and hooks; BST_ERR_INTERRUPTED */
 bst_status bst_executor_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
 /* logical_process.c: a message was published that an input of another logical process reads. */
 bst_status bst_process_reach(struct bst_step *step, const channel *ch, const slot *s,
                              channel_reader reader) BST_MUST_CHECK;
-/* observers.c: in a step, in place of calling the hooks. */
+
+/* Records a message of a step for the hooks, which are called later (observers.c).
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_observers_message(struct bst_step *step, const channel *ch,
                                  const void *payload) BST_MUST_CHECK;
+
+/* Records an event of a step for the hooks, which are called later.
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_observers_event(struct bst_step *step, const char *kind,
                                const char *text) BST_MUST_CHECK;
 /* `wants` of the hooks, by one thread at a time. */

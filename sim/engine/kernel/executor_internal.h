@@ -135,8 +135,12 @@ struct bst_executor {
     pthread_mutex_t asking;
 };
 
-/* partition.c: processes of a loaded engine, and the inputs between them. */
+/* Divides a loaded engine into logical processes and connects their inputs (partition.c).
+ *
+ * Given:     threads  threads of the executor
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_partition_make(bst_ctx *ctx, bst_executor *x, int threads) BST_MUST_CHECK;
+/* Frees the logical processes of an executor and their inputs. */
 void bst_partition_free(bst_executor *x);
 
 /* logical_process.c */

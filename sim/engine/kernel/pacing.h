@@ -26,29 +26,31 @@ typedef struct bst_pacing_config {
     double speed;      /* simulated seconds per second of the clock */
     double deadline_s; /* of wall time; 0: a frame period */
     int64_t priority;  /* SCHED_FIFO, 0: none */
-    int64_t cpu;       /* that the stepping thread stays on; -1: any */
-    bool replay;       /* not by the table: there is no clock, a link's recording tells of drops */
+    int64_t cpu;       /* processor of the stepping thread; -1: any */
+    bool replay;       /* not in the table: no clock; drops come from a link's recording */
 } bst_pacing_config;
 
 extern const bst_config_desc bst_pacing_config_table[];
+/* Name of a pacing mode, as scenarios write it. */
 const char *bst_pacing_mode_name(int32_t mode);
+/* Name of an overrun policy, as scenarios write it. */
 const char *bst_overrun_name(int32_t overrun);
 
 enum { BST_PACING_BINS = 16 };
 /* Upper ends of the bins of the histogram in milliseconds; the last bin has none. */
 extern const double bst_pacing_edges_ms[BST_PACING_BINS - 1];
 
-/* How the clock was kept. A frame's response is the wall time from when it was due to those who
- * read it (its exposure's end and the declared delay) until their detections were there; without
- * any, until it was made. Where time is not kept by the clock (BST_PACING_FAST) nothing is an
- * overrun, and a response is the wall time from when the frame was made. */
+/* Timing of a paced run. The response of a frame is the wall time from when its readers may see it
+ * (end of exposure plus declared delay) until its detections are published, or, without detections,
+ * until the frame is. With BST_PACING_FAST there are no overruns, and the response counts from the
+ * frame's publication. */
 typedef struct bst_pacing_figures {
     int64_t frames;  /* exposures that ended, dropped ones too */
     int64_t dropped; /* of these, by the overrun policy */
     int64_t done;    /* responses */
     int64_t late;    /* of these, beyond the deadline */
     int64_t overruns;
-    double slipped_s;  /* by how much the clock has been set back */
+    double slipped_s;  /* total by which the clock was set back */
     double longest_s;  /* response */
     double sum_s;      /* of all responses */
     double deadline_s; /* the longest that was used */

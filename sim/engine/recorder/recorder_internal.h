@@ -74,13 +74,20 @@ struct bst_recorder {
     bst_recorder_state sensors[];
 };
 
+/* Creates the tables of the run store that the configuration asks for. */
 bst_status bst_recorder_make_tables(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_CHECK;
 
 /* The row of a frame; fits_index < 0 and wcs NULL when there are none. */
 bst_status bst_recorder_frame_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                   const bst_frame_message *message, const bst_wcs *wcs,
                                   int64_t fits_index) BST_MUST_CHECK;
+/* Writes the row of the table `run`. */
 bst_status bst_recorder_run_row(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_CHECK;
+
+/* Writes a sensor's row of the table `sensors`.
+ *
+ * Given:     sensor  index of the sensor
+ *            file    name of its FITS file; NULL: none */
 bst_status bst_recorder_sensor_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const char *file) BST_MUST_CHECK;
 

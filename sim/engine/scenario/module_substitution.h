@@ -1,4 +1,4 @@
-/* A module that stands in for others of its sensor (bst_module_desc.stands_for). Inside of
+/* A module that substitutes others of its sensor (bst_module_desc.stands_for). Internal to
  * sim/engine. */
 #ifndef BST_ENGINE_SCENARIO_MODULE_SUBSTITUTION_H
 #define BST_ENGINE_SCENARIO_MODULE_SUBSTITUTION_H
@@ -7,19 +7,24 @@
 
 struct cJSON;
 
-/* After the modules of a sensor have been read from `block` (may be NULL): switches either the
- * module that stands in or those that it stands for off, as the sensor's observation_source says;
- * makes the former, with its defaults, where it is needed and the block has none; gives it the
- * settings of the others. BST_ERR_CONFIG where its own block says what is another's to say, and
- * where it is asked for and there is none of the kind. */
+/* Selects between a substitute and the modules that it replaces, by the sensor's
+ * observation_source. Called after the modules of the sensor have been read.
+ *
+ * Given:     block             JSON of the sensor's modules; may be NULL
+ *            observer, sensor  indices in the scenario
+ * Returned:  scenario  the modules that do not step are disabled; a substitute that is needed and
+ *                      missing is added with its defaults; it takes the settings of those that it
+ *                      replaces
+ * Errors:    BST_ERR_CONFIG if the substitute's block sets a key of the modules that it replaces,
+ *            or if a substitute is needed and the registry has none */
 bst_status bst_module_substitution(bst_ctx *ctx, const bst_scenario_registry *registry,
                                    const struct cJSON *block, int observer, int sensor,
                                    bst_scenario *scenario) BST_MUST_CHECK;
 
-/* Whether a key of a module's table has its value from a module that it stands for. */
+/* True if a key of a module has its value from a module that it replaces. */
 bool bst_module_substitution_taken(const bst_scenario *scenario,
                                    const bst_scenario_module_config *module, const char *key);
-/* Whether the delays of its inputs come from modules that it stands for. */
+/* True if the delays of a module's inputs come from modules that it replaces. */
 bool bst_module_substitution_delayed(const bst_scenario *scenario,
                                      const bst_scenario_module_config *module);
 

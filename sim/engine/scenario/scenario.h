@@ -8,11 +8,11 @@
 #include "sim/link/link.h"
 #include "sim/world/world_config.h"
 
-/* What becomes of "plugin" in a scenario. */
+/* Treatment of "plugin" in a scenario. */
 typedef enum bst_scenario_plugin_policy {
     BST_PLUGINS_LOAD = 0,
-    BST_PLUGINS_SKIP,   /* what names one is left unread: for those who need no modules, as their
-                           code is not to run when somebody's results are looked at */
+    BST_PLUGINS_SKIP,   /* blocks with a plug-in are not read: for commands that need no modules, so
+                           that viewing results runs no foreign code */
     BST_PLUGINS_REFUSE, /* an error */
 } bst_scenario_plugin_policy;
 
@@ -21,7 +21,7 @@ typedef struct bst_scenario_registry {
     const bst_module_desc *const *modules;
     int count;
     bst_scenario_plugin_policy policy;
-    /* libraries that some of these modules come from, so that it is told which were used */
+    /* libraries of those modules that are plug-ins, to report which ones a scenario uses */
     const bst_plugin *plugins;
     int plugin_count;
 } bst_scenario_registry;
@@ -81,6 +81,7 @@ extern const bst_config_desc bst_scenario_table[];
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
                              const bst_scenario_registry *registry,
                              bst_scenario *out) BST_MUST_CHECK;
+/* Frees everything that a scenario holds; the struct itself belongs to the caller. */
 void bst_scenario_free(bst_scenario *scenario);
 
 /* The module of a role ("gimbal", "control") that steps for a sensor; NULL: there is none, or

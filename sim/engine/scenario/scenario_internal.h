@@ -35,6 +35,11 @@ typedef struct bst_scenario_stages {
     const bst_scenario_registry *registry;
     bst_scenario *scenario;
 } bst_scenario_stages;
+
+/* Loads the plug-in of a stage: function `load` of a bst_stage_loader.
+ *
+ * Given:     user  a bst_scenario_stages
+ * Errors:    those of the plug-in's library, with the scenario's file and path */
 bst_status bst_scenario_stage(void *user, bst_ctx *ctx, const bst_json *json, const char *path,
                               const char *plugin, const char *kind, const char *type,
                               const bst_stage_desc **out, char *file, size_t bytes) BST_MUST_CHECK;

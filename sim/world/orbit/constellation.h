@@ -19,7 +19,7 @@ bst_status bst_constellation_check(bst_ctx *ctx,
 bst_elements bst_constellation_elements(const bst_constellation_config *config, bst_time epoch,
                                         int plane, int slot);
 
-/* "NAME PLANE-SLOT". */
+/* Name of a member of a constellation: "NAME PLANE-SLOT". */
 void bst_constellation_name(const bst_constellation_config *config, int plane, int slot,
                             char name[64]);
 

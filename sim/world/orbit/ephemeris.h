@@ -1,9 +1,9 @@
-/* One ephemeris of all objects and observers of a world, shared by all who look.
+/* One ephemeris of all objects and observers of a world, shared by all views.
  *
  * SGP4 orbits without burns are evaluated at knots t = k * step (seconds after the epoch, step a
  * power of two for each orbit), once, and interpolated by the polynomial through the ten knots
- * around t. What is returned is a function of the orbit and the time alone: the same to the bit
- * whatever was asked for before, from however many threads. */
+ * around t. The result depends on the orbit and the time alone: it is the same to the bit for any
+ * earlier queries and any number of threads. */
 #ifndef BST_WORLD_ORBIT_EPHEMERIS_H
 #define BST_WORLD_ORBIT_EPHEMERIS_H
 
@@ -50,6 +50,13 @@ int bst_ephemeris_near(bst_ephemeris *ephemeris, double seconds, const bst_ephem
 /* Geocentric places (m, GCRF) of all objects at the whole multiple of 8 s nearest to `seconds`,
  * which is returned, to BST_EPHEMERIS_PLACES_M. NAN: to be evaluated directly; all 0: no orbit. */
 #define BST_EPHEMERIS_PLACES_M 1e3
+
+/* Positions of all objects at the node of the ephemeris that is nearest to a time.
+ *
+ * Given:     seconds  since the epoch
+ * Returned:  time of the node, s since the epoch
+ *            x_m, y_m, z_m  [number of objects] GCRF, m
+ * Notes:     any thread. */
 double bst_ephemeris_places(bst_ephemeris *ephemeris, double seconds, double *x_m, double *y_m,
                             double *z_m);
 

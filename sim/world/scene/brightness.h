@@ -14,6 +14,7 @@ typedef struct bst_brightness bst_brightness;
  * `brightness`. */
 bst_status bst_brightness_create(bst_ctx *ctx, const bst_brightness_config *config,
                                  const char *base_dir, bst_brightness **out) BST_MUST_CHECK;
+/* Frees a brightness model; NULL is allowed. */
 void bst_brightness_free(bst_brightness *brightness);
 
 /* Where the light comes from and goes to. Positions are geocentric, GCRF. */

@@ -47,6 +47,9 @@ typedef struct bst_disc {
     double thermal; /* radiance, shares per steradian */
 } bst_disc;
 
+/* Computes what the radiance of a resolved object needs, once for all of its points.
+ *
+ * Given:     source  an object with a shape */
 void bst_disc_begin(const bst_scene_source *source, bst_disc *out);
 
 /* Share of the source's light per steradian in a direction (unit, apparent); 0 beside the disc. The

@@ -52,6 +52,7 @@ typedef struct bst_discs {
 /* Works out the bodies of one exposure. Those that `config` leaves out, or that are too far beside
  * the sensor, are not present. Directions are apparent ones. */
 void bst_discs_make(const bst_camera *camera, const bst_scene_surroundings *around, bst_discs *out);
+/* True if Earth, Moon or Sun is in the field. */
 bool bst_discs_any(const bst_discs *discs);
 
 /* Whether the background block asks for any disc. */
@@ -81,6 +82,9 @@ typedef struct bst_disc_light {
     double earth;    /* share of time and area that the Earth's disc fills */
 } bst_disc_light;
 
+/* Light of the discs of Earth, Moon and Sun in a direction; the Earth hides the others.
+ *
+ * Given:     direction  unit vector */
 bst_disc_light bst_discs_light(const bst_discs *discs, bst_vec3 direction);
 
 #endif

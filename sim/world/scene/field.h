@@ -149,8 +149,16 @@ typedef struct bst_field_options {
 typedef struct bst_field
     bst_field; /* work space and result of one query, reused from frame to frame */
 
+/* Creates the field query of a sensor.
+ *
+ * Given:     world             must outlive the query
+ *            observer, sensor  indices in the world
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY and those of the sky background
+ * Ownership: free *out with bst_field_free */
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                             bst_field **out) BST_MUST_CHECK;
+/* Frees a field query; NULL is allowed. */
 void bst_field_free(bst_field *field);
 /* From the next query on another camera than the sensor's; borrowed. */
 void bst_field_set_camera(bst_field *field, const bst_camera *camera);

@@ -33,6 +33,7 @@ void bst_scene_view_light(const bst_world_view *view, int object, const bst_scen
                           const bst_scene_path_light *light, double start_s, double end_s, double u,
                           bst_world_sight *out);
 
+/* Description of an object of the view's world. */
 const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object);
 
 /* Memory of a source for what belongs to it. */

@@ -33,6 +33,12 @@ bool bst_skylight_may_vary(const bst_camera *camera);
 /* Work space and the latest map of one camera. `world` must outlive it; not shareable between
  * threads. */
 typedef struct bst_skylight bst_skylight;
+
+/* Creates the sky background of a camera.
+ *
+ * Given:     world, camera  must outlive it
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_camera *camera,
                                bst_skylight **out) BST_MUST_CHECK;
 void bst_skylight_free(bst_skylight *skylight); /* NULL allowed */

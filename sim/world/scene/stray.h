@@ -18,12 +18,14 @@ typedef struct bst_scene_pst bst_scene_pst;
 bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *config,
                                 double optics_pixel_um, const char *base_dir,
                                 bst_scene_pst **out) BST_MUST_CHECK;
+/* Frees a table of point source transmittance; NULL is allowed. */
 void bst_scene_pst_free(bst_scene_pst *pst);
 
 /* Irradiance on the detector over that at the entrance (normal to the light's direction), of a
  * source angle_rad from the boresight: log-linear between the table's points (linear next to a
  * zero), its first and last value beyond. */
 double bst_scene_pst_at(const bst_scene_pst *pst, double angle_rad);
+/* Pixel pitch for stray light, m. */
 double bst_scene_pst_pixel_m(const bst_scene_pst *pst);
 
 /* V magnitude of the Moon: -12.73 + 0.026 |a| + 4e-9 a^4, a the phase angle (Sun - Moon - observer)

@@ -10,6 +10,7 @@ typedef struct bst_truth_list {
     int capacity;
 } bst_truth_list;
 
+/* Frees the memory of a list and clears the struct, which belongs to the caller. */
 void bst_truth_list_free(bst_truth_list *list);
 
 /* Expected electrons of source `index` (of those queried) in its brightest sensor pixel, without

@@ -1,0 +1,201 @@
+/* False alarms of the generator: noise, wings of bright stars, cosmic rays. */
+#include "tests/obsgen/generator_scene.h"
+
+static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 5.0;
+    start(&s);
+    enum { FRAMES = 4000 };
+    double n = 0.0, n2 = 0.0, energy = 0.0, x = 0.0, y2 = 0.0, least = 1e9;
+    for (int f = 0; f < FRAMES; f++) {
+        bst_generator_result r = run(&s, f);
+        n += r.count;
+        n2 += (double)r.count * r.count;
+        for (int i = 0; i < r.count; i++) {
+            const bst_detection *d = &r.items[i].detection;
+            double asked = r.filter.threshold;
+            assert_true(d->snr >= asked && r.items[i].item == -1);
+            energy += 0.5 * (d->snr * d->snr - asked * asked);
+            least = fmin(least, d->snr - asked);
+            x += d->x_px;
+            y2 += (d->y_px - 0.5 * (SIDE - 1)) * (d->y_px - 0.5 * (SIDE - 1));
+        }
+    }
+    double mean = n / FRAMES;
+    /* four standard deviations each: of a Poisson mean, its variance, an exponential's mean, and
+     * the first two moments of a uniform place */
+    bst_assert_close(mean, 5.0, 4.0 * sqrt(5.0 / FRAMES));
+    bst_assert_close((n2 / FRAMES - mean * mean) / mean, 1.0, 4.0 * sqrt(2.0 / FRAMES));
+    bst_assert_close(energy / n, 1.0, 4.0 / sqrt(n));
+    assert_true(least < 0.001);
+    bst_assert_close(x / n, 0.5 * (SIDE - 1), 4.0 * SIDE / sqrt(12.0 * n));
+    bst_assert_close(y2 / n / (SIDE * (double)SIDE / 12.0), 1.0, 4.0 * sqrt(0.8 / n));
+    close_scene(&s);
+}
+
+static void hits_come_at_the_detectors_rate(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.camera.detector.hits = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 5.0,
+                                                              .pixel_pitch_um = 13.0,
+                                                              .depth_um = 15.0,
+                                                              .e_per_um = 80.0,
+                                                              .straggling = 0.12};
+    start(&s);
+    double seen = 0.0, told = 0.0;
+    enum { FRAMES = 400 };
+    for (int f = 0; f < FRAMES; f++) {
+        bst_generator_result r = run(&s, f);
+        for (int i = 0; i < r.count; i++) {
+            assert_true(r.items[i].hit && r.items[i].item == -1);
+            told += r.items[i].detection.label == BST_LABEL_HIT;
+        }
+        seen += r.count;
+    }
+    /* all of them shine: 1200 e- at least on the filter's few pixels; four standard deviations, and
+     * tracks that leave the frame */
+    double expected = 5.0 * SIDE * SIDE * 169e-8 * 0.5;
+    bst_assert_close(seen / FRAMES, expected, 4.0 * sqrt(expected / FRAMES) + 0.01 * expected);
+    /* most fill one pixel or two, and stand out */
+    assert_true(told > 0.6 * seen);
+    close_scene(&s);
+}
+
+/* Light of a bright star's wings lifts noise above the threshold where no higher maximum is near.
+ */
+static void wings_make_alarms(void **state) {
+    (void)state;
+    enum { FRAMES = 150 };
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 1.0;
+    start(&s);
+    bst_camera camera = s.camera;
+    camera.optics = (bst_optics_config){.psf = BST_PSF_DIFFRACTION, .q = 1.9, .wavelengths = 4};
+    camera.optics.band_nm[0] = 500.0;
+    camera.optics.band_nm[1] = 800.0;
+    bst_psf *psf;
+    bst_assert_ok(&s.ctx, bst_psf_create(&s.ctx, &camera, &psf));
+    bst_response response;
+    const bst_response_side side = {psf, 0.0};
+    bst_response_set(&response, &side, &side, 1, 512.0, 512.0);
+    s.frame.response = &response;
+    double near[2] = {0.0, 0.0}, far[2] = {0.0, 0.0};
+    for (int bright = 0; bright < 2; bright++) {
+        for (int f = 0; f < FRAMES; f++) {
+            s.truth->count = 0;
+            add_source(&s, 1, 512.0, 512.0, electrons_of(&s, bright ? 4000.0 : 40.0));
+            bst_generator_result r = run(&s, f);
+            for (int i = 0; i < r.count; i++) {
+                const bst_detection *d = &r.items[i].detection;
+                double away = hypot(d->x_px - 512.0, d->y_px - 512.0);
+                if (r.items[i].item < 0) {
+                    (away < 24.0 ? near : far)[bright] += 1.0 / FRAMES;
+                    /* within the box in which maxima are compared the star is the higher one */
+                    assert_true(!bright || away > 7.0);
+                }
+            }
+        }
+    }
+    /* at 9 to 13 px the light is 3 to 1 of the noise, so that the rate there is up to exp(12) times
+     * that of 1 in 1024^2: a few in a hundred frames at the least; 150 frames, Poisson */
+    assert_true(near[0] < 0.04); /* 0.0017 expected */
+    assert_true(near[1] > 0.05 && near[1] < 3.0);
+    bst_assert_close(far[1], far[0], 0.5);
+    bst_psf_free(psf);
+    close_scene(&s);
+}
+
+/* With a maximum in 400 pixels and more, background and noise are those of the sky between the
+ * stars, and the threshold is that for its pixels. */
+static void crowded_frames_are_looked_at_twice(void **state) {
+    (void)state;
+    enum { WINDOW = 512 };
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 1.0;
+    start(&s);
+    s.frame.window = (bst_window){0, 0, WINDOW, WINDOW};
+    bst_generator_result r[2];
+    for (int dense = 0; dense < 2; dense++) {
+        int side = dense ? 30 : 22; /* a source in 291 pixels, in 542 */
+        s.truth->count = 0;
+        for (int i = 0; i < side * side; i++) {
+            add_source(&s, (uint32_t)i + 1, (i % side + 0.5) * WINDOW / side,
+                       (i / side + 0.5) * WINDOW / side, electrons_of(&s, 12.0));
+        }
+        r[dense] = run(&s, 0);
+    }
+    const bst_camera *c = &s.camera;
+    double dark =
+        sqrt(36.0 + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0);
+    assert_true(r[0].noise_e > 1.01 * dark && r[0].background_e > 36.1);
+    bst_assert_close(r[1].noise_e, dark, 1e-6 * dark);
+    bst_assert_close(r[1].background_e, 36.0, 1e-6);
+    assert_true(r[1].threshold_snr < r[0].threshold_snr - 0.02);
+    close_scene(&s);
+}
+
+/* Radiation comes by the sensor's area, whatever pixels are read, for as long as charge is
+ * collected, and from all directions of a half space: a track goes by tan(theta) of the depth,
+ * which exceeds T with probability 1 / (1 + T^2) for a flux that falls on a surface (cosine law).
+ */
+static void hits_on_a_binned_window(void **state) {
+    (void)state;
+    const double depth_um = 40.0, pitch_um = 13.0;
+    enum { FRAMES = 150 };
+    for (int b = 1; b <= 2; b++) {
+        scene s;
+        open_scene(&s);
+        s.camera.detector.hits = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 20.0,
+                                                                  .pixel_pitch_um = pitch_um,
+                                                                  .depth_um = depth_um,
+                                                                  .e_per_um = 80.0,
+                                                                  .straggling = 0.0,
+                                                                  .frame_s = 0.7};
+        s.frame.window = (bst_window){96, 160, 800, 480};
+        s.frame.binning = b;
+        start(&s);
+        double n = 0.0, drawn = 0.0, sum[2] = {0.0}, turned[2] = {0.0};
+        for (int f = 0; f < FRAMES; f++) {
+            bst_generator_result r = run(&s, f);
+            n += r.count;
+            for (int i = 0; i < r.count; i++) {
+                const bst_detection *d = &r.items[i].detection;
+                sum[0] += (d->x_px - 95.5) / 800.0 - 0.5;
+                sum[1] += (d->y_px - 159.5) / 480.0 - 0.5;
+                if (d->flags & BST_DETECTION_STREAK) {
+                    drawn += 1.0;
+                    turned[0] += cos(2.0 * d->angle_rad);
+                    turned[1] += sin(2.0 * d->angle_rad);
+                    assert_true(d->length_px > 1.5 * d->width_px);
+                }
+            }
+        }
+        double expected = 20.0 * 800 * 480 * pitch_um * pitch_um * 1e-8 * (0.5 + 0.7) * FRAMES;
+        /* four standard deviations; one in a hundred has its middle outside */
+        bst_assert_close(n, expected, 4.0 * sqrt(expected) + 0.01 * expected);
+        bst_assert_close(sum[0] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+        bst_assert_close(sum[1] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+        /* longer than 1.5 FWHM of 2 px */
+        double t = 3.0 * pitch_um / depth_um, share = 1.0 / (1.0 + t * t);
+        bst_assert_close(drawn / n, share, 4.0 * sqrt(share * (1.0 - share) / n) + 0.01);
+        bst_assert_close(turned[0] / drawn, 0.0, 4.0 * sqrt(0.5 / drawn));
+        bst_assert_close(turned[1] / drawn, 0.0, 4.0 * sqrt(0.5 / drawn));
+        close_scene(&s);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
+        cmocka_unit_test(hits_come_at_the_detectors_rate),
+        cmocka_unit_test(wings_make_alarms),
+        cmocka_unit_test(crowded_frames_are_looked_at_twice),
+        cmocka_unit_test(hits_on_a_binned_window),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
