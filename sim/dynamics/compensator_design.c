@@ -32,10 +32,6 @@ typedef struct need {
 } need;
 
 /* In (-pi, pi]. */
-static double wrap(double angle) {
-    return angle - two_pi * ceil(angle / two_pi - 0.5);
-}
-
 static double complex rest_of_loop(const design *d, double omega) {
     return d->plant(d->user, omega) * bst_compensator_response(&d->filters, omega);
 }
@@ -48,7 +44,7 @@ static void follow_phase(design *d, double lowest_hz) {
         if (i == 0) {
             d->phase_rad[0] = now > 0.5 * BST_PI ? now - two_pi : now;
         } else {
-            d->phase_rad[i] = d->phase_rad[i - 1] + wrap(now - d->phase_rad[i - 1]);
+            d->phase_rad[i] = d->phase_rad[i - 1] + bst_wrap_angle(now - d->phase_rad[i - 1]);
         }
     }
 }
@@ -56,7 +52,7 @@ static void follow_phase(design *d, double lowest_hz) {
 static double phase_at(const design *d, double hz, double wrapped) {
     double i = fmax(round(log(hz / d->lowest_hz) / d->log_step), 0.0);
     double near = d->phase_rad[(int)fmin(i, PHASE_POINTS - 1)];
-    return near + wrap(wrapped - near);
+    return near + bst_wrap_angle(wrapped - near);
 }
 
 static need need_at(const design *d, double hz, double phase_margin_rad) {

@@ -72,10 +72,6 @@ const bst_config_desc bst_orbit_spacecraft_table[] = {
     BST_CONFIG_END,
 };
 
-static bst_vec3 vec(const double v[3]) {
-    return (bst_vec3){v[0], v[1], v[2]};
-}
-
 static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_config *given,
                             const char *path, double gm, bst_world_state *out) {
     bst_initial_state_config all = *given;
@@ -103,7 +99,8 @@ static bst_status initial_state(const bst_world_builder *b, const bst_orbit_conf
     const bst_initial_state_config *s = &config->state;
     switch (s->from) {
         case BST_STATE_CARTESIAN:
-            *out = (bst_world_state){vec(s->position_gcrf_m), vec(s->velocity_gcrf_mps)};
+            *out = (bst_world_state){bst_vec3_from_array(s->position_gcrf_m),
+                                     bst_vec3_from_array(s->velocity_gcrf_mps)};
             return BST_OK;
         case BST_STATE_KEPLERIAN:
             return keplerian(b, s, path, gm, out);
@@ -169,8 +166,8 @@ bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
             return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for burns");
         }
         for (int i = 0; i < burns->count; i++) {
-            thrusts[i] =
-                (bst_astro_thrust){items[i].time_s, items[i].duration_s, vec(items[i].dv_rtn_mps)};
+            thrusts[i] = (bst_astro_thrust){items[i].time_s, items[i].duration_s,
+                                            bst_vec3_from_array(items[i].dv_rtn_mps)};
         }
         options.burns = thrusts;
         options.burn_count = burns->count;
