@@ -55,10 +55,10 @@ typedef struct imgproc_module {
     bst_region_of_interest windows; /* of the present frame; none: all of it */
     bst_stack *stack;               /* NULL: no stacks */
     bst_optics_photometer photometer;
-    bst_pixel_learner *pixels;    /* NULL: no bad pixels are learned */
-    int64_t steps;                /* that were made */
-    bst_psf_wings *wings;         /* NULL: the PSF has none */
-    bst_plugin_detector *plugged; /* NULL: detection is this module's own */
+    bst_pixel_learner *pixels;   /* NULL: no bad pixels are learned */
+    int64_t steps;               /* that were made */
+    bst_psf_wings *wings;        /* NULL: the PSF has none */
+    bst_plugin_detector *plugin; /* NULL: detection is this module's own */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -78,12 +78,12 @@ static void destroy(void *self) {
     bst_optics_photometer_free(&m->photometer);
     bst_pixel_learner_free(m->pixels);
     bst_psf_wings_free(m->wings);
-    bst_plugin_detector_free(m->plugged);
+    bst_plugin_detector_free(m->plugin);
     free(m);
 }
 
 static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
-    if (l->ip || m->plugged) {
+    if (l->ip || m->plugin) {
         return BST_OK;
     }
     BST_TRY(bst_imgproc_create(ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
@@ -105,7 +105,7 @@ static bst_status open_plugged(const bst_module_env *env, imgproc_module *m) {
             env->observer, env->sensor);
     }
     return bst_plugin_detector_create(env->ctx, &m->config->detector, &m->camera, &m->maps,
-                                      (int)m->config->capacity, &m->plugged);
+                                      (int)m->config->capacity, &m->plugin);
 }
 
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
@@ -119,7 +119,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                                env->sensor);
     }
     BST_TRY(open_plugged(env, m));
-    if (m->config->bad_pixel_learning.enabled && !m->plugged) {
+    if (m->config->bad_pixel_learning.enabled && !m->plugin) {
         BST_TRY(bst_pixel_learner_create(env->ctx, &m->camera, &m->config->bad_pixel_learning,
                                          &m->pixels));
     }
@@ -239,7 +239,7 @@ static bst_status identify(bst_ctx *ctx, imgproc_module *m, const lane *l, const
     const bst_window window = e->message->window;
     double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
     double v_limit =
-        m->plugged ? bst_plugin_detector_v_limit(m->plugged, snr) : bst_imgproc_v_limit(l->ip, snr);
+        m->plugin ? bst_plugin_detector_v_limit(m->plugin, snr) : bst_imgproc_v_limit(l->ip, snr);
     int expected = 0;
     bst_predicted_stars_query query = {out->q_cam_from_gcrf, &e->light, window,
                                        m->config->search_radius_px, v_limit};
@@ -329,8 +329,8 @@ static bst_status label_wings(bst_ctx *ctx, imgproc_module *m, const lane *l, co
             bst_psf_wings_add(m->wings, d->x_px, d->y_px, d->flux_e);
         }
     }
-    bst_psf_wings_label(m->wings, m->plugged ? bst_plugin_detector_ground : ground_at,
-                        m->plugged ? (const void *)m->plugged : l->ip, message->binning, out);
+    bst_psf_wings_label(m->wings, m->plugin ? bst_plugin_detector_ground : ground_at,
+                        m->plugin ? (const void *)m->plugin : l->ip, message->binning, out);
     return BST_OK;
 }
 
@@ -363,8 +363,8 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l, c
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
         .beside_another = beside_another};
     bst_status status =
-        m->plugged ? bst_plugin_detector_detect(ctx, m->plugged, &frame, message->exposure_id,
-                                                motion, out, capacity)
+        m->plugin ? bst_plugin_detector_detect(ctx, m->plugin, &frame, message->exposure_id, motion,
+                                               out, capacity)
         : windows.count > 0
             ? bst_imgproc_detect_windows(ctx, l->ip, &frame, &windows, motion, out, capacity)
             : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
@@ -379,7 +379,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
     l->ready = false;
     bst_sample sample = bst_step_next(step, PORT_FRAME);
     /* where the windows are is known in the step */
-    if (!sample.payload || m->config->track_windows || m->plugged) { /* frame by frame */
+    if (!sample.payload || m->config->track_windows || m->plugin) { /* frame by frame */
         return BST_OK;
     }
     BST_TRY(open_lane(ctx, m, l));
@@ -464,7 +464,7 @@ static void label_objects(imgproc_module *m, const lane *l,
                           const bst_imgproc_frame_knowledge *known,
                           const bst_optics_zero_point *zero_point, bst_detections *out) {
     bst_imgproc_discriminator_label(m->discriminator, known, out);
-    for (int i = 0; i < out->count && !m->plugged; i++) {
+    for (int i = 0; i < out->count && !m->plugin; i++) {
         if (out->items[i].label == BST_LABEL_OBJECT) {
             bst_imgproc_refine(l->ip, out, i, zero_point);
         }
@@ -506,14 +506,14 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         out->windows = m->windows.count;
     }
     BST_TRY(detections_of(ctx, m, l, &e, out, capacity));
-    bool smeared = !m->plugged && bst_imgproc_smeared(l->ip);
+    bool smeared = !m->plugin && bst_imgproc_smeared(l->ip);
     bst_optics_photometer_begin(&m->photometer);
-    bst_imgproc_frame_knowledge known = {
-        .q_cam_from_gcrf = out->q_cam_from_gcrf,
-        .window = message->window,
-        .streak_px =
-            m->plugged ? bst_plugin_detector_streak_px(m->plugged) : bst_imgproc_streak_px(l->ip),
-        .predictions = predictions};
+    bst_imgproc_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
+                                         .window = message->window,
+                                         .streak_px = m->plugin
+                                                          ? bst_plugin_detector_streak_px(m->plugin)
+                                                          : bst_imgproc_streak_px(l->ip),
+                                         .predictions = predictions};
     if (oriented && navigated && !smeared) {
         BST_TRY(identify(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
         known.light = e.light;

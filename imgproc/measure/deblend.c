@@ -129,7 +129,7 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
     if (ok) {
         found->source = copies[0];
     }
-    found->company = c.free_count - 1 + c.fixed_count;
+    found->neighbours = c.free_count - 1 + c.fixed_count;
     if (c.free_count > 1) {
         found->flags |= BST_DETECTION_BLEND;
     }

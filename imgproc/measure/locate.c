@@ -333,7 +333,7 @@ static bool company_changed(const bst_imgproc_worker *w, int i, const bst_imgpro
         end = group_end(end);
     }
     int begin = end == FIRST_GROUP ? 0 : end / 3;
-    bool changed = c.free_count - 1 + c.fixed_count != found->company;
+    bool changed = c.free_count - 1 + c.fixed_count != found->neighbours;
     for (int k = 0; k < c.fixed_count && !changed; k++) {
         const bst_imgproc_found *other = bst_imgproc_found_of(c.fixed[k]);
         double moved = hypot(other->source.shape.x_px - other->top_x_px,

@@ -29,7 +29,7 @@ typedef struct bst_imgproc_found {
     bool bleed;               /* its charge overflowed along its columns: blooming.h */
     double bleed_e, bleed_px; /* with bleed: charge of all its pixels, width of the full ones */
     bool rough;               /* placed by the filter, not fitted */
-    int company;              /* neighbours that the latest fit counted with */
+    int neighbours;           /* neighbours that the latest fit counted with */
     int label; /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
     double label_probability;
     bst_imgproc_cosmic_ray charge;

@@ -124,9 +124,9 @@ static cJSON *either(cJSON *own, const bst_config_desc *stage) {
     cJSON_AddStringToObject(node, "type", "object");
     cJSON *names = cJSON_AddArrayToObject(cJSON_AddObjectToObject(node, "if"), "required");
     cJSON_AddItemToArray(names, cJSON_CreateString(stage->key));
-    cJSON *plugged = cJSON_AddObjectToObject(node, "then");
-    cJSON_AddStringToObject(plugged, "title", stage->choices[0]);
-    cJSON *properties = cJSON_AddObjectToObject(plugged, "properties");
+    cJSON *plugin = cJSON_AddObjectToObject(node, "then");
+    cJSON_AddStringToObject(plugin, "title", stage->choices[0]);
+    cJSON *properties = cJSON_AddObjectToObject(plugin, "properties");
     cJSON_AddItemToObject(properties, stage->key, value_schema(stage));
     cJSON *type = cJSON_AddObjectToObject(properties, "type");
     cJSON_AddStringToObject(type, "type", "string");

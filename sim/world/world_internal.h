@@ -44,7 +44,7 @@ typedef struct bst_world_orbit {
 
     bst_world_burn *burns;
     int burn_count;
-    struct bst_external_states *steering; /* owned; NULL: its states do not come by message */
+    struct bst_external_states *external; /* owned; NULL: its states do not come by message */
     const char *name;                     /* for messages; borrowed */
 } bst_world_orbit;
 

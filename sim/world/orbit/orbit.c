@@ -115,8 +115,8 @@ bst_status bst_world_orbit_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst
                                  bst_time epoch, double seconds, bool with_burns,
                                  bst_world_state *out) {
     bool steered = false;
-    if (with_burns && orbit->steering) {
-        BST_TRY(bst_external_states_state(ctx, orbit->steering, seconds, &steered, out));
+    if (with_burns && orbit->external) {
+        BST_TRY(bst_external_states_state(ctx, orbit->external, seconds, &steered, out));
     }
     if (steered) {
         return BST_OK;

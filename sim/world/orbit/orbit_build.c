@@ -212,6 +212,6 @@ void bst_world_orbit_free(bst_world_orbit *orbit) {
     bst_trajectory_free(orbit->unburnt);
     bst_trajectory_free(orbit->burnt);
     bst_gravity_free(orbit->gravity);
-    bst_external_states_free(orbit->steering);
+    bst_external_states_free(orbit->external);
     free(orbit->burns);
 }
