@@ -36,7 +36,7 @@ struct bst_renderer {
     cl_program program;
     cl_kernel nodes_kernel, frame_kernel, expected_kernel;
     bst_psf *psf;
-    bst_fourier_render *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
+    bst_fourier_render *fourier; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
     bst_error_budget *budget;
     bst_detector *detector;
@@ -78,7 +78,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device, doubl
         &bst_kernel_readout};
     char options[2048];
     bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, law_widest,
-                            r->fft_light != NULL, r->detector, options, sizeof options);
+                            r->fourier != NULL, r->detector, options, sizeof options);
     BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
                              &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
@@ -112,12 +112,12 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     light.tolerance = fmin(fmax(light.tolerance, 2e-6), 1e-3);
     light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
     light.spatial_oversample = r->options.spatial_oversample;
-    BST_TRY(bst_fourier_render_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
-    smear->widest = bst_fourier_render_widest(r->fft_light);
-    smear->node_sigma_px = bst_fourier_render_band(r->fft_light)->node_sigma_px;
-    smear->share_sigma_px = bst_fourier_render_band(r->fft_light)->share_sigma_px;
-    smear->grid_per_px = bst_fourier_render_density(r->fft_light);
-    memcpy(smear->pixel_part, bst_fourier_render_band(r->fft_light)->pixel_part,
+    BST_TRY(bst_fourier_render_create(ctx, device, &r->camera, r->psf, &light, &r->fourier));
+    smear->widest = bst_fourier_render_widest(r->fourier);
+    smear->node_sigma_px = bst_fourier_render_band(r->fourier)->node_sigma_px;
+    smear->share_sigma_px = bst_fourier_render_band(r->fourier)->share_sigma_px;
+    smear->grid_per_px = bst_fourier_render_density(r->fourier);
+    memcpy(smear->pixel_part, bst_fourier_render_band(r->fourier)->pixel_part,
            sizeof smear->pixel_part);
     return BST_OK;
 }
@@ -160,7 +160,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_detector_keep_flags(ctx, r->detector);
     }
     if (status == BST_OK) {
-        r->law_degree = r->fft_light        ? 0
+        r->law_degree = r->fourier        ? 0
                         : r->law_degree > 0 ? r->law_degree
                                             : bst_profile_law_degree(sigma_px);
         status =
@@ -184,8 +184,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     }
     if (status == BST_OK && rolling) {
         double peak_px =
-            r->fft_light ? bst_fourier_render_band(r->fft_light)->share_sigma_px : sigma_px;
-        status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fft_light,
+            r->fourier ? bst_fourier_render_band(r->fourier)->share_sigma_px : sigma_px;
+        status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fourier,
                                     &r->rolling);
     }
     if (status == BST_OK) {
@@ -225,7 +225,7 @@ void bst_renderer_free(bst_renderer *r) {
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
     bst_error_budget_free(r->budget);
-    bst_fourier_render_free(r->fft_light);
+    bst_fourier_render_free(r->fourier);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
     bst_rolling_free(r->rolling);
@@ -241,7 +241,7 @@ void bst_renderer_free(bst_renderer *r) {
 static bool foreseen(const bst_renderer *r) {
     const bst_renderer_options *o = &r->options;
     return o->temporal_oversample <= 0 && o->spatial_oversample <= 0 &&
-           !(r->fft_light && o->fft_taps == 4);
+           !(r->fourier && o->fft_taps == 4);
 }
 
 /* Chooses nodes and stamps of all sources: fills plan and stats. */
@@ -251,7 +251,7 @@ static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_requ
         .margin_px = bst_renderer_margin_px(r),
         .bytes = r->most_bytes,
         .nodes = r->options.most_nodes};
-    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->budget, r->fft_light,
+    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->budget, r->fourier,
                                 &limits, q));
     r->stats = (bst_render_stats){.sources = r->plan.count,
                                   .nodes = (long long)r->plan.blocks * BST_BLOCK,
@@ -337,7 +337,7 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
                                       r->source_box.buffer, r->shares, p->source_groups,
                                       r->plan.fine};
     bst_fourier_render_image image;
-    BST_TRY(bst_fourier_render_frame(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
+    BST_TRY(bst_fourier_render_frame(ctx, r->fourier, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;
     p->light_pitch = image.pitch;
     *light = image.buffer;
@@ -371,7 +371,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
         r->tiles[r->set] = to->first_tile + (int)tiles;
     }
     cl_mem light = r->law;
-    if (r->fft_light) {
+    if (r->fourier) {
         BST_TRY(make_light(ctx, r, q, &p, &light));
     }
     cl_mem maps[BST_DETECTOR_BUFFERS];
@@ -573,5 +573,5 @@ double bst_renderer_peak_e(const bst_renderer *r, int index) {
 }
 
 int bst_renderer_margin_px(const bst_renderer *r) {
-    return r->fft_light ? bst_fourier_render_margin_px(r->fft_light) : r->taps / 2 + 1;
+    return r->fourier ? bst_fourier_render_margin_px(r->fourier) : r->taps / 2 + 1;
 }

@@ -8,9 +8,9 @@
 
 /* Writes them to text[bytes]; 2048 bytes do. taps: of the longest stamp; law_degree: of the
  * stamps' profile law (0: none); law_widest: widening up to
- * which it serves; fft_light: light comes from the Fourier path. */
+ * which it serves; fourier: light comes from the Fourier path. */
 void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
-                             int taps, int law_degree, double law_widest, bool fft_light,
+                             int taps, int law_degree, double law_widest, bool fourier,
                              const bst_detector *detector, char *text, size_t bytes);
 
 /* Those of them that kernels/nodes.cl takes, with a blank before. */

@@ -53,7 +53,7 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_
 typedef struct planning {
     bst_smear *smear;
     bst_error_budget *budget;
-    const bst_fourier_render *fft_light;
+    const bst_fourier_render *fourier;
     const bst_render_request *request;
     double dark_e2;
     double beyond; /* light that a pixel gets of a source beyond the margin, s */
@@ -70,10 +70,10 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
      * tests/scenegen/test_tolerance_sweep.c (slow). */
     static const double REST = 0.4;
     bst_error_budget_source error = *bst_smear_last_error(m->smear);
-    if (m->fft_light) { /* of its grid, on dark pixels too */
+    if (m->fourier) { /* of its grid, on dark pixels too */
         double peak_e = bst_smear_last_read_e(m->smear),
                presence = bst_smear_last_presence(m->smear);
-        double grid = bst_fourier_render_error_sigma(m->fft_light, m->fine, presence < 1.0,
+        double grid = bst_fourier_render_error_sigma(m->fourier, m->fine, presence < 1.0,
                                                      m->request->window, peak_e, m->dark_e2);
         m->grid_sigma = fmax(m->grid_sigma, grid);
         double nodes_e = (double)error.nodes_e,
@@ -82,7 +82,7 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
         const float *colour = source->colour;
         if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
             error.excess_e +=
-                (float)(presence * bst_fourier_render_mixing_error(m->fft_light) * peak_e);
+                (float)(presence * bst_fourier_render_mixing_error(m->fourier) * peak_e);
         }
     }
     return bst_error_budget_add(ctx, m->budget, &error);
@@ -102,7 +102,7 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
         bool visible;
         BST_TRY(bst_smear_source(ctx, m->smear, &q->sources[i], s, &visible));
         p->peak_e[i] = bst_smear_last_peak_e(m->smear);
-        if (m->fft_light && !q->sources[i].occulted && bst_smear_last_leaves(m->smear)) {
+        if (m->fourier && !q->sources[i].occulted && bst_smear_last_leaves(m->smear)) {
             bst_error_budget_miss(m->budget, m->beyond * q->sources[i].electrons_per_s);
         }
         if (!visible) {
@@ -112,8 +112,8 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
         p->blocks += *fits ? s->blocks : 0;
         s->first_box = i;
         p->count++;
-        if (m->fft_light) {
-            bst_fourier_render_stamp(m->fft_light, s);
+        if (m->fourier) {
+            bst_fourier_render_stamp(m->fourier, s);
         }
         BST_TRY(add_error(ctx, m, &q->sources[i]));
     }
@@ -174,7 +174,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
         }
         idle = error > GAIN * before ? idle + 1 : 0;
         before = error;
-        if (m->fft_light && !m->fine && m->grid_sigma > GRID_SHARE * tolerance) {
+        if (m->fourier && !m->fine && m->grid_sigma > GRID_SHARE * tolerance) {
             m->fine = true;
         } else {
             aim *= fmin(fmax(LESS * tolerance / error, MOST_STEP), LEAST_STEP);
@@ -192,10 +192,10 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
 
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
                                bst_smear *smear, bst_error_budget *budget,
-                               const bst_fourier_render *fft_light,
+                               const bst_fourier_render *fourier,
                                const bst_scene_plan_limits *limits, const bst_render_request *q) {
     double read = camera->read_noise_e, brightest = 0.0;
-    BST_TRY(reserve(ctx, p, q->count, fft_light && bst_fourier_render_spectra(fft_light) > 1));
+    BST_TRY(reserve(ctx, p, q->count, fourier && bst_fourier_render_spectra(fourier) > 1));
     for (int i = 0; i < q->count; i++) {
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
     }
@@ -212,11 +212,11 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
     planning m = {.smear = smear,
                   .budget = budget,
-                  .fft_light = fft_light,
+                  .fourier = fourier,
                   .request = q,
                   .dark_e2 = dark_e2,
                   .most_nodes = limits->nodes > 0 ? limits->nodes : BST_SCENE_MOST_NODES,
-                  .beyond = fft_light ? bst_fourier_render_band(fft_light)->beyond * binning *
+                  .beyond = fourier ? bst_fourier_render_band(fourier)->beyond * binning *
                                             binning * q->track->time_s[q->track->count - 1]
                                       : 0.0};
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */

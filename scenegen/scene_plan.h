@@ -34,12 +34,12 @@ typedef struct bst_scene_plan_limits {
 } bst_scene_plan_limits;
 
 /* Plans a request with a smear and a budget, which are begun for it, so that the predicted error is
- * within the tolerance where the number of nodes and the Fourier path's grid allow it. fft_light:
+ * within the tolerance where the number of nodes and the Fourier path's grid allow it. fourier:
  * the Fourier path, or NULL where stamps are drawn. BST_ERR_RANGE when the coarsest nodes need more
  * than a buffer or than SLEW times the most nodes. */
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_camera *camera,
                                bst_smear *smear, bst_error_budget *budget,
-                               const bst_fourier_render *fft_light,
+                               const bst_fourier_render *fourier,
                                const bst_scene_plan_limits *limits,
                                const bst_render_request *request) BST_MUST_CHECK;
 

@@ -80,7 +80,7 @@ static bst_status step(void *self, struct bst_step *s) {
             bst_task *task = bst_step_write(s, bst_member_port(PORT_COUNT, i, PORT_TASK), NULL);
             *task = t->sensors[i].task;
         }
-        bst_step_promise(s, bst_member_port(PORT_COUNT, i, PORT_TASK),
+        bst_step_set_lookahead(s, bst_member_port(PORT_COUNT, i, PORT_TASK),
                          bst_tasking_quiet_until(t, i));
     }
     return report(t, s);
@@ -93,7 +93,7 @@ const bst_module_desc bst_tasking_priority_module = {
     .doc =
         "Gives free sensors what is due: by priority, time since it was seen, visibility and "
         "keep-out angles.",
-    .flags = BST_MODULE_LINKS | BST_MODULE_PROMISES,
+    .flags = BST_MODULE_MULTI_SENSOR | BST_MODULE_HAS_LOOKAHEAD,
     .config = bst_tasking_config_table,
     .config_bytes = sizeof(bst_tasking_config),
     .default_rate_hz = 1.0,

@@ -27,7 +27,7 @@ const bst_config_desc bst_gyro_config_table[] = {
     BST_REAL(C, rate_hz, "Hz", 0.1, 10000, "100", "Samples a second; divides the plant's rate."),
     BST_REAL(C, angle_random_walk_deg_rth, "deg/sqrt(h)", 1e-9, 10, "0.005", "Angle random walk."),
     BST_REAL(C, rate_random_walk_deg_rth3, "deg/h^1.5", 1e-9, 100, "0.01",
-             "Rate random walk, by which the bias wanders."),
+             "Rate random walk, by which the bias drifts."),
     BST_REALS(C, bias_degph, "deg/h", -3600, 3600, "[0, 0, 0]", "Bias at the epoch."),
     BST_REAL(C, bias_sigma_degph, "deg/h", 1e-6, 3600, "0.05",
              "Drawn about each axis on top of bias_degph; what the filter first expects of it (it "

@@ -162,7 +162,7 @@ static bool take_step(const bst_fit_request *r, const equations *e,
                          start[s].shape.x_px + limit_px);
         double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7), start[s].shape.y_px - limit_px,
                          start[s].shape.y_px + limit_px);
-        /* of the standard deviation that the diagonal promises, at least 1e-5 px */
+        /* of the standard deviation that the diagonal gives, at least 1e-5 px */
         double share = s == 0 ? SETTLED : NEIGHBOUR_SETTLED;
         double slack_x = fmax(1e-5, share / e->a[3 * s][3 * s]);
         double slack_y = fmax(1e-5, share / e->a[3 * s + 1][3 * s + 1]);

@@ -10,7 +10,7 @@ static const double FAINTEST_SHARE = 0.3;
 static const double FLATTEST = 6.0;
 /* Deviation along a streak, in sigmas of the PSF, from which on the place is not that of the
  * nearest top any more; noise of its filters over white noise's that is believed. */
-static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
+static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
 /* Keys of such streaks. */
 static const uint64_t CENTROID_ERROR = (uint64_t)1 << 52;
 /* Alone, so bright and so many FWHM long, a detection is fitted as a streak of its own. */
@@ -123,7 +123,7 @@ static nearest_light nearest_of(const bst_generator *g, const generator_source *
     return n;
 }
 
-/* Where a streak so faint is found that the top of the filters' output wanders along it. beside: of
+/* Where a streak so faint is found that the top of the filters' output scatters along it. beside: of
  * the output there, what neighbours give that are found too. */
 static void centroid_error(const bst_generator *g, const generator_source *s,
                            const generator_source *merged, int count, double beside,
@@ -138,7 +138,7 @@ static void centroid_error(const bst_generator *g, const generator_source *s,
     double snr = fmax(s->flux_e * bound.norm / g->noise_e, UNLIFTED_SNR);
     double along = bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr) *
                    sqrt(bound.var_along_px2 * out->widen);
-    if (along * out->flat < WANDERS * g->total_sigma) {
+    if (along * out->flat < MERGED_CENTROID * g->total_sigma) {
         return;
     }
     bst_streak_centroid_error_set(g->centroid_error, g->streak, g->total_sigma);
@@ -150,7 +150,7 @@ static void centroid_error(const bst_generator *g, const generator_source *s,
     double gain =
         bst_obsgen_between(bst_obsgen_lengths_px, cal->gain, BST_OBSGEN_LENGTHS, s->length);
     double own = s->amplitude / gain;
-    /* the bound's deviation over that of these filters' top where nothing wanders */
+    /* the bound's deviation over that of these filters' top where nothing scatters */
     double noise = along * own * sqrt(g->centroid_error->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
     double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;

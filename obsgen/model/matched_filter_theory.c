@@ -10,16 +10,13 @@ static const double ROOT_2PI = 2.5066282746310002;
 static double density(double z) {
     return exp(-0.5 * z * z) / ROOT_2PI;
 }
-static double below(double z) {
-    return 0.5 * erfc(-z * 0.70710678118654752);
-}
 static double above(double z) {
     return 0.5 * erfc(z * 0.70710678118654752);
 }
 
 /* Second antiderivative of a normal density of deviation s. */
 static double ramp(double z, double s) {
-    return z * below(z / s) + s * density(z / s);
+    return z * bst_matched_normal_below(z / s) + s * density(z / s);
 }
 
 /* Autocorrelation of a blurred segment along itself, times s. */
@@ -52,8 +49,8 @@ double bst_matched_product(bst_obsgen_path_px p, bst_obsgen_path_px q, double si
     for (int i = 0; i < parts; i++) {
         double u = (i + 0.5) / parts - 0.5;
         double along = u * (p.dx * cx + p.dy * cy), across = u * (p.dy * cx - p.dx * cy);
-        sum +=
-            density(across / s) * (below((along + 0.5 * lq) / s) - below((along - 0.5 * lq) / s));
+        sum += density(across / s) * (bst_matched_normal_below((along + 0.5 * lq) / s) -
+                                      bst_matched_normal_below((along - 0.5 * lq) / s));
     }
     return sum / (parts * s * lq);
 }

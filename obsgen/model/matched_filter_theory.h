@@ -4,6 +4,13 @@
 #ifndef BST_OBSGEN_MODEL_MATCHED_FILTER_THEORY_H
 #define BST_OBSGEN_MODEL_MATCHED_FILTER_THEORY_H
 
+#include <math.h>
+
+/* Probability that a standard normal variable is below z. */
+static inline double bst_matched_normal_below(double z) {
+    return 0.5 * erfc(-z * 0.70710678118654752);
+}
+
 /* A straight path during the exposure, px; {0, 0}: at rest. */
 typedef struct bst_obsgen_path_px {
     double dx, dy;

@@ -5,14 +5,11 @@
 #include <string.h>
 
 #include "boresight/vec.h"
+#include "obsgen/model/matched_filter_theory.h"
 
 static double density(double z) {
     return exp(-0.5 * z * z) / 2.5066282746310002;
 }
-static double below(double z) {
-    return 0.5 * erfc(-z * 0.70710678118654752);
-}
-
 /* Beyond so many deviations a normal distribution is 0 or 1 to double precision. */
 static const double ALL_SIGMAS = 9.0;
 /* Bends that are none. */
@@ -104,7 +101,9 @@ static double piece_light(const piece *p, double x, double y, double s) {
     }
     double u = x * p->cx + y * p->cy, v = y * p->cx - x * p->cy;
     double high = u + p->half, low = u - p->half;
-    double within = high > ALL_SIGMAS && low < -ALL_SIGMAS ? 1.0 : below(high) - below(low);
+    double within = high > ALL_SIGMAS && low < -ALL_SIGMAS
+                        ? 1.0
+                        : bst_matched_normal_below(high) - bst_matched_normal_below(low);
     return p->height * exp(-0.5 * v * v) * within;
 }
 
@@ -228,7 +227,7 @@ static void straight_bias(const bst_star_trail_path *p, double dx_px, double dy_
         double fall = weight * exp(-0.5 * v * v / (s * s)), inside;
         if (drawn) {
             double high = (u + 0.5 * length) / s, low = (u - 0.5 * length) / s;
-            inside = fall * (below(high) - below(low));
+            inside = fall * (bst_matched_normal_below(high) - bst_matched_normal_below(low));
             along += fall * (density(low) - density(high)) / s;
         } else {
             inside = fall * exp(-0.5 * u * u / (s * s));

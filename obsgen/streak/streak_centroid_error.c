@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "obsgen/model/matched_filter_theory.h"
+
 enum {
     ROWS = BST_WANDER_ROWS,
     STEPS = BST_WANDER_STEPS,
@@ -13,10 +15,6 @@ enum {
 static const double BEYOND = 2.0;
 /* Distance of the rows, sigmas. */
 static const double APART = 0.7;
-
-static double below(double z) {
-    return 0.5 * erfc(-z * 0.70710678118654752);
-}
 
 /* What makes of white rows those of the output (Cholesky). */
 static void set_mix(bst_streak_centroid_error *w) {
@@ -80,7 +78,7 @@ typedef struct rows {
 static void add_light(const bst_streak_centroid_error *w,
                       const bst_streak_centroid_error_source *sources, int count, rows *out) {
     double s = w->sigma * sqrt(2.0), half = 0.5 * w->length;
-    double top = 2.0 * below(half / s) - 1.0;
+    double top = 2.0 * bst_matched_normal_below(half / s) - 1.0;
     for (int k = 0; k < count; k++) {
         double across[ROWS];
         for (int r = 0; r < ROWS; r++) {
@@ -90,7 +88,10 @@ static void add_light(const bst_streak_centroid_error *w,
         for (int i = 0; i <= 2 * w->side; i++) {
             double u = (i - w->side) * w->step - sources[k].along_px;
             double streak = bst_matched_falloff(u, 0.0, w->length, w->sigma);
-            double point = w->shared * (below((u + half) / s) - below((u - half) / s)) / top;
+            double point = w->shared *
+                           (bst_matched_normal_below((u + half) / s) -
+                            bst_matched_normal_below((u - half) / s)) /
+                           top;
             for (int r = 0; r < ROWS; r++) {
                 out->streak[r][i] += across[r] * streak;
                 out->point[r][i] += across[r] * point;

@@ -88,7 +88,7 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fourier_render *l)
     char options[1024];
     int length = snprintf(
         options, sizeof options,
-        "-cl-std=CL1.2 -DFFT_LIGHT -DDEPOSIT_W=%d -DDEPOSIT_H=%d "
+        "-cl-std=CL1.2 -DFOURIER -DDEPOSIT_W=%d -DDEPOSIT_H=%d "
         "-DDEPOSIT_GROUP=%d%s%s%s",
         l->tile_width, l->tile_height, l->group, l->field_nodes > 1 ? " -DFIELD" : "",
         l->nodes > l->field_nodes ? " -DSPECTRA" : "", l->group == 1 ? " -DNEAR_CACHE" : "");

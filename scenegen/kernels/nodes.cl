@@ -2,7 +2,7 @@
  * they are drawn (splat.cl, deposit.cl), and a kernel that finds the boxes of pixels that blocks,
  * sources and groups of sources touch, one work-item per source. Options: PLACE_BITS
  * (scenegen/stamp/fixed_point_px.h), SPATIAL_OVERSAMPLE (parts of a pixel per axis), DISTORTED (with K1, K2, K3,
- * P1, P2 and FOLD2), FFT_LIGHT (nodes are spread on a grid, else they get stamps). */
+ * P1, P2 and FOLD2), FOURIER (nodes are spread on a grid, else they get stamps). */
 
 /* any(), by halves: some compilers test lane after lane. */
 static int any16(int16 v) {
@@ -33,7 +33,7 @@ static int4 bounds_of(int16 x, int16 y) {
     return min(z.even, z.odd);
 }
 
-#ifdef FFT_LIGHT
+#ifdef FOURIER
 /* Row of the Fourier path's table, and the share of the way to the next. */
 static float16 width_of(float16 widening) {
     float16 square = fmin(widening, BST_WIDEST) * (BST_WIDTHS * BST_WIDTHS / BST_WIDEST);

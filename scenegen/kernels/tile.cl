@@ -1,6 +1,6 @@
 /* One tile of the frame per work-item: light, vignetting, background and, for a frame, the
  * detector. Options: GROUP (work-items per work-group), NEAR_CACHE (memory has one address space,
- * and what lies in it can be fetched ahead), FFT_LIGHT (the light is an image, else it comes from
+ * and what lies in it can be fetched ahead), FOURIER (the light is an image, else it comes from
  * nodes; `light` is the image or the profiles' law), FLAGS (those of saturated pixels are kept). */
 
 /* Where a tile lies: its first pixel on the full sensor and in the window, and its size. Tiles
@@ -116,7 +116,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     }
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
-#ifdef FFT_LIGHT
+#ifdef FOURIER
     load_tile(sum, p, t.left, t.top, light);
 #else
     splat_tile(p, sum, t.x, t.y, sources, table, block_box, source_box, group_box, light);
@@ -177,7 +177,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     }
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
-#ifdef FFT_LIGHT
+#ifdef FOURIER
     load_tile(sum, p, t.left, t.top, light);
 #else
     splat_tile(p, sum, t.x, t.y, sources, table, block_box, source_box, group_box, light);

@@ -304,66 +304,87 @@ static bool widened_norm(const moments *g, double trace, double bend2, double pe
     return low > 0.0;
 }
 
-/* Fills the rule and its error: what it misses of the image, over the peak. Infinite where there is
- * no such rule, or where its error is more than `limit`. */
-static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, double limit,
-                     rule *r) {
-    double var = m->variance, d[3][3];
-    memset(r, 0, sizeof *r);
-    r->nodes = n;
-    r->error = INFINITY;
-    memcpy(d, g->covariance, sizeof d);
-    for (int i = 0; i < 3 && n > 1; i++) {
+/* What a rule leaves of a group's covariance, and what of that its Gaussian can be widened by. */
+typedef struct residual {
+    double d[3][3];   /* covariance that nodes do not have yet */
+    double trace;     /* of d across the line of sight, at least 0 */
+    double per_trace; /* widening over trace */
+} residual;
+
+/* Takes the bend of a rule of three nodes off the residual. False where there is no such rule. */
+static bool take_bend(const moments *g, bool widen, residual *left, rule *r) {
+    double bend2 = g->bend[0] * g->bend[0] + g->bend[1] * g->bend[1];
+    double norm = second_norm(g, 0.0);
+    if (widen && !widened_norm(g, left->trace, bend2, left->per_trace, &norm)) {
+        return false;
+    }
+    if (!(norm > 0.0)) {
+        return false;
+    }
+    for (int i = 0; i < 3; i++) {
+        r->bend[i] = g->bend[i] / norm;
         for (int j = 0; j < 3; j++) {
-            d[i][j] -= g->along[2] * g->axis[i] * g->axis[j];
+            left->d[i][j] -= g->bend[i] * g->bend[j] / norm;
+        }
+    }
+    left->trace = fmax(left->d[0][0] + left->d[1][1], 0.0);
+    return true;
+}
+
+/* Takes the greatest variance of the residual as a pair of nodes, one on each side. */
+static void take_pair(residual *left, rule *r) {
+    double axis[3], length2 = 0.0;
+    bst_smear_nodes_main_axis(left->d, axis);
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            length2 += axis[i] * left->d[i][j] * axis[j];
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        r->pair[i] = sqrt(fmax(length2, 0.0)) * axis[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            left->d[i][j] -= r->pair[i] * r->pair[j];
+        }
+    }
+}
+
+/* Gives the rule the group's moments up to the second. False where there is no such rule. */
+static bool take_moments(const maker *m, const moments *g, bool widen, bool split, residual *left,
+                         rule *r) {
+    memcpy(left->d, g->covariance, sizeof left->d);
+    for (int i = 0; i < 3 && r->nodes > 1; i++) {
+        for (int j = 0; j < 3; j++) {
+            left->d[i][j] -= g->along[2] * g->axis[i] * g->axis[j];
         }
     }
     double tilt = g->axis[0] * g->axis[0] + g->axis[1] * g->axis[1];
-    double per_trace = 1.0 / (n == 1 ? 2.0 : 2.0 - tilt), trace = fmax(d[0][0] + d[1][1], 0.0);
-    if (n == 3) {
-        double bend2 = g->bend[0] * g->bend[0] + g->bend[1] * g->bend[1];
-        double norm = second_norm(g, 0.0);
-        if (widen && !widened_norm(g, trace, bend2, per_trace, &norm)) {
-            return;
-        }
-        if (!(norm > 0.0)) {
-            return;
-        }
-        for (int i = 0; i < 3; i++) {
-            r->bend[i] = g->bend[i] / norm;
-            for (int j = 0; j < 3; j++) {
-                d[i][j] -= g->bend[i] * g->bend[j] / norm;
-            }
-        }
-        trace = fmax(d[0][0] + d[1][1], 0.0);
+    left->per_trace = 1.0 / (r->nodes == 1 ? 2.0 : 2.0 - tilt);
+    left->trace = fmax(left->d[0][0] + left->d[1][1], 0.0);
+    if (r->nodes == 3 && !take_bend(g, widen, left, r)) {
+        return false;
     }
     if (widen) {
-        r->widening = fmin(trace * per_trace, m->widest);
-        if (n > 1) { /* along the axis the moments make room for it */
+        r->widening = fmin(left->trace * left->per_trace, m->widest);
+        if (r->nodes > 1) { /* along the axis the moments make room for it */
             for (int i = 0; i < 3; i++) {
                 for (int j = 0; j < 3; j++) {
-                    d[i][j] += r->widening * g->axis[i] * g->axis[j];
+                    left->d[i][j] += r->widening * g->axis[i] * g->axis[j];
                 }
             }
         }
     }
     if (split) {
-        double axis[3], length2 = 0.0;
-        bst_smear_nodes_main_axis(d, axis);
-        for (int i = 0; i < 3; i++) {
-            for (int j = 0; j < 3; j++) {
-                length2 += axis[i] * d[i][j] * axis[j];
-            }
-        }
-        for (int i = 0; i < 3; i++) {
-            r->pair[i] = sqrt(fmax(length2, 0.0)) * axis[i];
-        }
-        for (int i = 0; i < 3; i++) {
-            for (int j = 0; j < 3; j++) {
-                d[i][j] -= r->pair[i] * r->pair[j];
-            }
-        }
+        take_pair(left, r);
     }
+    return true;
+}
+
+/* Error of the image by third and fourth moments that the rule misses, over the peak. */
+static double higher_moments_error(const maker *m, const moments *g, bool split, const rule *r) {
+    double var = m->variance;
+    int n = r->nodes;
     /* third moments that are missed: a sixth, or half for mixed ones, times the greatest third
      * derivative, 1.38 or 0.61 of the peak over sigma^3 */
     double third = 0.3 * fabs(g->drift) + 0.23 * norm3(g->lean);
@@ -380,11 +401,27 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     /* Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds
      * up; on straight paths it nearly cancels (factors measured on random paths) */
     error *= 1.8 * m->pixel_part[0];
+    return error;
+}
+
+/* Fills the rule and its error: what it misses of the image, over the peak. Infinite where there is
+ * no such rule, or where its error is more than `limit`. */
+static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, double limit,
+                     rule *r) {
+    double var = m->variance;
+    residual rest;
+    memset(r, 0, sizeof *r);
+    r->nodes = n;
+    r->error = INFINITY;
+    if (!take_moments(m, g, widen, split, &rest, r)) {
+        return;
+    }
+    double error = higher_moments_error(m, g, split, r);
     if (!(error <= limit)) {
         return;
     }
     double left_out =
-        m->pixel_part[0] * covariance_error(m, d, r->widening * m->image_share, limit - error);
+        m->pixel_part[0] * covariance_error(m, rest.d, r->widening * m->image_share, limit - error);
     r->fixed = r->widening > 0.0 ? left_out : 0.0;
     error += left_out;
     /* the mean of places is no place of the mean: by half the second derivative of what is left of

@@ -49,7 +49,7 @@ bst_status bst_folder_make(bst_ctx *ctx, const char *path) {
     return make_one(ctx, path);
 }
 
-enum { OVERFLOW_USER = 65534 }; /* whom Linux shows where a container does not map a user */
+enum { OVERFLOW_USER = 65534 }; /* the user that Linux shows where a container does not map one */
 
 /* What is wrong with the owner and mode of a folder; NULL: nothing. */
 static const char *fault_of(const struct stat *info, bool above) {

@@ -30,7 +30,7 @@ const char *bst_text_of_count(char text[BST_COUNT_TEXT], int64_t count, const ch
                               const char *many);
 
 /* A finite number as the shortest text that reads back as the same bits, which cJSON's own printing
- * (15 digits, compared with a tolerance) does not promise. */
+ * (15 digits, compared with a tolerance) does not guarantee. */
 void bst_text_of_number(double value, char *buffer, size_t bytes);
 
 /* Whether a word can be the name of a file or folder that is made: 1 to 255 bytes without "/" and

@@ -1,5 +1,5 @@
-/* Headers of FITS files as bytes, read by our own means: whoever reads files of others checks with
- * these what cfitsio would believe. Source: FITS Standard 4.0, sections 3, 4 and 10. */
+/* Headers of FITS files as bytes, read without cfitsio: a reader of foreign files checks with these
+ * the sizes that cfitsio would believe. Source: FITS Standard 4.0, sections 3, 4 and 10. */
 #ifndef BST_IO_FITS_CARDS_INTERNAL_H
 #define BST_IO_FITS_CARDS_INTERNAL_H
 

@@ -252,7 +252,7 @@ int64_t bst_link_news(bst_link *link, int index, const char **name) {
 void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...) {
     link->counts[event]++;
     if (link->note_count == LINK_NOTES) {
-        return; /* whoever reads them has a handful; the counters have all */
+        return; /* the log has a few of them; the counters have all */
     }
     char *note = link->notes[(link->note_first + link->note_count++) % LINK_NOTES];
     int n = snprintf(note, LINK_NOTE_BYTES, "%s: ", event_names[event] + strlen("link_"));

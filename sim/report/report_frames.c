@@ -231,7 +231,7 @@ static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *
     bst_html_format(out, "Picture of the %s with what was detected and what is true",
                     overlay->caption ? overlay->caption : "frame");
     fputs("\">\n", out);
-    /* a small frame is not enlarged here but by whoever shows it */
+    /* a small frame is enlarged by the program that shows it */
     bool small = scale > 1.0;
     BST_TRY(put_pixels(ctx, out, frame, stretch, &whole,
                        small ? frame->width : (int)fmax(1.0, whole.width),

@@ -31,7 +31,7 @@ typedef struct bst_driver_outcome {
 } bst_driver_outcome;
 
 /* Attempts at a run before it is given up: after the first that is lost its shard is cut into small
- * ones, after the second into single runs, so that whoever kills its shard stands alone. */
+ * ones, after the second into single runs, so that a run that kills its shard is alone in it. */
 enum { BST_DRIVER_ATTEMPTS = 4 };
 
 /* Executes what `results` lacks, and takes the rows into it. With runs that stay missing it returns

@@ -40,7 +40,7 @@ typedef struct bst_study_result {
     double metrics[BST_STUDY_METRICS];
     double *series; /* [rows][series_count of the kind]; freed by who called run */
     int rows;
-    double cpu_s;  /* processor time of the run on all threads; whoever calls run fills it in */
+    double cpu_s;  /* processor time of the run on all threads; filled in by the caller of run */
     double left_s; /* of a run that ended after most_s: what the rest of it would take */
 } bst_study_result;
 

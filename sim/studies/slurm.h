@@ -6,7 +6,7 @@
  * node died, its time ran out, somebody cancelled it. While the controller does not answer nothing
  * is taken for lost. Slurm may run a task twice (a node that lost its slurmd, a restarted
  * controller); the shard's results count once all the same. Nothing stays behind: the jobs of a
- * study carry its name, and whoever continues it cancels those of a driver that died. */
+ * study carry its name, and the next driver cancels those of a driver that died. */
 #ifndef BST_STUDIES_SLURM_H
 #define BST_STUDIES_SLURM_H
 

@@ -25,7 +25,7 @@ static const bst_config_desc scenario_table[] = {
     BST_STRING(bst_study_scenario, file, NULL,
                "A scenario; a relative path starts from the study's folder."),
     BST_STRING(bst_study_scenario, name, "\"\"",
-               "Its name in tables; \"\": that which the scenario has."),
+               "Its name in tables; \"\": the name in the scenario."),
     BST_CONFIG_END};
 
 static const bst_config_desc axis_table[] = {

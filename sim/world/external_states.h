@@ -1,4 +1,4 @@
-/* States of an object that come while a run goes, from whoever steers it. */
+/* States of an object that another program sends during a run. */
 #ifndef BST_WORLD_EXTERNAL_STATES_H
 #define BST_WORLD_EXTERNAL_STATES_H
 

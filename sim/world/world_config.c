@@ -251,7 +251,7 @@ static const bst_config_desc star_errors_table[] = {
     BST_REAL(bst_star_errors_config, displaced_sigma_arcsec, "arcsec", 0, 3600, "0",
              "By how much: 1 sigma per axis, Gaussian."),
     BST_SEED(bst_star_errors_config, seed, "\"0x0\"",
-             "Draws which ones; the same star has the same fate for the same seed."),
+             "Draws which ones; the same seed changes the same stars in the same way."),
     BST_CONFIG_END,
 };
 

@@ -228,9 +228,9 @@ static bst_status step_any(fake *base, struct bst_step *step) {
             (!task || tick % (1 + k % 7) == 0)) {
             write_port(self, step, k, port->channel);
         }
-        if (port->direction == BST_PORT_OUT && (desc->flags & BST_MODULE_PROMISES)) {
+        if (port->direction == BST_PORT_OUT && (desc->flags & BST_MODULE_HAS_LOOKAHEAD)) {
             int64_t every = 1 + k % 7; /* of tasks that are written, at least */
-            bst_step_promise(step, k, (tick / every + 1) * every);
+            bst_step_set_lookahead(step, k, (tick / every + 1) * every);
         }
     }
     if (self->members > 0 && self->s->m.wakes) {
@@ -291,7 +291,7 @@ static void describe(const make *m, bst_module_desc descs[ROLES + 1]) {
                                       FAKE_DESC(camera_ports),    FAKE_DESC(seeing_ports),
                                       FAKE_DESC(following_ports), FAKE_DESC(control_ports),
                                       FAKE_DESC(tasking_ports)};
-    all[SEEING].flags = all[FOLLOWING].flags = BST_MODULE_APART;
+    all[SEEING].flags = all[FOLLOWING].flags = BST_MODULE_DEFERRABLE;
     all[SEEING].ahead = m->looks ? look : NULL;
     all[CAMERA].port_count -= !m->lends;
     if (m->task_steps) {
@@ -299,7 +299,7 @@ static void describe(const make *m, bst_module_desc descs[ROLES + 1]) {
     }
     all[CONTROL].port_count -= !m->closed; /* without the tracks */
     all[ROLES].port_count -= !m->link_tracks;
-    all[ROLES].flags = BST_MODULE_LINKS | (m->wakes ? 0u : (unsigned)BST_MODULE_PROMISES);
+    all[ROLES].flags = BST_MODULE_MULTI_SENSOR | (m->wakes ? 0u : (unsigned)BST_MODULE_HAS_LOOKAHEAD);
     memcpy(descs, all, sizeof all);
 }
 

@@ -15,7 +15,7 @@ static const bst_module_desc sensor_module = FAKE_DESC(sensor_ports),
                                             .role = "fake",
                                             .type = "link",
                                             .doc = "Links.",
-                                            .flags = BST_MODULE_LINKS,
+                                            .flags = BST_MODULE_MULTI_SENSOR,
                                             .config_bytes = sizeof(fake *),
                                             .ports = link_ports,
                                             .port_count = PORTS,
@@ -176,7 +176,7 @@ static const bst_module_desc ahead_sensor_module = FAKE_DESC(ahead_sensor_ports)
                                                   .role = "fake",
                                                   .type = "ahead",
                                                   .doc = "Links, and promises.",
-                                                  .flags = BST_MODULE_LINKS | BST_MODULE_PROMISES,
+                                                  .flags = BST_MODULE_MULTI_SENSOR | BST_MODULE_HAS_LOOKAHEAD,
                                                   .config_bytes = sizeof(fake *),
                                                   .ports = ahead_link_ports,
                                                   .port_count = AHEAD_PORTS,
@@ -216,7 +216,7 @@ static bst_status ahead_link_step(fake *self, struct bst_step *step) {
             bst_task *task = bst_step_write(step, base + AHEAD_TASK, NULL);
             task->id = tick;
         }
-        bst_step_promise(step, base + AHEAD_TASK, (tick / holds + 1) * holds - (i == 2 ? 7 : 0));
+        bst_step_set_lookahead(step, base + AHEAD_TASK, (tick / holds + 1) * holds - (i == 2 ? 7 : 0));
     }
     return BST_OK;
 }

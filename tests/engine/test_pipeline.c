@@ -164,7 +164,7 @@ static bst_status hear(void *user, int64_t tick, const char *instance, const cha
 /* Runs 2000 ticks; `awaited` adds a module that reads the tracks. */
 static bst_status run(scene *s, bst_ctx *ctx, bool overlap, bool awaited) {
     bst_module_desc seeing = FAKE_DESC(seeing_ports), following = FAKE_DESC(following_ports);
-    seeing.flags = following.flags = BST_MODULE_APART;
+    seeing.flags = following.flags = BST_MODULE_DEFERRABLE;
     seeing.ahead = s->looks ? look : NULL;
     s->stepping = pthread_self();
     s->kept[0] = s->kept[1] = -1;

@@ -102,10 +102,10 @@ static void fail_in_step(struct bst_step *step, const char *what) {
     }
 }
 
-void bst_step_promise(struct bst_step *step, int port_index, int64_t tick) {
+void bst_step_set_lookahead(struct bst_step *step, int port_index, int64_t tick) {
     port_state *port = &step->self->ports[port_index];
-    if (!(step->self->spec.desc->flags & BST_MODULE_PROMISES)) {
-        fail_in_step(step, "promises and does not say that it does (BST_MODULE_PROMISES)");
+    if (!(step->self->spec.desc->flags & BST_MODULE_HAS_LOOKAHEAD)) {
+        fail_in_step(step, "sets a lookahead without the flag BST_MODULE_HAS_LOOKAHEAD");
     }
     port->silent_until = tick > port->silent_until ? tick : port->silent_until;
 }
@@ -187,7 +187,7 @@ void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
     port_state *port = &step->self->ports[port_index];
     channel *ch = &step->engine->channels[port->channel];
     if (step->tick < port->silent_until) {
-        fail_in_step(step, "writes what it has promised not to write yet");
+        fail_in_step(step, "writes an output within its own lookahead");
     }
     if (port->writing) {
         /* a second message in one step: the first goes out */
@@ -249,8 +249,8 @@ void bst_engine_release_read(bst_engine *engine, int process) {
 }
 
 void bst_step_wake_at(struct bst_step *step, int64_t tick) {
-    if (step->self->spec.desc->flags & BST_MODULE_PROMISES) {
-        fail_in_step(step, "asks to be woken, which a module does not that promises");
+    if (step->self->spec.desc->flags & BST_MODULE_HAS_LOOKAHEAD) {
+        fail_in_step(step, "asks to be woken, which a module with BST_MODULE_HAS_LOOKAHEAD may not");
     } else if (tick > step->tick && tick < step->self->wake) {
         step->self->wake = tick;
     }

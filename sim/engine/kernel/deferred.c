@@ -5,7 +5,7 @@
 #include "sim/engine/kernel/engine_internal.h"
 
 static bool may_be_deferred(const bst_engine *engine, const instance *self) {
-    if (!(self->spec.desc->flags & BST_MODULE_APART) || self->spec.period_ticks > 0 ||
+    if (!(self->spec.desc->flags & BST_MODULE_DEFERRABLE) || self->spec.period_ticks > 0 ||
         self->trigger_count == 0 || self->spec.member_count > 0) {
         return false;
     }
@@ -67,7 +67,7 @@ static void put_last(bst_engine *engine) {
 
 void bst_engine_set_deferred(bst_engine *engine) {
     for (int i = 0; i < engine->instance_count; i++) {
-        engine->instances[i]->deferred = engine->instances[i]->spec.desc->flags & BST_MODULE_APART;
+        engine->instances[i]->deferred = engine->instances[i]->spec.desc->flags & BST_MODULE_DEFERRABLE;
     }
     for (bool changed = true; changed;) {
         changed = false;

@@ -69,7 +69,7 @@ typedef struct port_state {
     int64_t trigger_cursor; /* next position to be stepped for */
     int capacity;
     bool writing;         /* its payload was handed out and not yet published */
-    int64_t silent_until; /* an output: promised not to be written before */
+    int64_t silent_until; /* an output: its lookahead: not written before */
     /* an input across logical processes; `copied` and `announced` are the writer's process's */
     port_copies copies;
     int64_t copied;    /* next message of the channel that is to be copied */

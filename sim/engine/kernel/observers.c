@@ -1,6 +1,6 @@
-/* What observers are to see is noted down by each process in its order, and shown by whoever is
- * free, one thread at a time, merged by tick and stepping order: the order of a run on one
- * thread. */
+/* Each process logs the records for observers in its own order. A thread that has nothing to step
+ * passes them on, one thread at a time, merged by tick and stepping order: the order of a run on
+ * one thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

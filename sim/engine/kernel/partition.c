@@ -201,7 +201,7 @@ static bool steps_by_periods(const bst_executor *x) {
     const logical_process *link = all ? &x->processes[x->link] : NULL;
     for (int m = 0; all && m < link->member_count; m++) {
         const bst_instance_spec *spec = &x->engine->instances[link->members[m]]->spec;
-        all = spec->period_ticks > 0 && (spec->desc->flags & BST_MODULE_PROMISES);
+        all = spec->period_ticks > 0 && (spec->desc->flags & BST_MODULE_HAS_LOOKAHEAD);
     }
     return all;
 }

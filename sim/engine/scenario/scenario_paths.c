@@ -30,7 +30,7 @@ static bst_status resolve_path(bst_ctx *ctx, const bst_json *json, const bst_sce
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: there is no file %s", s->file, where, joined);
     }
     if (!real && path[0] != '/' && strcmp(folder, s->base_dir) != 0) {
-        /* whoever opens it starts from base_dir */
+        /* opened relative to base_dir */
         real = realpath(folder, NULL);
         snprintf(joined, sizeof joined, "%s/%s", real ? real : folder, path);
         free(real);

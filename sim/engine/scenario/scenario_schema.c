@@ -176,7 +176,7 @@ cJSON *bst_scenario_schema(const bst_scenario_registry *registry) {
     cJSON *roles = cJSON_AddObjectToObject(node, "properties");
     for (int i = 0; i < registry->count; i++) {
         const bst_module_desc *m = registry->modules[i];
-        cJSON *into = m->flags & BST_MODULE_LINKS ? properties : roles;
+        cJSON *into = m->flags & BST_MODULE_MULTI_SENSOR ? properties : roles;
         cJSON *role = cJSON_GetObjectItemCaseSensitive(into, m->role);
         if (!role) {
             role = cJSON_AddObjectToObject(into, m->role);
@@ -190,7 +190,7 @@ cJSON *bst_scenario_schema(const bst_scenario_registry *registry) {
     /* of a plug-in that is not known anything may be said; where some are known, these are meant */
     for (int i = 0; i < registry->count; i++) {
         const bst_module_desc *m = registry->modules[i];
-        cJSON *into = m->flags & BST_MODULE_LINKS ? properties : roles;
+        cJSON *into = m->flags & BST_MODULE_MULTI_SENSOR ? properties : roles;
         cJSON *role = cJSON_GetObjectItemCaseSensitive(into, m->role);
         cJSON *choices = cJSON_GetObjectItemCaseSensitive(role, "oneOf");
         bool known = false;

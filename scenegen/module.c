@@ -281,6 +281,44 @@ static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
     return counted;
 }
 
+/* Renders the frame and publishes it; a frame that is lost on its way is only planned. */
+static bst_status draw(scenegen *s, struct bst_step *step, const bst_exposure *e,
+                       const bst_render_request *request) {
+    bst_ctx *ctx = bst_step_ctx(step);
+    if (e->dropped) {
+        return bst_renderer_plan(ctx, s->renderer, request);
+    }
+    bst_frame *frame;
+    BST_TRY(bst_renderer_render(ctx, s->renderer, request, &frame));
+    bst_frame_message *message = bst_step_write(step, PORT_FRAME, NULL);
+    *message = (bst_frame_message){.frame = frame,
+                                   .exposure_id = e->id,
+                                   .start_tick = e->start_tick,
+                                   .end_tick = e->end_tick,
+                                   .window = e->window,
+                                   .binning = e->binning > 1 ? e->binning : 1,
+                                   .bits = (int)s->camera->bits};
+    return s->stage ? change_frame(ctx, s, message) : BST_OK;
+}
+
+/* What the truth says of the image: cosmic rays, predicted error, number of nodes. */
+static void describe_image(scenegen *s, struct bst_step *step, const bst_exposure *e,
+                           bst_truth *truth) {
+    bst_render_stats stats;
+    bst_renderer_get_stats(s->renderer, &stats);
+    truth->hits = stats.hits;
+    truth->hits_e = stats.hits_e;
+    truth->error_sigma = stats.predicted_sigma;
+    truth->nodes = stats.nodes;
+    if (stats.tolerance_missed && !e->dropped) {
+        bst_step_count(step, "tolerance_missed");
+    }
+    if (stats.nodes_bounded && !e->dropped) {
+        bst_step_count(step, "nodes_bounded");
+    }
+    truth->one_track = stats.single_kernel;
+}
+
 static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
                          const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
@@ -322,36 +360,8 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         .binning = e->binning,
         .key = s->key,
         .exposure_id = e->id};
-    if (e->dropped) {
-        BST_TRY(bst_renderer_plan(ctx, s->renderer, &request));
-    } else {
-        bst_frame *frame;
-        BST_TRY(bst_renderer_render(ctx, s->renderer, &request, &frame));
-        bst_frame_message *message = bst_step_write(step, PORT_FRAME, NULL);
-        *message = (bst_frame_message){.frame = frame,
-                                       .exposure_id = e->id,
-                                       .start_tick = e->start_tick,
-                                       .end_tick = e->end_tick,
-                                       .window = e->window,
-                                       .binning = e->binning > 1 ? e->binning : 1,
-                                       .bits = (int)s->camera->bits};
-        if (s->stage) {
-            BST_TRY(change_frame(ctx, s, message));
-        }
-    }
-    bst_render_stats stats;
-    bst_renderer_get_stats(s->renderer, &stats);
-    truth->hits = stats.hits;
-    truth->hits_e = stats.hits_e;
-    truth->error_sigma = stats.predicted_sigma;
-    truth->nodes = stats.nodes;
-    if (stats.tolerance_missed && !e->dropped) {
-        bst_step_count(step, "tolerance_missed");
-    }
-    if (stats.nodes_bounded && !e->dropped) {
-        bst_step_count(step, "nodes_bounded");
-    }
-    truth->one_track = stats.single_kernel;
+    BST_TRY(draw(s, step, e, &request));
+    describe_image(s, step, e, truth);
     /* while the device renders */
     const bst_truth_request items = {.field = s->field,
                                      .camera = s->camera,

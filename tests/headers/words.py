@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""No private words: names and sentences use the terms of the field. Each pattern below once named something in this
+project; the message says what it is called now.
+
+    words.py      from the root of the sources
+"""
+
+import re
+import subprocess
+import sys
+
+# pattern (whole words, any case) -> the term
+WORDS = {
+    r"company|companion light": "neighbours, deblend",
+    r"wander(s|ing)?": "centroid error",
+    r"islands?|island_notes": "logical process, message log",
+    r"stand_ins?|stands_for": "substitution, substitutes_for",
+    r"plugged": "plugin",
+    r"fates?": "outcome",
+    r"promis(e|es|ed|ing)": "lookahead; guarantee",
+    r"put aside": "stored, logged",
+    r"whoever|(?<!for )whom": "the caller, the consumer: name it",
+    r"that which": "what, the one that",
+    r"BST_MODULE_(APART|LINKS|PROMISES)": "BST_MODULE_DEFERRABLE, _MULTI_SENSOR, _HAS_LOOKAHEAD",
+    r"fft_light|light_wrap|light_grid|growing\.c|crowd\.c|hits\.c|borrow\.h|lanes\.h": "see docs: names of files",
+}
+FOLDERS = ["include", "sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen", "python", "docs", "README.md"]
+FILES = re.compile(r"\.(c|h|inc|cl|cpp|py|md|txt)$")
+
+
+def main():
+    names = subprocess.run(["git", "ls-files", *FOLDERS], check=True, capture_output=True, text=True).stdout.split("\n")
+    names = [name for name in names if FILES.search(name)]
+    if len(names) < 300:
+        sys.exit(f"only {len(names)} files found: run this from the root of the sources")
+    patterns = [(re.compile(rf"\b({pattern})\b", re.I), term) for pattern, term in WORDS.items()]
+    wrong = []
+    for name in names:
+        with open(name, encoding="utf-8") as file:
+            for number, line in enumerate(file, 1):
+                for pattern, term in patterns:
+                    for match in pattern.finditer(line):
+                        wrong.append(f"{name}:{number}: {match.group(0)!r}: say {term}")
+    if wrong:
+        sys.exit("\n".join(wrong) + f"\n{len(wrong)} private words")
+    print(f"{len(names)} files without private words")
+
+
+if __name__ == "__main__":
+    main()
