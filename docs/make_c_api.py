@@ -16,7 +16,9 @@ NAME = re.compile(r"\b((?:bst|BST)_\w+)\b")
 
 
 def markdown(text):
-    """Plain comment text as Markdown; names of the interface as code."""
+    """Plain comment text as Markdown; names of the interface as code, and what is between backquotes already."""
+    if match := re.search(r"`[^`]+`", text):
+        return markdown(text[:match.start()]) + match[0] + markdown(text[match.end():])
     out = re.sub(r"([\\`*<>\[\]#|$~])", r"\\\1", text)
     out = re.sub(r"(?<![\w`])([A-Za-z]\w*_\w*(?:->\w+|\.\w+)?)", r"`\1`", out)
     return re.sub(r"(?m)^(\s*)([-+]|\d+\.)(\s)", r"\1\\\2\3", out)
