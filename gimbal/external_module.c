@@ -78,10 +78,8 @@ static void destroy(void *self) {
             free(m->outputs[i].payload);
         }
         free(m->samples);
-        bst_platform_free(&m->platform);
-        bst_gimbal_base_free(&m->base);
-        free(m);
     }
+    bst_gimbal_destroy(m);
 }
 
 static bst_status make_outputs(bst_ctx *ctx, module *m) {
@@ -101,7 +99,7 @@ static bst_status make_outputs(bst_ctx *ctx, module *m) {
     return made ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an external gimbal");
 }
 
-static bst_status prepare(const bst_module_env *env, const void *config_in, void *self) {
+static bst_status prepare_external(const bst_module_env *env, const void *config_in, void *self) {
     const config *c = config_in;
     module *m = self;
     m->world = env->world;
@@ -122,15 +120,15 @@ static bst_status prepare(const bst_module_env *env, const void *config_in, void
     BST_TRY(make_outputs(env->ctx, m));
     BST_TRY(bst_platform_divider(env->ctx, "update_rate_hz", 1.0 / m->base.dt_s, c->update_rate_hz,
                                  &m->update_steps));
-    BST_TRY(bst_gimbal_platform_init(env, &c->platform, m->base.dt_s, &m->platform));
+    BST_TRY(bst_gimbal_platform_init(env, &c->platform, &m->base, &m->platform));
     BST_TRY(bst_gimbal_base_init(env, &c->platform, env->exposure_s, 0, &m->base));
     bst_link_part part = bst_external_describe(env, "gimbal");
     part.period_ticks = env->period_ticks * m->update_steps;
     return bst_link_add(env->ctx, m->link, &part, &m->part);
 }
 
-static bst_status create(const bst_module_env *env, const void *config_in, void **self) {
-    return bst_gimbal_create(env, sizeof(module), prepare, destroy, config_in, self);
+static bst_status create_external(const bst_module_env *env, const void *config_in, void **self) {
+    return bst_gimbal_create(env, sizeof(module), prepare_external, destroy, config_in, self);
 }
 
 /* The attitude at a tick: on the shortest way between two that were given; before the first and
@@ -261,8 +259,8 @@ static bst_status exchange(module *m, struct bst_step *s) {
         }
     }
     if (status == BST_OK) {
-        status = bst_link_exchange(ctx, m->link, m->part, tick, inputs, count, m->outputs, OUTPUTS,
-                                   &answered);
+        const bst_link_messages messages = {inputs, count, m->outputs, OUTPUTS};
+        status = bst_link_exchange(ctx, m->link, m->part, tick, &messages, &answered);
     }
     for (int i = 0; i < frame_count; i++) {
         bst_frame_unmap(mapped[i]);
@@ -307,7 +305,7 @@ const bst_module_desc bst_gimbal_external_module = {
     .default_rate_hz = 1000.0,
     .ports = ports,
     .port_count = PORT_COUNT,
-    .create = create,
+    .create = create_external,
     .step = step,
     .destroy = destroy,
 };

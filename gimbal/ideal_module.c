@@ -1,4 +1,3 @@
-#include <stdlib.h>
 #include <string.h>
 
 #include "gimbal/ideal.h"
@@ -79,28 +78,20 @@ static bst_status find_target(const bst_module_env *env, const config *c, module
     return BST_OK;
 }
 
-static void destroy(void *self) {
-    module *m = self;
-    if (m) {
-        bst_platform_free(&m->platform);
-        bst_gimbal_base_free(&m->base);
-        free(m);
-    }
-}
-
-static bst_status prepare(const bst_module_env *env, const void *config_in, void *self) {
+static bst_status prepare_ideal(const bst_module_env *env, const void *config_in, void *self) {
     const config *c = config_in;
     module *m = self;
     m->ideal = (bst_ideal){.direction_at = apparent, .user = m};
     m->x_hint_gcrf = bst_quat_rotate(bst_quat_conj(bst_gimbal_nominal(env)), (bst_vec3){1, 0, 0});
-    BST_TRY(bst_gimbal_platform_init(env, &c->platform, m->base.dt_s, &m->platform));
+    BST_TRY(bst_gimbal_platform_init(env, &c->platform, &m->base, &m->platform));
     BST_TRY(bst_platform_equip(env, &m->platform, &c->platform, m->base.dt_s));
     BST_TRY(find_target(env, c, m));
     return bst_gimbal_base_init(env, &c->platform, env->exposure_s, 0, &m->base);
 }
 
-static bst_status create(const bst_module_env *env, const void *config_in, void **self) {
-    return bst_gimbal_create(env, sizeof(module), prepare, destroy, config_in, self);
+static bst_status create_ideal(const bst_module_env *env, const void *config_in, void **self) {
+    return bst_gimbal_create(env, sizeof(module), prepare_ideal, bst_gimbal_destroy, config_in,
+                             self);
 }
 
 static bst_status step(void *self, struct bst_step *s) {
@@ -143,7 +134,7 @@ const bst_module_desc bst_gimbal_ideal_module = {
     .default_rate_hz = 1000.0,
     .ports = ports,
     .port_count = BST_GIMBAL_PORTS,
-    .create = create,
+    .create = create_ideal,
     .step = step,
-    .destroy = destroy,
+    .destroy = bst_gimbal_destroy,
 };

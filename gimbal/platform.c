@@ -40,11 +40,6 @@ static bst_vec3 arcsec_vector(const double v[3]) {
     return bst_vec3_scale((bst_vec3){v[0], v[1], v[2]}, BST_ARCSEC_RAD);
 }
 
-/* A frame that turns by r (its own axes) has q_new_from_old = from_rotvec(-r). */
-static bst_quat turned(bst_quat q, bst_vec3 r) {
-    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
-}
-
 /* The camera turned by small angles about its own x and y axes, its quaternion's length brought
  * back to one. */
 static bst_quat shaken(bst_quat q, const double shake_rad[2]) {
@@ -57,7 +52,7 @@ static bst_quat shaken(bst_quat q, const double shake_rad[2]) {
         q = (bst_quat){c * q.x + x * q.w + y * q.z, c * q.y + y * q.w - x * q.z,
                        c * q.z + x * q.y - y * q.x, c * q.w - x * q.x - y * q.y};
     } else {
-        q = turned(q, (bst_vec3){x, y, 0.0});
+        q = bst_quat_turn_frame(q, (bst_vec3){x, y, 0.0});
     }
     double n2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
     double scale = fabs(n2 - 1.0) < 1e-8 ? 1.5 - 0.5 * n2 : 1.0 / sqrt(n2);
@@ -82,20 +77,20 @@ bst_status bst_platform_jitter_spectrum(bst_ctx *ctx, const bst_platform_config 
 }
 
 bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
-                             const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
-                             double pixel_rad, double dt_s, bst_rng_key jitter_key,
-                             bst_rng_key attitude_key) {
+                             const bst_platform_config *config, const bst_platform_setup *setup) {
     bst_jitter_spectrum spectrum;
+    const bst_quat q_nominal_from_gcrf = setup->q_nominal_from_gcrf;
+    const double dt_s = setup->dt_s;
     platform->spacecraft = NULL;
     platform->sky = NULL;
     platform->jitter.more = NULL;
-    BST_TRY(bst_platform_jitter_spectrum(ctx, config, pixel_rad, &spectrum));
+    BST_TRY(bst_platform_jitter_spectrum(ctx, config, setup->pixel_rad, &spectrum));
     platform->q_nominal_from_gcrf = q_nominal_from_gcrf;
     platform->q_believed_from_gcrf =
-        turned(q_nominal_from_gcrf, arcsec_vector(config->attitude_bias_arcsec));
+        bst_quat_turn_frame(q_nominal_from_gcrf, arcsec_vector(config->attitude_bias_arcsec));
     platform->drift_radps = arcsec_vector(config->drift_arcsec_per_s);
     platform->attitude_noise_rad = config->attitude_noise_arcsec * BST_ARCSEC_RAD;
-    platform->attitude_key = attitude_key;
+    platform->attitude_key = setup->attitude_key;
     platform->jitter_unresolved_rad2 = bst_jitter_unresolved_rad2(&spectrum.flat, dt_s) +
                                        bst_jitter_spectrum_unresolved_rad2(&spectrum, dt_s);
     platform->unresolved_rad2 = platform->jitter_unresolved_rad2;
@@ -103,8 +98,9 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
     platform->body = (bst_body_state){q_nominal_from_gcrf, platform->drift_radps, {0, 0, 0}};
     platform->wheels_saturated = platform->trackers_blind = false;
     bst_jitter_spec followed = bst_jitter_resolved(&spectrum.flat, dt_s);
-    bst_jitter_init(&platform->jitter, &followed, dt_s, jitter_key);
-    bst_rng_key more_key = {{jitter_key.k[0] ^ 0x7F4A7C15u, jitter_key.k[1]}}; /* a stream apart */
+    bst_jitter_init(&platform->jitter, &followed, dt_s, setup->jitter_key);
+    bst_rng_key more_key = setup->jitter_key; /* a stream apart */
+    more_key.k[0] ^= 0x7F4A7C15u;
     bst_status status = bst_jitter_add(ctx, &platform->jitter, &spectrum, more_key);
     bst_jitter_spectrum_free(&spectrum);
     return status;
@@ -115,7 +111,7 @@ static bst_quat drifted(const bst_platform *platform, double seconds) {
     bst_vec3 drift = platform->drift_radps;
     bst_quat body = platform->q_nominal_from_gcrf;
     if (drift.x != 0.0 || drift.y != 0.0 || drift.z != 0.0) {
-        body = turned(body, bst_vec3_scale(drift, seconds));
+        body = bst_quat_turn_frame(body, bst_vec3_scale(drift, seconds));
     }
     return body;
 }
@@ -167,8 +163,9 @@ bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n) {
     double a[2], b[2];
     bst_rng_normal2(platform->attitude_key, (uint64_t)n, 0, a);
     bst_rng_normal2(platform->attitude_key, (uint64_t)n, 1, b);
-    return turned(platform->q_believed_from_gcrf,
-                  bst_vec3_scale((bst_vec3){a[0], a[1], b[0]}, platform->attitude_noise_rad));
+    return bst_quat_turn_frame(
+        platform->q_believed_from_gcrf,
+        bst_vec3_scale((bst_vec3){a[0], a[1], b[0]}, platform->attitude_noise_rad));
 }
 
 bst_status bst_platform_check_history(bst_ctx *ctx, const bst_platform_config *config,

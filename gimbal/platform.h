@@ -49,12 +49,19 @@ typedef struct bst_platform {
 bst_status bst_platform_jitter_spectrum(bst_ctx *ctx, const bst_platform_config *config,
                                         double pixel_rad, bst_jitter_spectrum *out) BST_MUST_CHECK;
 
-/* Prepares a platform. pixel_rad: angle of a sensor pixel (jitter is configured in pixels); dt_s:
- * plant step. Errors as bst_platform_jitter_spectrum. To be freed with bst_platform_free. */
+/* What a platform needs besides its configuration. */
+typedef struct bst_platform_setup {
+    bst_quat q_nominal_from_gcrf; /* of the body at the epoch */
+    double pixel_rad;             /* angle of a sensor pixel: jitter is configured in pixels */
+    double dt_s;                  /* plant step */
+    bst_rng_key jitter_key, attitude_key;
+} bst_platform_setup;
+
+/* Prepares a platform. Errors as bst_platform_jitter_spectrum. To be freed with bst_platform_free.
+ */
 bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
-                             const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
-                             double pixel_rad, double dt_s, bst_rng_key jitter_key,
-                             bst_rng_key attitude_key) BST_MUST_CHECK;
+                             const bst_platform_config *config,
+                             const bst_platform_setup *setup) BST_MUST_CHECK;
 
 /* Gives a platform whose configuration has a `rigid_body` its spacecraft, which sees the world of
  * the module's sensor; nothing for an inertial one. Errors as bst_spacecraft_create; freed by

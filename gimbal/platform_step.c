@@ -25,10 +25,14 @@ bst_status bst_gimbal_create(const bst_module_env *env, size_t bytes, bst_gimbal
 }
 
 bst_status bst_gimbal_platform_init(const bst_module_env *env, const bst_platform_config *config,
-                                    double dt_s, bst_platform *platform) {
-    return bst_platform_init(env->ctx, platform, config, bst_gimbal_nominal(env),
-                             bst_gimbal_pixel_rad(env), dt_s, bst_env_rng(env, "jitter"),
-                             bst_env_rng(env, "attitude"));
+                                    bst_gimbal_base *base, bst_platform *platform) {
+    const bst_platform_setup setup = {.q_nominal_from_gcrf = bst_gimbal_nominal(env),
+                                      .pixel_rad = bst_gimbal_pixel_rad(env),
+                                      .dt_s = base->dt_s,
+                                      .jitter_key = bst_env_rng(env, "jitter"),
+                                      .attitude_key = bst_env_rng(env, "attitude")};
+    base->platform = platform;
+    return bst_platform_init(env->ctx, platform, config, &setup);
 }
 
 bst_quat bst_gimbal_nominal(const bst_module_env *env) {
@@ -63,9 +67,15 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
     return BST_OK;
 }
 
-void bst_gimbal_base_free(bst_gimbal_base *base) {
-    bst_world_view_free(base->view);
-    base->view = NULL;
+void bst_gimbal_destroy(void *self) {
+    bst_gimbal_base *base = self;
+    if (base) {
+        if (base->platform) {
+            bst_platform_free(base->platform);
+        }
+        bst_world_view_free(base->view);
+        free(base);
+    }
 }
 
 bst_status bst_platform_step(struct bst_step *step, bst_platform *platform, int64_t n,

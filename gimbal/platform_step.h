@@ -30,7 +30,8 @@ enum {
 
 /* The first member of a gimbal module's instance. */
 typedef struct bst_gimbal_base {
-    bst_world_view *view; /* owned */
+    bst_world_view *view;   /* owned */
+    bst_platform *platform; /* the instance's own, which bst_gimbal_destroy frees; NULL: none yet */
     int observer, sensor;
     double tick_rate_hz, dt_s; /* plant step */
     int64_t telemetry_steps, nav_steps;
@@ -41,7 +42,8 @@ typedef bst_status (*bst_gimbal_prepare_fn)(const bst_module_env *env, const voi
                                             void *self);
 
 /* A module's `create`: `bytes` of zeros that begin with a bst_gimbal_base, prepared; what is left
- * after an error goes to `destroy`. BST_ERR_CONFIG without a rate; passes on errors of `prepare`.
+ * after an error goes to `destroy` (bst_gimbal_destroy, or the module's own). BST_ERR_CONFIG
+ * without a rate; passes on errors of `prepare`.
  */
 bst_status bst_gimbal_create(const bst_module_env *env, size_t bytes, bst_gimbal_prepare_fn prepare,
                              void (*destroy)(void *self), const void *config,
@@ -52,9 +54,10 @@ bst_quat bst_gimbal_nominal(const bst_module_env *env);
 /* Pixel scale of the module's sensor, rad. */
 double bst_gimbal_pixel_rad(const bst_module_env *env);
 
-/* bst_platform_init for them, with the instance's random streams. */
+/* bst_platform_init for the instance's platform, with its random streams; base->platform is that
+ * platform then. */
 bst_status bst_gimbal_platform_init(const bst_module_env *env, const bst_platform_config *config,
-                                    double dt_s, bst_platform *platform) BST_MUST_CHECK;
+                                    bst_gimbal_base *base, bst_platform *platform) BST_MUST_CHECK;
 
 /* The rest of the base: dividers, view, and the capacities of the rings. exposure_s: longest of the
  * sensor, which the history must cover; history_more: room in it besides the plant's steps. Errors
@@ -62,8 +65,9 @@ bst_status bst_gimbal_platform_init(const bst_module_env *env, const bst_platfor
 bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_config *config,
                                 double exposure_s, int history_more,
                                 bst_gimbal_base *base) BST_MUST_CHECK;
-/* What it owns; a zeroed base is allowed. */
-void bst_gimbal_base_free(bst_gimbal_base *base);
+/* A module's `destroy`: frees an instance that begins with a bst_gimbal_base, with the view and the
+ * platform of that; NULL is allowed. What the instance owns besides is freed before. */
+void bst_gimbal_destroy(void *self);
 
 /* bst_platform_advance in a module's step, the body's roll as commanded (NULL: nothing), with an
  * event and a count where wheels saturate or star

@@ -35,14 +35,12 @@ typedef struct module {
 static void destroy(void *self) {
     module *m = self;
     if (m) {
-        bst_platform_free(&m->platform);
         bst_scripted_free(m->scripted);
-        bst_gimbal_base_free(&m->base);
-        free(m);
     }
+    bst_gimbal_destroy(m);
 }
 
-static bst_status prepare(const bst_module_env *env, const void *config_in, void *self) {
+static bst_status prepare_scripted(const bst_module_env *env, const void *config_in, void *self) {
     const config *c = config_in;
     module *m = self;
     const bst_platform_config *platform = &c->platform;
@@ -59,7 +57,7 @@ static bst_status prepare(const bst_module_env *env, const void *config_in, void
     m->origin_tick = -1;
     double longest_s, cycle_s;
     bst_frame_updates_limits(updates, camera, exposure, &longest_s, &cycle_s);
-    BST_TRY(bst_gimbal_platform_init(env, platform, m->base.dt_s, &m->platform));
+    BST_TRY(bst_gimbal_platform_init(env, platform, &m->base, &m->platform));
     if (bst_platform_check_history(env->ctx, platform, longest_s) != BST_OK) {
         return bst_fail_prefix(env->ctx, BST_ERR_CONFIG, "with the exposures of %s",
                                bst_frame_updates_name(updates));
@@ -80,8 +78,8 @@ static bst_status prepare(const bst_module_env *env, const void *config_in, void
                                 &m->base);
 }
 
-static bst_status create(const bst_module_env *env, const void *config_in, void **self) {
-    return bst_gimbal_create(env, sizeof(module), prepare, destroy, config_in, self);
+static bst_status create_scripted(const bst_module_env *env, const void *config_in, void **self) {
+    return bst_gimbal_create(env, sizeof(module), prepare_scripted, destroy, config_in, self);
 }
 
 static bst_status step(void *self, struct bst_step *s) {
@@ -124,7 +122,7 @@ const bst_module_desc bst_gimbal_scripted_module = {
     .default_rate_hz = 1000.0,
     .ports = ports,
     .port_count = PORT_COUNT,
-    .create = create,
+    .create = create_scripted,
     .step = step,
     .destroy = destroy,
 };

@@ -112,13 +112,18 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                               const bst_camera_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
 
-/* The same in windows of the frame only, `count` of them, apart from each other, inside the frame's
- * own and along its binned pixels, none smaller than a mesh is good for (about 24 pixels a side).
- * Thresholds are those of the whole frame; background and noise are each window's own, and what is
- * reported of them is the mean over the windows. No streaks of unknown rate are searched for. The
- * time that it takes follows the windows' area. */
+/* Parts of a frame: apart from each other, inside the frame's own window and along its binned
+ * pixels, none smaller than a mesh is good for (about 24 pixels a side). */
+typedef struct bst_imgproc_windows {
+    const bst_window *items;
+    int count;
+} bst_imgproc_windows;
+
+/* The same in windows of the frame only. Thresholds are those of the whole frame; background and
+ * noise are each window's own, and what is reported of them is the mean over the windows. No
+ * streaks of unknown rate are searched for. The time that it takes follows the windows' area. */
 bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
-                                      const bst_window *windows, int count,
+                                      const bst_imgproc_windows *windows,
                                       const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) BST_MUST_CHECK;
 

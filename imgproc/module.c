@@ -10,6 +10,7 @@
 #include "imgproc/identify/predicted_stars.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/measure/discriminate.h"
+#include "imgproc/window_plan.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/onboard/nav_motion.h"
 #include "sim/optics/photometry.h"
@@ -54,10 +55,10 @@ typedef struct imgproc_module {
     bst_region_of_interest windows; /* of the present frame; none: all of it */
     bst_stack *stack;               /* NULL: no stacks */
     bst_optics_photometer photometer;
-    bst_pixel_learner *pixels;    /* NULL: no bad pixels are learned */
-    int64_t steps;                /* that were made */
-    bst_psf_wings *wings;         /* NULL: the PSF has none */
-    bst_plugin_detector *plugged; /* NULL: detection is this module's own */
+    bst_pixel_learner *pixels;   /* NULL: no bad pixels are learned */
+    int64_t steps;               /* that were made */
+    bst_psf_wings *wings;        /* NULL: the PSF has none */
+    bst_plugin_detector *plugin; /* NULL: detection is this module's own */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -77,12 +78,12 @@ static void destroy(void *self) {
     bst_optics_photometer_free(&m->photometer);
     bst_pixel_learner_free(m->pixels);
     bst_psf_wings_free(m->wings);
-    bst_plugin_detector_free(m->plugged);
+    bst_plugin_detector_free(m->plugin);
     free(m);
 }
 
 static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
-    if (l->ip || m->plugged) {
+    if (l->ip || m->plugin) {
         return BST_OK;
     }
     BST_TRY(bst_imgproc_create(ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
@@ -104,7 +105,7 @@ static bst_status open_plugged(const bst_module_env *env, imgproc_module *m) {
             env->observer, env->sensor);
     }
     return bst_plugin_detector_create(env->ctx, &m->config->detector, &m->camera, &m->maps,
-                                      (int)m->config->capacity, &m->plugged);
+                                      (int)m->config->capacity, &m->plugin);
 }
 
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
@@ -118,7 +119,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                                env->sensor);
     }
     BST_TRY(open_plugged(env, m));
-    if (m->config->bad_pixel_learning.enabled && !m->plugged) {
+    if (m->config->bad_pixel_learning.enabled && !m->plugin) {
         BST_TRY(bst_pixel_learner_create(env->ctx, &m->camera, &m->config->bad_pixel_learning,
                                          &m->pixels));
     }
@@ -186,69 +187,36 @@ static bst_quat attitude_of(const imgproc_module *m, const bst_starid_options *o
     return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(turn), q));
 }
 
-/* Windows that cover more of the frame than this save nothing. */
-static const double WINDOWS_SHARE = 0.5;
-/* Stars that show with less are no help beside bright ones. */
-static const double WINDOW_STAR_SNR = 12.0;
+/* A frame and what is known of its exposure. */
+typedef struct exposure {
+    const bst_frame_message *message;
+    const bst_camera_motion *motion; /* NULL: not known */
+    bst_light light;
+    const bst_predictions *predictions; /* NULL: none */
+    bool locked;                        /* they tell the pointing error */
+} exposure;
 
-/* Windows for the brightest stars: *count of those expected, which are put in front, brightest
- * first. */
-static void add_stars(imgproc_module *m, const bst_frame_message *message,
-                      const bst_camera_motion *motion, int count) {
-    double half = 0.5 * (double)m->config->window_px;
-    int chosen = 0;
-    for (; chosen < count && chosen < m->config->window_stars; chosen++) {
-        bst_imgproc_expected_star *e = m->sky.expected;
-        int best = chosen;
-        for (int i = chosen + 1; i < count; i++) {
-            best =
-                e[i].v_mag < e[best].v_mag || (e[i].v_mag == e[best].v_mag && e[i].id < e[best].id)
-                    ? i
-                    : best;
-        }
-        bst_imgproc_expected_star star = e[best];
-        e[best] = e[chosen];
-        e[chosen] = star;
-        double dx, dy;
-        bst_camera_motion_streak(motion, &m->camera, star.x_px, star.y_px, &dx, &dy);
-        (void)bst_region_of_interest_add(&m->windows, &message->window, star.x_px, star.y_px,
-                                         half + 0.5 * fabs(dx), half + 0.5 * fabs(dy));
-    }
-}
-
-/* Where to look in a frame while a target is followed: round what the tracker predicts, and round
- * bright stars. False: everywhere. */
-static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
-                               const bst_frame_message *message, const bst_camera_motion *motion,
-                               const bst_light *light, const bst_predictions *predictions,
-                               const bst_quat *q_cam_from_gcrf, bool *use) {
-    *use = false;
-    m->windows.count = 0;
+/* Sets the windows to look at while a target is followed; none: the whole frame. */
+static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
+                               bst_quat q_cam_from_gcrf) {
+    const bst_frame_message *message = e->message;
     if (!l->ip || message->exposure_id % m->config->full_every < m->config->full_frames) {
         return BST_OK;
     }
     double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
-    double age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
-    double half = 0.5 * (double)m->config->window_px, scale = bst_camera_scale_rad(&m->camera);
-    bool target = false;
-    for (int i = 0; i < predictions->count; i++) {
-        const bst_prediction *p = &predictions->items[i];
-        bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(p->direction_gcrf, age_s, p->rate_gcrf_radps));
-        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_light_aberrate(light, d));
-        double x, y, reach = half + 5.0 * p->sigma_rad / scale;
-        bool added = bst_camera_project(&m->camera, v, &x, &y) &&
-                     bst_region_of_interest_add(&m->windows, &message->window, x, y, reach, reach);
-        target = target || (added && p->target_of_interest);
-    }
-    if (!target || m->windows.count == BST_WINDOWS_MAX) {
-        return BST_OK;
-    }
-    int expected = 0;
-    BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, *q_cam_from_gcrf, light, message->window, 0.0,
-                                       bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR), &expected));
-    add_stars(m, message, motion, expected);
-    *use = bst_region_of_interest_settle(&m->windows, &message->window, message->binning,
-                                         WINDOWS_SHARE);
+    const bst_window_plan_input input = {
+        .camera = &m->camera,
+        .config = m->config,
+        .ip = l->ip,
+        .message = message,
+        .motion = e->motion,
+        .light = &e->light,
+        .predictions = e->predictions,
+        .predictions_age_s = (middle - (double)e->predictions->tick) / (double)m->tick_rate_hz,
+        .q_cam_from_gcrf = q_cam_from_gcrf};
+    bool use;
+    BST_TRY(bst_window_plan_make(ctx, &input, &m->sky, &m->windows, &use));
+    m->windows.count = use ? m->windows.count : 0;
     return BST_OK;
 }
 
@@ -266,15 +234,16 @@ static int in_windows(imgproc_module *m, int expected) {
 
 /* *q_cam_from_gcrf: in, the attitude that is believed; out, that of the stars, when any are
  * identified. */
-static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const bst_light *light,
-                           bst_window window, bool locked, bst_detections *out,
-                           bst_quat *q_cam_from_gcrf) {
+static bst_status identify(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
+                           bst_detections *out, bst_quat *q_cam_from_gcrf) {
+    const bst_window window = e->message->window;
     double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
     double v_limit =
-        m->plugged ? bst_plugin_detector_v_limit(m->plugged, snr) : bst_imgproc_v_limit(l->ip, snr);
+        m->plugin ? bst_plugin_detector_v_limit(m->plugin, snr) : bst_imgproc_v_limit(l->ip, snr);
     int expected = 0;
-    BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, out->q_cam_from_gcrf, light, window,
-                                       m->config->search_radius_px, v_limit, &expected));
+    bst_predicted_stars_query query = {out->q_cam_from_gcrf, &e->light, window,
+                                       m->config->search_radius_px, v_limit};
+    BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
     expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
     bst_starid_options options = {m->config->search_radius_px,
                                   m->config->match_tolerance_px,
@@ -283,7 +252,7 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const
                                   window.width,
                                   window.height};
     bst_starid_result result = {0};
-    if (locked && LOCKED_RADIUS_PX < options.search_radius_px) {
+    if (e->locked && LOCKED_RADIUS_PX < options.search_radius_px) {
         options.search_radius_px = LOCKED_RADIUS_PX;
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
                          &result);
@@ -303,8 +272,8 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx, const
                 out->items[i].star_id = 0;
             }
         }
-        BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, *q_cam_from_gcrf, light, window,
-                                           m->config->search_radius_px, v_limit, &expected));
+        query.q_cam_from_gcrf = *q_cam_from_gcrf;
+        BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
         expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
         options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
@@ -329,27 +298,28 @@ static void ground_at(const void *user, double x_px, double y_px, bst_psf_wings_
 
 /* Labels what the wings of bright stars pretend to be: catalogued ones, also beside the frame,
  * where the attitude is that of stars, and what saturates. */
-static bst_status label_wings(imgproc_module *m, bst_ctx *ctx, const lane *l,
-                              const bst_frame_message *message, const bst_camera_motion *motion,
+static bst_status label_wings(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
                               const bst_imgproc_frame_knowledge *known, bst_detections *out) {
+    const bst_frame_message *message = e->message;
     double dx = 0.0, dy = 0.0,
            exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz;
     double bright_e =
         bst_psf_wings_bright_e(m->wings, out->noise_e / message->binning, out->threshold_snr);
-    if (motion) {
-        bst_camera_motion_streak(motion, &m->camera, bst_camera_centre_x(&m->camera),
+    if (e->motion) {
+        bst_camera_motion_streak(e->motion, &m->camera, bst_camera_centre_x(&m->camera),
                                  bst_camera_centre_y(&m->camera), &dx, &dy);
     }
     bst_psf_wings_begin(m->wings, dx, dy);
     if (known->oriented) {
         int expected = 0;
-        BST_TRY(bst_predicted_stars_expect(
-            ctx, &m->sky, known->q_cam_from_gcrf, &known->light, message->window,
-            BST_WINGS_REACH_PX, bst_camera_v_mag(&m->camera, bright_e / exposure_s), &expected));
+        const bst_predicted_stars_query query = {
+            known->q_cam_from_gcrf, &known->light, message->window, BST_WINGS_REACH_PX,
+            bst_camera_v_mag(&m->camera, bright_e / exposure_s)};
+        BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
         for (int i = 0; i < expected; i++) {
-            const bst_imgproc_expected_star *e = &m->sky.expected[i];
-            bst_psf_wings_add(m->wings, e->x_px, e->y_px,
-                              exposure_s * bst_camera_electrons_per_s(&m->camera, e->v_mag));
+            const bst_imgproc_expected_star *star = &m->sky.expected[i];
+            bst_psf_wings_add(m->wings, star->x_px, star->y_px,
+                              exposure_s * bst_camera_electrons_per_s(&m->camera, star->v_mag));
         }
     }
     for (int i = 0; i < out->count; i++) {
@@ -359,8 +329,8 @@ static bst_status label_wings(imgproc_module *m, bst_ctx *ctx, const lane *l,
             bst_psf_wings_add(m->wings, d->x_px, d->y_px, d->flux_e);
         }
     }
-    bst_psf_wings_label(m->wings, m->plugged ? bst_plugin_detector_ground : ground_at,
-                        m->plugged ? (const void *)m->plugged : l->ip, message->binning, out);
+    bst_psf_wings_label(m->wings, m->plugin ? bst_plugin_detector_ground : ground_at,
+                        m->plugin ? (const void *)m->plugin : l->ip, message->binning, out);
     return BST_OK;
 }
 
@@ -375,9 +345,11 @@ static bool motion_of(struct bst_step *step, const bst_frame_message *message,
 }
 
 /* What is in a frame. It depends on how the camera turned, not on where it looked. */
-static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
-                         const bst_frame_message *message, const bst_camera_motion *motion,
+static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l, const exposure *e,
                          bool beside_another, bst_detections *out, int capacity) {
+    const bst_frame_message *message = e->message;
+    const bst_camera_motion *motion = e->motion;
+    const bst_imgproc_windows windows = {m->windows.items, m->windows.count};
     const uint16_t *pixels;
     if (m->pixels) {
         bst_imgproc_use_map(l->ip, bst_pixel_learner_map(m->pixels, l->map));
@@ -391,11 +363,11 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
         .beside_another = beside_another};
     bst_status status =
-        m->plugged ? bst_plugin_detector_detect(ctx, m->plugged, &frame, message->exposure_id,
-                                                motion, out, capacity)
-        : m->windows.count > 0 ? bst_imgproc_detect_windows(ctx, l->ip, &frame, m->windows.items,
-                                                            m->windows.count, motion, out, capacity)
-                               : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
+        m->plugin ? bst_plugin_detector_detect(ctx, m->plugin, &frame, message->exposure_id, motion,
+                                               out, capacity)
+        : windows.count > 0
+            ? bst_imgproc_detect_windows(ctx, l->ip, &frame, &windows, motion, out, capacity)
+            : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
     bst_frame_unmap(message->frame);
     return status;
 }
@@ -407,7 +379,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
     l->ready = false;
     bst_sample sample = bst_step_next(step, PORT_FRAME);
     /* where the windows are is known in the step */
-    if (!sample.payload || m->config->track_windows || m->plugged) { /* frame by frame */
+    if (!sample.payload || m->config->track_windows || m->plugin) { /* frame by frame */
         return BST_OK;
     }
     BST_TRY(open_lane(ctx, m, l));
@@ -422,21 +394,21 @@ static bst_status ahead(void *self, struct bst_step *step) {
     const bst_frame_message *message = sample.payload;
     bst_camera_motion motion;
     bool oriented = motion_of(step, message, &motion);
-    BST_TRY(detect(ctx, m, l, message, oriented ? &motion : NULL, true, l->made, capacity));
+    const exposure e = {.message = message, .motion = oriented ? &motion : NULL};
+    BST_TRY(detect(ctx, m, l, &e, true, l->made, capacity));
     l->exposure_id = message->exposure_id;
     l->ready = true;
     return BST_OK;
 }
 
 /* What was made ahead for this frame, or else made now. */
-static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
-                                const bst_frame_message *message, const bst_camera_motion *motion,
+static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l, const exposure *e,
                                 bst_detections *out, int capacity) {
-    bool made = l->ready && l->exposure_id == message->exposure_id;
+    bool made = l->ready && l->exposure_id == e->message->exposure_id;
     l->ready = false;
     if (!made) {
         BST_TRY(open_lane(ctx, m, l));
-        return detect(ctx, m, l, message, motion, false, out, capacity);
+        return detect(ctx, m, l, e, false, out, capacity);
     }
     out->background_e = l->made->background_e;
     out->noise_e = l->made->noise_e;
@@ -470,8 +442,9 @@ static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l
     int64_t lost = bst_pixel_learner_lost(m->pixels);
     double middle_s =
         0.5 * ((double)message->start_tick + (double)message->end_tick) / (double)m->tick_rate_hz;
-    bst_pixel_step(m->pixels, &m->camera, known, &m->windows, message->binning, middle_s,
-                   bst_imgproc_shows(l->ip), out);
+    const bst_pixel_step_input input = {
+        known, &m->windows, message->binning, middle_s, bst_imgproc_shows(l->ip), out};
+    bst_pixel_step(m->pixels, &m->camera, &input);
     if (bst_pixel_learner_waits(m->pixels)) {
         bst_step_count(step, "bad_pixels_sky_at_rest");
     }
@@ -484,6 +457,18 @@ static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l
 static bst_light light_at(const imgproc_module *m, const bst_nav_telemetry *nav,
                           double middle_tick) {
     return bst_nav_light_after(nav, (middle_tick - (double)nav->tick) / (double)m->tick_rate_hz);
+}
+
+/* Labels what is no star, and fits what may be an object. */
+static void label_objects(imgproc_module *m, const lane *l,
+                          const bst_imgproc_frame_knowledge *known,
+                          const bst_optics_zero_point *zero_point, bst_detections *out) {
+    bst_imgproc_discriminator_label(m->discriminator, known, out);
+    for (int i = 0; i < out->count && !m->plugin; i++) {
+        if (out->items[i].label == BST_LABEL_OBJECT) {
+            bst_imgproc_refine(l->ip, out, i, zero_point);
+        }
+    }
 }
 
 static bst_status process(imgproc_module *m, struct bst_step *step,
@@ -501,9 +486,11 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     out->end_tick = message->end_tick;
     out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
     const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
-    bool locked = oriented && predictions && predictions->attitude_valid;
+    exposure e = {
+        .message = message, .motion = oriented ? &motion : NULL, .predictions = predictions};
+    e.locked = oriented && predictions && predictions->attitude_valid;
     double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
-    if (locked) {
+    if (e.locked) {
         out->q_cam_from_gcrf =
             bst_quat_unit(bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
     }
@@ -511,26 +498,25 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     m->windows.count = 0;
     out->windows = 0;
     bool navigated = nav.payload && !nav.stale;
-    bst_light light = navigated ? light_at(m, nav.payload, middle) : (bst_light){0};
-    if (m->config->track_windows && locked && navigated) {
-        bool use;
-        BST_TRY(plan_windows(m, ctx, l, message, &motion, &light, predictions,
-                             &out->q_cam_from_gcrf, &use));
-        m->windows.count = use ? m->windows.count : 0;
+    if (navigated) {
+        e.light = light_at(m, nav.payload, middle);
+    }
+    if (m->config->track_windows && e.locked && navigated) {
+        BST_TRY(plan_windows(ctx, m, l, &e, out->q_cam_from_gcrf));
         out->windows = m->windows.count;
     }
-    BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
-    bool smeared = !m->plugged && bst_imgproc_smeared(l->ip);
+    BST_TRY(detections_of(ctx, m, l, &e, out, capacity));
+    bool smeared = !m->plugin && bst_imgproc_smeared(l->ip);
     bst_optics_photometer_begin(&m->photometer);
-    bst_imgproc_frame_knowledge known = {
-        .q_cam_from_gcrf = out->q_cam_from_gcrf,
-        .window = message->window,
-        .streak_px =
-            m->plugged ? bst_plugin_detector_streak_px(m->plugged) : bst_imgproc_streak_px(l->ip),
-        .predictions = predictions};
+    bst_imgproc_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
+                                         .window = message->window,
+                                         .streak_px = m->plugin
+                                                          ? bst_plugin_detector_streak_px(m->plugin)
+                                                          : bst_imgproc_streak_px(l->ip),
+                                         .predictions = predictions};
     if (oriented && navigated && !smeared) {
-        BST_TRY(identify(m, l, ctx, &light, message->window, locked, out, &known.q_cam_from_gcrf));
-        known.light = light;
+        BST_TRY(identify(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
+        known.light = e.light;
         known.oriented = out->stars_identified > 0;
     }
     bst_optics_zero_point zero_point = bst_optics_photometer_zero_point(&m->photometer);
@@ -545,15 +531,10 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     }
     out->bad_pixels = m->pixels ? bst_pixel_learner_bad_count(m->pixels) : 0;
     if (m->wings && !smeared && m->windows.count == 0) {
-        BST_TRY(label_wings(m, ctx, l, message, oriented ? &motion : NULL, &known, out));
+        BST_TRY(label_wings(ctx, m, l, &e, &known, out));
     }
     if (!smeared) {
-        bst_imgproc_discriminator_label(m->discriminator, &known, out);
-        for (int i = 0; i < out->count && !m->plugged; i++) {
-            if (out->items[i].label == BST_LABEL_OBJECT) {
-                bst_imgproc_refine(l->ip, out, i, &zero_point);
-            }
-        }
+        label_objects(m, l, &known, &zero_point, out);
     }
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");

@@ -39,8 +39,8 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     bst_blend_weights_init(&g->blend_weights);
     g->key = key;
     g->items = calloc((size_t)settings->capacity, sizeof *g->items);
-    g->wander = calloc(1, sizeof *g->wander);
-    if (!g->items || !g->wander) {
+    g->centroid_error = calloc(1, sizeof *g->centroid_error);
+    if (!g->items || !g->centroid_error) {
         bst_generator_free(g);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", settings->capacity);
     }
@@ -51,7 +51,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
 void bst_generator_free(bst_generator *g) {
     if (g) {
         free(g->items);
-        free(g->wander);
+        free(g->centroid_error);
         free(g->sources);
         free(g->ranks);
         free(g->route);

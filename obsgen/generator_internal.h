@@ -85,8 +85,8 @@ struct bst_generator {
     bst_star_trail_path path; /* the true one; count 0: not known */
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;
-    double streak;                     /* 0: not filtered for */
-    bst_streak_centroid_error *wander; /* for `streak`, once it was asked for */
+    double streak;                             /* 0: not filtered for */
+    bst_streak_centroid_error *centroid_error; /* for `streak`, once it was asked for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
     double open_share;   /* of a crowded frame: what is no star's; 1: not crowded */

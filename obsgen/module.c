@@ -533,7 +533,7 @@ static bst_status step_module(void *self, struct bst_step *step) {
     return BST_OK;
 }
 
-static const char *const stands_for[] = {"scenegen", "imgproc", NULL};
+static const char *const substitutes_for[] = {"scenegen", "imgproc", NULL};
 
 const bst_module_desc bst_obsgen_module = {
     .abi = BST_MODULE_ABI,
@@ -551,5 +551,5 @@ const bst_module_desc bst_obsgen_module = {
     .create = create,
     .step = step_module,
     .destroy = destroy,
-    .stands_for = stands_for,
+    .substitutes_for = substitutes_for,
 };

@@ -17,6 +17,6 @@ typedef struct bst_device_array {
 /* Makes room for `bytes`; the content is lost when the buffer grows. most_bytes: of one buffer, by
  * the device. BST_ERR_DEVICE. */
 bst_status bst_device_array_reserve(bst_ctx *ctx, cl_context context, uint64_t most_bytes,
-                                    bst_device_array *growing, size_t bytes) BST_MUST_CHECK;
+                                    bst_device_array *array, size_t bytes) BST_MUST_CHECK;
 
 #endif

@@ -38,7 +38,7 @@ struct bst_renderer {
     bst_psf *psf;
     bst_fourier_render *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
-    bst_error_budget *crowd;
+    bst_error_budget *budget;
     bst_detector *detector;
     bst_readout *readout;
     bst_rolling *rolling; /* NULL: all rows are exposed at once */
@@ -46,7 +46,7 @@ struct bst_renderer {
     cl_mem law; /* of the stamps' profiles */
     bst_upload_ring *stage;
     cl_mem sources, shares, table; /* of the present frame; borrowed */
-    growing block_box, source_box, group_box, expected;
+    bst_device_array block_box, source_box, group_box, expected;
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
     double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
     int rolled_capacity, set;
@@ -93,7 +93,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device, doubl
     return bst_readout_create(ctx, device, &r->camera, r->program, &r->readout);
 }
 
-static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) {
+static bst_status grow(bst_ctx *ctx, bst_renderer *r, bst_device_array *g, size_t bytes) {
     return bst_device_array_reserve(ctx, r->context, r->most_bytes, g, bytes);
 }
 
@@ -177,7 +177,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
     }
     if (status == BST_OK) {
-        status = bst_error_budget_create(ctx, &r->crowd);
+        status = bst_error_budget_create(ctx, &r->budget);
     }
     if (status == BST_OK) {
         status = bst_upload_ring_create(ctx, device, &r->stage);
@@ -224,7 +224,7 @@ void bst_renderer_free(bst_renderer *r) {
     bst_upload_ring_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
-    bst_error_budget_free(r->crowd);
+    bst_error_budget_free(r->budget);
     bst_fourier_render_free(r->fft_light);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
@@ -251,7 +251,7 @@ static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_requ
         .margin_px = bst_renderer_margin_px(r),
         .bytes = r->most_bytes,
         .nodes = r->options.most_nodes};
-    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->crowd, r->fft_light,
+    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->budget, r->fft_light,
                                 &limits, q));
     r->stats = (bst_render_stats){.sources = r->plan.count,
                                   .nodes = (long long)r->plan.blocks * BST_BLOCK,
@@ -446,7 +446,7 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
         to.first_tile = to.saturated ? r->tiles[r->set] : 0;
         all.nodes_bounded = all.nodes_bounded || r->stats.nodes_bounded;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
-        all.predicted_sigma = fmax(all.predicted_sigma, bst_error_budget_error_sigma(r->crowd) +
+        all.predicted_sigma = fmax(all.predicted_sigma, bst_error_budget_error_sigma(r->budget) +
                                                             bst_rolling_error_sigma(r->rolling));
         for (int i = 0; i < band.count; i++) {
             double *peak_e = &r->rolled_peak_e[bst_rolling_source(r->rolling, i)];
@@ -562,7 +562,7 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
     *out = r->stats;
     if (!r->rolled) {
-        out->predicted_sigma = bst_error_budget_error_sigma(r->crowd);
+        out->predicted_sigma = bst_error_budget_error_sigma(r->budget);
     }
     out->predicted_sigma = foreseen(r) ? out->predicted_sigma : NAN;
     out->tolerance_missed = out->predicted_sigma > r->options.tolerance_sigma;

@@ -52,7 +52,7 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_
 /* What one planning of the sources is given. */
 typedef struct planning {
     bst_smear *smear;
-    bst_error_budget *crowd;
+    bst_error_budget *budget;
     const bst_fourier_render *fft_light;
     const bst_render_request *request;
     double dark_e2;
@@ -85,7 +85,7 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
                 (float)(presence * bst_fourier_render_mixing_error(m->fft_light) * peak_e);
         }
     }
-    return bst_error_budget_add(ctx, m->crowd, &error);
+    return bst_error_budget_add(ctx, m->budget, &error);
 }
 
 /* Chooses nodes and stamps of all sources. *fits: false when they need more blocks than there may
@@ -93,7 +93,7 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
 static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, bool *fits) {
     const bst_render_request *q = m->request;
     bst_error_budget_motion motion = bst_smear_motion(m->smear);
-    bst_error_budget_begin(m->crowd, &motion);
+    bst_error_budget_begin(m->budget, &motion);
     p->count = p->blocks = 0;
     m->grid_sigma = 0.0;
     *fits = true;
@@ -103,7 +103,7 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
         BST_TRY(bst_smear_source(ctx, m->smear, &q->sources[i], s, &visible));
         p->peak_e[i] = bst_smear_last_peak_e(m->smear);
         if (m->fft_light && !q->sources[i].occulted && bst_smear_last_leaves(m->smear)) {
-            bst_error_budget_miss(m->crowd, m->beyond * q->sources[i].electrons_per_s);
+            bst_error_budget_miss(m->budget, m->beyond * q->sources[i].electrons_per_s);
         }
         if (!visible) {
             continue;
@@ -168,7 +168,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
      * prediction, made when it is asked for, says what came of it */
     coarse = coarse || m->request->count > TOO_MANY;
     for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
-        double error = bst_error_budget_error_sigma(m->crowd), last = aim;
+        double error = bst_error_budget_error_sigma(m->budget), last = aim;
         if (error <= tolerance) {
             break;
         }
@@ -191,7 +191,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
 }
 
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
-                               bst_smear *smear, bst_error_budget *crowd,
+                               bst_smear *smear, bst_error_budget *budget,
                                const bst_fourier_render *fft_light,
                                const bst_scene_plan_limits *limits, const bst_render_request *q) {
     double read = camera->read_noise_e, brightest = 0.0;
@@ -211,7 +211,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                              .brightest_e_per_s = brightest};
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
     planning m = {.smear = smear,
-                  .crowd = crowd,
+                  .budget = budget,
                   .fft_light = fft_light,
                   .request = q,
                   .dark_e2 = dark_e2,

@@ -33,12 +33,12 @@ typedef struct bst_scene_plan_limits {
     long long nodes;        /* as above; 0: BST_SCENE_MOST_NODES */
 } bst_scene_plan_limits;
 
-/* Plans a request with a smear and a crowd, which are begun for it, so that the predicted error is
+/* Plans a request with a smear and a budget, which are begun for it, so that the predicted error is
  * within the tolerance where the number of nodes and the Fourier path's grid allow it. fft_light:
  * the Fourier path, or NULL where stamps are drawn. BST_ERR_RANGE when the coarsest nodes need more
  * than a buffer or than SLEW times the most nodes. */
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_camera *camera,
-                               bst_smear *smear, bst_error_budget *crowd,
+                               bst_smear *smear, bst_error_budget *budget,
                                const bst_fourier_render *fft_light,
                                const bst_scene_plan_limits *limits,
                                const bst_render_request *request) BST_MUST_CHECK;

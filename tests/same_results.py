@@ -24,7 +24,7 @@ DURATIONS_S = {"constellation_images": 12, "constellation_quick": 600, "day_cons
                "day_generator": 1200, "day_images": 60, "day_plant": 300, "frame_by_frame": 7, "galactic_core": 6}
 PEERS = {"link_realtime"}  # needs another program
 CLOCK = re.compile(r"(seconds|wall|cpu|rate_hz_real|real_time|speed|rss|memory|processor|started|finished|late|version|"
-                   r"program|revision|host|created|build|device|path|took)", re.I)
+                   r"program|revision|host|created|build|device|path|took|process_ms)", re.I)
 
 
 def without_clock(value):

@@ -379,51 +379,59 @@ static int rank(const bst_mtt_track *track, int64_t target_id) {
     return track->id == target_id ? 0 : track->status == BST_TRACK_TENTATIVE ? 2 : 1;
 }
 
-static void write_outputs(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
-                          const bst_target_cue *cue, const bst_quat *q_now, int detections_lost,
-                          bst_tracks *tracks, int track_capacity, bst_predictions *predictions,
-                          int prediction_capacity) {
-    int64_t tick = attitude->fix.tick;
-    bst_quat q = q_now ? *q_now : bst_quat_unit(d->q_telemetry_from_gcrf);
-    double p[3][3];
-    *tracks = (bst_tracks){.exposure_id = d->exposure_id,
-                           .tick = tick,
-                           .attitude = attitude->fix,
-                           .target_id = t->target.id,
-                           .lost = bst_mtt_lost(t->mtt) + detections_lost};
-    *predictions = (bst_predictions){.tick = tick};
-    bst_attitude_error_get(&t->error, &t->error_params, q, &predictions->attitude_error_cam_rad,
-                           &predictions->attitude_error_rate_cam_radps, p);
-    predictions->attitude_valid =
-        t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
+static void write_tracks(const bst_tracker *t, const bst_detections *d, const bst_attitude_fix *fix,
+                         const bst_target_cue *cue, int detections_lost, bst_tracks *out,
+                         int capacity) {
     int count;
     const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
+    *out = (bst_tracks){.exposure_id = d->exposure_id,
+                        .tick = fix->tick,
+                        .attitude = *fix,
+                        .target_id = t->target.id,
+                        .lost = bst_mtt_lost(t->mtt) + detections_lost};
     for (int i = 0; i < count; i++) {
-        tracks->at_rest += all[i].at_rest;
+        out->at_rest += all[i].at_rest;
     }
     for (int r = 0; r < 3; r++) {
         for (int i = 0; i < count; i++) {
             if (rank(&all[i], t->target.id) != r) {
                 continue;
             }
-            if (tracks->count < track_capacity) {
-                write_track(t, cue, &all[i], &tracks->items[tracks->count++]);
+            if (out->count < capacity) {
+                write_track(t, cue, &all[i], &out->items[out->count++]);
             } else {
-                tracks->lost++;
+                out->lost++;
             }
-            if (r == 2) {
+        }
+    }
+}
+
+/* q_cam_from_gcrf: by telemetry, now. */
+static void write_predictions(const bst_tracker *t, int64_t tick, bst_quat q_cam_from_gcrf,
+                              bst_predictions *out, int capacity) {
+    int count;
+    double p[3][3];
+    const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
+    *out = (bst_predictions){.tick = tick};
+    bst_attitude_error_get(&t->error, &t->error_params, q_cam_from_gcrf,
+                           &out->attitude_error_cam_rad, &out->attitude_error_rate_cam_radps, p);
+    out->attitude_valid =
+        t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
+    for (int r = 0; r < 2; r++) { /* no tentative tracks */
+        for (int i = 0; i < count; i++) {
+            if (rank(&all[i], t->target.id) != r) {
                 continue;
             }
-            if (predictions->count < prediction_capacity) {
+            if (out->count < capacity) {
                 const bst_sky_state *s = &all[i].state;
-                predictions->items[predictions->count++] = (bst_prediction){
+                out->items[out->count++] = (bst_prediction){
                     .track_id = all[i].id,
                     .direction_gcrf = s->direction,
                     .rate_gcrf_radps = s->rate_radps,
                     .sigma_rad = sqrt(fmax(s->covariance[0][0], s->covariance[1][1])),
                     .target_of_interest = r == 0};
             } else {
-                predictions->lost++;
+                out->lost++;
             }
         }
     }
@@ -517,8 +525,11 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     }
     t->attitude_was_lost = !attitude.usable;
     choose_target(t, &view.cue, seconds);
-    write_outputs(t, d, &attitude, &view.cue, input->q_telemetry_now, detections_lost, tracks,
-                  track_capacity, predictions, prediction_capacity);
+    write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);
+    write_predictions(
+        t, attitude.fix.tick,
+        input->q_telemetry_now ? *input->q_telemetry_now : bst_quat_unit(d->q_telemetry_from_gcrf),
+        predictions, prediction_capacity);
     t->cue_before = *cue;
     t->started = true;
     t->last_exposure_id = d->exposure_id;

@@ -27,26 +27,6 @@ void bst_guidance_telemetry(bst_guidance *g, const bst_mount_status *mount) {
     }
 }
 
-int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,
-                       bst_keep_out_zone zones[BST_ZONE_KINDS]) {
-    const bst_guidance_config *c = &g->config;
-    const bst_keep_out exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
-                                    .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,
-                                    .earth = c->earth_keep_out,
-                                    .earth_limb_rad = c->earth_limb_keep_out_deg * BST_DEG_RAD,
-                                    .limb_altitude_m = 1e3 * c->earth_limb_altitude_km};
-    return bst_keep_out_zones(&exclusion, nav->position_gcrf_m, nav->sun_m, nav->moon_m, zones);
-}
-
-bst_quat bst_guidance_body(const bst_guidance *g, int64_t tick) {
-    double dt = (double)(tick - g->mount.tick) / g->env.tick_rate_hz;
-    if (g->roll_given) {
-        return bst_guidance_rolled(g, dt, g->roll_rad);
-    }
-    bst_vec3 turn = bst_vec3_scale(g->mount.rate_body_radps, -dt);
-    return bst_quat_mul(bst_quat_from_rotvec(turn), g->mount.q_body_from_gcrf);
-}
-
 static void tell(bst_guidance *g, bst_guidance_event event) {
     if (g->event_count < BST_GUIDANCE_EVENTS) {
         g->events[g->event_count++] = event;
@@ -114,28 +94,33 @@ static bst_status target_angles(bst_ctx *ctx, const bst_guidance *g, int64_t tic
     return BST_OK;
 }
 
-/* Where the aim will be at a tick, out of the cones, and how fast it moves there. */
-static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick,
-                         const bst_keep_out_zone *zones, int zone_count, bst_vec3 towards,
-                         bool *valid, bst_vec3 *d, bst_vec3 *rate) {
+/* A direction to arrive at, and how fast it moves there. */
+typedef struct aim {
+    bool valid;
+    bst_vec3 direction, rate_radps;
+} aim;
+
+/* Where the aim will be at a tick, out of the cones. */
+static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick, bst_vec3 towards,
+                         aim *out) {
     int64_t half = (int64_t)llround(0.1 * g->env.tick_rate_hz);
     half = half > 0 ? half : 1;
     bst_vec3 ahead, behind, free;
     bool both[2];
-    BST_TRY(g->env.aim(g->env.user, ctx, tick, valid, d));
+    BST_TRY(g->env.aim(g->env.user, ctx, tick, &out->valid, &out->direction));
     BST_TRY(g->env.aim(g->env.user, ctx, tick + half, &both[0], &ahead));
     BST_TRY(g->env.aim(g->env.user, ctx, tick - half, &both[1], &behind));
-    if (!*valid) {
+    if (!out->valid) {
         return BST_OK;
     }
-    *rate = both[0] && both[1] ? bst_vec3_scale(bst_vec3_sub(ahead, behind),
-                                                0.5 * g->env.tick_rate_hz / (double)half)
-                               : (bst_vec3){0.0, 0.0, 0.0};
-    if (!bst_keep_out_nearest(zones, zone_count, *d, towards, &free)) {
-        *valid = false;
-    } else if (bst_vec3_angle(free, *d) > 0.0) {
-        *d = free;
-        *rate = (bst_vec3){0.0, 0.0, 0.0};
+    out->rate_radps = both[0] && both[1] ? bst_vec3_scale(bst_vec3_sub(ahead, behind),
+                                                          0.5 * g->env.tick_rate_hz / (double)half)
+                                         : (bst_vec3){0.0, 0.0, 0.0};
+    if (!bst_keep_out_nearest(g->zones, g->zone_count, out->direction, towards, &free)) {
+        out->valid = false;
+    } else if (bst_vec3_angle(free, out->direction) > 0.0) {
+        out->direction = free;
+        out->rate_radps = (bst_vec3){0.0, 0.0, 0.0};
     }
     return BST_OK;
 }
@@ -157,8 +142,7 @@ static void present_axes(const bst_guidance *g, int64_t tick, double angle[], do
 
 /* The fastest motion of the axes onto the moving aim; *made false when it cannot be or would cross
  * a cone. */
-static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick,
-                            const bst_keep_out_zone *zones, int zone_count, bst_vec3 from,
+static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec3 from,
                             bool *made) {
     *made = false;
     if (!g->mount_known || !bst_mount_steers(&g->mount)) {
@@ -170,20 +154,20 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick,
     bst_guidance_slew slew = {.active = true, .start_tick = tick};
     for (int round = 0; round < 4; round++) {
         int64_t arrival = tick + (int64_t)llround(slew.duration_s * g->env.tick_rate_hz);
-        bst_vec3 d, r;
-        bool valid, found;
-        BST_TRY(aim_at(ctx, g, arrival, zones, zone_count, from, &valid, &d, &r));
-        if (!valid) {
+        aim end;
+        bool found;
+        BST_TRY(aim_at(ctx, g, arrival, from, &end));
+        if (!end.valid) {
             return BST_OK;
         }
-        BST_TRY(target_angles(ctx, g, arrival, d, angle, to, &found));
+        BST_TRY(target_angles(ctx, g, arrival, end.direction, angle, to, &found));
         bst_quat body = bst_guidance_body(g, arrival + (int64_t)(0.1 * g->env.tick_rate_hz));
-        bst_vec3 next = bst_quat_rotate(body, unit_after(d, r, 0.1));
+        bst_vec3 next = bst_quat_rotate(body, unit_after(end.direction, end.rate_radps, 0.1));
         if (!found || bst_mount_angles(&g->mount, next, to, ways) == 0) {
             return BST_OK;
         }
         double duration = 0.0;
-        slew.arrival = d;
+        slew.arrival = end.direction;
         for (int i = 0; i < g->mount.axes; i++) {
             const bst_mount_axis *axis = &g->mount.axis[i];
             double share = g->config.limits_share, limit = share * axis->rate_limit_radps;
@@ -200,10 +184,10 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick,
     }
     bst_guidance_slew before = g->slew;
     g->slew = slew;
-    for (int k = 0; k <= SAMPLES && zone_count > 0; k++) {
+    for (int k = 0; k <= SAMPLES && g->zone_count > 0; k++) {
         double depth;
         bst_vec3 d = slew_at(g, slew.duration_s * k / SAMPLES, NULL);
-        if (bst_keep_out_inside(zones, zone_count, d, &depth) >= 0) {
+        if (bst_keep_out_inside(g->zones, g->zone_count, d, &depth) >= 0) {
             g->slew = before;
             return BST_OK;
         }
@@ -249,8 +233,7 @@ static void path_nodes(const bst_guidance *g, const bst_keep_out_route *path, in
 }
 
 /* The shortest way round the cones, as fast as the axes allow. */
-static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick,
-                            const bst_keep_out_zone *zones, int zone_count, bst_vec3 from,
+static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec3 from,
                             bst_vec3 from_rate, bool *made) {
     bst_guidance_slew *slew = &g->slew;
     bst_guidance_slew before = *slew;
@@ -258,12 +241,13 @@ static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick,
     *made = false;
     for (int round = 0; round < 3; round++) {
         int64_t arrival = tick + (int64_t)llround(duration * g->env.tick_rate_hz);
-        bst_vec3 d, r, tangent, end, bend;
+        aim goal;
+        bst_vec3 tangent, end, bend;
         bst_slew_limits limits;
-        bool valid;
         *slew = before;
-        BST_TRY(aim_at(ctx, g, arrival, zones, zone_count, from, &valid, &d, &r));
-        if (!valid || !bst_keep_out_path(zones, zone_count, from, d, &slew->path)) {
+        BST_TRY(aim_at(ctx, g, arrival, from, &goal));
+        if (!goal.valid ||
+            !bst_keep_out_path(g->zones, g->zone_count, from, goal.direction, &slew->path)) {
             *slew = before;
             return BST_OK;
         }
@@ -275,14 +259,14 @@ static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick,
         (void)bst_keep_out_route_at(&slew->path, slew->path.length_rad, &end, &bend);
         path_nodes(g, &slew->path, tick, &g->nodes, &limits);
         if (!bst_slew_path_plan(&g->nodes, &limits, fmax(bst_vec3_dot(from_rate, tangent), 0.0),
-                                fmax(bst_vec3_dot(r, end), 0.0), &slew->speed)) {
+                                fmax(bst_vec3_dot(goal.rate_radps, end), 0.0), &slew->speed)) {
             *slew = before;
             return BST_OK;
         }
         slew->active = slew->along_path = true;
         slew->start_tick = tick;
         slew->duration_s = duration = slew->speed.duration_s;
-        slew->arrival = d;
+        slew->arrival = goal.direction;
     }
     *made = true;
     if (slew->path.count > 1) {
@@ -336,14 +320,13 @@ static void keep_turn(bst_guidance *g, bst_los_command *command) {
 }
 
 /* Whether the slew under way still ends on the aim. */
-static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, const bst_keep_out_zone *zones,
-                               int zone_count, bst_vec3 from, bool *out) {
+static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, bst_vec3 from, bool *out) {
     int64_t arrival =
         g->slew.start_tick + (int64_t)llround(g->slew.duration_s * g->env.tick_rate_hz);
-    bst_vec3 d, rate;
-    bool valid;
-    BST_TRY(aim_at(ctx, g, arrival, zones, zone_count, from, &valid, &d, &rate));
-    *out = valid && bst_vec3_angle(d, g->slew.arrival) <= g->config.slew_above_deg * BST_DEG_RAD;
+    aim now;
+    BST_TRY(aim_at(ctx, g, arrival, from, &now));
+    *out = now.valid &&
+           bst_vec3_angle(now.direction, g->slew.arrival) <= g->config.slew_above_deg * BST_DEG_RAD;
     return BST_OK;
 }
 
@@ -358,9 +341,7 @@ static bool turns_matter(const bst_guidance *g) {
 
 static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
                         bst_los_command *command, bool *give) {
-    const bst_keep_out_zone *zones = g->zones;
-    int zone_count = g->zone_count;
-    if (zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
+    if (g->zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
         return BST_OK;
     }
     int64_t tick = command->tick;
@@ -378,7 +359,7 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight
     if (g->slew.active) {
         double t = (double)(tick - g->slew.start_tick) / g->env.tick_rate_hz;
         bool wanted;
-        BST_TRY(still_wanted(ctx, g, zones, zone_count, from, &wanted));
+        BST_TRY(still_wanted(ctx, g, from, &wanted));
         if (wanted && t < g->slew.duration_s) {
             command_slew(g, tick, command);
             return BST_OK;
@@ -394,15 +375,15 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight
         }
     }
     double depth;
-    bool inside = bst_keep_out_inside(zones, zone_count, target, &depth) >= 0;
-    bool blocked = inside && !bst_keep_out_nearest(zones, zone_count, target, from, &target);
+    bool inside = bst_keep_out_inside(g->zones, g->zone_count, target, &depth) >= 0;
+    bool blocked = inside && !bst_keep_out_nearest(g->zones, g->zone_count, target, from, &target);
     bool made = false;
     if (!blocked && is_beyond(from, target, g->config.slew_above_deg * BST_DEG_RAD)) {
-        BST_TRY(plan_axes(ctx, g, tick, zones, zone_count, from, &made));
+        BST_TRY(plan_axes(ctx, g, tick, from, &made));
         if (!made) {
-            BST_TRY(plan_path(ctx, g, tick, zones, zone_count, from, from_rate, &made));
+            BST_TRY(plan_path(ctx, g, tick, from, from_rate, &made));
         }
-        blocked = !made && zone_count > 0;
+        blocked = !made && g->zone_count > 0;
     }
     if (blocked && !g->no_way) {
         tell(g, (bst_guidance_event){.kind = BST_GUIDANCE_NO_WAY,

@@ -126,7 +126,7 @@ void bst_guidance_see_sky(bst_guidance *guidance, const bst_nav_telemetry *nav, 
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) BST_MUST_CHECK;
 
-/* Keep-out cones at the time of `nav`.
+/* Keep-out cones at the time of `nav` (guidance_state.c).
  *
  * Returned:  number of zones */
 int bst_guidance_zones(const bst_guidance *guidance, const bst_nav_telemetry *nav,

@@ -75,15 +75,16 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
                                                       .limits_share = g->config.limits_share};
     double horizon = g->config.look_ahead_s, now_s = (double)tick / g->env.tick_rate_hz;
     double step = fmin(fmax(1e-3 * horizon, LEAST_STEP_S), MOST_STEP_S);
-    double when = 0.0, until = INFINITY;
-    bst_pointing_feasibility reach, why;
-    bool found;
+    bst_pointing_feasibility reach;
+    bst_pointing_feasibility_change lost, back;
+    const bst_pointing_feasibility_search reached = {0.0, horizon, step, true};
+    const bst_pointing_feasibility_search unreached = {0.0, horizon, step, false};
     BST_TRY(bst_pointing_feasibility_at(ctx, &problem, 0.0, &reach));
     if (reach != BST_REACH_OK) {
         if ((int)reach != g->reach) {
-            BST_TRY(bst_pointing_feasibility_next(ctx, &problem, 0.0, horizon, step, true, &found,
-                                                  &when, NULL));
-            tell(g, BST_GUIDANCE_UNREACHABLE, reach, now_s, found ? now_s + when : INFINITY);
+            BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &reached, &back));
+            tell(g, BST_GUIDANCE_UNREACHABLE, reach, now_s,
+                 back.found ? now_s + back.when_s : INFINITY);
         }
         g->reach = reach;
         return BST_OK;
@@ -92,18 +93,17 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         tell(g, BST_GUIDANCE_REACHABLE, g->reach, now_s, now_s);
     }
     g->reach = BST_REACH_OK;
-    BST_TRY(bst_pointing_feasibility_next(ctx, &problem, 0.0, horizon, step, false, &found, &when,
-                                          &why));
-    if (!found) {
+    BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &unreached, &lost));
+    if (!lost.found) {
         return BST_OK;
     }
+    const bst_pointing_feasibility why = lost.why;
     if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
         bst_pointing_feasibility_loss loss;
         int losses;
-        double from = fmax(when - RUN_UP_S, 0.0);
-        BST_TRY(bst_pointing_feasibility_chase(ctx, &problem, from, horizon,
-                                               g->config.loss_tolerance_px * g->env.pixel_rad,
-                                               &loss, 1, &losses));
+        const bst_pointing_feasibility_span span = {fmax(lost.when_s - RUN_UP_S, 0.0), horizon,
+                                                    g->config.loss_tolerance_px * g->env.pixel_rad};
+        BST_TRY(bst_pointing_feasibility_chase(ctx, &problem, &span, &loss, 1, &losses));
         bool rolls = false;
         double before = g->roll_rad;
         if (losses > 0 && g->config.body_roll) {
@@ -117,9 +117,9 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         }
         return BST_OK;
     }
-    BST_TRY(bst_pointing_feasibility_next(ctx, &problem, when, horizon, step, true, &found, &until,
-                                          NULL));
-    tell_ahead(g, now_s, BST_GUIDANCE_AHEAD, why, when, found ? until : INFINITY);
+    const bst_pointing_feasibility_search again = {lost.when_s, horizon, step, true};
+    BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &again, &back));
+    tell_ahead(g, now_s, BST_GUIDANCE_AHEAD, why, lost.when_s, back.found ? back.when_s : INFINITY);
     return BST_OK;
 }
 

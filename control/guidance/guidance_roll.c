@@ -37,22 +37,21 @@ bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *g,
     double before = g->roll_rad, from = given ? before : roll->angle_rad;
     bst_pointing_feasibility_problem careful = *problem;
     careful.limits_share *= SHARE;
+    const bst_pointing_feasibility_search unreached = {0.0, horizon_s, 0.5, false};
+    const bst_pointing_feasibility_span span = {0.0, horizon_s,
+                                                g->config.loss_tolerance_px * g->env.pixel_rad};
     g->roll_given = true;
     for (int i = 1; i <= MOST_STEPS && !*found; i++) {
         for (int side = -1; side <= 1 && !*found; side += 2) {
             bst_pointing_feasibility_loss loss;
-            bool out;
-            double when;
+            bst_pointing_feasibility_change out;
             int losses;
             g->roll_rad = from + side * i * STEP_RAD;
-            BST_TRY(bst_pointing_feasibility_next(ctx, &careful, 0.0, horizon_s, 0.5, false, &out,
-                                                  &when, NULL));
-            if (out) {
+            BST_TRY(bst_pointing_feasibility_next(ctx, &careful, &unreached, &out));
+            if (out.found) {
                 continue;
             }
-            BST_TRY(bst_pointing_feasibility_chase(ctx, &careful, 0.0, horizon_s,
-                                                   g->config.loss_tolerance_px * g->env.pixel_rad,
-                                                   &loss, 1, &losses));
+            BST_TRY(bst_pointing_feasibility_chase(ctx, &careful, &span, &loss, 1, &losses));
             *found = losses == 0;
         }
     }

@@ -126,16 +126,17 @@ bst_status bst_pointing_feasibility_at(bst_ctx *ctx,
 
 bst_status bst_pointing_feasibility_next(bst_ctx *ctx,
                                          const bst_pointing_feasibility_problem *problem,
-                                         double seconds, double horizon_s, double step_s,
-                                         bool wanted, bool *found, double *when_s,
-                                         bst_pointing_feasibility *why) {
-    *found = false;
-    double before = seconds;
-    for (double at = seconds;; at = fmin(at + step_s, seconds + horizon_s)) {
+                                         const bst_pointing_feasibility_search *search,
+                                         bst_pointing_feasibility_change *out) {
+    const bool wanted = search->wanted;
+    const double end = search->from_s + search->horizon_s;
+    double before = search->from_s;
+    *out = (bst_pointing_feasibility_change){.found = false};
+    for (double at = search->from_s;; at = fmin(at + search->step_s, end)) {
         bst_pointing_feasibility reach;
         BST_TRY(bst_pointing_feasibility_at(ctx, problem, at, &reach));
         if ((reach == BST_REACH_OK) != wanted) {
-            if (at >= seconds + horizon_s) {
+            if (at >= end) {
                 return BST_OK;
             }
             before = at;
@@ -152,11 +153,7 @@ bst_status bst_pointing_feasibility_next(bst_ctx *ctx,
                 before = middle;
             }
         }
-        *found = true;
-        *when_s = at;
-        if (why) {
-            *why = reach;
-        }
+        *out = (bst_pointing_feasibility_change){true, at, reach};
         return BST_OK;
     }
 }
@@ -211,10 +208,11 @@ static bst_status heading(bst_ctx *ctx, const bst_pointing_feasibility_problem *
 
 bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
                                           const bst_pointing_feasibility_problem *problem,
-                                          double from_s, double until_s, double tolerance_rad,
+                                          const bst_pointing_feasibility_span *span,
                                           bst_pointing_feasibility_loss *losses, int most,
                                           int *count) {
     const bst_mount_status *mount = problem->mount;
+    const double from_s = span->from_s;
     *count = 0;
     if (!mount || !bst_mount_steers(mount) || has_redundant(mount) || most < 1) {
         return BST_OK;
@@ -226,11 +224,11 @@ bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
     double to[BST_MOUNT_AXES], next[BST_MOUNT_AXES];
     bst_vec3 body, body_next;
     bool valid, valid_next, lost = false, started = false;
-    const double span = CHASE_STEP_S * CHASE_EVERY;
+    const double look_s = CHASE_STEP_S * CHASE_EVERY;
     BST_TRY(heading(ctx, problem, from_s, axes, to, &body, &valid));
-    for (int64_t n = 0; from_s + (double)n * span < until_s; n++) {
-        double at = from_s + (double)n * span;
-        BST_TRY(heading(ctx, problem, at + span, axes, next, &body_next, &valid_next));
+    for (int64_t n = 0; from_s + (double)n * look_s < span->until_s; n++) {
+        double at = from_s + (double)n * look_s;
+        BST_TRY(heading(ctx, problem, at + look_s, axes, next, &body_next, &valid_next));
         for (int i = 0; i < mount->axes && valid && valid_next; i++) {
             /* `to` and `next` by the same turn */
             to[i] -= 2.0 * BST_PI * round((to[i] - next[i]) / (2.0 * BST_PI));
@@ -239,7 +237,7 @@ bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
             double share = (double)k / CHASE_EVERY;
             double angle[BST_MOUNT_AXES] = {0.0};
             for (int i = 0; i < mount->axes; i++) {
-                double rate = (next[i] - to[i]) / span;
+                double rate = (next[i] - to[i]) / look_s;
                 double goal = to[i] + share * (next[i] - to[i]);
                 if (!started) {
                     axes[i] = (follower){to[i] + share * (next[i] - to[i]), rate};
@@ -252,10 +250,10 @@ bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
             bst_vec3 wanted = bst_vec3_axpy(bst_vec3_scale(body, 1.0 - share), share, body_next);
             double off = bst_vec3_angle(bst_mount_boresight(mount, angle), wanted);
             double t = at + k * CHASE_STEP_S;
-            if (off > tolerance_rad && !lost && *count < most) {
+            if (off > span->tolerance_rad && !lost && *count < most) {
                 losses[(*count)++] = (bst_pointing_feasibility_loss){t, INFINITY, off};
                 lost = true;
-            } else if (off <= tolerance_rad && lost) {
+            } else if (off <= span->tolerance_rad && lost) {
                 losses[*count - 1].until_s = t;
                 lost = false;
             }

@@ -53,14 +53,24 @@ bst_status bst_pointing_feasibility_at(bst_ctx *ctx,
                                        double seconds,
                                        bst_pointing_feasibility *out) BST_MUST_CHECK;
 
-/* The first time after `seconds` at which bst_pointing_feasibility_at says OK (wanted) or something
- * else (not wanted), to 0.01 s, within horizon_s in steps of step_s: shorter changes may be missed.
- * *found false: none. *why (may be NULL): the reason beyond, when not wanted. */
+/* What is looked for: a time from from_s to horizon_s later, in steps of step_s, at which
+ * bst_pointing_feasibility_at says OK (wanted) or something else (not wanted). */
+typedef struct bst_pointing_feasibility_search {
+    double from_s, horizon_s, step_s;
+    bool wanted;
+} bst_pointing_feasibility_search;
+
+typedef struct bst_pointing_feasibility_change {
+    bool found;                   /* false: there is none, and the rest is not set */
+    double when_s;                /* to 0.01 s */
+    bst_pointing_feasibility why; /* then */
+} bst_pointing_feasibility_change;
+
+/* The first such time. Changes shorter than a step may be missed. */
 bst_status bst_pointing_feasibility_next(bst_ctx *ctx,
                                          const bst_pointing_feasibility_problem *problem,
-                                         double seconds, double horizon_s, double step_s,
-                                         bool wanted, bool *found, double *when_s,
-                                         bst_pointing_feasibility *why) BST_MUST_CHECK;
+                                         const bst_pointing_feasibility_search *search,
+                                         bst_pointing_feasibility_change *out) BST_MUST_CHECK;
 
 /* A time in which the boresight is off by more than the tolerance. */
 typedef struct bst_pointing_feasibility_loss {
@@ -68,14 +78,19 @@ typedef struct bst_pointing_feasibility_loss {
     double worst_rad;
 } bst_pointing_feasibility_loss;
 
-/* Follows what is expected from from_s to until_s with axes that keep their limits, from perfectly
- * on it: each axis heads for the nearest angle within travel, at full rate, braking at the last
- * moment that 0.8 of the acceleration allow, as the mounts do. What is lost by a keyhole or by
- * limits is lost from, and back at, those times. Ends after `most` losses; finds none for a mount
- * with a redundant axis, which is taken to pass its pole. */
+/* A span of time to follow, and how far off the boresight may be. */
+typedef struct bst_pointing_feasibility_span {
+    double from_s, until_s, tolerance_rad;
+} bst_pointing_feasibility_span;
+
+/* Follows what is expected in a span with axes that keep their limits, from perfectly on it: each
+ * axis heads for the nearest angle within travel, at full rate, braking at the last moment that 0.8
+ * of the acceleration allow, as the mounts do. What is lost by a keyhole or by limits is lost from,
+ * and back at, those times. Ends after `most` losses; finds none for a mount with a redundant axis,
+ * which is taken to pass its pole. */
 bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
                                           const bst_pointing_feasibility_problem *problem,
-                                          double from_s, double until_s, double tolerance_rad,
+                                          const bst_pointing_feasibility_span *span,
                                           bst_pointing_feasibility_loss *losses, int most,
                                           int *count) BST_MUST_CHECK;
 

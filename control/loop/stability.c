@@ -35,10 +35,6 @@ static double complex open_at(const bst_loop *loop, double omega) {
     return loop->open(loop->user, omega);
 }
 
-static double wrap(double angle) {
-    return angle - two_pi * ceil(angle / two_pi - 0.5);
-}
-
 static double over_one(double complex l) {
     return cabs(l) - 1.0;
 }
@@ -79,7 +75,7 @@ static void phase_crossing(walk *w, double omega) {
 }
 
 static void gain_crossing(walk *w, double omega, bool falling) {
-    double margin = wrap(carg(open_at(w->loop, omega)) + BST_PI);
+    double margin = bst_wrap_angle(carg(open_at(w->loop, omega)) + BST_PI);
     w->phase_margin = fmin(w->phase_margin, fabs(margin));
     double until = margin < 0.0 ? margin + two_pi : margin;
     w->delay_margin = fmin(w->delay_margin, until / omega);
@@ -89,7 +85,7 @@ static void gain_crossing(walk *w, double omega, bool falling) {
 }
 
 static void between(walk *w, point a, point b) {
-    w->turned += wrap(carg(1.0 + b.l) - carg(1.0 + a.l));
+    w->turned += bst_wrap_angle(carg(1.0 + b.l) - carg(1.0 + a.l));
     if ((cimag(a.l) > 0.0) != (cimag(b.l) > 0.0) && creal(a.l) + creal(b.l) < 0.0) {
         phase_crossing(w, crossing(w->loop, a.omega, b.omega, cimag));
     }
@@ -104,8 +100,8 @@ static void between(walk *w, point a, point b) {
 }
 
 static void follow(walk *w, point a, point b, int depth) {
-    double turn = fabs(wrap(carg(1.0 + b.l) - carg(1.0 + a.l)));
-    double bend = fabs(wrap(carg(b.l) - carg(a.l)));
+    double turn = fabs(bst_wrap_angle(carg(1.0 + b.l) - carg(1.0 + a.l)));
+    double bend = fabs(bst_wrap_angle(carg(b.l) - carg(a.l)));
     double change = fabs(log(cabs(b.l) / cabs(a.l)));
     if (depth < DEEPEST && (turn > TURN_MAX || bend > TURN_MAX || change > TURN_MAX) &&
         b.omega - a.omega > 1e-12 * b.omega) {
@@ -267,7 +263,7 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins
                 w.peak_hz = a.omega / two_pi;
                 /* from -omega to omega past z = 1: half a turn back for each pole there */
                 double there = -BST_PI * poles_at_one(&a, &b);
-                closing = there + wrap(2.0 * carg(1.0 + first.l) - there);
+                closing = there + bst_wrap_angle(2.0 * carg(1.0 + first.l) - there);
             }
             follow(&w, a, b, 0);
         }

@@ -192,23 +192,26 @@ static int list_choices(bst_tasking *t, int sensor, double now_s) {
     return count;
 }
 
-/* Whether the sensor sees an object from its arrival to the last frame wanted. */
+/* Whether the sensor sees an object from its arrival to the last frame wanted: the sight is that of
+ * the arrival, the SNR the lesser. */
 static bst_status sees(bst_ctx *ctx, const bst_tasking *t, int sensor,
-                       const bst_tasking_choice *choice, double now_s, bst_tasking_why *why,
-                       bst_world_sight *first, double *snr) {
+                       const bst_tasking_choice *choice, double now_s,
+                       bst_tasking_visibility *out) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     double from_s = now_s + choice->slew_s + t->config.settle_s;
-    double until_s = from_s + (double)line_of(t, choice->object)->frames * s->period_s, worst;
-    BST_TRY(bst_tasking_look(ctx, t, sensor, choice->object, from_s, why, first, snr));
-    if (*why == BST_WHY_NOT) {
-        BST_TRY(bst_tasking_look(ctx, t, sensor, choice->object, until_s, why, NULL, &worst));
-        *snr = fmin(*snr, worst);
+    double until_s = from_s + (double)line_of(t, choice->object)->frames * s->period_s;
+    BST_TRY(bst_tasking_look(ctx, t, sensor, choice->object, from_s, out));
+    if (out->why == BST_WHY_NOT) {
+        bst_tasking_visibility last;
+        BST_TRY(bst_tasking_look(ctx, t, sensor, choice->object, until_s, &last));
+        out->why = last.why;
+        out->snr = fmin(out->snr, last.snr);
     }
     return BST_OK;
 }
 
 static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
-                 const bst_tasking_choice *choice, const bst_world_sight *sight, double snr) {
+                 const bst_tasking_choice *choice, const bst_tasking_visibility *seen) {
     const bst_tasking_config *c = &t->config;
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick);
@@ -220,12 +223,12 @@ static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
         s->task.norad = bst_knowledge_object(s->knowledge, choice->object)->norad;
         s->task.sigma_rad = c->sigma_deg * BST_DEG_RAD;
         s->task.rate_sigma_radps = c->rate_sigma_arcsec_per_s * BST_ARCSEC_RAD;
-        s->task.v_mag = sight->v_mag;
+        s->task.v_mag = seen->sight.v_mag;
         s->task.v_mag_sigma = c->v_mag_sigma;
-        s->task.snr = snr;
+        s->task.snr = seen->snr;
         s->arrival_s = now_s + choice->slew_s + c->settle_s;
         s->frames_wanted = line_of(t, choice->object)->frames;
-        s->direction = sight->geometric;
+        s->direction = seen->sight.geometric;
         s->pointed = true;
         t->holder[choice->object] = sensor;
     }
@@ -233,18 +236,17 @@ static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
 
 /* The best that the sensor can see, -1: none. */
 static bst_status choose(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s, int *chosen,
-                         bst_world_sight *sight, double *snr) {
+                         bst_tasking_visibility *seen) {
     int count = list_choices(t, sensor, now_s);
     *chosen = -1;
     for (int i = 0; i < count && i < TRIES && *chosen < 0; i++) {
-        bst_tasking_why why = BST_WHY_NOT;
-        BST_TRY(sees(ctx, t, sensor, &t->choices[i], now_s, &why, sight, snr));
-        if (why == BST_WHY_NOT) {
+        BST_TRY(sees(ctx, t, sensor, &t->choices[i], now_s, seen));
+        if (seen->why == BST_WHY_NOT) {
             *chosen = i;
         } else {
-            double wait_s = why == BST_WHY_FAINT    ? t->config.retry_s
-                            : why == BST_WHY_ITSELF ? INFINITY
-                                                    : HIDDEN_RETRY_S;
+            double wait_s = seen->why == BST_WHY_FAINT    ? t->config.retry_s
+                            : seen->why == BST_WHY_ITSELF ? INFINITY
+                                                          : HIDDEN_RETRY_S;
             *not_before(t, sensor, t->choices[i].object) = (float)(now_s + wait_s);
         }
     }
@@ -269,9 +271,9 @@ int64_t bst_tasking_quiet_until(const bst_tasking *t, int sensor) {
 /* Ends the task when that is due, and chooses the next. */
 static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
     bst_tasking_sensor *s = &t->sensors[sensor];
-    double now_s = seconds_of(t, tick), snr = 0.0;
+    double now_s = seconds_of(t, tick);
     bst_task_end before = BST_TASK_NONE;
-    bst_world_sight sight;
+    bst_tasking_visibility seen;
     int chosen;
     if (s->task.object >= 0) {
         before = ending(t, s, now_s);
@@ -283,14 +285,14 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
             *not_before(t, sensor, s->task.object) = (float)(now_s + t->config.retry_s);
         }
     }
-    BST_TRY(choose(ctx, t, sensor, now_s, &chosen, &sight, &snr));
+    BST_TRY(choose(ctx, t, sensor, now_s, &chosen, &seen));
     if (chosen >= 0) {
-        give(t, sensor, tick, before, &t->choices[chosen], &sight, snr);
+        give(t, sensor, tick, before, &t->choices[chosen], &seen);
         *given = true;
     } else {
         *given = s->task.object >= 0;
         if (*given) {
-            give(t, sensor, tick, before, NULL, NULL, 0.0);
+            give(t, sensor, tick, before, NULL, NULL);
         }
         s->next_plan_s = now_s + t->config.idle_s;
     }

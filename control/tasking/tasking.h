@@ -130,16 +130,19 @@ bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *tasking, int sensor, int6
  */
 int64_t bst_tasking_quiet_until(const bst_tasking *tasking, int sensor);
 
-/* Visibility of an object from a sensor at a time, by the onboard knowledge.
+/* Visibility of an object from a sensor at a time. */
+typedef struct bst_tasking_visibility {
+    bst_tasking_why why;   /* BST_WHY_NOT: it can be seen; or the first reason why not */
+    bst_world_sight sight; /* as far as it was computed */
+    double snr;            /* of a frame, as far as it was computed */
+} bst_tasking_visibility;
+
+/* Computes the visibility of an object from a sensor by the onboard knowledge.
  *
  * Given:     seconds  since the epoch
- * Returned:  *why    whether it can be seen, or the first reason why not
- *            *sight  as far as it was computed; may be NULL
- *            *snr    of a frame, as far as it was computed
  * Errors:    those of the onboard knowledge */
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *tasking, int sensor, int object,
-                            double seconds, bst_tasking_why *why, bst_world_sight *sight,
-                            double *snr) BST_MUST_CHECK;
+                            double seconds, bst_tasking_visibility *out) BST_MUST_CHECK;
 
 /* Checks the visibility of all targets of the list from all sensors. */
 bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *tasking, double seconds,

@@ -119,51 +119,49 @@ static bst_status mount_reaches(bst_ctx *ctx, const bst_tasking *t, const bst_ta
 }
 
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
-                            double seconds, bst_tasking_why *why, bst_world_sight *sight,
-                            double *snr) {
+                            double seconds, bst_tasking_visibility *out) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const double step_s = 1.0; /* over which the rate is taken */
     bst_ctx quiet = {0};       /* an orbit that has ended is no error here */
     bst_world_sight now, later;
     bst_world_state eye;
     bst_bodies bodies;
-    *snr = 0.0;
+    out->snr = 0.0;
     if (bst_knowledge_is_itself(s->knowledge, object)) {
-        *why = BST_WHY_ITSELF;
+        out->why = BST_WHY_ITSELF;
         return BST_OK;
     }
     BST_TRY(bst_knowledge_eye_at(ctx, s->view, seconds, &eye, &bodies));
     if (bst_knowledge_sight_at(&quiet, s->view, object, seconds, &now) != BST_OK ||
         bst_knowledge_sight_at(&quiet, s->view, object, seconds + step_s, &later) != BST_OK) {
-        *why = BST_WHY_NO_ORBIT;
+        out->why = BST_WHY_NO_ORBIT;
         return BST_OK;
     }
-    if (sight) {
-        *sight = now;
-    }
+    out->sight = now;
     bst_keep_out_zone zones[BST_ZONE_KINDS];
     int count = zones_at(&t->config, eye.position_m, bst_vec3_sub(bodies.sun_m, eye.position_m),
                          bst_vec3_sub(bodies.moon_m, eye.position_m), zones);
     double cosines[BST_ZONE_KINDS];
     cosines_of(zones, count, cosines);
-    *why = zone_reason(zones, cosines, count, now.apparent);
-    *why = now.occulted && *why == BST_WHY_NOT ? BST_WHY_EARTH : *why;
-    *why = *why == BST_WHY_NOT && now.sunlit_fraction < 0.5 ? BST_WHY_SHADOW : *why;
-    if (*why != BST_WHY_NOT) {
+    bst_tasking_why why = zone_reason(zones, cosines, count, now.apparent);
+    why = now.occulted && why == BST_WHY_NOT ? BST_WHY_EARTH : why;
+    why = why == BST_WHY_NOT && now.sunlit_fraction < 0.5 ? BST_WHY_SHADOW : why;
+    out->why = why;
+    if (why != BST_WHY_NOT) {
         return BST_OK;
     }
     const bst_camera *camera = bst_knowledge_camera(s->knowledge);
     double electrons = bst_scene_glow_electrons_per_s(camera, &now.glow, NULL) * s->exposure_s;
-    *snr = electrons / (s->noise_e * sqrt(s->pixels));
+    out->snr = electrons / (s->noise_e * sqrt(s->pixels));
     bool reached = true;
-    if (*snr < t->config.min_snr) {
-        *why = BST_WHY_FAINT;
+    if (out->snr < t->config.min_snr) {
+        out->why = BST_WHY_FAINT;
     } else if (bst_vec3_angle(now.geometric, later.geometric) >
                t->config.max_rate_arcsec_per_s * BST_ARCSEC_RAD * step_s) {
-        *why = BST_WHY_RATE;
+        out->why = BST_WHY_RATE;
     } else {
         BST_TRY(mount_reaches(ctx, t, s, object, seconds, &reached));
-        *why = reached ? BST_WHY_NOT : BST_WHY_MOUNT;
+        out->why = reached ? BST_WHY_NOT : BST_WHY_MOUNT;
     }
     return BST_OK;
 }
@@ -187,11 +185,11 @@ bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
         out->seen += t->seen_s[i] >= 0.0;
         bst_tasking_why best = BST_WHY_COUNT;
         for (int s = 0; s < t->sensor_count && best != BST_WHY_NOT; s++) {
-            bst_tasking_why why = BST_WHY_NOT;
-            double snr;
-            BST_TRY(bst_tasking_look(ctx, t, s, i, seconds, &why, NULL, &snr));
+            bst_tasking_visibility seen;
+            BST_TRY(bst_tasking_look(ctx, t, s, i, seconds, &seen));
             /* the nearest to being seen */
-            best = why == BST_WHY_NOT || best == BST_WHY_COUNT || why > best ? why : best;
+            best = seen.why == BST_WHY_NOT || best == BST_WHY_COUNT || seen.why > best ? seen.why
+                                                                                       : best;
         }
         if (best == BST_WHY_NOT) {
             out->visible++;

@@ -9,14 +9,20 @@
 /* Rotation steps between two evaluations of the exact phase: rounding grows to about 1e-14. */
 #define RESYNC_STEPS 256
 
-static void draw_band(bst_jitter_axis *axis, int first, int lines, double rms_axis_rad,
-                      double min_hz, double max_hz, double dt_s, bst_rng_key key, int axis_number) {
-    double amplitude = rms_axis_rad * sqrt(2.0 / lines);
-    for (int i = 0; i < lines; i++) {
-        int line = first + i;
+/* A flat band, and its lines in a bst_jitter_axis. */
+typedef struct flat_band {
+    int first, lines;
+    double rms_axis_rad, min_hz, max_hz;
+} flat_band;
+
+static void draw_band(bst_jitter_axis *axis, const flat_band *b, double dt_s, bst_rng_key key,
+                      int axis_number) {
+    double amplitude = b->rms_axis_rad * sqrt(2.0 / b->lines);
+    for (int i = 0; i < b->lines; i++) {
+        int line = b->first + i;
         uint64_t draw = (uint64_t)(2 * line);
         double u = bst_rng_uniform(key, (uint64_t)axis_number, draw);
-        double f = min_hz + (max_hz - min_hz) * (i + u) / lines;
+        double f = b->min_hz + (b->max_hz - b->min_hz) * (i + u) / b->lines;
         axis->amplitude[line] = amplitude;
         axis->frequency_hz[line] = f;
         axis->phase_cycles[line] = bst_rng_uniform(key, (uint64_t)axis_number, draw + 1);
@@ -70,12 +76,13 @@ void bst_jitter_init(bst_jitter *jitter, const bst_jitter_spec *spec, double dt_
                      bst_rng_key key) {
     *jitter = (bst_jitter){.dt_s = dt_s, .index = -1};
     jitter->silent = spec->low_rms_rad == 0.0 && spec->high_rms_rad == 0.0;
+    const flat_band low = {0, BST_JITTER_LOW_LINES, spec->low_rms_rad * sqrt(0.5), 0.0,
+                           spec->low_cutoff_hz};
+    const flat_band high = {BST_JITTER_LOW_LINES, BST_JITTER_HIGH_LINES,
+                            spec->high_rms_rad * sqrt(0.5), spec->high_min_hz, spec->high_max_hz};
     for (int a = 0; a < 2; a++) {
-        draw_band(&jitter->axis[a], 0, BST_JITTER_LOW_LINES, spec->low_rms_rad * sqrt(0.5), 0.0,
-                  spec->low_cutoff_hz, dt_s, key, a);
-        draw_band(&jitter->axis[a], BST_JITTER_LOW_LINES, BST_JITTER_HIGH_LINES,
-                  spec->high_rms_rad * sqrt(0.5), spec->high_min_hz, spec->high_max_hz, dt_s, key,
-                  a);
+        draw_band(&jitter->axis[a], &low, dt_s, key, a);
+        draw_band(&jitter->axis[a], &high, dt_s, key, a);
     }
 }
 

@@ -13,10 +13,6 @@ enum { M = BST_MOUNT_MOST };
 
 static const double two_pi = 2.0 * BST_PI;
 
-static double wrap(double angle) {
-    return angle - two_pi * ceil(angle / two_pi - 0.5);
-}
-
 static double clamp(double x, double least, double most) {
     return x < least ? least : x > most ? most : x;
 }
@@ -47,7 +43,7 @@ static bst_status init_servo(bst_ctx *ctx, bst_mount *m, const bst_mount_config 
         servo->ring_rad[i] = start[k];
     }
     servo->unwrapped_rad = servo->before_rad = servo->watched_rad = start[k];
-    servo->reading_rad = wrap(start[k]);
+    servo->reading_rad = bst_wrap_angle(start[k]);
     return BST_OK;
 }
 
@@ -96,7 +92,7 @@ typedef struct request {
 /* Of an angle's turns, the one nearest to `near` within the travel; without any, the nearer stop.
  */
 static double best_turn(double angle, double near, double least, double most, bool *outside) {
-    double best = near + wrap(angle - near);
+    double best = near + bst_wrap_angle(angle - near);
     if (best > most) {
         best -= two_pi * ceil((best - most) / two_pi);
     } else if (best < least) {
@@ -105,7 +101,8 @@ static double best_turn(double angle, double near, double least, double most, bo
     if (best > most || best < least) {
         *outside = true;
         /* the stop that is less far from any of its turns */
-        best = fabs(wrap(angle - most)) <= fabs(wrap(angle - least)) ? most : least;
+        best = fabs(bst_wrap_angle(angle - most)) <= fabs(bst_wrap_angle(angle - least)) ? most
+                                                                                         : least;
     }
     return best;
 }
@@ -270,8 +267,8 @@ static void read_encoders(bst_mount *m, int64_t n) {
         if (m->encoder_step_rad > 0.0) {
             reading = m->encoder_step_rad * rint(reading / m->encoder_step_rad);
         }
-        servo->reading_rad = wrap(reading);
-        servo->unwrapped_rad += wrap(servo->reading_rad - servo->unwrapped_rad);
+        servo->reading_rad = bst_wrap_angle(reading);
+        servo->unwrapped_rad += bst_wrap_angle(servo->reading_rad - servo->unwrapped_rad);
         if (n % m->rate_steps == 0) {
             servo->rate_radps =
                 (servo->unwrapped_rad - servo->before_rad) / ((double)m->rate_steps * m->dt_s);

@@ -99,13 +99,20 @@ static inline double passive_nm(const bst_mount_joint *joint, double angle, doub
            joint->spring_nm * (angle - joint->spring_zero_rad);
 }
 
-static inline void evaluate(const bst_mount_joints *j, const bst_mount_chain_state *state,
-                            const double s[N], const double c[N], const motion *m, double after_s,
+/* The chain's state a time after a part's start, with sines and cosines of its angles. */
+typedef struct instant {
+    const bst_mount_chain_state *state;
+    const double *sine, *cosine; /* [N] */
+    double after_s;
+} instant;
+
+static inline void evaluate(const bst_mount_joints *j, instant at, const motion *m,
                             bst_mount_chain_equations *eq, slopes *out) {
     const bst_mount_chain *chain = &j->chain;
+    const bst_mount_chain_state *state = at.state;
     int n = stages_of(j);
-    bst_mount_chain_base base = {bst_vec3_axpy(m->rate, after_s, m->slope), m->slope};
-    bst_mount_chain_equations_at(chain, state, s, c, &base, eq);
+    bst_mount_chain_base base = {bst_vec3_axpy(m->rate, at.after_s, m->slope), m->slope};
+    bst_mount_chain_equations_at(chain, state, at.sine, at.cosine, &base, eq);
     double right[N], mass[N][N];
     for (int k = 0; k < n; k++) {
         right[k] = m->torque_nm[k] - eq->bias_nm[k] +
@@ -157,16 +164,16 @@ static void runge_kutta(const bst_mount_joints *j, const motion *m, double h,
     bst_mount_chain_state at2, at3, at4;
     double sine[N], cosine[N];
     const bst_mount_chain_state *from = &j->state;
-    evaluate(j, from, j->sine, j->cosine, m, 0.0, &eq, &a);
+    evaluate(j, (instant){from, j->sine, j->cosine, 0.0}, m, &eq, &a);
     displace(n, from, 0.5 * h, from, &a, &at2);
     turned(j, &at2, sine, cosine);
-    evaluate(j, &at2, sine, cosine, m, 0.5 * h, &eq, &b);
+    evaluate(j, (instant){&at2, sine, cosine, 0.5 * h}, m, &eq, &b);
     displace(n, from, 0.5 * h, &at2, &b, &at3);
     turned(j, &at3, sine, cosine);
-    evaluate(j, &at3, sine, cosine, m, 0.5 * h, &eq, &c);
+    evaluate(j, (instant){&at3, sine, cosine, 0.5 * h}, m, &eq, &c);
     displace(n, from, h, &at3, &c, &at4);
     turned(j, &at4, sine, cosine);
-    evaluate(j, &at4, sine, cosine, m, h, &eq, &d);
+    evaluate(j, (instant){&at4, sine, cosine, h}, m, &eq, &d);
     double w = h / 6.0;
     for (int k = 0; k < n; k++) {
         accel[k] = a.accel[k];
@@ -196,13 +203,13 @@ static void leapfrog(const bst_mount_joints *j, const motion *m, double h,
     bst_mount_chain_state half, middle;
     displace(n, &j->state, 0.5 * h, &j->state, &none, &half);
     turned(j, &half, sine, cosine);
-    evaluate(j, &half, sine, cosine, m, 0.5 * h, &eq, &kick);
+    evaluate(j, (instant){&half, sine, cosine, 0.5 * h}, m, &eq, &kick);
     middle = half;
     for (int k = 0; k < n; k++) {
         middle.rate_radps[k] += 0.5 * h * kick.accel[k];
         middle.flex_radps[k] += 0.5 * h * kick.flex_accel[k];
     }
-    evaluate(j, &middle, sine, cosine, m, 0.5 * h, &eq, &kick);
+    evaluate(j, (instant){&middle, sine, cosine, 0.5 * h}, m, &eq, &kick);
     for (int k = 0; k < n; k++) {
         accel[k] = kick.accel[k];
         out->rate_radps[k] = half.rate_radps[k] + h * kick.accel[k];
@@ -239,7 +246,7 @@ static void settle(bst_mount_joints *j, motion *m) {
     while (rest) {
         bst_mount_chain_equations eq;
         slopes slope;
-        evaluate(j, &j->state, j->sine, j->cosine, m, 0.0, &eq, &slope);
+        evaluate(j, (instant){&j->state, j->sine, j->cosine, 0.0}, m, &eq, &slope);
         int worst = -1;
         double beyond = 0.0;
         for (int k = 0; k < n; k++) {

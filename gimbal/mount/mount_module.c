@@ -1,5 +1,3 @@
-#include <stdlib.h>
-
 #include "gimbal/modules.h"
 #include "gimbal/mount/mount.h"
 #include "gimbal/platform_step.h"
@@ -20,19 +18,10 @@ typedef struct module {
     bool stuck[BST_MOUNT_MOST]; /* as told */
 } module;
 
-static void destroy(void *self) {
-    module *m = self;
-    if (m) {
-        bst_platform_free(&m->platform);
-        bst_gimbal_base_free(&m->base);
-        free(m);
-    }
-}
-
 static bst_status prepare(const bst_module_env *env, int type, const bst_mount_config *c,
                           module *m) {
     double dt = m->base.dt_s, inertia[6], zero[BST_MOUNT_MOST] = {0.0};
-    BST_TRY(bst_gimbal_platform_init(env, &c->platform, dt, &m->platform));
+    BST_TRY(bst_gimbal_platform_init(env, &c->platform, &m->base, &m->platform));
     BST_TRY(bst_mount_init(env->ctx, &m->mount, type, c, dt, bst_env_rng(env, "encoder")));
     BST_TRY(bst_platform_equip(env, &m->platform, &c->platform, dt));
     m->mount.want_reaction = m->platform.spacecraft != NULL;
@@ -50,11 +39,12 @@ static bst_status prepare_cross(const bst_module_env *env, const void *config, v
 }
 
 static bst_status create_azimuth(const bst_module_env *env, const void *config, void **self) {
-    return bst_gimbal_create(env, sizeof(module), prepare_azimuth, destroy, config, self);
+    return bst_gimbal_create(env, sizeof(module), prepare_azimuth, bst_gimbal_destroy, config,
+                             self);
 }
 
 static bst_status create_cross(const bst_module_env *env, const void *config, void **self) {
-    return bst_gimbal_create(env, sizeof(module), prepare_cross, destroy, config, self);
+    return bst_gimbal_create(env, sizeof(module), prepare_cross, bst_gimbal_destroy, config, self);
 }
 
 static void tell_stuck(module *m, struct bst_step *s) {
@@ -122,7 +112,7 @@ const bst_module_desc bst_gimbal_azimuth_elevation_module = {
     .port_count = PORT_COUNT,
     .create = create_azimuth,
     .step = step,
-    .destroy = destroy,
+    .destroy = bst_gimbal_destroy,
 };
 
 const bst_module_desc bst_gimbal_cross_elevation_module = {
@@ -140,5 +130,5 @@ const bst_module_desc bst_gimbal_cross_elevation_module = {
     .port_count = PORT_COUNT,
     .create = create_cross,
     .step = step,
-    .destroy = destroy,
+    .destroy = bst_gimbal_destroy,
 };

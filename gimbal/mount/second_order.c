@@ -44,8 +44,12 @@ bst_status bst_mount_two_axis_init(bst_ctx *ctx, bst_mount_two_axis *plant,
                           .dt_s = dt_s};
     bst_axis_init(&plant->axis[0], &spec);
     bst_axis_init(&plant->axis[1], &spec);
-    return bst_platform_init(ctx, &plant->platform, &config->platform, q_nominal_from_gcrf,
-                             pixel_rad, dt_s, keys->jitter, keys->attitude);
+    const bst_platform_setup setup = {.q_nominal_from_gcrf = q_nominal_from_gcrf,
+                                      .pixel_rad = pixel_rad,
+                                      .dt_s = dt_s,
+                                      .jitter_key = keys->jitter,
+                                      .attitude_key = keys->attitude};
+    return bst_platform_init(ctx, &plant->platform, &config->platform, &setup);
 }
 
 void bst_mount_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_rad,
@@ -130,7 +134,7 @@ bst_quat bst_mount_two_axis_attitude(const double angle_rad[2]) {
 }
 
 static double wrap(double angle) {
-    return fabs(angle) < BST_PI ? angle : angle - two_pi * ceil(angle / two_pi - 0.5);
+    return fabs(angle) < BST_PI ? angle : bst_wrap_angle(angle);
 }
 
 /* The angle of (x, y) where that is no further from a known one than the arc tangent's series

@@ -18,20 +18,12 @@ typedef struct module {
     bst_mount_two_axis plant;
 } module;
 
-static void destroy(void *self) {
-    module *m = self;
-    if (m) {
-        bst_platform_free(&m->plant.platform);
-        bst_gimbal_base_free(&m->base);
-        free(m);
-    }
-}
-
 static bst_status prepare(const bst_module_env *env, const void *config, void *self) {
     const bst_mount_two_axis_config *c = config;
     module *m = self;
     const bst_mount_two_axis_keys keys = {bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude"),
                                           bst_env_rng(env, "encoder")};
+    m->base.platform = &m->plant.platform;
     BST_TRY(bst_mount_two_axis_init(env->ctx, &m->plant, c, bst_gimbal_nominal(env),
                                     bst_gimbal_pixel_rad(env), m->base.dt_s, &keys));
     BST_TRY(bst_platform_equip(env, &m->plant.platform, &c->platform, m->base.dt_s));
@@ -39,7 +31,7 @@ static bst_status prepare(const bst_module_env *env, const void *config, void *s
 }
 
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
-    return bst_gimbal_create(env, sizeof(module), prepare, destroy, config, self);
+    return bst_gimbal_create(env, sizeof(module), prepare, bst_gimbal_destroy, config, self);
 }
 
 static bst_status step(void *self, struct bst_step *s) {
@@ -84,5 +76,5 @@ const bst_module_desc bst_gimbal_second_order_module = {
     .port_count = PORT_COUNT,
     .create = create,
     .step = step,
-    .destroy = destroy,
+    .destroy = bst_gimbal_destroy,
 };

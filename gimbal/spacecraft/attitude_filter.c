@@ -19,10 +19,6 @@ bst_vec3 bst_attitude_filter_error(bst_quat q, bst_quat estimate) {
     return bst_vec3_scale(bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(estimate))), -1.0);
 }
 
-static bst_quat turned(bst_quat q, bst_vec3 e) {
-    return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(e, -1.0)), q));
-}
-
 void bst_attitude_filter_propagate(bst_attitude_filter *filter, bst_vec3 sample_rad, double dt_s) {
     bst_vec3 turn = bst_vec3_axpy(sample_rad, -dt_s, filter->bias_radps);
     bst_quat step = bst_quat_from_rotvec(bst_vec3_scale(turn, -1.0));
@@ -129,7 +125,7 @@ void bst_attitude_filter_update(bst_attitude_filter *filter, bst_vec3 error, dou
         x[i] = k[i][0] * e.x + k[i][1] * e.y + k[i][2] * e.z;
     }
     bst_vec3 turn = {x[0], x[1], x[2]}, bias = {x[3], x[4], x[5]};
-    filter->q_body_from_gcrf = turned(filter->q_body_from_gcrf, turn);
+    filter->q_body_from_gcrf = bst_quat_unit(bst_quat_turn_frame(filter->q_body_from_gcrf, turn));
     filter->bias_radps = bst_vec3_add(filter->bias_radps, bias);
     joseph(p, (const double(*)[3])k, age_s, &r);
     if (correction) {

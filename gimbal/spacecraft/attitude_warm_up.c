@@ -2,10 +2,6 @@
 
 #define MOST_STEPS 5000.0
 
-static bst_quat turned(bst_quat q, bst_vec3 r) {
-    return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q));
-}
-
 void bst_attitude_warm_up(const bst_attitude_past *past, bst_attitude_filter *filter) {
     double fastest_hz = 1.0;
     for (int i = 0; i < past->trackers; i++) {
@@ -34,7 +30,7 @@ void bst_attitude_warm_up(const bst_attitude_past *past, bst_attitude_filter *fi
     bst_vec3 turn = bst_vec3_scale(past->rate_radps, dt);
     bst_quat q = past->q_body_from_gcrf; /* where it was does not matter, only where it is seen */
     for (int64_t n = 1; n <= steps; n++) {
-        q = turned(q, turn);
+        q = bst_quat_unit(bst_quat_turn_frame(q, turn));
         bst_attitude_filter_propagate(filter, bst_spacecraft_gyro_measure(&gyro, turn), dt);
         for (int i = 0; i < past->trackers; i++) {
             if (n % every[i] == 0) {
@@ -47,7 +43,8 @@ void bst_attitude_warm_up(const bst_attitude_past *past, bst_attitude_filter *fi
     }
     /* back to the attitude of the epoch, and to the bias that the gyro has then */
     bst_vec3 error = bst_attitude_filter_error(q, filter->q_body_from_gcrf);
-    filter->q_body_from_gcrf = turned(past->q_body_from_gcrf, bst_vec3_scale(error, -1.0));
+    filter->q_body_from_gcrf =
+        bst_quat_unit(bst_quat_turn_frame(past->q_body_from_gcrf, bst_vec3_scale(error, -1.0)));
     filter->bias_radps =
         bst_vec3_add(filter->bias_radps, bst_vec3_sub(past->gyro->bias_radps, gyro.bias_radps));
 }

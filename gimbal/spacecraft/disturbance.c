@@ -21,10 +21,6 @@ const bst_config_desc bst_disturbance_config_table[] = {
     BST_CONFIG_END};
 #undef C
 
-static bst_vec3 vec(const double v[3]) {
-    return (bst_vec3){v[0], v[1], v[2]};
-}
-
 bst_vec3 bst_spacecraft_gravity_gradient_torque(const bst_mat3 *inertia_kgm2,
                                                 bst_quat q_body_from_gcrf, bst_vec3 position_m) {
     double r2 = bst_vec3_dot(position_m, position_m);
@@ -39,7 +35,7 @@ bst_vec3 bst_spacecraft_solar_torque(const bst_disturbance_config *config,
     double force = BST_SUNLIGHT_PRESSURE_PA * (BST_AU_M / d) * (BST_AU_M / d) *
                    config->solar_area_m2 * config->solar_coefficient * sunlit;
     bst_vec3 away = bst_quat_rotate(q_body_from_gcrf, bst_vec3_scale(sun_m, -force / d));
-    return bst_vec3_cross(vec(config->solar_lever_m), away);
+    return bst_vec3_cross(bst_vec3_from_array(config->solar_lever_m), away);
 }
 
 bst_vec3 bst_spacecraft_dipole_field_t(bst_vec3 position_m) {
@@ -64,7 +60,7 @@ bst_vec3 bst_spacecraft_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, d
 bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_mat3 *inertia_kgm2,
                                 bst_quat q_body_from_gcrf, bst_vec3 position_m, bst_vec3 sun_m,
                                 double sunlit, bst_vec3 wheel_momentum_nms) {
-    bst_vec3 sum = vec(config->constant_torque_nm);
+    bst_vec3 sum = bst_vec3_from_array(config->constant_torque_nm);
     if (config->gravity_gradient) {
         sum = bst_vec3_add(sum, bst_spacecraft_gravity_gradient_torque(
                                     inertia_kgm2, q_body_from_gcrf, position_m));
@@ -73,7 +69,7 @@ bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_
         sum =
             bst_vec3_add(sum, bst_spacecraft_solar_torque(config, q_body_from_gcrf, sun_m, sunlit));
     }
-    bst_vec3 dipole = vec(config->residual_dipole_am2);
+    bst_vec3 dipole = bst_vec3_from_array(config->residual_dipole_am2);
     if (config->unload_dipole_am2 > 0.0 || bst_vec3_norm(dipole) > 0.0) {
         bst_vec3 field =
             bst_quat_rotate(q_body_from_gcrf, bst_spacecraft_dipole_field_t(position_m));

@@ -4,10 +4,6 @@
 
 const char *const bst_law_names[] = {"inertial", "nadir", "sun", "target", "free", NULL};
 
-static bst_quat turned(bst_quat q, bst_vec3 r) {
-    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
-}
-
 bst_quat bst_pointing_law_attitude(const bst_pointing_law *law,
                                    const bst_spacecraft_law_inputs *inputs) {
     bst_vec3 towards = {0, 0, 0};
@@ -33,7 +29,7 @@ bst_quat bst_pointing_law_attitude(const bst_pointing_law *law,
         bst_quat q_law_from_body = bst_quat_look(law->axis, law->second_axis);
         q = bst_quat_mul(bst_quat_conj(q_law_from_body), bst_quat_look(towards, second));
     }
-    return bst_quat_unit(turned(q, bst_vec3_scale(law->axis, law->roll_rad)));
+    return bst_quat_unit(bst_quat_turn_frame(q, bst_vec3_scale(law->axis, law->roll_rad)));
 }
 
 bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_at(const bst_quat node[4],
@@ -66,7 +62,8 @@ bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_at(const bst
     /* w = r' - r x r' / 2 + ..., in the turned axes */
     rate = bst_vec3_axpy(rate, -0.5, bst_vec3_cross(turn, rate));
     accel = bst_vec3_axpy(accel, -0.5, bst_vec3_cross(turn, accel));
-    return (bst_spacecraft_attitude_reference){bst_quat_unit(turned(node[1], turn)), rate, accel};
+    return (bst_spacecraft_attitude_reference){bst_quat_unit(bst_quat_turn_frame(node[1], turn)),
+                                               rate, accel};
 }
 
 bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_rolled(

@@ -72,14 +72,6 @@ void bst_spacecraft_free(bst_spacecraft *craft) {
     }
 }
 
-static bst_vec3 vec(const double v[3]) {
-    return (bst_vec3){v[0], v[1], v[2]};
-}
-
-static bst_quat turned(bst_quat q, bst_vec3 r) {
-    return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q));
-}
-
 static bst_rng_key stream(const bst_spacecraft_setup *setup, const char *name) {
     return bst_rng_make_key(setup->seed, setup->run, setup->instance, name);
 }
@@ -101,8 +93,8 @@ static bst_status whole_steps(bst_ctx *ctx, const char *key, double plant_hz, do
 
 static bst_status set_law(bst_ctx *ctx, bst_spacecraft *craft,
                           const bst_spacecraft_attitude_config *config, bst_quat q_nominal) {
-    bst_vec3 axis = bst_vec3_unit(vec(config->axis)),
-             second = bst_vec3_unit(vec(config->second_axis));
+    bst_vec3 axis = bst_vec3_unit(bst_vec3_from_array(config->axis)),
+             second = bst_vec3_unit(bst_vec3_from_array(config->second_axis));
     if (!(bst_vec3_norm(bst_vec3_cross(axis, second)) > 1e-3)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "attitude/second_axis: [%g, %g, %g] is parallel to axis [%g, %g, %g], or "
@@ -136,7 +128,7 @@ static bst_status set_body(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacec
     const bst_spacecraft_mode_config *modes = config->modes.items;
     for (int k = 0; k < spec.modes; k++) {
         spec.mode[k] = (bst_spacecraft_mode){2.0 * BST_PI * modes[k].frequency_hz, modes[k].damping,
-                                             vec(modes[k].coupling)};
+                                             bst_vec3_from_array(modes[k].coupling)};
     }
     BST_TRY(bst_spacecraft_body_init(ctx, &craft->body, &spec, q, rate, start));
     for (int i = 0; i < spec.wheels; i++) {
@@ -167,7 +159,7 @@ static bst_status set_trackers(bst_ctx *ctx, bst_spacecraft *craft,
     for (int i = 0; i < craft->trackers; i++) {
         char name[64];
         snprintf(name, sizeof name, "star_trackers/%d/rate_hz", i);
-        if (!(bst_vec3_norm(vec(all[i].axis)) > 0.0)) {
+        if (!(bst_vec3_norm(bst_vec3_from_array(all[i].axis)) > 0.0)) {
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "star_trackers/%d/axis: a direction of length zero (allowed: any "
                             "other)",
@@ -206,7 +198,7 @@ static void set_filter(bst_spacecraft *craft, const bst_spacecraft_config *confi
                        const bst_spacecraft_setup *setup, bst_quat q, bst_vec3 rate) {
     double sigma = config->initial_knowledge_arcsec * BST_ARCSEC_RAD;
     bst_vec3 error = bst_vec3_scale(normal3(stream(setup, "knowledge")), sigma);
-    bst_attitude_filter_init(&craft->filter, turned(q, error), sigma,
+    bst_attitude_filter_init(&craft->filter, bst_quat_unit(bst_quat_turn_frame(q, error)), sigma,
                              config->gyro.bias_sigma_degph * BST_DEG_RAD / 3600.0,
                              craft->gyro.angle_walk, craft->gyro.rate_walk);
     if (config->running_s <= 0.0) {
@@ -250,11 +242,11 @@ static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecr
     craft->grid =
         (bst_spacecraft_sky_grid){.sky_at = setup->sky_at, .user = setup->user, .law = &craft->law};
     BST_TRY(bst_spacecraft_sky_grid_at(&craft->grid, ctx, 0.0, &craft->sky, &craft->now.reference));
-    bst_vec3 turn = bst_vec3_scale(vec(config->initial_turn_deg), BST_DEG_RAD);
-    bst_quat q = turned(craft->now.reference.q_body_from_gcrf, turn);
+    bst_vec3 turn = bst_vec3_scale(bst_vec3_from_array(config->initial_turn_deg), BST_DEG_RAD);
+    bst_quat q = bst_quat_unit(bst_quat_turn_frame(craft->now.reference.q_body_from_gcrf, turn));
     bst_vec3 rate = bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(turn, -1.0)),
                                     craft->now.reference.rate_radps);
-    rate = bst_vec3_axpy(rate, BST_DEG_RAD, vec(config->initial_rate_degps));
+    rate = bst_vec3_axpy(rate, BST_DEG_RAD, bst_vec3_from_array(config->initial_rate_degps));
     BST_TRY(set_body(ctx, craft, config, q, rate));
     set_filter(craft, config, setup, q, rate);
     bst_spacecraft_attitude_control_spec spec = bst_spacecraft_attitude_control_of(config);
@@ -374,7 +366,7 @@ static void correct_past(bst_quat *estimate, bst_quat q_now, double age_s,
                          const bst_vec3 correction[2]) {
     bst_quat q_then_from_now = bst_quat_mul(*estimate, bst_quat_conj(q_now));
     bst_vec3 e = bst_vec3_axpy(correction[0], age_s, correction[1]);
-    *estimate = turned(*estimate, bst_quat_rotate(q_then_from_now, e));
+    *estimate = bst_quat_unit(bst_quat_turn_frame(*estimate, bst_quat_rotate(q_then_from_now, e)));
 }
 
 static void take_in(bst_spacecraft *craft, int64_t n) {
@@ -462,8 +454,8 @@ static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double
     roll(craft);
     /* the estimate stands at the newest gyro sample */
     double age = (double)(n - craft->filter_step) * craft->dt_s;
-    bst_quat q =
-        turned(craft->filter.q_body_from_gcrf, bst_vec3_scale(craft->now.rate_believed_radps, age));
+    bst_quat q = bst_quat_unit(bst_quat_turn_frame(
+        craft->filter.q_body_from_gcrf, bst_vec3_scale(craft->now.rate_believed_radps, age)));
     if (craft->samples_since_control > 0) {
         /* of all samples, lest their noise be counted twice */
         craft->rate_control_radps =
@@ -500,6 +492,8 @@ bst_status bst_spacecraft_step(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, d
     double age = (double)(n - craft->filter_step) * craft->dt_s;
     bst_quat q = craft->filter.q_body_from_gcrf;
     craft->now.q_believed_from_gcrf =
-        age > 0.0 ? turned(q, bst_vec3_scale(craft->now.rate_believed_radps, age)) : q;
+        age > 0.0 ? bst_quat_unit(
+                        bst_quat_turn_frame(q, bst_vec3_scale(craft->now.rate_believed_radps, age)))
+                  : q;
     return BST_OK;
 }

@@ -22,16 +22,12 @@ const bst_config_desc bst_wheel_config_table[] = {
     BST_CONFIG_END};
 #undef C
 
-static bst_vec3 vec(const double v[3]) {
-    return (bst_vec3){v[0], v[1], v[2]};
-}
-
 bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_wheel_config *config,
                            int count, bst_rng_key key) {
     *wheels = (bst_wheels){.count = count};
     for (int i = 0; i < count; i++) {
         const bst_wheel_config *c = &config[i];
-        bst_vec3 axis = vec(c->axis);
+        bst_vec3 axis = bst_vec3_from_array(c->axis);
         if (!(bst_vec3_norm(axis) > 0.0)) {
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "wheels/%d/axis: a direction of length zero (allowed: any other)", i);
@@ -45,7 +41,7 @@ bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_wheel_con
         }
         wheels->wheel[i] =
             (bst_wheel){.axis = axis,
-                        .position_m = vec(c->position_m),
+                        .position_m = bst_vec3_from_array(c->position_m),
                         .across = {x, bst_vec3_cross(axis, x)},
                         .inertia_kgm2 = c->inertia_kgm2,
                         .torque_limit_nm = c->failed ? 0.0 : c->torque_limit_nm,

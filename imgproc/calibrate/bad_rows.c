@@ -58,10 +58,11 @@ bool bst_bad_rows_hold(const bst_bad_rows *rows, int32_t pixel) {
     return i < rows->first[y + 1] && rows->column[i] == x;
 }
 
-void bst_bad_rows_mask(const bst_bad_rows *rows, const bst_window *window, int binning, int y,
-                       int x, int count, float value, float *out) {
-    int top = window->y0 + y * binning, left = window->x0 + x * binning;
-    int right = left + count * binning;
+void bst_bad_rows_mask(const bst_bad_rows *rows, const bst_bad_rows_run *run, float value,
+                       float *out) {
+    int binning = run->binning;
+    int top = run->window->y0 + run->y * binning, left = run->window->x0 + run->x * binning;
+    int right = left + run->count * binning;
     for (int v = top; v < top + binning; v++) {
         for (int i = first_from(rows, v, left); i < rows->first[v + 1] && rows->column[i] < right;
              i++) {

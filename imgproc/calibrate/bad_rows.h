@@ -32,9 +32,15 @@ void bst_bad_rows_end(bst_bad_rows *rows);
 /* Whether pixel y * width + x of the sensor is in the map. */
 bool bst_bad_rows_hold(const bst_bad_rows *rows, int32_t pixel);
 
-/* Sets to `value` those of the `count` pixels of row y of a window, from its column x on, that hold
- * a bad pixel of the sensor. The window is read out with binning x binning. */
-void bst_bad_rows_mask(const bst_bad_rows *rows, const bst_window *window, int binning, int y,
-                       int x, int count, float value, float *out);
+/* `count` pixels of row y, from column x on, of a window that is read out with binning x binning.
+ */
+typedef struct bst_bad_rows_run {
+    const bst_window *window;
+    int binning, y, x, count;
+} bst_bad_rows_run;
+
+/* Sets to `value` those of out[run->count] that hold a bad pixel of the sensor. */
+void bst_bad_rows_mask(const bst_bad_rows *rows, const bst_bad_rows_run *run, float value,
+                       float *out);
 
 #endif

@@ -44,7 +44,7 @@ void bst_calibrate_pixels_read(const void *electrons, int y, int x, int count, f
         correct(e, y, x, count, out);
     }
     if (e->learned && e->learned->count > 0) {
-        bst_bad_rows_mask(e->learned, &e->frame->window, e->frame->binning, y, x, count,
-                          BST_PIXEL_BAD, out);
+        const bst_bad_rows_run run = {&e->frame->window, e->frame->binning, y, x, count};
+        bst_bad_rows_mask(e->learned, &run, BST_PIXEL_BAD, out);
     }
 }

@@ -24,16 +24,23 @@ static bst_status read_map(bst_ctx *ctx, const char *key, const char *path,
     return BST_OK;
 }
 
-static bst_status check_map(bst_ctx *ctx, const char *key, const char *path, const float *map,
-                            const uint8_t *bad, const bst_camera *camera, float above,
-                            const char *allowed) {
+/* A map's file, and what its good pixels must be. */
+typedef struct map_file {
+    const char *key, *path;
+    float above;
+    const char *allowed;
+} map_file;
+
+static bst_status check_map(bst_ctx *ctx, const map_file *file, const float *map,
+                            const uint8_t *bad, const bst_camera *camera) {
     for (int64_t y = 0, k = 0; y < camera->height_px; y++) {
         for (int64_t x = 0; x < camera->width_px; x++, k++) {
-            if (!(bad && bad[k]) && !(isfinite(map[k]) && map[k] > above)) {
+            if (!(bad && bad[k]) && !(isfinite(map[k]) && map[k] > file->above)) {
                 return bst_fail(ctx, BST_ERR_CONFIG,
                                 "%s: %s: pixel (%lld, %lld) is %g (allowed: %s; or mark it in "
                                 "bad_pixel_file)",
-                                key, path, (long long)x, (long long)y, (double)map[k], allowed);
+                                file->key, file->path, (long long)x, (long long)y, (double)map[k],
+                                file->allowed);
             }
         }
     }
@@ -61,16 +68,16 @@ static bst_status load(bst_ctx *ctx, const bst_imgproc_config *config, const bst
         BST_TRY(read_bad(ctx, config->bad_pixel_file, camera, &maps->bad));
     }
     if (*config->dark_file) {
-        BST_TRY(read_map(ctx, "dark_file", config->dark_file, camera, &map));
+        const map_file dark = {"dark_file", config->dark_file, -INFINITY, "finite numbers"};
+        BST_TRY(read_map(ctx, dark.key, dark.path, camera, &map));
         maps->dark_e_per_s = map;
-        BST_TRY(check_map(ctx, "dark_file", config->dark_file, map, maps->bad, camera, -INFINITY,
-                          "finite numbers"));
+        BST_TRY(check_map(ctx, &dark, map, maps->bad, camera));
     }
     if (*config->flat_file) {
-        BST_TRY(read_map(ctx, "flat_file", config->flat_file, camera, &map));
+        const map_file flat = {"flat_file", config->flat_file, 0.0f, "finite numbers above 0"};
+        BST_TRY(read_map(ctx, flat.key, flat.path, camera, &map));
         maps->flat = map;
-        BST_TRY(check_map(ctx, "flat_file", config->flat_file, map, maps->bad, camera, 0.0f,
-                          "finite numbers above 0"));
+        BST_TRY(check_map(ctx, &flat, map, maps->bad, camera));
     }
     return BST_OK;
 }

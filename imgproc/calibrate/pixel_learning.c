@@ -45,21 +45,19 @@ static int predict(const bst_camera *camera, const bst_imgproc_frame_knowledge *
 }
 
 void bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
-                    const bst_imgproc_frame_knowledge *known, const bst_region_of_interest *windows,
-                    int binning, double time_s, const bst_pixel_shows *shows,
-                    const bst_detections *out) {
-    if (!shows->usable) {
+                    const bst_pixel_step_input *input) {
+    if (!input->shows->usable) {
         return;
     }
     double predicted[MOST_PREDICTED][3];
-    note_stars(learner, camera, shows, out);
-    bst_pixel_frame frame = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
-                             .time_s = time_s,
-                             .window = known->window,
-                             .binning = binning,
-                             .windows = windows->items,
-                             .window_count = windows->count,
+    note_stars(learner, camera, input->shows, input->detections);
+    bst_pixel_frame frame = {.q_cam_from_gcrf = input->detections->q_cam_from_gcrf,
+                             .time_s = input->time_s,
+                             .window = input->known->window,
+                             .binning = input->binning,
+                             .windows = input->windows->items,
+                             .window_count = input->windows->count,
                              .predicted = (const double(*)[3])predicted,
-                             .predicted_count = predict(camera, known, predicted)};
-    bst_pixel_learner_update(learner, &frame, shows);
+                             .predicted_count = predict(camera, input->known, predicted)};
+    bst_pixel_learner_update(learner, &frame, input->shows);
 }

@@ -153,10 +153,13 @@ typedef struct reading {
     bool again;      /* a mesh may stay as it is */
 } reading;
 
-/* Sums over the pixels from low to high: their number, mean and variance. False for less than two.
- */
+typedef struct moments {
+    double count, mean, variance;
+} moments;
+
+/* Of the pixels from low to high in `rows` rows; false for less than two. */
 static bool inner_moments(const mesh_pixels *m, int first, int rows, float low, float high,
-                          double *count, double *mean, double *variance) {
+                          moments *out) {
     bst_row_sums sums = {0};
     float middle = 0.5f * (low + high);
     bst_row_clipped_sums(m->pixels + (size_t)first * m->stride, m->width, rows, m->stride, middle,
@@ -170,9 +173,9 @@ static bool inner_moments(const mesh_pixels *m, int first, int rows, float low, 
     if (n < 2.0) {
         return false;
     }
-    *count = n;
-    *mean = (double)middle + s / n;
-    *variance = fmax(q - s * s / n, 0.0) / (n - 1.0);
+    out->count = n;
+    out->mean = (double)middle + s / n;
+    out->variance = fmax(q - s * s / n, 0.0) / (n - 1.0);
     return true;
 }
 
@@ -210,22 +213,24 @@ static bool estimate_mesh(const reading *r, const mesh_pixels *m, float *level, 
         /* the first passes need not be exact */
         int half = (m->height + 1) / 2, first = pass == 1 ? m->height - half : 0;
         int rows = pass + 2 < CLIP_PASSES ? half : m->height;
-        double n, mean, variance, deviation = (double)*noise, centre = (double)*level;
-        if (!inner_moments(m, first, rows, low, high, &n, &mean, &variance)) {
+        double deviation = (double)*noise, centre = (double)*level;
+        moments inner;
+        if (!inner_moments(m, first, rows, low, high, &inner)) {
             break;
         }
+        double mean = inner.mean;
         if (last) {
             bst_truncated_moments_noise law = {r->read_variance, (double)step_e};
-            bst_truncated_moments_solve(&law, (double)low, (double)high, mean, variance, &centre,
-                                        &deviation);
+            bst_truncated_moments_solve(&law, (double)low, (double)high, mean, inner.variance,
+                                        &centre, &deviation);
             mean = centre;
         } else {
             /* 0.97334 = 1 - 6 phi(3) / (2 Phi(3) - 1): variance of a normal cut at 3 sigma */
-            deviation = sqrt(variance / 0.97334);
+            deviation = sqrt(inner.variance / 0.97334);
         }
         *level = (float)mean;
         *noise = fmaxf((float)deviation, QUANTISATION * step_e);
-        *error = (float)(1.0 / sqrt(n));
+        *error = (float)(1.0 / sqrt(inner.count));
     }
     return true;
 }
@@ -341,23 +346,27 @@ static void read_meshes(bst_background *b, bst_parallel *pool, const reading *r)
     smooth(b, b->noise, true);
 }
 
-void bst_background_read(bst_background *b, bst_parallel *pool, bst_imgproc_pixel_fn pixels,
-                         const void *user, int width, int height, const bst_background_steps *steps,
-                         double read_variance_e2) {
+static reading reading_of(bst_background *b, const bst_background_input *input, bool again) {
+    return (reading){b,           input->read_variance_e2, input->read,
+                     input->user, (float)input->step_e,    input->origin_e,
+                     again};
+}
+
+void bst_background_read(bst_background *b, bst_parallel *pool, const bst_background_input *input,
+                         int width, int height) {
     b->width = width;
     b->height = height;
     /* a rest narrower than half a mesh joins its neighbour */
     int half = b->mesh_px / 2;
     b->columns = (width + half) / b->mesh_px > 0 ? (width + half) / b->mesh_px : 1;
     b->rows = (height + half) / b->mesh_px > 0 ? (height + half) / b->mesh_px : 1;
-    reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e, false};
+    reading r = reading_of(b, input, false);
     read_meshes(b, pool, &r);
 }
 
-double bst_background_read_again(bst_background *b, bst_parallel *pool, bst_imgproc_pixel_fn pixels,
-                                 const void *user, const bst_background_steps *steps,
-                                 double read_variance_e2) {
-    reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e, true};
+double bst_background_read_again(bst_background *b, bst_parallel *pool,
+                                 const bst_background_input *input) {
+    reading r = reading_of(b, input, true);
     read_meshes(b, pool, &r);
     double left = 0.0, read = 0.0;
     for (int k = 0; k < b->columns * b->rows; k++) {
@@ -380,8 +389,8 @@ static void of_picture(const void *user, int y, int x, int count, float *out) {
 void bst_background_estimate(bst_background *b, const float *image, int width, int height,
                              float step_e) {
     picture p = {image, width};
-    bst_background_steps steps = {(double)step_e, 0.0};
-    bst_background_read(b, NULL, of_picture, &p, width, height, &steps, INFINITY);
+    const bst_background_input input = {of_picture, &p, (double)step_e, 0.0, INFINITY};
+    bst_background_read(b, NULL, &input, width, height);
 }
 
 /* Medians of the frame, which also stand for meshes without usable pixels. */

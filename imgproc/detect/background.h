@@ -37,29 +37,30 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
 /* Frees the memory of a background and clears the struct, which belongs to the caller. */
 void bst_background_free(bst_background *background);
 
-/* The digital values of pixels, in electrons: origin_e + step_e n. */
-typedef struct bst_background_steps {
-    double step_e, origin_e;
-} bst_background_steps;
+/* The pixels of a frame and what their noise is made of. */
+typedef struct bst_background_input {
+    bst_imgproc_pixel_fn read;
+    const void *user;
+    double step_e, origin_e; /* the digital values, in electrons: origin_e + step_e n, step_e > 0 */
+    double read_variance_e2; /* of the noise that is not counted electrons */
+} bst_background_input;
 
 /* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a
  * sample, then mean and standard deviation within 3 sigma, four times, from half of the rows where
  * a mesh has 4096 pixels and more. The last time is cut midway between digital values, and both are
  * corrected for it as the noise of a normal part of read_variance_e2 and counted electrons asks
  * (truncated_moments.h); the deviation also for the slope of the level. No pixel is better known
- * than its step, step_e (> 0) / sqrt(12). A mesh without usable pixels takes the frame's medians.
+ * than its step, step_e / sqrt(12). A mesh without usable pixels takes the frame's medians.
  * Then each mesh takes the mean with those pairs of opposite neighbours whose mean agrees with it
  * to four standard errors: a slope stays what it is, and where the sky is even the error falls to a
  * third.
  */
 void bst_background_read(bst_background *background, bst_parallel *pool,
-                         bst_imgproc_pixel_fn pixels, const void *user, int width, int height,
-                         const bst_background_steps *steps, double read_variance_e2);
+                         const bst_background_input *input, int width, int height);
 /* The same again of the same frame with pixels left out; returns the share of pixels that were not.
  * A mesh of which less than a sixteenth is left stays as it is. */
 double bst_background_read_again(bst_background *background, bst_parallel *pool,
-                                 bst_imgproc_pixel_fn pixels, const void *user,
-                                 const bst_background_steps *steps, double read_variance_e2);
+                                 const bst_background_input *input);
 /* The same of image [height][width] whose noise is normal. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
                              float step_e);

@@ -201,8 +201,8 @@ static void sort_by_cell(bst_candidates *c, int maxima, int cells) {
     c->cell[cells] = maxima;
 }
 
-void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f, int reach_px,
-                         float floor, float certain, bst_candidate_fn accept, const void *user) {
+void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f,
+                         const bst_candidates_criteria *criteria) {
     int maxima = 0, rows = (f->height + CELL_PX - 1) / CELL_PX;
     c->columns = (f->width + CELL_PX - 1) / CELL_PX;
     for (int y = 0; y < f->height; y++) {
@@ -219,7 +219,15 @@ void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter
     sort_by_cell(c, maxima, c->columns * rows);
     const float *map = !f->streak ? f->point : f->kept ? f->best : NULL;
     map = map ? map + (long)f->pad * f->stride + f->pad : NULL;
-    search s = {c, f, map, reach_px, rows, floor, certain, accept, user};
+    search s = {c,
+                f,
+                map,
+                criteria->reach_px,
+                rows,
+                criteria->floor,
+                criteria->certain,
+                criteria->accept,
+                criteria->user};
     /* long parts where each reads the rows about it */
     bst_parallel_for(pool, maxima, f->crowded ? 1024 : 256, decide, &s);
     c->count = 0;

@@ -35,12 +35,19 @@ void bst_candidates_free(bst_candidates *candidates);
  * several threads at a time. */
 typedef bool (*bst_candidate_fn)(const void *user, const bst_candidate *candidate);
 
+/* What makes a maximum a candidate: `accept` is asked of those below `certain`. */
+typedef struct bst_candidates_criteria {
+    int reach_px;
+    float floor, certain;
+    bst_candidate_fn accept;
+    const void *user;
+} bst_candidates_criteria;
+
 /* Finds the candidates among the filter's latest maxima. One stands alone when on the straight way
  * to each higher one within reach_px the SNR falls more than max(3, 0.15 maximum) below it, or
  * below `floor`: three standard deviations of the map's noise, and the share by which a streak's
  * own brightness may ripple. Of those below `certain` only those stay that `accept` accepts. */
 void bst_candidates_find(bst_candidates *candidates, bst_parallel *pool, const bst_filter *filter,
-                         int reach_px, float floor, float certain, bst_candidate_fn accept,
-                         const void *user);
+                         const bst_candidates_criteria *criteria);
 
 #endif

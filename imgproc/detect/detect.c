@@ -57,13 +57,14 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_filter_create(ctx, ip->known, width, height, streak, bst_parallel_threads(ip->pool),
                               &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_imgproc_locator_create(ctx, ip->known, bst_parallel_threads(ip->pool), capacity,
-                                       width, height, side, &ip->locator));
+    const bst_imgproc_locator_limits limits = {bst_parallel_threads(ip->pool), capacity, width,
+                                               height, side};
+    const bst_streak_locator_limits streaks = {width, height, fwhm, ip->config.streak_search_px};
+    BST_TRY(bst_imgproc_locator_create(ctx, ip->known, &limits, &ip->locator));
     ip->locator.most_fits = (int)ip->config.most_fits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
-               ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
-                                           ip->config.streak_search_px, &ip->streaks)
+               ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, &streaks, &ip->streaks)
                : BST_OK;
 }
 
@@ -145,9 +146,9 @@ static void correct_row(const void *user, int y, int width, float *signal, float
     if (!e->learned) {
         return;
     }
-    const bst_window *w = &e->frame->window;
-    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, BST_PIXEL_BAD, signal);
-    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, 0.0f, normalised);
+    const bst_bad_rows_run run = {&e->frame->window, e->frame->binning, y, 0, width};
+    bst_bad_rows_mask(e->learned, &run, BST_PIXEL_BAD, signal);
+    bst_bad_rows_mask(e->learned, &run, 0.0f, normalised);
 }
 
 /* What tells noise from a source. */
@@ -346,9 +347,9 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     const bst_row_gain *plain = bst_calibrate_pixels_plain(read, &by_gain) ? &by_gain : NULL;
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
-    bst_background_steps steps = {gain, -ip->camera.offset_dn * gain};
-    bst_background_read(&ip->background, pool, bst_calibrate_pixels_read, read, width, height,
-                        &steps, read_noise * read_noise);
+    bst_background_input ground = {bst_calibrate_pixels_read, read, gain,
+                                   -ip->camera.offset_dn * gain, read_noise * read_noise};
+    bst_background_read(&ip->background, pool, &ground, width, height);
     double dx, dy;
     filter_path(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
@@ -361,26 +362,32 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
     double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
     int saturated_dn = saturation_dn(ip, frame);
-    bst_filter_run(&ip->filter, pool, &ip->background, bst_calibrate_pixels_read, read,
-                   frame->pixels, plain, ip->electrons, width, height, saturated_dn,
-                   (float)look_from(ip, threshold));
+    const bst_filter_input input = {.background = &ip->background,
+                                    .read = bst_calibrate_pixels_read,
+                                    .user = read,
+                                    .raw = frame->pixels,
+                                    .gain = plain,
+                                    .signal = ip->electrons,
+                                    .width = width,
+                                    .height = height,
+                                    .saturated_dn = saturated_dn};
+    bst_filter_run(&ip->filter, pool, &input, (float)look_from(ip, threshold));
     if (ip->filter.crowded && !ip->smeared) {
-        double share = bst_background_read_again(&ip->background, pool, read_between_stars,
-                                                 &sparing, &steps, read_noise * read_noise);
+        ground.read = read_between_stars;
+        ground.user = &sparing;
+        double share = bst_background_read_again(&ip->background, pool, &ground);
         /* where there are stars noise makes no detections of its own */
         pixels *= fmax(share, LEAST_OPEN);
         threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
-        bst_filter_run(&ip->filter, pool, &ip->background, bst_calibrate_pixels_read, read,
-                       frame->pixels, plain, ip->electrons, width, height, saturated_dn,
-                       (float)look_from(ip, threshold));
+        bst_filter_run(&ip->filter, pool, &input, (float)look_from(ip, threshold));
     }
     double look = look_from(ip, threshold);
     const float *column_noise = columns ? columns->noise + first_column : NULL;
     judge noise = {ip, column_noise, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
-    bst_candidates_find(&ip->candidates, pool, &ip->filter,
-                        (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
-                        stands_out, &noise);
+    const bst_candidates_criteria criteria = {(int)ceil(6.0 * sigma + hypot(dx, dy)) + 2,
+                                              (float)look, (float)certain, stands_out, &noise};
+    bst_candidates_find(&ip->candidates, pool, &ip->filter, &criteria);
     set_view(ip, frame, motion, sigma, column_noise, pool);
     ip->view.full_e = saturation_e(ip, saturated_dn);
     *out = (part){threshold, false_alarms, search};
@@ -463,22 +470,23 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
 
 /* Whether the windows' streaks are to tell the motion: looks for them in all windows. */
 static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
-                               const bst_window *windows, int count,
+                               const bst_imgproc_windows *windows,
                                const bst_camera_motion *motion) {
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < windows->count; i++) {
         part p;
-        bst_imgproc_frame window = bst_region_of_interest_crop(frame, &windows[i], ip->cropped);
+        bst_imgproc_frame window =
+            bst_region_of_interest_crop(frame, &windows->items[i], ip->cropped);
         find(ip, &window, frame, motion, NULL, &p);
         if (i == 0 && (ip->smeared || !bst_streak_motion_begin(&ip->streak_motion, &ip->view))) {
             return false;
         }
         bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
     }
-    return count > 0;
+    return windows->count > 0;
 }
 
 bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
-                                      const bst_window *windows, int count,
+                                      const bst_imgproc_windows *windows,
                                       const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) {
     BST_TRY(check_frame(ctx, ip, frame));
@@ -489,18 +497,19 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
     ip->windowed = true;
     if (motion) {
         used = *motion;
-        if (measure_in_windows(ip, frame, windows, count, motion)) {
+        if (measure_in_windows(ip, frame, windows, motion)) {
             correct_motion(ip, frame->binning, &used);
         }
     }
     bst_imgproc_begin_shows(ip);
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < windows->count; i++) {
         part p;
-        bst_imgproc_frame window = bst_region_of_interest_crop(frame, &windows[i], ip->cropped);
+        const bst_window *w = &windows->items[i];
+        bst_imgproc_frame window = bst_region_of_interest_crop(frame, w, ip->cropped);
         find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
         bst_imgproc_add_shows(ip, &window, frame);
         take(ip, &p, out, capacity);
-        double n = (double)windows[i].width * (double)windows[i].height;
+        double n = (double)w->width * (double)w->height;
         pixels += n;
         out->background_e += n * (double)ip->background.median_level;
         out->noise_e += n * (double)ip->background.median_noise;

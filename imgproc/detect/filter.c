@@ -163,8 +163,8 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
     if (!p->gain) {
         p->read(p->user, y, 0, width, electrons);
     }
-    bst_row_normalise(p->raw + row, p->gain, electrons, parts,
-                      bst_background_parts(p->background, y, parts), p->saturated_dn, signal,
+    const bst_row_input pixels = {p->raw + row, p->gain, electrons, p->saturated_dn};
+    bst_row_normalise(&pixels, parts, bst_background_parts(p->background, y, parts), signal,
                       normalised + r);
     if (f->correct_row) {
         f->correct_row(f->correct_user, y, width, signal, normalised + r);
@@ -341,10 +341,9 @@ static bool is_crowded(const bst_filter *f) {
     return maxima * CROWD_PX > (long)f->width * f->height;
 }
 
-void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *background,
-                    bst_imgproc_pixel_fn read, const void *user, const uint16_t *raw,
-                    const bst_row_gain *gain, float *signal, int width, int height,
-                    int saturated_dn, float threshold) {
+void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *input,
+                    float threshold) {
+    const int width = input->width, height = input->height;
     if (f->width != width || f->height != height) {
         f->width = width;
         f->height = height;
@@ -362,13 +361,13 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *bac
     }
     bool past_cache = width * height > CACHED_PX;
     pass p = {.f = f,
-              .background = background,
-              .read = read,
-              .user = user,
-              .raw = raw,
-              .gain = gain,
-              .signal = signal,
-              .saturated_dn = saturated_dn,
+              .background = input->background,
+              .read = input->read,
+              .user = input->user,
+              .raw = input->raw,
+              .gain = input->gain,
+              .signal = input->signal,
+              .saturated_dn = input->saturated_dn,
               .part_rows = rows,
               .reach = reach,
               .past_cache = past_cache,

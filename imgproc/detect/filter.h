@@ -103,14 +103,22 @@ void bst_filter_set(bst_filter *filter, double sigma_px, int binning, double dx_
  * share. At least 2.5. */
 double bst_filter_threshold(bst_filter *filter, double false_alarms, double pixels);
 
-/* One pass over a frame of pixels as `read` gives them, which is (raw - offset) gain unless `gain`
- * is NULL: `signal` [height][width] becomes electrons above the background (BST_PIXEL_SATURATED
- * where raw >= saturated_dn), then maps and maxima are made. Memory outside the frame counts as
- * noise-free background. */
-void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background *background,
-                    bst_imgproc_pixel_fn read, const void *user, const uint16_t *raw,
-                    const bst_row_gain *gain, float *signal, int width, int height,
-                    int saturated_dn, float threshold);
+/* A frame of pixels as `read` gives them, which is (raw - offset) gain unless `gain` is NULL. */
+typedef struct bst_filter_input {
+    const bst_background *background;
+    bst_imgproc_pixel_fn read;
+    const void *user;
+    const uint16_t *raw; /* [height][width] */
+    const bst_row_gain *gain;
+    float *signal; /* [height][width]: becomes electrons above the background */
+    int width, height;
+    int saturated_dn; /* signal is BST_PIXEL_SATURATED where raw is not below */
+} bst_filter_input;
+
+/* One pass over a frame: sets its signal, then makes maps, and maxima above the threshold. Memory
+ * outside the frame counts as noise-free background. */
+void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_filter_input *input,
+                    float threshold);
 
 /* Sets to BST_PIXEL_BAD those of the `count` pixels of row y from column x on that lie within two
  * rows and columns of one where the greater output of the latest frame is above `snr`. Only when a

@@ -298,8 +298,8 @@ static void set_known(bst_filter *f, int binning) {
     }
     int n = 2 * f->radius + 1;
     known_shares(f, binning, 0.0, 0.0, n, shares);
-    f->rank =
-        bst_low_rank(shares, 1, n, BST_FILTER_RANK, RANK_SHARE, down, across, work + 3 * PLANE);
+    const bst_low_rank_images kernel = {shares, 1, n};
+    f->rank = bst_low_rank(&kernel, BST_FILTER_RANK, RANK_SHARE, down, across, work + 3 * PLANE);
     f->kernel_norm = scale_to_unit(across, f->rank * n);
     for (int i = 0; i < n; i++) {
         f->square_x[i] = f->square_y[i] = 0.0;

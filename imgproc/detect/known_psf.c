@@ -158,8 +158,9 @@ static bst_status fill_in(bst_ctx *ctx, bst_known_psf *k, double blur_px) {
                                images + (size_t)n * plane);
     }
     if (status == BST_OK) {
-        k->terms = bst_low_rank(images, k->nodes, k->side, BST_KNOWN_PSF_TERMS, TOLERANCE, k->down,
-                                k->across, images + nodes * plane);
+        const bst_low_rank_images all = {images, k->nodes, k->side};
+        k->terms = bst_low_rank(&all, BST_KNOWN_PSF_TERMS, TOLERANCE, k->down, k->across,
+                                images + nodes * plane);
     }
     free(images);
     return status;

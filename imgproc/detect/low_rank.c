@@ -66,8 +66,10 @@ static void iterate(const double *images, int planes, int side, int most, double
     orthonormalise(v, most, side);
 }
 
-int bst_low_rank(const double *images, int planes, int side, int most, double tolerance,
-                 double *down, double *across, double *work) {
+int bst_low_rank(const bst_low_rank_images *given, int most, double tolerance, double *down,
+                 double *across, double *work) {
+    const double *images = given->items;
+    const int planes = given->planes, side = given->side;
     /* any start will do that no singular vector is at right angles to */
     unsigned state = 1;
     for (int i = 0; i < most * side; i++) {

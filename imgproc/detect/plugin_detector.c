@@ -147,9 +147,9 @@ double bst_plugin_detector_streak_px(const bst_plugin_detector *p) {
     return p->streak_px;
 }
 
-void bst_plugin_detector_ground(const void *plugged, double x_px, double y_px,
+void bst_plugin_detector_ground(const void *plugin, double x_px, double y_px,
                                 bst_psf_wings_ground *out) {
-    const bst_plugin_detector *p = plugged;
+    const bst_plugin_detector *p = plugin;
     (void)x_px;
     (void)y_px;
     out->level_e = p->level_e;

@@ -16,11 +16,11 @@ bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
                                       const bst_camera *camera, const bst_imgproc_maps *maps,
                                       int capacity, bst_plugin_detector **out) BST_MUST_CHECK;
 /* Destroys the plug-in's stage and frees the detector; NULL is allowed. */
-void bst_plugin_detector_free(bst_plugin_detector *plugged);
+void bst_plugin_detector_free(bst_plugin_detector *plugin);
 
 /* As bst_imgproc_detect. BST_ERR_STATE, naming the plug-in, for a place, size or noise that is not
  * finite, a place off the window, or more items than there is room for. */
-bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *plugged,
+bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *plugin,
                                       const bst_imgproc_frame *frame, int64_t exposure_id,
                                       const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) BST_MUST_CHECK;
@@ -30,16 +30,16 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *plugged
  * Given:     snr  signal-to-noise ratio of the limit
  * Returned:  V magnitude, for a Gaussian PSF smeared along the star streak, in the noise that the
  *            plug-in gave */
-double bst_plugin_detector_v_limit(const bst_plugin_detector *plugged, double snr);
+double bst_plugin_detector_v_limit(const bst_plugin_detector *plugin, double snr);
 /* bst_imgproc_streak_px for the latest frame: length of the stars' streaks, px. */
-double bst_plugin_detector_streak_px(const bst_plugin_detector *plugged);
+double bst_plugin_detector_streak_px(const bst_plugin_detector *plugin);
 
 /* bst_imgproc_ground for the latest frame: the plug-in's background and noise, constant over the
  * frame.
  *
- * Given:     plugged     a bst_plugin_detector
+ * Given:     plugin     a bst_plugin_detector
  *            x_px, y_px  not used */
-void bst_plugin_detector_ground(const void *plugged, double x_px, double y_px,
+void bst_plugin_detector_ground(const void *plugin, double x_px, double y_px,
                                 bst_psf_wings_ground *out);
 
 #endif

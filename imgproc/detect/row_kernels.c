@@ -143,17 +143,18 @@ static bool may_stream(const float *to) {
 #define BST_SIMD_KERNELS "imgproc/detect/row_kernels_simd.inc"
 #include "sim/core/simd_each.inc"
 
-void bst_row_normalise(const uint16_t *raw, const bst_row_gain *gain, const float *electrons,
-                       const bst_row_part *parts, int count, int saturated_dn, float *signal,
-                       float *normalised) {
+void bst_row_normalise(const bst_row_input *row, const bst_row_part *parts, int count,
+                       float *signal, float *normalised) {
+    const uint16_t *raw = row->raw;
+    const int saturated_dn = row->saturated_dn;
     int width = count > 0 ? parts[count - 1].end : 0;
     bool full;
-    if (gain) {
-        full = BST_SIMD_PICK(take_raw)(raw, gain, parts, count, (float)saturated_dn, signal,
+    if (row->gain) {
+        full = BST_SIMD_PICK(take_raw)(raw, row->gain, parts, count, (float)saturated_dn, signal,
                                        normalised);
     } else {
         full = greatest(raw, width) >= saturated_dn;
-        BST_SIMD_PICK(take_level_off)(electrons, parts, count, signal, normalised);
+        BST_SIMD_PICK(take_level_off)(row->electrons, parts, count, signal, normalised);
     }
     for (int x = full ? 0 : width; x < width; x++) {
         if (raw[x] >= saturated_dn && signal[x] > BST_PIXEL_NONE) {

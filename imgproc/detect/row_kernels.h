@@ -51,13 +51,19 @@ typedef struct bst_row_gain {
     float offset, gain;
 } bst_row_gain;
 
-/* Takes the level off a row of electrons, of `raw` by their gain, or given where that is NULL:
- * signal = electrons - level, but BST_PIXEL_SATURATED where raw >= saturated_dn; normalised =
- * signal / noise (saturated pixels with their value), 0 where a pixel is bad. The first part begins
- * at column 0. The rows may not overlap. */
-void bst_row_normalise(const uint16_t *raw, const bst_row_gain *gain, const float *electrons,
-                       const bst_row_part *parts, int count, int saturated_dn, float *signal,
-                       float *normalised);
+/* A row of electrons: of `raw` by their gain, or as given where that is NULL. */
+typedef struct bst_row_input {
+    const uint16_t *raw;
+    const bst_row_gain *gain;
+    const float *electrons;
+    int saturated_dn; /* raw from which a pixel does not measure */
+} bst_row_input;
+
+/* Takes the level off a row: signal = electrons - level, but BST_PIXEL_SATURATED where raw >=
+ * saturated_dn; normalised = signal / noise (saturated pixels with their value), 0 where a pixel is
+ * bad. The first of the `count` parts begins at column 0. The rows may not overlap. */
+void bst_row_normalise(const bst_row_input *row, const bst_row_part *parts, int count,
+                       float *signal, float *normalised);
 
 /* out[x] = weight[0] * in[0][x] + sum of weight[t] * (in[-t][x] + in[t][x]), t from 1 to radius */
 void bst_row_even(float *out, int count, const float *const *in, const float *weight, int radius);

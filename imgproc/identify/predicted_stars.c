@@ -37,9 +37,11 @@ static double seen_mag(const bst_camera *camera, const bst_star *star) {
 }
 
 bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
-                                      bst_quat q_cam_from_gcrf, const bst_light *light,
-                                      bst_window window, double margin_px, double v_limit,
-                                      int *count) {
+                                      const bst_predicted_stars_query *query, int *count) {
+    const bst_quat q_cam_from_gcrf = query->q_cam_from_gcrf;
+    const bst_light *light = query->light;
+    const bst_window window = query->window;
+    const double margin_px = query->margin_px;
     *count = 0;
     double x0 = window.x0 - margin_px, x1 = window.x0 + window.width - 1 + margin_px;
     double y0 = window.y0 - margin_px, y1 = window.y0 + window.height - 1 + margin_px;
@@ -57,7 +59,7 @@ bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
     bst_vec3 direction = bst_quat_rotate(bst_quat_conj(q_cam_from_gcrf), centre);
     direction = bst_light_catalogue_star(light, direction);
     int total = 0;
-    for (; v_limit > BRIGHTEST_V; v_limit -= 0.5) {
+    for (double v_limit = query->v_limit; v_limit > BRIGHTEST_V; v_limit -= 0.5) {
         BST_TRY(bst_stars_query(ctx, sky->stars, direction, radius + BST_ARCSEC_RAD, v_limit,
                                 sky->julian_year, sky->found, sky->capacity, &total));
         if (total <= sky->capacity) {

@@ -29,12 +29,19 @@ bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
 /* Frees the memory of the predicted stars and clears the struct, which belongs to the caller. */
 void bst_predicted_stars_free(bst_predicted_stars *sky);
 
-/* Fills sky->expected with the stars to v_limit whose apparent places fall within margin_px of the
- * window, for a camera at q_cam_from_gcrf that sees light as `light` says. Where there are more
+/* The stars to v_limit whose apparent places fall within margin_px of a window, for a camera at
+ * q_cam_from_gcrf that sees light as `light` says. */
+typedef struct bst_predicted_stars_query {
+    bst_quat q_cam_from_gcrf;
+    const bst_light *light;
+    bst_window window;
+    double margin_px, v_limit;
+} bst_predicted_stars_query;
+
+/* Fills sky->expected with the stars that are asked for. Where there are more
  * than fit, the limit is raised by half a magnitude until they do. */
 bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
-                                      bst_quat q_cam_from_gcrf, const bst_light *light,
-                                      bst_window window, double margin_px, double v_limit,
+                                      const bst_predicted_stars_query *query,
                                       int *count) BST_MUST_CHECK;
 
 #endif

@@ -104,10 +104,21 @@ static double poisson_tail(double mu, int k) {
     return fmin(sum, 1.0);
 }
 
+/* What is to be matched with what. */
+typedef struct problem {
+    const bst_starid_options *options;
+    const bst_imgproc_expected_star *stars;
+    int star_count;
+    const bst_detection *items;
+    int count;
+} problem;
+
 /* The shift that most pairs agree on; false when none stands out from chance. */
-static bool vote(bst_starid *s, const bst_starid_options *o, const bst_imgproc_expected_star *stars,
-                 int star_count, const bst_detection *items, int count, double *shift_x,
-                 double *shift_y) {
+static bool vote(bst_starid *s, const problem *p, double *shift_x, double *shift_y) {
+    const bst_starid_options *o = p->options;
+    const bst_imgproc_expected_star *stars = p->stars;
+    const bst_detection *items = p->items;
+    const int star_count = p->star_count, count = p->count;
     int *bright_stars = s->bright, *bright_items = s->bright + star_count;
     for (int i = 0; i < star_count; i++) {
         bright_stars[i] = i;
@@ -189,16 +200,16 @@ static int first_not_below(const bst_starid *s, const bst_imgproc_expected_star 
 }
 
 /* One-to-one nearest partners within the tolerance. Returns how many. */
-static int pair_up(bst_starid *s, const bst_starid_options *o,
-                   const bst_imgproc_expected_star *stars, int star_count,
-                   const bst_detection *items, int count, double floor_px,
-                   const bst_starid_result *r) {
+static int pair_up(bst_starid *s, const problem *p, double floor_px, const bst_starid_result *r) {
+    const bst_starid_options *o = p->options;
+    const bst_imgproc_expected_star *stars = p->stars;
+    const int star_count = p->star_count;
     for (int j = 0; j < star_count; j++) {
         s->detection_of[j] = -1;
     }
     int matched = 0;
-    for (int i = 0; i < count; i++) {
-        const bst_detection *d = &items[i];
+    for (int i = 0; i < p->count; i++) {
+        const bst_detection *d = &p->items[i];
         s->star_of[i] = -1;
         double sigma = sqrt(fmax(d->cov_xx + d->cov_yy, 0.0) + floor_px * floor_px);
         double tolerance = fmin(o->tolerance_px, 4.0 * sigma);
@@ -238,9 +249,11 @@ static int pair_up(bst_starid *s, const bst_starid_options *o,
 }
 
 /* Least squares for shift and turn; residuals as they are after it. */
-static void refine(const bst_starid *s, const bst_starid_options *o,
-                   const bst_imgproc_expected_star *stars, const bst_detection *items, int count,
-                   int matched, bst_starid_result *r) {
+static void refine(const bst_starid *s, const problem *p, int matched, bst_starid_result *r) {
+    const bst_starid_options *o = p->options;
+    const bst_imgproc_expected_star *stars = p->stars;
+    const bst_detection *items = p->items;
+    const int count = p->count;
     double a[3][3] = {{0}}, g[3] = {0};
     for (int i = 0; i < count; i++) {
         if (s->star_of[i] < 0) {
@@ -286,8 +299,8 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o,
     s->matched_of = 0;
     star_count = star_count < s->max_stars ? star_count : s->max_stars;
     count = count < s->max_detections ? count : s->max_detections;
-    if (star_count <= 0 || count <= 0 ||
-        !vote(s, o, stars, star_count, items, count, &out->shift_x_px, &out->shift_y_px)) {
+    const problem p = {o, stars, star_count, items, count};
+    if (star_count <= 0 || count <= 0 || !vote(s, &p, &out->shift_x_px, &out->shift_y_px)) {
         *out = (bst_starid_result){0};
         return;
     }
@@ -297,13 +310,13 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o,
     bst_heapsort_indices(s->by_y, star_count, star_higher, stars);
     double floor_px = o->tolerance_px;
     for (int pass = 0; pass < PASSES; pass++) {
-        out->matched = pair_up(s, o, stars, star_count, items, count, floor_px, out);
+        out->matched = pair_up(s, &p, floor_px, out);
         if (out->matched == 0) {
             *out = (bst_starid_result){0};
             return;
         }
         if (pass + 1 < PASSES) {
-            refine(s, o, stars, items, count, out->matched, out);
+            refine(s, &p, out->matched, out);
             floor_px = fmax(0.25, fmin(out->rms_px, 0.5 * floor_px));
         }
     }

@@ -107,22 +107,29 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
         free_sources[k] = &copies[k];
     }
     bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
-    double limit = bst_deblend_fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px));
-    bool ok = bst_fit_run(w->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
-                          free_width && c.free_count == 1, limit);
+    bst_fit_request request = {
+        .data = &data,
+        .stamp = stamp,
+        .free = free_sources,
+        .free_count = c.free_count,
+        .fixed = c.fixed,
+        .fixed_count = c.fixed_count,
+        .free_width = free_width && c.free_count == 1,
+        .limit_px = bst_deblend_fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px))};
+    bool ok = bst_fit_run(w->fit, &request);
     if (!ok && c.free_count > 1) {
         /* the pixels do not determine a neighbour, as at the stamp's edge: it stays as it is */
-        int fixed_count = c.fixed_count;
-        for (int k = 1; k < c.free_count && fixed_count < BST_COMPANY_MAX_FIXED; k++) {
-            c.fixed[fixed_count++] = c.free[k];
+        for (int k = 1; k < c.free_count && request.fixed_count < BST_COMPANY_MAX_FIXED; k++) {
+            c.fixed[request.fixed_count++] = c.free[k];
         }
         copies[0] = *c.free[0];
-        ok = bst_fit_run(w->fit, &data, stamp, free_sources, 1, c.fixed, fixed_count, false, limit);
+        request.free_count = 1;
+        ok = bst_fit_run(w->fit, &request);
     }
     if (ok) {
         found->source = copies[0];
     }
-    found->company = c.free_count - 1 + c.fixed_count;
+    found->neighbours = c.free_count - 1 + c.fixed_count;
     if (c.free_count > 1) {
         found->flags |= BST_DETECTION_BLEND;
     }

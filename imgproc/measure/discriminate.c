@@ -47,9 +47,9 @@ typedef struct charged {
 } charged;
 
 /* Of new sources of one brightness: how many were judged by the next frame, how many stayed. */
-typedef struct fate {
+typedef struct outcome {
     double judged, stayed;
-} fate;
+} outcome;
 
 struct bst_imgproc_discriminator {
     bst_camera camera;
@@ -63,7 +63,7 @@ struct bst_imgproc_discriminator {
     int64_t *keys;
     int *band;
     int bands;
-    fate fates[2][MAG_BINS]; /* alone, blended */
+    outcome outcomes[2][MAG_BINS]; /* alone, blended */
     /* of the latest oriented frame, and of the latest frame at all */
     bool covered, charge_covered;
     bst_quat q_cam_from_gcrf;
@@ -276,9 +276,9 @@ static int recall(bst_imgproc_discriminator *d, const bst_detection *item) {
     return best;
 }
 
-static fate *fate_of(bst_imgproc_discriminator *d, double v_mag, bool blend) {
+static outcome *outcome_of(bst_imgproc_discriminator *d, double v_mag, bool blend) {
     int bin = (int)floor(2.0 * (v_mag + 5.0));
-    return &d->fates[blend][bin < 0 ? 0 : bin >= MAG_BINS ? MAG_BINS - 1 : bin];
+    return &d->outcomes[blend][bin < 0 ? 0 : bin >= MAG_BINS ? MAG_BINS - 1 : bin];
 }
 
 static bool is_source(const bst_detection *item) {
@@ -318,7 +318,7 @@ static void look_back(bst_imgproc_discriminator *d, const bst_imgproc_frame_know
     for (int i = 0; i < d->count; i++) {
         remembered *r = &d->sources[i];
         if (r->fresh && r->inside) {
-            fate *t = fate_of(d, r->v_mag, r->blend);
+            outcome *t = outcome_of(d, r->v_mag, r->blend);
             t->judged += 1.0;
             t->stayed += r->taken && !r->moved ? 1.0 : 0.0;
             r->fresh = false;
@@ -360,7 +360,7 @@ static void forget(bst_imgproc_discriminator *d) {
 
 /* The probability that a source which no earlier frame had there is a star all the same. */
 static double new_star_probability(bst_imgproc_discriminator *d, const bst_detection *item) {
-    const fate *t = fate_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
+    const outcome *t = outcome_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
     /* two that moved are believed in beforehand */
     double stayed = t->stayed / (t->judged + 2.0);
     return fmin(stayed / STAR_REDETECTED, 0.98);

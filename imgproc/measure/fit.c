@@ -96,29 +96,37 @@ static int load(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp 
     return BST_SIMD_PICK(load_pixels)(fit, data, stamp);
 }
 
-/* Normal equations at the current sources. Parameters: x, y, flux of each, then the product of flux
- * and widening of the first (only when it is alone). Returns chi-square. */
-static double accumulate(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
-                         bst_imgproc_source *const *free, int count, bool free_width,
-                         double a[][BST_FIT_MAX_PARAMETERS], double *g) {
+/* Normal equations. Parameters: x, y, flux of each source, then the product of flux and widening of
+ * the first (only when it is alone). */
+typedef struct equations {
+    bool free_width;
+    int parameters;
+    double a[BST_FIT_MAX_PARAMETERS][BST_FIT_MAX_PARAMETERS]; /* or its Cholesky factor */
+    double g[BST_FIT_MAX_PARAMETERS];                         /* the right side, or the step */
+} equations;
+
+/* The equations at the current sources; returns chi-square. */
+static double accumulate(bst_fit *fit, const bst_fit_request *r, equations *e) {
+    const bst_imgproc_stamp *stamp = r->stamp;
+    const int count = r->free_count;
     terms t = {.value = fit->value,
                .fixed = fit->fixed,
                .valid = fit->valid,
                .n = plane_of(stamp),
-               .noise2 = (float)(data->noise_e * data->noise_e)};
+               .noise2 = (float)(r->data->noise_e * r->data->noise_e)};
     for (int s = 0; s < count; s++) {
-        t.model[s] = render(fit, stamp, free[s], s);
-        t.flux[s] = (float)free[s]->flux_e;
-        t.widening[s] = (float)free[s]->widening_px2;
+        t.model[s] = render(fit, stamp, r->free[s], s);
+        t.flux[s] = (float)r->free[s]->flux_e;
+        t.widening[s] = (float)r->free[s]->widening_px2;
     }
     float sums[(MAX_SUMS + 1) * BST_LANES];
-    BST_SIMD_PICK(sum_terms)(&t, count, free_width, sums);
+    BST_SIMD_PICK(sum_terms)(&t, count, e->free_width, sums);
     const float *at = sums;
-    for (int p = 0; p < 3 * count + (free_width ? 1 : 0); p++) {
+    for (int p = 0; p < e->parameters; p++) {
         for (int q = 0; q <= p; q++, at += BST_LANES) {
-            a[p][q] = bst_simd_layout_sum(at);
+            e->a[p][q] = bst_simd_layout_sum(at);
         }
-        g[p] = bst_simd_layout_sum(at);
+        e->g[p] = bst_simd_layout_sum(at);
         at += BST_LANES;
     }
     return bst_simd_layout_sum(at);
@@ -128,105 +136,135 @@ static double clamp(double v, double lo, double hi) {
     return v < lo ? lo : v > hi ? hi : v;
 }
 
-bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
-                 bst_imgproc_source *const *free, int free_count,
-                 const bst_imgproc_source *const *fixed, int fixed_count, bool free_width,
-                 double limit_px) {
-    free_width = free_width && free_count == 1;
-    int parameters = 3 * free_count + (free_width ? 1 : 0);
-    if (!fits_in(fit, stamp) || free_count < 1 || free_count > BST_FIT_MAX_FREE) {
-        return false;
+static bool factor(equations *e) {
+    return bst_cholesky_factor(e->a[0], BST_FIT_MAX_PARAMETERS, e->parameters, LEAST_PIVOT);
+}
+
+static void solve(const equations *e, double *x) {
+    bst_cholesky_solve(e->a[0], BST_FIT_MAX_PARAMETERS, e->parameters, x);
+}
+
+/* The greatest correction that the PSF's variance may need. */
+static double widest(const bst_imgproc_source *s) {
+    return 0.6 * s->shape.sigma_px * s->shape.sigma_px;
+}
+
+/* Moves the sources by the step in e->g, no further than limit_px from their start; whether that
+ * changed none by much. */
+static bool take_step(const bst_fit_request *r, const equations *e,
+                      const bst_imgproc_source *start) {
+    const double limit_px = r->limit_px;
+    bool settled = true;
+    for (int s = 0; s < r->free_count; s++) {
+        const double *step = e->g + 3 * s;
+        bst_imgproc_source *f = r->free[s];
+        double x = clamp(f->shape.x_px + clamp(step[0], -0.7, 0.7), start[s].shape.x_px - limit_px,
+                         start[s].shape.x_px + limit_px);
+        double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7), start[s].shape.y_px - limit_px,
+                         start[s].shape.y_px + limit_px);
+        /* of the standard deviation that the diagonal promises, at least 1e-5 px */
+        double share = s == 0 ? SETTLED : NEIGHBOUR_SETTLED;
+        double slack_x = fmax(1e-5, share / e->a[3 * s][3 * s]);
+        double slack_y = fmax(1e-5, share / e->a[3 * s + 1][3 * s + 1]);
+        settled = settled && fabs(x - f->shape.x_px) < slack_x && fabs(y - f->shape.y_px) < slack_y;
+        double product = f->flux_e * f->widening_px2;
+        double flux = f->flux_e + step[2];
+        flux = flux > 0.1 * f->flux_e ? flux : 0.1 * f->flux_e;
+        settled = settled && fabs(flux - f->flux_e) < share / e->a[3 * s + 2][3 * s + 2];
+        f->shape.x_px = x;
+        f->shape.y_px = y;
+        f->flux_e = flux;
+        if (s == 0 && e->free_width) {
+            product += e->g[3 * r->free_count];
+            f->widening_px2 = clamp(product / flux, -widest(f), 3.0 * widest(f));
+        }
     }
-    int pixels = load(fit, data, stamp, fixed, fixed_count);
-    if (pixels < parameters + 1) {
-        return false;
-    }
-    double a[BST_FIT_MAX_PARAMETERS][BST_FIT_MAX_PARAMETERS], g[BST_FIT_MAX_PARAMETERS];
-    bst_imgproc_source start[BST_FIT_MAX_FREE];
-    for (int s = 0; s < free_count; s++) {
-        start[s] = *free[s];
-    }
-    bool good = true, settled = false;
-    double chi = 0.0;
-    double widest = 0.6 * free[0]->shape.sigma_px * free[0]->shape.sigma_px;
+    return settled;
+}
+
+/* Gauss-Newton steps until they change little; leaves the factor of the matrix. False when the
+ * pixels do not determine the parameters. */
+static bool iterate(bst_fit *fit, const bst_fit_request *r, equations *e,
+                    const bst_imgproc_source *start, double *chi) {
     /* a streak's ends tell of a shift only as far as the PSF reaches: it is found step by step */
-    double path = hypot(free[0]->shape.dx_px, free[0]->shape.dy_px);
+    double path = hypot(r->free[0]->shape.dx_px, r->free[0]->shape.dy_px);
     int iterations = MAX_ITERATIONS + (int)fmin(path, BST_PSF_MAX_SIDE);
-    for (int iteration = 0; iteration < iterations && good && !settled; iteration++) {
-        chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
-        good = bst_cholesky_factor(a[0], BST_FIT_MAX_PARAMETERS, parameters, LEAST_PIVOT);
-        if (!good) {
-            break;
+    bool settled = false;
+    for (int iteration = 0; iteration < iterations && !settled; iteration++) {
+        *chi = accumulate(fit, r, e);
+        if (!factor(e)) {
+            return false;
         }
         double gradient[BST_FIT_MAX_PARAMETERS];
-        memcpy(gradient, g, sizeof gradient);
-        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, g);
+        memcpy(gradient, e->g, sizeof gradient);
+        solve(e, e->g);
         double gain = 0.0;
-        for (int k = 0; k < parameters; k++) {
-            gain += gradient[k] * g[k];
+        for (int k = 0; k < e->parameters; k++) {
+            gain += gradient[k] * e->g[k];
         }
-        settled = iteration > 0;
-        for (int s = 0; s < free_count; s++) {
-            const double *step = g + 3 * s;
-            bst_imgproc_source *f = free[s];
-            double x = clamp(f->shape.x_px + clamp(step[0], -0.7, 0.7),
-                             start[s].shape.x_px - limit_px, start[s].shape.x_px + limit_px);
-            double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7),
-                             start[s].shape.y_px - limit_px, start[s].shape.y_px + limit_px);
-            /* of the standard deviation that the diagonal promises, at least 1e-5 px */
-            double share = s == 0 ? SETTLED : NEIGHBOUR_SETTLED;
-            double slack_x = fmax(1e-5, share / a[3 * s][3 * s]);
-            double slack_y = fmax(1e-5, share / a[3 * s + 1][3 * s + 1]);
-            settled =
-                settled && fabs(x - f->shape.x_px) < slack_x && fabs(y - f->shape.y_px) < slack_y;
-            double product = f->flux_e * f->widening_px2;
-            double flux = f->flux_e + step[2];
-            flux = flux > 0.1 * f->flux_e ? flux : 0.1 * f->flux_e;
-            settled = settled && fabs(flux - f->flux_e) < share / a[3 * s + 2][3 * s + 2];
-            f->shape.x_px = x;
-            f->shape.y_px = y;
-            f->flux_e = flux;
-            if (s == 0 && free_width) {
-                product += g[3 * free_count];
-                f->widening_px2 = clamp(product / flux, -widest, 3.0 * widest);
-            }
-        }
-        chi -= settled ? gain : 0.0; /* what so small a step still brings */
+        settled = take_step(r, e, start) && iteration > 0;
+        *chi -= settled ? gain : 0.0; /* what so small a step still brings */
     }
-    if (good && !settled) {
-        /* the covariance belongs to the place where the fit ended */
-        chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
-        good = bst_cholesky_factor(a[0], BST_FIT_MAX_PARAMETERS, parameters, LEAST_PIVOT);
+    if (settled) {
+        return true;
     }
-    for (int s = 0; s < free_count; s++) {
-        good = good && isfinite(free[s]->shape.x_px) && isfinite(free[s]->shape.y_px) &&
-               isfinite(free[s]->flux_e) && free[s]->flux_e > 0.0;
-    }
-    if (!good) {
-        for (int s = 0; s < free_count; s++) {
-            *free[s] = start[s];
-        }
-        return false;
-    }
+    /* the covariance belongs to the place where the fit ended */
+    *chi = accumulate(fit, r, e);
+    return factor(e);
+}
+
+/* The first source's errors, from the inverse of the matrix. */
+static void set_errors(const equations *e, bst_imgproc_source *out) {
     double column[3][BST_FIT_MAX_PARAMETERS];
     for (int c = 0; c < 3; c++) {
         memset(column[c], 0, sizeof column[c]);
         column[c][c] = 1.0;
-        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, column[c]);
+        solve(e, column[c]);
     }
-    free[0]->cov_xx = column[0][0];
-    free[0]->cov_xy = column[0][1];
-    free[0]->cov_yy = column[1][1];
-    free[0]->flux_variance = column[2][2];
-    if (free_width) {
+    out->cov_xx = column[0][0];
+    out->cov_xy = column[0][1];
+    out->cov_yy = column[1][1];
+    out->flux_variance = column[2][2];
+    if (e->free_width) {
         double last[BST_FIT_MAX_PARAMETERS] = {0};
-        last[parameters - 1] = 1.0;
-        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, last);
-        free[0]->widening_variance = last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
+        last[e->parameters - 1] = 1.0;
+        solve(e, last);
+        out->widening_variance = last[e->parameters - 1] / (out->flux_e * out->flux_e);
     }
-    free[0]->chi_square = chi;
-    free[0]->pixels = pixels;
-    free[0]->fitted = true;
+}
+
+bool bst_fit_run(bst_fit *fit, const bst_fit_request *r) {
+    equations e;
+    e.free_width = r->free_width && r->free_count == 1;
+    e.parameters = 3 * r->free_count + (e.free_width ? 1 : 0);
+    if (!fits_in(fit, r->stamp) || r->free_count < 1 || r->free_count > BST_FIT_MAX_FREE) {
+        return false;
+    }
+    int pixels = load(fit, r->data, r->stamp, r->fixed, r->fixed_count);
+    if (pixels < e.parameters + 1) {
+        return false;
+    }
+    bst_imgproc_source start[BST_FIT_MAX_FREE];
+    for (int s = 0; s < r->free_count; s++) {
+        start[s] = *r->free[s];
+    }
+    double chi = 0.0;
+    bool good = iterate(fit, r, &e, start, &chi);
+    for (int s = 0; s < r->free_count; s++) {
+        const bst_imgproc_source *f = r->free[s];
+        good = good && isfinite(f->shape.x_px) && isfinite(f->shape.y_px) && isfinite(f->flux_e) &&
+               f->flux_e > 0.0;
+    }
+    if (!good) {
+        for (int s = 0; s < r->free_count; s++) {
+            *r->free[s] = start[s];
+        }
+        return false;
+    }
+    set_errors(&e, r->free[0]);
+    r->free[0]->chi_square = chi;
+    r->free[0]->pixels = pixels;
+    r->free[0]->fitted = true;
     return true;
 }
 

@@ -54,17 +54,25 @@ void bst_fit_free(bst_fit *fit);
 bst_imgproc_stamp bst_fit_stamp(const bst_imgproc_source *source, double reach_px, int max_side,
                                 int width, int height);
 
-/* Fits x, y and flux of `free` sources (the first is the one wanted, at most BST_FIT_MAX_FREE) with
- * `fixed` sources taken off, on the first one's pixels; free_width: also its widening. Gauss-Newton
- * on sum (d - m)^2 / (noise^2 + m), the variance from the current model (quasi-likelihood, equal to
- * maximum likelihood to first order). Centres stay within limit_px of where they start. The first
- * source's covariance is the inverse of the Fisher matrix, its neighbours' uncertainty included;
- * saturated and bad pixels are left out. False and nothing changed when the pixels do not determine
- * the parameters. */
-bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
-                 bst_imgproc_source *const *free, int free_count,
-                 const bst_imgproc_source *const *fixed, int fixed_count, bool free_width,
-                 double limit_px);
+/* What is to be fitted: x, y and flux of the `free` sources (the first is the one wanted, at most
+ * BST_FIT_MAX_FREE) with the `fixed` ones taken off. */
+typedef struct bst_fit_request {
+    const bst_fit_data *data;
+    const bst_imgproc_stamp *stamp; /* the first source's pixels */
+    bst_imgproc_source *const *free;
+    int free_count;
+    const bst_imgproc_source *const *fixed;
+    int fixed_count;
+    bool free_width; /* also the first one's widening, where it is alone */
+    double limit_px; /* by which a centre may move at most */
+} bst_fit_request;
+
+/* Gauss-Newton on sum (d - m)^2 / (noise^2 + m), the variance from the current model
+ * (quasi-likelihood, equal to maximum likelihood to first order). Centres stay within limit_px of
+ * where they start. The first source's covariance is the inverse of the Fisher matrix, its
+ * neighbours' uncertainty included; saturated and bad pixels are left out. False and nothing
+ * changed when the pixels do not determine the parameters. */
+bool bst_fit_run(bst_fit *fit, const bst_fit_request *request);
 
 /* sqrt(sum share^2) of the first source of the latest bst_fit_run on this stamp: its SNR is flux
  * times this over the background's noise. */

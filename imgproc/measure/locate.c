@@ -23,11 +23,13 @@ static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured 
  * streak's by no more than the other two: both shapes are tried */
 static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 
-bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known, int threads,
-                                      int capacity, int max_width, int max_height, int max_side,
+bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
+                                      const bst_imgproc_locator_limits *limits,
                                       bst_imgproc_locator *out) {
+    const int threads = limits->threads, capacity = limits->capacity;
+    const int max_width = limits->max_width, max_height = limits->max_height;
     *out = (bst_imgproc_locator){.threads = threads,
-                                 .max_side = max_side,
+                                 .max_side = limits->max_side,
                                  .capacity = capacity,
                                  .columns = max_width / BST_LOCATE_CELL_PX + 1,
                                  .rows = max_height / BST_LOCATE_CELL_PX + 1};
@@ -49,7 +51,7 @@ bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known, 
     }
     bst_status status = bst_source_profiles_create(ctx, known, &out->profiles);
     for (int i = 0; i < threads && status == BST_OK; i++) {
-        status = bst_fit_create(ctx, &out->psf, &out->profiles, max_side, &out->fits[i]);
+        status = bst_fit_create(ctx, &out->psf, &out->profiles, limits->max_side, &out->fits[i]);
     }
     if (status != BST_OK) {
         bst_imgproc_locator_free(out);
@@ -331,7 +333,7 @@ static bool company_changed(const bst_imgproc_worker *w, int i, const bst_imgpro
         end = group_end(end);
     }
     int begin = end == FIRST_GROUP ? 0 : end / 3;
-    bool changed = c.free_count - 1 + c.fixed_count != found->company;
+    bool changed = c.free_count - 1 + c.fixed_count != found->neighbours;
     for (int k = 0; k < c.fixed_count && !changed; k++) {
         const bst_imgproc_found *other = bst_imgproc_found_of(c.fixed[k]);
         double moved = hypot(other->source.shape.x_px - other->top_x_px,

@@ -29,7 +29,7 @@ typedef struct bst_imgproc_found {
     bool bleed;               /* its charge overflowed along its columns: blooming.h */
     double bleed_e, bleed_px; /* with bleed: charge of all its pixels, width of the full ones */
     bool rough;               /* placed by the filter, not fitted */
-    int company;              /* neighbours that the latest fit counted with */
+    int neighbours;           /* neighbours that the latest fit counted with */
     int label; /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
     double label_probability;
     bst_imgproc_cosmic_ray charge;
@@ -97,9 +97,17 @@ static inline double bst_locate_noise_at(const bst_locate_frame *f, int x, int y
 /* Squares of the frame that the found ones are kept by, px. */
 enum { BST_LOCATE_CELL_PX = 16 };
 
-/* known: lent; NULL: the PSF is a Gaussian. For loops on up to `threads` threads. */
-bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known, int threads,
-                                      int capacity, int max_width, int max_height, int max_side,
+/* What a locator has room for. */
+typedef struct bst_imgproc_locator_limits {
+    int threads;  /* of a loop */
+    int capacity; /* detections */
+    int max_width, max_height;
+    int max_side; /* of a stamp */
+} bst_imgproc_locator_limits;
+
+/* known: lent; NULL: the PSF is a Gaussian. */
+bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
+                                      const bst_imgproc_locator_limits *limits,
                                       bst_imgproc_locator *out) BST_MUST_CHECK;
 /* Frees the memory of a locator and clears the struct, which belongs to the caller. */
 void bst_imgproc_locator_free(bst_imgproc_locator *locator);

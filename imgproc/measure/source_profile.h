@@ -55,21 +55,22 @@ void bst_source_profile_render(const bst_source_profiles *profiles, const bst_im
                                const bst_imgproc_shape *shape, const bst_imgproc_stamp *stamp,
                                float *scratch, float *planes);
 
-/* The planes of a path's own changes, after the four: by its length in direction (ex, ey), by its
- * end minus start across that, (-ey, ex), and by its bend in direction (ex, ey). */
+/* The planes of a path's own changes, after the four: by its length in the direction `along` (a
+ * unit vector), by its end minus start across that, (-along[1], along[0]), and by its bend in
+ * direction `along`. */
 enum { BST_IMAGE_BY_LENGTH = 4, BST_IMAGE_BY_ACROSS, BST_IMAGE_BY_BEND, BST_IMAGE_MOTION_PLANES };
 
 /* As bst_source_profile_render, with the planes of changes that all streaks of a frame share. */
 void bst_source_profile_render_motion(const bst_source_profiles *profiles,
                                       const bst_imgproc_gauss *psf, const bst_imgproc_shape *shape,
-                                      const bst_imgproc_stamp *stamp, double ex, double ey,
+                                      const bst_imgproc_stamp *stamp, const double along[2],
                                       float *scratch, float *planes);
 
-/* The same two for a known PSF; moved: with the planes of changes, else ex and ey are not used. */
+/* The same two for a known PSF: with the planes of changes unless `along` is NULL. */
 void bst_source_profile_render_known(const bst_source_profiles *profiles,
                                      const bst_imgproc_gauss *psf, const bst_imgproc_shape *shape,
-                                     const bst_imgproc_stamp *stamp, bool moved, double ex,
-                                     double ey, float *scratch, float *planes);
+                                     const bst_imgproc_stamp *stamp, const double *along,
+                                     float *scratch, float *planes);
 /* Fills the profiles of a known PSF for the frame's binning. */
 void bst_source_profiles_set_known(bst_source_profiles *profiles);
 

@@ -68,7 +68,6 @@ typedef struct mix {
 
 void bst_source_profile_render_known(const bst_source_profiles *t, const bst_imgproc_gauss *psf,
                                      const bst_imgproc_shape *shape, const bst_imgproc_stamp *stamp,
-                                     bool moved, double ex, double ey, float *scratch,
-                                     float *planes) {
-    BST_SIMD_PICK(render)(t, psf, shape, stamp, moved, ex, ey, scratch, planes);
+                                     const double *along, float *scratch, float *planes) {
+    BST_SIMD_PICK(render)(t, psf, shape, stamp, along, scratch, planes);
 }

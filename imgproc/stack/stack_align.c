@@ -150,8 +150,8 @@ static void align_rows(void *user, int begin, int end) {
 
 void stack_align(bst_stack *s, const bst_stack_frame *f, int number) {
     static const double AT_REST_PX = 0.005;
-    bst_streak_map_filter(&s->map, s->pool, f->signal, f->width, f->height, f->background,
-                          f->sigma_px, STACK_CLAMP, s->steady);
+    const bst_streak_map_input input = {f->signal, f->width, f->height, f->background, f->sigma_px};
+    bst_streak_map_filter(&s->map, s->pool, &input, STACK_CLAMP, s->steady);
     stack_set_interpolation(s, f->sigma_px, s->map.correlation);
     align_job job = {s, stack_map(s, number), false};
     if (number > 0) {

@@ -18,13 +18,13 @@ static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.
 static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
 
 bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, bst_parallel *pool,
-                                     int max_width, int max_height, double fwhm_px, double max_px,
+                                     const bst_streak_locator_limits *limits,
                                      bst_streak_locator *out) {
     *out = (bst_streak_locator){0};
-    int side = (int)ceil(1.25 * max_px + 6.0 * fwhm_px) + 14;
+    int side = (int)ceil(1.25 * limits->max_px + 6.0 * limits->fwhm_px) + 14;
     side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
-    bst_status status =
-        bst_streak_search_create(ctx, pool, max_width, max_height, max_px, &out->search);
+    bst_status status = bst_streak_search_create(ctx, pool, limits->max_width, limits->max_height,
+                                                 limits->max_px, &out->search);
     if (status == BST_OK) {
         status = bst_streak_fit_create(ctx, psf, side, &out->fit);
     }
@@ -133,10 +133,18 @@ static void claim_line(const bst_locate_frame *f, const bst_streak_line *line,
     s->flux_variance = s->flux_e * s->flux_e / (line->snr * line->snr);
 }
 
-/* The source that a line tells of; false when the fit fails and the line itself is all there is. */
-static bool measure(bst_streak_locator *l, const bst_locate_frame *f,
+/* The source that a line tells of. */
+typedef struct measured {
+    bst_imgproc_found streak;
+    bst_imgproc_stamp stamp;
+    bool fitted; /* false: the fit failed, and the line itself is all there is */
+} measured;
+
+static void measure(bst_streak_locator *l, const bst_locate_frame *f,
                     const bst_imgproc_locator *found, int count, const bst_streak_line *line,
-                    double beyond_px, bst_imgproc_found *out, bst_imgproc_stamp *stamp) {
+                    double beyond_px, measured *result) {
+    bst_imgproc_found *out = &result->streak;
+    bst_imgproc_stamp *stamp = &result->stamp;
     *out = (bst_imgproc_found){.peak_snr = (float)line->snr, .streak = true};
     bst_imgproc_source *s = &out->source;
     s->shape = (bst_imgproc_shape){.x_px = 0.5 * (line->x0 + line->x1),
@@ -155,8 +163,8 @@ static bool measure(bst_streak_locator *l, const bst_locate_frame *f,
     *stamp = bst_fit_stamp(s, reach, l->fit.max_side, f->width, f->height);
     bst_fit_data data = {f->signal, f->width, f->height, out->noise_e};
     exclude(l, f, found, count, stamp);
-    bool fitted = bst_streak_fit_run(&l->fit, &data, stamp, l->excluded, s, &norm);
-    if (!fitted) {
+    result->fitted = bst_streak_fit_run(&l->fit, &data, stamp, l->excluded, s, &norm);
+    if (!result->fitted) {
         claim_line(f, line, out);
     }
     out->peak_x = (int)floor(s->shape.x_px + 0.5);
@@ -179,7 +187,6 @@ static bool measure(bst_streak_locator *l, const bst_locate_frame *f,
         out->label = BST_LABEL_ARTEFACT;
         out->label_probability = 0.9;
     }
-    return fitted;
 }
 
 /* Chi-square of the dropped pieces as sources of their own, on the stamp of the latest fit. */
@@ -258,27 +265,27 @@ static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_imgpr
     double piece =
         bare ? line->snr * sqrt(3.5 * f->sigma_px / (length + 3.5 * f->sigma_px)) : INFINITY;
     int pieces = drop_pieces(l, found, points, line, f->sigma_px, piece, beyond_px);
-    bst_imgproc_found streak;
-    bst_imgproc_stamp stamp;
-    bool fitted = measure(l, f, found, points, line, beyond_px, &streak, &stamp);
+    measured own;
+    measure(l, f, found, points, line, beyond_px, &own);
+    const bst_imgproc_found *streak = &own.streak;
     /* a line that owes its SNR to light of others keeps little of it without that */
-    bool good = fitted ? streak.snr > line->snr - LOST_SNR : bare && pieces == 0;
-    good = good && !is_known(f, found, points, &streak);
+    bool good = own.fitted ? streak->snr > line->snr - LOST_SNR : bare && pieces == 0;
+    good = good && !is_known(f, found, points, streak);
     if (good && pieces > 0) {
         /* points have three parameters, streaks five */
         int parameters = 0;
         for (int k = 0; k < pieces; k++) {
             parameters += found->found[l->pieces[k]].streak ? 5 : 3;
         }
-        double chi = chi_of_pieces(l, f, found, pieces, &stamp, streak.noise_e);
-        good = streak.snr > snr_of_points(l, found, pieces, line) &&
-               streak.source.chi_square + 5.0 <= chi + parameters;
+        double chi = chi_of_pieces(l, f, found, pieces, &own.stamp, streak->noise_e);
+        good = streak->snr > snr_of_points(l, found, pieces, line) &&
+               streak->source.chi_square + 5.0 <= chi + parameters;
     }
     for (int k = 0; k < pieces; k++) {
         found->found[l->pieces[k]].dropped = good;
     }
     if (good) {
-        found->found[found->count++] = streak;
+        found->found[found->count++] = *streak;
     }
     return good;
 }

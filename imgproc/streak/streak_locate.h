@@ -13,9 +13,16 @@ typedef struct bst_streak_locator {
     int *pieces;       /* points that a streak takes the place of */
 } bst_streak_locator;
 
+/* The frames and streaks that a locator is made for. */
+typedef struct bst_streak_locator_limits {
+    int max_width, max_height;
+    double fwhm_px; /* of the PSF */
+    double max_px;  /* the longest streak */
+} bst_streak_locator_limits;
+
 /* psf and pool are kept; pool NULL: the caller's thread alone. */
 bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, bst_parallel *pool,
-                                     int max_width, int max_height, double fwhm_px, double max_px,
+                                     const bst_streak_locator_limits *limits,
                                      bst_streak_locator *out) BST_MUST_CHECK;
 /* Frees the memory of a locator and clears the struct, which belongs to the caller. */
 void bst_streak_locator_free(bst_streak_locator *locator);

@@ -151,9 +151,9 @@ static void turn_band(void *user, int begin, int end) {
     }
 }
 
-void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
-                           int height, const bst_background *background, double sigma_px, int clamp,
-                           float *sum) {
+void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool,
+                           const bst_streak_map_input *input, int clamp, float *sum) {
+    const int width = input->width, height = input->height;
     if (map->width != width || map->height != height) {
         map->width = width;
         map->height = height;
@@ -166,16 +166,15 @@ void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool, const float 
         }
     }
     map->clamp = clamp;
-    set_kernel(map, sigma_px);
-    fill_job job = {map, signal, sum, background};
+    set_kernel(map, input->sigma_px);
+    fill_job job = {map, input->signal, sum, input->background};
     bst_parallel_for(pool, (height + BAND - 1) / BAND, 1, fill_bands, &job);
 }
 
-void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
-                         int height, const bst_background *background, double sigma_px) {
-    bst_streak_map_filter(map, pool, signal, width, height, background, sigma_px,
-                          CLAMP_SIGMA * BST_STREAK_QUANTA, NULL);
-    bst_parallel_for(pool, (width + TURN - 1) / TURN, 1, turn_band, map);
+void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool,
+                         const bst_streak_map_input *input) {
+    bst_streak_map_filter(map, pool, input, CLAMP_SIGMA * BST_STREAK_QUANTA, NULL);
+    bst_parallel_for(pool, (input->width + TURN - 1) / TURN, 1, turn_band, map);
 }
 
 static void blank(bst_streak_map *map, int plane, double x0, double y0, double x1, double y1,

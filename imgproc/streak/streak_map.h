@@ -36,15 +36,22 @@ bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height, bo
 /* Frees the memory of a map and clears the struct, which belongs to the caller. */
 void bst_streak_map_free(bst_streak_map *map);
 
-/* Makes both planes from signal [height][width] (electrons above the background, see
- * background.h): what holds no measurement counts as background. sigma_px: of the PSF. */
-void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
-                         int height, const bst_background *background, double sigma_px);
+/* A frame. */
+typedef struct bst_streak_map_input {
+    const float *signal; /* [height][width], electrons above the background, see background.h: what
+                            holds no measurement counts as background */
+    int width, height;
+    const bst_background *background;
+    double sigma_px; /* of the PSF */
+} bst_streak_map_input;
+
+/* Makes both planes. */
+void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool,
+                         const bst_streak_map_input *input);
 /* Makes the first plane alone, with values of at most `clamp` quanta. Unless `sum` [height][width]
  * is NULL the SNR of each pixel by itself, within 6, is added to it. */
-void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
-                           int height, const bst_background *background, double sigma_px, int clamp,
-                           float *sum);
+void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool,
+                           const bst_streak_map_input *input, int clamp, float *sum);
 /* Sets both planes to zero within radius_px of a segment. */
 void bst_streak_map_blank(bst_streak_map *map, double x0, double y0, double x1, double y1,
                           double radius_px);

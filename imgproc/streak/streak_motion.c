@@ -160,8 +160,9 @@ static void load_pixels(const bst_locate_frame *f, const bst_imgproc_stamp *stam
 static bool accumulate(const bst_streak_motion *work, const bst_imgproc_gauss *psf,
                        const bst_source_profiles *profiles, star *s) {
     int n = bst_simd_layout_round_up(s->stamp.width) * s->stamp.height;
-    bst_source_profile_render_motion(profiles, psf, &s->shape, &s->stamp, work->ex, work->ey,
-                                     work->scratch, work->planes);
+    const double along[2] = {work->ex, work->ey};
+    bst_source_profile_render_motion(profiles, psf, &s->shape, &s->stamp, along, work->scratch,
+                                     work->planes);
     memcpy(work->planes + BST_IMAGE_MOTION_PLANES * n, s->pixels,
            2 * (size_t)n * sizeof *s->pixels);
     float sums[SUMS * BST_LANES];

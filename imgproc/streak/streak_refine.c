@@ -100,14 +100,27 @@ static void best_ends(const profile *p, int reach, int most_rows, path *at) {
     }
 }
 
-/* One round: both ends moved across by up to `steps` steps. */
-static bool improve(const bst_streak_map *map, int plane, double step, int steps, int reach,
-                    int rows, double max_px, profile *work, path *best) {
+/* The plane of a map that a path lies in, and the longest path. */
+typedef struct field {
+    const bst_streak_map *map;
+    int plane, rows;
+    double max_px;
+} field;
+
+/* How far the ends of a path are moved: across by up to `steps` steps, along by `reach` rows. */
+typedef struct moves {
+    double step;
+    int steps, reach;
+} moves;
+
+/* One round of all moves. */
+static bool improve(const field *in, const moves *by, profile *work, path *best) {
     const path start = *best;
+    const int steps = by->steps, reach = by->reach;
     int first = start.e0 - reach > 0 ? start.e0 - reach : 0;
-    int last = start.e1 + reach < rows - 1 ? start.e1 + reach : rows - 1;
+    int last = start.e1 + reach < in->rows - 1 ? start.e1 + reach : in->rows - 1;
     double slant = start.t1 > start.t0 ? (start.s1 - start.s0) / (start.t1 - start.t0) : 0.0;
-    int most = (int)ceil(max_px / sqrt(1.0 + slant * slant));
+    int most = (int)ceil(in->max_px / sqrt(1.0 + slant * slant));
     most = most < BST_STREAK_MAX_ROWS ? most : BST_STREAK_MAX_ROWS;
     if (last - first + 1 > MOST || last < first) {
         return false;
@@ -116,9 +129,9 @@ static bool improve(const bst_streak_map *map, int plane, double step, int steps
     for (int i = -steps; i <= steps; i++) {
         for (int j = -steps; j <= steps; j++) {
             path trial = start;
-            trial.s0 += i * step;
-            trial.s1 += j * step;
-            sample(map, plane, &trial, first, last - first + 1, most, work);
+            trial.s0 += i * by->step;
+            trial.s1 += j * by->step;
+            sample(in->map, in->plane, &trial, first, last - first + 1, most, work);
             best_ends(work, reach, most, &trial);
             if (trial.snr > best->snr + 1e-9) {
                 *best = trial;
@@ -191,9 +204,10 @@ void bst_streak_refine(const bst_streak_map *map, const bst_streak_hit *hit, dou
     best.t1 = best.e1 = best.e0 + hit->rows - 1;
     profile work;
     int reach = hit->rows / 4 > 2 ? hit->rows / 4 : 2;
-    improve(map, plane, 0.5, 2, reach, rows, max_px, &work, &best);
-    for (int round = 0; round < 3 && improve(map, plane, 0.25, 1, 2, rows, max_px, &work, &best);
-         round++) {
+    const field in = {map, plane, rows, max_px};
+    const moves coarse = {0.5, 2, reach}, fine = {0.25, 1, 2};
+    improve(&in, &coarse, &work, &best);
+    for (int round = 0; round < 3 && improve(&in, &fine, &work, &best); round++) {
     }
     *out = (bst_streak_line){0};
     if (best.snr > 0.0) {

@@ -120,7 +120,8 @@ static int choose(bst_streak_search *s, int hits) {
 
 void bst_streak_search_fill(bst_streak_search *s, const float *signal, int width, int height,
                             const bst_background *background, double sigma_px) {
-    bst_streak_map_fill(&s->map, s->pool, signal, width, height, background, sigma_px);
+    const bst_streak_map_input input = {signal, width, height, background, sigma_px};
+    bst_streak_map_fill(&s->map, s->pool, &input);
 }
 
 /* Leaves lines above `threshold` whose `filled` and length are at least those given in s->found.

@@ -126,7 +126,7 @@ typedef struct bst_module_desc {
      * observation_source is "generator"; otherwise it does not step. Keys that its table shares
      * with theirs take their values. Its last trigger is delayed by the sum of the delays between
      * them. */
-    const char *const *stands_for;
+    const char *const *substitutes_for;
     const char *also; /* another name that a scenario may write as "type"; NULL: none */
 } bst_module_desc;
 

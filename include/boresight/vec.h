@@ -37,9 +37,18 @@ static inline double bst_atan2(double y, double x) {
     }
     return atan2(y, x);
 }
+/* The same angle in (-pi, pi], rad. */
+static inline double bst_wrap_angle(double angle_rad) {
+    const double two_pi = 2.0 * BST_PI;
+    return angle_rad - two_pi * ceil(angle_rad / two_pi - 0.5);
+}
 /* Vector of three components. */
 static inline bst_vec3 bst_vec3_make(double x, double y, double z) {
     return (bst_vec3){x, y, z};
+}
+/* Vector of the three components in an array. */
+static inline bst_vec3 bst_vec3_from_array(const double v[3]) {
+    return (bst_vec3){v[0], v[1], v[2]};
 }
 /* a + b */
 static inline bst_vec3 bst_vec3_add(bst_vec3 a, bst_vec3 b) {
@@ -177,7 +186,8 @@ bst_quat bst_quat_from_large_rotvec(bst_vec3 r);
  *
  * Given:     r  axis times angle, rad; right-handed
  * Returned:  q with bst_quat_rotate(q, v) = v turned by |r| about r
- * Notes:     a frame that turns by r has q_new_from_old = bst_quat_from_rotvec(-r). */
+ * Notes:     a frame that turns by r has q_new_from_old = bst_quat_from_rotvec(-r), see
+ *            bst_quat_turn_frame. */
 static inline bst_quat bst_quat_from_rotvec(bst_vec3 r) {
     double square = 0.25 * bst_vec3_dot(r, r); /* of half the angle */
     if (!(square < 2e-4)) {
@@ -190,6 +200,15 @@ static inline bst_quat bst_quat_from_rotvec(bst_vec3 r) {
         1.0 -
         square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0))));
     return (bst_quat){s * r.x, s * r.y, s * r.z, c};
+}
+
+/* Attitude of a frame after a turn about its own axes.
+ *
+ * Given:     q  q_old_from_a
+ *            r  axis in the frame times angle, rad; right-handed
+ * Returned:  q_new_from_a, not brought back to unit length */
+static inline bst_quat bst_quat_turn_frame(bst_quat q, bst_vec3 r) {
+    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
 }
 
 /* Rotation vector of a unit quaternion (logarithm), |r| in [0, pi] rad. q and -q give the same

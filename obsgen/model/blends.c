@@ -12,7 +12,7 @@ static const double FLATTEST = 6.0;
  * nearest top any more; noise of its filters over white noise's that is believed. */
 static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
 /* Keys of such streaks. */
-static const uint64_t WANDER = (uint64_t)1 << 52;
+static const uint64_t CENTROID_ERROR = (uint64_t)1 << 52;
 /* Alone, so bright and so many FWHM long, a detection is fitted as a streak of its own. */
 static const double OWN_STREAK_SNR = 10.0, OWN_STREAK_LENGTH = 1.5;
 
@@ -125,8 +125,9 @@ static nearest_light nearest_of(const bst_generator *g, const generator_source *
 
 /* Where a streak so faint is found that the top of the filters' output wanders along it. beside: of
  * the output there, what neighbours give that are found too. */
-static void wander(const bst_generator *g, const generator_source *s,
-                   const generator_source *merged, int count, double beside, generator_blend *out) {
+static void centroid_error(const bst_generator *g, const generator_source *s,
+                           const generator_source *merged, int count, double beside,
+                           generator_blend *out) {
     if (!s->as_streak || s->length < 1.0) {
         return;
     }
@@ -140,8 +141,8 @@ static void wander(const bst_generator *g, const generator_source *s,
     if (along * out->flat < WANDERS * g->total_sigma) {
         return;
     }
-    bst_streak_centroid_error_set(g->wander, g->streak, g->total_sigma);
-    if (g->wander->steps == 0) {
+    bst_streak_centroid_error_set(g->centroid_error, g->streak, g->total_sigma);
+    if (g->centroid_error->steps == 0) {
         return;
     }
     double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr) *
@@ -150,7 +151,7 @@ static void wander(const bst_generator *g, const generator_source *s,
         bst_obsgen_between(bst_obsgen_lengths_px, cal->gain, BST_OBSGEN_LENGTHS, s->length);
     double own = s->amplitude / gain;
     /* the bound's deviation over that of these filters' top where nothing wanders */
-    double noise = along * own * sqrt(g->wander->curvature);
+    double noise = along * own * sqrt(g->centroid_error->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
     double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;
     turned = fmin(fmax(turned, LEAST_NOISE), MOST_NOISE);
@@ -163,11 +164,12 @@ static void wander(const bst_generator *g, const generator_source *s,
         sources[used++] = (bst_streak_centroid_error_source){dx * c + dy * n, dy * c - dx * n,
                                                              own * m->flux_e / s->flux_e};
     }
-    bst_philox_words words = bst_rng_words(g->key, (uint64_t)g->exposure_id, WANDER | s->name);
+    bst_philox_words words =
+        bst_rng_words(g->key, (uint64_t)g->exposure_id, CENTROID_ERROR | s->name);
     const bst_rng_key key = {{words.w[0], words.w[1]}};
     double threshold = g->filters[1].threshold - beside;
     bst_streak_centroid_error_peak top =
-        bst_streak_centroid_error_draw(g->wander, key, sources, used, noise, threshold);
+        bst_streak_centroid_error_draw(g->centroid_error, key, sources, used, noise, threshold);
     if (!(top.snr > threshold)) {
         return; /* so faint that it is seen for another reason */
     }
@@ -317,6 +319,6 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         }
         out.flat = fmin(fmax(alone / fmax(all, 1e-9 * alone), 1.0), FLATTEST);
     }
-    wander(g, s, merged, count, beside, &out);
+    centroid_error(g, s, merged, count, beside, &out);
     return out;
 }

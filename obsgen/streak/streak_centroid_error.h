@@ -26,7 +26,7 @@ typedef struct bst_streak_centroid_error {
 } bst_streak_centroid_error;
 
 /* For streaks of length_px > 0. Does nothing when it is set so already. */
-void bst_streak_centroid_error_set(bst_streak_centroid_error *wander, double length_px,
+void bst_streak_centroid_error_set(bst_streak_centroid_error *centroid_error, double length_px,
                                    double sigma_px);
 
 /* Light of one source on the streak's line, SNR of its own filter; the streak itself is at 0, 0. */
@@ -43,7 +43,7 @@ typedef struct bst_streak_centroid_error_peak {
  * white noise as the filters were made for), given that it exceeds `threshold`: noise is drawn
  * until it does, a few times at the most. The key belongs to this streak alone. */
 bst_streak_centroid_error_peak bst_streak_centroid_error_draw(
-    const bst_streak_centroid_error *wander, bst_rng_key key,
+    const bst_streak_centroid_error *centroid_error, bst_rng_key key,
     const bst_streak_centroid_error_source *sources, int count, double noise, double threshold);
 
 #endif

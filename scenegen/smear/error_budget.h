@@ -48,21 +48,21 @@ typedef struct bst_error_budget_source {
  * Ownership: free *out with bst_error_budget_free */
 bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) BST_MUST_CHECK;
 /* Frees an error budget; NULL is allowed. */
-void bst_error_budget_free(bst_error_budget *crowd);
+void bst_error_budget_free(bst_error_budget *budget);
 
 /* Starts a frame. */
-void bst_error_budget_begin(bst_error_budget *crowd, const bst_error_budget_motion *motion);
+void bst_error_budget_begin(bst_error_budget *budget, const bst_error_budget_motion *motion);
 
 /* Adds a source of the frame; it is copied.
  *
  * Errors:    BST_ERR_MEMORY */
-bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *crowd,
+bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *budget,
                                 const bst_error_budget_source *source) BST_MUST_CHECK;
 
 /* Adds light that any pixel may lack, e-: of sources too far away to be drawn. */
-void bst_error_budget_miss(bst_error_budget *crowd, double electrons);
+void bst_error_budget_miss(bst_error_budget *budget, double electrons);
 
 /* Largest error expected in any pixel, in its sigma. The work is done at the first call. */
-double bst_error_budget_error_sigma(bst_error_budget *crowd);
+double bst_error_budget_error_sigma(bst_error_budget *budget);
 
 #endif

@@ -159,26 +159,23 @@ static bst_status check(bst_ctx *ctx, const errand *e, int count, char **files, 
     return BST_OK;
 }
 
-static void print_help(const bst_option *table) {
-    printf(
-        "usage: boresight calibrate-obsgen SCENARIO.json... --out FILE [options]\n"
-        "       boresight calibrate-obsgen --check SCENARIO.json... [--calibration FILE] "
-        "[options]\n\n"
-        "Runs the image path of scenarios and fits to it what the observation generator takes from "
-        "measurement:\n"
-        "threshold, noise, Pd by SNR and streak length, false alarms, errors of places. The file "
-        "goes into the\n"
-        "scenario's obsgen block as calibration_file. Only the first sensor counts; each run has "
-        "another number.\n\n"
-        "With --check: runs each scenario with images and with the generator and compares them: "
-        "95 %% bootstrap\n"
-        "intervals over the runs, against the margins of equivalence. Exit code 1 when an interval "
-        "is not inside.\n\n"
-        "  boresight calibrate-obsgen scenarios/calibration/*.json --out obsgen.json\n"
-        "  boresight calibrate-obsgen --check scenarios/neossat_geo_track.json --calibration "
-        "obsgen.json --seeds 100\n\noptions:\n");
-    bst_options_print(stdout, table);
-}
+static const char help_text[] =
+    "usage: boresight calibrate-obsgen SCENARIO.json... --out FILE [options]\n"
+    "       boresight calibrate-obsgen --check SCENARIO.json... [--calibration FILE] "
+    "[options]\n\n"
+    "Runs the image path of scenarios and fits to it what the observation generator takes from "
+    "measurement:\n"
+    "threshold, noise, Pd by SNR and streak length, false alarms, errors of places. The file "
+    "goes into the\n"
+    "scenario's obsgen block as calibration_file. Only the first sensor counts; each run has "
+    "another number.\n\n"
+    "With --check: runs each scenario with images and with the generator and compares them: "
+    "95 % bootstrap\n"
+    "intervals over the runs, against the margins of equivalence. Exit code 1 when an interval "
+    "is not inside.\n\n"
+    "  boresight calibrate-obsgen scenarios/calibration/*.json --out obsgen.json\n"
+    "  boresight calibrate-obsgen --check scenarios/neossat_geo_track.json --calibration "
+    "obsgen.json --seeds 100\n\noptions:\n";
 
 int bst_cmd_calibrate_obsgen(int argc, char **argv) {
     errand e = {.load = BST_LOAD_DEFAULTS, .seeds = 2};
@@ -227,7 +224,8 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
         return bst_options_misuse(&ctx, "calibrate-obsgen");
     }
     if (help) {
-        print_help(table);
+        fputs(help_text, stdout);
+        bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
     if (arguments < 1) {

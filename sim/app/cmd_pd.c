@@ -162,25 +162,157 @@ static bst_status measure(bst_ctx *ctx, const pd_request *r, const bst_scenario 
     return status;
 }
 
-static void print_help(const bst_option *table) {
-    printf(
-        "usage: boresight pd SCENARIO.json [options]\n\n"
-        "Measures the detector of a scenario against theory. Frames of the scenario's camera are\n"
-        "filled with targets at random places, kept apart, of all SNRs in turn; its image\n"
-        "processing finds what it finds. Printed for each SNR: probability of detection with its\n"
-        "95 %% interval and the ideal one, Q(Q^-1(Pfa) - SNR), at the false alarms per frame that\n"
-        "were measured without targets; errors of place and flux over the Cramer-Rao bound. The\n"
-        "loss is 20 log10 of the SNR needed over the ideal one, at Pd 0.5 and 0.9.\n\n"
-        "SNR is sqrt(sum s^2) over the noise of a pixel without the source's own light. A\n"
-        "detection counts within one FWHM of the true place; along a streak within its half\n"
-        "length.\n\n"
-        "  boresight pd scenarios/neossat_geo_stare.json --snr 3:9:0.5 --trials 2000 --plot "
-        "pd.png\n"
-        "  boresight pd scenarios/neossat_geo_stare.json --streak 20 --known-rate --json "
-        "pd.json\n\n"
-        "options:\n");
-    bst_options_print(stdout, table);
-}
+static const char help_text[] =
+    "usage: boresight pd SCENARIO.json [options]\n\n"
+    "Measures the detector of a scenario against theory. Frames of the scenario's camera are\n"
+    "filled with targets at random places, kept apart, of all SNRs in turn; its image\n"
+    "processing finds what it finds. Printed for each SNR: probability of detection with its\n"
+    "95 % interval and the ideal one, Q(Q^-1(Pfa) - SNR), at the false alarms per frame that\n"
+    "were measured without targets; errors of place and flux over the Cramer-Rao bound. The\n"
+    "loss is 20 log10 of the SNR needed over the ideal one, at Pd 0.5 and 0.9.\n\n"
+    "SNR is sqrt(sum s^2) over the noise of a pixel without the source's own light. A\n"
+    "detection counts within one FWHM of the true place; along a streak within its half\n"
+    "length.\n\n"
+    "  boresight pd scenarios/neossat_geo_stare.json --snr 3:9:0.5 --trials 2000 --plot "
+    "pd.png\n"
+    "  boresight pd scenarios/neossat_geo_stare.json --streak 20 --known-rate --json "
+    "pd.json\n\n"
+    "options:\n";
+
+#define FIELD(member) .offset = offsetof(pd_request, member)
+
+static const bst_option OPTIONS[] = {
+    {.name = "snr",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(pd_request, range),
+     .argument = "FIRST:LAST:STEP",
+     .doc = "SNRs of the targets (default 2:12:0.5)"},
+    {.name = "magnitude",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(pd_request, magnitudes),
+     .argument = "FIRST:LAST:STEP",
+     .doc = "V magnitudes instead of SNRs"},
+    {.name = "trials",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(pd_request, options.trials),
+     .argument = "N",
+     .doc = "targets of each SNR (default 1000)",
+     .minimum = 1,
+     .maximum = 1e9},
+    {.name = "json",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(pd_request, json),
+     .path = BST_PATH_OUTPUT,
+     .argument = "FILE",
+     .doc = "write the figures there"},
+    {.name = "plot",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(pd_request, plot),
+     .path = BST_PATH_OUTPUT,
+     .argument = "FILE",
+     .doc = "draw Pd beside the ideal, and errors over bounds, as a PNG"},
+    {.name = "streak",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.streak_px),
+     .argument = "PX",
+     .doc = "length of the targets' streaks, each in a direction of its own (default 0: "
+            "points)",
+     .minimum = 0,
+     .maximum = 1000},
+    {.name = "stack",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(pd_request, options.stack),
+     .argument = "N",
+     .doc = "search N frames together, in which targets move at rates of their own; SNRs are of "
+            "one frame (default 0: each frame by itself)",
+     .minimum = 0,
+     .maximum = BST_STACK_MAX_FRAMES},
+    {.name = "rates",
+     .needs = "stack",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.rates_px),
+     .argument = "PX",
+     .doc = "greatest rate of the targets of a stack and of the search, px per frame in x and "
+            "in y (default 3)",
+     .minimum = 0.05,
+     .maximum = 16},
+    {.name = "known-rate",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(pd_request, options.known_rate),
+     .doc = "the camera turns, each frame in its own direction, and image processing is told"},
+    {.name = "false-alarms",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.false_alarms),
+     .argument = "PER_FRAME",
+     .doc = "asked of the detector (default: the scenario's)",
+     .minimum = 1e-6,
+     .maximum = 1e4},
+    {.name = "empty-frames",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(pd_request, options.empty_frames),
+     .argument = "N",
+     .doc = "frames without targets (default: for 400 false alarms, 50 to 400)",
+     .minimum = 1,
+     .maximum = 1e7},
+    {.name = "background",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.background_e),
+     .argument = "E",
+     .doc = "sky per pixel and exposure, electrons (default: the camera's)",
+     .minimum = 0,
+     .maximum = 1e6},
+    {.name = "jitter",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.jitter_px),
+     .argument = "PX",
+     .doc = "RMS per axis by which the image is blurred (default: jitter_px of imgproc)",
+     .minimum = 0,
+     .maximum = 5},
+    {.name = "apart",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.apart_px),
+     .argument = "PX",
+     .doc = "least distance between targets, their own length not counted (default 24)",
+     .minimum = 1,
+     .maximum = 1000},
+    {.name = "cell",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.cell_px),
+     .argument = "PX",
+     .doc = "one target in each square of this side (default: 40 more than they are apart)",
+     .minimum = 3,
+     .maximum = 32768},
+    {.name = "stars",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(pd_request, options.stars),
+     .doc = "keep the scenario's stars and sky, the camera rolled from frame to frame; what "
+            "may be a star of SNR 1 or more is no false alarm"},
+    {.name = "star-streak",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(pd_request, options.star_streak_px),
+     .argument = "PX",
+     .doc = "the camera turns with the targets, each frame in a direction of its own, so that "
+            "stars streak by this; image processing is told (default 0)",
+     .minimum = 0,
+     .maximum = 1000},
+    {.name = "module",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(pd_request, options.by_module),
+     .doc = "step the scenario's imgproc module as a run does; always so of one that does not "
+            "come with Boresight"},
+    {.name = "sensor",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(pd_request, options.sensor),
+     .argument = "OBSERVER/SENSOR",
+     .doc = "whose camera and detector (default the first)"},
+    BST_LOAD_OPTIONS_AT(FIELD, load),
+    BST_DEVICE_OPTIONS_AT(FIELD, options.device, threads),
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(pd_request, help),
+     .doc = "print this"},
+    {.name = NULL},
+};
 
 int bst_cmd_pd(int argc, char **argv) {
     pd_request r = {.load = BST_LOAD_DEFAULTS,
@@ -189,137 +321,8 @@ int bst_cmd_pd(int argc, char **argv) {
                                 .jitter_px = -1.0,
                                 .apart_px = 24.0,
                                 .rates_px = 3.0}};
-    bst_pd_options *o = &r.options;
-    const bst_option table[] = {
-        {.name = "snr",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.range,
-         .argument = "FIRST:LAST:STEP",
-         .doc = "SNRs of the targets (default 2:12:0.5)"},
-        {.name = "magnitude",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.magnitudes,
-         .argument = "FIRST:LAST:STEP",
-         .doc = "V magnitudes instead of SNRs"},
-        {.name = "trials",
-         .kind = BST_OPTION_INT,
-         .target = &o->trials,
-         .argument = "N",
-         .doc = "targets of each SNR (default 1000)",
-         .minimum = 1,
-         .maximum = 1e9},
-        {.name = "json",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.json,
-         .path = BST_PATH_OUTPUT,
-         .argument = "FILE",
-         .doc = "write the figures there"},
-        {.name = "plot",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.plot,
-         .path = BST_PATH_OUTPUT,
-         .argument = "FILE",
-         .doc = "draw Pd beside the ideal, and errors over bounds, as a PNG"},
-        {.name = "streak",
-         .kind = BST_OPTION_REAL,
-         .target = &o->streak_px,
-         .argument = "PX",
-         .doc = "length of the targets' streaks, each in a direction of its own (default 0: "
-                "points)",
-         .minimum = 0,
-         .maximum = 1000},
-        {.name = "stack",
-         .kind = BST_OPTION_INT,
-         .target = &o->stack,
-         .argument = "N",
-         .doc =
-             "search N frames together, in which targets move at rates of their own; SNRs are of "
-             "one frame (default 0: each frame by itself)",
-         .minimum = 0,
-         .maximum = BST_STACK_MAX_FRAMES},
-        {.name = "rates",
-         .needs = "stack",
-         .kind = BST_OPTION_REAL,
-         .target = &o->rates_px,
-         .argument = "PX",
-         .doc = "greatest rate of the targets of a stack and of the search, px per frame in x and "
-                "in y (default 3)",
-         .minimum = 0.05,
-         .maximum = 16},
-        {.name = "known-rate",
-         .kind = BST_OPTION_FLAG,
-         .target = &o->known_rate,
-         .doc = "the camera turns, each frame in its own direction, and image processing is told"},
-        {.name = "false-alarms",
-         .kind = BST_OPTION_REAL,
-         .target = &o->false_alarms,
-         .argument = "PER_FRAME",
-         .doc = "asked of the detector (default: the scenario's)",
-         .minimum = 1e-6,
-         .maximum = 1e4},
-        {.name = "empty-frames",
-         .kind = BST_OPTION_INT,
-         .target = &o->empty_frames,
-         .argument = "N",
-         .doc = "frames without targets (default: for 400 false alarms, 50 to 400)",
-         .minimum = 1,
-         .maximum = 1e7},
-        {.name = "background",
-         .kind = BST_OPTION_REAL,
-         .target = &o->background_e,
-         .argument = "E",
-         .doc = "sky per pixel and exposure, electrons (default: the camera's)",
-         .minimum = 0,
-         .maximum = 1e6},
-        {.name = "jitter",
-         .kind = BST_OPTION_REAL,
-         .target = &o->jitter_px,
-         .argument = "PX",
-         .doc = "RMS per axis by which the image is blurred (default: jitter_px of imgproc)",
-         .minimum = 0,
-         .maximum = 5},
-        {.name = "apart",
-         .kind = BST_OPTION_REAL,
-         .target = &o->apart_px,
-         .argument = "PX",
-         .doc = "least distance between targets, their own length not counted (default 24)",
-         .minimum = 1,
-         .maximum = 1000},
-        {.name = "cell",
-         .kind = BST_OPTION_REAL,
-         .target = &o->cell_px,
-         .argument = "PX",
-         .doc = "one target in each square of this side (default: 40 more than they are apart)",
-         .minimum = 3,
-         .maximum = 32768},
-        {.name = "stars",
-         .kind = BST_OPTION_FLAG,
-         .target = &o->stars,
-         .doc = "keep the scenario's stars and sky, the camera rolled from frame to frame; what "
-                "may be a star of SNR 1 or more is no false alarm"},
-        {.name = "star-streak",
-         .kind = BST_OPTION_REAL,
-         .target = &o->star_streak_px,
-         .argument = "PX",
-         .doc = "the camera turns with the targets, each frame in a direction of its own, so that "
-                "stars streak by this; image processing is told (default 0)",
-         .minimum = 0,
-         .maximum = 1000},
-        {.name = "module",
-         .kind = BST_OPTION_FLAG,
-         .target = &o->by_module,
-         .doc = "step the scenario's imgproc module as a run does; always so of one that does not "
-                "come with Boresight"},
-        {.name = "sensor",
-         .kind = BST_OPTION_TEXT,
-         .target = &o->sensor,
-         .argument = "OBSERVER/SENSOR",
-         .doc = "whose camera and detector (default the first)"},
-        BST_LOAD_OPTIONS(r.load),
-        BST_DEVICE_OPTIONS(o->device, r.threads),
-        {.name = "help", .kind = BST_OPTION_FLAG, .target = &r.help, .doc = "print this"},
-        {.name = NULL},
-    };
+    bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
+    bst_options_bind(OPTIONS, &r, table);
     bst_ctx ctx;
     bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
@@ -327,7 +330,8 @@ int bst_cmd_pd(int argc, char **argv) {
         return bst_options_misuse(&ctx, "pd");
     }
     if (r.help) {
-        print_help(table);
+        fputs(help_text, stdout);
+        bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
     if (bst_plot_check_path(&ctx, r.plot) != BST_OK) {

@@ -24,52 +24,114 @@ static const char help_text[] =
     "\n"
     "options:\n";
 
+typedef struct run_request {
+    bst_load_options load;
+    bst_simulation_options simulation;
+    const char *out, *replay;
+    int64_t threads;
+    bool help, overwrite, quiet, serial, force;
+} run_request;
+
+/* An option that says how peers connect has no effect without one. */
+static bst_status check_link(bst_ctx *ctx, const run_request *r, const bst_scenario *scenario,
+                             bst_simulation *sim) {
+    if ((!r->load.link && !r->load.link_keys) || bst_simulation_link(sim)) {
+        return BST_OK;
+    }
+    const char *option = r->load.link ? "link" : "link-keys";
+    return bst_fail(ctx, BST_ERR_ARGUMENT,
+                    "--%s: no module of %s is of type \"external\", so that no peer would be "
+                    "waited for: add --external MODULE,... or leave --%s out",
+                    option, scenario->file, option);
+}
+
+static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
+                             const bst_scenario *scenario) {
+    char default_out[128];
+    snprintf(default_out, sizeof default_out, "runs/%s", scenario->name);
+    const bst_run_request request = {.out = r->out ? r->out : default_out,
+                                     .overwrite = r->overwrite,
+                                     .force = r->force,
+                                     .progress = !r->quiet && isatty(STDERR_FILENO),
+                                     .print = true};
+    bst_simulation *sim = NULL;
+    bst_status status = bst_simulation_create(ctx, scenario, &r->simulation, &sim);
+    if (status != BST_OK) {
+        bst_json_name_file(ctx, json);
+    }
+    if (status == BST_OK) {
+        status = check_link(ctx, r, scenario, sim);
+    }
+    if (status == BST_OK) {
+        status = r->replay ? bst_run_link_replay(ctx, sim, r->replay)
+                           : bst_run_link_open(ctx, sim); /* before anything is written */
+    }
+    if (status == BST_OK) {
+        status = bst_check_rules_apply(ctx, scenario, sim);
+    }
+    if (status == BST_OK) {
+        status = bst_run_scenario(ctx, scenario, sim, &request, NULL);
+    }
+    if (status != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx->message);
+    }
+    bst_run_link_end(sim, status, ctx->message);
+    bst_simulation_free(sim);
+    return status;
+}
+
+#define FIELD(member) .offset = offsetof(run_request, member)
+
+static const bst_option OPTIONS[] = {
+    {.name = "out",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(run_request, out),
+     .path = BST_PATH_OUTPUT_FOLDER,
+     .argument = "FOLDER",
+     .doc = "where the results go (default runs/NAME)"},
+    {.name = "overwrite",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, overwrite),
+     .doc = "replace an earlier run there"},
+    {.name = "force",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, force),
+     .doc = "start although the frames will take more space than is free"},
+    BST_LINK_OPTIONS_AT(FIELD, load),
+    {.name = "replay",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(run_request, replay),
+     .path = BST_PATH_INPUT,
+     .argument = "RUN",
+     .doc = "external modules do what they did in the run of this folder, without their peers"},
+    BST_LOAD_OPTIONS_AT(FIELD, load),
+    BST_DEVICE_OPTIONS_AT(FIELD, simulation.device, threads),
+    {.name = "serial",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, serial),
+     .doc = "do not process and record beside the simulation; the results are the same"},
+    {.name = "quiet",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, quiet),
+     .doc = "no progress line"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, help),
+     .doc = "print this"},
+    {.name = NULL},
+};
+
 int bst_cmd_run(int argc, char **argv) {
-    bool help = false, overwrite = false, quiet = false;
-    const char *out = NULL, *replay = NULL;
-    bool serial = false, force = false;
-    bst_simulation_options sim_options = {0};
-    int64_t threads = 0;
-    bst_load_options load = BST_LOAD_DEFAULTS;
-    const bst_option table[] = {
-        {.name = "out",
-         .kind = BST_OPTION_TEXT,
-         .target = &out,
-         .path = BST_PATH_OUTPUT_FOLDER,
-         .argument = "FOLDER",
-         .doc = "where the results go (default runs/NAME)"},
-        {.name = "overwrite",
-         .kind = BST_OPTION_FLAG,
-         .target = &overwrite,
-         .doc = "replace an earlier run there"},
-        {.name = "force",
-         .kind = BST_OPTION_FLAG,
-         .target = &force,
-         .doc = "start although the frames will take more space than is free"},
-        BST_LINK_OPTIONS(load),
-        {.name = "replay",
-         .kind = BST_OPTION_TEXT,
-         .target = &replay,
-         .path = BST_PATH_INPUT,
-         .argument = "RUN",
-         .doc = "external modules do what they did in the run of this folder, without their peers"},
-        BST_LOAD_OPTIONS(load),
-        BST_DEVICE_OPTIONS(sim_options.device, threads),
-        {.name = "serial",
-         .kind = BST_OPTION_FLAG,
-         .target = &serial,
-         .doc = "do not process and record beside the simulation; the results are the same"},
-        {.name = "quiet", .kind = BST_OPTION_FLAG, .target = &quiet, .doc = "no progress line"},
-        {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
-        {.name = NULL},
-    };
+    run_request r = {.load = BST_LOAD_DEFAULTS};
+    bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
+    bst_options_bind(OPTIONS, &r, table);
     bst_ctx ctx;
     bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_INFO);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
     }
-    if (help) {
+    if (r.help) {
         fputs(help_text, stdout);
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
@@ -78,55 +140,22 @@ int bst_cmd_run(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "run");
     }
-    ctx.log_level = quiet ? BST_LOG_WARNING : BST_LOG_INFO;
-    sim_options.threads = (int)threads;
-    sim_options.parallel = !serial;
-    sim_options.pace = true;
-    sim_options.replay = replay != NULL;
-    if (bst_load_check(&ctx, &load, table) != BST_OK) {
+    ctx.log_level = r.quiet ? BST_LOG_WARNING : BST_LOG_INFO;
+    r.simulation.threads = (int)r.threads;
+    r.simulation.parallel = !r.serial;
+    r.simulation.pace = true;
+    r.simulation.replay = r.replay != NULL;
+    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
     }
     bst_json *json = NULL;
     bst_scenario scenario;
-    if (bst_load_scenario(&ctx, argv[1], &load, &json, &scenario) != BST_OK) {
+    if (bst_load_scenario(&ctx, argv[1], &r.load, &json, &scenario) != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
         return BST_EXIT_FAILED;
     }
-    char default_out[128];
-    snprintf(default_out, sizeof default_out, "runs/%s", scenario.name);
     bst_stop_catch_signals();
-    const bst_run_request request = {.out = out ? out : default_out,
-                                     .overwrite = overwrite,
-                                     .force = force,
-                                     .progress = !quiet && isatty(STDERR_FILENO),
-                                     .print = true};
-    bst_simulation *sim = NULL;
-    bst_status status = bst_simulation_create(&ctx, &scenario, &sim_options, &sim);
-    if (status != BST_OK) {
-        bst_json_name_file(&ctx, json);
-    }
-    if (status == BST_OK && (load.link || load.link_keys) && !bst_simulation_link(sim)) {
-        const char *option = load.link ? "link" : "link-keys";
-        status = bst_fail(&ctx, BST_ERR_ARGUMENT,
-                          "--%s: no module of %s is of type \"external\", so that no peer would be "
-                          "waited for: add --external MODULE,... or leave --%s out",
-                          option, scenario.file, option);
-    }
-    if (status == BST_OK) {
-        status = replay ? bst_run_link_replay(&ctx, sim, replay)
-                        : bst_run_link_open(&ctx, sim); /* before anything is written */
-    }
-    if (status == BST_OK) {
-        status = bst_check_rules_apply(&ctx, &scenario, sim);
-    }
-    if (status == BST_OK) {
-        status = bst_run_scenario(&ctx, &scenario, sim, &request, NULL);
-    }
-    if (status != BST_OK) {
-        fprintf(stderr, "boresight: %s\n", ctx.message);
-    }
-    bst_run_link_end(sim, status, ctx.message);
-    bst_simulation_free(sim);
+    bst_status status = run_loaded(&ctx, &r, json, &scenario);
     bst_scenario_free(&scenario);
     bst_json_free(json);
     return status == BST_OK                ? BST_EXIT_OK

@@ -22,22 +22,29 @@ static const char help_text[] =
     "\n"
     "options:\n";
 
-static int serve(bst_ctx *ctx, const char *file, const bst_load_options *load, const char *part,
-                 const char *address, bool shared, int threads, double timeout_s) {
+typedef struct serve_request {
+    bst_load_options load;
+    const char *part, *address;
+    int64_t threads;
+    double timeout_s;
+    bool help, shared;
+} serve_request;
+
+static int serve(bst_ctx *ctx, const char *file, const serve_request *r) {
     bst_json *json = NULL;
     bst_scenario scenario;
-    if (bst_load_scenario(ctx, file, load, &json, &scenario) != BST_OK) {
+    if (bst_load_scenario(ctx, file, &r->load, &json, &scenario) != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }
     bst_stop_catch_signals();
     bst_link_host *host = NULL;
     int reason = 0;
-    bst_status status = bst_link_host_create(ctx, &scenario, part, threads, &host);
+    bst_status status = bst_link_host_create(ctx, &scenario, r->part, (int)r->threads, &host);
     if (status == BST_OK) {
-        bst_link_host_use_keys(host, load->link_keys);
-        status =
-            bst_link_host_play(ctx, host, address, shared, timeout_s, bst_stop_requested, &reason);
+        bst_link_host_use_keys(host, r->load.link_keys);
+        status = bst_link_host_play(ctx, host, r->address, r->shared, r->timeout_s,
+                                    bst_stop_requested, &reason);
     }
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
@@ -51,48 +58,44 @@ static int serve(bst_ctx *ctx, const char *file, const bst_load_options *load, c
 }
 
 int bst_cmd_serve(int argc, char **argv) {
-    bool help = false, shared = false;
-    const char *part = NULL, *address = NULL;
-    int64_t threads = 0;
-    double timeout_s = 60.0;
-    bst_load_options load = BST_LOAD_DEFAULTS;
+    serve_request r = {.load = BST_LOAD_DEFAULTS, .timeout_s = 60.0};
     const bst_option table[] = {
         {.name = "link",
          .kind = BST_OPTION_TEXT,
-         .target = &address,
+         .target = &r.address,
          .argument = "ADDRESS",
          .doc = "where the run is: tcp://127.0.0.1:PORT or ipc://PATH"},
         {.name = "link-keys",
          .kind = BST_OPTION_TEXT,
-         .target = &load.link_keys,
+         .target = &r.load.link_keys,
          .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "keys of boresight link-keys, where the run asks for them"},
         {.name = "part",
          .kind = BST_OPTION_TEXT,
-         .target = &part,
+         .target = &r.part,
          .argument = "MODULE",
          .doc = "imgproc, tracker, control, or OBSERVER/SENSOR/MODULE"},
         {.name = "shared-memory",
          .kind = BST_OPTION_FLAG,
-         .target = &shared,
+         .target = &r.shared,
          .doc = "take frames by shared memory where the run offers it"},
         {.name = "timeout",
          .kind = BST_OPTION_REAL,
-         .target = &timeout_s,
+         .target = &r.timeout_s,
          .argument = "S",
          .doc = "end when nothing has come for so long (default 60)",
          .minimum = 0.1,
          .maximum = 1e6},
-        BST_LOAD_OPTIONS(load),
+        BST_LOAD_OPTIONS(r.load),
         {.name = "threads",
          .kind = BST_OPTION_INT,
-         .target = &threads,
+         .target = &r.threads,
          .argument = "N",
          .doc = "threads (default: one per processor)",
          .minimum = 0,
          .maximum = 1024},
-        {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
+        {.name = "help", .kind = BST_OPTION_FLAG, .target = &r.help, .doc = "print this"},
         {.name = NULL},
     };
     bst_ctx ctx;
@@ -101,17 +104,17 @@ int bst_cmd_serve(int argc, char **argv) {
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "serve");
     }
-    if (help) {
+    if (r.help) {
         fputs(help_text, stdout);
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
-    if (arguments != 1 || !part || !address) {
+    if (arguments != 1 || !r.part || !r.address) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file, --part and --link are expected");
         return bst_options_misuse(&ctx, "serve");
     }
-    if (bst_load_check(&ctx, &load, table) != BST_OK) {
+    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "serve");
     }
-    return serve(&ctx, argv[1], &load, part, address, shared, (int)threads, timeout_s);
+    return serve(&ctx, argv[1], &r);
 }

@@ -3,7 +3,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "sim/app/cmd_stars.h"
+#include "sim/app/app.h"
 #include "sim/catalogue/star_fetch.h"
 #include "sim/catalogue/star_import.h"
 #include "sim/catalogue/stars.h"

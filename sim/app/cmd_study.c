@@ -1,29 +1,24 @@
 /* boresight study: expands a study into runs, has them executed, and makes tables of them. */
 #include <cjson/cJSON.h>
-#include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include "sim/core/text.h"
 
 #include "sim/app/app.h"
 #include "sim/cli/options.h"
 #include "sim/cli/stop_signals.h"
-#include "sim/core/folder.h"
+#include "sim/core/text.h"
 #include "sim/core/wall_clock.h"
 #include "sim/io/draft_file.h"
-#include "sim/io/manifest.h"
 #include "sim/io/run_store.h"
 #include "sim/studies/driver.h"
 #include "sim/studies/local_pool.h"
 #include "sim/studies/shard_run.h"
+#include "sim/studies/study_folder.h"
 #include "sim/studies/tables.h"
 #include "sim/study_kinds/study_devices.h"
 #include "sim/study_kinds/study_kinds.h"
@@ -39,87 +34,6 @@ typedef struct study_request {
     bool resume, dry_run, quiet, schema, help, unpinned, slurm;
     bst_study_devices devices; /* of `device` */
 } study_request;
-
-/* ------------------------------------------------------------------ the folder */
-
-/* Locks the folder against another driver; -1 with a message. */
-static int lock_folder(bst_ctx *ctx, const char *out, bool shared) {
-    char path[4200];
-    snprintf(path, sizeof path, "%.4000s/lock", out);
-    int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd < 0) {
-        bst_fail(ctx, BST_ERR_IO, "%s: %s", path, strerror(errno));
-        return -1;
-    }
-    if (flock(fd, (shared ? LOCK_SH : LOCK_EX) | LOCK_NB) != 0) {
-        bst_fail(ctx, BST_ERR_IO,
-                 "%s: another boresight study is at work there; wait for it, or choose another "
-                 "folder with --out",
-                 out);
-        close(fd);
-        return -1;
-    }
-    return fd;
-}
-
-/* The study of the folder is this one, or there is none yet. */
-static bst_status settle_study(bst_ctx *ctx, const bst_study *study, const char *out, bool resume) {
-    char path[4200];
-    bst_study there;
-    snprintf(path, sizeof path, "%.4000s/study.json", out);
-    if (access(path, F_OK) == 0) {
-        bst_ctx quiet = {0};
-        bool same = bst_study_open(&quiet, path, &there) == BST_OK &&
-                    strcmp(there.digest, study->digest) == 0;
-        bst_study_close(&there);
-        if (!same) {
-            return bst_fail(ctx, BST_ERR_STATE,
-                            "%s: holds another study, or this one before it or its scenarios were "
-                            "changed; choose another folder with --out",
-                            out);
-        }
-        return resume ? BST_OK
-                      : bst_fail(ctx, BST_ERR_STATE,
-                                 "%s: holds this study already; go on with --resume, or choose "
-                                 "another folder with --out",
-                                 out);
-    }
-    cJSON *echo = bst_study_echo(study);
-    char *text = echo ? cJSON_Print(echo) : NULL;
-    cJSON_Delete(echo);
-    bst_status status = text ? bst_io_write_file_atomic(ctx, path, text, strlen(text))
-                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
-    free(text);
-    return status;
-}
-
-static bst_status open_folder(bst_ctx *ctx, const bst_study *study, const char *out, bool resume,
-                              bool shared, int *lock) {
-    char shards[4200];
-    *lock = -1;
-    if (!resume) {
-        char path[4200];
-        snprintf(path, sizeof path, "%.4000s/study.json", out);
-        if (access(path, F_OK) != 0 && rmdir(out) != 0 && errno == ENOTEMPTY) {
-            return bst_fail(ctx, BST_ERR_IO,
-                            "%s: is in the way and holds no study; choose another folder with "
-                            "--out",
-                            out);
-        }
-    }
-    snprintf(shards, sizeof shards, "%.4000s/shards", out);
-    BST_TRY(bst_folder_make(ctx, shards));
-    *lock = lock_folder(ctx, out, shared);
-    if (*lock < 0) {
-        return BST_ERR_IO;
-    }
-    bst_status status = settle_study(ctx, study, out, resume || shared);
-    if (status != BST_OK) {
-        close(*lock);
-        *lock = -1;
-    }
-    return status;
-}
 
 /* ------------------------------------------------------------------ execution */
 
@@ -193,41 +107,49 @@ static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_st
     }
 }
 
-static bst_status open_pool(bst_ctx *ctx, const study_request *r, const bst_study *study,
-                            const bst_study_kind *kind, const char *out, int lock,
-                            bst_executor *executor) {
+/* A study that is executed. */
+typedef struct work {
+    const study_request *request;
+    const bst_study *study;
+    const bst_study_kind *kind;
+    const char *out; /* the folder */
+    int lock;        /* its lock */
+} work;
+
+static bst_status open_pool(bst_ctx *ctx, const work *w, bst_executor *executor) {
+    const study_request *r = w->request;
     const bst_local_pool_options pool = {.devices = r->devices.list,
                                          .device_count = r->devices.count,
                                          .cores = (int)r->cores,
-                                         .study = study,
-                                         .kind = kind,
-                                         .out = out,
+                                         .study = w->study,
+                                         .kind = w->kind,
+                                         .out = w->out,
                                          .workers = (int)r->workers,
-                                         .lock_fd = lock,
+                                         .lock_fd = w->lock,
                                          .unpinned = r->unpinned};
     return bst_local_pool_open(ctx, &pool, executor);
 }
 
-static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study *study,
-                          const bst_study_kind *kind, const char *out, int lock,
-                          bst_results *results, bst_driver_outcome *outcome) {
+static bst_status execute(bst_ctx *ctx, const work *w, bst_results *results,
+                          bst_driver_outcome *outcome) {
+    const study_request *r = w->request;
     bst_executor executor;
     shown line = {.on = !r->quiet && isatty(STDERR_FILENO) == 1};
     const bst_driver_options options = {
-        .out = out,
-        .kind = kind,
+        .out = w->out,
+        .kind = w->kind,
         .shard_s = r->slurm ? SLURM_SHARD_S : SHARD_S,
         .shard_runs = r->shard_runs,
         .parallel = r->slurm ? 0 : bst_local_workers((int)r->workers, r->devices.count),
         .probe = r->slurm,
         .progress = show,
         .user = &line};
-    BST_TRY(bst_results_load_folder(ctx, results, out, 0, study->runs, true));
-    forget_what_is_gone(ctx, results, kind, out);
+    BST_TRY(bst_results_load_folder(ctx, results, w->out, 0, w->study->runs, true));
+    forget_what_is_gone(ctx, results, w->kind, w->out);
     if (r->slurm) {
-        BST_TRY(bst_study_slurm(ctx, r->site, r->device ? r->device : "", out, &executor));
+        BST_TRY(bst_study_slurm(ctx, r->site, r->device ? r->device : "", w->out, &executor));
     } else {
-        BST_TRY(open_pool(ctx, r, study, kind, out, lock, &executor));
+        BST_TRY(open_pool(ctx, w, &executor));
     }
     bst_status status = bst_driver_run(ctx, results, &executor, &options, outcome);
     executor.close(executor.self);
@@ -247,13 +169,14 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }
-    bst_status status = open_folder(ctx, study, out, r->resume, false, &lock);
+    bst_status status = bst_study_folder_open(ctx, study, out, r->resume, false, &lock);
     if (status == BST_OK) {
         bst_draft_sweep(out); /* under the lock: a driver's that was killed */
         status = bst_study_plugins_settle(ctx, kind->user, out);
     }
     if (status == BST_OK) {
-        status = execute(ctx, r, study, kind, out, lock, &results, &outcome);
+        const work w = {r, study, kind, out, lock};
+        status = execute(ctx, &w, &results, &outcome);
     }
     if (status == BST_OK && outcome.missing == 0) {
         bst_results_sort(&results);
@@ -337,7 +260,7 @@ static int run_shard(bst_ctx *ctx, const study_request *r, const bst_study *stud
     bst_status status = bst_results_create(ctx, study, kind, &results);
     /* a driver that is at work holds the folder's lock, and asks for exact runs */
     if (status == BST_OK && !exact) {
-        status = open_folder(ctx, study, out, true, true, &lock);
+        status = bst_study_folder_open(ctx, study, out, true, true, &lock);
     }
     if (status == BST_OK) {
         status = bst_results_load_folder(ctx, &results, out, part.first, part.count, false);
@@ -477,87 +400,96 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
     return code;
 }
 
+static const bst_option OPTIONS[] = {
+    {.name = "out",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(study_request, out),
+     .path = BST_PATH_OUTPUT_FOLDER,
+     .argument = "FOLDER",
+     .doc = "where the results go (default studies/NAME)"},
+    {.name = "workers",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(study_request, workers),
+     .argument = "N",
+     .doc = "worker processes (default: one a core, or one for each of --device)",
+     .minimum = 1,
+     .maximum = 1024},
+    {.name = "cores",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(study_request, cores),
+     .argument = "N",
+     .doc = "cores of each worker (default: all, in equal parts)",
+     .minimum = 1,
+     .maximum = 1024},
+    {.name = "device",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(study_request, device),
+     .argument = "NAME,...",
+     .doc = "OpenCL devices by part of a name or P:D, which the workers take in turn"},
+    {.name = "slurm",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, slurm),
+     .doc = "execute on a cluster, as job arrays of Slurm (docs/how-to/slurm.md)"},
+    {.name = "site",
+     .needs = "slurm",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(study_request, site),
+     .path = BST_PATH_INPUT,
+     .argument = "FILE",
+     .doc = "what --slurm is to know of the cluster: account, partition, time (default "
+            "boresight/slurm.json in the user's configuration folder, where there is one)"},
+    {.name = "resume",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, resume),
+     .doc = "do what is missing of a study that was begun there"},
+    {.name = "dry-run",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, dry_run),
+     .doc = "only check the study, and tell its runs, time and disk"},
+    {.name = "emit",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(study_request, emit),
+     .argument = "N",
+     .doc = "write the scenario of run N to the standard output, and how to run it by hand to "
+            "the standard error",
+     .minimum = 0,
+     .maximum = 1e9},
+    {.name = "shard",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(study_request, shard),
+     .argument = "I/N",
+     .doc = "execute part I of N here, for a scheduler of your own (or FIRST:COUNT); then "
+            "--resume for the tables"},
+    {.name = "shard-runs",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(study_request, shard_runs),
+     .argument = "N",
+     .doc = "runs that a worker does at a time (default: some seconds' worth)",
+     .minimum = 1,
+     .maximum = 1e6},
+    {.name = "unpinned",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, unpinned),
+     .doc = "do not bind workers to cores"},
+    {.name = "schema",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, schema),
+     .doc = "print the JSON Schema of studies"},
+    {.name = "quiet",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, quiet),
+     .doc = "no progress line"},
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(study_request, help),
+     .doc = "print this"},
+    {.name = NULL},
+};
+
 int bst_cmd_study(int argc, char **argv) {
     study_request r = {.emit = -1};
-    const bst_option table[] = {
-        {.name = "out",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.out,
-         .path = BST_PATH_OUTPUT_FOLDER,
-         .argument = "FOLDER",
-         .doc = "where the results go (default studies/NAME)"},
-        {.name = "workers",
-         .kind = BST_OPTION_INT,
-         .target = &r.workers,
-         .argument = "N",
-         .doc = "worker processes (default: one a core, or one for each of --device)",
-         .minimum = 1,
-         .maximum = 1024},
-        {.name = "cores",
-         .kind = BST_OPTION_INT,
-         .target = &r.cores,
-         .argument = "N",
-         .doc = "cores of each worker (default: all, in equal parts)",
-         .minimum = 1,
-         .maximum = 1024},
-        {.name = "device",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.device,
-         .argument = "NAME,...",
-         .doc = "OpenCL devices by part of a name or P:D, which the workers take in turn"},
-        {.name = "slurm",
-         .kind = BST_OPTION_FLAG,
-         .target = &r.slurm,
-         .doc = "execute on a cluster, as job arrays of Slurm (docs/how-to/slurm.md)"},
-        {.name = "site",
-         .needs = "slurm",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.site,
-         .path = BST_PATH_INPUT,
-         .argument = "FILE",
-         .doc = "what --slurm is to know of the cluster: account, partition, time (default "
-                "boresight/slurm.json in the user's configuration folder, where there is one)"},
-        {.name = "resume",
-         .kind = BST_OPTION_FLAG,
-         .target = &r.resume,
-         .doc = "do what is missing of a study that was begun there"},
-        {.name = "dry-run",
-         .kind = BST_OPTION_FLAG,
-         .target = &r.dry_run,
-         .doc = "only check the study, and tell its runs, time and disk"},
-        {.name = "emit",
-         .kind = BST_OPTION_INT,
-         .target = &r.emit,
-         .argument = "N",
-         .doc = "write the scenario of run N to the standard output, and how to run it by hand to "
-                "the standard error",
-         .minimum = 0,
-         .maximum = 1e9},
-        {.name = "shard",
-         .kind = BST_OPTION_TEXT,
-         .target = &r.shard,
-         .argument = "I/N",
-         .doc = "execute part I of N here, for a scheduler of your own (or FIRST:COUNT); then "
-                "--resume for the tables"},
-        {.name = "shard-runs",
-         .kind = BST_OPTION_INT,
-         .target = &r.shard_runs,
-         .argument = "N",
-         .doc = "runs that a worker does at a time (default: some seconds' worth)",
-         .minimum = 1,
-         .maximum = 1e6},
-        {.name = "unpinned",
-         .kind = BST_OPTION_FLAG,
-         .target = &r.unpinned,
-         .doc = "do not bind workers to cores"},
-        {.name = "schema",
-         .kind = BST_OPTION_FLAG,
-         .target = &r.schema,
-         .doc = "print the JSON Schema of studies"},
-        {.name = "quiet", .kind = BST_OPTION_FLAG, .target = &r.quiet, .doc = "no progress line"},
-        {.name = "help", .kind = BST_OPTION_FLAG, .target = &r.help, .doc = "print this"},
-        {.name = NULL},
-    };
+    bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
+    bst_options_bind(OPTIONS, &r, table);
     bst_ctx ctx;
     bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
     int arguments = 0;

@@ -10,16 +10,14 @@
 
 #define MAX_FILE_BYTES ((uint64_t)64 << 20)
 
+static const char NO_MEMORY[] = "no memory for the Earth-orientation table";
+
 struct bst_astro_eop {
     int first_mjd; /* of rows[0], 0h UTC */
     int count;     /* >= 2 */
     bst_astro_eop_values *rows;
     bst_astro_eop_prediction after;
 };
-
-static bst_status out_of_memory(bst_ctx *ctx) {
-    return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the Earth-orientation table");
-}
 
 bst_status bst_astro_eop_builtin(bst_ctx *ctx, bst_astro_eop **out) {
     int count = bst_eop_table_rows;
@@ -28,7 +26,7 @@ bst_status bst_astro_eop_builtin(bst_ctx *ctx, bst_astro_eop **out) {
     if (!eop || !rows) {
         free(eop);
         free(rows);
-        return out_of_memory(ctx);
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s", NO_MEMORY);
     }
     for (int i = 0; i < count; i++) {
         const bst_eop_table_row *row = &bst_eop_table[i];
@@ -112,7 +110,7 @@ static bst_status append_row(bst_ctx *ctx, bst_astro_eop *eop, int *capacity, in
         int grown = *capacity ? 2 * *capacity : 1024;
         bst_astro_eop_values *rows = realloc(eop->rows, (size_t)grown * sizeof *rows);
         if (!rows) {
-            return out_of_memory(ctx);
+            return bst_fail(ctx, BST_ERR_MEMORY, "%s", NO_MEMORY);
         }
         eop->rows = rows;
         *capacity = grown;
@@ -185,7 +183,8 @@ bst_status bst_astro_eop_read_buffer(bst_ctx *ctx, const char *name, const char 
     *out = NULL;
     BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     bst_astro_eop *eop = calloc(1, sizeof *eop);
-    bst_status status = eop ? read_rows(ctx, name, data, bytes, eop) : out_of_memory(ctx);
+    bst_status status = eop ? read_rows(ctx, name, data, bytes, eop)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "%s", NO_MEMORY);
     if (status == BST_OK) {
         status =
             bst_astro_eop_prediction_fit(ctx, eop->first_mjd, eop->count, eop->rows, &eop->after);

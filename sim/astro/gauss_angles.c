@@ -13,16 +13,25 @@ static double quintic(double a, double b, double c, double x) {
     return x * x * x * (8.0 * x * x + 6.0 * a) + 3.0 * b;
 }
 
-/* The zero of f between two places where its signs differ. */
-static double bisect(double (*f)(double, double, double, double), double a, double b, double c,
-                     double low, double high) {
-    bool rising = f(a, b, c, high) > 0.0;
+/* A polynomial with its coefficients. */
+typedef struct polynomial {
+    double (*f)(double a, double b, double c, double x);
+    double a, b, c;
+} polynomial;
+
+static double value_of(const polynomial *p, double x) {
+    return p->f(p->a, p->b, p->c, x);
+}
+
+/* The zero between two places where its signs differ. */
+static double bisect(const polynomial *p, double low, double high) {
+    bool rising = value_of(p, high) > 0.0;
     for (int i = 0; i < 200; i++) {
         double middle = 0.5 * (low + high);
         if (middle == low || middle == high) {
             break;
         }
-        if ((f(a, b, c, middle) > 0.0) == rising) {
+        if ((value_of(p, middle) > 0.0) == rising) {
             high = middle;
         } else {
             low = middle;
@@ -31,14 +40,14 @@ static double bisect(double (*f)(double, double, double, double), double a, doub
     return 0.5 * (low + high);
 }
 
-/* Adds the sign changes of f between neighbours of `knots` to `zeros`. */
-static int zeros_between(double (*f)(double, double, double, double), double a, double b, double c,
-                         const double *knots, int count, double *zeros, int room) {
+/* Adds the sign changes between neighbours of `knots` to `zeros`. */
+static int zeros_between(const polynomial *p, const double *knots, int count, double *zeros,
+                         int room) {
     int found = 0;
     for (int i = 0; i + 1 < count && found < room; i++) {
-        double left = f(a, b, c, knots[i]), right = f(a, b, c, knots[i + 1]);
+        double left = value_of(p, knots[i]), right = value_of(p, knots[i + 1]);
         if ((left > 0.0) != (right > 0.0)) {
-            zeros[found++] = bisect(f, a, b, c, knots[i], knots[i + 1]);
+            zeros[found++] = bisect(p, knots[i], knots[i + 1]);
         }
     }
     return found;
@@ -59,13 +68,13 @@ int bst_gauss_roots(double a, double b, double c, double roots[BST_GAUSS_ROOTS])
         knots[count++] = sqrt(-18.0 * a / 40.0);
     }
     knots[count++] = 2.5;
-    int turns = zeros_between(quintic, a, b, c, knots, count, turning, 2);
+    int turns = zeros_between(&(polynomial){quintic, a, b, c}, knots, count, turning, 2);
     count = 1;
     for (int i = 0; i < turns; i++) {
         knots[count++] = turning[i];
     }
     knots[count++] = 2.5;
-    int found = zeros_between(octic, a, b, c, knots, count, roots, BST_GAUSS_ROOTS);
+    int found = zeros_between(&(polynomial){octic, a, b, c}, knots, count, roots, BST_GAUSS_ROOTS);
     for (int i = 0; i < found; i++) {
         roots[i] *= unit;
     }

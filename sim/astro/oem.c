@@ -84,18 +84,13 @@ static bst_status fail_line(const reader *r, const char *problem, const char *ex
     return bst_text_fail_at(&r->source, &r->line, problem, r->line.text, r->line.length, expected);
 }
 
-static bst_status fail_memory(const reader *r) {
-    return bst_fail(r->source.ctx, BST_ERR_MEMORY, "%.400s: no memory for its states",
-                    r->source.name);
-}
-
 static bst_status append_row(const reader *r, const bst_astro_table_state *row) {
     bst_oem *oem = r->oem;
     if (oem->row_count == oem->row_capacity) {
         int64_t capacity = oem->row_capacity ? 2 * oem->row_capacity : 64;
         bst_astro_table_state *rows = realloc(oem->rows, (size_t)capacity * sizeof *rows);
         if (!rows) {
-            return fail_memory(r);
+            return bst_text_fail_memory(&r->source, "states");
         }
         oem->rows = rows;
         oem->row_capacity = capacity;
@@ -111,7 +106,7 @@ static bst_status append_segment(const reader *r) {
         bst_oem_segment_rows *segments =
             realloc(oem->segments, (size_t)capacity * sizeof *segments);
         if (!segments) {
-            return fail_memory(r);
+            return bst_text_fail_memory(&r->source, "states");
         }
         oem->segments = segments;
         oem->segment_capacity = capacity;
@@ -508,7 +503,8 @@ bst_status bst_oem_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     if (r.oem) {
         r.oem->name = strdup(name);
     }
-    bst_status status = r.oem && r.oem->name ? read_lines(&r, data, bytes) : fail_memory(&r);
+    bst_status status = r.oem && r.oem->name ? read_lines(&r, data, bytes)
+                                             : bst_text_fail_memory(&r.source, "states");
     if (status == BST_OK) {
         status = bst_oem_sort(ctx, r.oem);
     }

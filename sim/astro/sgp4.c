@@ -45,93 +45,108 @@ static void solve_kepler(double u, double ax, double ay, double *sin_e, double *
     *cos_e = c;
 }
 
-bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *s, double minutes, double position_teme_km[3],
-                                  double velocity_teme_kmps[3]) {
-    /* Comparisons are written so that NaN takes the error branch. */
-    const double t = minutes;
-    if (!(fabs(t) <= MAX_MINUTES)) {
-        return BST_SGP4_MEAN_MOTION;
-    }
-
-    /* Secular gravity and drag: STR3 section 6; HSG appendix B. */
-    bst_sgp4_mean x = {.n = s->n0,
-                       .e = s->e0,
-                       .i = s->i0,
-                       .m = s->m0 + s->m_rate * t,
-                       .argp = s->argp0 + s->argp_rate * t,
-                       .raan = s->raan0 + t * (s->raan_rate + t * s->raan_drag)};
-    double a = s->a0, root_a_ratio, e_loss, l_gain;
+/* Secular gravity and drag: STR3 section 6; HSG appendix B. *a: semi-major axis. */
+static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, double *a) {
+    *x = (bst_sgp4_mean){.n = s->n0,
+                         .e = s->e0,
+                         .i = s->i0,
+                         .m = s->m0 + s->m_rate * t,
+                         .argp = s->argp0 + s->argp_rate * t,
+                         .raan = s->raan0 + t * (s->raan_rate + t * s->raan_drag)};
+    double root_a_ratio, e_loss, l_gain;
     if (s->short_drag) {
         root_a_ratio = 1.0 - s->a_drag[0] * t;
         e_loss = s->e_drag * t;
         l_gain = s->l_drag[0] * t * t;
     } else {
-        double sin_m = sin(x.m), cos_m = cos(x.m);
+        double sin_m = sin(x->m), cos_m = cos(x->m);
         double w = 1.0 + s->eta * cos_m;
         double shift = s->argp_drag * t + s->m_drag * (w * w * w - s->cube_m0);
-        x.m += shift;
-        x.argp -= shift;
-        bst_sgp4_turn(x.m, shift, &sin_m, &cos_m);
+        x->m += shift;
+        x->argp -= shift;
+        bst_sgp4_turn(x->m, shift, &sin_m, &cos_m);
         const double *ad = s->a_drag, *ld = s->l_drag;
         root_a_ratio = 1.0 - t * (ad[0] + t * (ad[1] + t * (ad[2] + t * ad[3])));
         e_loss = s->e_drag * t + s->e_drag_sin * (sin_m - s->sin_m0);
         l_gain = t * t * (ld[0] + t * (ld[1] + t * (ld[2] + t * ld[3])));
     }
+    *a = s->a0;
     if (s->deep_space) {
-        bst_sgp4_deep_secular(s, t, &x);
-        if (!(x.n > 0.0)) {
+        bst_sgp4_deep_secular(s, t, x);
+        if (!(x->n > 0.0)) {
             return BST_SGP4_MEAN_MOTION;
         }
         if (s->deep.resonance != BST_SGP4_NOT_RESONANT) {
-            double root = cbrt(s->k.ke / x.n);
-            a = root * root;
+            double root = cbrt(s->k.ke / x->n);
+            *a = root * root;
         }
     }
-    a *= root_a_ratio * root_a_ratio;
-    x.e -= e_loss;
-    x.m += l_gain;
+    *a *= root_a_ratio * root_a_ratio;
+    x->e -= e_loss;
+    x->m += l_gain;
     /* Summed and wrapped as the reference does: after years the rounding of this sum, at perigee of
      * an eccentric orbit, is the largest of all. */
-    x.m = fmod(x.m + x.argp + x.raan, BST_SGP4_TWO_PI) - x.argp - x.raan;
-    if (!(x.e < 1.0 && x.e >= -0.001)) {
+    x->m = fmod(x->m + x->argp + x->raan, BST_SGP4_TWO_PI) - x->argp - x->raan;
+    if (!(x->e < 1.0 && x->e >= -0.001)) {
         return BST_SGP4_MEAN_ECCENTRICITY;
     }
-    if (x.e < 1e-6) {
-        x.e = 1e-6; /* VCHK */
+    if (x->e < 1e-6) {
+        x->e = 1e-6; /* VCHK */
     }
+    return BST_SGP4_OK;
+}
 
+/* Disturbed elements with the plane that they lie in. */
+typedef struct disturbed {
+    bst_sgp4_mean x;
+    double a, ax, ay, u; /* ax, ay: eccentricity vector; u: mean argument of latitude */
+    double p;            /* semi-latus rectum */
     double sin_raan, cos_raan;
-    const bst_sgp4_plane *plane = &s->plane;
-    bst_sgp4_plane moved;
+    bst_sgp4_plane plane;
+} disturbed;
+
+/* Sun and Moon, then the long periodics by J3; the node drops out of the argument of Kepler's
+ * equation. */
+static bst_sgp4_error add_long_periodics(const bst_sgp4 *s, double t, disturbed *d) {
+    bst_sgp4_mean *x = &d->x;
+    d->plane = s->plane;
     if (s->deep_space) {
         double i[2], node[2];
-        bst_sgp4_deep_periodic(s, t, &x, i, node);
-        if (!(x.e >= 0.0 && x.e <= 1.0)) {
+        bst_sgp4_deep_periodic(s, t, x, i, node);
+        if (!(x->e >= 0.0 && x->e <= 1.0)) {
             return BST_SGP4_PERTURBED_ECCENTRICITY;
         }
-        bst_sgp4_set_plane(&s->k, i[0], i[1], &moved);
-        plane = &moved;
-        sin_raan = node[0];
-        cos_raan = node[1];
+        bst_sgp4_set_plane(&s->k, i[0], i[1], &d->plane);
+        d->sin_raan = node[0];
+        d->cos_raan = node[1];
     } else {
-        sin_raan = sin(x.raan);
-        cos_raan = cos(x.raan);
+        d->sin_raan = sin(x->raan);
+        d->cos_raan = cos(x->raan);
     }
+    double inv_p_mean = 1.0 / (d->a * (1.0 - x->e * x->e));
+    d->ax = x->e * cos(x->argp);
+    d->ay = x->e * sin(x->argp) + inv_p_mean * d->plane.y_long;
+    d->u = x->m + x->argp + inv_p_mean * d->plane.l_long * d->ax;
+    double e2 = d->ax * d->ax + d->ay * d->ay;
+    d->p = d->a * (1.0 - e2);
+    return d->p >= 0.0 ? BST_SGP4_OK : BST_SGP4_SEMI_LATUS_RECTUM;
+}
 
-    /* Long periodics by J3; the node drops out of the argument of Kepler's equation. */
-    double inv_p_mean = 1.0 / (a * (1.0 - x.e * x.e));
-    double ax = x.e * cos(x.argp);
-    double ay = x.e * sin(x.argp) + inv_p_mean * plane->y_long;
-    double u = x.m + x.argp + inv_p_mean * plane->l_long * ax;
+/* Radius, speeds and angles with the short periodics. */
+typedef struct osculating {
+    double r, v_radial, v_along;
+    double sin_u, cos_u, sin_i, cos_i, sin_raan, cos_raan;
+} osculating;
+
+/* By J2, lengths in Earth radii, speeds in units of ke. */
+static osculating add_short_periodics(const bst_sgp4 *s, const disturbed *d) {
+    const bst_sgp4_plane *plane = &d->plane;
+    const bst_sgp4_mean *x = &d->x;
+    double a = d->a, ax = d->ax, ay = d->ay, p = d->p;
     double e2 = ax * ax + ay * ay;
-    double p = a * (1.0 - e2);
-    if (!(p >= 0.0)) {
-        return BST_SGP4_SEMI_LATUS_RECTUM;
-    }
     double sin_e, cos_e;
-    solve_kepler(u, ax, ay, &sin_e, &cos_e);
+    solve_kepler(d->u, ax, ay, &sin_e, &cos_e);
 
-    /* Short periodics by J2, lengths in Earth radii, speeds in units of ke. */
     double e_cos_e = ax * cos_e + ay * sin_e;
     double e_sin_e = ax * sin_e - ay * cos_e;
     double beta = sqrt(1.0 - e2);
@@ -150,36 +165,57 @@ bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *s, double minutes, double posi
     double g2 = g1 * inv_p;
     double n = 1.0 / (a * root_a);
 
-    double r_now =
-        r * (1.0 - 1.5 * g2 * beta * plane->three_c2_m1) + 0.5 * g1 * plane->one_m_c2 * cos_2u;
+    osculating o = {.sin_i = plane->sin_i,
+                    .cos_i = plane->cos_i,
+                    .sin_raan = d->sin_raan,
+                    .cos_raan = d->cos_raan};
+    o.r = r * (1.0 - 1.5 * g2 * beta * plane->three_c2_m1) + 0.5 * g1 * plane->one_m_c2 * cos_2u;
     double u_shift = -0.25 * g2 * plane->seven_c2_m1 * sin_2u;
     double raan_shift = 1.5 * g2 * plane->cos_i * sin_2u;
     double i_shift = 1.5 * g2 * plane->cos_i * plane->sin_i * cos_2u;
-    double v_radial = r_rate - n * g1 * plane->one_m_c2 * sin_2u;
-    double v_along = rf_rate + n * g1 * (plane->one_m_c2 * cos_2u + 1.5 * plane->three_c2_m1);
+    o.v_radial = r_rate - n * g1 * plane->one_m_c2 * sin_2u;
+    o.v_along = rf_rate + n * g1 * (plane->one_m_c2 * cos_2u + 1.5 * plane->three_c2_m1);
 
-    double sin_i = plane->sin_i, cos_i = plane->cos_i;
     if (fabs(u_shift) < 0.125) {
         bst_sgp4_turn(0.0, u_shift, &sin_u, &cos_u);
     } else {
         bst_sgp4_turn(atan2(sin_u, cos_u) + u_shift, u_shift, &sin_u, &cos_u);
     }
-    bst_sgp4_turn(x.raan + raan_shift, raan_shift, &sin_raan, &cos_raan);
-    bst_sgp4_turn(x.i + i_shift, i_shift, &sin_i, &cos_i);
+    bst_sgp4_turn(x->raan + raan_shift, raan_shift, &o.sin_raan, &o.cos_raan);
+    bst_sgp4_turn(x->i + i_shift, i_shift, &o.sin_i, &o.cos_i);
+    o.sin_u = sin_u;
+    o.cos_u = cos_u;
+    return o;
+}
 
+bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *s, double minutes, double position_teme_km[3],
+                                  double velocity_teme_kmps[3]) {
+    /* Comparisons are written so that NaN takes the error branch. */
+    if (!(fabs(minutes) <= MAX_MINUTES)) {
+        return BST_SGP4_MEAN_MOTION;
+    }
+    disturbed d;
+    bst_sgp4_error error = move_mean(s, minutes, &d.x, &d.a);
+    if (error == BST_SGP4_OK) {
+        error = add_long_periodics(s, minutes, &d);
+    }
+    if (error != BST_SGP4_OK) {
+        return error;
+    }
+    osculating o = add_short_periodics(s, &d);
     /* Unit vectors along the radius and along track. */
-    double m_x = -sin_raan * cos_i, m_y = cos_raan * cos_i;
-    double radial[3] = {m_x * sin_u + cos_raan * cos_u, m_y * sin_u + sin_raan * cos_u,
-                        sin_i * sin_u};
-    double along[3] = {m_x * cos_u - cos_raan * sin_u, m_y * cos_u - sin_raan * sin_u,
-                       sin_i * cos_u};
-    double r_km = r_now * s->k.radius_km;
-    double vr = v_radial * s->k.speed_kmps, va = v_along * s->k.speed_kmps;
+    double m_x = -o.sin_raan * o.cos_i, m_y = o.cos_raan * o.cos_i;
+    double radial[3] = {m_x * o.sin_u + o.cos_raan * o.cos_u, m_y * o.sin_u + o.sin_raan * o.cos_u,
+                        o.sin_i * o.sin_u};
+    double along[3] = {m_x * o.cos_u - o.cos_raan * o.sin_u, m_y * o.cos_u - o.sin_raan * o.sin_u,
+                       o.sin_i * o.cos_u};
+    double r_km = o.r * s->k.radius_km;
+    double vr = o.v_radial * s->k.speed_kmps, va = o.v_along * s->k.speed_kmps;
     for (int j = 0; j < 3; j++) {
         position_teme_km[j] = r_km * radial[j];
         velocity_teme_kmps[j] = vr * radial[j] + va * along[j];
     }
-    return r_now >= 1.0 ? BST_SGP4_OK : BST_SGP4_DECAYED;
+    return o.r >= 1.0 ? BST_SGP4_OK : BST_SGP4_DECAYED;
 }
 
 const char *bst_sgp4_error_text(bst_sgp4_error error) {

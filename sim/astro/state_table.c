@@ -59,11 +59,6 @@ typedef struct reader {
     int64_t count, capacity;
 } reader;
 
-static bst_status fail_memory(const reader *r) {
-    return bst_fail(r->source.ctx, BST_ERR_MEMORY, "%.400s: no memory for its states",
-                    r->source.name);
-}
-
 static bst_status fail_column(const reader *r, const bst_text_line *line, int c,
                               bst_text_span found, const char *problem, const char *expected) {
     char text[120];
@@ -141,7 +136,7 @@ static bst_status append(reader *r, const frame *f) {
         int64_t capacity = r->capacity ? 2 * r->capacity : 64;
         frame *frames = realloc(r->frames, (size_t)capacity * sizeof *frames);
         if (!frames) {
-            return fail_memory(r);
+            return bst_text_fail_memory(&r->source, "states");
         }
         r->frames = frames;
         r->capacity = capacity;
@@ -245,7 +240,7 @@ static bst_status build(reader *r, bst_state_table *out) {
     out->states = malloc(2 * (size_t)r->count * sizeof *out->states);
     out->objects = calloc((size_t)objects, sizeof *out->objects);
     if (!out->states || !out->objects) {
-        return fail_memory(r);
+        return bst_text_fail_memory(&r->source, "states");
     }
     for (int64_t i = 0; i < r->count; i++) {
         const frame *f = &r->frames[i];
@@ -255,7 +250,7 @@ static bst_status build(reader *r, bst_state_table *out) {
             o->first = 2 * i;
             o->name = strndup(f->name.text, f->name.length);
             if (!o->name) {
-                return fail_memory(r);
+                return bst_text_fail_memory(&r->source, "states");
             }
         } else if (f->start.t_s < f[-1].end.t_s) {
             return bst_fail(r->source.ctx, BST_ERR_FORMAT,
@@ -276,7 +271,7 @@ bst_status bst_state_table_read_buffer(bst_ctx *ctx, const char *name, const cha
     reader r = {.source = {ctx, name}, .epoch = epoch};
     bst_state_table *injected = calloc(1, sizeof *injected);
     char *scratch = malloc(MAX_LINE);
-    bst_status status = injected && scratch ? BST_OK : fail_memory(&r);
+    bst_status status = injected && scratch ? BST_OK : bst_text_fail_memory(&r.source, "states");
     if (status == BST_OK) {
         status = read_lines(&r, data, bytes, scratch);
     }
@@ -285,7 +280,7 @@ bst_status bst_state_table_read_buffer(bst_ctx *ctx, const char *name, const cha
     }
     if (status == BST_OK) {
         injected->name = strdup(name);
-        status = injected->name ? BST_OK : fail_memory(&r);
+        status = injected->name ? BST_OK : bst_text_fail_memory(&r.source, "states");
     }
     free(scratch);
     free(r.frames);
@@ -303,7 +298,9 @@ bst_status bst_state_table_create(bst_ctx *ctx, const char *name,
     *out = NULL;
     reader r = {.source = {ctx, name}, .frames = NULL};
     bst_state_table *injected = calloc(1, sizeof *injected);
-    bst_status status = injected && (injected->name = strdup(name)) ? BST_OK : fail_memory(&r);
+    bst_status status = injected && (injected->name = strdup(name))
+                            ? BST_OK
+                            : bst_text_fail_memory(&r.source, "states");
     if (status == BST_OK && count < 1) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%.400s: holds no states of objects", name);
     }

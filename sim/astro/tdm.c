@@ -58,11 +58,6 @@ static bst_status fail(const reader *r, const char *problem, const char *expecte
     return bst_text_fail_at(&r->source, &r->line, problem, r->line.text, r->line.length, expected);
 }
 
-static bst_status fail_memory(const reader *r) {
-    return bst_fail(r->source.ctx, BST_ERR_MEMORY, "%.400s: no memory for its angles",
-                    r->source.name);
-}
-
 static bool same(bst_text_span span, const char *word) {
     return span.length == strlen(word) && strncasecmp(span.text, word, span.length) == 0;
 }
@@ -216,7 +211,7 @@ static bst_status read_data(reader *r) {
         int64_t capacity = r->value_capacity ? 2 * r->value_capacity : 256;
         value *values = realloc(r->values, (size_t)capacity * sizeof *values);
         if (!values) {
-            return fail_memory(r);
+            return bst_text_fail_memory(&r->source, "angles");
         }
         r->values = values;
         r->value_capacity = capacity;
@@ -280,14 +275,14 @@ static bst_status end_data(reader *r) {
         int capacity = tdm->capacity ? 2 * tdm->capacity : 4;
         bst_tdm_pair *pairs = realloc(tdm->pairs, (size_t)capacity * sizeof *pairs);
         if (!pairs) {
-            return fail_memory(r);
+            return bst_text_fail_memory(&r->source, "angles");
         }
         tdm->pairs = pairs;
         tdm->capacity = capacity;
     }
     bst_tdm_angles *items = malloc((size_t)(r->value_count + 1) * sizeof *items);
     if (!items) {
-        return fail_memory(r);
+        return bst_text_fail_memory(&r->source, "angles");
     }
     bst_tdm_pair *pair = &tdm->pairs[tdm->count++];
     *pair = (bst_tdm_pair){.items = items};
@@ -375,7 +370,8 @@ bst_status bst_tdm_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     *out = NULL;
     BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     reader r = {.source = {ctx, name}, .tdm = calloc(1, sizeof *r.tdm)};
-    bst_status status = r.tdm ? read_all(&r, data, bytes) : fail_memory(&r);
+    bst_status status =
+        r.tdm ? read_all(&r, data, bytes) : bst_text_fail_memory(&r.source, "angles");
     free(r.values);
     if (status != BST_OK) {
         bst_tdm_free(r.tdm);

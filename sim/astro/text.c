@@ -6,6 +6,11 @@
 
 #include "sim/astro/text_internal.h"
 
+bst_status bst_text_fail_memory(const bst_text_source *source, const char *what) {
+    return bst_fail(source->ctx, BST_ERR_MEMORY, "%.400s: no memory for its %s", source->name,
+                    what);
+}
+
 void bst_text_quote(const char *text, size_t length, char out[BST_TEXT_QUOTE_BYTES]) {
     size_t used = 0;
     out[used++] = '"';
@@ -116,14 +121,10 @@ bool bst_text_is_plain(bst_text_span span) {
     return true;
 }
 
-static bool is_digit(char c) {
-    return c >= '0' && c <= '9';
-}
-
 /* Bytes of the digits at the start. */
 static size_t digits_at(const char *text, size_t length) {
     size_t i = 0;
-    while (i < length && is_digit(text[i])) {
+    while (i < length && bst_text_is_digit(text[i])) {
         i++;
     }
     return i;
@@ -196,7 +197,7 @@ bool bst_text_number(bst_text_span span, double *out) {
     if (whole + decimals <= 15 && !has_exponent) {
         long long digits = 0;
         for (size_t k = 0; k < n; k++) {
-            digits = is_digit(c[k]) ? 10 * digits + (c[k] - '0') : digits;
+            digits = bst_text_is_digit(c[k]) ? 10 * digits + (c[k] - '0') : digits;
         }
         double value = (double)digits / tens[decimals];
         *out = c[0] == '-' ? -value : value;
@@ -217,7 +218,7 @@ bool bst_text_number(bst_text_span span, double *out) {
 bool bst_text_count(bst_text_span span, int maximum, int *out) {
     long long value = 0;
     for (size_t i = 0; i < span.length; i++) {
-        if (!is_digit(span.text[i])) {
+        if (!bst_text_is_digit(span.text[i])) {
             return false;
         }
         value = 10 * value + (span.text[i] - '0');

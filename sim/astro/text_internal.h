@@ -40,6 +40,13 @@ bst_status bst_text_fail_at(const bst_text_source *source, const bst_text_line *
                             const char *problem, const char *found, size_t found_length,
                             const char *expected);
 
+/* BST_ERR_MEMORY with "file: no memory for its WHAT". */
+bst_status bst_text_fail_memory(const bst_text_source *source, const char *what);
+
+static inline bool bst_text_is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+
 /* Puts text in quotes, what is not printable ASCII as \xNN, cut to what fits. */
 void bst_text_quote(const char *text, size_t length, char out[BST_TEXT_QUOTE_BYTES]);
 

@@ -35,10 +35,6 @@ static bst_status fail_field(const field *f, const char *problem, const char *ex
                             expected);
 }
 
-static bool is_digit(char c) {
-    return c >= '0' && c <= '9';
-}
-
 static double power_of_ten(int exponent) {
     double p = 1.0;
     for (int i = 0; i < exponent; i++) {
@@ -68,7 +64,7 @@ static bool scan_decimal(const field *f, bool *negative, int64_t *digits, int *d
     for (; c < end; c++) {
         if (*c == '.' && !point) {
             point = true;
-        } else if (is_digit(*c) && seen < 15) {
+        } else if (bst_text_is_digit(*c) && seen < 15) {
             *digits = *digits * 10 + (*c - '0');
             seen++;
             *decimals += point;
@@ -104,7 +100,7 @@ static bst_status read_count(const field *f, int *out) {
     }
     *out = 0;
     for (; i < length; i++) {
-        if (!is_digit(c[i])) {
+        if (!bst_text_is_digit(c[i])) {
             return fail_field(f, "is not a whole number", "digits or blanks");
         }
         *out = *out * 10 + (c[i] - '0');
@@ -136,7 +132,7 @@ static bst_status read_implied(const field *f, double *out) {
     }
     int64_t digits = 0;
     int count = 0;
-    for (; c < end && is_digit(*c); c++) {
+    for (; c < end && bst_text_is_digit(*c); c++) {
         digits = digits * 10 + (*c - '0');
         count++;
     }
@@ -150,7 +146,7 @@ static bst_status read_implied(const field *f, double *out) {
         if (*c == '-' || *c == '+' || *c == ' ') {
             c++;
         }
-        for (; c < end && is_digit(*c); c++) {
+        for (; c < end && bst_text_is_digit(*c); c++) {
             exponent = exponent * 10 + (*c - '0');
             exponent_digits++;
         }
@@ -170,10 +166,10 @@ static bst_status read_eccentricity(const field *f, double *out) {
     int64_t digits = 0;
     for (int i = 0; i < field_length(f); i++) {
         char c = field_text(f)[i];
-        if (!is_digit(c) && c != ' ') {
+        if (!bst_text_is_digit(c) && c != ' ') {
             return fail_field(f, "is not a fraction", "7 digits after an implied decimal point");
         }
-        digits = digits * 10 + (is_digit(c) ? c - '0' : 0);
+        digits = digits * 10 + (bst_text_is_digit(c) ? c - '0' : 0);
     }
     *out = (double)digits / 1e7;
     return BST_OK;
@@ -191,7 +187,7 @@ bool bst_tle_decode_number(const char *text, int *out) {
         i = 1;
     }
     for (; i < 5; i++) {
-        if (!is_digit(text[i])) {
+        if (!bst_text_is_digit(text[i])) {
             return false;
         }
         value = value * 10 + (text[i] - '0');
@@ -214,7 +210,7 @@ static bst_status read_epoch(const bst_text_source *source, const bst_text_line 
     field year_field = {source, line, 19, 20, "epoch year"};
     field day_field = {source, line, 21, 32, "epoch day"};
     const char *y = field_text(&year_field);
-    if (!(is_digit(y[1]) && (is_digit(y[0]) || y[0] == ' '))) {
+    if (!(bst_text_is_digit(y[1]) && (bst_text_is_digit(y[0]) || y[0] == ' '))) {
         return fail_field(&year_field, "is not a number", "2 digits");
     }
     int year = (y[0] == ' ' ? 0 : y[0] - '0') * 10 + (y[1] - '0');
@@ -276,7 +272,7 @@ static bst_status check_line(const bst_text_source *source, const bst_text_line 
     int sum = 0;
     for (int i = 0; i < LINE_CHARS - 1; i++) {
         char c = line->text[i];
-        sum += is_digit(c) ? c - '0' : c == '-';
+        sum += bst_text_is_digit(c) ? c - '0' : c == '-';
     }
     char expected[2] = {(char)('0' + sum % 10), '\0'};
     if (line->text[LINE_CHARS - 1] != expected[0]) {

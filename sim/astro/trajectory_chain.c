@@ -215,23 +215,30 @@ static void keep_way_point(bst_trajectory_chain *chain) {
     chain->way[chain->way_count++] = chain->here;
 }
 
+/* What a step leads to. */
+typedef struct step_end {
+    double next_h_s; /* what the next one tries */
+    bool to_edge;    /* it ends at an edge of the thrust */
+    double floor_s;  /* share of it after which the path is below the floor; above 1: never */
+} step_end;
+
 /* A step that the forces, the error and the shadow agree to. */
 static bst_status work_step(bst_ctx *ctx, bst_trajectory_chain *chain,
                             bst_trajectory_chain_context *context,
                             const bst_trajectory_chain_point *p, bst_radau_step *step,
-                            double *next_h_s, bool *to_edge, double *floor_s) {
+                            step_end *end) {
     step_forces f = {ctx, context, p->time_s, p->time_low_s,
                      thrust_now(context, chain->direction, p)};
     double h = p->h_s, h_natural = 0.0; /* what the next step may try after a shadow's edge */
     bool edge_found = false;
     for (;;) {
-        *to_edge = false;
+        end->to_edge = false;
         if (p->edge >= 0 && p->edge < context->edges->count) {
             double left = (context->edges->items[p->edge].time_s - p->time_s) - p->time_low_s;
             if (fabs(h) >= fabs(left)) {
                 h_natural = h_natural != 0.0 ? h_natural : h;
                 h = left;
-                *to_edge = true;
+                end->to_edge = true;
             }
         }
         double error;
@@ -264,8 +271,8 @@ static bst_status work_step(bst_ctx *ctx, bst_trajectory_chain *chain,
         }
         double longer = h * change;
         longer = fabs(h_natural) > fabs(longer) ? h_natural : longer;
-        *next_h_s = chain->direction * fmin(fabs(longer), LONGEST_STEP_S);
-        *floor_s = floor_crossing(&f, step);
+        end->next_h_s = chain->direction * fmin(fabs(longer), LONGEST_STEP_S);
+        end->floor_s = floor_crossing(&f, step);
         return BST_OK;
     }
 }
@@ -275,10 +282,9 @@ static void extend(bst_ctx *ctx, bst_trajectory_chain *chain,
                    bst_trajectory_chain_context *context) {
     bst_trajectory_chain_point *p = &chain->here;
     keep_way_point(chain);
-    double next_h_s = 0.0, floor_s = 2.0;
-    bool to_edge = false;
+    step_end end = {.floor_s = 2.0};
     bst_radau_step motion;
-    bst_status status = work_step(ctx, chain, context, p, &motion, &next_h_s, &to_edge, &floor_s);
+    bst_status status = work_step(ctx, chain, context, p, &motion, &end);
     if (status != BST_OK) {
         end_chain(chain, p->time_s, status, ctx->message);
         return;
@@ -290,7 +296,7 @@ static void extend(bst_ctx *ctx, bst_trajectory_chain *chain,
     kept->motion = motion;
     kept->time_s = p->time_s;
     kept->time_low_s = p->time_low_s;
-    if (to_edge) {
+    if (end.to_edge) {
         p->time_s = context->edges->items[p->edge].time_s;
         p->time_low_s = 0.0;
     } else {
@@ -303,14 +309,14 @@ static void extend(bst_ctx *ctx, bst_trajectory_chain *chain,
     }
     kept->end_s = p->time_s;
     bst_radau_advance(&p->motion, &motion);
-    p->h_s = next_h_s;
+    p->h_s = end.next_h_s;
     p->step++;
-    if (floor_s <= 1.0) {
+    if (end.floor_s <= 1.0) {
         char text[160];
-        double end = kept->time_s + (kept->time_low_s + floor_s * motion.h_s);
+        double floor_at_s = kept->time_s + (kept->time_low_s + end.floor_s * motion.h_s);
         snprintf(text, sizeof text, "the orbit passes below %.0f km, %.1f s after the epoch",
-                 1e-3 * BST_TRAJECTORY_FLOOR_M, end);
-        end_chain(chain, end, BST_ERR_NUMERIC, text);
+                 1e-3 * BST_TRAJECTORY_FLOOR_M, floor_at_s);
+        end_chain(chain, floor_at_s, BST_ERR_NUMERIC, text);
     } else if (at_edge(context, p)) {
         status = cross_edge(ctx, context, chain->direction, p);
         if (status != BST_OK) {

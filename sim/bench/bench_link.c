@@ -89,8 +89,9 @@ static bst_status round_trips(bst_ctx *ctx, bst_link *link, int part, uint16_t *
         answer pointing = {.head = {0}};
         bst_link_output output = {.type = BST_LINK_POINTING, .payload = &pointing, .capacity = 2};
         bool answered;
+        const bst_link_messages messages = {&input, 1, &output, 1};
         bst_bench_start(&clock);
-        BST_TRY(bst_link_exchange(ctx, link, part, i, &input, 1, &output, 1, &answered));
+        BST_TRY(bst_link_exchange(ctx, link, part, i, &messages, &answered));
         if (i >= WARM) {
             bst_bench_stop(&clock, 1);
         }

@@ -66,9 +66,12 @@ bst_status bst_bench_plant_full(bst_ctx *ctx, const bst_bench *self,
     bst_platform platform;
     BST_TRY(bst_mount_init(ctx, &mount, BST_MOUNT_AZIMUTH_ELEVATION, &config, PLANT_DT,
                            (bst_rng_key){{5, 6}}));
-    BST_TRY(bst_platform_init(ctx, &platform, &config.platform, BST_QUAT_IDENTITY,
-                              3.0 * BST_ARCSEC_RAD, PLANT_DT, (bst_rng_key){{1, 2}},
-                              (bst_rng_key){{3, 4}}));
+    const bst_platform_setup setup = {.q_nominal_from_gcrf = BST_QUAT_IDENTITY,
+                                      .pixel_rad = 3.0 * BST_ARCSEC_RAD,
+                                      .dt_s = PLANT_DT,
+                                      .jitter_key = {{1, 2}},
+                                      .attitude_key = {{3, 4}}};
+    BST_TRY(bst_platform_init(ctx, &platform, &config.platform, &setup));
     bst_mount_body body = {.rate_radps = platform.drift_radps,
                            .q_believed_from_gcrf = platform.q_believed_from_gcrf};
     bst_bench_clock clock = {.count = 0};

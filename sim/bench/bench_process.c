@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "sim/bench/bench.h"
+#include "sim/core/compare.h"
 
 bst_bench_result bst_bench_nothing(const char *name) {
     return (bst_bench_result){.name = name,
@@ -57,13 +58,8 @@ void bst_bench_stop(bst_bench_clock *clock, int calls) {
     }
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 double bst_bench_median(double *times, int count) {
-    qsort(times, (size_t)count, sizeof *times, ascending);
+    qsort(times, (size_t)count, sizeof *times, bst_compare_doubles);
     return 0.5 * (times[(count - 1) / 2] + times[count / 2]);
 }
 

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "sim/bench/bench_scenes.h"
+#include "sim/core/compare.h"
 #include "sim/device/device.h"
 
 extern char **environ;
@@ -105,11 +106,6 @@ static bst_status one_process(bst_ctx *ctx, const bst_bench_options *options, do
                : bst_fail(ctx, BST_ERR_STATE, "a fresh process did not get to its first frame");
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 bst_status bst_bench_cold_start(bst_ctx *ctx, const bst_bench *self,
                                 const bst_bench_options *options, bst_bench_result *out) {
     (void)self;
@@ -138,7 +134,7 @@ bst_status bst_bench_cold_start(bst_ctx *ctx, const bst_bench *self,
     bst_bench_summarise(&clock, out);
     out->phase_count = STEPS;
     for (int i = 0; i < STEPS; i++) {
-        qsort(steps_ms[i], PROCESSES, sizeof steps_ms[i][0], ascending);
+        qsort(steps_ms[i], PROCESSES, sizeof steps_ms[i][0], bst_compare_doubles);
         snprintf(out->phases[i].name, sizeof out->phases[i].name, "%s", steps[i]);
         out->phases[i].ms = steps_ms[i][PROCESSES / 2];
     }

@@ -238,10 +238,12 @@ typedef struct cone {
     bst_vec3 centre;
     double radius_rad, chord2, v_limit;
     int bins;
+    bst_star *out; /* [capacity] */
+    int capacity;
 } cone;
 
 static bst_status query_cell(bst_ctx *ctx, bst_faint_stars *f, const cone *q, int band,
-                             uint32_t cell, bst_star *out, int capacity, int *found) {
+                             uint32_t cell, int *found) {
     slot *s = NULL;
     BST_TRY(find_slot(ctx, f, cell, &s));
     if (s->bins < q->bins) {
@@ -256,8 +258,8 @@ static bst_status query_cell(bst_ctx *ctx, bst_faint_stars *f, const cone *q, in
         const bst_star *star = &s->stars[i];
         bst_vec3 d = bst_vec3_sub(star->icrs, q->centre);
         if ((double)star->v_mag <= q->v_limit && bst_vec3_dot(d, d) <= q->chord2) {
-            if (*found < capacity) {
-                out[*found] = *star;
+            if (*found < q->capacity) {
+                q->out[*found] = *star;
             }
             ++*found;
         }
@@ -278,8 +280,13 @@ bst_status bst_faint_stars_query(bst_ctx *ctx, bst_faint_stars *f, bst_vec3 cent
     }
     const bst_faint_sky *sky = f->sky;
     double chord = 2.0 * sin(0.5 * radius_rad);
-    cone q = {centre, radius_rad, radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord,
-              fmin(v_limit, BST_FAINT_LIMIT_V), 0};
+    cone q = {centre,
+              radius_rad,
+              radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord,
+              fmin(v_limit, BST_FAINT_LIMIT_V),
+              0,
+              out,
+              capacity};
     q.bins = (int)fmax(0.0, ceil(q.v_limit - BST_COUNT_FIRST_V));
     if (q.bins == 0) {
         return BST_OK;
@@ -308,7 +315,7 @@ bst_status bst_faint_stars_query(bst_ctx *ctx, bst_faint_stars *f, bst_vec3 cent
             /* a chord is shorter than its angle: no cell is missed */
             bst_vec3 d = bst_vec3_sub(c.centre, centre);
             if (bst_vec3_dot(d, d) <= reach * reach) {
-                BST_TRY(query_cell(ctx, f, &q, band, cell, out, capacity, count));
+                BST_TRY(query_cell(ctx, f, &q, band, cell, count));
             }
         }
     }

@@ -18,69 +18,77 @@ typedef struct bst_load_options {
     const bst_option *table; /* of the command, for its outputs; bst_load_check sets it */
 } bst_load_options;
 
+/* Where the entries below put their values: in a variable, or by a table of constant data, which
+ * gives a macro of its own with .offset. */
+#define BST_OPTION_TARGET(variable) .target = &(variable)
+
 /* The same of those runs that can have modules outside. */
-#define BST_LINK_OPTIONS(load)                                                                   \
-    {.name = "link",                                                                             \
-     .kind = BST_OPTION_TEXT,                                                                    \
-     .target = &(load).link,                                                                     \
-     .argument = "ADDRESS",                                                                      \
-     .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},        \
-        {.name = "link-keys",                                                                    \
-         .kind = BST_OPTION_TEXT,                                                                \
-         .target = &(load).link_keys,                                                            \
-         .path = BST_PATH_INPUT,                                                                 \
-         .argument = "FILE",                                                                     \
-         .doc = "keys of boresight link-keys that peers must have"},                             \
-        {.name = "external",                                                                     \
-         .kind = BST_OPTION_TEXT,                                                                \
-         .target = &(load).external,                                                             \
-         .argument = "MODULE,...",                                                               \
-         .doc = "modules that peers play: imgproc, tracker, control, gimbal"},                   \
-    {                                                                                            \
-        .name = "pacing", .kind = BST_OPTION_TEXT, .target = &(load).pacing, .argument = "MODE", \
-        .doc = "lockstep (default), realtime, or fast"                                           \
+#define BST_LINK_OPTIONS_AT(PLACE, load)                                                   \
+    {.name = "link",                                                                       \
+     .kind = BST_OPTION_TEXT,                                                              \
+     PLACE(load.link),                                                                     \
+     .argument = "ADDRESS",                                                                \
+     .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},  \
+        {.name = "link-keys",                                                              \
+         .kind = BST_OPTION_TEXT,                                                          \
+         PLACE(load.link_keys),                                                            \
+         .path = BST_PATH_INPUT,                                                           \
+         .argument = "FILE",                                                               \
+         .doc = "keys of boresight link-keys that peers must have"},                       \
+        {.name = "external",                                                               \
+         .kind = BST_OPTION_TEXT,                                                          \
+         PLACE(load.external),                                                             \
+         .argument = "MODULE,...",                                                         \
+         .doc = "modules that peers play: imgproc, tracker, control, gimbal"},             \
+    {                                                                                      \
+        .name = "pacing", .kind = BST_OPTION_TEXT, PLACE(load.pacing), .argument = "MODE", \
+        .doc = "lockstep (default), realtime, or fast"                                     \
     }
+#define BST_LINK_OPTIONS(load) BST_LINK_OPTIONS_AT(BST_OPTION_TARGET, load)
 
 /* Entries of an options table that fill a bst_load_options named `load`. */
-#define BST_LOAD_OPTIONS(load)                                                                 \
+#define BST_LOAD_OPTIONS_AT(PLACE, load)                                                       \
     {.name = "set",                                                                            \
      .kind = BST_OPTION_LIST,                                                                  \
-     .target = &(load).set,                                                                    \
+     PLACE(load.set),                                                                          \
      .argument = "/PATH=VALUE",                                                                \
      .doc = "override a value of the scenario; may be given several times"},                   \
         {.name = "seed",                                                                       \
          .kind = BST_OPTION_TEXT,                                                              \
-         .target = &(load).seed,                                                               \
+         PLACE(load.seed),                                                                     \
          .argument = "SEED",                                                                   \
          .doc = "master seed, for example 42 or 0x2A"},                                        \
         {.name = "duration",                                                                   \
          .kind = BST_OPTION_REAL,                                                              \
-         .target = &(load).duration_s,                                                         \
+         PLACE(load.duration_s),                                                               \
          .argument = "S",                                                                      \
          .doc = "simulated time in seconds",                                                   \
          .minimum = 0,                                                                         \
          .maximum = 1e9},                                                                      \
     {                                                                                          \
-        .name = "run-number", .kind = BST_OPTION_INT, .target = &(load).run, .argument = "N",  \
+        .name = "run-number", .kind = BST_OPTION_INT, PLACE(load.run), .argument = "N",        \
         .doc = "number of the run in a study: other random numbers, same scene", .minimum = 0, \
         .maximum = 9e15                                                                        \
     }
+#define BST_LOAD_OPTIONS(load) BST_LOAD_OPTIONS_AT(BST_OPTION_TARGET, load)
 
 #define BST_LOAD_DEFAULTS \
     { .duration_s = -1.0, .run = -1 }
 
 /* Entries of an options table that choose the OpenCL device: `device_` is a const char *,
  * `threads_` an int64_t. */
-#define BST_DEVICE_OPTIONS(device_, threads_)                                                \
+#define BST_DEVICE_OPTIONS_AT(PLACE, device_, threads_)                                      \
     {.name = "device",                                                                       \
      .kind = BST_OPTION_TEXT,                                                                \
-     .target = &(device_),                                                                   \
+     PLACE(device_),                                                                         \
      .argument = "NAME",                                                                     \
      .doc = "OpenCL device: part of its name, or PLATFORM:DEVICE by number (default PoCL)"}, \
     {                                                                                        \
-        .name = "threads", .kind = BST_OPTION_INT, .target = &(threads_), .argument = "N",   \
+        .name = "threads", .kind = BST_OPTION_INT, PLACE(threads_), .argument = "N",         \
         .doc = "threads for the OpenCL device (default all)", .minimum = 1, .maximum = 1024  \
     }
+#define BST_DEVICE_OPTIONS(device_, threads_) \
+    BST_DEVICE_OPTIONS_AT(BST_OPTION_TARGET, device_, threads_)
 
 /* Whether the overrides have the form /path=value; BST_ERR_ARGUMENT when one has not: the command
  * was called wrongly. `table`: the command's options, kept in *options: bst_load_scenario looks at

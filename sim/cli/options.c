@@ -203,6 +203,14 @@ static bst_status check_together(bst_ctx *ctx, const bst_option *table, const bo
     return BST_OK;
 }
 
+void bst_options_bind(const bst_option *table, void *request, bst_option *out) {
+    for (; table->name; table++) {
+        *out = *table;
+        out++->target = (char *)request + table->offset;
+    }
+    *out = *table;
+}
+
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) {
     bool given[MOST_OPTIONS] = {false};

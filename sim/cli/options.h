@@ -3,6 +3,7 @@
 #define BST_CLI_OPTIONS_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 
@@ -39,6 +40,7 @@ typedef struct bst_option {
     const char *name; /* without the dashes */
     bst_option_kind kind;
     void *target;         /* of the kind's type; untouched when the option is not given */
+    size_t offset;        /* of the target in a request, for bst_options_bind */
     const char *argument; /* what --help calls the value: "FILE"; CHOICE: "teme|gcrf" */
     const char *doc;      /* what it does, and the default where there is one */
     bool required;
@@ -46,6 +48,10 @@ typedef struct bst_option {
     const char *needs;       /* options of which one must be given too: "frames|coco"; NULL: none */
     bst_option_path path;    /* TEXT, LIST */
 } bst_option;
+
+/* Copies a table of constant data, its last entry too, to *out, and sets each target to the place
+ * at the entry's offset in *request. */
+void bst_options_bind(const bst_option *table, void *request, bst_option *out);
 
 /* Reads argv[1] .. argv[argc - 1] into the table's targets. Forms: --name value, --name=value,
  * --flag; "--" ends the options. What is no option is moved, in order, to argv[1] ..

@@ -25,43 +25,6 @@ typedef struct reader {
 static bst_status read_object(const reader *r, const cJSON *node, const char *path,
                               const bst_config_desc *table, void *object);
 
-/* A number as the shortest text that reads back as the same bits, which cJSON's own printing (15
- * digits, compared with a tolerance) does not promise. */
-static void exact_text(double value, char *buffer, size_t bytes) {
-    for (int digits = 15; digits <= 17; digits++) {
-        snprintf(buffer, bytes, "%.*g", digits, value);
-        if (strtod(buffer, NULL) == value) {
-            return;
-        }
-    }
-}
-
-/* The offending value as text, shortened. */
-static void value_text(const cJSON *value, char *buffer, size_t bytes) {
-    if (cJSON_IsNumber(value)) {
-        exact_text(value->valuedouble, buffer, bytes);
-        return;
-    }
-    char *text = cJSON_PrintUnformatted(value);
-    snprintf(buffer, bytes, "%s", text ? text : "?");
-    if (text && strlen(text) >= bytes && bytes > 4) {
-        size_t end = bytes - 4;
-        while (end > 0 && ((unsigned char)buffer[end] & 0xC0) == 0x80) {
-            end--; /* not in the middle of a UTF-8 character */
-        }
-        memcpy(buffer + end, "...", 4);
-    }
-    free(text);
-}
-
-bst_status bst_config_fail(bst_ctx *ctx, const char *file, const char *path, const cJSON *value,
-                           const char *what, const char *allowed) {
-    char found[80];
-    value_text(value, found, sizeof found);
-    return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: %s (found %s; allowed: %s)", file,
-                    *path ? path : "/", what, found, allowed);
-}
-
 static bst_status wrong(const reader *r, const char *path, const cJSON *value, const char *what,
                         const char *allowed) {
     return bst_config_fail(r->ctx, r->file, path, value, what, allowed);
@@ -457,7 +420,7 @@ void bst_config_free(const bst_config_desc *table, void *object) {
 
 static cJSON *exact_number(double value) {
     char text[40];
-    exact_text(value, text, sizeof text);
+    bst_text_of_number(value, text, sizeof text);
     return isfinite(value) ? cJSON_CreateRaw(text) : cJSON_CreateNull();
 }
 

@@ -26,6 +26,31 @@ static void add_range(cJSON *node, const bst_config_desc *d) {
     }
 }
 
+/* The words of a choice as an "enum" of the node. */
+static void add_choices(cJSON *node, const bst_config_desc *d) {
+    cJSON *choices = cJSON_AddArrayToObject(node, "enum");
+    for (int i = 0; d->choices[i]; i++) {
+        cJSON_AddItemToArray(choices, cJSON_CreateString(d->choices[i]));
+    }
+}
+
+/* The documentation with the unit in brackets. */
+static void add_description(cJSON *node, const bst_config_desc *d) {
+    char text[600];
+    const char *unit = d->unit && *d->unit ? d->unit : NULL;
+    size_t length = strlen(d->doc);
+    if (unit && length + strlen(unit) + 4 < sizeof text) {
+        memcpy(text, d->doc, length);
+        text[length] = '\0';
+        strcat(text, " [");
+        strcat(text, unit);
+        strcat(text, "]");
+        cJSON_AddStringToObject(node, "description", text);
+    } else {
+        cJSON_AddStringToObject(node, "description", d->doc);
+    }
+}
+
 static cJSON *value_schema(const bst_config_desc *d) {
     cJSON *node =
         d->type == BST_CONFIG_OBJECT ? bst_config_schema(d->children) : cJSON_CreateObject();
@@ -50,22 +75,14 @@ static cJSON *value_schema(const bst_config_desc *d) {
             cJSON_AddStringToObject(node, "type", "string");
             cJSON_AddNumberToObject(node, "maxLength", (double)d->size - 1.0);
             break;
-        case BST_CONFIG_ENUM: {
-            cJSON *choices = cJSON_AddArrayToObject(node, "enum");
-            for (int i = 0; d->choices[i]; i++) {
-                cJSON_AddItemToArray(choices, cJSON_CreateString(d->choices[i]));
-            }
+        case BST_CONFIG_ENUM:
+            add_choices(node, d);
             break;
-        }
-        case BST_CONFIG_CHOICES: {
+        case BST_CONFIG_CHOICES:
             cJSON_AddStringToObject(node, "type", "array");
             cJSON_AddBoolToObject(node, "uniqueItems", 1);
-            cJSON *choices = cJSON_AddArrayToObject(cJSON_AddObjectToObject(node, "items"), "enum");
-            for (int i = 0; d->choices[i]; i++) {
-                cJSON_AddItemToArray(choices, cJSON_CreateString(d->choices[i]));
-            }
+            add_choices(cJSON_AddObjectToObject(node, "items"), d);
             break;
-        }
         case BST_CONFIG_SEED:
             add_seed(node);
             break;
@@ -93,19 +110,7 @@ static cJSON *value_schema(const bst_config_desc *d) {
             break;
     }
     if (d->doc) {
-        char text[600];
-        const char *unit = d->unit && *d->unit ? d->unit : NULL;
-        size_t length = strlen(d->doc);
-        if (unit && length + strlen(unit) + 4 < sizeof text) {
-            memcpy(text, d->doc, length);
-            text[length] = '\0';
-            strcat(text, " [");
-            strcat(text, unit);
-            strcat(text, "]");
-            cJSON_AddStringToObject(node, "description", text);
-        } else {
-            cJSON_AddStringToObject(node, "description", d->doc);
-        }
+        add_description(node, d);
     }
     if (d->fallback && d->type != BST_CONFIG_OBJECT) {
         cJSON_AddItemToObject(node, "default", cJSON_Parse(d->fallback));
@@ -119,9 +124,9 @@ static cJSON *either(cJSON *own, const bst_config_desc *stage) {
     cJSON_AddStringToObject(node, "type", "object");
     cJSON *names = cJSON_AddArrayToObject(cJSON_AddObjectToObject(node, "if"), "required");
     cJSON_AddItemToArray(names, cJSON_CreateString(stage->key));
-    cJSON *plugged = cJSON_AddObjectToObject(node, "then");
-    cJSON_AddStringToObject(plugged, "title", stage->choices[0]);
-    cJSON *properties = cJSON_AddObjectToObject(plugged, "properties");
+    cJSON *plugin = cJSON_AddObjectToObject(node, "then");
+    cJSON_AddStringToObject(plugin, "title", stage->choices[0]);
+    cJSON *properties = cJSON_AddObjectToObject(plugin, "properties");
     cJSON_AddItemToObject(properties, stage->key, value_schema(stage));
     cJSON *type = cJSON_AddObjectToObject(properties, "type");
     cJSON_AddStringToObject(type, "type", "string");

@@ -100,3 +100,18 @@ bst_status bst_file_check_text(bst_ctx *ctx, const char *name, const char *text,
                     "%.400s:%d: a zero byte: the file is not text (allowed: ASCII or UTF-8)", name,
                     line);
 }
+
+bool bst_file_write_all(int fd, const void *data, size_t bytes) {
+    const char *next = data;
+    while (bytes > 0) {
+        ssize_t n = write(fd, next, bytes);
+        if (n < 0 && errno != EINTR) {
+            return false;
+        }
+        if (n > 0) {
+            next += n;
+            bytes -= (size_t)n;
+        }
+    }
+    return true;
+}

@@ -2,6 +2,7 @@
 #ifndef BST_CORE_FILE_H
 #define BST_CORE_FILE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -22,6 +23,9 @@ bst_status bst_file_open(bst_ctx *ctx, const char *path, uint64_t max_bytes, con
  * them; the caller frees it. Also BST_ERR_MEMORY. */
 bst_status bst_file_read(bst_ctx *ctx, const char *path, uint64_t max_bytes, const char *expected,
                          char **out, size_t *bytes) BST_MUST_CHECK;
+
+/* Writes all bytes, also in pieces; false with errno. */
+bool bst_file_write_all(int fd, const void *data, size_t bytes);
 
 /* Refuses what is no text: UTF-16, and any zero byte, by line and with what is allowed. `name`
  * stands for the file in the message. BST_ERR_FORMAT. */

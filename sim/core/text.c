@@ -1,6 +1,7 @@
 #include "sim/core/text.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { LONGEST_WORD = 64, FARTHEST_SUGGESTION = 3 };
@@ -58,4 +59,13 @@ bool bst_text_is_file_name(const char *word) {
         }
     }
     return true;
+}
+
+void bst_text_of_number(double value, char *buffer, size_t bytes) {
+    for (int digits = 15; digits <= 17; digits++) {
+        snprintf(buffer, bytes, "%.*g", digits, value);
+        if (strtod(buffer, NULL) == value) {
+            return;
+        }
+    }
 }

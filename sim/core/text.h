@@ -29,6 +29,10 @@ enum { BST_COUNT_TEXT = 64 };
 const char *bst_text_of_count(char text[BST_COUNT_TEXT], int64_t count, const char *one,
                               const char *many);
 
+/* A finite number as the shortest text that reads back as the same bits, which cJSON's own printing
+ * (15 digits, compared with a tolerance) does not promise. */
+void bst_text_of_number(double value, char *buffer, size_t bytes);
+
 /* Whether a word can be the name of a file or folder that is made: 1 to 255 bytes without "/" and
  * control characters, not beginning with "." (which also refuses "." and ".."). */
 bool bst_text_is_file_name(const char *word);

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "boresight/vec.h"
+#include "sim/dynamics/compensator_internal.h"
 
 static const double two_pi = 2.0 * BST_PI;
 
@@ -127,12 +128,12 @@ static double add_lead_lag(bst_compensator *c, const bst_compensator_config *con
     return lag ? 1.0 / (two_pi * config->lag_zero_hz) : INFINITY;
 }
 
-static bool has_gains(const bst_compensator_config *c) {
+bool bst_compensator_has_gains(const bst_compensator_config *c) {
     return c->proportional > 0.0 || c->integral_per_s > 0.0 || c->derivative_s > 0.0 ||
            c->gain > 0.0;
 }
 
-static bst_status check(bst_ctx *ctx, const bst_compensator_config *config, double dt_s) {
+bst_status bst_compensator_check(bst_ctx *ctx, const bst_compensator_config *config, double dt_s) {
     if (config->type < 0 || config->type >= BST_COMPENSATOR_TYPE_COUNT) {
         return bst_fail(ctx, BST_ERR_CONFIG, "type: this is no cascade of biquads");
     }
@@ -158,7 +159,7 @@ static bst_status check(bst_ctx *ctx, const bst_compensator_config *config, doub
 
 static bst_status build(bst_ctx *ctx, bst_compensator *c, const bst_compensator_config *config,
                         double dt_s) {
-    BST_TRY(check(ctx, config, dt_s));
+    BST_TRY(bst_compensator_check(ctx, config, dt_s));
     *c = (bst_compensator){.dt_s = dt_s,
                            .feed_forward = config->feed_forward,
                            .limit = config->output_limit > 0.0 ? config->output_limit : INFINITY,
@@ -210,29 +211,9 @@ static bst_status plug(bst_ctx *ctx, bst_compensator *c, const bst_stage_use *us
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "plug-in %s", use->plugin);
 }
 
-bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *c,
-                                const bst_compensator_config *config, double dt_s,
-                                bst_dynamics_response_fn plant, const void *user) {
-    if (config->plug.desc) {
-        return plug(ctx, c, &config->plug, dt_s);
-    }
-    if (!(config->bandwidth_hz > 0.0 || config->crossover_hz > 0.0)) {
-        return build(ctx, c, config, dt_s);
-    }
-    BST_TRY(check(ctx, config, dt_s));
-    if (has_gains(config)) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "both gains and a specification (bandwidth_hz or crossover_hz) are given; "
-                        "leave one out");
-    }
-    if (!plant) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "a specification (bandwidth_hz or crossover_hz) cannot be used here; give "
-                        "gains");
-    }
-    bst_compensator_config designed;
-    BST_TRY(bst_compensator_design(ctx, config, dt_s, plant, user, &designed));
-    return build(ctx, c, &designed, dt_s);
+bst_status bst_compensator_from_gains(bst_ctx *ctx, bst_compensator *c,
+                                      const bst_compensator_config *config, double dt_s) {
+    return config->plug.desc ? plug(ctx, c, &config->plug, dt_s) : build(ctx, c, config, dt_s);
 }
 
 static double advance(const bst_dynamics_biquad *q, double state[2], double x, double y,

@@ -3,6 +3,7 @@
 
 #include "boresight/compensator.h"
 #include "boresight/vec.h"
+#include "sim/dynamics/compensator_internal.h"
 
 static const double two_pi = 2.0 * BST_PI;
 
@@ -31,10 +32,6 @@ typedef struct need {
 } need;
 
 /* In (-pi, pi]. */
-static double wrap(double angle) {
-    return angle - two_pi * ceil(angle / two_pi - 0.5);
-}
-
 static double complex rest_of_loop(const design *d, double omega) {
     return d->plant(d->user, omega) * bst_compensator_response(&d->filters, omega);
 }
@@ -47,7 +44,7 @@ static void follow_phase(design *d, double lowest_hz) {
         if (i == 0) {
             d->phase_rad[0] = now > 0.5 * BST_PI ? now - two_pi : now;
         } else {
-            d->phase_rad[i] = d->phase_rad[i - 1] + wrap(now - d->phase_rad[i - 1]);
+            d->phase_rad[i] = d->phase_rad[i - 1] + bst_wrap_angle(now - d->phase_rad[i - 1]);
         }
     }
 }
@@ -55,7 +52,7 @@ static void follow_phase(design *d, double lowest_hz) {
 static double phase_at(const design *d, double hz, double wrapped) {
     double i = fmax(round(log(hz / d->lowest_hz) / d->log_step), 0.0);
     double near = d->phase_rad[(int)fmin(i, PHASE_POINTS - 1)];
-    return near + wrap(wrapped - near);
+    return near + bst_wrap_angle(wrapped - near);
 }
 
 static need need_at(const design *d, double hz, double phase_margin_rad) {
@@ -158,7 +155,7 @@ static bst_status closed_loop_bandwidth(bst_ctx *ctx, const design *d,
     bst_compensator c;
     bst_compensator_config plain = *gains;
     plain.bandwidth_hz = plain.crossover_hz = 0.0;
-    BST_TRY(bst_compensator_init(ctx, &c, &plain, d->dt_s, NULL, NULL));
+    BST_TRY(bst_compensator_from_gains(ctx, &c, &plain, d->dt_s));
     double nyquist = 0.5 / d->dt_s, hz = gains->crossover_hz, inside = hz;
     /* from the crossover upwards; with more than 90 deg of phase margin it lies below */
     for (int up = 0;; up++) {
@@ -289,7 +286,7 @@ bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *co
                                       .notches = config->notches,
                                       .low_pass_hz = config->low_pass_hz,
                                       .gain_scale = 1.0};
-    BST_TRY(bst_compensator_init(ctx, &d.filters, &filters, dt_s, NULL, NULL));
+    BST_TRY(bst_compensator_from_gains(ctx, &d.filters, &filters, dt_s));
     bst_compensator_config as_asked = *config; /* margins are found on top of the design */
     as_asked.gain_scale = 1.0;
     as_asked.delay_s = 0.0;
@@ -308,4 +305,26 @@ bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *co
     out->gain_scale = config->gain_scale;
     out->delay_s = config->delay_s;
     return BST_OK;
+}
+
+bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *c,
+                                const bst_compensator_config *config, double dt_s,
+                                bst_dynamics_response_fn plant, const void *user) {
+    if (config->plug.desc || !(config->bandwidth_hz > 0.0 || config->crossover_hz > 0.0)) {
+        return bst_compensator_from_gains(ctx, c, config, dt_s);
+    }
+    BST_TRY(bst_compensator_check(ctx, config, dt_s));
+    if (bst_compensator_has_gains(config)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "both gains and a specification (bandwidth_hz or crossover_hz) are given; "
+                        "leave one out");
+    }
+    if (!plant) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "a specification (bandwidth_hz or crossover_hz) cannot be used here; give "
+                        "gains");
+    }
+    bst_compensator_config designed;
+    BST_TRY(bst_compensator_design(ctx, config, dt_s, plant, user, &designed));
+    return bst_compensator_from_gains(ctx, c, &designed, dt_s);
 }

@@ -9,16 +9,16 @@
 
 enum { N = BST_BOUND_COUNT };
 
-bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double *by_x,
-                                 const double *by_y, int count, double flux_e,
+bst_status bst_location_bound_of(bst_ctx *ctx, const bst_location_image *image, double flux_e,
                                  const bst_eval_bound_noise *noise, bst_location_bound *out) {
+    const double *share = image->share, *by_x = image->by_x, *by_y = image->by_y;
     double variance = noise->noise_e * noise->noise_e, fisher[N][N] = {{0.0}}, sharpness = 0.0;
     if (!(flux_e > 0.0 && variance > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a bound needs flux and noise above 0 (flux %g e-, noise %g e-)", flux_e,
                         noise->noise_e);
     }
-    for (int p = 0; p < count; p++) {
+    for (int p = 0; p < image->count; p++) {
         double slope[N] = {flux_e * by_x[p], flux_e * by_y[p], share[p], 1.0};
         double v = variance + (noise->own_shot_noise ? fmax(flux_e * share[p], 0.0) : 0.0);
         for (int i = 0; i < N; i++) {
@@ -30,7 +30,7 @@ bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double
     }
     if (!bst_symmetric_invert(N, fisher[0], out->covariance[0])) {
         return bst_fail(ctx, BST_ERR_NUMERIC,
-                        "%d pixels do not determine place, flux and background", count);
+                        "%d pixels do not determine place, flux and background", image->count);
     }
     out->snr = flux_e * sqrt(sharpness / variance);
     return BST_OK;
@@ -150,8 +150,8 @@ bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_eval_bound_source
     image m = {.pixels = 0};
     BST_TRY(open_image(ctx, source, margin_px, &m));
     draw(&m, source);
-    bst_status status =
-        bst_location_bound_of(ctx, m.share, m.by_x, m.by_y, m.pixels, source->flux_e, noise, out);
+    const bst_location_image shares = {m.share, m.by_x, m.by_y, m.pixels};
+    bst_status status = bst_location_bound_of(ctx, &shares, source->flux_e, noise, out);
     free(m.memory);
     return status;
 }

@@ -28,14 +28,19 @@ typedef struct bst_location_bound {
     double snr;
 } bst_location_bound;
 
+/* A source's image: shares of its light in the pixels, and their derivatives by its place. */
+typedef struct bst_location_image {
+    const double *share, *by_x, *by_y; /* [count] */
+    int count;
+} bst_location_image;
+
 /* The bound from any image: `share` [count] is the part of the source's light in each pixel of a
  * region, by_x and by_y its derivatives by the source's place, 1/px. The background, equal in all
  * those pixels, is estimated from them too. Fisher information sum (dm)(dm)^T / variance with
  * m = flux share + background (Winick 1986, JOSA A 3, 1809, for photon noise; Kay, Fundamentals of
  * Statistical Signal Processing I, 1993, eq. 3.31). BST_ERR_ARGUMENT for a flux or noise that is
  * not positive, BST_ERR_NUMERIC where the pixels do not determine the four numbers. */
-bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double *by_x,
-                                 const double *by_y, int count, double flux_e,
+bst_status bst_location_bound_of(bst_ctx *ctx, const bst_location_image *image, double flux_e,
                                  const bst_eval_bound_noise *noise,
                                  bst_location_bound *out) BST_MUST_CHECK;
 

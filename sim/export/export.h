@@ -42,6 +42,25 @@ typedef struct bst_export {
     const char *split;       /* "80,10,10": shares of training, validation and test; NULL: none */
 } bst_export;
 
+/* What is exported of a run: formats by their numbers, BST_EXPORT_NOT for none. */
+enum { BST_EXPORT_NOT = -1 };
+typedef struct bst_export_parts {
+    bst_export e;
+    const char *out;                         /* folder; NULL: RUN.export */
+    const char *tables;                      /* "a,b"; NULL: all */
+    int frames, table, orbits, observations; /* pictures 0, film 1; csv; oem 0, czml 1; as
+                                                bst_export_observation_format */
+} bst_export_parts;
+
+/* Whether anything goes into the folder `out`. */
+bool bst_export_into_folder(const bst_export_parts *parts);
+
+/* Makes the folders and exports all that is asked for of the run parts->e.run. Folders of satnet,
+ * coco and yolo lie in `out` where that is given. BST_ERR_ARGUMENT: a path is too long or is the
+ * run itself; BST_ERR_NOT_FOUND: the run has none of the frames asked for; what the parts fail
+ * with. */
+bst_status bst_export_run(bst_ctx *ctx, bst_export_parts *parts) BST_MUST_CHECK;
+
 /* Writes the selected frames as pictures or as a video.
  *
  * Given:     e  the checked request

@@ -280,8 +280,9 @@ static bst_status write_image(bst_ctx *ctx, const job *j, const char *folder, co
         return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
     }
     bst_io_stretch stretch = bst_io_stretch_of(image->pixels, f->width, f->height);
-    bst_status status = bst_frame_picture(ctx, image->pixels, f->width, f->height, stretch, NULL,
-                                          f->width, f->height, &picture);
+    const bst_io_counts counts = {image->pixels, f->width, f->height};
+    bst_status status =
+        bst_frame_picture(ctx, &counts, stretch, NULL, f->width, f->height, &picture);
     if (status == BST_OK) {
         status = bst_picture_copy(ctx, picture, bgr);
         bst_picture_free(picture);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "sim/cli/progress.h"
+#include "sim/core/compare.h"
 #include "sim/core/folder.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
@@ -55,11 +56,6 @@ static bst_status choose(bst_ctx *ctx, job *j) {
     return BST_OK;
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* One stretch for all frames: the median of those of a few, evenly spread. */
 static bst_status find_stretch(bst_ctx *ctx, job *j) {
     double values[3][STRETCH_FRAMES];
@@ -74,7 +70,7 @@ static bst_status find_stretch(bst_ctx *ctx, job *j) {
         values[2][i] = s.softening;
     }
     for (int k = 0; k < 3; k++) {
-        qsort(values[k], (size_t)n, sizeof **values, ascending);
+        qsort(values[k], (size_t)n, sizeof **values, bst_compare_doubles);
     }
     double black = values[0][n / 2];
     j->stretch = (bst_io_stretch){black, black + values[1][n / 2], values[2][n / 2]};
@@ -100,8 +96,9 @@ static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
         width = (int)fmax(1.0, round(frame.width * scale));
         height = (int)fmax(1.0, round(frame.height * scale));
     }
-    BST_TRY(bst_frame_picture(ctx, frame.pixels, frame.width, frame.height, stretch,
-                              j->e->annotate ? &overlay : NULL, width, height, &picture));
+    const bst_io_counts counts = {frame.pixels, frame.width, frame.height};
+    BST_TRY(bst_frame_picture(ctx, &counts, stretch, j->e->annotate ? &overlay : NULL, width,
+                              height, &picture));
     bst_status status;
     if (j->e->film) {
         status = bst_picture_copy(ctx, picture, j->bgr);

@@ -11,6 +11,7 @@
 
 #include "sim/cli/plugins.h"
 #include "sim/cli/progress.h"
+#include "sim/core/compare.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
 #include "sim/export/orbit_selection.h"
@@ -97,11 +98,6 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
     return BST_OK;
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void add_break(track *t, double seconds) {
     if (seconds > 0.0 && seconds < t->span_s && t->break_count < MOST_BREAKS) {
         t->breaks[t->break_count++] = seconds;
@@ -145,7 +141,7 @@ static void find_breaks(const bst_scenario *scenario, bool czml, track *t) {
         orbit = object ? &object->orbit : NULL;
         burns = object ? &object->burns : NULL;
     }
-    qsort(t->breaks, (size_t)t->break_count, sizeof *t->breaks, ascending);
+    qsort(t->breaks, (size_t)t->break_count, sizeof *t->breaks, bst_compare_doubles);
     t->breaks[t->break_count++] = t->span_s;
 }
 
@@ -252,18 +248,27 @@ static bst_status write_tracks(bst_ctx *ctx, const bst_export *e, const bst_scen
     return status;
 }
 
-static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                               const bst_world *world, bst_world_view *view,
-                               const bst_orbit_selection *s, FILE *stream, int *written) {
-    track t = {.view = view, .world = world, .sensor = -1, .span_s = recorded_s(e->run, scenario)};
+/* Whose orbits are written. */
+typedef struct scene {
+    const bst_scenario *scenario;
+    const bst_world *world;
+    bst_world_view *view;
+    const bst_orbit_selection *selection; /* of objects */
+} scene;
+
+static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const scene *in, FILE *stream,
+                               int *written) {
+    const bst_scenario *scenario = in->scenario;
+    track t = {
+        .view = in->view, .world = in->world, .sensor = -1, .span_s = recorded_s(e->run, scenario)};
     t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
     if (!(t.span_s > 0.0)) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no time span to write orbits for",
                         bst_run_reader_folder(e->run));
     }
     if (e->czml) {
-        BST_TRY(bst_czml_write_head(ctx, stream, scenario->name, bst_world_time(world, 0.0),
-                                    bst_world_time(world, t.span_s), 1.0));
+        BST_TRY(bst_czml_write_head(ctx, stream, scenario->name, bst_world_time(in->world, 0.0),
+                                    bst_world_time(in->world, t.span_s), 1.0));
     } else {
         char created[32];
         bst_run_creation_date(created);
@@ -271,10 +276,10 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
                                    "true states of a simulated run"));
     }
     t.kept = malloc(MOST_KEPT_ROWS * sizeof *t.kept); /* without it states are computed twice */
-    bst_status status = write_tracks(ctx, e, scenario, stream, &t, s, written);
+    bst_status status = write_tracks(ctx, e, scenario, stream, &t, in->selection, written);
     free(t.kept);
     if (status == BST_OK && e->czml) {
-        status = bst_export_views(ctx, e, scenario, world, view, stream);
+        status = bst_export_views(ctx, e, scenario, in->world, in->view, stream);
     }
     if (status == BST_OK && e->czml) {
         status = bst_czml_write_tail(ctx, stream);
@@ -283,11 +288,11 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
 }
 
 /* The observers' orbits as they believe them; of several sensors the first that is asked for. */
-static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                                 const bst_world *world, bst_world_view *view,
-                                 const bst_orbit_selection *s, FILE *stream, int *written) {
-    (void)s; /* no objects */
-    track t = {.view = view, .world = world, .object = -1, .span_s = recorded_s(e->run, scenario)};
+static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const scene *in, FILE *stream,
+                                 int *written) {
+    const bst_scenario *scenario = in->scenario;
+    track t = {
+        .view = in->view, .world = in->world, .object = -1, .span_s = recorded_s(e->run, scenario)};
     bst_run_sensor sensors[BST_EXPORT_SENSORS];
     char created[32];
     int count;
@@ -300,7 +305,7 @@ static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const bst_sc
     bst_run_creation_date(created);
     BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
                                "states of a simulated run's observers as they are known on board"));
-    const bst_run_scene scene = {.run = e->run, .scenario = *scenario};
+    const bst_run_scene run_scene = {.run = e->run, .scenario = *scenario};
     for (int i = 0; i < count; i++) {
         bool before = false;
         for (int k = 0; k < i; k++) {
@@ -308,7 +313,7 @@ static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const bst_sc
         }
         if (!before) {
             BST_TRY(bst_export_check(ctx));
-            BST_TRY(bst_run_scene_find(ctx, &scene, &sensors[i], &t.observer, &t.sensor));
+            BST_TRY(bst_run_scene_find(ctx, &run_scene, &sensors[i], &t.observer, &t.sensor));
             BST_TRY(write_one(ctx, e, scenario, stream, &t, written));
         }
     }
@@ -342,8 +347,8 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
         status = bst_draft_open(ctx, path, &draft);
     }
     if (status == BST_OK) {
-        status = (believed ? write_believed : write_orbits)(ctx, e, scenario, world, view,
-                                                            &selection, draft.stream, &written);
+        const scene in = {scenario, world, view, &selection};
+        status = (believed ? write_believed : write_orbits)(ctx, e, &in, draft.stream, &written);
         status = bst_draft_close(ctx, &draft, status);
     }
     if (status == BST_OK) {

@@ -12,6 +12,7 @@
 #include "boresight/version.h"
 #include "sim/cli/plugins.h"
 #include "sim/cli/progress.h"
+#include "sim/core/compare.h"
 #include "sim/core/fnv.h"
 #include "sim/core/folder.h"
 #include "sim/core/json_number.h"
@@ -108,25 +109,22 @@ static bst_status read_frame_row(bst_ctx *ctx, const job *j, const bst_io_rows *
     return BST_OK;
 }
 
-static double minimum(const double v[3]) {
-    return fmin(v[0], fmin(v[1], v[2]));
-}
-static double maximum(const double v[3]) {
-    return fmax(v[0], fmax(v[1], v[2]));
-}
-
 /* Along one axis: start, middle and end as fractions of the image. */
 static void put_axis(cJSON *node, char axis, const double v[3], double box) {
     const char *const names[] = {"min", "max", "center", "start", "mid", "end"};
-    const double values[] = {minimum(v), maximum(v), 0.5 * (minimum(v) + maximum(v)),
-                             v[0],       v[1],       v[2]};
+    const double values[] = {bst_least_of_3(v),
+                             bst_greatest_of_3(v),
+                             0.5 * (bst_least_of_3(v) + bst_greatest_of_3(v)),
+                             v[0],
+                             v[1],
+                             v[2]};
     char key[16];
     for (int k = 0; k < 6; k++) {
         snprintf(key, sizeof key, "%c_%s", axis, names[k]);
         bst_json_add_number(node, key, values[k]);
     }
     bst_json_add_number(node, axis == 'y' ? "bbox_height" : "bbox_width",
-                        box > 0.0 ? box : maximum(v) - minimum(v));
+                        box > 0.0 ? box : bst_greatest_of_3(v) - bst_least_of_3(v));
 }
 
 static const char truth_sql[] =
@@ -153,8 +151,9 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
             return NULL;
         }
     }
-    if (!(electrons > 0.0) || (star && !(v_mag <= j->e->star_limit)) || maximum(x) < 0.0 ||
-        minimum(x) > 1.0 || maximum(y) < 0.0 || minimum(y) > 1.0) {
+    if (!(electrons > 0.0) || (star && !(v_mag <= j->e->star_limit)) ||
+        bst_greatest_of_3(x) < 0.0 || bst_least_of_3(x) > 1.0 || bst_greatest_of_3(y) < 0.0 ||
+        bst_least_of_3(y) > 1.0) {
         return NULL;
     }
     char id[32];

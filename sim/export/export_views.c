@@ -121,9 +121,14 @@ static bst_status write_frustum(bst_ctx *ctx, FILE *stream, const char *name, fr
     }
     char id[200];
     snprintf(id, sizeof id, "view/%.180s", name);
-    return bst_czml_write_line(ctx, stream, id, name, line, (int)(sizeof way / sizeof *way), colour,
-                               bst_world_time(f->world, f->poses[0].seconds),
-                               bst_world_time(f->world, f->poses[f->count - 1].seconds));
+    const bst_czml_line view = {.id = id,
+                                .name = name,
+                                .ids = line,
+                                .count = (int)(sizeof way / sizeof *way),
+                                .rgba = colour,
+                                .start = bst_world_time(f->world, f->poses[0].seconds),
+                                .stop = bst_world_time(f->world, f->poses[f->count - 1].seconds)};
+    return bst_czml_write_line(ctx, stream, &view);
 }
 
 bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,

@@ -314,19 +314,6 @@ void bst_chart_end(bst_chart *c) {
 
 /* ------------------------------------------------------------------ shapes */
 
-static void put_rect(const bst_chart *c, const char *class, int colour, double x0, double y0,
-                     double x1, double y1, const char *title) {
-    fprintf(c->out, "<rect class=\"%s c%d\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"",
-            class, colour, fmin(x0, x1), fmin(y0, y1), fabs(x1 - x0), fabs(y1 - y0));
-    if (title) {
-        fputs("><title>", c->out);
-        bst_html_text(c->out, title);
-        fputs("</title></rect>\n", c->out);
-    } else {
-        fputs("/>\n", c->out);
-    }
-}
-
 void bst_chart_bands(const bst_chart *c, const double *from, const double *to, size_t n, int colour,
                      const char *title) {
     fprintf(c->out, "<path class=\"b c%d\" d=\"", colour);
@@ -348,8 +335,17 @@ void bst_chart_bands(const bst_chart *c, const double *from, const double *to, s
 
 void bst_chart_bar(const bst_chart *c, double x0, double x1, double y0, double y1, int colour,
                    const char *title) {
-    put_rect(c, "h", colour, inside_x(c, x0), inside_y(c, y0), inside_x(c, x1), inside_y(c, y1),
-             title);
+    double left = inside_x(c, x0), right = inside_x(c, x1);
+    double top = inside_y(c, y0), bottom = inside_y(c, y1);
+    fprintf(c->out, "<rect class=\"h c%d\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"",
+            colour, fmin(left, right), fmin(top, bottom), fabs(right - left), fabs(bottom - top));
+    if (title) {
+        fputs("><title>", c->out);
+        bst_html_text(c->out, title);
+        fputs("</title></rect>\n", c->out);
+    } else {
+        fputs("/>\n", c->out);
+    }
 }
 
 /* A path inside the plotting area: coordinates are whole steps from its upper left corner. */

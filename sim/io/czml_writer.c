@@ -149,22 +149,20 @@ bst_status bst_czml_write_object(bst_ctx *ctx, FILE *stream, const bst_czml_obje
     return bst_text_stream_ok(ctx, stream);
 }
 
-bst_status bst_czml_write_line(bst_ctx *ctx, FILE *stream, const char *id, const char *name,
-                               const char *const *ids, int count, const unsigned char rgba[4],
-                               bst_time start, bst_time stop) {
+bst_status bst_czml_write_line(bst_ctx *ctx, FILE *stream, const bst_czml_line *line) {
     fputs(",\n{\"id\":", stream);
-    write_string(stream, id);
+    write_string(stream, line->id);
     fputs(",\"name\":", stream);
-    write_string(stream, name);
+    write_string(stream, line->name);
     fputs(",\n\"availability\":", stream);
-    write_interval(stream, start, stop);
+    write_interval(stream, line->start, line->stop);
     fprintf(stream,
             ",\n\"polyline\":{\"arcType\":\"NONE\",\"width\":1,\"material\":{\"solidColor\":{"
             "\"color\":{\"rgba\":[%d,%d,%d,%d]}}},\n\"positions\":{\"references\":[",
-            rgba[0], rgba[1], rgba[2], rgba[3]);
-    for (int i = 0; i < count; i++) {
+            line->rgba[0], line->rgba[1], line->rgba[2], line->rgba[3]);
+    for (int i = 0; i < line->count; i++) {
         char reference[300];
-        snprintf(reference, sizeof reference, "%.280s#position", ids[i]);
+        snprintf(reference, sizeof reference, "%.280s#position", line->ids[i]);
         fputs(i ? "," : "", stream);
         write_string(stream, reference);
     }

@@ -37,10 +37,20 @@ bst_status bst_czml_write_head(bst_ctx *ctx, FILE *stream, const char *name, bst
 bst_status bst_czml_write_object(bst_ctx *ctx, FILE *stream,
                                  const bst_czml_object *object) BST_MUST_CHECK;
 
-/* A line through the positions of packets with these ids, in their order. */
-bst_status bst_czml_write_line(bst_ctx *ctx, FILE *stream, const char *id, const char *name,
-                               const char *const *ids, int count, const unsigned char rgba[4],
-                               bst_time start, bst_time stop) BST_MUST_CHECK;
+/* A line through the positions of packets, in their order. */
+typedef struct bst_czml_line {
+    const char *id, *name;
+    const char *const *ids; /* [count] of the packets */
+    int count;
+    const unsigned char *rgba; /* [4] */
+    bst_time start, stop;      /* of its availability */
+} bst_czml_line;
+
+/* Writes a line.
+ *
+ * Errors: BST_ERR_IO */
+bst_status bst_czml_write_line(bst_ctx *ctx, FILE *stream,
+                               const bst_czml_line *line) BST_MUST_CHECK;
 
 /* Ends the document. */
 bst_status bst_czml_write_tail(bst_ctx *ctx, FILE *stream) BST_MUST_CHECK;

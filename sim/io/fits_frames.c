@@ -10,22 +10,6 @@
 #include "sim/io/fits_internal.h"
 #include "sim/io/manifest.h"
 
-bst_status bst_fits_check(bst_ctx *ctx, const bst_fits *fits, int code, const char *what) {
-    if (code == 0) {
-        return BST_OK;
-    }
-    int error = errno;
-    char reason[FLEN_STATUS];
-    fits_get_errstatus(code, reason);
-    fits_clear_errmsg();
-    return bst_fail(ctx, BST_ERR_IO, "%s: %s: %s%s%s%s", fits->path, what, reason,
-                    error ? " (" : "", error ? strerror(error) : "", error ? ")" : "");
-}
-
-bst_status bst_fits_fail_errno(bst_ctx *ctx, const bst_fits *fits, const char *what) {
-    return bst_fail(ctx, BST_ERR_IO, "%s: %s: %s", fits->path, what, strerror(errno));
-}
-
 static void copy_name(char to[BST_FITS_NAME_BYTES], const char *from) {
     snprintf(to, BST_FITS_NAME_BYTES, "%s", from ? from : "");
 }
@@ -37,21 +21,6 @@ static void copy_names(bst_fits *fits, const bst_fits_info *info) {
     copy_name(fits->names.image_type, info->image_type);
     copy_name(fits->names.program, info->program);
     fits->names.camera = *info->camera;
-}
-
-/* Sets the sums of an HDU with the pixels behind it (NULL: none). */
-static bst_status sign(bst_ctx *ctx, const bst_fits *fits, char *hdu, long long bytes,
-                       const uint16_t *pixels, size_t count) {
-    bst_fits_sum sum = {0};
-    if (!fits->checksums) {
-        return BST_OK;
-    }
-    if (pixels) {
-        bst_fits_sum_pixels(&sum, pixels, count);
-    }
-    return bst_fits_sign(hdu, (size_t)bytes, sum)
-               ? BST_OK
-               : bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
 }
 
 /* The primary HDU of a file of extensions, or of a cube without planes. */
@@ -68,7 +37,7 @@ static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
     if (status == BST_OK) {
-        status = sign(ctx, fits, hdu, bytes, NULL, 0);
+        status = bst_fits_sign_hdu(ctx, fits, hdu, bytes, NULL, 0);
     }
     if (status == BST_OK) {
         status = bst_fits_start_file(ctx, fits, hdu, bytes);
@@ -139,64 +108,6 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     return BST_OK;
 }
 
-/* Gives the header of an image without pixels its size; false when the cards are elsewhere. */
-static bool set_size(char *header, int width, int height) {
-    const int size[2] = {width, height};
-    for (int k = 0; k < 2; k++) {
-        /* after XTENSION, BITPIX and NAXIS: FITS 4.0, section 4.4.1.2 */
-        char *card = header + (size_t)(3 + k) * 80, start[11], value[21];
-        snprintf(start, sizeof start, "NAXIS%d  = ", k + 1);
-        if (memcmp(card, start, 10) != 0) {
-            return false;
-        }
-        snprintf(value, sizeof value, "%20d", size[k]);
-        memcpy(card + 10, value, 20);
-    }
-    return true;
-}
-
-bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
-                                    const uint16_t *pixels, int width, int height, int64_t number) {
-    bool rice = fits->compression == BST_FITS_RICE;
-    long size[2] = {rice ? width : 0, rice ? height : 0};
-    size_t count = (size_t)width * (size_t)height;
-    char *hdu = NULL;
-    long long bytes = 0;
-    int code = 0;
-    errno = 0;
-    bst_fits_memory_open(&fits->memory, true, &code);
-    fitsfile *file = fits->memory.file;
-    if (rice) {
-        fits_set_compression_type(file, RICE_1, &code);
-    }
-    fits_create_img(file, USHORT_IMG, 2, size, &code);
-    fits_write_key_str(file, "EXTNAME", "FRAME", "", &code);
-    fits_write_key_lng(file, "EXTVER", number, "counted from 1", &code);
-    fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
-    bst_fits_put_frame_keys(file, &fits->names, frame, &code);
-    bst_fits_put_statements(file, &code);
-    bst_fits_put_sums(fits, file, &code);
-    if (rice) {
-        /* cfitsio's prototype lacks const; it does not write to the array */
-        fits_write_img(file, TUSHORT, 1, (LONGLONG)count, (void *)(uintptr_t)pixels, &code);
-    }
-    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
-    bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
-    if (status == BST_OK && !rice && !set_size(hdu, width, height)) {
-        status = bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS1 is not where it belongs", fits->path);
-    }
-    const uint16_t *behind = rice ? NULL : pixels;
-    count = rice ? 0 : count;
-    if (status == BST_OK) {
-        status = sign(ctx, fits, hdu, bytes, behind, count);
-    }
-    if (status == BST_OK) {
-        status = bst_fits_append_image(ctx, fits, hdu, bytes, behind, count);
-    }
-    bst_fits_memory_close(&fits->memory, &code);
-    return status;
-}
-
 bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                           const uint16_t *pixels, int width, int height, int64_t *index) {
     if (width < 1 || height < 1 || frame->bits < 1 || frame->bits > 16) {
@@ -216,55 +127,6 @@ bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *fr
         *index = fits->layout == BST_FITS_CUBE ? fits->frames - 1 : fits->frames;
     }
     return BST_OK;
-}
-
-bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
-                                const char *name, const void *pixels, int width, int height,
-                                int64_t *index) {
-    if (width < 1 || height < 1 || fits->content == BST_FITS_COUNTS) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: no plane of %d x %d pixels", fits->path, width,
-                        height);
-    }
-    static const int
-        images[] = {[BST_FITS_ELECTRONS] = FLOAT_IMG,
-                    [BST_FITS_ITEMS] = LONG_IMG,
-                    [BST_FITS_FLAGS] = BYTE_IMG},
-        types[] = {
-            [BST_FITS_ELECTRONS] = TFLOAT, [BST_FITS_ITEMS] = TINT, [BST_FITS_FLAGS] = TBYTE};
-    long size[2] = {width, height};
-    char *hdu = NULL;
-    long long bytes = 0;
-    int code = 0;
-    errno = 0;
-    bst_fits_memory_open(&fits->memory, true, &code);
-    fitsfile *file = fits->memory.file;
-    fits_create_img(file, images[fits->content], 2, size, &code);
-    fits_write_key_str(file, "EXTNAME", name, "", &code);
-    fits_write_key_lng(file, "EXTVER", fits->frames + 1, "counted from 1", &code);
-    fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
-    bst_fits_put_frame_keys(file, &fits->names, frame, &code);
-    bst_fits_put_content(file, fits->content, &code);
-    bst_fits_put_statements(file, &code);
-    bst_fits_put_sums(fits, file, &code);
-    /* cfitsio's prototype lacks const; it does not write to the array */
-    fits_write_img(file, types[fits->content], 1, (LONGLONG)width * height,
-                   (void *)(uintptr_t)pixels, &code);
-    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
-    bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
-    if (status == BST_OK) {
-        status = sign(ctx, fits, hdu, bytes, NULL, 0);
-    }
-    if (status == BST_OK) {
-        status = bst_fits_append_hdu(ctx, fits, hdu, bytes);
-    }
-    bst_fits_memory_close(&fits->memory, &code);
-    if (status == BST_OK) {
-        fits->frames++;
-        if (index) {
-            *index = fits->frames;
-        }
-    }
-    return status;
 }
 
 bst_status bst_fits_write_single(bst_ctx *ctx, const char *path, const bst_fits_info *info,

@@ -73,12 +73,16 @@ bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *fr
                           const uint16_t *pixels, int width, int height,
                           int64_t *index) BST_MUST_CHECK;
 
+typedef struct bst_fits_plane {
+    const char *name;   /* EXTNAME */
+    const void *pixels; /* [height][width] */
+    int width, height;
+} bst_fits_plane;
+
 /* Writes a plane of a file of electrons (float), items (int32) or flags (uint8) as bst_fits_write
- * does a frame;
- * `name` is its EXTNAME. */
+ * does a frame. */
 bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
-                                const char *name, const void *pixels, int width, int height,
-                                int64_t *index) BST_MUST_CHECK;
+                                const bst_fits_plane *plane, int64_t *index) BST_MUST_CHECK;
 
 /* Writes one frame as a file of its own, its pixels in the primary array, with the keys that
  * bst_fits_write gives a frame; the file appears whole or not at all, and replaces an earlier one.

@@ -95,6 +95,10 @@ void bst_fits_put_sums(const bst_fits *fits, fitsfile *file, int *code);
  * no place for them. */
 bool bst_fits_sign(char *hdu, size_t bytes, bst_fits_sum data);
 
+/* Sets the sums of an HDU with the pixels behind it (NULL: none), in a file that has checksums. */
+bst_status bst_fits_sign_hdu(bst_ctx *ctx, const bst_fits *fits, char *hdu, long long bytes,
+                             const uint16_t *pixels, size_t count) BST_MUST_CHECK;
+
 /* Makes the file with one HDU in it: it appears whole or not at all. */
 bst_status bst_fits_start_file(bst_ctx *ctx, bst_fits *fits, const char *hdu,
                                long long bytes) BST_MUST_CHECK;

@@ -108,9 +108,11 @@ static void draw_overlay(bst_picture *p, const bst_io_overlay *overlay, int widt
     draw_legend(p, width, height, 0.8 * h);
 }
 
-bst_status bst_frame_picture(bst_ctx *ctx, const uint16_t *pixels, int columns, int rows,
-                             bst_io_stretch stretch, const bst_io_overlay *overlay, int width,
-                             int height, bst_picture **out) {
+bst_status bst_frame_picture(bst_ctx *ctx, const bst_io_counts *counts, bst_io_stretch stretch,
+                             const bst_io_overlay *overlay, int width, int height,
+                             bst_picture **out) {
+    const uint16_t *pixels = counts->pixels;
+    int columns = counts->columns, rows = counts->rows;
     *out = NULL;
     if (columns < 1 || rows < 1) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "a frame without pixels");

@@ -39,11 +39,17 @@ typedef struct bst_io_overlay {
     const char *caption; /* one line, upper left; NULL for none */
 } bst_io_overlay;
 
+/* The pixels of a frame. */
+typedef struct bst_io_counts {
+    const uint16_t *pixels; /* [rows][columns] */
+    int columns, rows;
+} bst_io_counts;
+
 /* Makes a picture of width x height that holds a frame of columns x rows pixels as large as it
  * fits, in the middle, and black around it. `overlay` may be NULL. A frame that has the picture's
  * size is shown pixel for pixel. The caller frees. */
-bst_status bst_frame_picture(bst_ctx *ctx, const uint16_t *pixels, int columns, int rows,
-                             bst_io_stretch stretch, const bst_io_overlay *overlay, int width,
-                             int height, bst_picture **out) BST_MUST_CHECK;
+bst_status bst_frame_picture(bst_ctx *ctx, const bst_io_counts *counts, bst_io_stretch stretch,
+                             const bst_io_overlay *overlay, int width, int height,
+                             bst_picture **out) BST_MUST_CHECK;
 
 #endif

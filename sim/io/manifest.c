@@ -8,27 +8,14 @@
 #include <unistd.h>
 
 #include "sim/core/draft.h"
-
-static bool write_all(int fd, const char *data, size_t bytes) {
-    while (bytes > 0) {
-        ssize_t n = write(fd, data, bytes);
-        if (n < 0 && errno != EINTR) {
-            return false;
-        }
-        if (n > 0) {
-            data += n;
-            bytes -= (size_t)n;
-        }
-    }
-    return true;
-}
+#include "sim/core/file.h"
 
 bst_status bst_io_write_file_atomic(bst_ctx *ctx, const char *path, const void *data,
                                     size_t bytes) {
     char draft[4160];
     int fd;
     BST_TRY(bst_draft_make(ctx, path, draft, sizeof draft, &fd));
-    bool ok = write_all(fd, data, bytes) && fsync(fd) == 0;
+    bool ok = bst_file_write_all(fd, data, bytes) && fsync(fd) == 0;
     int error = ok ? 0 : errno;
     if (close(fd) != 0 && ok) {
         ok = false;

@@ -1,4 +1,4 @@
-/* What run_store.c (the folder) and run_tables.c (the database) share. */
+/* What run_store.c and run_folder.c (the folder) and run_tables.c (the database) share. */
 #ifndef BST_IO_RUN_INTERNAL_H
 #define BST_IO_RUN_INTERNAL_H
 
@@ -9,6 +9,7 @@
 
 #define BST_RUN_PATH_BYTES 4096
 #define BST_RUN_DATABASE "run.sqlite"
+#define BST_RUN_LOCK "lock"
 
 struct bst_io_table {
     bst_run *run;
@@ -33,6 +34,10 @@ struct bst_run {
     bst_run_before_commit before_commit;
     void *before_commit_user;
 };
+
+/* FOLDER/NAME; BST_ERR_ARGUMENT when it is too long. */
+bst_status bst_run_path_join(bst_ctx *ctx, char *buffer, size_t bytes, const char *folder,
+                             const char *name) BST_MUST_CHECK;
 
 /* Fails when the folder was removed, moved or replaced while the run writes it. */
 bst_status bst_run_check_folder(bst_ctx *ctx, const bst_run *run) BST_MUST_CHECK;

@@ -15,19 +15,9 @@
 #include "sim/io/run_files.h"
 #include "sim/io/run_internal.h"
 
-#define LOCK_NAME "lock"
 /* The lock keeps this much of the disk and gives it back when the run is abandoned: reading tables
  * with a journal takes 32 KiB of disk, also of a full one. */
 #define SPARE_BYTES 65536
-
-static bst_status join(bst_ctx *ctx, char *buffer, size_t bytes, const char *folder,
-                       const char *name) {
-    int n = snprintf(buffer, bytes, "%s/%s", folder, name);
-    if (n < 0 || (size_t)n >= bytes) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s/%s: the path is too long", folder, name);
-    }
-    return BST_OK;
-}
 
 static bst_status fail_errno(bst_ctx *ctx, const char *path, const char *what) {
     return bst_fail(ctx, BST_ERR_IO, "%s: %s: %s", path, what, strerror(errno));
@@ -108,7 +98,7 @@ static bool looks_like_run(const char *folder) {
     bool empty = true, tables = false;
     for (struct dirent *entry; (entry = readdir(dir));) {
         if (!is_dots(entry->d_name)) {
-            empty = empty && strcmp(entry->d_name, LOCK_NAME) == 0;
+            empty = empty && strcmp(entry->d_name, BST_RUN_LOCK) == 0;
             tables = tables || strcmp(entry->d_name, BST_RUN_DATABASE) == 0;
         }
     }
@@ -119,7 +109,7 @@ static bool looks_like_run(const char *folder) {
 /* Opens folder/lock and locks it; -1 with errno (EWOULDBLOCK: a living process holds it). */
 static int take_lock(const char *folder, int flags) {
     char path[BST_RUN_PATH_BYTES];
-    if (join(NULL, path, sizeof path, folder, LOCK_NAME) != BST_OK) {
+    if (bst_run_path_join(NULL, path, sizeof path, folder, BST_RUN_LOCK) != BST_OK) {
         errno = ENAMETOOLONG;
         return -1;
     }
@@ -284,29 +274,6 @@ bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bs
     return BST_OK;
 }
 
-const char *bst_run_folder(const bst_run *run) {
-    return run->folder;
-}
-
-bst_status bst_run_file(bst_ctx *ctx, const bst_run *run, const char *name, char *buffer,
-                        size_t bytes) {
-    return join(ctx, buffer, bytes, run->folder, name);
-}
-
-bst_status bst_run_check_folder(bst_ctx *ctx, const bst_run *run) {
-    char path[BST_RUN_PATH_BYTES];
-    struct stat held, named;
-    BST_TRY(join(ctx, path, sizeof path, run->folder, LOCK_NAME));
-    if (stat(path, &named) != 0 || fstat(run->lock, &held) != 0 || held.st_ino != named.st_ino ||
-        held.st_dev != named.st_dev) {
-        return bst_fail(
-            ctx, BST_ERR_IO,
-            "%s: the folder was removed, moved or replaced while the run was writing it",
-            run->folder);
-    }
-    return BST_OK;
-}
-
 int64_t bst_run_free_bytes(const char *path) {
     char folder[BST_RUN_PATH_BYTES];
     if (snprintf(folder, sizeof folder, "%s", path) >= (int)sizeof folder) {
@@ -357,7 +324,7 @@ static bst_status sync_folder(bst_ctx *ctx, const char *folder) {
         /* links, pipes and folders are somebody else's */
         if (fstatat(dirfd(dir), entry->d_name, &info, AT_SYMLINK_NOFOLLOW) == 0 &&
             S_ISREG(info.st_mode)) {
-            status = join(ctx, path, sizeof path, folder, entry->d_name);
+            status = bst_run_path_join(ctx, path, sizeof path, folder, entry->d_name);
             status = status == BST_OK ? sync_path(ctx, path) : status;
         }
     }
@@ -417,7 +384,8 @@ bst_status bst_run_seal(bst_ctx *ctx, bst_run *run) {
 bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) {
     bst_status status = run->db ? bst_run_seal(ctx, run) : bst_run_check_folder(ctx, run);
     char lock_path[BST_RUN_PATH_BYTES];
-    bool have_lock_path = join(NULL, lock_path, sizeof lock_path, run->folder, LOCK_NAME) == BST_OK;
+    bool have_lock_path =
+        bst_run_path_join(NULL, lock_path, sizeof lock_path, run->folder, BST_RUN_LOCK) == BST_OK;
     if (status == BST_OK && have_lock_path && unlink(lock_path) != 0) {
         status = fail_errno(ctx, lock_path, "cannot be removed");
     }

@@ -259,6 +259,49 @@ static void misfit(const bst_sip *sip, const pair *pairs, int count, double *for
     }
 }
 
+/* Pixels and their places on the undistorted plane: those of the fit, and a grid to judge it by. */
+static bool make_pairs(const mapping *m, const samples *s, const bst_io_sky_plane *plane,
+                       const double cd[2][2], pair *pairs, pair *grid) {
+    for (int i = 0; i < NODES * NODES + GRID * GRID; i++) {
+        int g = i - NODES * NODES;
+        pair *p = g < 0 ? &pairs[i] : &grid[g];
+        double x = g < 0 ? m->hx * cos(BST_PI * (i % NODES + 0.5) / NODES)
+                         : (m->hx - 0.5) * (2.0 * (g % GRID) / (GRID - 1) - 1.0);
+        double y = g < 0 ? m->hy * cos(BST_PI * (double)(i / NODES) / NODES + 0.5 * BST_PI / NODES)
+                         : (m->hy - 0.5) * (2.0 * (double)(g / GRID) / (GRID - 1) - 1.0);
+        p->u = m->cx + x - m->x0;
+        p->v = m->cy + y - m->y0;
+        bst_vec3 icrs = g < 0 ? s->icrs[i / NODES][i % NODES] : place(m, m->cx + x, m->cy + y);
+        double xi, eta;
+        if (!bst_io_sky_to_plane(plane, icrs, &xi, &eta)) {
+            return false;
+        }
+        apply_inverse(cd, xi, eta, &p->big_u, &p->big_v);
+    }
+    return true;
+}
+
+/* The inverse of least error, of the order of the polynomial or more; returns the larger misfit of
+ * both directions over the grid, px. */
+static double fit_best_inverse(const pair *pairs, const pair *grid, bst_sip *out) {
+    double forward = 0.0, inverse = INFINITY;
+    for (int order = out->order; order <= BST_SIP_ORDER && inverse > INVERSE_PX; order++) {
+        bst_sip before = *out;
+        double old = inverse;
+        if (!fit_inverse(pairs, NODES * NODES, order, out)) {
+            *out = before;
+            break;
+        }
+        misfit(out, grid, GRID * GRID, &forward, &inverse);
+        if (inverse > old) {
+            *out = before;
+            inverse = old;
+            break;
+        }
+    }
+    return fmax(forward, inverse);
+}
+
 bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_light *light,
                  double crval_rad[2], double cd[2][2], bst_sip *out, double *residual_px) {
     double w = (double)camera->width_px, h = (double)camera->height_px;
@@ -306,38 +349,10 @@ bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_l
         apply_inverse((const double(*)[2])cd, powers[0][k], powers[1][k], &out->a[k], &out->b[k]);
     }
     pair pairs[NODES * NODES], grid[GRID * GRID];
-    for (int i = 0; i < NODES * NODES + GRID * GRID; i++) {
-        int g = i - NODES * NODES;
-        pair *p = g < 0 ? &pairs[i] : &grid[g];
-        double x = g < 0 ? m.hx * cos(BST_PI * (i % NODES + 0.5) / NODES)
-                         : (m.hx - 0.5) * (2.0 * (g % GRID) / (GRID - 1) - 1.0);
-        double y = g < 0 ? m.hy * cos(BST_PI * (double)(i / NODES) / NODES + 0.5 * BST_PI / NODES)
-                         : (m.hy - 0.5) * (2.0 * (double)(g / GRID) / (GRID - 1) - 1.0);
-        p->u = m.cx + x - m.x0;
-        p->v = m.cy + y - m.y0;
-        bst_vec3 icrs = g < 0 ? s.icrs[i / NODES][i % NODES] : place(&m, m.cx + x, m.cy + y);
-        double xi, eta;
-        if (!bst_io_sky_to_plane(&plane, icrs, &xi, &eta)) {
-            return false;
-        }
-        apply_inverse((const double(*)[2])cd, xi, eta, &p->big_u, &p->big_v);
+    if (!make_pairs(&m, &s, &plane, (const double(*)[2])cd, pairs, grid)) {
+        return false;
     }
-    double forward = 0.0, inverse = INFINITY;
-    for (int order = out->order; order <= BST_SIP_ORDER && inverse > INVERSE_PX; order++) {
-        bst_sip before = *out;
-        double old = inverse;
-        if (!fit_inverse(pairs, NODES * NODES, order, out)) {
-            *out = before;
-            break;
-        }
-        misfit(out, grid, GRID * GRID, &forward, &inverse);
-        if (inverse > old) {
-            *out = before;
-            inverse = old;
-            break;
-        }
-    }
-    *residual_px = fmax(forward, inverse);
+    *residual_px = fit_best_inverse(pairs, grid, out);
     return isfinite(*residual_px);
 }
 

@@ -284,8 +284,9 @@ static bst_status ready(external *m, struct bst_step *step, bool *is_ready) {
 static bst_status exchange(external *m, struct bst_step *step, const bst_link_input *inputs,
                            int count) {
     bool answered;
+    const bst_link_messages messages = {inputs, count, m->outputs, m->output_count};
     bst_status status = bst_link_exchange(bst_step_ctx(step), m->link, m->part, bst_step_tick(step),
-                                          inputs, count, m->outputs, m->output_count, &answered);
+                                          &messages, &answered);
     bst_external_tell(m->link, step);
     BST_TRY(status);
     publish_answer(m, step);

@@ -89,13 +89,19 @@ typedef struct bst_link_output {
     int dropped; /* items beyond the capacity */
 } bst_link_output;
 
+/* What a part is sent in a step, and what it may answer with. */
+typedef struct bst_link_messages {
+    const bst_link_input *inputs; /* [input_count] */
+    int input_count;
+    bst_link_output *outputs; /* [output_count] */
+    int output_count;
+} bst_link_messages;
+
 /* One step of a part: sends the inputs (at most 63), waits for the answer. *answered false: there
  * was none in time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one
  * said that it has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
-                             const bst_link_input *inputs, int input_count,
-                             bst_link_output *outputs, int output_count,
-                             bool *answered) BST_MUST_CHECK;
+                             const bst_link_messages *messages, bool *answered) BST_MUST_CHECK;
 
 /* Takes another answer of a part, if there is one, with BST_LINK_HOLD or BST_LINK_RUSH.
  *

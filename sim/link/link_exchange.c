@@ -236,15 +236,14 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
 
 /* A step that is sent and not awaited, or not for long. */
 static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                              const bst_link_input *inputs, int input_count,
-                              bst_link_output *outputs, int output_count, bool *answered) {
+                              const bst_link_messages *m, bool *answered) {
     link_part *part = &link->parts[number];
     *answered = false;
-    for (int i = 0; i < output_count; i++) {
-        outputs[i].given = false;
+    for (int i = 0; i < m->output_count; i++) {
+        m->outputs[i].given = false;
     }
     link_exchange x = {.ctx = ctx, .part = number, .tick = tick};
-    BST_TRY(make_ahead(ctx, part, outputs, output_count));
+    BST_TRY(make_ahead(ctx, part, m->outputs, m->output_count));
     link_answer *place = free_place(link, part);
     if (part->peer < 0 || !place) {
         link->counts[LINK_SKIPPED]++;
@@ -260,11 +259,11 @@ static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t 
         place->outputs[i].given = false;
         place->outputs[i].dropped = 0;
     }
-    sending s = {.inputs = inputs, .count = input_count};
+    sending s = {.inputs = m->inputs, .count = m->input_count};
     send_step(link, &x, &s);
     bool hold = link->run.waiting == BST_LINK_HOLD;
     BST_TRY(take_until(link, &x, place->sent_s + (hold ? link->run.hold_s : 0.0), newest_finished));
-    *answered = oldest_answer(link, number, outputs, output_count);
+    *answered = oldest_answer(link, number, m->outputs, m->output_count);
     link->counts[LINK_HELD] += !*answered;
     return BST_OK;
 }
@@ -294,8 +293,7 @@ bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
 }
 
 static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                          const bst_link_input *inputs, int input_count, bst_link_output *outputs,
-                          int output_count, bool *answered) {
+                          const bst_link_messages *m, bool *answered) {
     link->exchanges++;
     link_part *part = &link->parts[number];
     link_exchange x = {.ctx = ctx,
@@ -303,10 +301,10 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
                        .tick = tick,
                        .answer = {.open = true,
                                   .step = part->step++,
-                                  .outputs = outputs,
-                                  .output_count = output_count},
+                                  .outputs = m->outputs,
+                                  .output_count = m->output_count},
                        .resend = part->peer >= 0};
-    sending s = {.inputs = inputs, .count = input_count};
+    sending s = {.inputs = m->inputs, .count = m->input_count};
     double began = bst_wall_seconds();
     bool first = !part->had_peer;
     /* one that has been lost already is not waited for again where the run does without */
@@ -318,9 +316,9 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
         if (x.resend && part->peer >= 0) {
             x.resend = false;
             x.answer.taken = 0;
-            for (int i = 0; i < output_count; i++) {
-                outputs[i].given = false;
-                outputs[i].dropped = 0;
+            for (int i = 0; i < m->output_count; i++) {
+                m->outputs[i].given = false;
+                m->outputs[i].dropped = 0;
             }
             send_step(link, &x, &s);
         }
@@ -350,15 +348,14 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
 }
 
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                             const bst_link_input *inputs, int input_count,
-                             bst_link_output *outputs, int output_count, bool *answered) {
+                             const bst_link_messages *m, bool *answered) {
     if (bst_link_replays(link)) {
         *answered = true;
-        return bst_link_tape_read(ctx, link, number, tick, outputs, output_count);
+        return bst_link_tape_read(ctx, link, number, tick, m->outputs, m->output_count);
     }
     BST_TRY(bst_link_open(ctx, link));
-    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? awaited : not_awaited)(
-        ctx, link, number, tick, inputs, input_count, outputs, output_count, answered));
-    bst_link_tape_answer(link, number, tick, outputs, output_count);
+    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? awaited : not_awaited)(ctx, link, number, tick,
+                                                                          m, answered));
+    bst_link_tape_answer(link, number, tick, m->outputs, m->output_count);
     return BST_OK;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <zmq.h>
 
+#include "sim/core/memory.h"
 #include "sim/core/wall_clock.h"
 #include "sim/link/crc32c.h"
 #include "sim/link/curve_keys.h"
@@ -162,18 +163,6 @@ static bst_status receive_parts(bst_ctx *ctx, bst_link_peer *peer, double timeou
     return BST_OK;
 }
 
-static bst_status grow(bst_ctx *ctx, void **memory, size_t *room, size_t bytes) {
-    if (*room < bytes) {
-        void *more = realloc(*memory, bytes);
-        if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "link: no memory for %zu bytes", bytes);
-        }
-        *memory = more;
-        *room = bytes;
-    }
-    return BST_OK;
-}
-
 /* What is wrong with a message from the simulation. */
 static bst_status wrong(bst_ctx *ctx, bst_wire_fault fault) {
     return bst_fail_prefix(ctx, BST_ERR_FORMAT, "link: a message of the simulation is %s",
@@ -201,7 +190,7 @@ static bst_status find_pixels(bst_ctx *ctx, bst_link_peer *peer, bst_link_receiv
         return BST_OK;
     }
     void *copy = peer->pixels;
-    BST_TRY(grow(ctx, &copy, &peer->pixel_room, (size_t)bytes));
+    BST_TRY(bst_memory_grow(ctx, "link: no memory", &copy, &peer->pixel_room, (size_t)bytes));
     peer->pixels = copy;
     memcpy(peer->pixels, data, (size_t)bytes);
     out->pixels = peer->pixels;
@@ -242,8 +231,8 @@ static bst_status read_message(bst_ctx *ctx, bst_link_peer *peer, bst_link_recei
     size_t bytes = zmq_msg_size(&peer->parts[1]), record = bst_wire_bytes(about->record);
     size_t items =
         about->items && bytes > record ? (bytes - record) / bst_wire_bytes(about->items) : 0;
-    BST_TRY(grow(ctx, &peer->payload, &peer->payload_room,
-                 about->header_bytes + (items + 1) * about->item_bytes + 64));
+    BST_TRY(bst_memory_grow(ctx, "link: no memory", &peer->payload, &peer->payload_room,
+                            about->header_bytes + (items + 1) * about->item_bytes + 64));
     fault = bst_wire_decode(ctx, about, zmq_msg_data(&peer->parts[1]), bytes, peer->payload,
                             (int)items, NULL);
     if (fault != BST_WIRE_GOOD) {

@@ -169,8 +169,8 @@ static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, doub
         *out = bst_vec3_unit(*out);
         return BST_OK;
     }
-    return bst_world_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t,
-                                           &eye, out);
+    const bst_world_cue_at at = {k->observer, k->sensor, view->clock, t, &eye};
+    return bst_world_cue_nominal_direction(ctx, k->world, &at, out);
 }
 
 static bst_quat error_of(const bst_knowledge_view *view) {
@@ -282,8 +282,8 @@ bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *v
     bst_world_state eye;
     bst_vec3 nominal;
     BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &eye));
-    BST_TRY(bst_world_region_place(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
-                                   along_rad, across_rad, &nominal));
+    const bst_world_cue_at at = {k->observer, k->sensor, view->clock, t, &eye};
+    BST_TRY(bst_world_region_place(ctx, k->world, &at, along_rad, across_rad, &nominal));
     *direction = bst_quat_rotate(view->cue_error, nominal);
     return BST_OK;
 }

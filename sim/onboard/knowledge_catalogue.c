@@ -74,9 +74,9 @@ bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int ob
     bst_vec3 line;
     BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &eye));
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(world->epoch, t), &sky));
-    BST_TRY(bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, &eye, view->clock,
-                                          world->epoch, &sky.bodies, t, false, &line, &target,
-                                          &emission_s));
+    const bst_world_reception at = {&eye, view->clock, world->epoch, &sky.bodies, t};
+    BST_TRY(bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, &at, false, &line,
+                                          &target, &emission_s));
     bst_light light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
     bst_vec3 to_eye = bst_vec3_sub(eye.position_m, target.position_m);
     bst_vec3 to_sun = bst_vec3_sub(sky.bodies.sun_m, target.position_m);

@@ -47,7 +47,7 @@ double bst_psf_reach_px(const bst_psf *psf) {
 }
 
 int bst_psf_nodes(const bst_psf *psf) {
-    return psf->columns * psf->rows * psf->spectra;
+    return bst_psf_node_count(psf);
 }
 
 int bst_psf_spectra(const bst_psf *psf) {

@@ -188,6 +188,12 @@ static bool aberrated(const bst_zernike_polynomial *w) {
 /* Tables of one node, as many as there are spectra. */
 typedef bst_optics_grid_otf *tables[BST_PSF_SPECTRA];
 
+/* The frequencies of tables. */
+typedef struct grid {
+    double step;
+    int reach;
+} grid;
+
 /* Adds the band's OTF of an aperture to a node's tables. */
 static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
                            const band *b, bool with_waves, tables out) {
@@ -195,12 +201,12 @@ static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *
         /* cells of one step of the tables' frequency at this wavelength: no resampling */
         double cell = out[0]->step * b->q[k];
         double wavelength_m = with_waves ? b->rule.wavelength_m[k] : 0.0;
-        int cells = (int)ceil(1.0 / cell), stride, side;
+        int cells = (int)ceil(1.0 / cell);
         int reach = cells + 1 < out[0]->reach ? cells + 1 : out[0]->reach;
-        const float *h;
-        BST_TRY(bst_pupil_transfer(ctx, work, pupil, cell, wavelength_m, &h, &stride, &side));
+        bst_pupil_shifts h;
+        BST_TRY(bst_pupil_transfer(ctx, work, pupil, cell, wavelength_m, &h));
         for (int ky = -reach; ky <= reach; ky++) {
-            const float *row = h + 2 * (size_t)((ky + side) % side) * (size_t)stride;
+            const float *row = h.rows + 2 * (size_t)((ky + h.side) % h.side) * (size_t)h.stride;
             for (int s = 0; s < b->spectra; s++) {
                 float *to = bst_optics_grid_otf_node(out[s], 0, ky),
                       weight = (float)b->weight[s][k];
@@ -213,9 +219,9 @@ static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *
     return BST_OK;
 }
 
-static bst_status create_tables(bst_ctx *ctx, const band *b, double step, int reach, tables out) {
+static bst_status create_tables(bst_ctx *ctx, const band *b, grid g, tables out) {
     for (int s = 0; s < b->spectra; s++) {
-        BST_TRY(bst_optics_grid_otf_create(ctx, step, reach, out[s]));
+        BST_TRY(bst_optics_grid_otf_create(ctx, g.step, g.reach, out[s]));
     }
     return BST_OK;
 }
@@ -223,13 +229,14 @@ static bst_status create_tables(bst_ctx *ctx, const band *b, double step, int re
 /* What a node's aperture adds to the annulus. base: tables of the annulus, made when first needed.
  */
 static bst_status make_node(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
-                            const band *b, tables base, double step, int reach, tables out) {
+                            const band *b, grid g, tables base, tables out) {
+    int reach = g.reach;
     if (base[0]->step == 0.0) {
         bst_pupil annulus = {.inner = pupil->inner};
-        BST_TRY(create_tables(ctx, b, step, reach, base));
+        BST_TRY(create_tables(ctx, b, g, base));
         BST_TRY(add_band(ctx, work, &annulus, b, false, base));
     }
-    BST_TRY(create_tables(ctx, b, step, reach, out));
+    BST_TRY(create_tables(ctx, b, g, out));
     BST_TRY(add_band(ctx, work, pupil, b, true, out));
     for (int s = 0; s < b->spectra; s++) {
         for (int ky = -reach; ky <= reach; ky++) {
@@ -274,10 +281,9 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
                         waves, most);
     }
     double cells = fmax(pupil.vanes > 0 ? CELLS_VANES : CELLS, ceil(CELLS_PER_WAVE * waves));
-    double step = 1.0 / (cells * b->q_least);
-    int reach = (int)cells + 1;
+    const grid g = {1.0 / (cells * b->q_least), (int)cells + 1};
     bst_pupil_work *work;
-    BST_TRY(bst_pupil_work_create(ctx, reach, &work));
+    BST_TRY(bst_pupil_work_create(ctx, g.reach, &work));
     bst_optics_grid_otf annulus[BST_PSF_SPECTRA] = {{0}};
     tables base, own;
     bst_status status = BST_OK;
@@ -290,7 +296,7 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
             for (int s = 0; s < b->spectra; s++) {
                 own[s] = &psf->nodes[s * nodes + k].grid;
             }
-            status = make_node(ctx, work, &pupil, b, base, step, reach, own);
+            status = make_node(ctx, work, &pupil, b, g, base, own);
         }
     }
     for (int s = 0; s < b->spectra; s++) {

@@ -57,23 +57,40 @@ void bst_psf_fit_gaussians(const bst_psf *psf, int node, bst_psf_node *out) {
     }
 }
 
+/* Integral of the squared image of one node and spectrum. */
+static double squared_of(const bst_psf_node *n, double along_px2, double across_px2,
+                         double length_px) {
+    double sum = 0.0;
+    for (int i = 0; i < PARTS; i++) {
+        if (n->gaussian_weight[i] > 0.0) {
+            double own = n->gaussian_px2[i];
+            sum +=
+                n->gaussian_weight[i] *
+                bst_optics_image_squared(sqrt(own + along_px2), sqrt(own + across_px2), length_px);
+        }
+    }
+    return sum;
+}
+
 double bst_psf_squared_image(const bst_psf *psf, const float colour[BST_PSF_COLOURS], double x_px,
                              double y_px, double along_px2, double across_px2, double length_px) {
-    int node[4], fields = psf->columns * psf->rows;
-    double weight[4], sum = 0.0;
+    enum { MOST = 4 * BST_PSF_SPECTRA };
+    int node[4], fields = psf->columns * psf->rows, count = 0;
+    double weight[4], share[MOST], squared[MOST], sum = 0.0;
     int nodes = bst_psf_weights(psf, x_px, y_px, node, weight);
     for (int k = 0; k < nodes; k++) {
         for (int s = 0; s < psf->spectra; s++) {
-            double share = psf->spectra > 1 ? bst_psf_share(colour, s) : 1.0;
-            const bst_psf_node *n = &psf->nodes[s * fields + node[k]];
-            for (int i = 0; i < PARTS; i++) {
-                if (n->gaussian_weight[i] > 0.0) {
-                    double own = n->gaussian_px2[i];
-                    sum += weight[k] * share * n->gaussian_weight[i] *
-                           bst_optics_image_squared(sqrt(own + along_px2), sqrt(own + across_px2),
-                                                    length_px);
-                }
-            }
+            share[count] = weight[k] * (psf->spectra > 1 ? bst_psf_share(colour, s) : 1.0);
+            squared[count++] =
+                squared_of(&psf->nodes[s * fields + node[k]], along_px2, across_px2, length_px);
+        }
+    }
+    /* the image is the sum of the nodes' images; the integral of the product of two is the harmonic
+     * mean of those of their squares, exactly so for round Gaussians */
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < count; k++) {
+            double both = squared[i] + squared[k];
+            sum += both > 0.0 ? share[i] * share[k] * 2.0 * squared[i] * squared[k] / both : 0.0;
         }
     }
     return sum;

@@ -106,6 +106,10 @@ struct bst_psf {
     bst_psf_node *nodes;                           /* [spectra][rows][columns] */
 };
 
+static inline int bst_psf_node_count(const bst_psf *psf) {
+    return psf->columns * psf->rows * psf->spectra;
+}
+
 /* What fills psf->nodes and psf->cutoff for the models that need more than a formula. */
 bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_psf_spectrum *spectrum, bst_psf *psf) BST_MUST_CHECK;

@@ -132,7 +132,7 @@ static bst_status make_plane(bst_ctx *ctx, const transform *t, const bst_psf_sam
 
 bst_status bst_psf_make_sampled(bst_ctx *ctx, const bst_camera *camera,
                                 const bst_psf_samples *samples, bst_psf *psf) {
-    int nodes = bst_psf_nodes(psf);
+    int nodes = bst_psf_node_count(psf);
     if (!samples) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "the PSF of optics/psf_file is needed here: hand its samples over");

@@ -192,7 +192,7 @@ void bst_pupil_mask(const bst_pupil *pupil, double cell, int side, double *open)
 }
 
 bst_status bst_pupil_transfer(bst_ctx *ctx, bst_pupil_work *w, const bst_pupil *pupil, double cell,
-                              double wavelength_m, const float **out, int *stride, int *side) {
+                              double wavelength_m, bst_pupil_shifts *out) {
     BST_TRY(plan(ctx, w, (int)ceil(1.0 / cell)));
     int n = w->side;
     bst_pupil_mask(pupil, cell, n, w->open);
@@ -229,9 +229,7 @@ bst_status bst_pupil_transfer(bst_ctx *ctx, bst_pupil_work *w, const bst_pupil *
         w->power[at] = scale * (a[0] * a[0] + a[1] * a[1]);
     }
     fftwf_execute(w->back);
-    *out = &w->transfer[0][0];
-    *stride = n / 2 + 1;
-    *side = n;
+    *out = (bst_pupil_shifts){&w->transfer[0][0], n / 2 + 1, n};
     return BST_OK;
 }
 

@@ -27,14 +27,20 @@ void bst_pupil_work_free(bst_pupil_work *work);
  * its centre on the cell [side / 2][side / 2]. Exact along rows, 16 lines per cell across them. */
 void bst_pupil_mask(const bst_pupil *pupil, double cell, int side, double *open);
 
+/* An autocorrelation by shifts: rows of `stride` complex pairs; the shift of (kx, ky) cells with
+ * kx >= 0 is at row (ky modulo side), column kx. */
+typedef struct bst_pupil_shifts {
+    const float *rows;
+    int stride, side;
+} bst_pupil_shifts;
+
 /* The autocorrelation of exp(2 pi i wavefront / wavelength) over the aperture, over the aperture's
- * area: *out lends, until the next call, rows of (*stride) complex pairs; the shift of (kx, ky)
- * cells with kx >= 0 is at row (ky modulo *side), column kx. Conjugated so that it is the transfer
+ * area: *out is lent until the next call. Conjugated so that it is the transfer
  * function of the image in which a wavefront that grows towards +x moves light to +x.
  * wavelength_m 0: as if there were no aberration. BST_ERR_MEMORY. */
 bst_status bst_pupil_transfer(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
-                              double cell, double wavelength_m, const float **out, int *stride,
-                              int *side) BST_MUST_CHECK;
+                              double cell, double wavelength_m,
+                              bst_pupil_shifts *out) BST_MUST_CHECK;
 
 /* Largest slope of the wavefront on the aperture, m per diameter. */
 double bst_pupil_slope_m(const bst_pupil *pupil);

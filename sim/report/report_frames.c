@@ -199,9 +199,14 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
     }
 }
 
+/* Detections of a frame, and how many of them are drawn. */
+typedef struct shown {
+    int detections, drawn;
+} shown;
+
 static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
                             const bst_io_overlay *overlay, const bst_report_frame *facts,
-                            bool tracked, int *detections, int *drawn) {
+                            bool tracked, shown *marks) {
     bst_io_stretch stretch = bst_io_stretch_of(frame->pixels, frame->width, frame->height);
     double scale = (double)SIDE / (frame->width > frame->height ? frame->width : frame->height);
     part whole = {.columns = frame->width,
@@ -231,7 +236,7 @@ static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *
     BST_TRY(put_pixels(ctx, out, frame, stretch, &whole,
                        small ? frame->width : (int)fmax(1.0, whole.width),
                        small ? frame->height : (int)fmax(1.0, whole.height)));
-    put_marks(out, overlay, &whole, detections, drawn);
+    put_marks(out, overlay, &whole, &marks->detections, &marks->drawn);
     BST_TRY(put_pixels(ctx, out, frame, stretch, &inset, columns, rows));
     int there, marked;
     put_marks(out, overlay, &inset, &there, &marked);
@@ -309,15 +314,15 @@ static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s
         }
         if (status == BST_OK) {
             bst_report_page_figure(out, BST_PAGE_HALF);
-            int detections, drawn;
+            shown marks_of = {0};
             char caption[280];
-            status = put_frame(ctx, out, &frame, &overlay, facts_of(s, id), s->has_tracks,
-                               &detections, &drawn);
+            status =
+                put_frame(ctx, out, &frame, &overlay, facts_of(s, id), s->has_tracks, &marks_of);
             int n = snprintf(caption, sizeof caption, "%s", overlay.caption ? overlay.caption : "");
-            if (status == BST_OK && drawn < detections && n < 200) {
+            if (status == BST_OK && marks_of.drawn < marks_of.detections && n < 200) {
                 snprintf(caption + n, sizeof caption - (size_t)n,
-                         "   %d of %d detections drawn: the target's and the brightest", drawn,
-                         detections);
+                         "   %d of %d detections drawn: the target's and the brightest",
+                         marks_of.drawn, marks_of.detections);
             }
             bst_report_page_figure_end(out, caption);
         }

@@ -9,15 +9,6 @@
 
 /* ------------------------------------------------------------------ helpers */
 
-size_t bst_report_fill(const bst_report_drawing *d, bst_report_quantity quantity, double *series) {
-    size_t numbers = 0;
-    for (size_t i = 0; i < d->sensor->count; i++) {
-        series[i] = quantity(&d->sensor->frames[i]);
-        numbers += isfinite(series[i]);
-    }
-    return numbers;
-}
-
 /* The last mode that began by then; -1: none. *k goes on from call to call. */
 static int mode_at(const bst_report_sensor *s, double seconds, size_t *k) {
     while (*k + 1 < s->mode_count && s->modes[*k + 1].from_s <= seconds) {
@@ -84,44 +75,14 @@ bst_chart bst_report_time_chart(const bst_report_drawing *d, const char *name, c
     return c;
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* The nearest rank. */
-static double percentile(const double *sorted, size_t n, double share) {
-    size_t rank = (size_t)ceil(share * (double)n);
-    return n > 0 ? sorted[rank > 0 ? rank - 1 : 0] : NAN;
-}
-
-bst_report_statistics bst_report_measure(double *values, size_t n) {
-    bst_report_statistics r = {.count = n, .mean = NAN, .rms = NAN};
-    double sum = 0.0, squares = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        sum += values[i];
-        squares += values[i] * values[i];
-    }
-    if (n > 0) {
-        qsort(values, n, sizeof *values, ascending);
-        r.mean = sum / (double)n;
-        r.rms = sqrt(squares / (double)n);
-    }
-    r.median = percentile(values, n, 0.5);
-    r.p95 = percentile(values, n, 0.95);
-    r.p99 = percentile(values, n, 0.99);
-    r.worst = percentile(values, n, 1.0);
-    return r;
-}
-
-void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
-                          const double *values, size_t n, double low, double high, int bins,
-                          int colour, double (*density)(double x, const void *user),
-                          const void *user) {
+void bst_report_histogram(FILE *out, const bst_report_histogram_of *h) {
     enum { MOST = 64, CURVE = 120 };
+    const double *values = h->values;
+    double low = h->low, high = h->high;
+    int bins = h->bins;
     double counts[MOST] = {0}, top = 0.0, x[CURVE], y[CURVE], width = (high - low) / bins;
     size_t total = 0;
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < h->n; i++) {
         if (isfinite(values[i])) {
             total++;
             double at = floor((values[i] - low) / width);
@@ -135,22 +96,23 @@ void bst_report_histogram(FILE *out, const char *name, const char *label, const 
     }
     for (int i = 0; i < CURVE; i++) {
         x[i] = low + (high - low) * i / (CURVE - 1);
-        y[i] = density ? density(x[i], user) * width * (double)total : 0.0;
+        y[i] = h->density ? h->density(x[i], h->user) * width * (double)total : 0.0;
         top = fmax(top, y[i]);
     }
     bst_chart c = {.out = out,
-                   .name = name,
+                   .name = h->name,
                    .width = 360.0,
                    .height = 230.0,
-                   .x = {.label = label, .low = low, .high = high},
-                   .y = {.label = what, .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
+                   .x = {.label = h->label, .low = low, .high = high},
+                   .y = {.label = h->what, .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
     bst_chart_begin(&c);
     for (int i = 0; i < bins; i++) {
         if (counts[i] > 0.0) {
-            bst_chart_bar(&c, low + i * width, low + (i + 1) * width, 0.0, counts[i], colour, NULL);
+            bst_chart_bar(&c, low + i * width, low + (i + 1) * width, 0.0, counts[i], h->colour,
+                          NULL);
         }
     }
-    if (density) {
+    if (h->density) {
         bst_chart_line(&c, x, y, CURVE, BST_CHART_RED, false);
     }
     bst_chart_end(&c);
@@ -473,12 +435,23 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
         return;
     }
     bst_report_statistics m = bst_report_measure(d->y, n); /* sorts */
-    double inner = 0.5 * (percentile(d->y, n, 0.8413) - percentile(d->y, n, 0.1587));
+    double inner =
+        0.5 * (bst_report_percentile(d->y, n, 0.8413) - bst_report_percentile(d->y, n, 0.1587));
     double law[2] = {m.median, fmax(inner, 1e-9)}, half = 5.0 * law[1];
     char caption[160], words[2][32];
     bst_report_page_figure(d->out, BST_PAGE_THIRD);
-    bst_report_histogram(d->out, label, label, "frames", d->y, n, m.median - half, m.median + half,
-                         40, colour, normal, law);
+    const bst_report_histogram_of histogram = {.name = label,
+                                               .label = label,
+                                               .what = "frames",
+                                               .values = d->y,
+                                               .n = n,
+                                               .low = m.median - half,
+                                               .high = m.median + half,
+                                               .bins = 40,
+                                               .colour = colour,
+                                               .density = normal,
+                                               .user = law};
+    bst_report_histogram(d->out, &histogram);
     snprintf(
         caption, sizeof caption, "Mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
         bst_report_page_number(words[0], m.mean, 2), bst_report_page_number(words[1], m.rms, 3));
@@ -493,8 +466,16 @@ static void plot_histograms(const bst_report_drawing *d) {
     size_t n = gather(d->y, d->sensor->count);
     if (n >= 20) {
         bst_report_page_figure(d->out, BST_PAGE_THIRD);
-        bst_report_histogram(d->out, "NEES of the track", "NEES of the track", "frames", d->y, n,
-                             0.0, 12.0, 40, BST_CHART_GREEN, chi_square_2, NULL);
+        const bst_report_histogram_of histogram = {.name = "NEES of the track",
+                                                   .label = "NEES of the track",
+                                                   .what = "frames",
+                                                   .values = d->y,
+                                                   .n = n,
+                                                   .high = 12.0,
+                                                   .bins = 40,
+                                                   .colour = BST_CHART_GREEN,
+                                                   .density = chi_square_2};
+        bst_report_histogram(d->out, &histogram);
         bst_report_page_figure_end(
             d->out, "Frames with a detection; the curve is chi-square with 2 degrees of freedom.");
     }

@@ -47,13 +47,24 @@ typedef struct bst_report_statistics {
  * Given:     values  [n]; sorted in place
  * Returned:  NAN for n = 0 */
 bst_report_statistics bst_report_measure(double *values, size_t n);
+/* The value of nearest rank at a share (0 to 1) of n ascending numbers; NAN for none. */
+double bst_report_percentile(const double *sorted, size_t n, double share);
 
-/* A histogram of what is finite among n values, between low and high, with a curve of expected
- * shares per unit of x (NULL: none) over it. `what` is counted. */
-void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
-                          const double *values, size_t n, double low, double high, int bins,
-                          int colour, double (*density)(double x, const void *user),
-                          const void *user);
+/* A histogram of what is finite among n values, between low and high. */
+typedef struct bst_report_histogram_of {
+    const char *name, *label;
+    const char *what; /* is counted */
+    const double *values;
+    size_t n;
+    double low, high;
+    int bins, colour;
+    double (*density)(double x, const void *user); /* expected shares per unit of x, a curve over
+                                                      it; NULL: none */
+    const void *user;
+} bst_report_histogram_of;
+
+/* Draws a histogram as a chart of 360 by 230 px. */
+void bst_report_histogram(FILE *out, const bst_report_histogram_of *h);
 
 /* Timeline of modes and of what could be seen (report_timeline.c). */
 void bst_report_timeline(const bst_report_drawing *d);

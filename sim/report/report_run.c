@@ -6,6 +6,7 @@
 #include <cjson/cJSON.h>
 
 #include "boresight/version.h"
+#include "sim/core/json_member.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
 #include "sim/report/report.h"
@@ -24,36 +25,23 @@ typedef struct page {
     bst_report_warnings warnings;
 } page;
 
-static const cJSON *get(const cJSON *node, const char *key) {
-    return cJSON_GetObjectItemCaseSensitive(node, key);
-}
-
-static const char *text_of(const cJSON *node, const char *key, const char *fallback) {
-    const cJSON *item = get(node, key);
-    return cJSON_IsString(item) ? item->valuestring : fallback;
-}
-
-static double number_of(const cJSON *node, const char *key) {
-    const cJSON *item = get(node, key);
-    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
-}
-
 /* The summary of a sensor; NULL when the run has none. */
 static const cJSON *summary_of(const page *p, int i) {
     const cJSON *manifest = bst_run_reader_manifest(p->run);
-    const cJSON *own = get(get(manifest, "sensors"), p->sensors[i].name);
-    return own ? own : i == 0 ? get(manifest, "summary") : NULL;
+    const cJSON *own = bst_json_member(bst_json_member(manifest, "sensors"), p->sensors[i].name);
+    return own ? own : i == 0 ? bst_json_member(manifest, "summary") : NULL;
 }
 
 /* ------------------------------------------------------------------ reading */
 
 static double span_of(const bst_run_reader *run) {
     const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
-    double rate = number_of(scenario, "tick_rate_hz"), whole = number_of(scenario, "duration_s");
+    double rate = bst_json_member_number(scenario, "tick_rate_hz"),
+           whole = bst_json_member_number(scenario, "duration_s");
     if (bst_run_reader_state(run) == BST_RUN_COMPLETE) {
         return whole;
     }
-    double last = number_of(manifest, "last_tick");
+    double last = bst_json_member_number(manifest, "last_tick");
     if (isnan(last)) {
         static const char *const sources[] = {"SELECT max(end_tick) FROM frames",
                                               "SELECT max(end_tick) FROM exposures",
@@ -101,7 +89,7 @@ static void put_head(const page *p) {
             bst_run_state_name(state));
     bst_html_text(p->out, bst_report_folder(p->run, name));
     fputs("</p>\n", p->out);
-    const char *description = text_of(scenario, "description", "");
+    const char *description = bst_json_member_text(scenario, "description", "");
     if (description[0]) {
         fputs("<p>", p->out);
         bst_html_text(p->out, description);
@@ -121,7 +109,7 @@ static void put_times(const page *p) {
     }
     bst_report_page_row(p->out, "from (UTC)", "%s", from);
     bst_report_page_row(p->out, "to (UTC)", "%s", to);
-    double whole = number_of(scenario, "duration_s");
+    double whole = bst_json_member_number(scenario, "duration_s");
     if (bst_run_reader_state(p->run) == BST_RUN_COMPLETE) {
         bst_report_page_row(p->out, "duration", "%.9g s", p->span_s);
     } else {
@@ -130,24 +118,25 @@ static void put_times(const page *p) {
 }
 
 static void put_objects(const page *p) {
-    const cJSON *world = get(bst_run_reader_scenario(p->run), "world"),
-                *objects = get(world, "objects"), *object;
+    const cJSON *world = bst_json_member(bst_run_reader_scenario(p->run), "world"),
+                *objects = bst_json_member(world, "objects"), *object;
     int count = cJSON_GetArraySize(objects), shown = 0;
     char names[600] = "";
     cJSON_ArrayForEach(object, objects) {
         size_t n = strlen(names);
         if (shown++ < 8) {
             snprintf(names + n, sizeof names - n, "%s%.60s", n ? ", " : "",
-                     text_of(object, "name", "?"));
+                     bst_json_member_text(object, "name", "?"));
         }
     }
-    const cJSON *catalogues = get(world, "catalogues"), *catalogue;
+    const cJSON *catalogues = bst_json_member(world, "catalogues"), *catalogue;
     if (count > 0 || cJSON_GetArraySize(catalogues) == 0) {
         bst_report_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
                             count > 8 ? " ..." : "");
     }
     cJSON_ArrayForEach(catalogue, catalogues) {
-        const char *file = text_of(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
+        const char *file = bst_json_member_text(catalogue, "elements_file", "?"),
+                   *slash = strrchr(file, '/');
         bst_report_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
                             slash ? slash + 1 : file);
     }
@@ -158,22 +147,28 @@ static void put_identity(const page *p) {
                 *scenario = bst_run_reader_scenario(p->run);
     bst_report_page_section(p->out, 2, "What was run");
     fputs("<div class=\"scroll\"><table class=\"two\">\n", p->out);
-    bst_report_page_row(p->out, "scenario", "%s",
-                        text_of(scenario, "name", text_of(manifest, "scenario", "-")));
-    bst_report_page_row(p->out, "scenario file", "%s", text_of(manifest, "scenario_file", "-"));
+    bst_report_page_row(
+        p->out, "scenario", "%s",
+        bst_json_member_text(scenario, "name", bst_json_member_text(manifest, "scenario", "-")));
+    bst_report_page_row(p->out, "scenario file", "%s",
+                        bst_json_member_text(manifest, "scenario_file", "-"));
     put_times(p);
     bst_report_page_row(p->out, "program", "Boresight %s",
-                        text_of(manifest, "version", "(version unknown)"));
-    bst_report_page_row(p->out, "git revision", "%s", text_of(manifest, "git_revision", "-"));
+                        bst_json_member_text(manifest, "version", "(version unknown)"));
+    bst_report_page_row(p->out, "git revision", "%s",
+                        bst_json_member_text(manifest, "git_revision", "-"));
     const cJSON *identity = manifest ? manifest : scenario;
-    bst_report_page_row(p->out, "seed", "%s, run %.0f", text_of(identity, "seed", "-"),
-                        isfinite(number_of(identity, "run")) ? number_of(identity, "run") : 0.0);
-    const char *device = text_of(manifest, "device", "");
+    bst_report_page_row(p->out, "seed", "%s, run %.0f", bst_json_member_text(identity, "seed", "-"),
+                        isfinite(bst_json_member_number(identity, "run"))
+                            ? bst_json_member_number(identity, "run")
+                            : 0.0);
+    const char *device = bst_json_member_text(manifest, "device", "");
     bst_report_page_row(p->out, "device", "%s",
                         device[0] || !manifest ? device : "none: no images");
-    if (isfinite(number_of(manifest, "stars"))) {
+    if (isfinite(bst_json_member_number(manifest, "stars"))) {
         bst_report_page_row(p->out, "star catalogue", "%s, %.0f stars",
-                            text_of(manifest, "star_catalogue", ""), number_of(manifest, "stars"));
+                            bst_json_member_text(manifest, "star_catalogue", ""),
+                            bst_json_member_number(manifest, "stars"));
     }
     put_objects(p);
     for (int i = 0; i < p->count; i++) {
@@ -183,8 +178,9 @@ static void put_identity(const page *p) {
                             s->width_px, s->height_px, s->pixel_scale_arcsec,
                             s->sensor.target[0] ? ", target " : "", s->sensor.target);
     }
-    if (isfinite(number_of(manifest, "wall_time_s"))) {
-        bst_report_page_row(p->out, "wall time", "%.3g s", number_of(manifest, "wall_time_s"));
+    if (isfinite(bst_json_member_number(manifest, "wall_time_s"))) {
+        bst_report_page_row(p->out, "wall time", "%.3g s",
+                            bst_json_member_number(manifest, "wall_time_s"));
     }
     fputs("</table></div>\n", p->out);
     bst_report_page_section_end(p->out);
@@ -311,7 +307,7 @@ static bst_status put_sensor(bst_ctx *ctx, const page *p, int i) {
 
 /* The summary alone, of a run without tables. */
 static void put_summary(const page *p) {
-    const cJSON *summary = get(bst_run_reader_manifest(p->run), "summary"), *item;
+    const cJSON *summary = bst_json_member(bst_run_reader_manifest(p->run), "summary"), *item;
     bst_report_page_section(p->out, 2, "Summary");
     fputs("<table class=\"two\">\n", p->out);
     cJSON_ArrayForEach(item, summary) {
@@ -330,8 +326,10 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     char title[200];
     const cJSON *scenario = bst_run_reader_scenario(p->run),
                 *manifest = bst_run_reader_manifest(p->run);
-    snprintf(title, sizeof title, "Run of %.150s",
-             text_of(scenario, "name", text_of(manifest, "scenario", "an unknown scenario")));
+    snprintf(
+        title, sizeof title, "Run of %.150s",
+        bst_json_member_text(scenario, "name",
+                             bst_json_member_text(manifest, "scenario", "an unknown scenario")));
     bst_report_page_begin(p->out, title);
     put_head(p);
     bst_report_warnings_write(p->out, &p->warnings);

@@ -180,9 +180,17 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
 
 /* ------------------------------------------------------------------ objects seen so far */
 
+/* Points of a curve over time. */
+typedef struct curve {
+    double unit_s; /* of x */
+    double *x, *y; /* [room] */
+    size_t room;
+} curve;
+
 /* First detections of objects by a sensor (-1: by any) as a curve of their number over time. */
 static bst_status put_count(bst_ctx *ctx, bst_chart *c, const bst_run_reader *run, int sensor,
-                            double unit_s, double *x, double *y, size_t room, size_t *total) {
+                            const curve *k, size_t *total) {
+    double *x = k->x, *y = k->y;
     bst_io_rows *rows;
     bst_status status;
     bool more;
@@ -191,8 +199,8 @@ static bst_status put_count(bst_ctx *ctx, bst_chart *c, const bst_run_reader *ru
                              "SELECT min(first_s) FROM passes WHERE first_s IS NOT NULL"
                              " AND (?1 < 0 OR sensor = ?1) GROUP BY object ORDER BY 1",
                              sensor, 0, &rows));
-    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more && n + 1 < room) {
-        x[n] = bst_io_rows_real(rows, 0) / unit_s;
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more && n + 1 < k->room) {
+        x[n] = bst_io_rows_real(rows, 0) / k->unit_s;
         y[n] = (double)(n + 1);
         n++;
     }
@@ -218,7 +226,8 @@ static bst_status put_counts(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for who saw what");
     }
     snprintf(label, sizeof label, "time since the epoch, %s", unit);
-    bst_status status = put_count(ctx, NULL, run, -1, unit_s, x, x + room, room, &total);
+    const curve k = {unit_s, x, x + room, room};
+    bst_status status = put_count(ctx, NULL, run, -1, &k, &total);
     if (status == BST_OK && total > 0) {
         bst_report_page_figure(out, BST_PAGE_WIDE);
         bst_chart c = {
@@ -232,7 +241,7 @@ static bst_status put_counts(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
         bst_chart_begin(&c);
         for (int i = -1; i < names->count && status == BST_OK; i++) {
             size_t own;
-            status = put_count(ctx, &c, run, i, unit_s, x, x + room, room, &own);
+            status = put_count(ctx, &c, run, i, &k, &own);
         }
         bst_chart_end(&c);
         put_legend(out, names, BST_KEY_LINE, false);
@@ -265,8 +274,16 @@ static bst_status put_histogram(bst_ctx *ctx, FILE *out, const bst_run_reader *r
     bst_chart_widen(values, n, false, &low, &high);
     if (status == BST_OK && n >= 10 && high > low) {
         bst_report_page_figure(out, BST_PAGE_THIRD);
-        bst_report_histogram(out, caption, label, "objects", values, n, low,
-                             high + 1e-9 * (high - low), 30, BST_CHART_BLUE, NULL, NULL);
+        const bst_report_histogram_of histogram = {.name = caption,
+                                                   .label = label,
+                                                   .what = "objects",
+                                                   .values = values,
+                                                   .n = n,
+                                                   .low = low,
+                                                   .high = high + 1e-9 * (high - low),
+                                                   .bins = 30,
+                                                   .colour = BST_CHART_BLUE};
+        bst_report_histogram(out, &histogram);
         bst_report_page_figure_end(out, caption);
     }
     free(values);

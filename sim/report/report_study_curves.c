@@ -96,10 +96,19 @@ static void describe(const bst_report_study_view *v, int64_t setting,
     }
 }
 
-/* One chart over s->x[x]: the settings `group` with `count` curves. */
+/* Settings whose curves stand in one chart. */
+typedef struct chart_group {
+    int64_t settings[CURVES];
+    int count;
+    const bst_report_study_axis_view *lines; /* in whose values they differ; NULL: one curve */
+} chart_group;
+
+/* One chart over s->x[x]. */
 static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_report_study_view *v,
-                            const series *s, int x, const int64_t *group, int count,
-                            const bst_report_study_axis_view *lines) {
+                            const series *s, int x, const chart_group *g) {
+    const int64_t *group = g->settings;
+    const bst_report_study_axis_view *lines = g->lines;
+    int count = g->count;
     static const int colours[CURVES] = {BST_CHART_BLUE,   BST_CHART_ORANGE, BST_CHART_GREEN,
                                         BST_CHART_VIOLET, BST_CHART_CYAN,   BST_CHART_BROWN};
     curve *curves = calloc((size_t)count, sizeof *curves);
@@ -202,24 +211,23 @@ bst_status bst_report_study_plot_curves(bst_ctx *ctx, FILE *out, const bst_repor
     bst_report_page_section(out, 2, "Curves");
     bst_report_page_grid(out, BST_PAGE_HALF);
     for (int64_t i = 0; i < v->settings && status == BST_OK; i++) {
-        int64_t group[CURVES];
-        int count = 0;
+        chart_group g = {.lines = lines};
         if (taken[i]) {
             continue;
         }
-        for (int64_t k = i; k < v->settings && count < (lines ? CURVES : 1); k++) {
+        for (int64_t k = i; k < v->settings && g.count < (lines ? CURVES : 1); k++) {
             if (!taken[k] && (k == i || alike(v, i, k, lines))) {
                 taken[k] = true;
-                group[count++] = k;
+                g.settings[g.count++] = k;
             }
         }
         if (charts < CHARTS) {
             charts++;
             for (int x = 0; x < 2 && s.x[x][0] && status == BST_OK; x++) {
-                status = put_chart(ctx, out, v, &s, x, group, count, lines);
+                status = put_chart(ctx, out, v, &s, x, &g);
             }
         } else {
-            left_out += count;
+            left_out += g.count;
         }
     }
     free(taken);

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/compare.h"
 #include "sim/core/text.h"
 #include "sim/report/report_plots.h"
 #include "sim/report/report_study.h"
@@ -257,11 +258,6 @@ void bst_report_study_plot_axes(FILE *out, const bst_report_study_view *v) {
 
 /* ------------------------------------------------------------------ histograms */
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v) {
     int metrics[16], count = bst_report_study_key_metrics(v, metrics, 16), shown = 0;
     double *values = malloc((size_t)(v->runs > 0 ? v->runs : 1) * sizeof *values);
@@ -276,7 +272,7 @@ void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v)
         if (m->rate || n < 10) {
             continue;
         }
-        qsort(values, n, sizeof *values, ascending);
+        qsort(values, n, sizeof *values, bst_compare_doubles);
         double quarter = values[n / 4], upper = values[n - 1 - n / 4], spread = upper - quarter;
         double low = values[0], high = values[n - 1];
         /* a few far ones are not to hide the rest */
@@ -299,8 +295,16 @@ void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v)
         snprintf(name, sizeof name, "Histogram of %s", m->name);
         bst_report_page_figure(out, BST_PAGE_THIRD);
         /* the greatest value is to lie inside the last bin */
-        bst_report_histogram(out, name, bst_report_study_label(m, label), "runs", values, n, low,
-                             high + 1e-9 * (high - low), 30, BST_CHART_BLUE, NULL, NULL);
+        const bst_report_histogram_of histogram = {.name = name,
+                                                   .label = bst_report_study_label(m, label),
+                                                   .what = "runs",
+                                                   .values = values,
+                                                   .n = n,
+                                                   .low = low,
+                                                   .high = high + 1e-9 * (high - low),
+                                                   .bins = 30,
+                                                   .colour = BST_CHART_BLUE};
+        bst_report_histogram(out, &histogram);
         /* a meaning that refers to the metric before it says nothing here */
         bool refers = strncmp(m->doc, "The same", 8) == 0;
         int used = snprintf(

@@ -5,23 +5,16 @@
 #include <cjson/cJSON.h>
 
 #include "sim/analysis/loop/loop_model.h"
+#include "sim/core/json_member.h"
 #include "sim/core/text.h"
 #include "sim/report/report.h"
 #include "sim/run/run_losses.h"
 
-static const cJSON *get(const cJSON *node, const char *key) {
-    return cJSON_GetObjectItemCaseSensitive(node, key);
-}
-
-static double number_of(const cJSON *node, const char *key) {
-    const cJSON *item = get(node, key);
-    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
-}
-
 /* ------------------------------------------------------------------ how it ended */
 
 static void add_end(const bst_run_reader *run, bst_report_warnings *w) {
-    const cJSON *manifest = bst_run_reader_manifest(run), *error = get(manifest, "error");
+    const cJSON *manifest = bst_run_reader_manifest(run),
+                *error = bst_json_member(manifest, "error");
     static const char *const words[] = {
         [BST_RUN_INTERRUPTED] =
             "The run was interrupted: it was closed properly before its end. "
@@ -37,7 +30,7 @@ static void add_end(const bst_run_reader *run, bst_report_warnings *w) {
     if (cJSON_IsString(error)) {
         bst_report_warnings_add(w, BST_SEVERITY_PROBLEM, "The run failed: %s", error->valuestring);
     }
-    double logged = number_of(manifest, "warnings");
+    double logged = bst_json_member_number(manifest, "warnings");
     if (logged > 0.0) {
         char text[64];
         bst_report_warnings_add(
@@ -67,7 +60,7 @@ static void add_losses(const bst_run_reader *run, const bst_report_sensor *senso
         bst_run_losses_read(run, sensors[i].name, sensors[i].sensor.index, &losses);
         bst_run_losses_report(&losses, add_loss, &s);
     }
-    const cJSON *counters = get(bst_run_reader_manifest(run), "counters"), *item;
+    const cJSON *counters = bst_json_member(bst_run_reader_manifest(run), "counters"), *item;
     cJSON_ArrayForEach(item, counters) {
         if (cJSON_IsNumber(item) && fabs(item->valuedouble) < 1e15 && item->string) {
             bst_run_losses_report_counter(item->string, (int64_t)item->valuedouble, add_loss,
@@ -269,7 +262,7 @@ void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *senso
     add_summaries(run, sensors, count, w);
     add_losses(run, sensors, count, w);
     add_tables(run, sensors, count, w);
-    const cJSON *misfits = get(bst_run_reader_manifest(run), "wcs_misfit_px"), *item;
+    const cJSON *misfits = bst_json_member(bst_run_reader_manifest(run), "wcs_misfit_px"), *item;
     cJSON_ArrayForEach(item, misfits) {
         if (cJSON_IsNumber(item) && item->valuedouble > 1e-3) {
             bst_report_warnings_add(

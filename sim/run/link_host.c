@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/memory.h"
 #include "sim/link/external.h"
 
 enum { MOST_PORTS = 12, MOST_PENDING = 24, MOST_FRAMES = 4, RING = 16384, MOST_ITEMS = 65536 };
@@ -257,18 +258,6 @@ const char *bst_link_host_instance(const bst_link_host *host) {
 
 /* ---- playing ---- */
 
-static bst_status grow(bst_ctx *ctx, void **memory, size_t *room, size_t bytes) {
-    if (*room < bytes) {
-        void *more = realloc(*memory, bytes);
-        if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu bytes", bytes);
-        }
-        *memory = more;
-        *room = bytes;
-    }
-    return BST_OK;
-}
-
 /* Keeps an input for the step that will follow. */
 static bst_status keep(bst_ctx *ctx, bst_link_host *host, const bst_link_received *got) {
     const bst_wire_message *about = bst_wire_message_of(got->header.type);
@@ -282,7 +271,7 @@ static bst_status keep(bst_ctx *ctx, bst_link_host *host, const bst_link_receive
     }
     pending *one = &host->pending[host->pending_count];
     size_t bytes = about->header_bytes + (size_t)items * about->item_bytes;
-    BST_TRY(grow(ctx, &one->payload, &one->room, bytes));
+    BST_TRY(bst_memory_grow(ctx, "out of memory", &one->payload, &one->room, bytes));
     memcpy(one->payload, got->payload, bytes);
     one->type = got->header.type;
     one->frame = NULL;
@@ -297,7 +286,7 @@ static bst_status keep(bst_ctx *ctx, bst_link_host *host, const bst_link_receive
         }
         size_t size = sizeof(uint16_t) * (size_t)f->width * (size_t)f->height;
         void *pixels = frame->pixels;
-        BST_TRY(grow(ctx, &pixels, &frame->room, size));
+        BST_TRY(bst_memory_grow(ctx, "out of memory", &pixels, &frame->room, size));
         frame->pixels = pixels;
         memcpy(frame->pixels, got->pixels, size);
         frame->frame.width = f->width;

@@ -24,12 +24,6 @@ void bst_study_levels(const bst_study *study, int64_t setting, int64_t *levels) 
     }
 }
 
-static bst_study_value listed(const bst_study_axis *axis, int64_t index) {
-    const cJSON *item = cJSON_GetArrayItem(axis->values, (int)index);
-    bool number = cJSON_IsNumber(item);
-    return (bst_study_value){true, number, number ? item->valuedouble : 0.0, item};
-}
-
 /* The value at `unit` of an axis: 0 its first, 1 its last. */
 static bst_study_value at_unit(const bst_study_axis *axis, double unit) {
     const bst_study_axis_config *c = axis->axis;
@@ -46,7 +40,7 @@ static int64_t own_levels(const bst_study_axis *axis) {
 
 static bst_study_value at_level(const bst_study_axis *axis, int64_t level) {
     if (axis->values) {
-        return listed(axis, level);
+        return bst_study_listed(axis, level);
     }
     int64_t last = axis->axis->count - 1;
     return at_unit(axis, last > 0 ? (double)level / (double)last : 0.0);
@@ -58,7 +52,8 @@ static bst_study_value at_place(const bst_study_axis *axis, double unit, int ste
         return at_unit(axis, unit);
     }
     double n = axis->value_count;
-    return listed(axis, (int64_t)fmin(steps ? round(unit * (n - 1.0)) : unit * n, n - 1.0));
+    return bst_study_listed(axis,
+                            (int64_t)fmin(steps ? round(unit * (n - 1.0)) : unit * n, n - 1.0));
 }
 
 static void factor_values(const bst_study *study, const bst_study_factor *f, int64_t level,
@@ -87,40 +82,6 @@ void bst_study_swept_values(const bst_study *study, const int64_t *levels, bst_s
     for (int f = 0; f < study->factor_count; f++) {
         factor_values(study, &study->factors[f], levels[f], out);
     }
-}
-
-bst_study_value bst_study_draw(const bst_study_axis *axis, bst_rng_key key, uint64_t a,
-                               uint64_t b) {
-    const bst_study_dispersion_config *c = axis->dispersion;
-    double u = bst_rng_uniform(key, a, b), z;
-    bst_study_value value = {true, true, 0.0, NULL};
-    switch ((bst_study_distribution)c->distribution) {
-        case BST_DISTRIBUTION_UNIFORM:
-            value.number = c->from + u * (c->to - c->from);
-            break;
-        case BST_DISTRIBUTION_LOG_UNIFORM:
-            value.number = c->from * exp(u * log(c->to / c->from));
-            break;
-        case BST_DISTRIBUTION_NORMAL:
-            /* 8 % of the draws pass the narrowest limit */
-            do {
-                z = bst_rng_normal(key, a, ++b);
-            } while (fabs(z) > c->truncate_sigma);
-            value.number = c->mean + c->sigma * z;
-            break;
-        case BST_DISTRIBUTION_TABLE: {
-            int i = 0, n = axis->value_count;
-            if (axis->cumulative) {
-                while (i < n - 1 && u >= axis->cumulative[i]) {
-                    i++;
-                }
-            } else {
-                i = (int)fmin(u * n, n - 1.0);
-            }
-            return listed(axis, i);
-        }
-    }
-    return value;
 }
 
 void bst_study_values(const bst_study *study, const bst_study_place *place, bst_study_value *out) {

@@ -7,6 +7,7 @@
 
 #include "boresight/rng.h"
 #include "sim/astro/tle.h"
+#include "sim/core/compare.h"
 #include "sim/core/text.h"
 #include "sim/studies/study_internal.h"
 
@@ -15,10 +16,6 @@
 enum { MOST_ATTEMPTS = 1 << 16 };
 /* Of the objects of a population: as of a document. */
 static const double MOST_VALUES = 8e6;
-
-bool bst_study_population_pointer(const char *pointer) {
-    return strncmp(pointer, "/populations/", strlen("/populations/")) == 0;
-}
 
 /* ------------------------------------------------------------------ reading */
 
@@ -143,11 +140,6 @@ void bst_study_populations_free(bst_study_population_list *list) {
     *list = (bst_study_population_list){0};
 }
 
-static int compare_numbers(const void *a, const void *b) {
-    int x = *(const int *)a, y = *(const int *)b;
-    return (x > y) - (x < y);
-}
-
 /* The satellites of a population's file; a relative path starts from the folder of `study_file`. */
 static bst_status read_file(bst_ctx *ctx, const bst_study *study, const char *study_file,
                             const bst_study_population *p, bst_study_population_file *out) {
@@ -175,7 +167,7 @@ static bst_status read_file(bst_ctx *ctx, const bst_study *study, const char *st
     if (!out->norad) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study's populations");
     }
-    qsort(out->norad, (size_t)count, sizeof *out->norad, compare_numbers);
+    qsort(out->norad, (size_t)count, sizeof *out->norad, bst_compare_ints);
     for (int i = 0; i < count; i++) {
         if (out->count == 0 || out->norad[out->count - 1] != out->norad[i]) {
             out->norad[out->count++] = out->norad[i];
@@ -325,7 +317,7 @@ static void mark(const cJSON *owner, const bst_study_population_file *file, bool
                  int *left) {
     int number = number_of(cJSON_GetObjectItemCaseSensitive(owner, "orbit"));
     const int *found =
-        bsearch(&number, file->norad, (size_t)file->count, sizeof number, compare_numbers);
+        bsearch(&number, file->norad, (size_t)file->count, sizeof number, bst_compare_ints);
     if (found && !taken[found - file->norad]) {
         taken[found - file->norad] = true;
         (*left)--;
@@ -436,11 +428,22 @@ static bst_status add_object(bst_ctx *ctx, const bst_study_population *p, const 
     return BST_OK;
 }
 
-static bst_status add_population(bst_ctx *ctx, const bst_study *study,
-                                 const bst_study_population *p,
-                                 const bst_study_population_file *file, int number,
-                                 uint64_t counter, const bst_study_population_probe *probe,
+/* A population of a run, and how many of it there are. */
+typedef struct wanted {
+    const bst_study_population *population;
+    const bst_study_population_file *file;
+    int number;
+    uint64_t counter;                        /* of the random numbers: the run's number */
+    const bst_study_population_probe *probe; /* NULL: none */
+} wanted;
+
+static bst_status add_population(bst_ctx *ctx, const bst_study *study, const wanted *w,
                                  bst_json *json) {
+    const bst_study_population *p = w->population;
+    const bst_study_population_file *file = w->file;
+    const bst_study_population_probe *probe = w->probe;
+    int number = w->number;
+    uint64_t counter = w->counter;
     cJSON *objects;
     int left = 0;
     BST_TRY(find_objects(ctx, study, p, json, &objects));
@@ -489,10 +492,9 @@ bst_status bst_study_populations_add(bst_ctx *ctx, const bst_study *study,
             probe && probe->population == i ? probe : NULL;
         int count = number->given ? (int)number->number : 0;
         count = own_probe && count == 0 ? 1 : count;
-        status = count > 0
-                     ? add_population(ctx, study, &list->items[i], &study->population_files[i],
-                                      count, place->run_number, own_probe, json)
-                     : BST_OK;
+        const wanted w = {&list->items[i], &study->population_files[i], count, place->run_number,
+                          own_probe};
+        status = count > 0 ? add_population(ctx, study, &w, json) : BST_OK;
     }
     bst_study_populations_free(&own);
     return status;

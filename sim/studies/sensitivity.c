@@ -174,7 +174,8 @@ static bst_status write_table(bst_ctx *ctx, const bst_tables_job *j, const char 
         {"effects", BST_COLUMN_INT, "", "Effects that it was worked out from."}};
     const bst_study *s = j->results->study;
     bst_table_out t;
-    BST_TRY(bst_table_begin(ctx, j->out, name, doc, columns, 10, true, &t));
+    const bst_table_design design = {name, doc, columns, 10, true};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int f = 0; f < s->factor_count && status == BST_OK; f++) {
         if (!has_effects(&s->factors[f])) {

@@ -18,8 +18,9 @@ static bst_status write_rows(bst_ctx *ctx, const bst_tables_job *j) {
         const bst_study_metric *m = &kind->series[c];
         columns[c + 1] = (bst_io_column){m->name, BST_COLUMN_REAL, m->unit, m->doc};
     }
-    BST_TRY(bst_table_begin(ctx, j->out, kind->series_name, "Rows of each run.", columns,
-                            kind->series_count + 1, true, &t));
+    const bst_table_design design = {kind->series_name, "Rows of each run.", columns,
+                                     kind->series_count + 1, true};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int64_t p = 0; p < r->part_count; p++) {
         for (int i = 0; i < r->parts[p].rows && status == BST_OK; i++) {
@@ -144,8 +145,9 @@ bst_status bst_study_write_series(bst_ctx *ctx, const bst_tables_job *j) {
     BST_TRY(write_rows(ctx, j));
     snprintf(name, sizeof name, "%s_statistics", j->results->kind->series_name);
     int n = statistics_columns(j->results->kind, columns);
-    BST_TRY(bst_table_begin(ctx, j->out, name, "Rows of the runs of each setting together.",
-                            columns, n, true, &t));
+    const bst_table_design design = {name, "Rows of the runs of each setting together.", columns, n,
+                                     true};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     keyed *list = malloc(MOST_KEYS * sizeof *list);
     bst_status status = list ? put_settings(ctx, j, list, &t)
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for tables");

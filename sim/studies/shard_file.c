@@ -94,20 +94,6 @@ bst_status bst_study_shard_path(bst_ctx *ctx, const char *out, int64_t first, in
                : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", out);
 }
 
-static bool write_all(int fd, const char *data, size_t bytes) {
-    while (bytes > 0) {
-        ssize_t n = write(fd, data, bytes);
-        if (n < 0 && errno != EINTR) {
-            return false;
-        }
-        if (n > 0) {
-            data += n;
-            bytes -= (size_t)n;
-        }
-    }
-    return true;
-}
-
 static void sync_folder(const char *out) {
     char folder[4096];
     snprintf(folder, sizeof folder, "%s/shards", out);
@@ -141,7 +127,7 @@ static bst_status write_file(bst_ctx *ctx, const bst_study_shard_draft *d, const
     int fd;
     BST_TRY(bst_study_shard_path(ctx, out, d->first, d->count, path, sizeof path));
     BST_TRY(bst_draft_make(ctx, path, draft, sizeof draft, &fd));
-    bool ok = write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
+    bool ok = bst_file_write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
     int error = ok ? 0 : errno;
     if (close(fd) != 0 && ok) {
         ok = false;

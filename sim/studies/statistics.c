@@ -5,10 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
+#include "sim/core/compare.h"
 
 double bst_study_quantile(const double *sorted, int64_t n, double q) {
     if (n == 0) {
@@ -40,7 +37,7 @@ static void describe(const double *values, int64_t rows, int columns, int column
         square += (scratch[i] - s->mean) * (scratch[i] - s->mean);
     }
     s->std = n > 1 ? sqrt(square / (double)(n - 1)) : NAN;
-    qsort(scratch, (size_t)n, sizeof *scratch, compare);
+    qsort(scratch, (size_t)n, sizeof *scratch, bst_compare_doubles);
     s->minimum = n > 0 ? scratch[0] : NAN;
     s->maximum = n > 0 ? scratch[n - 1] : NAN;
     s->p05 = bst_study_quantile(scratch, n, 0.05);
@@ -50,18 +47,29 @@ static void describe(const double *values, int64_t rows, int columns, int column
     s->p95 = bst_study_quantile(scratch, n, 0.95);
 }
 
-/* Means of one resample into means[columns]; NAN where none of its numbers was drawn. Values are
- * taken from the column's mean, so that sums do not cancel. there: 1 for a number, 0 for none; NULL
- * when all are numbers. */
-static void resample(const double *restrict centred, const double *restrict there, int64_t rows,
-                     int columns, bst_rng_key key, uint64_t number, double *restrict sums,
-                     double *restrict counts, double *restrict means) {
+/* Numbers that are drawn from again. Values are taken from the column's mean, so that sums do not
+ * cancel. */
+typedef struct sample {
+    const double *centred, *there; /* [rows][columns]; there: 1 for a number, 0 for none; NULL when
+                                      all are numbers */
+    int64_t rows;
+    int columns;
+    bst_rng_key key;
+    double *sums, *counts; /* [columns], for use */
+} sample;
+
+/* Means of a resample into means[columns]; NAN where none of its numbers was drawn. */
+static void resample(const sample *s, uint64_t number, double *restrict means) {
+    const double *restrict centred = s->centred, *restrict there = s->there;
+    double *restrict sums = s->sums, *restrict counts = s->counts;
+    int64_t rows = s->rows;
+    int columns = s->columns;
     memset(sums, 0, (size_t)columns * sizeof *sums);
     memset(counts, 0, (size_t)columns * sizeof *counts);
     bst_philox_words words = {{0, 0, 0, 0}};
     for (int64_t i = 0; i < rows; i++) {
         if (i % 4 == 0) {
-            words = bst_rng_words(key, number, (uint64_t)(i / 4));
+            words = bst_rng_words(s->key, number, (uint64_t)(i / 4));
         }
         /* rows are far below 2^32: the draw is even to rows / 2^32 */
         int64_t row = (int64_t)(((uint64_t)words.w[i % 4] * (uint64_t)rows) >> 32);
@@ -87,7 +95,7 @@ static void set_interval(double *means, int64_t n, bst_statistics *s) {
             means[kept++] = means[i];
         }
     }
-    qsort(means, (size_t)kept, sizeof *means, compare);
+    qsort(means, (size_t)kept, sizeof *means, bst_compare_doubles);
     s->low = s->mean + bst_study_quantile(means, kept, 0.025);
     s->high = s->mean + bst_study_quantile(means, kept, 0.975);
 }
@@ -124,8 +132,8 @@ bst_status bst_statistics_of(bst_ctx *ctx, const double *values, int64_t rows, i
         gaps = gaps || missing;
     }
     for (int64_t b = 0; b < resamples && rows > 1; b++) {
-        resample(centred, gaps ? there : NULL, rows, columns, key, (uint64_t)b, sums, counts,
-                 means + (size_t)b * wide);
+        const sample s = {centred, gaps ? there : NULL, rows, columns, key, sums, counts};
+        resample(&s, (uint64_t)b, means + (size_t)b * wide);
     }
     for (int c = 0; c < columns && rows > 1; c++) {
         for (int64_t b = 0; b < resamples; b++) {

@@ -12,6 +12,16 @@ bst_status bst_study_place_points(bst_ctx *ctx, const bst_study *study,
                                   const bst_study_sweep_config *sweep,
                                   bst_study_factor *factor) BST_MUST_CHECK;
 
+/* Reads pointers and values of an axis or a dispersion, whose place in the study, axis->where, is
+ * known. */
+bst_status bst_study_read_axis(bst_ctx *ctx, const bst_study *study, const struct cJSON *node,
+                               bst_study_axis *axis) BST_MUST_CHECK;
+/* Whether "from" and "to" are a range; `log`: of logarithms; `down`: also from above. */
+bst_status bst_study_check_range(bst_ctx *ctx, const bst_study *study, const char *where,
+                                 double from, double to, bool log, bool down) BST_MUST_CHECK;
+/* Value `index` of an axis that lists its values. */
+bst_study_value bst_study_listed(const bst_study_axis *axis, int64_t index);
+
 /* Reads what a dispersion is beside its table: axis->where is given, the rest of it is filled in.
  * The axis has axis->cumulative to be freed, after an error too. */
 bst_status bst_study_read_dispersion(bst_ctx *ctx, const bst_study *study, const struct cJSON *node,

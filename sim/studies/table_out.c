@@ -119,15 +119,17 @@ static bst_status create_table(bst_ctx *ctx, bst_table_out *out, const bst_io_co
     return status;
 }
 
-bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *name, const char *doc,
-                           const bst_io_column *columns, int count, bool csv, bst_table_out *out) {
+bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const bst_table_design *design,
+                           bst_table_out *out) {
+    const bst_io_column *columns = design->columns;
+    int count = design->count;
     char path[2200];
     *out = (bst_table_out){.tables = tables, .columns = count};
-    snprintf(out->name, sizeof out->name, "%s", name);
-    BST_TRY(note_columns(ctx, tables, name, doc, columns, count));
+    snprintf(out->name, sizeof out->name, "%s", design->name);
+    BST_TRY(note_columns(ctx, tables, design->name, design->doc, columns, count));
     BST_TRY(create_table(ctx, out, columns));
-    if (csv) {
-        snprintf(path, sizeof path, "%s/%s.csv", tables->folder, name);
+    if (design->csv) {
+        snprintf(path, sizeof path, "%s/%s.csv", tables->folder, design->name);
         bst_status status = bst_draft_open(ctx, path, &out->csv);
         if (status != BST_OK) {
             sqlite3_finalize(out->insert);

@@ -32,10 +32,17 @@ bst_status bst_tables_begin(bst_ctx *ctx, const char *folder, bst_tables_out *ou
  */
 bst_status bst_tables_end(bst_ctx *ctx, bst_tables_out *tables, bst_status status) BST_MUST_CHECK;
 
+/* A table to be made. */
+typedef struct bst_table_design {
+    const char *name, *doc;
+    const bst_io_column *columns; /* [count] */
+    int count;
+    bool csv; /* also as a file of its own */
+} bst_table_design;
+
 /* A table of `count` columns, and FOLDER/<name>.csv if `csv`; columns are noted in the table
  * "columns", with unit and meaning. */
-bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *name, const char *doc,
-                           const bst_io_column *columns, int count, bool csv,
+bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const bst_table_design *design,
                            bst_table_out *out) BST_MUST_CHECK;
 
 /* Appends a row to a table and to its CSV file.

@@ -43,7 +43,8 @@ static bst_status write_about(bst_ctx *ctx, const bst_tables_job *j) {
         {"seed", numbers[5]},     {"settings", numbers[0]},         {"replicates", numbers[1]},
         {"runs", numbers[2]},     {"runs_done", numbers[3]},        {"runs_failed", numbers[4]}};
     bst_table_out t;
-    BST_TRY(bst_table_begin(ctx, j->out, "about", "The study.", columns, 2, false, &t));
+    const bst_table_design design = {"about", "The study.", columns, 2, false};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs && status == BST_OK; i++) {
         const bst_io_value row[] = {bst_io_text_value(pairs[i][0]), bst_io_text_value(pairs[i][1])};
@@ -62,8 +63,9 @@ static bst_status write_scenarios(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_io_column columns[] = {int_column("scenario", "Its number."),
                                      text_column("name", "Its name.")};
     bst_table_out t;
-    BST_TRY(bst_table_begin(ctx, j->out, "scenarios", "The scenarios that are varied.", columns, 2,
-                            false, &t));
+    const bst_table_design design = {"scenarios", "The scenarios that are varied.", columns, 2,
+                                     false};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int i = 0; i < s->base_count && status == BST_OK; i++) {
         const bst_io_value row[] = {bst_io_int_value(i), bst_io_text_value(s->bases[i].name)};
@@ -92,7 +94,8 @@ static bst_status write_axes(bst_ctx *ctx, const bst_tables_job *j) {
         text_column("design", "How a sweep takes its values."),
         int_column("sweep", "Number of the sweep in the study.")};
     bst_table_out t;
-    BST_TRY(bst_table_begin(ctx, j->out, "axes", "What is varied.", columns, 6, false, &t));
+    const bst_table_design design = {"axes", "What is varied.", columns, 6, false};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int a = 0; a < s->axis_count && status == BST_OK; a++) {
         const bst_study_factor *f = factor_of(s, a);
@@ -116,7 +119,8 @@ static bst_status write_metrics(bst_ctx *ctx, const bst_tables_job *j) {
         text_column("doc", "Meaning."),
         text_column("kind", "value, or rate: 1 or 0 in each run, a rate over runs.")};
     bst_table_out t;
-    BST_TRY(bst_table_begin(ctx, j->out, "metrics", "Figures of a run.", columns, 4, false, &t));
+    const bst_table_design design = {"metrics", "Figures of a run.", columns, 4, false};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int i = 0; i < j->metric_count && status == BST_OK; i++) {
         const bst_study_metric *m = &j->results->kind->metrics[j->metrics[i]];
@@ -192,8 +196,8 @@ static bst_status write_settings(bst_ctx *ctx, const bst_tables_job *j) {
         j->columns[fixed + a] = bst_study_axis_column(&s->axes[a]);
     }
     bst_table_out t;
-    BST_TRY(bst_table_begin(ctx, j->out, "settings", "Values of the settings.", j->columns, n, true,
-                            &t));
+    const bst_table_design design = {"settings", "Values of the settings.", j->columns, n, true};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int64_t i = 0; i < s->settings && status == BST_OK; i++) {
         bst_study_place place = bst_study_place_of(s, i * s->config.replicates);
@@ -235,7 +239,8 @@ static bst_status write_runs(bst_ctx *ctx, const bst_tables_job *j) {
     int64_t error = 0;
     bst_table_out t;
     run_columns(j);
-    BST_TRY(bst_table_begin(ctx, j->out, "runs", "A row for each run.", j->columns, n, true, &t));
+    const bst_table_design design = {"runs", "A row for each run.", j->columns, n, true};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int64_t i = 0; i < s->runs && status == BST_OK; i++) {
         if (r->state[i] == BST_ROW_MISSING) {
@@ -271,9 +276,10 @@ static bst_status write_speed(bst_ctx *ctx, const bst_tables_job *j) {
         int_column("run", "Its number."), real_column("wall_s", "s", "Wall time of the run."),
         real_column("cpu_s", "s", "Processor time of the run, on all threads.")};
     bst_table_out t;
-    BST_TRY(bst_table_begin(ctx, j->out, "speed",
-                            "What differs from machine to machine, and is in no other table.",
-                            columns, 3, true, &t));
+    const bst_table_design design = {
+        "speed", "What differs from machine to machine, and is in no other table.", columns, 3,
+        true};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = BST_OK;
     for (int64_t i = 0; i < r->study->runs && status == BST_OK; i++) {
         if (r->state[i] != BST_ROW_MISSING) {
@@ -356,8 +362,9 @@ static bst_status write_statistics(bst_ctx *ctx, const bst_tables_job *j) {
     bst_io_column columns[STATISTICS_COLUMNS];
     bst_table_out t;
     statistics_columns(columns);
-    BST_TRY(bst_table_begin(ctx, j->out, "statistics", "Metrics over the runs of each setting.",
-                            columns, 16, true, &t));
+    const bst_table_design design = {"statistics", "Metrics over the runs of each setting.",
+                                     columns, 16, true};
+    BST_TRY(bst_table_begin(ctx, j->out, &design, &t));
     bst_status status = put_statistics(ctx, j, &t, -1, 0, s->runs);
     int64_t n = s->config.replicates;
     for (int64_t i = 0; i < s->settings && n > 1 && status == BST_OK; i++) {

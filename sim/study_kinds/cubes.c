@@ -176,8 +176,8 @@ static bst_status take_planes(cube *c, const bst_planes *p) {
     if (!c->masks || !p->segmentation || p->exposure_id != c->mask_frame.id) {
         return BST_OK;
     }
-    return bst_fits_write_plane(c->ctx, c->masks, &c->mask_frame, "SEGMENTATION", p->segmentation,
-                                p->width, p->height, NULL);
+    const bst_fits_plane plane = {"SEGMENTATION", p->segmentation, p->width, p->height};
+    return bst_fits_write_plane(c->ctx, c->masks, &c->mask_frame, &plane, NULL);
 }
 
 static bst_status take_frame(cube *c, const bst_frame_message *m) {

@@ -3,14 +3,9 @@
 #include <inttypes.h>
 #include <math.h>
 
-#define DEG (180.0 / BST_PI)
+#include "sim/core/compare.h"
 
-static double minimum(const double v[3]) {
-    return fmin(v[0], fmin(v[1], v[2]));
-}
-static double maximum(const double v[3]) {
-    return fmax(v[0], fmax(v[1], v[2]));
-}
+#define DEG (180.0 / BST_PI)
 
 /* As JSON: what is not finite becomes null. */
 static void put_number(FILE *stream, const char *key, double value) {
@@ -39,10 +34,10 @@ static void put_axis(FILE *stream, char axis, const double v[3], double box) {
     fprintf(stream,
             ",\"%c_min\":%.12g,\"%c_max\":%.12g,\"%c_center\":%.12g,\"%c_start\":%.12g,\"%c_mid\":"
             "%.12g,\"%c_end\":%.12g",
-            axis, minimum(v), axis, maximum(v), axis, 0.5 * (minimum(v) + maximum(v)), axis, v[0],
-            axis, v[1], axis, v[2]);
+            axis, bst_least_of_3(v), axis, bst_greatest_of_3(v), axis,
+            0.5 * (bst_least_of_3(v) + bst_greatest_of_3(v)), axis, v[0], axis, v[1], axis, v[2]);
     put_number(stream, axis == 'y' ? "bbox_height" : "bbox_width",
-               box > 0.0 ? box : maximum(v) - minimum(v));
+               box > 0.0 ? box : bst_greatest_of_3(v) - bst_least_of_3(v));
 }
 
 static bool put_object(bst_study_labels *l, const bst_frame_message *f, double exposure_s,
@@ -64,7 +59,8 @@ static bool put_object(bst_study_labels *l, const bst_frame_message *f, double e
         }
     }
     if (!(item->electrons > 0.0) || (star && !(item->v_mag <= l->star_limit_v_mag)) ||
-        maximum(x) < 0.0 || minimum(x) > 1.0 || maximum(y) < 0.0 || minimum(y) > 1.0) {
+        bst_greatest_of_3(x) < 0.0 || bst_least_of_3(x) > 1.0 || bst_greatest_of_3(y) < 0.0 ||
+        bst_least_of_3(y) > 1.0) {
         return false;
     }
     FILE *s = l->stream;

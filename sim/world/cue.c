@@ -8,28 +8,25 @@ bst_status bst_world_object_nominal_line(bst_ctx *ctx, const bst_world *world, i
     BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
     bst_world_state target;
     double emission_s;
-    return bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, eye, clock,
-                                         world->epoch, &sky.bodies, seconds, false, line_m, &target,
-                                         &emission_s);
+    const bst_world_reception at = {eye, clock, world->epoch, &sky.bodies, seconds};
+    return bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, &at, false, line_m,
+                                         &target, &emission_s);
 }
 
-bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer,
-                                      int sensor, bst_sky_clock *clock, double seconds,
-                                      const bst_world_state *eye, bst_vec3 *line_m) {
-    int object = world->observers[observer].sensors[sensor].cue_object;
+bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world,
+                                      const bst_world_cue_at *at, bst_vec3 *line_m) {
+    int object = world->observers[at->observer].sensors[at->sensor].cue_object;
     *line_m = (bst_vec3){0, 0, 0};
-    return object < 0
-               ? BST_OK
-               : bst_world_object_nominal_line(ctx, world, object, clock, seconds, eye, line_m);
+    return object < 0 ? BST_OK
+                      : bst_world_object_nominal_line(ctx, world, object, at->clock, at->seconds,
+                                                      at->eye, line_m);
 }
 
-bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer,
-                                           int sensor, bst_sky_clock *clock, double seconds,
-                                           const bst_world_state *eye, bst_vec3 *out) {
-    const world_sensor *s = &world->observers[observer].sensors[sensor];
+bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world,
+                                           const bst_world_cue_at *at, bst_vec3 *out) {
+    const world_sensor *s = &world->observers[at->observer].sensors[at->sensor];
     if (s->config.cue.region.kind != BST_REGION_NONE) {
-        return bst_world_region_place(ctx, world, observer, sensor, clock, seconds, eye, 0.0, 0.0,
-                                      out);
+        return bst_world_region_place(ctx, world, at, 0.0, 0.0, out);
     }
     if (s->cue_object < 0) {
         const double *radec = s->config.cue.direction_radec_deg;
@@ -37,7 +34,7 @@ bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world,
         return BST_OK;
     }
     bst_vec3 line;
-    BST_TRY(bst_world_cue_nominal_line(ctx, world, observer, sensor, clock, seconds, eye, &line));
+    BST_TRY(bst_world_cue_nominal_line(ctx, world, at, &line));
     *out = bst_vec3_unit(line);
     return BST_OK;
 }
@@ -68,19 +65,19 @@ static bst_vec3 on_arc(const double ends_deg[4], double along_rad, double across
     return bst_vec3_axpy(bst_vec3_scale(on, cos(across_rad)), sin(across_rad), pole);
 }
 
-bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                  bst_sky_clock *clock, double seconds, const bst_world_state *eye,
+bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, const bst_world_cue_at *at,
                                   double along_rad, double across_rad, bst_vec3 *out) {
-    const bst_region_config *region = &world->observers[observer].sensors[sensor].config.cue.region;
+    const bst_region_config *region =
+        &world->observers[at->observer].sensors[at->sensor].config.cue.region;
     if (region->kind == BST_REGION_ARC) {
         *out = on_arc(region->arc_radec_deg, along_rad, across_rad);
         return BST_OK;
     }
     bst_sky_rotation sky;
-    BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
+    BST_TRY(bst_sky_clock_at(ctx, at->clock, bst_time_add(world->epoch, at->seconds), &sky));
     double middle = 0.5 * (region->longitude_deg[0] + region->longitude_deg[1]) * BST_DEG_RAD;
     bst_vec3 place = bst_belt_place(middle + along_rad, across_rad, &sky.frames.itrf_from_gcrf);
-    *out = bst_vec3_unit(bst_vec3_sub(place, eye->position_m));
+    *out = bst_vec3_unit(bst_vec3_sub(place, at->eye->position_m));
     return BST_OK;
 }
 
@@ -119,8 +116,8 @@ bst_status bst_world_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *
                                               world->epoch, now_s, true, &eye);
     if (status == BST_OK) {
         bst_world_nav_estimate(world, observer, sensor, now_s, &eye);
-        status = bst_world_cue_nominal_direction(ctx, world, observer, sensor, clock, now_s, &eye,
-                                                 &nominal);
+        const bst_world_cue_at at = {observer, sensor, clock, now_s, &eye};
+        status = bst_world_cue_nominal_direction(ctx, world, &at, &nominal);
     }
     if (status != BST_OK) {
         return bst_fail_prefix(ctx, status == BST_ERR_NUMERIC ? BST_ERR_CONFIG : status,

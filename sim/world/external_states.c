@@ -75,10 +75,10 @@ bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *s, doubl
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
                            const bst_world_state *state) {
     int object = bst_world_find_object(world, name);
-    bst_external_states *steering = object >= 0 ? world->objects[object].orbit.steering : NULL;
-    if (!steering) {
+    bst_external_states *external = object >= 0 ? world->objects[object].orbit.external : NULL;
+    if (!external) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "no object \"%.64s\" whose key \"steered\" is true",
                         name);
     }
-    return bst_external_states_add(ctx, steering, seconds, state);
+    return bst_external_states_add(ctx, external, seconds, state);
 }

@@ -14,15 +14,15 @@ typedef struct bst_external_states bst_external_states;
  * Returned:  *out  NULL on error
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_external_states_create(bst_ctx *ctx, bst_external_states **out) BST_MUST_CHECK;
-void bst_external_states_free(bst_external_states *steering); /* NULL allowed */
+void bst_external_states_free(bst_external_states *external); /* NULL allowed */
 
 /* From `seconds` after the epoch on the object is in this state (GCRF) and moves on by two-body
  * motion. What was before is not changed: BST_ERR_ARGUMENT unless it is later than the last one. */
-bst_status bst_external_states_add(bst_ctx *ctx, bst_external_states *steering, double seconds,
+bst_status bst_external_states_add(bst_ctx *ctx, bst_external_states *external, double seconds,
                                    const bst_world_state *state) BST_MUST_CHECK;
 
 /* *steered false: before the first state. Passes on errors of bst_kepler_propagate. */
-bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *steering, double seconds,
+bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *external, double seconds,
                                      bool *steered, bst_world_state *out) BST_MUST_CHECK;
 
 #endif

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/compare.h"
 #include "sim/world/external_states.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/world_build.h"
@@ -14,11 +15,6 @@ typedef struct candidate {
     double age_s; /* distance of the set's epoch from the scenario's */
     int catalogue_index, order;
 } candidate;
-
-static int compare_numbers(const void *a, const void *b) {
-    int x = *(const int *)a, y = *(const int *)b;
-    return (x > y) - (x < y);
-}
 
 /* By number, then nearest epoch, then place in the files. */
 static int compare_candidates(const void *a, const void *b) {
@@ -82,7 +78,7 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         BST_TRY(bst_world_orbit_build(b, &config->orbit, &config->burns, path, object->info.name,
                                       &object->orbit, &object->info.norad));
         if (config->steered) {
-            BST_TRY(bst_external_states_create(b->ctx, &object->orbit.steering));
+            BST_TRY(bst_external_states_create(b->ctx, &object->orbit.external));
         }
         bst_name_index_add(world->object_names, object->info.name, i);
     }
@@ -145,7 +141,7 @@ static int choose(candidate *list, int count, const int *listed, int listed_coun
         int norad = list[i].set->norad;
         bool again = kept > 0 && list[kept - 1].set->norad == norad;
         if (!again &&
-            !bsearch(&norad, listed, (size_t)listed_count, sizeof norad, compare_numbers)) {
+            !bsearch(&norad, listed, (size_t)listed_count, sizeof norad, bst_compare_ints)) {
             list[kept++] = list[i];
         }
     }
@@ -262,7 +258,7 @@ static bst_status build_all(const bst_world_builder *b, const bst_world_config *
     for (int i = 0; i < b->world->object_count; i++) {
         listed[i] = b->world->objects[i].info.norad;
     }
-    qsort(listed, (size_t)b->world->object_count, sizeof *listed, compare_numbers);
+    qsort(listed, (size_t)b->world->object_count, sizeof *listed, bst_compare_ints);
     BST_TRY(list_candidates(b, &config->catalogues, loaded, list));
     int count = choose(list, loaded->total, listed, b->world->object_count);
     BST_TRY(build_candidates(b, list, count, first_brightness));

@@ -288,10 +288,6 @@ bool bst_world_element_age(const bst_world *world, int body, double *seconds) {
     return orbit->source == BST_ORBIT_SGP4;
 }
 
-int bst_world_find_object(const bst_world *world, const char *name) {
-    return world->object_names ? bst_name_index_find(world->object_names, name) : -1;
-}
-
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor) {
     return &world->observers[observer].sensors[sensor].config.camera;
 }

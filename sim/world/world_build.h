@@ -49,12 +49,17 @@ bst_status bst_world_updates_injected(const bst_world_builder *b, const char *pa
 
 /* Closes the files that orbits came from. */
 void bst_world_files_free(bst_world *world);
-/* Makes a numerical orbit; called by bst_world_orbit_build, arguments as there. */
+/* Makes the gravity of a numerical orbit, the first step to it. */
+bst_status bst_world_orbit_make_gravity(const bst_world_builder *b, const bst_force_config *f,
+                                        const char *path, bst_gravity **out) BST_MUST_CHECK;
+/* Makes a numerical orbit whose gravity is there; called by bst_world_orbit_build, arguments as
+ * there. `other`: the state that it begins with where that comes from an orbit of another source.
+ */
 bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
                                            const bst_orbit_config *config,
-                                           const bst_config_list *burns, const char *path,
-                                           const char *name, bst_world_orbit *orbit,
-                                           int *norad) BST_MUST_CHECK;
+                                           const bst_config_list *burns,
+                                           const bst_world_state *other, const char *path,
+                                           bst_world_orbit *orbit) BST_MUST_CHECK;
 
 /* Frees what an orbit holds (SGP4, trajectories, gravity field, burns); the struct itself stays. */
 void bst_world_orbit_free(bst_world_orbit *orbit);

@@ -44,7 +44,7 @@ typedef struct bst_world_orbit {
 
     bst_world_burn *burns;
     int burn_count;
-    struct bst_external_states *steering; /* owned; NULL: its states do not come by message */
+    struct bst_external_states *external; /* owned; NULL: its states do not come by message */
     const char *name;                     /* for messages; borrowed */
 } bst_world_orbit;
 
@@ -126,30 +126,43 @@ bst_status bst_world_orbit_set_burns(bst_ctx *ctx, bst_world_orbit *orbit, bst_s
                                      bst_time epoch, const bst_burn_config *burns,
                                      int count) BST_MUST_CHECK;
 
+/* Where and when light arrives. */
+typedef struct bst_world_reception {
+    const bst_world_state *observer;
+    bst_sky_clock *clock;
+    bst_time epoch;
+    const bst_bodies *bodies;
+    double seconds; /* after the epoch */
+} bst_world_reception;
+
 /* Light-time solution: where the object was when the light left that reaches the observer at
  * `seconds`. *geometric_m: from the observer at reception to the object at emission in barycentric
  * axes (its direction is what stars are compared with); *emission_s: the time of emission. */
 bst_status bst_world_orbit_line_of_sight(bst_ctx *ctx, const bst_world_orbit *object,
-                                         const bst_world_state *observer, bst_sky_clock *clock,
-                                         bst_time epoch, const bst_bodies *bodies, double seconds,
-                                         bool with_burns, bst_vec3 *geometric_m,
-                                         bst_world_state *object_state,
+                                         const bst_world_reception *at, bool with_burns,
+                                         bst_vec3 *geometric_m, bst_world_state *object_state,
                                          double *emission_s) BST_MUST_CHECK;
+
+/* Who looks, and when: an exposure. */
+typedef struct bst_world_view_span {
+    int observer;
+    double start_s, end_s;
+} bst_world_view_span;
 
 struct bst_scene_source_path;
 struct bst_scene_path_light;
-/* The path of an object as an observer sees it from start_s to end_s, the sight at the middle, and
+/* The path of an object as an observer sees it in a span, the sight at the middle, and
  * what its light follows from.
  * BST_ERR_NUMERIC when either has no orbit at some time of it. */
-bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, int observer, int object,
-                               double start_s, double end_s, struct bst_scene_source_path *path,
+bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
+                               int object, struct bst_scene_source_path *path,
                                struct bst_scene_path_light *light,
                                bst_world_sight *mid) BST_MUST_CHECK;
 
 /* Indices (ascending) of the objects that may be seen in a cone of apparent directions at any time
- * from start_s to end_s, and few others; room for all. */
-bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, int observer, double start_s,
-                               double end_s, bst_vec3 axis, double half_angle_rad, int *indices,
+ * of a span, and few others; room for all. */
+bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
+                               bst_vec3 axis, double half_angle_rad, int *indices,
                                int *count) BST_MUST_CHECK;
 
 /* Works out a sensor's cue: object index, error rotation, body attitude. `scenario` names the file
@@ -157,19 +170,25 @@ bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, int observer,
 bst_status bst_world_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
                                  int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
 
+/* A sensor, and the time and the observer's state for which its cue is worked out. */
+typedef struct bst_world_cue_at {
+    int observer, sensor;
+    bst_sky_clock *clock;
+    double seconds;
+    const bst_world_state *eye;
+} bst_world_cue_at;
+
 /* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit as
  * seen from an observer in state `eye`, light time in. */
-bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer,
-                                           int sensor, bst_sky_clock *clock, double seconds,
-                                           const bst_world_state *eye,
+bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world,
+                                           const bst_world_cue_at *at,
                                            bst_vec3 *out) BST_MUST_CHECK;
 
 /* The vector (m, GCRF, geometric) of which that is the direction; 0 where the cue is a direction
  * only. */
 /* A place of the cue's region (kind other than none) by its angles from the middle, as
  * bst_knowledge_region_direction_at. */
-bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                  bst_sky_clock *clock, double seconds, const bst_world_state *eye,
+bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, const bst_world_cue_at *at,
                                   double along_rad, double across_rad,
                                   bst_vec3 *out) BST_MUST_CHECK;
 /* Half the length of a region's arc, rad; 0 for regions that are not an arc. */
@@ -177,12 +196,10 @@ double bst_world_region_half_length_rad(const bst_region_config *region);
 
 /* Vector from an observer to the cued object on its nominal orbit, m; zero without an object.
  *
- * Given:     seconds  since the epoch
- *            eye      state of the observer
+ * Given:     at       sensor, time since the epoch and the observer's state then
  * Errors:    those of the orbit */
-bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer,
-                                      int sensor, bst_sky_clock *clock, double seconds,
-                                      const bst_world_state *eye, bst_vec3 *line_m) BST_MUST_CHECK;
+bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world,
+                                      const bst_world_cue_at *at, bst_vec3 *line_m) BST_MUST_CHECK;
 
 /* The same of any object. */
 bst_status bst_world_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,

@@ -59,41 +59,49 @@ static bst_mount_status mount_of(double rate_degps, double accel_degps2) {
 static void reasons_and_times(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_pointing_feasibility reach, why;
-    bool found;
-    double when;
+    bst_pointing_feasibility reach;
+    bst_pointing_feasibility_change change;
     /* in the Sun's cone of 20 degrees, its axis on the pass: out where the pass is 20 degrees on */
     pass p = {.miss_rad = 60 * DEG, .sun_rad = 20 * DEG};
     p.sun = direction_at(&p, CLOSEST_S);
     bst_pointing_feasibility_problem problem = {.look = look, .user = &p, .limits_share = 1.0};
     bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_SUN); /* cue and Sun parallel */
-    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, CLOSEST_S, 100.0, 1.0, true,
-                                                      &found, &when, &why));
-    assert_true(found);
-    bst_assert_close(when, CLOSEST_S + tan(20 * DEG) / RATE, 0.01); /* what it is found to */
-    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, 0.0, 200.0, 1.0, false,
-                                                      &found, &when, &why));
-    assert_true(found && why == BST_REACH_SUN);
-    bst_assert_close(when, CLOSEST_S - tan(20 * DEG) / RATE, 0.01);
+    bst_assert_ok(
+        &ctx, bst_pointing_feasibility_next(
+                  &ctx, &problem, &(bst_pointing_feasibility_search){CLOSEST_S, 100.0, 1.0, true},
+                  &change));
+    assert_true(change.found);
+    bst_assert_close(change.when_s, CLOSEST_S + tan(20 * DEG) / RATE,
+                     0.01); /* what it is found to */
+    bst_assert_ok(&ctx, bst_pointing_feasibility_next(
+                            &ctx, &problem,
+                            &(bst_pointing_feasibility_search){0.0, 200.0, 1.0, false}, &change));
+    assert_true(change.found && change.why == BST_REACH_SUN);
+    bst_assert_close(change.when_s, CLOSEST_S - tan(20 * DEG) / RATE, 0.01);
     /* and never, within a horizon that ends before */
-    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, CLOSEST_S, 9.0, 1.0, true,
-                                                      &found, &when, NULL));
-    assert_false(found);
+    bst_assert_ok(&ctx,
+                  bst_pointing_feasibility_next(
+                      &ctx, &problem, &(bst_pointing_feasibility_search){CLOSEST_S, 9.0, 1.0, true},
+                      &change));
+    assert_false(change.found);
     /* the cue ends */
     bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, 1000.0, &reach));
     assert_int_equal(reach, BST_REACH_NO_CUE);
     /* behind the Earth: nadir angle below asin(6378.137 / 7000), from 180 - 65.7 degrees on, when
      * farther than the limb; in front of it when nearer */
     p = (pass){.height_m = 1e7};
-    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, 0.0, 300.0, 5.0, false,
-                                                      &found, &when, &why));
-    assert_true(found && why == BST_REACH_BEHIND_EARTH);
-    bst_assert_close(when, 180.0 - asin(BST_EARTH_RADIUS_M / 7000e3) / DEG, 0.01);
-    bst_assert_ok(&ctx, bst_pointing_feasibility_next(&ctx, &problem, when, 300.0, 5.0, true,
-                                                      &found, &when, &why));
-    assert_true(found);
-    bst_assert_close(when, 180.0 + asin(BST_EARTH_RADIUS_M / 7000e3) / DEG, 0.01);
+    bst_assert_ok(&ctx, bst_pointing_feasibility_next(
+                            &ctx, &problem,
+                            &(bst_pointing_feasibility_search){0.0, 300.0, 5.0, false}, &change));
+    assert_true(change.found && change.why == BST_REACH_BEHIND_EARTH);
+    bst_assert_close(change.when_s, 180.0 - asin(BST_EARTH_RADIUS_M / 7000e3) / DEG, 0.01);
+    bst_assert_ok(
+        &ctx, bst_pointing_feasibility_next(
+                  &ctx, &problem,
+                  &(bst_pointing_feasibility_search){change.when_s, 300.0, 5.0, true}, &change));
+    assert_true(change.found);
+    bst_assert_close(change.when_s, 180.0 + asin(BST_EARTH_RADIUS_M / 7000e3) / DEG, 0.01);
     p.height_m = 300e3;
     bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, 180.0, &reach));
     assert_int_equal(reach, BST_REACH_OK);
@@ -138,6 +146,7 @@ static void keyholes_as_simulated(void **state) {
     (void)state;
     const double misses_deg[] = {0.0, 0.5, 2.0, 5.0, 10.0, 15.0};
     const double tolerance = 20 * BST_ARCSEC_RAD;
+    const bst_pointing_feasibility_span span = {40.0, 160.0, tolerance};
     for (int k = 0; k < 6; k++) {
         bst_ctx ctx = {0};
         bst_mount_status mount = mount_of(5, 5);
@@ -146,8 +155,8 @@ static void keyholes_as_simulated(void **state) {
             .look = look, .user = &p, .mount = &mount, .limits_share = 0.95};
         bst_pointing_feasibility_loss losses[4];
         int count;
-        bst_assert_ok(&ctx, bst_pointing_feasibility_chase(&ctx, &problem, 40.0, 160.0, tolerance,
-                                                           losses, 4, &count));
+        bst_assert_ok(&ctx,
+                      bst_pointing_feasibility_chase(&ctx, &problem, &span, losses, 4, &count));
         assert_int_equal(count, 1);
 
         bst_mount_two_axis_config config;
@@ -197,8 +206,7 @@ static void keyholes_as_simulated(void **state) {
         .look = look, .user = &p, .mount = &mount, .limits_share = 0.95};
     bst_pointing_feasibility_loss losses[4];
     int count;
-    bst_assert_ok(&ctx, bst_pointing_feasibility_chase(&ctx, &problem, 40.0, 160.0, tolerance,
-                                                       losses, 4, &count));
+    bst_assert_ok(&ctx, bst_pointing_feasibility_chase(&ctx, &problem, &span, losses, 4, &count));
     assert_int_equal(count, 0);
 }
 

@@ -95,15 +95,13 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
           "\"earth_limb_keep_out_deg\": 8, \"earth_limb_altitude_km\": 100}");
     bst_world_view *view;
     bst_assert_ok(&f.ctx, bst_world_view_create(&f.ctx, f.world, &view));
-    int seen[BST_WHY_COUNT] = {0};
+    int reasons[BST_WHY_COUNT] = {0};
     for (double t = 0.0; t < 12000.0; t += 60.0) {
         for (int object = GX5; object <= GPS; object++) {
-            bst_tasking_why why = BST_WHY_COUNT, expected = BST_WHY_NOT;
-            bst_world_sight sight;
-            double snr;
-            bst_assert_ok(&f.ctx,
-                          bst_tasking_look(&f.ctx, &f.tasking, 0, object, t, &why, &sight, &snr));
-            seen[why]++;
+            bst_tasking_why expected = BST_WHY_NOT;
+            bst_tasking_visibility seen;
+            bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, object, t, &seen));
+            reasons[seen.why]++;
             bst_world_state eye, target;
             bst_bodies bodies;
             bst_assert_ok(&f.ctx, bst_world_view_observer_state(&f.ctx, view, 0, t, &eye));
@@ -120,21 +118,20 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
             }
             expected = earth_off < 0.0 ? BST_WHY_EARTH : sun_off < 0.0 ? BST_WHY_SUN : expected;
             if (expected == BST_WHY_NOT) {
-                assert_true(why == BST_WHY_NOT || why == BST_WHY_SHADOW);
+                assert_true(seen.why == BST_WHY_NOT || seen.why == BST_WHY_SHADOW);
                 double lit =
                     bst_astro_sun_fraction(target.position_m, bodies.sun_m, BST_EARTH_POLE_J2000);
-                assert_true(why == BST_WHY_SHADOW ? lit < 0.6 : lit > 0.4);
+                assert_true(seen.why == BST_WHY_SHADOW ? lit < 0.6 : lit > 0.4);
             } else {
-                assert_int_equal(why, expected);
+                assert_int_equal(seen.why, expected);
             }
         }
     }
-    assert_true(seen[BST_WHY_NOT] > 50 && seen[BST_WHY_EARTH] > 50 && seen[BST_WHY_SUN] > 5);
-    bst_tasking_why why;
-    double snr;
-    bst_assert_ok(&f.ctx,
-                  bst_tasking_look(&f.ctx, &f.tasking, 0, NEOSSAT_OBJECT, 0.0, &why, NULL, &snr));
-    assert_int_equal(why, BST_WHY_ITSELF);
+    assert_true(reasons[BST_WHY_NOT] > 50 && reasons[BST_WHY_EARTH] > 50 &&
+                reasons[BST_WHY_SUN] > 5);
+    bst_tasking_visibility seen;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, NEOSSAT_OBJECT, 0.0, &seen));
+    assert_int_equal(seen.why, BST_WHY_ITSELF);
     bst_world_view_free(view);
     tear_down(&f);
 }
@@ -143,18 +140,17 @@ static void faint_and_fast_ones_are_left_out(void **state) {
     (void)state;
     fixture f;
     start(&f, "{\"targets\": [{\"object\": \"INMARSAT GX5\"}], \"min_snr\": 8}");
-    bst_tasking_why why;
-    double snr;
-    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
-    assert_int_equal(why, BST_WHY_NOT);
-    double enough = snr;
+    bst_tasking_visibility seen;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &seen));
+    assert_int_equal(seen.why, BST_WHY_NOT);
+    double enough = seen.snr;
     f.tasking.config.min_snr = 1.01 * enough;
-    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
-    assert_int_equal(why, BST_WHY_FAINT);
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &seen));
+    assert_int_equal(seen.why, BST_WHY_FAINT);
     f.tasking.config.min_snr = 0.99 * enough;
     f.tasking.config.max_rate_arcsec_per_s = 10.0; /* it moves at about 50 */
-    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
-    assert_int_equal(why, BST_WHY_RATE);
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &seen));
+    assert_int_equal(seen.why, BST_WHY_RATE);
     tear_down(&f);
 }
 
@@ -173,14 +169,12 @@ static void noise_and_snr_are_the_cameras(void **state) {
     double pixels = 4.0 * BST_PI * (sigma * sigma + 1.0 / 12.0);
     bst_assert_close(f.tasking.sensors[0].noise_e, sqrt(noise2), 1e-9); /* rounding */
     bst_assert_close(f.tasking.sensors[0].pixels, pixels, 1e-9);
-    bst_tasking_why why;
-    bst_world_sight sight;
-    double snr;
-    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, &sight, &snr));
-    assert_int_equal(why, BST_WHY_NOT);
-    double electrons = 0.5 * v0 * pow(10.0, -0.4 * sight.v_mag);
+    bst_tasking_visibility seen;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &seen));
+    assert_int_equal(seen.why, BST_WHY_NOT);
+    double electrons = 0.5 * v0 * pow(10.0, -0.4 * seen.sight.v_mag);
     /* the object's light is of the Sun's colour, as the magnitude is */
-    bst_assert_close(snr, electrons / sqrt(noise2 * pixels), 1e-3 * snr);
+    bst_assert_close(seen.snr, electrons / sqrt(noise2 * pixels), 1e-3 * seen.snr);
     tear_down(&f);
 }
 
@@ -200,14 +194,14 @@ static void the_rate_is_that_of_the_line_of_sight(void **state) {
         bst_assert_ok(&f.ctx, bst_world_view_object_state(&f.ctx, view, GX5, k, &target));
         to[k] = bst_vec3_sub(target.position_m, eye.position_m);
     }
-    double rate = bst_vec3_angle(to[0], to[1]) / BST_ARCSEC_RAD, snr;
+    double rate = bst_vec3_angle(to[0], to[1]) / BST_ARCSEC_RAD;
     for (int slower = 0; slower < 2; slower++) {
-        bst_tasking_why why;
+        bst_tasking_visibility seen;
         /* light time changes the rate by some 1e-4 of itself; a second later it is another by more
          * than that */
         f.tasking.config.max_rate_arcsec_per_s = (slower ? 0.9997 : 1.0003) * rate;
-        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
-        assert_int_equal(why, slower ? BST_WHY_RATE : BST_WHY_NOT);
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &seen));
+        assert_int_equal(seen.why, slower ? BST_WHY_RATE : BST_WHY_NOT);
     }
     bst_world_view_free(view);
     tear_down(&f);
@@ -223,15 +217,12 @@ static void the_body_turns_on_after_its_telemetry(void **state) {
           "\"earth_limb_keep_out_deg\": 0}");
     const bst_vec3 rates[3] = {{0.02, 0, 0}, {0, 0.02, 0}, {-0.01, 0.02, 0.01}};
     for (int k = 0; k < 3; k++) {
-        bst_tasking_why why;
-        bst_world_sight sight;
-        double snr;
+        bst_tasking_visibility seen;
         f.tasking.sensors[0].mount_known = false;
-        bst_assert_ok(&f.ctx,
-                      bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 20.0, &why, &sight, &snr));
-        assert_int_equal(why, BST_WHY_NOT);
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 20.0, &seen));
+        assert_int_equal(seen.why, BST_WHY_NOT);
         /* z on the target at 20 s; the body's coordinates turn against its own motion */
-        bst_quat then = bst_quat_look(sight.apparent, (bst_vec3){0.3, -0.5, 0.8});
+        bst_quat then = bst_quat_look(seen.sight.apparent, (bst_vec3){0.3, -0.5, 0.8});
         bst_mount_status mount = {.tick = 50, /* 5 s */
                                   .axes = 2,
                                   .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
@@ -248,28 +239,25 @@ static void the_body_turns_on_after_its_telemetry(void **state) {
         bst_tasking_telemetry(&f.tasking, 0, NULL, &mount);
         const double times[3] = {20.0, 5.0, 35.0};
         for (int i = 0; i < 3; i++) {
-            bst_assert_ok(&f.ctx,
-                          bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, times[i], &why, NULL, &snr));
-            assert_int_equal(why, i == 0 ? BST_WHY_NOT : BST_WHY_MOUNT);
+            bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, times[i], &seen));
+            assert_int_equal(seen.why, i == 0 ? BST_WHY_NOT : BST_WHY_MOUNT);
         }
         mount.axes = 0; /* follows at once */
         bst_tasking_telemetry(&f.tasking, 0, NULL, &mount);
-        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 5.0, &why, NULL, &snr));
-        assert_int_equal(why, BST_WHY_NOT);
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 5.0, &seen));
+        assert_int_equal(seen.why, BST_WHY_NOT);
     }
     /* nine tenths of an axis' rate may be used: the camera's x along the target's motion, so that
      * one axis makes all of it, the body at rest */
-    bst_tasking_why why;
-    bst_world_sight now, later;
-    double snr;
-    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, &now, &snr));
-    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 1.0, &why, &later, &snr));
-    bst_vec3 moved = bst_vec3_sub(later.apparent, now.apparent);
+    bst_tasking_visibility now, later, seen;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &now));
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 1.0, &later));
+    bst_vec3 moved = bst_vec3_sub(later.sight.apparent, now.sight.apparent);
     for (int enough = 0; enough < 2; enough++) {
         double limit = bst_vec3_norm(moved) / (enough ? 0.88 : 0.92);
         bst_mount_status mount = {.axes = 2,
                                   .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
-                                  .q_body_from_gcrf = bst_quat_look(now.apparent, moved)};
+                                  .q_body_from_gcrf = bst_quat_look(now.sight.apparent, moved)};
         for (int a = 0; a < 2; a++) {
             mount.axis[a] = (bst_mount_axis){.axis_body = {a == 1, a == 0, 0},
                                              .rate_limit_radps = limit,
@@ -278,8 +266,8 @@ static void the_body_turns_on_after_its_telemetry(void **state) {
                                              .max_rad = 50 * BST_DEG_RAD};
         }
         bst_tasking_telemetry(&f.tasking, 0, NULL, &mount);
-        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
-        assert_int_equal(why, enough ? BST_WHY_NOT : BST_WHY_MOUNT);
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &seen));
+        assert_int_equal(seen.why, enough ? BST_WHY_NOT : BST_WHY_MOUNT);
     }
     assert_string_equal(bst_tasking_reason(BST_WHY_MOUNT), "out of the mount's reach");
     assert_string_equal(bst_tasking_reason(BST_WHY_NOT), "visible");
@@ -391,22 +379,21 @@ static void priority_and_waiting_decide(void **state) {
           "\"moon_keep_out_deg\": 0, \"max_rate_arcsec_per_s\": 1e6, "
           "\"earth_limb_keep_out_deg\": 0}");
     /* a time at which the low one sees both */
-    double t = 4000.0, snr;
-    bst_tasking_why a = BST_WHY_EARTH, b = BST_WHY_EARTH;
+    double t = 4000.0;
+    bst_tasking_visibility a, b;
     for (; t < 24000.0; t += 60.0) {
-        bst_tasking_why later_a, later_b;
-        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, t, &a, NULL, &snr));
-        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, MOLNIYA, t, &b, NULL, &snr));
-        bst_assert_ok(
-            &f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, t + 120.0, &later_a, NULL, &snr));
-        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, MOLNIYA, t + 120.0, &later_b,
-                                               NULL, &snr));
-        if (a == BST_WHY_NOT && b == BST_WHY_NOT && later_a == BST_WHY_NOT &&
-            later_b == BST_WHY_NOT) {
+        bst_tasking_visibility later_a, later_b;
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, t, &a));
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, MOLNIYA, t, &b));
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, t + 120.0, &later_a));
+        bst_assert_ok(&f.ctx,
+                      bst_tasking_look(&f.ctx, &f.tasking, 0, MOLNIYA, t + 120.0, &later_b));
+        if (a.why == BST_WHY_NOT && b.why == BST_WHY_NOT && later_a.why == BST_WHY_NOT &&
+            later_b.why == BST_WHY_NOT) {
             break;
         }
     }
-    assert_int_equal(a, BST_WHY_NOT);
+    assert_int_equal(a.why, BST_WHY_NOT);
     assert_true(plan(&f, 0, (int64_t)(10.0 * t)));
     assert_int_equal(f.tasking.sensors[0].task.object, MOLNIYA);
     /* the other has waited for longer than its wish by a factor of more than 3 */

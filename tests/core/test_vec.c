@@ -95,6 +95,29 @@ static void radec_wraps(void **state) {
     bst_assert_close(dec, -BST_PI / 2, 0.0);
 }
 
+/* A frame that turns by r about its own axis sees a fixed vector turn by -r. */
+static void frames_turn_against_what_they_see(void **state) {
+    (void)state;
+    const double fixed[3] = {1.0, 0.0, 0.0};
+    bst_quat q = bst_quat_turn_frame(BST_QUAT_IDENTITY, (bst_vec3){0.0, 0.0, 0.5 * BST_PI});
+    /* rounding of a few products */
+    assert_vec(bst_quat_rotate(q, bst_vec3_from_array(fixed)), (bst_vec3){0.0, -1.0, 0.0}, 1e-15);
+    /* two turns of a quarter are a half one, each about the frame's own axis */
+    q = bst_quat_turn_frame(q, (bst_vec3){0.0, 0.0, 0.5 * BST_PI});
+    assert_vec(bst_quat_rotate(q, bst_vec3_from_array(fixed)), (bst_vec3){-1.0, 0.0, 0.0}, 1e-15);
+}
+
+static void angles_wrap_to_the_half_open_turn(void **state) {
+    (void)state;
+    const double cases[][2] = {{0.0, 0.0},          {BST_PI, BST_PI},        {-BST_PI, BST_PI},
+                               {-3.0, -3.0},        {3.5, 3.5 - 2 * BST_PI}, {2 * BST_PI, 0.0},
+                               {7 * BST_PI, BST_PI}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        /* rounding of angles up to 22 */
+        bst_assert_close(bst_wrap_angle(cases[i][0]), cases[i][1], 8e-15);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(quaternion_and_matrix_agree),
@@ -105,6 +128,8 @@ int main(void) {
         cmocka_unit_test(look_survives_parallel_vectors),
         cmocka_unit_test(angle_is_accurate_at_both_ends),
         cmocka_unit_test(radec_wraps),
+        cmocka_unit_test(frames_turn_against_what_they_see),
+        cmocka_unit_test(angles_wrap_to_the_half_open_turn),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -116,7 +116,7 @@ static const bst_port gimbal_ports[] = {
         .config_bytes = bytes_, .ports = ports_, .port_count = sizeof(ports_) / sizeof *(ports_), \
         .create = create_, .step = rest, .destroy = destroy                                       \
     }
-static const char *const stands_for[] = {"scenegen", "imgproc", NULL};
+static const char *const substitutes_for[] = {"scenegen", "imgproc", NULL};
 static const bst_module_desc camera_desc = MODULE("scenegen", camera_table, sizeof(camera_settings),
                                                   camera_ports, create_plain),
                              finder_desc = MODULE("imgproc", finder_table, sizeof(finder_settings),
@@ -136,7 +136,7 @@ static const bst_module_desc camera_desc = MODULE("scenegen", camera_table, size
                                                .create = create_settings,
                                                .step = rest,
                                                .destroy = destroy,
-                                               .stands_for = stands_for};
+                                               .substitutes_for = substitutes_for};
 static const bst_module_desc *const modules[] = {&camera_desc,  &finder_desc, &tracker_desc,
                                                  &control_desc, &gimbal_desc, &generator_desc};
 static const bst_scenario_registry registry = {.modules = modules, .count = 6};

@@ -19,9 +19,12 @@ static bst_platform make(const bst_platform_config *config, bst_quat nominal) {
     bst_ctx ctx = {0};
     bst_platform p;
     memset(&p, 0, sizeof p);
-    bst_assert_ok(&ctx, bst_platform_init(&ctx, &p, config, nominal, 3 * BST_ARCSEC_RAD, 1.0 / RATE,
-                                          bst_rng_make_key(1, 0, "test", "jitter"),
-                                          bst_rng_make_key(1, 0, "test", "attitude")));
+    const bst_platform_setup setup = {.q_nominal_from_gcrf = nominal,
+                                      .pixel_rad = 3 * BST_ARCSEC_RAD,
+                                      .dt_s = 1.0 / RATE,
+                                      .jitter_key = bst_rng_make_key(1, 0, "test", "jitter"),
+                                      .attitude_key = bst_rng_make_key(1, 0, "test", "attitude")};
+    bst_assert_ok(&ctx, bst_platform_init(&ctx, &p, config, &setup));
     return p;
 }
 

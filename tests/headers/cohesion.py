@@ -35,10 +35,11 @@ def sources(suffixes):
 
 
 def without_comments(text):
-    """The text with blanks in place of comments, texts and preprocessor lines: lines and places stay the same."""
+    """The text with blanks in place of comments, texts, characters and preprocessor lines: lines and places stay the same."""
     blank = lambda m: re.sub(r"[^\n]", " ", m.group(0))
     text = re.sub(r"/\*.*?\*/|//[^\n]*", blank, text, flags=re.S)
     text = re.sub(r'"(?:\\.|[^"\\\n])*"', blank, text)
+    text = re.sub(r"'(?:\\.|[^'\\\n])+'", blank, text)
     return re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", blank, text, flags=re.M)
 
 

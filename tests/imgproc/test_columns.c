@@ -82,8 +82,9 @@ static void false_alarms_and_sources(void **state) {
         expose(&s, key, 10 + t);
         bst_imgproc_frame frame = synthetic_frame(&s);
         bst_assert_ok(&ctx, t % 2 == 0 ? bst_imgproc_detect(&ctx, ip, &frame, NULL, d, 2048)
-                                       : bst_imgproc_detect_windows(&ctx, ip, &frame, &window, 1,
-                                                                    NULL, d, 2048));
+                                       : bst_imgproc_detect_windows(
+                                             &ctx, ip, &frame, &(bst_imgproc_windows){&window, 1},
+                                             NULL, d, 2048));
         int n = synthetic_nearest(d, x, y, 1.0);
         assert_true(n >= 0);
         const bst_detection *found = &d->items[n];

@@ -58,9 +58,10 @@ static void low_rank_finds_the_products_of_an_image(void **state) {
         }
     }
     /* a sum of two products is no more than two */
-    assert_int_equal(bst_low_rank(image, 1, N, 5, 1e-12, down, across, work), 2);
-    assert_int_equal(bst_low_rank(image, 1, N, 5, 0.9, down, across, work), 1);
-    int terms = bst_low_rank(image, 1, N, 5, 1e-12, down, across, work);
+    const bst_low_rank_images images = {image, 1, N};
+    assert_int_equal(bst_low_rank(&images, 5, 1e-12, down, across, work), 2);
+    assert_int_equal(bst_low_rank(&images, 5, 0.9, down, across, work), 1);
+    int terms = bst_low_rank(&images, 5, 1e-12, down, across, work);
     for (int k = 0; k < N * N; k++) {
         double sum = 0.0;
         for (int t = 0; t < terms; t++) {

@@ -16,8 +16,8 @@ static void check(bst_camera camera) {
     bst_predicted_stars sky;
     bst_assert_ok(&ctx, bst_predicted_stars_create(&ctx, &camera, stars, 2022.46, 4096, &sky));
     int count = 0;
-    bst_assert_ok(&ctx,
-                  bst_predicted_stars_expect(&ctx, &sky, q, &light, window, 50.0, 7.0, &count));
+    bst_predicted_stars_query query = {q, &light, window, 50.0, 7.0};
+    bst_assert_ok(&ctx, bst_predicted_stars_expect(&ctx, &sky, &query, &count));
     assert_true(count > 10);
     for (int i = 0; i < count; i++) {
         const bst_imgproc_expected_star *e = &sky.expected[i];
@@ -39,8 +39,8 @@ static void check(bst_camera camera) {
     bst_predicted_stars small;
     bst_assert_ok(&ctx, bst_predicted_stars_create(&ctx, &camera, stars, 2022.46, 40, &small));
     int fewer = 0;
-    bst_assert_ok(&ctx,
-                  bst_predicted_stars_expect(&ctx, &small, q, &light, window, 50.0, 9.0, &fewer));
+    query.v_limit = 9.0;
+    bst_assert_ok(&ctx, bst_predicted_stars_expect(&ctx, &small, &query, &fewer));
     assert_true(fewer > 0 && fewer <= 40);
     bst_predicted_stars_free(&small);
     static bst_star all[60000];

@@ -93,8 +93,9 @@ static void windows_show_what_the_frame_shows(void **state) {
         bst_detections *all = synthetic_detections(500), *some = synthetic_detections(500);
         bst_imgproc_frame frame = synthetic_frame(&s);
         bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, all, 500));
-        bst_assert_ok(
-            &ctx, bst_imgproc_detect_windows(&ctx, ip, &frame, windows, STARS, &motion, some, 500));
+        bst_assert_ok(&ctx, bst_imgproc_detect_windows(&ctx, ip, &frame,
+                                                       &(bst_imgproc_windows){windows, STARS},
+                                                       &motion, some, 500));
         assert_true(synthetic_sound(some));
         assert_int_equal(synthetic_nearest(some, 160.0, 160.0, 20.0), -1);
         assert_true(synthetic_nearest(all, 160.0, 160.0, 1.0) >= 0);

@@ -141,13 +141,13 @@ static void normalised_is_signal_over_noise(void **state) {
         electrons[x] = x % 17 == 3 ? BST_PIXEL_BAD : 100.0f + 10.0f * electrons[x];
         raw[x] = x % 13 == 5 ? 60000 : 500;
     }
-    bst_row_normalise(raw, NULL, electrons, parts, 3, 60000, signal, normalised);
+    bst_row_normalise(&(bst_row_input){raw, NULL, electrons, 60000}, parts, 3, signal, normalised);
     /* from digital numbers: the same operations */
     const bst_row_gain gain = {20.0f, 0.25f};
     float by_gain[WIDTH], same_signal[WIDTH], same[WIDTH], other[WIDTH], *direct = signal + WIDTH;
     bst_row_electrons(raw, WIDTH, gain.offset, gain.gain, by_gain);
-    bst_row_normalise(raw, NULL, by_gain, parts, 3, 60000, same_signal, same);
-    bst_row_normalise(raw, &gain, NULL, parts, 3, 60000, direct, other);
+    bst_row_normalise(&(bst_row_input){raw, NULL, by_gain, 60000}, parts, 3, same_signal, same);
+    bst_row_normalise(&(bst_row_input){raw, &gain, NULL, 60000}, parts, 3, direct, other);
     assert_memory_equal(direct, same_signal, sizeof same_signal);
     assert_memory_equal(other, same, sizeof same);
     for (int x = 0; x < WIDTH; x++) {

@@ -73,8 +73,9 @@ bst_status scene_step(link_scene *s) {
                                   .pixel_bytes = sizeof s->pixels};
     bst_link_output output = {
         .type = BST_LINK_DETECTIONS, .payload = &s->detections, .capacity = 4};
-    bst_status status = bst_link_exchange(&s->ctx, s->link, s->part, frame.end_tick, &input, 1,
-                                          &output, 1, &s->answered);
+    const bst_link_messages messages = {&input, 1, &output, 1};
+    bst_status status =
+        bst_link_exchange(&s->ctx, s->link, s->part, frame.end_tick, &messages, &s->answered);
     s->given = output.given;
     s->dropped = output.dropped;
     return status;

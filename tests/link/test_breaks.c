@@ -79,7 +79,8 @@ static void one_round(const char *folder, const uint16_t *pixels, int number) {
                                       .pixels = pixels,
                                       .pixel_bytes = sizeof(uint16_t) * PIXELS};
         bool answered;
-        bst_assert_ok(&ctx, bst_link_exchange(&ctx, link, index, i, &input, 1, NULL, 0, &answered));
+        const bst_link_messages messages = {&input, 1, NULL, 0};
+        bst_assert_ok(&ctx, bst_link_exchange(&ctx, link, index, i, &messages, &answered));
     }
     bst_link_close(link, 0, "the round is over");
     assert_true(bst_wall_seconds() - began < 60.0); /* a hang, not a slow machine */

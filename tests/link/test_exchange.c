@@ -153,8 +153,8 @@ static void frames_that_were_lent_come_back(void **state) {
                                   .hold = hold,
                                   .release = release,
                                   .owner = &held};
-    bst_assert_ok(&s.ctx,
-                  bst_link_exchange(&s.ctx, s.link, s.part, 0, &input, 1, NULL, 0, &s.answered));
+    const bst_link_messages messages = {&input, 1, NULL, 0};
+    bst_assert_ok(&s.ctx, bst_link_exchange(&s.ctx, s.link, s.part, 0, &messages, &s.answered));
     assert_false(s.answered);
     raw_close(&raw);
     scene_close(&s);

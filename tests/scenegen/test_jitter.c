@@ -37,10 +37,12 @@ static width measure(bst_ctx *ctx, bst_device *device, double top_hz, double rat
     bst_platform_config config = {.jitter_high_px_rms = 0.7, .jitter_high_band_hz = {20.0, top_hz}};
     bst_platform platform;
     bst_quat level = {0, 0, 0, 1};
-    bst_assert_ok(ctx,
-                  bst_platform_init(ctx, &platform, &config, level, bst_camera_scale_rad(&camera),
-                                    1.0 / rate_hz, bst_rng_make_key(3, 0, "a", "jitter"),
-                                    bst_rng_make_key(3, 0, "a", "attitude")));
+    const bst_platform_setup setup = {.q_nominal_from_gcrf = level,
+                                      .pixel_rad = bst_camera_scale_rad(&camera),
+                                      .dt_s = 1.0 / rate_hz,
+                                      .jitter_key = bst_rng_make_key(3, 0, "a", "jitter"),
+                                      .attitude_key = bst_rng_make_key(3, 0, "a", "attitude")};
+    bst_assert_ok(ctx, bst_platform_init(ctx, &platform, &config, &setup));
     double lack_px = sqrt(platform.unresolved_rad2) / bst_camera_scale_rad(&camera);
     bst_assert_ok(ctx, bst_psf_camera_blurred(ctx, &camera, lack_px, &blurred));
     bst_renderer *r;

@@ -58,8 +58,9 @@ static void matches_exhaustive_search(void **state) {
     for (uint64_t seed = 0; seed < 3000; seed++) {
         problem p = make(key, seed);
         int column_of_row[MAX_ROWS];
-        bst_assignment_solve(work, p.rows, p.columns, p.first, p.edge_columns, p.costs, p.miss,
-                             column_of_row);
+        const bst_assignment_problem asked = {p.rows,         p.columns, p.first,
+                                              p.edge_columns, p.costs,   p.miss};
+        bst_assignment_solve(work, &asked, column_of_row);
         double total = 0.0;
         unsigned taken = 0;
         for (int i = 0; i < p.rows; i++) {
@@ -90,8 +91,10 @@ static void empty_problems(void **state) {
     bst_assert_ok(&ctx, bst_assignment_create(&ctx, 1, 0, &work));
     int first[2] = {0, 0}, column = 7;
     double miss = 1.0;
-    bst_assignment_solve(work, 0, 0, first, NULL, NULL, NULL, NULL);
-    bst_assignment_solve(work, 1, 0, first, NULL, NULL, &miss, &column);
+    const bst_assignment_problem empty = {.first = first};
+    const bst_assignment_problem one_row = {.rows = 1, .first = first, .miss = &miss};
+    bst_assignment_solve(work, &empty, NULL);
+    bst_assignment_solve(work, &one_row, &column);
     assert_int_equal(column, -1);
     bst_assignment_free(work);
     assert_int_equal(bst_assignment_create(&ctx, -1, 0, &work), BST_ERR_ARGUMENT);

@@ -99,7 +99,8 @@ static void a_million_updates_of_each_filter(void **state) {
                 .cov_12 = c * si * (good - bad),
                 .cov_22 = si * si * good + c * c * bad};
             bst_filter_candidate candidate = {.measurement = &z};
-            bst_filter_update(&params, &s, &models, &candidate, 1, 0.0, 1.0, 1);
+            const bst_filter_evidence evidence = {&candidate, 1, 0.0, 1.0};
+            bst_filter_update(&params, &s, &models, &evidence, 1);
             if (k % 997 == 0 || k % 1000 < 2) {
                 assert_true(positive(s.covariance));
             }

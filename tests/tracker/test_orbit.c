@@ -543,8 +543,9 @@ static void a_track_at_an_assumed_range(void **state) {
     for (int i = 0; i < 4; i++) {
         sky[i][i] = i < 2 ? ARCSEC * ARCSEC : 1e-4 * ARCSEC * ARCSEC;
     }
+    const bst_orbit_range range = {seen.range_m, 1e6, seen.range_rate_mps, 500.0};
     bst_od_from_track(&items[0].observer, seen.direction, seen.rate_radps, (const double(*)[4])sky,
-                      seen.range_m, 1e6, seen.range_rate_mps, 500.0, &got, p);
+                      &range, &got, p);
     /* what the light time leaves out: 0.5 a tau^2, 2 mm, and a tau, 0.03 m/s */
     assert_true(bst_vec3_norm(bst_vec3_sub(got.position_m, truth.position_m)) < 0.01);
     assert_true(bst_vec3_norm(bst_vec3_sub(got.velocity_mps, truth.velocity_mps)) < 0.05);

@@ -212,8 +212,9 @@ static void a_tracks_covariance_by_differences(void **state) {
             }
         }
     }
-    bst_od_from_track(eye, seen.direction, seen.rate_radps, (const double(*)[4])sky, seen.range_m,
-                      scale[4], seen.range_rate_mps, scale[5], &got, p);
+    const bst_orbit_range range = {seen.range_m, scale[4], seen.range_rate_mps, scale[5]};
+    bst_od_from_track(eye, seen.direction, seen.rate_radps, (const double(*)[4])sky, &range, &got,
+                      p);
     for (int k = 0; k < 6; k++) {
         bst_od_state side[2];
         const double step = 0.1 * scale[k];
@@ -223,8 +224,9 @@ static void a_tracks_covariance_by_differences(void **state) {
             bst_vec3 d = bst_tangent_exp(seen.direction, bst_tangent_vector(&axes, x[0], x[1]));
             bst_vec3 w = bst_vec3_add(seen.rate_radps, bst_tangent_vector(&axes, x[2], x[3]));
             w = bst_tangent_carry(seen.direction, d, w);
-            bst_od_from_track(eye, d, w, (const double(*)[4])sky, seen.range_m + x[4], scale[4],
-                              seen.range_rate_mps + x[5], scale[5], &side[e], unused);
+            const bst_orbit_range beside = {seen.range_m + x[4], scale[4],
+                                            seen.range_rate_mps + x[5], scale[5]};
+            bst_od_from_track(eye, d, w, (const double(*)[4])sky, &beside, &side[e], unused);
         }
         bst_vec3 r = bst_vec3_sub(side[0].position_m, side[1].position_m);
         bst_vec3 v = bst_vec3_sub(side[0].velocity_mps, side[1].velocity_mps);

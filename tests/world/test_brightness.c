@@ -470,11 +470,11 @@ static void light_curves_are_those_of_the_instant_of_emission(void **state) {
         bst_scene_source_path path_of;
         bst_scene_path_light light;
         bst_world_sight mid;
-        bst_assert_ok(
-            &ctx, bst_world_view_path(&ctx, view, 0, 0, t - 1.0, t + 1.0, &path_of, &light, &mid));
+        const bst_world_view_span span = {0, t - 1.0, t + 1.0};
+        bst_assert_ok(&ctx, bst_world_view_path(&ctx, view, &span, 0, &path_of, &light, &mid));
         for (double u = 0.0; u <= 1.0; u += 0.25) {
             bst_world_sight then;
-            bst_scene_view_light(view, 0, &path_of, &light, t - 1.0, t + 1.0, u, &then);
+            bst_scene_view_light(view, &span, 0, &path_of, &light, u, &then);
             double at = t - 1.0 + 2.0 * u;
             bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 1, at, &steady));
             factor = pow(10.0, -0.4 * (then.v_mag - steady.v_mag));

@@ -272,9 +272,10 @@ static void near_objects_are_evaluated_directly(void **state) {
             bst_assert_ok(&ctx, bst_world_orbit_state(&ctx, &world->observers[0].orbit, clock,
                                                       world->epoch, t, true, &eye));
             bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
-            bst_assert_ok(&ctx, bst_world_orbit_line_of_sight(&ctx, &world->objects[i].orbit, &eye,
-                                                              clock, world->epoch, &bodies, t, true,
-                                                              &geometric, &target, &emission));
+            const bst_world_reception at = {&eye, clock, world->epoch, &bodies, t};
+            bst_assert_ok(&ctx,
+                          bst_world_orbit_line_of_sight(&ctx, &world->objects[i].orbit, &at, true,
+                                                        &geometric, &target, &emission));
             bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, i, t, &sight));
             double off = test_distance(sight.geometric, bst_vec3_unit(geometric));
             same += i == 2 && off == 0;
@@ -300,7 +301,8 @@ static bool seen(bst_ctx *ctx, const bst_world *world, bst_world_view *view, int
     bst_scene_source_path path;
     bst_scene_path_light light;
     bst_world_sight mid;
-    if (bst_world_view_path(ctx, view, 0, object, start, end, &path, &light, &mid) != BST_OK) {
+    const bst_world_view_span span = {0, start, end};
+    if (bst_world_view_path(ctx, view, &span, object, &path, &light, &mid) != BST_OK) {
         return false;
     }
     bst_scene_source s = {.kind = BST_SOURCE_OBJECT, .path = &path};
@@ -414,9 +416,10 @@ static void three_observers_share_it(void **state) {
             bst_assert_ok(
                 &ctx, bst_world_orbit_state(&ctx, eye_orbit, clock, world->epoch, t, true, &eye));
             bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
-            bst_assert_ok(&ctx, bst_world_orbit_line_of_sight(
-                                    &ctx, &world->objects[n / 3].orbit, &eye, clock, world->epoch,
-                                    &bodies, t, true, &geometric, &target, &emission));
+            const bst_world_reception at = {&eye, clock, world->epoch, &bodies, t};
+            bst_assert_ok(
+                &ctx, bst_world_orbit_line_of_sight(&ctx, &world->objects[n / 3].orbit, &at, true,
+                                                    &geometric, &target, &emission));
             bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, n % 3, n / 3, t, &sight));
             if (sight.range_m > 0) {
                 bst_assert_close(test_distance(sight.geometric, bst_vec3_unit(geometric)), 0,

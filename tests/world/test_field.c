@@ -276,11 +276,9 @@ static void truth_follows_the_optics(void **state) {
         double share = 1.0 - 0.4 * (dx * dx + dy * dy) / (2.0 * 512.0 * 512.0);
         bst_assert_close(item.electrons, share * s.sources[i].electrons_per_s * 0.5, 1e-9);
         double u = fmin(fmax(item.x_chief_px / 1023.0, 0.0), 1.0);
-        double area = (1.0 - u) * bst_psf_noise_area_px2(camera->psf, 0) +
-                      u * bst_psf_noise_area_px2(camera->psf, 1);
-        if (s.sources[i].kind == BST_SOURCE_STAR) { /* at rest */
-            /* the mean of the widths is not that of the areas: 6 % of the area half-way */
-            bst_assert_close(item.snr / (item.electrons / sqrt(variance * area)), 1, 0.06);
+        if (s.sources[i].kind == BST_SOURCE_STAR) { /* at rest: the image is a mean of two */
+            double snr = item.electrons * sqrt(test_mixed_square(camera->psf, u) / variance);
+            bst_assert_close(item.snr / snr, 1, 0.02);
         }
         least = fmin(least, u);
         most = fmax(most, u);

@@ -2,6 +2,7 @@
 #ifndef BST_TESTS_WORLD_WORLD_SUPPORT_H
 #define BST_TESTS_WORLD_WORLD_SUPPORT_H
 
+#include "sim/optics/psf.h"
 #include "sim/world/world_internal.h"
 #include "tests/test_support.h"
 
@@ -64,6 +65,19 @@ static inline bst_world *test_world_with(const char *objects, const char *sensor
 
 static inline double test_distance(bst_vec3 a, bst_vec3 b) {
     return bst_vec3_norm(bst_vec3_sub(a, b));
+}
+
+/* Integral of the squared image that is (1 - u) of the first node's and u of the second one's, both
+ * round. */
+static inline double test_mixed_square(const bst_psf *psf, double u) {
+    const double df = 0.002; /* 1/px; both images are round */
+    double sum = 0.0, a[2], b[2];
+    for (double f = 0.5 * df; f < 1.0; f += df) {
+        bst_psf_otf(psf, 0, f, 0.0, a);
+        bst_psf_otf(psf, 1, f, 0.0, b);
+        sum += 2.0 * BST_PI * f * df * pow((1.0 - u) * a[0] + u * b[0], 2.0);
+    }
+    return sum;
 }
 
 #endif

@@ -10,6 +10,13 @@ typedef struct star_residual {
     double chi2;
 } star_residual;
 
+/* The identified stars of a frame. */
+typedef struct star_set {
+    const bst_camera *camera;
+    bst_attitude_star *items;
+    int count;
+} star_set;
+
 static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
                      const bst_attitude_star *star, star_residual *out) {
     bst_vec3 v = bst_quat_rotate(q, star->apparent_gcrf);
@@ -44,16 +51,16 @@ static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
 typedef enum weighting { WEIGHT_CAUCHY, WEIGHT_GIVEN } weighting;
 
 /* One Gauss-Newton step; false when the normal matrix cannot be inverted. */
-static bool step(const bst_camera *camera, double extra_px2, const bst_attitude_star *stars,
-                 int count, weighting how, double scale2, bst_quat *q, double covariance[3][3],
-                 double *moved_rad) {
+static bool step(const star_set *stars, double extra_px2, weighting how, double scale2, bst_quat *q,
+                 double covariance[3][3], double *moved_rad) {
     double n[3][3] = {{0}}, g[3] = {0};
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < stars->count; i++) {
         star_residual s;
-        if (!evaluate(camera, extra_px2, *q, &stars[i], &s)) {
+        if (!evaluate(stars->camera, extra_px2, *q, &stars->items[i], &s)) {
             continue;
         }
-        double weight = how == WEIGHT_GIVEN ? stars[i].weight : 1.0 / (1.0 + s.chi2 / scale2);
+        double weight =
+            how == WEIGHT_GIVEN ? stars->items[i].weight : 1.0 / (1.0 + s.chi2 / scale2);
         for (int k = 0; k < 3; k++) {
             double a = weight * (s.w[0] * s.j[0][k] + s.w[1] * s.j[1][k]);
             double b = weight * (s.w[1] * s.j[0][k] + s.w[2] * s.j[1][k]);
@@ -78,28 +85,28 @@ static bool step(const bst_camera *camera, double extra_px2, const bst_attitude_
 }
 
 /* Gives weight 1 to the stars within `limit`, 0 to the others; how many changed. */
-static int select_stars(const bst_camera *camera, double extra_px2, double limit, bst_quat q,
-                        bst_attitude_star *stars, int count, int *used) {
+static int select_stars(const star_set *stars, double extra_px2, double limit, bst_quat q,
+                        int *used) {
     int changed = 0;
     *used = 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < stars->count; i++) {
         star_residual s;
+        bst_attitude_star *star = &stars->items[i];
         double weight =
-            evaluate(camera, extra_px2, q, &stars[i], &s) && s.chi2 <= limit ? 1.0 : 0.0;
-        changed += weight != stars[i].weight;
-        stars[i].weight = weight;
+            evaluate(stars->camera, extra_px2, q, star, &s) && s.chi2 <= limit ? 1.0 : 0.0;
+        changed += weight != star->weight;
+        star->weight = weight;
         *used += weight > 0.0;
     }
     return changed;
 }
 
-static double mean_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
-                        const bst_attitude_star *stars, int count) {
+static double mean_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     double sum = 0.0;
     int n = 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < stars->count; i++) {
         star_residual s;
-        if (evaluate(camera, extra_px2, q, &stars[i], &s)) {
+        if (evaluate(stars->camera, extra_px2, q, &stars->items[i], &s)) {
             sum += s.chi2;
             n++;
         }
@@ -112,47 +119,45 @@ enum { FEWEST_FOR_EXCESS = 6, BISECTIONS = 40 };
 static const double LARGEST_EXCESS_PX2 = 4.0;
 
 /* Median chi-square of the stars, by bisection: no memory, any order. */
-static double median_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
-                          bst_attitude_star *stars, int count) {
+static double median_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     double low = 0.0, high = 1e6;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < stars->count; i++) {
         star_residual s;
-        stars[i].weight = evaluate(camera, extra_px2, q, &stars[i], &s) ? s.chi2 : INFINITY;
+        bst_attitude_star *star = &stars->items[i];
+        star->weight = evaluate(stars->camera, extra_px2, q, star, &s) ? s.chi2 : INFINITY;
     }
     for (int k = 0; k < 60; k++) {
         double middle = 0.5 * (low + high);
         int below = 0;
-        for (int i = 0; i < count; i++) {
-            below += stars[i].weight <= middle;
+        for (int i = 0; i < stars->count; i++) {
+            below += stars->items[i].weight <= middle;
         }
-        *(2 * below >= count ? &high : &low) = middle;
+        *(2 * below >= stars->count ? &high : &low) = middle;
     }
     return high;
 }
 
 /* From the median, which misidentified stars hardly move: 0 when it lies within three standard
  * errors of what it should be, ln 4. */
-static double excess_of_median(const bst_camera *camera, double floor_px2, bst_quat q,
-                               bst_attitude_star *stars, int count) {
-    const double right = log(4.0), error = 2.0 / sqrt((double)count);
-    if (count < FEWEST_FOR_EXCESS ||
-        median_chi2(camera, floor_px2, q, stars, count) <= right + error) {
+static double excess_of_median(const star_set *stars, double floor_px2, bst_quat q) {
+    const double right = log(4.0), error = 2.0 / sqrt((double)stars->count);
+    if (stars->count < FEWEST_FOR_EXCESS || median_chi2(stars, floor_px2, q) <= right + error) {
         return 0.0;
     }
     double low = 0.0, high = LARGEST_EXCESS_PX2;
     for (int k = 0; k < BISECTIONS; k++) {
         double middle = 0.5 * (low + high);
-        *(median_chi2(camera, floor_px2 + middle, q, stars, count) > right ? &low : &high) = middle;
+        *(median_chi2(stars, floor_px2 + middle, q) > right ? &low : &high) = middle;
     }
     return high;
 }
 
-static double total_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
-                         const bst_attitude_star *stars, int count) {
+static double total_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     double sum = 0.0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < stars->count; i++) {
         star_residual s;
-        if (stars[i].weight > 0.0 && evaluate(camera, extra_px2, q, &stars[i], &s)) {
+        const bst_attitude_star *star = &stars->items[i];
+        if (star->weight > 0.0 && evaluate(stars->camera, extra_px2, q, star, &s)) {
             sum += s.chi2;
         }
     }
@@ -161,17 +166,16 @@ static double total_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
 
 /* From the sum over the stars that are used (Paule and Mandel, J. Res. NBS 87, 1982): 0 when it is
  * below its 99.9 % quantile (Wilson and Hilferty 1931). */
-static double excess_of_sum(const bst_camera *camera, double floor_px2, bst_quat q,
-                            const bst_attitude_star *stars, int count, int dof) {
+static double excess_of_sum(const star_set *stars, double floor_px2, bst_quat q, int dof) {
     double spread = 2.0 / (9.0 * dof), root = 1.0 - spread + 3.09 * sqrt(spread);
     if (dof < 2 * FEWEST_FOR_EXCESS - 3 ||
-        total_chi2(camera, floor_px2, q, stars, count) <= dof * root * root * root) {
+        total_chi2(stars, floor_px2, q) <= dof * root * root * root) {
         return 0.0;
     }
     double low = 0.0, high = LARGEST_EXCESS_PX2;
     for (int k = 0; k < BISECTIONS; k++) {
         double middle = 0.5 * (low + high);
-        *(total_chi2(camera, floor_px2 + middle, q, stars, count) > dof ? &low : &high) = middle;
+        *(total_chi2(stars, floor_px2 + middle, q) > dof ? &low : &high) = middle;
     }
     return high;
 }
@@ -179,45 +183,43 @@ static double excess_of_sum(const bst_camera *camera, double floor_px2, bst_quat
 /* Iterations are bounded by what the scales need: each halves, from at most 1e6 sigma. */
 enum { MAX_ANNEAL = 24, MAX_RESELECT = 8, MAX_NEWTON = 6 };
 
-static bool solve(const bst_camera *camera, const bst_attitude_params *params,
-                  bst_attitude_star *stars, int count, bst_quat *q, double covariance[3][3],
-                  int *used, double *extra_px2) {
+static bool solve(const star_set *stars, const bst_attitude_params *params, bst_quat *q,
+                  double covariance[3][3], int *used, double *extra_px2) {
     const double floor_px2 = params->floor_px * params->floor_px;
-    double moved, scale2 = fmax(mean_chi2(camera, floor_px2, *q, stars, count), 4.0);
+    double moved, scale2 = fmax(mean_chi2(stars, floor_px2, *q), 4.0);
     for (int i = 0; i < MAX_ANNEAL; i++) {
-        if (!step(camera, floor_px2, stars, count, WEIGHT_CAUCHY, scale2, q, covariance, &moved)) {
+        if (!step(stars, floor_px2, WEIGHT_CAUCHY, scale2, q, covariance, &moved)) {
             return false;
         }
         if (scale2 <= 4.0 && moved < 1e-9) {
             break;
         }
         /* a common shift of all stars leaves at the first step: follow what remains */
-        double now = mean_chi2(camera, floor_px2, *q, stars, count);
+        double now = mean_chi2(stars, floor_px2, *q);
         scale2 = fmax(fmin(0.25 * scale2, now), 4.0);
     }
-    *extra_px2 = floor_px2 + excess_of_median(camera, floor_px2, *q, stars, count);
-    for (int i = 0; i < count; i++) {
-        stars[i].weight = -1.0;
+    *extra_px2 = floor_px2 + excess_of_median(stars, floor_px2, *q);
+    for (int i = 0; i < stars->count; i++) {
+        stars->items[i].weight = -1.0;
     }
     for (int i = 0; i < MAX_RESELECT; i++) {
-        if (select_stars(camera, *extra_px2, params->reject_chi2, *q, stars, count, used) == 0) {
+        if (select_stars(stars, *extra_px2, params->reject_chi2, *q, used) == 0) {
             break;
         }
         if (*used < 2) {
             return false;
         }
         for (int k = 0; k < MAX_NEWTON; k++) {
-            if (!step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved)) {
+            if (!step(stars, *extra_px2, WEIGHT_GIVEN, 1.0, q, covariance, &moved)) {
                 return false;
             }
             if (moved < 1e-12) {
                 break;
             }
         }
-        *extra_px2 = floor_px2 + excess_of_sum(camera, floor_px2, *q, stars, count, 2 * *used - 3);
+        *extra_px2 = floor_px2 + excess_of_sum(stars, floor_px2, *q, 2 * *used - 3);
     }
-    return *used >= 2 &&
-           step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved);
+    return *used >= 2 && step(stars, *extra_px2, WEIGHT_GIVEN, 1.0, q, covariance, &moved);
 }
 
 /* What a star does to the attitude. */
@@ -252,7 +254,8 @@ void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *par
     bst_quat q = bst_quat_unit(q_start);
     int used = 0;
     double extra_px2 = 0.0;
-    if (!solve(camera, params, stars, count, &q, out->covariance, &used, &extra_px2)) {
+    const star_set set = {camera, stars, count};
+    if (!solve(&set, params, &q, out->covariance, &used, &extra_px2)) {
         return;
     }
     double square = 0.0;

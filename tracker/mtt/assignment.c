@@ -60,8 +60,10 @@ void bst_assignment_free(bst_assignment *w) {
 
 /* Places row `root`: the cheapest path that ends in a free column or in a row's staying
  * unassigned. */
-static void place(bst_assignment *w, int root, const int *first, const int *columns,
-                  const double *costs, const double *miss, int *column_of_row) {
+static void place(bst_assignment *w, int root, const bst_assignment_problem *p,
+                  int *column_of_row) {
+    const int *first = p->first, *columns = p->edge_columns;
+    const double *costs = p->costs, *miss = p->miss;
     int touched = 0, row = root, end_row = -1, end_column = -1;
     double row_distance = 0.0, best_miss = INFINITY;
     for (;;) {
@@ -130,23 +132,21 @@ static void place(bst_assignment *w, int root, const int *first, const int *colu
     }
 }
 
-void bst_assignment_solve(bst_assignment *w, int rows, int column_count, const int *first,
-                          const int *columns, const double *costs, const double *miss,
-                          int *column_of_row) {
-    for (int c = 0; c < column_count; c++) {
+void bst_assignment_solve(bst_assignment *w, const bst_assignment_problem *p, int *column_of_row) {
+    for (int c = 0; c < p->columns; c++) {
         w->column_dual[c] = 0.0;
         w->distance[c] = INFINITY;
         w->row_of_column[c] = -1;
         w->settled[c] = false;
     }
-    for (int i = 0; i < rows; i++) {
+    for (int i = 0; i < p->rows; i++) {
         /* the smallest reduced cost of a new row must not be negative */
-        double least = miss[i];
-        for (int e = first[i]; e < first[i + 1]; e++) {
-            least = fmin(least, costs[e] - w->column_dual[columns[e]]);
+        double least = p->miss[i];
+        for (int e = p->first[i]; e < p->first[i + 1]; e++) {
+            least = fmin(least, p->costs[e] - w->column_dual[p->edge_columns[e]]);
         }
         w->row_dual[i] = least;
         column_of_row[i] = -1;
-        place(w, i, first, columns, costs, miss, column_of_row);
+        place(w, i, p, column_of_row);
     }
 }

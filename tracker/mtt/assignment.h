@@ -13,13 +13,18 @@ bst_status bst_assignment_create(bst_ctx *ctx, int rows, int columns,
 /* Frees a work space; NULL is allowed. */
 void bst_assignment_free(bst_assignment *work);
 
-/* Minimises the sum of costs. Row i has candidates first[i] .. first[i + 1] - 1 with columns[] and
- * costs[] (any finite numbers; a column at most once per row); staying unassigned costs miss[i].
- * Writes the column of each row, or -1, to column_of_row. Within the work space's size; no
- * allocation.
+/* Row i has candidates first[i] .. first[i + 1] - 1 with edge_columns[] and costs[] (any finite
+ * numbers; a column at most once per row); staying unassigned costs miss[i]. */
+typedef struct bst_assignment_problem {
+    int rows, columns;
+    const int *first, *edge_columns;
+    const double *costs, *miss;
+} bst_assignment_problem;
+
+/* Minimises the sum of costs. Writes the column of each row, or -1, to column_of_row. Within the
+ * work space's size; no allocation.
  * Successive shortest augmenting paths with dual variables (Jonker and Volgenant 1987). */
-void bst_assignment_solve(bst_assignment *work, int rows, int column_count, const int *first,
-                          const int *columns, const double *costs, const double *miss,
+void bst_assignment_solve(bst_assignment *work, const bst_assignment_problem *problem,
                           int *column_of_row);
 
 #endif

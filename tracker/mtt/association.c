@@ -7,101 +7,6 @@
 /* Share of a frame in the smoothed number of false alarms, once there are enough frames. */
 #define ALARM_GAIN 0.1
 
-static double component(bst_vec3 v, int axis) {
-    return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
-}
-
-static void sift(double *key, int *order, int root, int count) {
-    for (;;) {
-        int child = 2 * root + 1;
-        if (child >= count) {
-            return;
-        }
-        if (child + 1 < count && key[child + 1] > key[child]) {
-            child++;
-        }
-        if (!(key[child] > key[root])) {
-            return;
-        }
-        double k = key[root];
-        int o = order[root];
-        key[root] = key[child];
-        order[root] = order[child];
-        key[child] = k;
-        order[child] = o;
-        root = child;
-    }
-}
-
-void bst_mtt_sort(double *key, int *order, int count) {
-    for (int i = count / 2 - 1; i >= 0; i--) {
-        sift(key, order, i, count);
-    }
-    for (int end = count - 1; end > 0; end--) {
-        double k = key[0];
-        int o = order[0];
-        key[0] = key[end];
-        order[0] = order[end];
-        key[end] = k;
-        order[end] = o;
-        sift(key, order, 0, end);
-    }
-}
-
-void bst_mtt_pool_index(bst_mtt_pool *pool) {
-    double low[3] = {2, 2, 2}, high[3] = {-2, -2, -2};
-    for (int i = 0; i < pool->count; i++) {
-        for (int a = 0; a < 3; a++) {
-            double v = component(pool->items[i].sky.direction, a);
-            low[a] = fmin(low[a], v);
-            high[a] = fmax(high[a], v);
-        }
-    }
-    pool->axis = 0;
-    for (int a = 1; a < 3; a++) {
-        if (high[a] - low[a] > high[pool->axis] - low[pool->axis]) {
-            pool->axis = a;
-        }
-    }
-    for (int i = 0; i < pool->count; i++) {
-        pool->key[i] = component(pool->items[i].sky.direction, pool->axis);
-        pool->order[i] = i;
-    }
-    bst_mtt_sort(pool->key, pool->order, pool->count);
-}
-
-static int lower_bound(const bst_mtt_pool *pool, double key) {
-    int low = 0, high = pool->count;
-    while (low < high) {
-        int mid = low + (high - low) / 2;
-        if (pool->key[mid] < key) {
-            low = mid + 1;
-        } else {
-            high = mid;
-        }
-    }
-    return low;
-}
-
-void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double chord, int *begin,
-                        int *end) {
-    double centre = component(direction, pool->axis);
-    *begin = lower_bound(pool, centre - chord);
-    *end = *begin;
-    while (*end < pool->count && pool->key[*end] <= centre + chord) {
-        ++*end;
-    }
-}
-
-/* Brightness counts, but a flare or an eclipse must not cost a track its detection. */
-double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection) {
-    double variance =
-        track->v_mag_variance + 0.09 + detection->v_mag_sigma * detection->v_mag_sigma;
-    double difference = track->v_mag - detection->v_mag;
-    double chi2 = difference * difference / variance;
-    return isfinite(chi2) ? 0.5 * fmin(chi2, 9.0) : 0.0;
-}
-
 /* Largest standard deviation of a measurement among the frame's detections. */
 static double largest_sigma(const bst_mtt_pool *pool) {
     double variance = 0.0;
@@ -211,8 +116,13 @@ static void assign_group(bst_mtt *mtt, bool tentative) {
     if (mtt->params.association == BST_MTT_NEAREST) {
         take_nearest(mtt, rows);
     } else {
-        bst_assignment_solve(mtt->assignment, rows, mtt->now.count, mtt->first, mtt->edge_columns,
-                             mtt->edge_costs, mtt->miss_costs, mtt->column_of_row);
+        const bst_assignment_problem problem = {.rows = rows,
+                                                .columns = mtt->now.count,
+                                                .first = mtt->first,
+                                                .edge_columns = mtt->edge_columns,
+                                                .costs = mtt->edge_costs,
+                                                .miss = mtt->miss_costs};
+        bst_assignment_solve(mtt->assignment, &problem, mtt->column_of_row);
     }
     for (int r = 0; r < rows; r++) {
         int column = mtt->column_of_row[r];

@@ -165,18 +165,19 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
 
 /* Appends the hypotheses of one Gaussian of weight exp(log_weight); returns the new count. */
 static int spread(const bst_sky_state *state, double log_weight,
-                  const bst_filter_candidate *candidates, int count, double miss_weight,
-                  double hit_weight, bst_sky_state *hypotheses, double *logs, int n) {
-    if (miss_weight > 0.0) {
+                  const bst_filter_evidence *evidence, bst_sky_state *hypotheses, double *logs,
+                  int n) {
+    if (evidence->miss_weight > 0.0) {
         hypotheses[n] = *state;
-        logs[n++] = log_weight + log(miss_weight);
+        logs[n++] = log_weight + log(evidence->miss_weight);
     }
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < evidence->count; i++) {
+        const bst_filter_candidate *candidate = &evidence->candidates[i];
         bst_sky_innovation innovation;
-        if (bst_sky_innovate(state, candidates[i].measurement, candidates[i].extra, &innovation)) {
+        if (bst_sky_innovate(state, candidate->measurement, candidate->extra, &innovation)) {
             hypotheses[n] = *state;
             bst_sky_update(&hypotheses[n], &innovation);
-            logs[n++] = log_weight + log(hit_weight) + log_density(&innovation);
+            logs[n++] = log_weight + log(evidence->hit_weight) + log_density(&innovation);
         }
     }
     return n;
@@ -196,11 +197,10 @@ static double to_weights(double *logs, int n) {
 }
 
 /* Updates one Gaussian; returns ln of its hypotheses' total weight. */
-static double update_one(bst_sky_state *state, const bst_filter_candidate *candidates, int count,
-                         double miss_weight, double hit_weight) {
+static double update_one(bst_sky_state *state, const bst_filter_evidence *evidence) {
     bst_sky_state hypotheses[BST_FILTER_CANDIDATES + 1];
     double weights[BST_FILTER_CANDIDATES + 1];
-    int n = spread(state, 0.0, candidates, count, miss_weight, hit_weight, hypotheses, weights, 0);
+    int n = spread(state, 0.0, evidence, hypotheses, weights, 0);
     if (n == 0) {
         return 0.0;
     }
@@ -213,13 +213,11 @@ static double update_one(bst_sky_state *state, const bst_filter_candidate *candi
     return total;
 }
 
-static void update_models(bst_filter_models *models, const bst_filter_candidate *candidates,
-                          int count, double miss_weight, double hit_weight) {
+static void update_models(bst_filter_models *models, const bst_filter_evidence *evidence) {
     double sum = 0.0;
     for (int m = 0; m < models->count; m++) {
         models->probability[m] =
-            log(models->probability[m]) +
-            update_one(&models->state[m], candidates, count, miss_weight, hit_weight);
+            log(models->probability[m]) + update_one(&models->state[m], evidence);
     }
     (void)to_weights(models->probability, models->count);
     for (int m = 0; m < models->count; m++) {
@@ -231,18 +229,17 @@ static void update_models(bst_filter_models *models, const bst_filter_candidate 
 }
 
 static void update_mixture(const bst_sky_state *state, bst_filter_models *models,
-                           const bst_filter_candidate *candidates, int count, double miss_weight,
-                           double hit_weight, int components) {
+                           const bst_filter_evidence *evidence, int components) {
     enum { MOST = BST_FILTER_COMPONENTS * (BST_FILTER_CANDIDATES + 1) };
     bst_sky_state hypotheses[MOST];
     double weights[MOST];
     int n = 0;
     for (int m = 0; m < models->count; m++) {
-        n = spread(&models->state[m], log(models->probability[m]), candidates, count, miss_weight,
-                   hit_weight, hypotheses, weights, n);
+        n = spread(&models->state[m], log(models->probability[m]), evidence, hypotheses, weights,
+                   n);
     }
     if (models->count == 0) {
-        n = spread(state, 0.0, candidates, count, miss_weight, hit_weight, hypotheses, weights, 0);
+        n = spread(state, 0.0, evidence, hypotheses, weights, 0);
     }
     if (n == 0) {
         return;
@@ -255,17 +252,17 @@ static void update_mixture(const bst_sky_state *state, bst_filter_models *models
 }
 
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
-                       bst_filter_models *models, const bst_filter_candidate *candidates, int count,
-                       double miss_weight, double hit_weight, int components) {
+                       bst_filter_models *models, const bst_filter_evidence *evidence,
+                       int components) {
     if (params->kind == BST_FILTER_IMM && models->count > 0) {
-        update_models(models, candidates, count, miss_weight, hit_weight);
+        update_models(models, evidence);
         combine(models, state);
     } else if (models->count > 0 || components > 1) {
-        update_mixture(state, models, candidates, count, miss_weight, hit_weight, components);
+        update_mixture(state, models, evidence, components);
         if (models->count > 0) {
             combine(models, state);
         }
     } else {
-        (void)update_one(state, candidates, count, miss_weight, hit_weight);
+        (void)update_one(state, evidence);
     }
 }

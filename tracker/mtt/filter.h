@@ -68,14 +68,19 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
 /* Most candidates of bst_filter_update. */
 #define BST_FILTER_CANDIDATES 16
 
-/* Updates a state with the candidates of a frame, of which at most one is the object's.
+/* The candidates of a frame, of which at most one is the object's, and the weights of hypotheses.
+ */
+typedef struct bst_filter_evidence {
+    const bst_filter_candidate *candidates; /* [count] detections */
+    int count;                              /* 0 to BST_FILTER_CANDIDATES */
+    double miss_weight;                     /* of the hypothesis of a miss */
+    double hit_weight; /* factor on the likelihood of the innovation for that of a detection */
+} bst_filter_evidence;
+
+/* Updates a state with the candidates of a frame.
  *
- * Given:     models                   models of an IMM, or components of a mixture
- *            candidates               [count] detections
- *            count                    0 to BST_FILTER_CANDIDATES
- *            miss_weight, hit_weight  weight of the hypothesis of a miss; factor on the likelihood
- *                                     of the innovation for that of a detection
- *            components               most components that are kept, 1 to BST_FILTER_COMPONENTS
+ * Given:     models      models of an IMM, or components of a mixture
+ *            components  most components that are kept, 1 to BST_FILTER_COMPONENTS
  * Notes:     weights (0, 1) with one detection give the Kalman filter. (1 - PD PG, PD / clutter
  *            density) give the posterior of probabilistic data association as a mixture.
  *            components = 1 merges the mixture to one Gaussian of the same mean and covariance
@@ -83,8 +88,8 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
  *            More components, not for an IMM, let later detections decide between hypotheses.
  * Reference: Bar-Shalom and Tse 1975 (PDA); Salmond 1990 (mixture reduction) */
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
-                       bst_filter_models *models, const bst_filter_candidate *candidates, int count,
-                       double miss_weight, double hit_weight, int components);
+                       bst_filter_models *models, const bst_filter_evidence *evidence,
+                       int components);
 
 /* bst_sky_predict with the covariance, and the mean's shift, from eight sigma points: the unscented
  * transform (Julier and Uhlmann 1997) with kappa = 0, whose weights are all positive, in the

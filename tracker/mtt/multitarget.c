@@ -5,24 +5,6 @@
 
 #include "tracker/mtt/multitarget_internal.h"
 
-#define JUMP_FLOOR_RAD 1e-6
-
-static bool pool_create(bst_mtt_pool *pool, int capacity) {
-    size_t n = (size_t)capacity + 1;
-    pool->order = calloc(n, sizeof *pool->order);
-    pool->key = calloc(n, sizeof *pool->key);
-    pool->items = calloc(n, sizeof *pool->items);
-    pool->used = calloc(n, sizeof *pool->used);
-    return pool->order && pool->key && pool->items && pool->used;
-}
-
-static void pool_free(bst_mtt_pool *pool) {
-    free(pool->order);
-    free(pool->key);
-    free(pool->items);
-    free(pool->used);
-}
-
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
         p->confirm_frames < p->confirm_hits || p->max_stars < 0 || !(p->field_sr > 0.0) ||
@@ -86,9 +68,10 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
     bool ok = m->tracks && m->memory && m->events && m->edge_order && m->edge_row && m->edge_key &&
               m->owner && m->rows && m->first && m->column_of_row && m->miss_costs &&
               m->edge_columns && m->edge_costs && m->detection_of_track && m->extra && m->shared &&
-              m->observable && m->departed_chi2 && pool_create(&m->now, params->max_detections);
+              m->observable && m->departed_chi2 &&
+              bst_mtt_pool_create(&m->now, params->max_detections);
     for (int h = 0; ok && h < BST_MTT_HISTORY; h++) {
-        ok = pool_create(&m->history[h], params->max_detections);
+        ok = bst_mtt_pool_create(&m->history[h], params->max_detections);
     }
     bst_status status =
         ok ? bst_assignment_create(ctx, params->max_tracks + params->max_stars,
@@ -125,9 +108,9 @@ void bst_mtt_free(bst_mtt *m) {
     free(m->shared);
     free(m->observable);
     free(m->departed_chi2);
-    pool_free(&m->now);
+    bst_mtt_pool_free(&m->now);
     for (int h = 0; h < BST_MTT_HISTORY; h++) {
-        pool_free(&m->history[h]);
+        bst_mtt_pool_free(&m->history[h]);
     }
     bst_assignment_free(m->assignment);
     free(m);
@@ -137,40 +120,6 @@ static void record(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *tra
                    double statistic) {
     m->events[m->event_count++] =
         (bst_mtt_event){.kind = kind, .statistic = statistic, .track = *track};
-}
-
-/* What the cue's motion has that a constant rate has not, as tangent vectors at the cue's present
- * direction. */
-static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *step,
-                             bst_vec3 *rate) {
-    if (!frame->cue_valid || !frame->cue_before_valid) {
-        return false;
-    }
-    bst_sky_state cue = {.direction = frame->cue_before_direction,
-                         .rate_radps = bst_tangent_project(frame->cue_before_direction,
-                                                           frame->cue_before_rate_radps)};
-    bst_sky_predict(&cue, dt_s, 0.0);
-    bst_vec3 now = frame->cue_direction;
-    if (!(bst_vec3_dot(cue.direction, now) > 0.9)) {
-        return false;
-    }
-    *step = bst_vec3_scale(bst_tangent_log(now, cue.direction), -1.0);
-    /* what accelerates evenly is off by half the change of its rate; a cue that is off by more than
-     * its rate has jumped */
-    if (bst_vec3_norm(*step) > 2.0 * bst_vec3_norm(frame->cue_rate_radps) * dt_s + JUMP_FLOOR_RAD) {
-        return false;
-    }
-    *rate = bst_vec3_sub(bst_tangent_project(now, frame->cue_rate_radps),
-                         bst_tangent_carry(cue.direction, now, cue.rate_radps));
-    return true;
-}
-
-bool bst_mtt_shares_acceleration(const bst_mtt *m, const bst_mtt_track *track,
-                                 const bst_mtt_frame *frame) {
-    return !track->at_rest &&
-           bst_vec3_dot(track->state.direction, frame->cue_direction) >
-               cos(m->params.feed_forward_rad) &&
-           bst_vec3_norm(track->state.rate_radps) > 0.1 * bst_vec3_norm(frame->cue_rate_radps);
 }
 
 static void shift(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 step, bst_vec3 rate) {
@@ -195,7 +144,7 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
     m->sleepers = 0;
-    bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
+    bool forward = m->started && bst_mtt_cue_acceleration(frame, dt, &step, &rate);
     m->cue_lag_valid = forward && dt > 0.0;
     if (m->cue_lag_valid) {
         bst_vec3 behind = bst_vec3_sub(rate, bst_vec3_scale(step, 1.0 / dt));
@@ -275,8 +224,8 @@ static void update_filter(bst_mtt *m, int t) {
         if (given >= 0) {
             candidates[0] = (bst_filter_candidate){.measurement = &m->now.items[given].sky,
                                                    .extra = m->shared[t] ? m->extra[t] : NULL};
-            bst_filter_update(&m->filter, &track->state, &track->models, candidates, 1, 0.0, 1.0,
-                              components);
+            const bst_filter_evidence own = {candidates, 1, 0.0, 1.0};
+            bst_filter_update(&m->filter, &track->state, &track->models, &own, components);
         }
         return;
     }
@@ -287,8 +236,8 @@ static void update_filter(bst_mtt *m, int t) {
     }
     if (count > 0) {
         double pd = m->params.detection_probability, pg = -expm1(-0.5 * m->params.gate_chi2);
-        bst_filter_update(&m->filter, &track->state, &track->models, candidates, count,
-                          1.0 - pd * pg, pd / m->alarm_density, components);
+        const bst_filter_evidence gated = {candidates, count, 1.0 - pd * pg, pd / m->alarm_density};
+        bst_filter_update(&m->filter, &track->state, &track->models, &gated, components);
     }
 }
 

@@ -82,6 +82,11 @@ struct bst_mtt {
         *departed_chi2; /* chi2 of a manoeuvre found in this frame with the wider gate; 0: none */
 };
 
+/* A pool with room for `capacity` detections; false without memory. Either way freed by
+ * bst_mtt_pool_free. */
+bool bst_mtt_pool_create(bst_mtt_pool *pool, int capacity);
+/* Frees what bst_mtt_pool_create made. */
+void bst_mtt_pool_free(bst_mtt_pool *pool);
 /* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
  * library sort that may allocate. */
 void bst_mtt_sort(double *key, int *order, int count);
@@ -194,6 +199,10 @@ bool bst_mtt_may_be_fixed(const bst_mtt *mtt, const bst_mtt_track *track);
  * to share it. */
 bool bst_mtt_shares_acceleration(const bst_mtt *mtt, const bst_mtt_track *track,
                                  const bst_mtt_frame *frame);
+/* What the cue's motion over dt_s has that a constant rate has not, as tangent vectors at the cue's
+ * present direction; false: it cannot be told. */
+bool bst_mtt_cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *step,
+                              bst_vec3 *rate);
 
 /* Starts tentative tracks from unused detections of this frame and of earlier ones. */
 void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame);

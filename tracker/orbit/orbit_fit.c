@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/core/cholesky.h"
+#include "sim/core/compare.h"
 #include "tracker/mtt/tangent.h"
 
 enum { PARAMETERS = 6, MAX_ITERATIONS = 60, MAX_ROUNDS = 6 };
@@ -299,18 +300,13 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
 
 /* ------------------------------------------------------------------ the whole fit */
 
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Leaves out what does not fit; true when that changed anything. */
 static bool reject(work *w, bool *changed, double *scratch) {
     int count = 0;
     for (int i = 0; i < w->count; i++) {
         scratch[i] = chi2_of(w->residual[i]);
     }
-    qsort(scratch, (size_t)w->count, sizeof *scratch, compare);
+    qsort(scratch, (size_t)w->count, sizeof *scratch, bst_compare_doubles);
     double limit_chi2 = fmax(w->options->reject_chi2, 10.0 * scratch[w->count / 2]);
     *changed = false;
     for (int i = 0; i < w->count; i++) {

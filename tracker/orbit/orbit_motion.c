@@ -269,9 +269,9 @@ bst_status bst_od_predict(bst_ctx *ctx, const bst_od_motion *motion, const bst_o
 }
 
 void bst_od_from_track(const bst_od_observer *observer, bst_vec3 direction, bst_vec3 rate_radps,
-                       const double sky_covariance[4][4], double range_m, double range_sigma_m,
-                       double range_rate_mps, double range_rate_sigma_mps, bst_od_state *out,
-                       double covariance[6][6]) {
+                       const double sky_covariance[4][4], const bst_orbit_range *range,
+                       bst_od_state *out, double covariance[6][6]) {
+    const double range_m = range->range_m, range_rate_mps = range->range_rate_mps;
     double tau = range_m / BST_LIGHT_SPEED_MPS;
     bst_tangent axes = bst_tangent_at(direction);
     /* the line from observer to body holds -tau times the Earth's velocity and the body's own */
@@ -308,8 +308,8 @@ void bst_od_from_track(const bst_od_observer *observer, bst_vec3 direction, bst_
     for (int i = 0; i < 4; i++) {
         memcpy(p[i], sky_covariance[i], sizeof sky_covariance[i]);
     }
-    p[4][4] = range_sigma_m * range_sigma_m;
-    p[5][5] = range_rate_sigma_mps * range_rate_sigma_mps;
+    p[4][4] = range->range_sigma_m * range->range_sigma_m;
+    p[5][5] = range->range_rate_sigma_mps * range->range_rate_sigma_mps;
     double map[6][6];
     for (int k = 0; k < 6; k++) {
         const double column[6] = {position[k].x, position[k].y, position[k].z,

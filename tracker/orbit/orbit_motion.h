@@ -94,13 +94,17 @@ bst_status bst_od_predict(bst_ctx *ctx, const bst_od_motion *motion, const bst_o
                           const double covariance[6][6], const bst_od_observer *observer,
                           bst_od_sight *out, double sky_covariance[4][4]) BST_MUST_CHECK;
 
+/* What is believed of a range, m and m/s, with standard deviations. */
+typedef struct bst_orbit_range {
+    double range_m, range_sigma_m, range_rate_mps, range_rate_sigma_mps;
+} bst_orbit_range;
+
 /* A state with covariance from a track (unit direction, rate, covariance of both in the tangent
- * axes at the direction) and an assumed range and range rate with their standard deviations: what
- * bst_od_predict then carries on. Light time is taken as that of the assumed range. */
+ * axes at the direction) and an assumed range and range rate: what bst_od_predict then carries on.
+ * Light time is taken as that of the assumed range. */
 void bst_od_from_track(const bst_od_observer *observer, bst_vec3 direction, bst_vec3 rate_radps,
-                       const double sky_covariance[4][4], double range_m, double range_sigma_m,
-                       double range_rate_mps, double range_rate_sigma_mps, bst_od_state *out,
-                       double covariance[6][6]);
+                       const double sky_covariance[4][4], const bst_orbit_range *range,
+                       bst_od_state *out, double covariance[6][6]);
 
 /* Gravitational parameter that a motion has (m^3/s^2). */
 double bst_od_gm(const bst_od_motion *motion);

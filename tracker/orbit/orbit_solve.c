@@ -128,14 +128,23 @@ static bool is_same(const bst_od_solution *a, const bst_od_solution *b) {
                0.02 * bst_vec3_norm(a->state.velocity_mps);
 }
 
+/* All observations, how they are to be fitted, and room for GROWING_SAMPLES of them. */
+typedef struct arc {
+    const bst_od_observation *items;
+    int count;
+    const bst_od_options *options;
+    bst_od_observation *room;
+} arc;
+
 /* From an orbit that fits the part to one that fits all. */
-static bst_status grow(bst_ctx *ctx, const bst_od_observation *o, int count, part p, double span_s,
-                       const bst_od_options *options, const bst_od_state *from,
-                       bst_od_observation *room, double *residual_chi2, bst_od_solution *out) {
+static bst_status grow(bst_ctx *ctx, const arc *a, part p, double span_s, const bst_od_state *from,
+                       bst_od_solution *out) {
+    const bst_od_observation *o = a->items;
+    const int count = a->count;
     bst_od_state state = *from;
     double middle = 0.5 * (time_of(o, p.first) + time_of(o, p.last));
     double whole = time_of(o, count - 1) - time_of(o, 0);
-    bst_od_options growing = *options;
+    bst_od_options growing = *a->options;
     growing.scale_variance = false;
     while (span_s < whole) {
         int n = p.last - p.first + 1;
@@ -147,26 +156,25 @@ static bst_status grow(bst_ctx *ctx, const bst_od_observation *o, int count, par
             p.last++;
         }
         if (p.last - p.first + 1 > n && p.last - p.first + 1 < count) {
-            int used = thin(o, p, GROWING_SAMPLES, room);
-            BST_TRY(bst_od_fit(ctx, room, used, &growing, &state, NULL, out));
+            int used = thin(o, p, GROWING_SAMPLES, a->room);
+            BST_TRY(bst_od_fit(ctx, a->room, used, &growing, &state, NULL, out));
             state = out->state;
         }
     }
     if (count > GROWING_SAMPLES) { /* near first, then all */
-        int used = thin(o, (part){0, count - 1}, GROWING_SAMPLES, room);
-        BST_TRY(bst_od_fit(ctx, room, used, &growing, &state, NULL, out));
+        int used = thin(o, (part){0, count - 1}, GROWING_SAMPLES, a->room);
+        BST_TRY(bst_od_fit(ctx, a->room, used, &growing, &state, NULL, out));
         state = out->state;
     }
-    return bst_od_fit(ctx, o, count, options, &state, residual_chi2, out);
+    return bst_od_fit(ctx, o, count, a->options, &state, NULL, out);
 }
 
 /* From a first part of the arc. */
-static bst_status solve_from(bst_ctx *ctx, const bst_od_observation *o, int count, part p,
-                             double span_s, const bst_od_options *options, bst_od_observation *room,
+static bst_status solve_from(bst_ctx *ctx, const arc *a, part p, double span_s,
                              double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
     started starts[BST_OD_CANDIDATES];
-    int found, used = thin(o, p, FIRST_SAMPLES, room);
-    BST_TRY(start(ctx, room, used, starts, &found, &report->candidates));
+    int found, used = thin(a->items, p, FIRST_SAMPLES, a->room);
+    BST_TRY(start(ctx, a->room, used, starts, &found, &report->candidates));
     bst_status status = BST_OK;
     bool done = false;
     bst_ctx quiet = {0};
@@ -187,13 +195,12 @@ static bst_status solve_from(bst_ctx *ctx, const bst_od_observation *o, int coun
             break;
         }
         bst_od_solution solution;
-        bst_status grown = grow(&quiet, o, count, p, span_s, options, &starts[i].solution.state,
-                                room, NULL, &solution);
+        bst_status grown = grow(&quiet, a, p, span_s, &starts[i].solution.state, &solution);
         double excess = grown == BST_OK && solution.dof > 0 ? solution.chi2 / solution.dof : 1.0;
         /* leaving observations out is no way to fit */
-        excess += grown == BST_OK ? 100.0 * solution.rejected / count : 0.0;
+        excess += grown == BST_OK ? 100.0 * solution.rejected / a->count : 0.0;
         if (grown == BST_OK &&
-            !(eccentricity(&solution.state, bst_od_gm(&options->motion)) < 1.0)) {
+            !(eccentricity(&solution.state, bst_od_gm(&a->options->motion)) < 1.0)) {
             grown = bst_fail(&quiet, BST_ERR_NUMERIC,
                              "only a hyperbolic orbit fits the observations, which nothing about "
                              "the Earth has: the arc is too short for their errors, or they are "
@@ -214,19 +221,19 @@ static bst_status solve_from(bst_ctx *ctx, const bst_od_observation *o, int coun
     }
     if (residual_chi2) {
         bst_od_state chosen = out->state;
-        return bst_od_fit(ctx, o, count, options, &chosen, residual_chi2, out);
+        return bst_od_fit(ctx, a->items, a->count, a->options, &chosen, residual_chi2, out);
     }
     return BST_OK;
 }
 
-static bst_status solve(bst_ctx *ctx, const bst_od_observation *o, int count,
-                        const bst_od_options *options, bst_od_observation *room,
-                        double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
+static bst_status solve(bst_ctx *ctx, const arc *a, double *residual_chi2, bst_od_solution *out,
+                        bst_od_report *report) {
+    const bst_od_observation *o = a->items;
+    const int count = a->count;
     double span_s, whole = time_of(o, count - 1) - time_of(o, 0);
     part p = first_part(o, count, &span_s);
     for (;;) {
-        bst_status status =
-            solve_from(ctx, o, count, p, span_s, options, room, residual_chi2, out, report);
+        bst_status status = solve_from(ctx, a, p, span_s, residual_chi2, out, report);
         if (status != BST_ERR_NUMERIC || span_s >= whole) {
             return status;
         }
@@ -251,7 +258,8 @@ bst_status bst_od_determine(bst_ctx *ctx, const bst_od_observation *observations
     if (!room) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for observations");
     }
-    bst_status status = solve(ctx, observations, count, options, room, residual_chi2, out, report);
+    const arc all = {observations, count, options, room};
+    bst_status status = solve(ctx, &all, residual_chi2, out, report);
     free(room);
     return status;
 }

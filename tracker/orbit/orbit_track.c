@@ -27,8 +27,7 @@ static void look(bst_orbit_track *t, const bst_od_observer *observer) {
 void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *observer,
                            const bst_orbit_range *range, bst_orbit_track *out) {
     *out = (bst_orbit_track){.valid = true};
-    bst_od_from_track(observer, sky->direction, sky->rate_radps, sky->covariance, range->range_m,
-                      range->range_sigma_m, range->range_rate_mps, range->range_rate_sigma_mps,
+    bst_od_from_track(observer, sky->direction, sky->rate_radps, sky->covariance, range,
                       &out->state, out->covariance);
     look(out, observer);
 }

@@ -6,11 +6,6 @@
 #include "tracker/mtt/sky_filter.h"
 #include "tracker/orbit/orbit_motion.h"
 
-/* What is believed of a range, m and m/s, with standard deviations. */
-typedef struct bst_orbit_range {
-    double range_m, range_sigma_m, range_rate_mps, range_rate_sigma_mps;
-} bst_orbit_range;
-
 typedef struct bst_orbit_track {
     bool valid;
     bst_od_state state;      /* geocentric, GCRF */

@@ -229,15 +229,21 @@ static bool stands_alone(const bst_calibration_fitter *c, const bst_truth *truth
            is_free(truth, x, y, reach + 0.5 * length_of(t), i, 0.5);
 }
 
-/* A star that stands alone, and its detection: number k, or -1. dark_e: background and dark
- * current.
- */
-static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth_item *t,
-                           const bst_detections *detections, int k,
-                           const bst_generator_result *theory, double dark_e,
-                           const common_error *common) {
+/* What holds for the stars of a frame. */
+typedef struct frame_facts {
+    const bst_detections *detections;
+    const bst_generator_result *theory;
+    double dark_e; /* background and dark current */
+    const common_error *common;
+} frame_facts;
+
+/* A star that stands alone, and its detection: number k, or -1. */
+static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth_item *t, int k,
+                           const frame_facts *f) {
+    const bst_detections *detections = f->detections;
+    const bst_generator_result *theory = f->theory;
     const bst_camera *camera = c->path.camera;
-    double plain = sqrt(dark_e + camera->read_noise_e * camera->read_noise_e);
+    double plain = sqrt(f->dark_e + camera->read_noise_e * camera->read_noise_e);
     /* what its background has too much is missing from the output */
     double missing = (detections->background_e - theory->background_e) /
                      (bst_crlb_table_norm(&c->bound, length_of(t)) * detections->noise_e);
@@ -249,7 +255,7 @@ static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_tr
     }
     c->detected++;
     const bst_detection *d = &detections->items[k];
-    add_place(c, t, d, detections->noise_e, common);
+    add_place(c, t, d, detections->noise_e, f->common);
     if (detections->stars_identified > 0 && t->snr > detections->threshold_snr + 2.0 &&
         !(t->id & UINT32_C(0x80000000))) {
         c->identifiable++;
@@ -297,8 +303,9 @@ bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *c,
                 common.weight += weight;
                 common.count++;
             } else {
-                BST_TRY(add_star(ctx, c, t, detections, k, &theory,
-                                 truth->background_e + truth->dark_e, &common));
+                const frame_facts facts = {detections, &theory, truth->background_e + truth->dark_e,
+                                           &common};
+                BST_TRY(add_star(ctx, c, t, k, &facts));
             }
         }
         if (pass == 0 && common.count > 0) {

@@ -11,6 +11,7 @@
 #include "boresight/rng.h"
 #include "sim/analysis/calibration/pairing.h"
 #include "sim/analysis/calibration/watch.h"
+#include "sim/core/compare.h"
 #include "sim/core/text.h"
 #include "sim/io/manifest.h"
 
@@ -139,11 +140,6 @@ static double value_of(const figure_of *f, const run_sums *runs, const int *chos
     return f->root ? sqrt(value) : value;
 }
 
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* What resampling says of a figure. */
 typedef struct sampling {
     double low, high; /* 95 % interval */
@@ -173,7 +169,7 @@ static sampling bootstrap(const figure_of *f, const run_sums *image, const run_s
     if (n == 0) {
         return (sampling){NAN, NAN, NAN};
     }
-    qsort(values, (size_t)n, sizeof *values, ascending);
+    qsort(values, (size_t)n, sizeof *values, bst_compare_doubles);
     double mean = sum / n;
     return (sampling){values[(int)(low * (n - 1))], values[(int)((1.0 - low) * (n - 1))],
                       sqrt(fmax(square / n - mean * mean, 0.0))};

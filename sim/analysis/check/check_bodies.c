@@ -141,8 +141,7 @@ typedef struct meeting {
     double from_s;
 } meeting;
 
-static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_check_body_span *spans,
-                           int capacity, int *count) {
+static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_check_body_spans *out) {
     double step = fmin(fmax(1e-3 * duration_s, LEAST_STEP_S), MOST_STEP_S);
     double clear[BST_FIELD_BODIES];
     meeting met[BST_FIELD_BODIES] = {{0}};
@@ -163,10 +162,11 @@ static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_chec
             }
             m->inside = in;
             if ((was && !in) || (in && now >= duration_s)) {
-                if (*count < capacity) {
-                    spans[*count] = (bst_check_body_span){(bst_check_field_body)b, m->from_s, at};
+                if (out->count < out->capacity) {
+                    out->items[out->count] =
+                        (bst_check_body_span){(bst_check_field_body)b, m->from_s, at};
                 }
-                (*count)++;
+                out->count++;
             }
         }
     }
@@ -174,7 +174,7 @@ static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_chec
 }
 
 static bst_status look_ahead(bst_ctx *ctx, const bst_scenario *scenario, looking *l,
-                             bst_check_body_span *spans, int capacity, int *count) {
+                             bst_check_body_spans *out) {
     l->gaze = gaze_of(scenario, l);
     if (l->gaze == GAZE_UNKNOWN) {
         return BST_OK;
@@ -190,15 +190,15 @@ static bst_status look_ahead(bst_ctx *ctx, const bst_scenario *scenario, looking
         BST_TRY(bst_knowledge_view_create(ctx, l->knowledge, &l->cue));
     }
     l->half_rad = bst_camera_half_diagonal_rad(bst_world_camera(l->world, l->observer, l->sensor));
-    return spans_of(ctx, l, fmin(scenario->duration_s, BST_CHECK_LOOKED_S), spans, capacity, count);
+    return spans_of(ctx, l, fmin(scenario->duration_s, BST_CHECK_LOOKED_S), out);
 }
 
 bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
                                      const bst_world *world, int observer, int sensor,
-                                     bst_check_body_span *spans, int capacity, int *count) {
+                                     bst_check_body_spans *out) {
     looking l = {.observer = observer, .sensor = sensor, .world = world};
-    *count = 0;
-    bst_status status = look_ahead(ctx, scenario, &l, spans, capacity, count);
+    out->count = 0;
+    bst_status status = look_ahead(ctx, scenario, &l, out);
     bst_knowledge_view_free(l.cue);
     bst_knowledge_free(l.knowledge);
     bst_world_view_free(l.view);
@@ -229,15 +229,14 @@ bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,
         const bst_sensor_config *sensors = observers[o].sensors.items;
         for (int i = 0; i < observers[o].sensors.count; i++) {
             char name[160];
-            int count;
             bst_check_body_span spans[MOST_SPANS];
+            bst_check_body_spans met = {.items = spans, .capacity = MOST_SPANS};
             snprintf(name, sizeof name, "%s/%s", observers[o].name, sensors[i].name);
-            bst_status status =
-                bst_check_bodies_in_field(ctx, scenario, world, o, i, spans, MOST_SPANS, &count);
+            bst_status status = bst_check_bodies_in_field(ctx, scenario, world, o, i, &met);
             if (status != BST_OK) {
                 return bst_fail_prefix(ctx, status, "%s", name);
             }
-            count = count < MOST_SPANS ? count : MOST_SPANS;
+            int count = met.count < MOST_SPANS ? met.count : MOST_SPANS;
             for (int b = 0; b < BST_FIELD_BODIES; b++) {
                 warn_of_body(ctx, name, b, spans, count, scenario->duration_s);
             }

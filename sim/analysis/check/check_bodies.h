@@ -19,21 +19,25 @@ typedef struct bst_check_body_span {
                              * of longer runs BST_CHECK_LOOKED_S */
 } bst_check_body_span;
 
+typedef struct bst_check_body_spans {
+    bst_check_body_span *items; /* [capacity] */
+    int capacity;
+    int count; /* may exceed the capacity */
+} bst_check_body_spans;
+
 /* Times at which bodies are in the field of a sensor whose boresight is known beforehand.
  *
  * Given:    observer, sensor  indices in the scenario
- *           capacity          of `spans`
- * Returned: *spans, by the time of their end; *count, which may exceed the capacity; 0 where the
- * boresight is not known: strategies fixed and scan, a region for a cue, tasks, scripted and
- *           external mounts
+ *           out->items        room for out->capacity
+ * Returned: *out, by the time of their end; none where the boresight is not known: strategies fixed
+ *           and scan, a region for a cue, tasks, scripted and external mounts
  * Errors:   what orbits and cues fail with
  * Notes: the boresight is on the cue (strategies track and rate; stare: at stare_time_s, without
  * moving) or on the ideal mount's target. It is looked at in steps of a thousandth of the run, 0.5
  * to 10 s: shorter meetings may be missed. */
 bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
                                      const bst_world *world, int observer, int sensor,
-                                     bst_check_body_span *spans, int capacity,
-                                     int *count) BST_MUST_CHECK;
+                                     bst_check_body_spans *out) BST_MUST_CHECK;
 
 /* Logs a warning for each body that comes into a sensor's field, with the first time span, and
  * number and sum of all. */

@@ -67,6 +67,7 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds,
 /* ---- what was found ---- */
 
 typedef struct found {
+    double duration_s; /* that is examined */
     bst_check_spans spans[BST_REACH_COUNT];
 } found;
 
@@ -87,16 +88,16 @@ static void warn(bst_ctx *ctx, const char *name, const found *f, double examined
 /* What the mount's limits lose about [from_s, until_s]; *until_s: the end of the last loss. */
 static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *problem,
                         double tolerance_rad, int reason, double from_s, double *until_s,
-                        double duration_s, found *f) {
+                        found *f) {
     bst_pointing_feasibility_loss losses[MOST_LOSSES];
     bst_pointing_feasibility middle;
     int count;
-    double end_s = fmin(*until_s + RUN_OUT_S, duration_s);
+    double end_s = fmin(*until_s + RUN_OUT_S, f->duration_s);
     /* on the way to the pole it is the acceleration that is too great first */
     BST_TRY(bst_pointing_feasibility_at(ctx, problem, 0.5 * (from_s + *until_s), &middle));
     reason = middle == BST_REACH_KEYHOLE ? (int)middle : reason;
-    BST_TRY(bst_pointing_feasibility_chase(ctx, problem, fmax(from_s - RUN_UP_S, 0.0), end_s,
-                                           tolerance_rad, losses, MOST_LOSSES, &count));
+    const bst_pointing_feasibility_span span = {fmax(from_s - RUN_UP_S, 0.0), end_s, tolerance_rad};
+    BST_TRY(bst_pointing_feasibility_chase(ctx, problem, &span, losses, MOST_LOSSES, &count));
     for (int i = 0; i < count; i++) {
         double until = fmin(losses[i].until_s, end_s);
         bst_check_spans_add(&f->spans[reason], losses[i].from_s, until);
@@ -107,6 +108,7 @@ static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *pr
 
 static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double tolerance_rad,
                         found *f) {
+    f->duration_s = duration_s;
     const bst_pointing_feasibility_problem problem = {.look = look,
                                                       .user = s,
                                                       .mount = s->mount.axes > 0 ? &s->mount : NULL,
@@ -114,19 +116,19 @@ static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double toler
     double step = fmin(fmax(1e-3 * duration_s, LEAST_STEP_S), MOST_STEP_S);
     double at = 0.0;
     for (int i = 0; i < MOST_SPANS && at < duration_s; i++) {
-        bool lost, back;
-        double from, until = duration_s;
-        bst_pointing_feasibility why;
-        BST_TRY(bst_pointing_feasibility_next(ctx, &problem, at, duration_s - at, step, false,
-                                              &lost, &from, &why));
-        if (!lost) {
+        bst_pointing_feasibility_change lost, back;
+        const bst_pointing_feasibility_search unreached = {at, duration_s - at, step, false};
+        BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &unreached, &lost));
+        if (!lost.found) {
             break;
         }
-        BST_TRY(bst_pointing_feasibility_next(ctx, &problem, from, duration_s - from, step, true,
-                                              &back, &until, NULL));
-        until = back ? until : duration_s;
+        double from = lost.when_s;
+        const bst_pointing_feasibility why = lost.why;
+        const bst_pointing_feasibility_search reached = {from, duration_s - from, step, true};
+        BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &reached, &back));
+        double until = back.found ? back.when_s : duration_s;
         if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
-            BST_TRY(chase(ctx, &problem, tolerance_rad, (int)why, from, &until, duration_s, f));
+            BST_TRY(chase(ctx, &problem, tolerance_rad, (int)why, from, &until, f));
         } else {
             bst_check_spans_add(&f->spans[why], from, until);
         }

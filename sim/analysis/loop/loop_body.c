@@ -1,5 +1,4 @@
-/* The attitude loop of a spacecraft that has one, and what its knowledge and its wheels add to the
- * disturbances. */
+/* The attitude loop of a spacecraft that has one. */
 #include "gimbal/spacecraft/spacecraft_response.h"
 #include "sim/analysis/loop/loop_model.h"
 
@@ -35,23 +34,4 @@ bst_status bst_loop_build_body(bst_ctx *ctx, const bst_spacecraft_config *config
     }
     model->bodies = BST_LOOP_BODY;
     return BST_OK;
-}
-
-/* The mount points by the believed attitude: its error moves the line of sight as jitter does, in
- * bands from a day's to ten times a second's. */
-void bst_loop_body_bands(const bst_spacecraft_config *config, int body_axis, double pixel_rad,
-                         bst_loop_axis *axis) {
-    if (config->type != BST_CRAFT_RIGID_BODY) {
-        return;
-    }
-    enum { BANDS = 60 };
-    const double lowest_hz = 1e-5, ratio = pow(1e6, 1.0 / BANDS);
-    double low = 0.0, high = lowest_hz;
-    for (int i = 0; i <= BANDS; i++) {
-        double middle = i == 0 ? 0.5 * high : sqrt(low * high);
-        double density = bst_spacecraft_noise_at(config, body_axis, middle).knowledge;
-        bst_loop_add_band(axis, low, high, density * (high - low) / (pixel_rad * pixel_rad));
-        low = high;
-        high *= ratio;
-    }
 }

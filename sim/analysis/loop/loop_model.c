@@ -79,53 +79,7 @@ static bst_status second_order_response(bst_ctx *ctx, const bst_mount_two_axis_c
     return BST_OK;
 }
 
-void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, double variance_px2) {
-    if (variance_px2 > 0.0 && high_hz >= low_hz && axis->band_count < BST_LOOP_BANDS) {
-        axis->bands[axis->band_count++] = (bst_tracking_band){low_hz, high_hz, variance_px2};
-    }
-}
-
-/* A table cut at its points, and these at a quarter of an octave, up to what the plant's steps can
- * follow. */
-static void table_bands(const bst_jitter_density *table, double scale, double top_hz,
-                        bst_loop_axis *axis) {
-    for (int i = 0; i + 1 < table->count; i++) {
-        double from = table->points[i].frequency_hz;
-        double to = fmin(table->points[i + 1].frequency_hz, top_hz);
-        int parts = from > 0.0 && to > from ? (int)fmin(ceil(4.0 * log2(to / from)), 40.0) : 8;
-        for (int k = 0; k < parts && to > from; k++) {
-            double a = from + (to - from) * k / parts, b = from + (to - from) * (k + 1) / parts;
-            bst_loop_add_band(axis, a, b, scale * bst_jitter_density_integral(table, a, b));
-        }
-    }
-}
-
-static bst_status platform_bands(bst_ctx *ctx, const bst_platform_config *platform,
-                                 double pixel_rad, double dt_s, int camera_axis,
-                                 bst_loop_axis *axis) {
-    bst_jitter_spectrum spectrum;
-    BST_TRY(bst_platform_jitter_spectrum(ctx, platform, pixel_rad, &spectrum));
-    double per_px2 = 1.0 / (pixel_rad * pixel_rad), top_hz = BST_JITTER_RESOLVED / dt_s;
-    bst_jitter_spec flat = bst_jitter_resolved(&spectrum.flat, dt_s);
-    bst_loop_add_band(axis, 0.0, flat.low_cutoff_hz,
-                      0.5 * per_px2 * flat.low_rms_rad * flat.low_rms_rad);
-    bst_loop_add_band(axis, flat.high_min_hz, flat.high_max_hz,
-                      0.5 * per_px2 * flat.high_rms_rad * flat.high_rms_rad);
-    double scale = per_px2 * (camera_axis == 1 ? spectrum.y_scale : 1.0);
-    table_bands(&spectrum.low, scale, top_hz, axis);
-    table_bands(&spectrum.high, scale, top_hz, axis);
-    for (int i = 0; i < spectrum.line_count; i++) {
-        const bst_jitter_line *line = &spectrum.line[i];
-        if (line->axis == camera_axis && line->frequency_hz <= top_hz) {
-            bst_loop_add_band(axis, line->frequency_hz, line->frequency_hz,
-                              0.5 * per_px2 * line->amplitude_rad * line->amplitude_rad);
-        }
-    }
-    bst_jitter_spectrum_free(&spectrum);
-    return BST_OK;
-}
-
-/* ---- the tracking loop ---- */
+/* ---- the gains of the tracking loop ---- */
 
 static bst_status observer_gains(bst_ctx *ctx, const bst_control_config *control,
                                  const bst_image_loop_env *env, const bst_loop_options *options,
@@ -169,59 +123,6 @@ static bst_status control_gains(bst_ctx *ctx, const bst_control_config *control,
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "control/compensator");
 }
 
-static void predict(bst_loop_axis *axis, double drift_pxps, const bst_loop_options *options,
-                    double period_s) {
-    bst_loop_prediction *p = &axis->prediction;
-    double open = 0.0, above = 0.0, nyquist = 0.5 / period_s;
-    for (int i = 0; i < axis->band_count; i++) {
-        const bst_tracking_band *b = &axis->bands[i];
-        double width = b->high_hz - b->low_hz;
-        double share = width > 0.0 ? (b->high_hz - nyquist) / width : b->low_hz > nyquist;
-        open += b->variance;
-        above += b->variance * fmin(fmax(share, 0.0), 1.0);
-    }
-    double left = bst_tracking_variance(axis->tracking, axis->bands, axis->band_count);
-    double noise =
-        bst_tracking_noise_gain(axis->tracking) * options->fix_sigma_px * options->fix_sigma_px;
-    double lag = bst_tracking_lag(axis->tracking) * fabs(drift_pxps);
-    *p = (bst_loop_prediction){.rms_px = sqrt(left + noise + lag * lag),
-                               .jitter_px = sqrt(left),
-                               .open_px = sqrt(open),
-                               .above_px = sqrt(above),
-                               .noise_px = sqrt(noise),
-                               .lag_px = lag};
-    if (!axis->margins.stable) {
-        p->rms_px = p->jitter_px = p->noise_px = p->lag_px = INFINITY;
-    }
-}
-
-bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
-                                   const bst_control_servo_response *servo,
-                                   const bst_platform_config *platform, int camera_axis,
-                                   double drift_pxps, const bst_loop_options *options,
-                                   bst_loop_model *model, bst_loop_axis *axis) {
-    BST_TRY(platform_bands(ctx, platform, model->pixel_rad, model->timing.gimbal_period_s,
-                           camera_axis, axis));
-    bst_loop_body_bands(&platform->spacecraft, camera_axis, model->pixel_rad, axis);
-    if (!control || !control->compensate_attitude) {
-        return BST_OK;
-    }
-    const bst_loop_timing *t = &model->timing;
-    double arrival = 0.5 * t->exposure_s + t->frame_latency_s;
-    bst_tracking_timing timing = {.period_s = t->period_s,
-                                  .exposure_s = t->exposure_s,
-                                  .arrival_s = arrival,
-                                  .effect_s = arrival + control->command_latency_s,
-                                  .switch_s = arrival + t->command_delay_s};
-    BST_TRY(bst_tracking_loop_create(ctx, &timing, servo, model->observes ? NULL : &model->gains,
-                                     &model->alpha_beta, &axis->tracking));
-    axis->tracked = true;
-    axis->loop = bst_tracking_as_loop(axis->tracking);
-    BST_TRY(bst_loop_analyse(ctx, &axis->loop, &axis->margins));
-    predict(axis, drift_pxps, options, t->period_s);
-    return BST_OK;
-}
-
 /* ---- a sensor ---- */
 
 static bst_status build_second_order(bst_ctx *ctx, const bst_scenario_module_config *gimbal,
@@ -241,8 +142,9 @@ static bst_status build_second_order(bst_ctx *ctx, const bst_scenario_module_con
         /* the outer axis moves the image along x, as a turn about body y does */
         double drift = config->platform.drift_arcsec_per_s[a == 0 ? 1 : 0] / arcsec_px;
         if (status == BST_OK) {
-            status = bst_loop_close_tracking(ctx, control, &servo, &config->platform,
-                                             a == 0 ? 1 : 0, drift, options, model, axis);
+            const bst_loop_tracked tracked = {control,        &servo, &config->platform,
+                                              a == 0 ? 1 : 0, drift,  options};
+            status = bst_loop_close_tracking(ctx, &tracked, model, axis);
         }
     }
     free((double *)(uintptr_t)servo.step);

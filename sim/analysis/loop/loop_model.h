@@ -87,7 +87,7 @@ void bst_loop_model_free(bst_loop_model *model);
  * (bst_loop_verdict); what cannot be analysed is left to those who run it. */
 void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario);
 
-/* ---- what loop_model.c shares with loop_mount.c ---- */
+/* ---- what the files of this folder share ---- */
 
 /* So small a command that no axis meets a limit, rad: the linear regime. */
 #define BST_LOOP_TINY 1e-9
@@ -99,6 +99,12 @@ void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario);
  * out. */
 void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, double variance_px2);
 
+/* The platform's jitter, as what it does to an axis that turns about a camera axis (0 x, 1 y),
+ * stepped every dt_s. */
+bst_status bst_loop_platform_bands(bst_ctx *ctx, const bst_platform_config *platform,
+                                   double pixel_rad, double dt_s, int camera_axis,
+                                   bst_loop_axis *axis) BST_MUST_CHECK;
+
 /* The loops of a rigid_body with an attitude law; nothing of other spacecraft. */
 bst_status bst_loop_build_body(bst_ctx *ctx, const bst_spacecraft_config *config,
                                bst_loop_model *model) BST_MUST_CHECK;
@@ -106,13 +112,19 @@ bst_status bst_loop_build_body(bst_ctx *ctx, const bst_spacecraft_config *config
 void bst_loop_body_bands(const bst_spacecraft_config *config, int body_axis, double pixel_rad,
                          bst_loop_axis *axis);
 
-/* Adds the platform's jitter and attitude errors to an axis that turns about a camera axis (0 x, 1
- * y), and closes the tracking loop round it (control NULL:
- * none). drift_pxps: of the image along this axis. */
-bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
-                                   const bst_control_servo_response *servo,
-                                   const bst_platform_config *platform, int camera_axis,
-                                   double drift_pxps, const bst_loop_options *options,
+/* What the tracking loop round an axis consists of beside the model. */
+typedef struct bst_loop_tracked {
+    const bst_control_config *control; /* NULL: no tracking loop */
+    const bst_control_servo_response *servo;
+    const bst_platform_config *platform;
+    int camera_axis;   /* about which the axis turns: 0 x, 1 y */
+    double drift_pxps; /* of the image along this axis */
+    const bst_loop_options *options;
+} bst_loop_tracked;
+
+/* Adds the platform's jitter and attitude errors to an axis, and closes the tracking loop round it.
+ */
+bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_loop_tracked *tracked,
                                    bst_loop_model *model, bst_loop_axis *axis) BST_MUST_CHECK;
 
 /* The axes of a full mount at its start angles. `type` as bst_mount_type. */

@@ -135,8 +135,9 @@ bst_status bst_loop_build_mount(bst_ctx *ctx, int type, const bst_mount_config *
         double drift = (about.x * d[0] + about.y * d[1] + about.z * d[2]) / arcsec_px;
         bst_control_servo_response servo = {0};
         BST_TRY(respond(ctx, config, &axis->servo.mount, k, dt, &servo));
-        bst_status status = bst_loop_close_tracking(ctx, control, &servo, &config->platform,
-                                                    camera_axis, drift, options, model, axis);
+        const bst_loop_tracked tracked = {control,     &servo, &config->platform,
+                                          camera_axis, drift,  options};
+        bst_status status = bst_loop_close_tracking(ctx, &tracked, model, axis);
         free((double *)(uintptr_t)servo.step);
         BST_TRY(status);
     }

@@ -46,17 +46,26 @@ static int by_time(const void *a, const void *b) {
     return (d > 0.0) - (d < 0.0);
 }
 
+/* Angles, and the observer's states that they are completed with. */
+typedef struct sources {
+    const bst_tdm *tdm;
+    const bst_oem *oem;
+    int object; /* the observer in oem */
+    bst_sky_clock *clock;
+    bst_time epoch; /* of the first angles */
+} sources;
+
 /* The observer's state when the light came, and the direction as a track has it. */
-static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const bst_oem *oem, int object,
-                           bst_sky_clock *clock, const bst_tdm_angles *a, bst_time epoch,
-                           bst_run_observation *o) {
+static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const sources *s,
+                           const bst_tdm_angles *a, bst_run_observation *o) {
     bst_bodies bodies;
     bst_od_observer *eye = &o->od.observer;
     double variance = q->sigma_rad * q->sigma_rad;
     *o = (bst_run_observation){.time = a->time, .v_mag = a->mag, .snr = NAN};
-    BST_TRY(bst_oem_state(ctx, oem, object, clock, a->time, &eye->position_m, &eye->velocity_mps));
+    BST_TRY(bst_oem_state(ctx, s->oem, s->object, s->clock, a->time, &eye->position_m,
+                          &eye->velocity_mps));
     bst_bodies_at(a->time, &bodies);
-    eye->time_s = bst_time_diff(a->time, epoch);
+    eye->time_s = bst_time_diff(a->time, s->epoch);
     eye->earth_bary_mps = bodies.earth_bary_mps;
     o->od.cov_11 = o->od.cov_22 = variance;
     o->od.direction = bst_vec3_from_radec(a->ra_rad, a->dec_rad);
@@ -67,30 +76,30 @@ static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const bst_oem
     return BST_OK;
 }
 
-static bst_status gather(bst_ctx *ctx, const bst_tdm_request *q, const bst_tdm *tdm,
-                         const bst_oem *oem, bst_sky_clock *clock, bst_run_sensor *sensor,
-                         bst_run_observation *items, const bst_tdm_pair *pair) {
-    int object;
+static bst_status gather(bst_ctx *ctx, const bst_tdm_request *q, sources *s,
+                         const bst_tdm_pair *pair, bst_run_sensor *sensor,
+                         bst_run_observation *items) {
+    const bst_tdm *tdm = s->tdm;
     const char *name = q->observer_name ? q->observer_name : pair->observer;
-    if (!q->observer_name && bst_oem_object_count(oem) == 1) {
+    if (!q->observer_name && bst_oem_object_count(s->oem) == 1) {
         name = ""; /* the only one, whatever it is called */
     }
-    bst_status status = bst_oem_find(ctx, oem, name, &object);
+    bst_status status = bst_oem_find(ctx, s->oem, name, &s->object);
     if (status != BST_OK) {
         return bst_fail_prefix(ctx, status, "%s", q->observer);
     }
-    bst_time epoch = pair->items[0].time;
+    s->epoch = pair->items[0].time;
     for (int i = 0; i < bst_tdm_pair_count(tdm); i++) {
         const bst_tdm_pair *p = bst_tdm_pair_at(tdm, i);
-        if (is_same(p, pair) && p->count > 0 && bst_time_diff(p->items[0].time, epoch) < 0.0) {
-            epoch = p->items[0].time;
+        if (is_same(p, pair) && p->count > 0 && bst_time_diff(p->items[0].time, s->epoch) < 0.0) {
+            s->epoch = p->items[0].time;
         }
     }
     int64_t n = 0;
     for (int i = 0; i < bst_tdm_pair_count(tdm); i++) {
         const bst_tdm_pair *p = bst_tdm_pair_at(tdm, i);
         for (int64_t k = 0; k < p->count && is_same(p, pair); k++, n++) {
-            status = complete(ctx, q, oem, object, clock, &p->items[k], epoch, &items[n]);
+            status = complete(ctx, q, s, &p->items[k], &items[n]);
             if (status != BST_OK) {
                 return bst_fail_prefix(ctx, status, "%s", q->observer);
             }
@@ -126,7 +135,8 @@ bst_status bst_tdm_observations(bst_ctx *ctx, const bst_tdm_request *q, bst_run_
     if (status == BST_OK) {
         *count = count_of(tdm, pair);
         *items = malloc((size_t)*count * sizeof **items);
-        status = *items ? gather(ctx, q, tdm, oem, clock, sensor, *items, pair)
+        sources s = {.tdm = tdm, .oem = oem, .clock = clock};
+        status = *items ? gather(ctx, q, &s, pair, sensor, *items)
                         : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for angles");
     }
     if (status != BST_OK) {

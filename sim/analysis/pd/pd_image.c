@@ -140,5 +140,6 @@ bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *m, const bst_eval_matc
                               double flux_e, const bst_eval_bound_noise *noise,
                               bst_location_bound *out) {
     int count = draw(m, place, true);
-    return bst_location_bound_of(ctx, m->share, m->by_x, m->by_y, count, flux_e, noise, out);
+    const bst_location_image image = {m->share, m->by_x, m->by_y, count};
+    return bst_location_bound_of(ctx, &image, flux_e, noise, out);
 }

@@ -336,8 +336,8 @@ static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, 
             BST_TRY(
                 open_file(ctx, recorder, s, plane_choices[k], plane_contents[k], &s->planes[k]));
         }
-        BST_TRY(bst_fits_write_plane(ctx, s->planes[k], &s->shown, plane_names[k], pixels, p->width,
-                                     p->height, NULL));
+        const bst_fits_plane plane = {plane_names[k], pixels, p->width, p->height};
+        BST_TRY(bst_fits_write_plane(ctx, s->planes[k], &s->shown, &plane, NULL));
     }
     return BST_OK;
 }

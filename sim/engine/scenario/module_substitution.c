@@ -6,8 +6,8 @@
 
 #include <cjson/cJSON.h>
 
-static bool stands_for(const bst_module_desc *desc, const char *role) {
-    for (const char *const *r = desc->stands_for; r && *r; r++) {
+static bool substitutes_for(const bst_module_desc *desc, const char *role) {
+    for (const char *const *r = desc->substitutes_for; r && *r; r++) {
         if (strcmp(*r, role) == 0) {
             return true;
         }
@@ -35,10 +35,10 @@ static const bst_scenario_module_config *giver(const bst_scenario *s,
                                                const bst_scenario_module_config *module,
                                                const bst_config_desc *key,
                                                const bst_config_desc **theirs) {
-    for (int m = 0; module->desc->stands_for && m < s->module_count; m++) {
+    for (int m = 0; module->desc->substitutes_for && m < s->module_count; m++) {
         const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer != module->observer || other->sensor != module->sensor ||
-            !other->desc || !stands_for(module->desc, other->desc->role)) {
+            !other->desc || !substitutes_for(module->desc, other->desc->role)) {
             continue;
         }
         *theirs = find_key(other->desc->config, key->key);
@@ -61,7 +61,7 @@ bool bst_module_substitution_delayed(const bst_scenario *s,
     for (int m = 0; m < s->module_count; m++) {
         const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer == module->observer && other->sensor == module->sensor &&
-            stands_for(module->desc, other->desc->role)) {
+            substitutes_for(module->desc, other->desc->role)) {
             return true;
         }
     }
@@ -109,7 +109,7 @@ static bool is_inner(const bst_scenario *s, const bst_scenario_module_config *mo
     for (int m = 0; m < s->module_count; m++) {
         const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer == module->observer && other->sensor == module->sensor &&
-            stands_for(module->desc, other->desc->role) && writes(other->desc, channel)) {
+            substitutes_for(module->desc, other->desc->role) && writes(other->desc, channel)) {
             return true;
         }
     }
@@ -156,7 +156,7 @@ static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s,
     for (int m = 0; m < s->module_count; m++) {
         const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer != module->observer || other->sensor != module->sensor ||
-            !stands_for(own, other->desc->role)) {
+            !substitutes_for(own, other->desc->role)) {
             continue;
         }
         for (int d = 0; d < other->delay_count; d++) {
@@ -182,7 +182,7 @@ static bst_status make_default(bst_ctx *ctx, const bst_scenario_registry *regist
                                int sensor, bst_scenario *s, bst_scenario_module_config **out) {
     const bst_module_desc *desc = NULL;
     for (int i = 0; i < registry->count && !desc; i++) {
-        desc = registry->modules[i]->stands_for ? registry->modules[i] : NULL;
+        desc = registry->modules[i]->substitutes_for ? registry->modules[i] : NULL;
     }
     if (!desc) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -206,28 +206,30 @@ bst_status bst_module_substitution(bst_ctx *ctx, const bst_scenario_registry *re
     const bst_observer_config *observers = s->observers.items;
     const bst_sensor_config *sensors = observers[observer].sensors.items;
     bool generator = sensors[sensor].observation_source == BST_OBSERVE_GENERATOR;
-    bst_scenario_module_config *stand_in = NULL;
-    for (int m = 0; m < s->module_count; m++) {
-        bst_scenario_module_config *module = &s->modules[m];
-        if (module->observer == observer && module->sensor == sensor && module->desc->stands_for) {
-            stand_in = module;
-        }
-    }
-    const cJSON *node = stand_in ? cJSON_GetObjectItemCaseSensitive(block, stand_in->name) : NULL;
-    if (!stand_in && !generator) {
-        return BST_OK;
-    }
-    if (!stand_in) {
-        BST_TRY(make_default(ctx, registry, observer, sensor, s, &stand_in));
-    }
-    stand_in->off = !generator;
+    bst_scenario_module_config *substitute = NULL;
     for (int m = 0; m < s->module_count; m++) {
         bst_scenario_module_config *module = &s->modules[m];
         if (module->observer == observer && module->sensor == sensor &&
-            stands_for(stand_in->desc, module->desc->role)) {
+            module->desc->substitutes_for) {
+            substitute = module;
+        }
+    }
+    const cJSON *node =
+        substitute ? cJSON_GetObjectItemCaseSensitive(block, substitute->name) : NULL;
+    if (!substitute && !generator) {
+        return BST_OK;
+    }
+    if (!substitute) {
+        BST_TRY(make_default(ctx, registry, observer, sensor, s, &substitute));
+    }
+    substitute->off = !generator;
+    for (int m = 0; m < s->module_count; m++) {
+        bst_scenario_module_config *module = &s->modules[m];
+        if (module->observer == observer && module->sensor == sensor &&
+            substitutes_for(substitute->desc, module->desc->role)) {
             module->off = generator;
         }
     }
-    BST_TRY(take_settings(ctx, node, s, stand_in));
-    return take_delays(ctx, s, stand_in);
+    BST_TRY(take_settings(ctx, node, s, substitute));
+    return take_delays(ctx, s, substitute);
 }

@@ -1,4 +1,4 @@
-/* A module that substitutes others of its sensor (bst_module_desc.stands_for). Internal to
+/* A module that substitutes others of its sensor (bst_module_desc.substitutes_for). Internal to
  * sim/engine. */
 #ifndef BST_ENGINE_SCENARIO_MODULE_SUBSTITUTION_H
 #define BST_ENGINE_SCENARIO_MODULE_SUBSTITUTION_H

@@ -44,8 +44,8 @@ typedef struct bst_scenario_module_config {
     int64_t period_ticks, offset_ticks;
     bst_input_delay delays[BST_MAX_DELAYS];
     int delay_count;
-    bool off;     /* another stands in for it, or it for others that are there: does not step */
-    bool plugged; /* its block names the plug-in that it comes from */
+    bool off;    /* another stands in for it, or it for others that are there: does not step */
+    bool plugin; /* its block names the plug-in that it comes from */
 } bst_scenario_module_config;
 
 typedef struct bst_scenario {

@@ -19,7 +19,7 @@ static void module_path(const bst_scenario_module_config *module, char *path, si
 static cJSON *echo_module(const bst_scenario *s, const bst_scenario_module_config *module) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "type", module->desc->type);
-    for (int i = 0; module->plugged && i < s->plugin_count; i++) {
+    for (int i = 0; module->plugin && i < s->plugin_count; i++) {
         char where[300];
         module_path(module, where, sizeof where);
         if (strcmp(s->plugins[i].where, where) == 0) {

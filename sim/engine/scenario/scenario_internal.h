@@ -21,20 +21,20 @@ bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json,
                                 const bst_scenario_registry *registry,
                                 bst_scenario *out) BST_MUST_CHECK;
 
+/* What plug-ins are looked up in, and the scenario that uses them. */
+typedef struct bst_scenario_stages {
+    const bst_scenario_registry *registry;
+    bst_scenario *scenario;
+} bst_scenario_stages;
+
 /* scenario_plugins.c: opens the plug-in that `text`, at the JSON pointer `where`, names. *out NULL:
  * the registry says that plug-ins are left unread. */
-bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json,
-                               const bst_scenario_registry *registry, bst_scenario *s,
+bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_scenario_stages *in,
                                const char *where, const char *text, bst_plugin *out,
                                bool *skip) BST_MUST_CHECK;
 /* Notes that a module or stage of it is used at `where`. */
 bst_status bst_scenario_plugin_used(bst_ctx *ctx, bst_scenario *s, const bst_plugin *plugin,
                                     const char *where, const char *type) BST_MUST_CHECK;
-/* For bst_stage_read_config; user: a bst_scenario_stages. */
-typedef struct bst_scenario_stages {
-    const bst_scenario_registry *registry;
-    bst_scenario *scenario;
-} bst_scenario_stages;
 
 /* Loads the plug-in of a stage: function `load` of a bst_stage_loader.
  *

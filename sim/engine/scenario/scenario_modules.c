@@ -142,8 +142,8 @@ static bst_status find_desc(bst_ctx *ctx, const bst_json *json,
     if (*common->plugin) {
         bst_plugin plugin;
         bool skip;
-        BST_TRY(bst_scenario_plugin(ctx, json, registry, scenario, where, common->plugin, &plugin,
-                                    &skip));
+        const bst_scenario_stages in = {registry, scenario};
+        BST_TRY(bst_scenario_plugin(ctx, json, &in, where, common->plugin, &plugin, &skip));
         if (skip) {
             return BST_OK;
         }
@@ -196,8 +196,8 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json,
     char names[400];
     snprintf(module->name, sizeof module->name, "%s", node->string);
     const bst_module_desc *any = find_module(registry, node->string, NULL);
-    bool plugged = cJSON_GetObjectItemCaseSensitive(node, "plugin") != NULL;
-    if (!plugged && (!any || !fits(any, module))) {
+    bool plugin = cJSON_GetObjectItemCaseSensitive(node, "plugin") != NULL;
+    if (!plugin && (!any || !fits(any, module))) {
         list_names(registry, NULL, names, sizeof names);
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: no module of this name (allowed: %s)",
                         scenario->file, path, names);
@@ -221,7 +221,7 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json,
         cJSON_Delete(own_part);
         return status;
     }
-    module->plugged = plugged;
+    module->plugin = plugin;
     static const bst_config_desc no_keys[] = {BST_CONFIG_END};
     bst_scenario_stages stages = {registry, scenario};
     const bst_stage_loader loader = {&stages, bst_scenario_stage};

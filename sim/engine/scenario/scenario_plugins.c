@@ -4,16 +4,16 @@
 
 #include "sim/engine/scenario/scenario_internal.h"
 
-bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json,
-                               const bst_scenario_registry *registry, bst_scenario *s,
+bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_scenario_stages *in,
                                const char *where, const char *text, bst_plugin *out, bool *skip) {
+    const bst_scenario *s = in->scenario;
     char folder[sizeof s->base_dir], path[sizeof folder + 520];
-    *skip = registry->policy == BST_PLUGINS_SKIP;
+    *skip = in->registry->policy == BST_PLUGINS_SKIP;
     *out = (bst_plugin){.modules = NULL};
     if (*skip) {
         return BST_OK;
     }
-    if (registry->policy == BST_PLUGINS_REFUSE) {
+    if (in->registry->policy == BST_PLUGINS_REFUSE) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "%s: %s: plug-ins are not loaded here, as --no-plugins asks (found \"%s\")",
                         s->file, where, text);
@@ -54,8 +54,7 @@ bst_status bst_scenario_stage(void *user, bst_ctx *ctx, const bst_json *json, co
     bst_plugin library;
     bool skip;
     *out = NULL;
-    BST_TRY(bst_scenario_plugin(ctx, json, stages->registry, stages->scenario, path, plugin,
-                                &library, &skip));
+    BST_TRY(bst_scenario_plugin(ctx, json, stages, path, plugin, &library, &skip));
     if (skip) {
         return BST_OK;
     }

@@ -4,9 +4,9 @@
 
 #include "sim/engine/scenario/scenario_internal.h"
 
-/* Schema of one module: its own keys, the common ones, and "type" fixed. `plugged`: of a plug-in,
+/* Schema of one module: its own keys, the common ones, and "type" fixed. `plugin`: of a plug-in,
  * whose block names it by "plugin", by "type", or both. */
-static cJSON *module_schema(const bst_module_desc *m, bool plugged) {
+static cJSON *module_schema(const bst_module_desc *m, bool plugin) {
     static const bst_config_desc none[] = {BST_CONFIG_END};
     cJSON *node = bst_config_schema(m->config ? m->config : none);
     cJSON *common = bst_config_schema(bst_module_common_table);
@@ -45,7 +45,7 @@ static cJSON *module_schema(const bst_module_desc *m, bool plugged) {
     if (!required) {
         required = cJSON_AddArrayToObject(node, "required");
     }
-    if (!plugged) {
+    if (!plugin) {
         cJSON_AddItemToArray(required, cJSON_CreateString("type"));
         cJSON_DeleteItemFromObjectCaseSensitive(properties, "plugin");
         return node;
@@ -119,14 +119,14 @@ static void fill_stages(cJSON *node, const bst_scenario_registry *registry) {
     for (cJSON *item = node->child; item; item = item->next) {
         fill_stages(item, registry);
     }
-    cJSON *plugged = cJSON_GetObjectItemCaseSensitive(node, "then");
-    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(plugged, "title");
+    cJSON *plugin = cJSON_GetObjectItemCaseSensitive(node, "then");
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(plugin, "title");
     if (!cJSON_IsString(kind)) {
         return;
     }
     cJSON *known = stage_schemas(registry, kind->valuestring);
     if (cJSON_GetArraySize(known) > 0) {
-        cJSON_AddItemToObject(plugged, "anyOf", known);
+        cJSON_AddItemToObject(plugin, "anyOf", known);
     } else {
         cJSON_Delete(known);
     }

@@ -486,7 +486,7 @@ static double sharpest_pixel(const bst_world *world) {
 }
 
 static void set_body(const bst_ephemeris *e, const bst_world_orbit *orbit, body *b) {
-    if (orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && !orbit->steering) {
+    if (orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && !orbit->external) {
         b->orbit = orbit;
         b->step_class = choose_class(e, orbit);
     }

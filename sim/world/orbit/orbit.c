@@ -115,8 +115,8 @@ bst_status bst_world_orbit_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst
                                  bst_time epoch, double seconds, bool with_burns,
                                  bst_world_state *out) {
     bool steered = false;
-    if (with_burns && orbit->steering) {
-        BST_TRY(bst_external_states_state(ctx, orbit->steering, seconds, &steered, out));
+    if (with_burns && orbit->external) {
+        BST_TRY(bst_external_states_state(ctx, orbit->external, seconds, &steered, out));
     }
     if (steered) {
         return BST_OK;
@@ -147,21 +147,20 @@ bst_status bst_world_orbit_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst
 }
 
 bst_status bst_world_orbit_line_of_sight(bst_ctx *ctx, const bst_world_orbit *object,
-                                         const bst_world_state *observer, bst_sky_clock *clock,
-                                         bst_time epoch, const bst_bodies *bodies, double seconds,
-                                         bool with_burns, bst_vec3 *geometric_m,
-                                         bst_world_state *object_state, double *emission_s) {
+                                         const bst_world_reception *at, bool with_burns,
+                                         bst_vec3 *geometric_m, bst_world_state *object_state,
+                                         double *emission_s) {
     /* Barycentric light time: the Earth moves by v_earth * tau between emission and reception, and
      * the observer's aberration is taken with its barycentric velocity. Leaving either out would be
      * 20 arcsec wrong. Three rounds shrink the error by (v/c)^3. */
     double tau = 0.0;
     for (int i = 0; i < 3; i++) {
-        BST_TRY(bst_world_orbit_state(ctx, object, clock, epoch, seconds - tau, with_burns,
-                                      object_state));
-        bst_vec3 d = bst_vec3_sub(object_state->position_m, observer->position_m);
-        *geometric_m = bst_vec3_axpy(d, -tau, bodies->earth_bary_mps);
+        BST_TRY(bst_world_orbit_state(ctx, object, at->clock, at->epoch, at->seconds - tau,
+                                      with_burns, object_state));
+        bst_vec3 d = bst_vec3_sub(object_state->position_m, at->observer->position_m);
+        *geometric_m = bst_vec3_axpy(d, -tau, at->bodies->earth_bary_mps);
         tau = bst_vec3_norm(*geometric_m) / BST_LIGHT_SPEED_MPS;
     }
-    *emission_s = seconds - tau;
+    *emission_s = at->seconds - tau;
     return BST_OK;
 }

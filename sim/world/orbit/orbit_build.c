@@ -8,14 +8,6 @@
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/world_build.h"
 
-bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path) {
-    bst_world_path full;
-    bool as_it_is = path[0] == '/' || !*path || !*b->base_dir;
-    snprintf(full.text, sizeof full.text, "%s%s%s", as_it_is ? "" : b->base_dir,
-             as_it_is ? "" : "/", path);
-    return full;
-}
-
 bst_status bst_world_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *set,
                                       const char *name, bst_world_orbit *orbit) {
     bst_time epoch;
@@ -130,6 +122,37 @@ static bst_status build_member(const bst_world_builder *b, const bst_orbit_confi
     return status == BST_OK ? BST_OK : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, path);
 }
 
+/* The state that an orbit of another source, asked once, gives a numerical one to begin with. */
+static bst_status state_of_other(const bst_world_builder *b, const bst_orbit_config *config,
+                                 const char *path, const char *name, bst_world_state *out,
+                                 int *norad) {
+    const bst_initial_state_config *s = &config->state;
+    bst_orbit_config other = *config;
+    other.source = s->from == BST_STATE_ELEMENT_SET ? BST_ORBIT_SGP4 : BST_ORBIT_RELATIVE;
+    other.at_s = s->at_s;
+    const bst_config_list no_burns = {NULL, 0};
+    bst_world_orbit orbit = {0};
+    bst_status status = bst_world_orbit_build(b, &other, &no_burns, path, name, &orbit, norad);
+    if (status == BST_OK && bst_world_orbit_state(b->ctx, &orbit, b->clock, b->world->epoch,
+                                                  s->at_s, true, out) != BST_OK) {
+        status = bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/state", b->scenario, path);
+    }
+    bst_world_orbit_free(&orbit);
+    return status;
+}
+
+static bst_status build_numerical(const bst_world_builder *b, const bst_orbit_config *config,
+                                  const bst_config_list *burns, const char *path, const char *name,
+                                  bst_world_orbit *orbit, int *norad) {
+    bst_world_state other = {.position_m = {.x = 0.0}};
+    int32_t from = config->state.from;
+    BST_TRY(bst_world_orbit_make_gravity(b, &config->forces, path, &orbit->gravity));
+    if (from != BST_STATE_CARTESIAN && from != BST_STATE_KEPLERIAN) {
+        BST_TRY(state_of_other(b, config, path, name, &other, norad));
+    }
+    return bst_world_orbit_build_numerical(b, config, burns, &other, path, orbit);
+}
+
 /* `path` of the orbit is "OWNER/orbit"; burns are at "OWNER/burns". */
 static bst_status check_burns(const bst_world_builder *b, const bst_config_list *list, int source,
                               const char *path) {
@@ -172,7 +195,7 @@ bst_status bst_world_orbit_build(const bst_world_builder *b, const bst_orbit_con
             BST_TRY(build_member(b, config, path, name, orbit));
             break;
         case BST_ORBIT_NUMERICAL:
-            return bst_world_orbit_build_numerical(b, config, burns, path, name, orbit, norad);
+            return build_numerical(b, config, burns, path, name, orbit, norad);
         default:
             BST_TRY(build_relative(b, config, path, orbit));
     }
@@ -189,6 +212,6 @@ void bst_world_orbit_free(bst_world_orbit *orbit) {
     bst_trajectory_free(orbit->unburnt);
     bst_trajectory_free(orbit->burnt);
     bst_gravity_free(orbit->gravity);
-    bst_external_states_free(orbit->steering);
+    bst_external_states_free(orbit->external);
     free(orbit->burns);
 }

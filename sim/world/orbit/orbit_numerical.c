@@ -72,10 +72,6 @@ const bst_config_desc bst_orbit_spacecraft_table[] = {
     BST_CONFIG_END,
 };
 
-static bst_vec3 vec(const double v[3]) {
-    return (bst_vec3){v[0], v[1], v[2]};
-}
-
 static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_config *given,
                             const char *path, double gm, bst_world_state *out) {
     bst_initial_state_config all = *given;
@@ -98,33 +94,24 @@ static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_
 }
 
 static bst_status initial_state(const bst_world_builder *b, const bst_orbit_config *config,
-                                const char *path, const char *name, double gm, bst_world_state *out,
-                                int *norad) {
+                                const bst_world_state *other, const char *path, double gm,
+                                bst_world_state *out) {
     const bst_initial_state_config *s = &config->state;
-    if (s->from == BST_STATE_CARTESIAN) {
-        *out = (bst_world_state){vec(s->position_gcrf_m), vec(s->velocity_gcrf_mps)};
-        return BST_OK;
+    switch (s->from) {
+        case BST_STATE_CARTESIAN:
+            *out = (bst_world_state){bst_vec3_from_array(s->position_gcrf_m),
+                                     bst_vec3_from_array(s->velocity_gcrf_mps)};
+            return BST_OK;
+        case BST_STATE_KEPLERIAN:
+            return keplerian(b, s, path, gm, out);
+        default:
+            *out = *other;
+            return BST_OK;
     }
-    if (s->from == BST_STATE_KEPLERIAN) {
-        return keplerian(b, s, path, gm, out);
-    }
-    /* an orbit of another source, asked once */
-    bst_orbit_config other = *config;
-    other.source = s->from == BST_STATE_ELEMENT_SET ? BST_ORBIT_SGP4 : BST_ORBIT_RELATIVE;
-    other.at_s = s->at_s;
-    const bst_config_list no_burns = {NULL, 0};
-    bst_world_orbit orbit = {0};
-    bst_status status = bst_world_orbit_build(b, &other, &no_burns, path, name, &orbit, norad);
-    if (status == BST_OK && bst_world_orbit_state(b->ctx, &orbit, b->clock, b->world->epoch,
-                                                  s->at_s, true, out) != BST_OK) {
-        status = bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/state", b->scenario, path);
-    }
-    bst_world_orbit_free(&orbit);
-    return status;
 }
 
-static bst_status make_gravity(const bst_world_builder *b, const bst_force_config *f,
-                               const char *path, bst_gravity **out) {
+bst_status bst_world_orbit_make_gravity(const bst_world_builder *b, const bst_force_config *f,
+                                        const char *path, bst_gravity **out) {
     bst_ctx *ctx = b->ctx;
     if (f->order > f->degree) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -149,11 +136,11 @@ static bst_status make_gravity(const bst_world_builder *b, const bst_force_confi
 
 bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
                                            const bst_orbit_config *config,
-                                           const bst_config_list *burns, const char *path,
-                                           const char *name, bst_world_orbit *orbit, int *norad) {
-    BST_TRY(make_gravity(b, &config->forces, path, &orbit->gravity));
+                                           const bst_config_list *burns,
+                                           const bst_world_state *other, const char *path,
+                                           bst_world_orbit *orbit) {
     bst_world_state state;
-    BST_TRY(initial_state(b, config, path, name, bst_gravity_gm(orbit->gravity), &state, norad));
+    BST_TRY(initial_state(b, config, other, path, bst_gravity_gm(orbit->gravity), &state));
     const bst_force_config *f = &config->forces;
     const bst_orbit_spacecraft_config *s = &config->spacecraft;
     bst_trajectory_options options = {
@@ -179,8 +166,8 @@ bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
             return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for burns");
         }
         for (int i = 0; i < burns->count; i++) {
-            thrusts[i] =
-                (bst_astro_thrust){items[i].time_s, items[i].duration_s, vec(items[i].dv_rtn_mps)};
+            thrusts[i] = (bst_astro_thrust){items[i].time_s, items[i].duration_s,
+                                            bst_vec3_from_array(items[i].dv_rtn_mps)};
         }
         options.burns = thrusts;
         options.burn_count = burns->count;

@@ -4,10 +4,9 @@
 #include <string.h>
 
 #include "sim/optics/psf.h"
-#include "sim/world/scene/field_image.h"
+#include "sim/world/scene/field_internal.h"
 #include "sim/world/scene/field_objects.h"
 #include "sim/world/scene/los_track.h"
-#include "sim/world/scene/row_exposure.h"
 #include "sim/world/scene/skylight.h"
 
 /* How far an apparent place lies from the catalogue's, at most: aberration and light deflection. */
@@ -15,32 +14,6 @@
 
 /* Statistical stars that a field query keeps for the next one: 40 MiB. */
 #define FAINT_CACHE_STARS 1048576
-
-/* Sigma points of (attitude deviation, time), over which a position is averaged (Julier and Uhlmann
- * 1997). Exact to second order; the first one, the mean itself, has no weight. */
-enum { SIGMA_DIMENSIONS = 4, SIGMA_POINTS = 2 * SIGMA_DIMENSIONS + 1 };
-
-struct bst_field {
-    const bst_world *world;
-    bst_world_view *view;
-    const bst_camera *camera;
-    int observer;
-    bst_los_track_store track, middle; /* middle: of a rolling shutter's middle row */
-    bst_star *stars;
-    int star_capacity;
-    bst_faint_stars *faint;      /* NULL: none */
-    bst_skylight *skylight;      /* NULL: always the same all over the sensor */
-    const bst_skylight_map *map; /* of the latest query */
-    bst_scene_source *sources;
-    int source_capacity;
-    bst_scene_object_parts *parts; /* [part_capacity], of the objects among the sources */
-    int part_capacity;
-    int *near; /* objects that may be in the field; room for all */
-    bst_quat q_mid;
-    double exposure_s;
-    bst_quat sigma_q[SIGMA_POINTS];
-    double sigma_time[SIGMA_POINTS]; /* fraction of the exposure */
-};
 
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                             bst_field **out) {
@@ -112,10 +85,10 @@ static bst_quat attitude_of_mean_place(const bst_field *field) {
     bst_quat mean = field->sigma_q[0];
     bst_vec3 axis = bst_quat_rotate(bst_quat_conj(mean), (bst_vec3){0, 0, 1});
     double x = 0.0, y = 0.0;
-    for (int p = 1; p < SIGMA_POINTS; p++) {
+    for (int p = 1; p < BST_FIELD_SIGMA_POINTS; p++) {
         bst_vec3 seen = bst_quat_rotate(field->sigma_q[p], axis);
-        x += seen.x / seen.z / (SIGMA_POINTS - 1);
-        y += seen.y / seen.z / (SIGMA_POINTS - 1);
+        x += seen.x / seen.z / (BST_FIELD_SIGMA_POINTS - 1);
+        y += seen.y / seen.z / (BST_FIELD_SIGMA_POINTS - 1);
     }
     if (!isfinite(x) || !isfinite(y)) {
         return mean; /* turned by a right angle: there is no image of anything */
@@ -127,7 +100,7 @@ static bst_quat attitude_of_mean_place(const bst_field *field) {
  * point from its place at mid-exposure. */
 static void summarise_track(bst_field *field, const bst_los_track *track, bst_quat *mean,
                             double *reach_px) {
-    enum { D = SIGMA_DIMENSIONS };
+    enum { D = BST_FIELD_SIGMA_DIMENSIONS };
     double exposure = track->time_s[track->count - 1];
     field->exposure_s = exposure;
     field->q_mid = bst_los_track_attitude(track, 0.5 * exposure);
@@ -165,7 +138,7 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
         }
     }
     const double spread = sqrt((double)D); /* centre weight 0 */
-    for (int p = 0; p < SIGMA_POINTS; p++) {
+    for (int p = 0; p < BST_FIELD_SIGMA_POINTS; p++) {
         double point[D];
         for (int i = 0; i < D; i++) {
             double step = p == 0 ? 0.0 : chol[i][(p - 1) / 2] * spread * ((p & 1) ? 1.0 : -1.0);
@@ -198,31 +171,6 @@ static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
         field->star_capacity = count;
     }
     return BST_OK;
-}
-
-/* The catalogue's stars, then the statistical ones down to faint_limit. */
-static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, double radius,
-                              double v_limit, double faint_limit, double julian_year, int *count) {
-    int known, drawn = 0;
-    for (;;) {
-        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), centre, radius, v_limit,
-                                julian_year, field->stars, field->star_capacity, &known));
-        if (known > field->star_capacity) {
-            BST_TRY(reserve_stars(ctx, field, known));
-            continue;
-        }
-        if (field->faint) {
-            int room = field->star_capacity - known;
-            BST_TRY(bst_faint_stars_query(ctx, field->faint, centre, radius, faint_limit,
-                                          field->stars + known, room, &drawn));
-            if (drawn > room) {
-                BST_TRY(reserve_stars(ctx, field, known + drawn + drawn / 4));
-                continue;
-            }
-        }
-        *count = known + drawn;
-        return BST_OK;
-    }
 }
 
 /* Notes in the truth how much of the window bright bodies cover; whether any is to be drawn. */
@@ -283,80 +231,105 @@ static bool is_self(const bst_field *field, int index) {
            object->info.norad == field->world->observers[field->observer].norad;
 }
 
-bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
-                           int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
-                           bst_window window, const bst_field_options *options, bst_truth *truth,
-                           const bst_scene_source **sources, int *count) {
-    const bst_camera *camera = field->camera;
-    double start_s = (double)start_tick / (double)tick_rate_hz,
-           end_s = (double)end_tick / (double)tick_rate_hz;
-    double mid_s = 0.5 * (start_s + end_s), exposure = end_s - start_s;
-    double reach_px;
+/* A query under way. */
+typedef struct query {
+    double start_s, end_s; /* of the track */
+    double mid_s, exposure_s;
+    bst_los_track own; /* of the exposure itself */
     bst_quat mean;
-    bst_los_track own = *track; /* of the exposure itself */
-    if (options->lead_s > 0.0) {
-        BST_TRY(bst_los_track_part(ctx, &field->middle, track, options->lead_s,
-                                   options->lead_s + exposure, &own));
-    }
-    summarise_track(field, &own, &mean, &reach_px);
-    for (int k = 0; options->lead_s > 0.0 && k < track->count; k++) {
-        reach_px =
-            fmax(reach_px, bst_los_track_moved_px(camera, field->q_mid, track->q_cam_from_gcrf[k]));
-    }
-    start_s -= options->lead_s;
-    end_s += options->lead_s;
-
+    bst_window window;
+    double margin_px; /* of the window, with what the attitude moves during the exposure */
+    bst_vec3
+        centre; /* cone of directions that holds the window with its margin: axis, half angle */
+    double radius;
     bst_world_state eye;
     bst_bodies bodies;
-    BST_TRY(bst_world_view_observer_state(ctx, field->view, field->observer, mid_s, &eye));
-    BST_TRY(bst_world_view_bodies(ctx, field->view, mid_s, &bodies));
-    bst_astro_earth_frames frames;
-    BST_TRY(bst_world_view_earth_frames(ctx, field->view, mid_s, &frames));
-    bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
-    bst_light geocentric = bst_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
+    bst_mat3 itrf_from_gcrf;
+    bst_light light, geocentric;
+    double v_limit, faint_limit; /* of stars; of statistical ones */
+} query;
 
-    truth->start_tick = start_tick;
-    truth->end_tick = end_tick;
+/* Times, mean attitude and the margin that the motion asks for. */
+static bst_status settle_track(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
+                               const bst_field_options *options, query *q) {
+    double reach_px;
+    q->own = *track;
+    if (options->lead_s > 0.0) {
+        BST_TRY(bst_los_track_part(ctx, &field->middle, track, options->lead_s,
+                                   options->lead_s + q->exposure_s, &q->own));
+    }
+    summarise_track(field, &q->own, &q->mean, &reach_px);
+    for (int k = 0; options->lead_s > 0.0 && k < track->count; k++) {
+        reach_px = fmax(reach_px, bst_los_track_moved_px(field->camera, field->q_mid,
+                                                         track->q_cam_from_gcrf[k]));
+    }
+    q->start_s -= options->lead_s;
+    q->end_s += options->lead_s;
+    q->margin_px = options->margin_px + reach_px;
+    return BST_OK;
+}
+
+/* Where observer, Earth, Sun and Moon are at mid-exposure, and how light comes from there. */
+static bst_status place_observer(bst_ctx *ctx, bst_field *field, query *q) {
+    bst_astro_earth_frames frames;
+    BST_TRY(bst_world_view_observer_state(ctx, field->view, field->observer, q->mid_s, &q->eye));
+    BST_TRY(bst_world_view_bodies(ctx, field->view, q->mid_s, &q->bodies));
+    BST_TRY(bst_world_view_earth_frames(ctx, field->view, q->mid_s, &frames));
+    q->itrf_from_gcrf = frames.itrf_from_gcrf;
+    q->light = bst_light_at(&q->bodies, q->eye.position_m, q->eye.velocity_mps);
+    q->geocentric = bst_light_at(&q->bodies, q->eye.position_m, (bst_vec3){0, 0, 0});
+    return BST_OK;
+}
+
+static void fill_header(const bst_field *field, const query *q, bst_truth *truth) {
+    const bst_camera *camera = field->camera;
     truth->q_cam_from_gcrf_mid = field->q_mid;
-    truth->q_cam_from_gcrf_mean = mean;
-    truth->observer_gcrf_m = eye.position_m;
-    truth->observer_gcrf_mps = eye.velocity_mps;
-    truth->velocity_bary_mps = light.velocity_mps;
-    truth->sun_m = light.sun_m;
+    truth->q_cam_from_gcrf_mean = q->mean;
+    truth->observer_gcrf_m = q->eye.position_m;
+    truth->observer_gcrf_mps = q->eye.velocity_mps;
+    truth->velocity_bary_mps = q->light.velocity_mps;
+    truth->sun_m = q->light.sun_m;
     truth->pixel_scale_arcsec = camera->pixel_scale_arcsec;
     truth->boresight_x_px = bst_camera_centre_x(camera);
     truth->boresight_y_px = bst_camera_centre_y(camera);
-    truth->background_e = bst_camera_background_e_per_s(camera) * exposure;
-    truth->dark_e = bst_camera_dark_e_per_s(camera) * exposure;
+    truth->background_e = bst_camera_background_e_per_s(camera) * q->exposure_s;
+    truth->dark_e = bst_camera_dark_e_per_s(camera) * q->exposure_s;
+}
 
-    double margin_px = options->margin_px + reach_px;
+static void find_cone(const bst_field *field, query *q) {
+    const bst_camera *camera = field->camera;
+    bst_window window = q->window;
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
                                                window.y0 + 0.5 * (window.height - 1));
-    bst_vec3 centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
-    double radius = APPARENT_SHIFT_RAD;
+    q->centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
+    q->radius = APPARENT_SHIFT_RAD;
     if (camera->geometry.general) {
-        radius += bst_camera_reach_rad(camera, centre_cam, window.x0 - margin_px,
-                                       window.y0 - margin_px, window.x0 + window.width + margin_px,
-                                       window.y0 + window.height + margin_px, margin_px);
+        q->radius +=
+            bst_camera_reach_rad(camera, centre_cam, window.x0 - q->margin_px,
+                                 window.y0 - q->margin_px, window.x0 + window.width + q->margin_px,
+                                 window.y0 + window.height + q->margin_px, q->margin_px);
     } else {
-        radius += atan(bst_camera_scale_rad(camera) *
-                       (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px));
+        q->radius += atan(bst_camera_scale_rad(camera) *
+                          (0.5 * hypot(window.width, window.height) + sqrt(2.0) * q->margin_px));
     }
-    double tt1, tt2;
-    bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
-    int star_count;
+}
+
+/* Bright bodies in the field, and the background that they, the sky and undrawn stars give. */
+static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q,
+                                  bst_truth *truth) {
+    const bst_camera *camera = field->camera;
+    bst_window window = q->window;
     field->map = NULL;
-    double faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag);
-    bst_scene_surroundings around = {.eye_m = eye.position_m,
-                                     .eye_mps = eye.velocity_mps,
-                                     .bodies = bodies,
-                                     .itrf_from_gcrf = frames.itrf_from_gcrf,
-                                     .light = light,
-                                     .exposure_s = exposure,
-                                     .v_limit = options->v_limit,
-                                     .faint_limit = faint_limit};
+    bst_scene_surroundings around = {.eye_m = q->eye.position_m,
+                                     .eye_mps = q->eye.velocity_mps,
+                                     .bodies = q->bodies,
+                                     .itrf_from_gcrf = q->itrf_from_gcrf,
+                                     .light = q->light,
+                                     .exposure_s = q->exposure_s,
+                                     .v_limit = q->v_limit,
+                                     .faint_limit = q->faint_limit};
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
-        around.q[k] = bst_los_track_attitude(&own, exposure * k / BST_DISC_PARTS);
+        around.q[k] = bst_los_track_attitude(&q->own, q->exposure_s * k / BST_DISC_PARTS);
     }
     if (bodies_in_field(camera, &around, window, truth) || bst_skylight_varies(camera)) {
         bst_window lit = window;
@@ -370,50 +343,93 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     } else if (field->faint) {
         double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
         truth->background_e +=
-            bst_faint_sky_undrawn(field->world->faint, centre, options->v_limit, faint_limit) *
-            pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * exposure;
+            bst_faint_sky_undrawn(field->world->faint, q->centre, q->v_limit, q->faint_limit) *
+            pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * q->exposure_s;
     }
-    BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit, faint_limit,
-                        2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
-    int near_count;
-    BST_TRY(bst_world_view_near(ctx, field->view, field->observer, start_s, end_s, centre, radius,
-                                field->near, &near_count));
-    BST_TRY(reserve_sources(ctx, field, star_count + near_count));
-    int n = 0;
-    bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
-    for (int i = 0; i < star_count; i++) {
-        const bst_star *star = &field->stars[i];
-        bst_vec3 apparent = bst_light_apparent_star(&light, star->icrs);
-        if (!near_window(field, field->q_mid, apparent, window, margin_px)) {
+    return BST_OK;
+}
+
+/* The catalogue's stars, then the statistical ones down to faint_limit. */
+static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, double julian_year,
+                              int *count) {
+    int known, drawn = 0;
+    for (;;) {
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), q->centre, q->radius,
+                                q->v_limit, julian_year, field->stars, field->star_capacity,
+                                &known));
+        if (known > field->star_capacity) {
+            BST_TRY(reserve_stars(ctx, field, known));
             continue;
         }
-        bst_scene_source *s = &field->sources[n++];
-        *s = (bst_scene_source){.kind = BST_SOURCE_STAR,
-                                .id = star->id,
-                                .apparent_mid = apparent,
-                                .electrons_per_s = bst_camera_star_electrons_per_s(
-                                    camera, (double)star->v_mag, (double)star->b_minus_v),
-                                .v_mag = (double)star->v_mag,
-                                .sunlit_fraction = NAN,
-                                .phase_rad = NAN,
-                                .range_m = INFINITY};
-        if (coloured && !isnan(star->b_minus_v)) {
-            bst_psf_colour(camera->psf, bst_optics_star_spectrum_k((double)star->b_minus_v),
-                           s->colour);
+        if (field->faint) {
+            int room = field->star_capacity - known;
+            BST_TRY(bst_faint_stars_query(ctx, field->faint, q->centre, q->radius, q->faint_limit,
+                                          field->stars + known, room, &drawn));
+            if (drawn > room) {
+                BST_TRY(reserve_stars(ctx, field, known + drawn + drawn / 4));
+                continue;
+            }
         }
-        /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
-         * move with the Earth, stands for the star */
-        bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
-        s->occulted = bst_astro_earth_occults(
-            eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray), bodies.pole);
-        if (s->occulted) {
-            s->electrons_per_s = 0.0;
-        }
-        bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
+        *count = known + drawn;
+        return BST_OK;
+    }
+}
+
+/* The source that a star is; false when its image does not touch the window. */
+static bool make_star(const bst_field *field, const query *q, const bst_star *star,
+                      bst_scene_source *s) {
+    const bst_camera *camera = field->camera;
+    bst_vec3 apparent = bst_light_apparent_star(&q->light, star->icrs);
+    if (!near_window(field, field->q_mid, apparent, q->window, q->margin_px)) {
+        return false;
+    }
+    *s = (bst_scene_source){.kind = BST_SOURCE_STAR,
+                            .id = star->id,
+                            .apparent_mid = apparent,
+                            .electrons_per_s = bst_camera_star_electrons_per_s(
+                                camera, (double)star->v_mag, (double)star->b_minus_v),
+                            .v_mag = (double)star->v_mag,
+                            .sunlit_fraction = NAN,
+                            .phase_rad = NAN,
+                            .range_m = INFINITY};
+    bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
+    if (coloured && !isnan(star->b_minus_v)) {
+        bst_psf_colour(camera->psf, bst_optics_star_spectrum_k((double)star->b_minus_v), s->colour);
+    }
+    /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
+     * move with the Earth, stands for the star */
+    bst_vec3 ray = bst_light_apparent_star(&q->geocentric, star->icrs);
+    s->occulted = bst_astro_earth_occults(
+        q->eye.position_m, bst_vec3_axpy(q->eye.position_m, 1e12, ray), q->bodies.pole);
+    if (s->occulted) {
+        s->electrons_per_s = 0.0;
+    }
+    bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
+    return true;
+}
+
+/* Stars, then objects. */
+static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, int *count) {
+    int star_count, near_count, n = 0;
+    double tt1, tt2;
+    bst_time_tt(bst_world_time(field->world, q->mid_s), &tt1, &tt2);
+    BST_TRY(query_stars(ctx, field, q, 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
+    const bst_world_view_span span = {field->observer, q->start_s, q->end_s};
+    BST_TRY(bst_world_view_near(ctx, field->view, &span, q->centre, q->radius, field->near,
+                                &near_count));
+    BST_TRY(reserve_sources(ctx, field, star_count + near_count));
+    for (int i = 0; i < star_count; i++) {
+        n += make_star(field, q, &field->stars[i], &field->sources[n]);
     }
     BST_TRY(reserve_parts(ctx, field, near_count));
-    const bst_scene_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
-                                            field->q_mid, window, margin_px,       centre,  radius};
+    const bst_scene_object_query objects = {.view = field->view,
+                                            .camera = field->camera,
+                                            .span = span,
+                                            .q_mid = field->q_mid,
+                                            .window = q->window,
+                                            .margin_px = q->margin_px,
+                                            .centre = q->centre,
+                                            .radius = q->radius};
     for (int i = 0, used = 0; i < near_count; i++) {
         bool there;
         if (is_self(field, field->near[i])) {
@@ -424,38 +440,32 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         n += there;
         used += there;
     }
-    *sources = field->sources;
     *count = n;
     return BST_OK;
 }
 
-/* Of the image of a point; NAN when it is behind the camera. */
-static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_source *source) {
-    bst_scene_image_moments m = {0};
-    double x[SIGMA_POINTS], y[SIGMA_POINTS];
-    for (int p = 0; p < SIGMA_POINTS; p++) {
-        bst_vec3 d = bst_scene_source_direction(source, field->sigma_time[p]);
-        x[p] = y[p] = NAN;
-        (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
-                                 &y[p]);
-    }
-    for (int p = 1; p < SIGMA_POINTS; p++) {
-        m.x_mean += x[p] / (SIGMA_POINTS - 1);
-        m.y_mean += y[p] / (SIGMA_POINTS - 1);
-    }
-    for (int p = 1; p < SIGMA_POINTS; p++) {
-        double dx = x[p] - m.x_mean, dy = y[p] - m.y_mean;
-        m.xx += dx * dx / (SIGMA_POINTS - 1);
-        m.xy += dx * dy / (SIGMA_POINTS - 1);
-        m.yy += dy * dy / (SIGMA_POINTS - 1);
-    }
-    return m;
+bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
+                           int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
+                           bst_window window, const bst_field_options *options, bst_truth *truth,
+                           const bst_scene_source **sources, int *count) {
+    query q = {.start_s = (double)start_tick / (double)tick_rate_hz,
+               .end_s = (double)end_tick / (double)tick_rate_hz,
+               .window = window,
+               .v_limit = options->v_limit,
+               .faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag)};
+    q.mid_s = 0.5 * (q.start_s + q.end_s);
+    q.exposure_s = q.end_s - q.start_s;
+    BST_TRY(settle_track(ctx, field, track, options, &q));
+    BST_TRY(place_observer(ctx, field, &q));
+    truth->start_tick = start_tick;
+    truth->end_tick = end_tick;
+    fill_header(field, &q, truth);
+    find_cone(field, &q);
+    BST_TRY(find_background(ctx, field, &q, truth));
+    BST_TRY(find_sources(ctx, field, &q, count));
+    *sources = field->sources;
+    return BST_OK;
 }
-
-/* Variance that a path has beyond a straight one, over the PSF's, from which on it is followed:
- * what a bend across is taken for a Gaussian's then makes 3 % of a long streak's signal-to-noise
- * ratio. */
-static const double BENT = 0.12;
 
 const bst_skylight_map *bst_field_background(const bst_field *field) {
     return field->map;
@@ -465,127 +475,4 @@ double bst_field_background_e(const bst_field *field, const bst_truth *header, d
                               double y_px) {
     return field->map && isfinite(x_px) && isfinite(y_px) ? bst_skylight_at(field->map, x_px, y_px)
                                                           : header->background_e;
-}
-
-/* What a rolling shutter sees of a source: it is exposed while the row where it is. */
-static bst_scene_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
-                                             const bst_scene_source *source, bst_window window,
-                                             double u[2], bst_quat *q_mid, bst_truth_item *out) {
-    const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
-    double duration = track->time_s[track->count - 1];
-    bst_row_source_times(field->camera, &rows, track, source, u);
-    double middle = 0.5 * (u[0] + u[1]);
-    const double when[3] = {u[0], middle, u[1]};
-    double *const x[3] = {&out->x_start_px, &out->x_mid_px, &out->x_end_px};
-    double *const y[3] = {&out->y_start_px, &out->y_mid_px, &out->y_end_px};
-    *q_mid = bst_los_track_attitude(track, middle * duration);
-    for (int k = 0; k < 3; k++) {
-        bst_quat q = bst_los_track_attitude(track, when[k] * duration);
-        (void)bst_camera_project(field->camera,
-                                 bst_quat_rotate(q, bst_scene_source_direction(source, when[k])),
-                                 x[k], y[k]);
-    }
-    out->delay_s = (middle - 0.5) * duration;
-    out->electrons = source->electrons_per_s * duration *
-                     (bst_scene_source_light(source, u[1]) - bst_scene_source_light(source, u[0]));
-    return bst_scene_image_by_light(field->camera, track, source, u[0], u[1]);
-}
-
-void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
-                          const bst_scene_source *source, bst_window window, int binning,
-                          const bst_truth *header, bst_truth_item *out) {
-    const bst_camera *camera = field->camera;
-    *out = (bst_truth_item){.kind = source->kind,
-                            .id = source->id,
-                            .norad = source->kind == BST_SOURCE_OBJECT
-                                         ? bst_world_object(field->world, (int)source->id)->norad
-                                         : 0,
-                            .ra_rad = source->ra_rad,
-                            .dec_rad = source->dec_rad,
-                            .v_mag = source->v_mag,
-                            .electrons = source->electrons_per_s * field->exposure_s,
-                            .sunlit_fraction = source->sunlit_fraction,
-                            .phase_rad = source->phase_rad,
-                            .range_m = source->range_m,
-                            .x_start_px = NAN,
-                            .y_start_px = NAN,
-                            .x_mid_px = NAN,
-                            .y_mid_px = NAN,
-                            .x_end_px = NAN,
-                            .y_end_px = NAN,
-                            .x_chief_px = NAN,
-                            .y_chief_px = NAN,
-                            .x_centroid_px = NAN,
-                            .y_centroid_px = NAN};
-    bst_scene_image_moments image, path;
-    bst_quat q_mid = field->q_mid;
-    double u[2] = {0.0, 1.0}; /* of the track, while the source is exposed */
-    if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
-        image = place_in_rows(field, track, source, window, u, &q_mid, out);
-    } else {
-        (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
-        (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
-                                &out->y_end_px);
-        (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
-                                 &out->x_mid_px, &out->y_mid_px);
-        image = source->rate ? bst_scene_image_by_light(field->camera, track, source, 0.0, 1.0)
-                             : smear_of(field, source);
-    }
-    path = image;
-    out->x_chief_px = image.x_mean;
-    out->y_chief_px = image.y_mean;
-    if (source->shape) {
-        bst_scene_image_add_disc(field->camera, q_mid, source, &image);
-    }
-    bst_scene_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
-    if (isfinite(image.x_mean)) {
-        out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
-    }
-    double dark =
-        bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
-    /* pixels that are added are read once; their sum is the image blurred by a wider box */
-    double added = (double)binning * binning, widened = (added - 1.0) / 12.0;
-    double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
-    double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
-    double along, across;
-    double sharp = bst_image_blur(camera, source, &image, out->x_end_px - out->x_start_px,
-                                  out->y_end_px - out->y_start_px, &along, &across);
-    if (isfinite(length) && variance > 0.0) {
-        double gauss = bst_optics_image_squared(sqrt(along * along + widened),
-                                                sqrt(across * across + widened), length);
-        double square = gauss, sigma;
-        bool plain = !camera->psf || bst_psf_gaussian(camera->psf, &sigma);
-        if (!plain) {
-            /* jitter widens both ways alike; what the path has more along itself is its length */
-            double blurred = across * across - sharp;
-            double drawn = sqrt(12.0 * fmax(image.xx + image.yy - 2.0 * blurred, 0.0));
-            square = bst_psf_squared_image(camera->psf, source->colour, image.x_mean, image.y_mean,
-                                           blurred + widened, blurred + widened, drawn);
-        }
-        double excess = along * along + across * across - 2.0 * sharp;
-        if (excess > BENT * (sharp + widened)) {
-            /* a disc's own light widens the path */
-            double disc = 0.5 * fmax(image.xx + image.yy - path.xx - path.yy, 0.0);
-            double exact = bst_scene_image_squared_path(camera, track, source, u[0], u[1], &path,
-                                                        excess, sharp + widened + disc);
-            if (isfinite(exact)) {
-                square = plain ? exact : square * exact / gauss;
-            }
-        }
-        out->snr = out->electrons * sqrt(square / variance);
-    }
-    if (source->occulted) {
-        out->flags |= BST_TRUTH_OCCULTED;
-    }
-    if (image.x_mean >= window.x0 - 0.5 && image.x_mean < window.x0 + window.width - 0.5 &&
-        image.y_mean >= window.y0 - 0.5 && image.y_mean < window.y0 + window.height - 0.5) {
-        out->flags |= BST_TRUTH_IN_FIELD;
-    }
-    /* peak of the image: of a point 1 / (2 pi sigma^2), of a long streak 1 / (sqrt(2 pi) sigma
-     * length) */
-    double peak =
-        out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
-    if (peak + dark > camera->full_well_e) {
-        out->flags |= BST_TRUTH_SATURATED;
-    }
 }

@@ -133,11 +133,12 @@ static double roughness(const double *x, const double *y, int count) {
 }
 
 double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_track *track,
-                                    const bst_scene_source *source, double u0, double u1,
+                                    const bst_scene_source *source, const double u01[2],
                                     const bst_scene_image_moments *moments, double excess_px2,
                                     double variance_px2) {
     enum { COARSE = 9, FEWEST = 20, MOST = 256 };
     const double step_px = 1.5;
+    const double u0 = u01[0], u1 = u01[1];
     double x[MOST], y[MOST], w[MOST], total = 0.0, length = 0.0, line = 0.0;
     double duration = track->time_s[track->count - 1], before = bst_scene_source_light(source, u0);
     for (int k = 0; k < COARSE; k++) { /* most jitter shows in a few places */

@@ -110,8 +110,7 @@ typedef struct course {
 static double course_at(void *user, double u) {
     const course *c = user;
     bst_world_sight sight;
-    bst_scene_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
-                         c->query->end_s, u, &sight);
+    bst_scene_view_light(c->query->view, &c->query->span, c->object, c->path, c->light, u, &sight);
     return bst_scene_glow_electrons_per_s(c->query->camera, &sight.glow, NULL);
 }
 
@@ -131,8 +130,8 @@ static bst_world_sight sight_at(const course *c, const bst_world_sight *mid,
                                 const bst_scene_source *source, int k) {
     bst_world_sight sight = *mid;
     if (source->rate) {
-        bst_scene_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
-                             c->query->end_s, (k + 0.5) / TIMES, &sight);
+        bst_scene_view_light(c->query->view, &c->query->span, c->object, c->path, c->light,
+                             (k + 0.5) / TIMES, &sight);
     }
     return sight;
 }
@@ -192,8 +191,8 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     bst_world_sight mid;
     bst_scene_path_light light;
     *there = false;
-    bst_status status = bst_world_view_path(ctx, q->view, q->observer, object, q->start_s, q->end_s,
-                                            &parts->path, &light, &mid);
+    bst_status status =
+        bst_world_view_path(ctx, q->view, &q->span, object, &parts->path, &light, &mid);
     if (status == BST_ERR_NUMERIC) {
         return BST_OK;
     }
@@ -217,7 +216,7 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
         return BST_OK;
     }
     course c = {q, object, &parts->path, &light};
-    if (!mid.occulted && q->end_s > q->start_s &&
+    if (!mid.occulted && q->span.end_s > q->span.start_s &&
         bst_field_rate(course_at, &c, &parts->rate, &out->electrons_per_s)) {
         out->rate = &parts->rate;
     } else {

@@ -8,9 +8,8 @@
 typedef struct bst_scene_object_query {
     bst_world_view *view;
     const bst_camera *camera;
-    int observer;
-    double start_s, end_s; /* of the exposure */
-    bst_quat q_mid;        /* camera attitude half way */
+    bst_world_view_span span;
+    bst_quat q_mid; /* camera attitude half way */
     bst_window window;
     double margin_px; /* of the window, with what the attitude moves during the exposure */
     bst_vec3 centre;  /* a cone of directions (GCRF) that holds the window with its margin: axis */
@@ -27,11 +26,11 @@ typedef struct bst_scene_path_light {
     double light_time_s;
 } bst_scene_path_light;
 
-/* How bright the object is at time u in [0, 1] of an exposure from start_s to end_s: fills phase,
+/* How bright the object is at time u in [0, 1] of a span: fills phase,
  * sunlit fraction and light of *out. */
-void bst_scene_view_light(const bst_world_view *view, int object, const bst_scene_source_path *path,
-                          const bst_scene_path_light *light, double start_s, double end_s, double u,
-                          bst_world_sight *out);
+void bst_scene_view_light(const bst_world_view *view, const bst_world_view_span *span, int object,
+                          const bst_scene_source_path *path, const bst_scene_path_light *light,
+                          double u, bst_world_sight *out);
 
 /* Description of an object of the view's world. */
 const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object);

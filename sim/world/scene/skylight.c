@@ -60,14 +60,13 @@ bool bst_skylight_may_vary(const bst_camera *camera) {
 
 /* Bilinear between the four nodes about a place; with a step of a power of two the weights are
  * exact, so that neighbouring lattices give the same bits. */
-static float interpolate(const float *value, int columns, int rows, int step, int x0, int y0,
-                         float x, float y) {
-    float u = (x - (float)x0) / (float)step, v = (y - (float)y0) / (float)step;
+static float interpolate(const lattice *l, float x, float y) {
+    float u = (x - (float)l->x0) / (float)l->step, v = (y - (float)l->y0) / (float)l->step;
     int i = (int)floorf(u), j = (int)floorf(v);
-    i = i < 0 ? 0 : i > columns - 2 ? columns - 2 : i;
-    j = j < 0 ? 0 : j > rows - 2 ? rows - 2 : j;
+    i = i < 0 ? 0 : i > l->columns - 2 ? l->columns - 2 : i;
+    j = j < 0 ? 0 : j > l->rows - 2 ? l->rows - 2 : j;
     float s = u - (float)i, t = v - (float)j;
-    const float *a = value + (size_t)j * (size_t)columns + (size_t)i, *b = a + columns;
+    const float *a = l->value + (size_t)j * (size_t)l->columns + (size_t)i, *b = a + l->columns;
     float left = a[0] + t * (b[0] - a[0]), right = a[1] + t * (b[1] - a[1]);
     return left + s * (right - left);
 }
@@ -79,8 +78,13 @@ double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
         size_t i = (size_t)(x - map->x0_px + 0.5), j = (size_t)(y - map->y0_px + 0.5);
         return (double)map->e[j * (size_t)map->columns + i];
     }
-    return (double)interpolate(map->e, map->columns, map->rows, map->step_px, map->x0_px,
-                               map->y0_px, (float)x, (float)y);
+    const lattice l = {.step = map->step_px,
+                       .x0 = map->x0_px,
+                       .y0 = map->y0_px,
+                       .columns = map->columns,
+                       .rows = map->rows,
+                       .value = (float *)(uintptr_t)map->e};
+    return (double)interpolate(&l, (float)x, (float)y);
 }
 
 bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_camera *camera,
@@ -177,8 +181,7 @@ static bst_status paint_sky(bst_ctx *ctx, const painter *p, bst_skylight *b, bst
     for (int j = 0; j < s->rows; j++) {
         for (int i = 0; i < s->columns; i++) {
             int x = s->x0 + i * s->step, y = s->y0 + j * s->step;
-            double e = uniform + (double)interpolate(l->value, l->columns, l->rows, l->step, l->x0,
-                                                     l->y0, (float)x, (float)y);
+            double e = uniform + (double)interpolate(l, (float)x, (float)y);
             if (sky && c->zodiacal) {
                 bst_vec3 d = to_gcrf(p, bst_camera_unproject(camera, x, y));
                 e += p->sun_e * 1e-4 * DEG2_PER_SR * bst_zodiacal_towards(d, p->sun);
@@ -267,8 +270,7 @@ static bst_status paint_pixels(bst_ctx *ctx, const painter *p, bst_skylight *b, 
                 float *row = out->value + (size_t)(y - window.y0) * (size_t)window.width;
                 for (int x = cx > window.x0 ? cx : window.x0; x < cx + n->step && x < x1; x++) {
                     const lattice *from = edge ? s : n;
-                    float e = interpolate(from->value, from->columns, from->rows, from->step,
-                                          from->x0, from->y0, (float)x, (float)y);
+                    float e = interpolate(from, (float)x, (float)y);
                     row[x - window.x0] = edge ? paint(p, x, y, (double)e) : e;
                 }
             }

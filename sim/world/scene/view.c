@@ -37,6 +37,12 @@ struct bst_world_view {
 /* Where a body comes from in a solution: both ends of a line of sight take the same way. */
 typedef enum from { FROM_EPHEMERIS, FROM_ORBIT } from;
 
+/* The body that is looked at. */
+typedef struct looked_at {
+    int object;
+    from source;
+} looked_at;
+
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world_view **out) {
     *out = NULL;
     bst_world_view *view = calloc(1, sizeof *view);
@@ -196,20 +202,21 @@ static bst_status known_eye(bst_ctx *ctx, bst_world_view *view, int observer, do
     return BST_OK;
 }
 
-static double node_time(double start_s, double end_s, int i) {
-    return start_s + (end_s - start_s) * i / (BST_PATH_NODES - 1);
+static double node_time(const bst_world_view_span *span, int i) {
+    return span->start_s + (span->end_s - span->start_s) * i / (BST_PATH_NODES - 1);
 }
 
 /* Light time and aberration. now_m: the object at the instant of the eye. *emitted_m: when the
  * light left. See bst_world_orbit_line_of_sight. */
-static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, int object, from source,
+static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_at b,
                        bst_vec3 now_m, bst_vec3 *emitted_m, bst_world_sight *out) {
     double tau = 0.0;
     bst_vec3 geometric = {0}, velocity;
     *emitted_m = now_m;
     for (int i = 0; i < 3; i++) {
         if (i > 0) {
-            BST_TRY(place_of(ctx, view, object, e->seconds - tau, source, emitted_m, &velocity));
+            BST_TRY(
+                place_of(ctx, view, b.object, e->seconds - tau, b.source, emitted_m, &velocity));
         }
         geometric = bst_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
         tau = bst_vec3_norm(geometric) / BST_LIGHT_SPEED_MPS;
@@ -269,19 +276,19 @@ bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer
         BST_TRY(eye_at(ctx, view, observer, seconds, source, &e));
         BST_TRY(place_of(ctx, view, object, seconds, source, &now, &velocity));
     }
-    BST_TRY(look(ctx, view, &e, object, source, now, &emitted, out));
+    BST_TRY(look(ctx, view, &e, (looked_at){object, source}, now, &emitted, out));
     shine(view, &e, object, emitted, out);
     return BST_OK;
 }
 
 static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
-                            const eye *const eyes[BST_PATH_NODES], int object, from source,
+                            const eye *const eyes[BST_PATH_NODES], looked_at b,
                             bst_scene_source_path *path, bst_scene_path_light *light,
                             bst_world_sight *mid) {
     for (int i = 0; i < BST_PATH_NODES; i++) {
         const eye *e = eyes[i];
         bst_vec3 now, velocity, emitted;
-        BST_TRY(place_of(ctx, view, object, e->seconds, source, &now, &velocity));
+        BST_TRY(place_of(ctx, view, b.object, e->seconds, b.source, &now, &velocity));
         path->place[i] = bst_vec3_sub(now, e->state.position_m);
         light->eye_m[i] = e->state.position_m;
         light->sun_m[i] = e->sky.bodies.sun_m;
@@ -289,14 +296,14 @@ static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
             continue;
         }
         bst_world_sight sight = {0};
-        BST_TRY(look(ctx, view, e, object, source, now, &emitted, &sight));
+        BST_TRY(look(ctx, view, e, b, now, &emitted, &sight));
         bst_vec3 unit = bst_vec3_unit(path->place[i]);
         bst_vec3 relative = bst_vec3_sub(e->state.velocity_mps, velocity);
         bst_vec3 about = bst_vec3_axpy(unit, 1.0 / BST_LIGHT_SPEED_MPS, relative);
         bst_vec3 apparent = bst_vec3_scale(sight.apparent, bst_vec3_dot(sight.apparent, about));
         path->shift[i / 2] = bst_vec3_sub(apparent, unit);
         if (i == BST_PATH_NODES / 2) {
-            shine(view, e, object, emitted, &sight);
+            shine(view, e, b.object, emitted, &sight);
             *mid = sight;
             light->lag_m = bst_vec3_sub(emitted, now);
             light->earth_bary_mps = e->sky.bodies.earth_bary_mps;
@@ -307,14 +314,14 @@ static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
     return BST_OK;
 }
 
-bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, int observer, int object,
-                               double start_s, double end_s, bst_scene_source_path *path,
-                               bst_scene_path_light *light, bst_world_sight *mid) {
+bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
+                               int object, bst_scene_source_path *path, bst_scene_path_light *light,
+                               bst_world_sight *mid) {
     const eye *eyes[BST_PATH_NODES];
     for (int i = 0; i < BST_PATH_NODES; i++) {
-        BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, i), i, &eyes[i]));
+        BST_TRY(known_eye(ctx, view, span->observer, node_time(span, i), i, &eyes[i]));
     }
-    BST_TRY(path_from(ctx, view, eyes, object, FROM_EPHEMERIS, path, light, mid));
+    BST_TRY(path_from(ctx, view, eyes, (looked_at){object, FROM_EPHEMERIS}, path, light, mid));
     double nearest = INFINITY;
     for (int i = 0; i < BST_PATH_NODES; i++) {
         nearest = fmin(nearest, bst_vec3_norm(path->place[i]));
@@ -322,10 +329,10 @@ bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, int observer,
     if (nearest < BST_EPHEMERIS_NEAREST_M) {
         eye direct[BST_PATH_NODES];
         for (int i = 0; i < BST_PATH_NODES; i++) {
-            BST_TRY(eye_at(ctx, view, observer, eyes[i]->seconds, FROM_ORBIT, &direct[i]));
+            BST_TRY(eye_at(ctx, view, span->observer, eyes[i]->seconds, FROM_ORBIT, &direct[i]));
             eyes[i] = &direct[i];
         }
-        BST_TRY(path_from(ctx, view, eyes, object, FROM_ORBIT, path, light, mid));
+        BST_TRY(path_from(ctx, view, eyes, (looked_at){object, FROM_ORBIT}, path, light, mid));
     }
     return BST_OK;
 }
@@ -343,34 +350,33 @@ static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
     return sum;
 }
 
-void bst_scene_view_light(const bst_world_view *view, int object, const bst_scene_source_path *path,
-                          const bst_scene_path_light *light, double start_s, double end_s, double u,
-                          bst_world_sight *out) {
+void bst_scene_view_light(const bst_world_view *view, const bst_world_view_span *span, int object,
+                          const bst_scene_source_path *path, const bst_scene_path_light *light,
+                          double u, bst_world_sight *out) {
     bst_vec3 eye_m = quartic(light->eye_m, u);
     bst_vec3 emitted_m = bst_vec3_add(bst_vec3_add(eye_m, quartic(path->place, u)), light->lag_m);
-    double seconds = start_s + u * (end_s - start_s) - light->light_time_s;
+    double seconds = span->start_s + u * (span->end_s - span->start_s) - light->light_time_s;
     bst_bodies bodies = {.sun_m = quartic(light->sun_m, u),
                          .earth_bary_mps = light->earth_bary_mps,
                          .pole = light->pole};
     shine_at(view->world, object, emitted_m, eye_m, &bodies, seconds, out);
 }
 
-bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, int observer, double start_s,
-                               double end_s, bst_vec3 axis, double half_angle_rad, int *indices,
-                               int *count) {
-    bst_ephemeris_cone cone = {
-        .axis = axis, .half_angle_rad = half_angle_rad, .half_span_s = 0.5 * (end_s - start_s)};
+bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
+                               bst_vec3 axis, double half_angle_rad, int *indices, int *count) {
+    bst_ephemeris_cone cone = {.axis = axis,
+                               .half_angle_rad = half_angle_rad,
+                               .half_span_s = 0.5 * (span->end_s - span->start_s)};
     const eye *e;
     const int middle = BST_PATH_NODES / 2;
-    BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, middle), middle, &e));
+    BST_TRY(known_eye(ctx, view, span->observer, node_time(span, middle), middle, &e));
     cone.apex_m = e->state.position_m;
     for (int i = 0; i < BST_PATH_NODES; i++) {
-        BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, i), i, &e));
+        BST_TRY(known_eye(ctx, view, span->observer, node_time(span, i), i, &e));
         bst_vec3 way = bst_vec3_sub(e->state.position_m, cone.apex_m);
         cone.apex_span_m = fmax(cone.apex_span_m, bst_vec3_norm(way));
     }
-    *count = bst_ephemeris_near(view->world->ephemeris, node_time(start_s, end_s, middle), &cone,
-                                indices);
+    *count = bst_ephemeris_near(view->world->ephemeris, node_time(span, middle), &cone, indices);
     return BST_OK;
 }
 

@@ -1,0 +1,186 @@
+/* The truth about a source: where its image is, how wide and how bright. */
+#include "sim/optics/psf.h"
+#include "sim/world/scene/field_image.h"
+#include "sim/world/scene/field_internal.h"
+#include "sim/world/scene/row_exposure.h"
+
+/* Of the image of a point; NAN when it is behind the camera. */
+static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_source *source) {
+    bst_scene_image_moments m = {0};
+    double x[BST_FIELD_SIGMA_POINTS], y[BST_FIELD_SIGMA_POINTS];
+    for (int p = 0; p < BST_FIELD_SIGMA_POINTS; p++) {
+        bst_vec3 d = bst_scene_source_direction(source, field->sigma_time[p]);
+        x[p] = y[p] = NAN;
+        (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
+                                 &y[p]);
+    }
+    for (int p = 1; p < BST_FIELD_SIGMA_POINTS; p++) {
+        m.x_mean += x[p] / (BST_FIELD_SIGMA_POINTS - 1);
+        m.y_mean += y[p] / (BST_FIELD_SIGMA_POINTS - 1);
+    }
+    for (int p = 1; p < BST_FIELD_SIGMA_POINTS; p++) {
+        double dx = x[p] - m.x_mean, dy = y[p] - m.y_mean;
+        m.xx += dx * dx / (BST_FIELD_SIGMA_POINTS - 1);
+        m.xy += dx * dy / (BST_FIELD_SIGMA_POINTS - 1);
+        m.yy += dy * dy / (BST_FIELD_SIGMA_POINTS - 1);
+    }
+    return m;
+}
+
+/* Variance that a path has beyond a straight one, over the PSF's, from which on it is followed:
+ * what a bend across is taken for a Gaussian's then makes 3 % of a long streak's signal-to-noise
+ * ratio. */
+static const double BENT = 0.12;
+
+/* What a rolling shutter sees of a source: it is exposed while the row where it is. */
+static bst_scene_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
+                                             const bst_scene_source *source, bst_window window,
+                                             double u[2], bst_quat *q_mid, bst_truth_item *out) {
+    const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
+    double duration = track->time_s[track->count - 1];
+    bst_row_source_times(field->camera, &rows, track, source, u);
+    double middle = 0.5 * (u[0] + u[1]);
+    const double when[3] = {u[0], middle, u[1]};
+    double *const x[3] = {&out->x_start_px, &out->x_mid_px, &out->x_end_px};
+    double *const y[3] = {&out->y_start_px, &out->y_mid_px, &out->y_end_px};
+    *q_mid = bst_los_track_attitude(track, middle * duration);
+    for (int k = 0; k < 3; k++) {
+        bst_quat q = bst_los_track_attitude(track, when[k] * duration);
+        (void)bst_camera_project(field->camera,
+                                 bst_quat_rotate(q, bst_scene_source_direction(source, when[k])),
+                                 x[k], y[k]);
+    }
+    out->delay_s = (middle - 0.5) * duration;
+    out->electrons = source->electrons_per_s * duration *
+                     (bst_scene_source_light(source, u[1]) - bst_scene_source_light(source, u[0]));
+    return bst_scene_image_by_light(field->camera, track, source, u[0], u[1]);
+}
+
+static bst_truth_item item_without_place(const bst_field *field, const bst_scene_source *source) {
+    return (bst_truth_item){.kind = source->kind,
+                            .id = source->id,
+                            .norad = source->kind == BST_SOURCE_OBJECT
+                                         ? bst_world_object(field->world, (int)source->id)->norad
+                                         : 0,
+                            .ra_rad = source->ra_rad,
+                            .dec_rad = source->dec_rad,
+                            .v_mag = source->v_mag,
+                            .electrons = source->electrons_per_s * field->exposure_s,
+                            .sunlit_fraction = source->sunlit_fraction,
+                            .phase_rad = source->phase_rad,
+                            .range_m = source->range_m,
+                            .x_start_px = NAN,
+                            .y_start_px = NAN,
+                            .x_mid_px = NAN,
+                            .y_mid_px = NAN,
+                            .x_end_px = NAN,
+                            .y_end_px = NAN,
+                            .x_chief_px = NAN,
+                            .y_chief_px = NAN,
+                            .x_centroid_px = NAN,
+                            .y_centroid_px = NAN};
+}
+
+/* The positions of a source at start, middle and end, and the moments of its image; u: the share of
+ * the track in which it is exposed. */
+static bst_scene_image_moments place(const bst_field *field, const bst_los_track *track,
+                                     const bst_scene_source *source, bst_window window, double u[2],
+                                     bst_quat *q_mid, bst_truth_item *out) {
+    const bst_camera *camera = field->camera;
+    if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
+        return place_in_rows(field, track, source, window, u, q_mid, out);
+    }
+    (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
+    (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
+                            &out->y_end_px);
+    (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
+                             &out->x_mid_px, &out->y_mid_px);
+    return source->rate ? bst_scene_image_by_light(field->camera, track, source, 0.0, 1.0)
+                        : smear_of(field, source);
+}
+
+/* How long and wide an image is, px and px^2. */
+typedef struct image_width {
+    double length;        /* from the first to the last place */
+    double along, across; /* as of bst_image_blur */
+    double sharp;         /* variance of the PSF alone */
+    double widened;       /* variance that adding pixels adds */
+} image_width;
+
+/* The sum of the squared shares of the light in pixels. `path`: without the source's disc. */
+static double squared_light(const bst_camera *camera, const bst_los_track *track,
+                            const bst_scene_source *source, const double u[2],
+                            const bst_scene_image_moments *image,
+                            const bst_scene_image_moments *path, const image_width *w) {
+    double along = w->along, across = w->across, sharp = w->sharp, widened = w->widened;
+    double gauss = bst_optics_image_squared(sqrt(along * along + widened),
+                                            sqrt(across * across + widened), w->length);
+    double square = gauss, sigma;
+    bool plain = !camera->psf || bst_psf_gaussian(camera->psf, &sigma);
+    if (!plain) {
+        /* jitter widens both ways alike; what the path has more along itself is its length */
+        double blurred = across * across - sharp;
+        double drawn = sqrt(12.0 * fmax(image->xx + image->yy - 2.0 * blurred, 0.0));
+        square = bst_psf_squared_image(camera->psf, source->colour, image->x_mean, image->y_mean,
+                                       blurred + widened, blurred + widened, drawn);
+    }
+    double excess = along * along + across * across - 2.0 * sharp;
+    if (excess > BENT * (sharp + widened)) {
+        /* a disc's own light widens the path */
+        double disc = 0.5 * fmax(image->xx + image->yy - path->xx - path->yy, 0.0);
+        double exact = bst_scene_image_squared_path(camera, track, source, u, path, excess,
+                                                    sharp + widened + disc);
+        if (isfinite(exact)) {
+            square = plain ? exact : square * exact / gauss;
+        }
+    }
+    return square;
+}
+
+void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
+                          const bst_scene_source *source, bst_window window, int binning,
+                          const bst_truth *header, bst_truth_item *out) {
+    const bst_camera *camera = field->camera;
+    *out = item_without_place(field, source);
+    bst_quat q_mid = field->q_mid;
+    double u[2] = {0.0, 1.0}; /* of the track, while the source is exposed */
+    bst_scene_image_moments image = place(field, track, source, window, u, &q_mid, out);
+    bst_scene_image_moments path = image;
+    out->x_chief_px = image.x_mean;
+    out->y_chief_px = image.y_mean;
+    if (source->shape) {
+        bst_scene_image_add_disc(field->camera, q_mid, source, &image);
+    }
+    bst_scene_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
+    if (isfinite(image.x_mean)) {
+        out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
+    }
+    double dark =
+        bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
+    /* pixels that are added are read once; their sum is the image blurred by a wider box */
+    double added = (double)binning * binning, widened = (added - 1.0) / 12.0;
+    double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
+    double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
+    double along, across;
+    double sharp = bst_image_blur(camera, source, &image, out->x_end_px - out->x_start_px,
+                                  out->y_end_px - out->y_start_px, &along, &across);
+    if (isfinite(length) && variance > 0.0) {
+        const image_width w = {length, along, across, sharp, widened};
+        out->snr = out->electrons *
+                   sqrt(squared_light(camera, track, source, u, &image, &path, &w) / variance);
+    }
+    if (source->occulted) {
+        out->flags |= BST_TRUTH_OCCULTED;
+    }
+    if (image.x_mean >= window.x0 - 0.5 && image.x_mean < window.x0 + window.width - 0.5 &&
+        image.y_mean >= window.y0 - 0.5 && image.y_mean < window.y0 + window.height - 0.5) {
+        out->flags |= BST_TRUTH_IN_FIELD;
+    }
+    /* peak of the image: of a point 1 / (2 pi sigma^2), of a long streak 1 / (sqrt(2 pi) sigma
+     * length) */
+    double peak =
+        out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
+    if (peak + dark > camera->full_well_e) {
+        out->flags |= BST_TRUTH_SATURATED;
+    }
+}

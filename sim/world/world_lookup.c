@@ -1,0 +1,16 @@
+/* Objects by name, and files by path. */
+#include <stdio.h>
+
+#include "sim/world/world_build.h"
+
+int bst_world_find_object(const bst_world *world, const char *name) {
+    return world->object_names ? bst_name_index_find(world->object_names, name) : -1;
+}
+
+bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path) {
+    bst_world_path full;
+    bool as_it_is = path[0] == '/' || !*path || !*b->base_dir;
+    snprintf(full.text, sizeof full.text, "%s%s%s", as_it_is ? "" : b->base_dir,
+             as_it_is ? "" : "/", path);
+    return full;
+}
