@@ -3,19 +3,22 @@
 
 usage: docs/make_c_api.py HEADERS_FOLDER OUT_FOLDER
 
-HEADERS_FOLDER is what `make install` puts under include/boresight: the set of public headers is
-listed in cmake/install.cmake and nowhere else.
+HEADERS_FOLDER is include/boresight, of the repository or installed: both have the same headers.
+Programs include them as "boresight/NAME.h", by the name of that folder.
 """
 import pathlib
 import re
 import sys
+import textwrap
 
 SECTION = re.compile(r"(Given|Given and returned|Returned|Errors|Ownership|Notes?|References?|Threads?)\s*:\s*(.*)", re.DOTALL)
 NAME = re.compile(r"\b((?:bst|BST)_\w+)\b")
 
 
 def markdown(text):
-    """Plain comment text as Markdown; names of the interface as code."""
+    """Plain comment text as Markdown; names of the interface as code, and what is between backquotes already."""
+    if match := re.search(r"`[^`]+`", text):
+        return markdown(text[:match.start()]) + match[0] + markdown(text[match.end():])
     out = re.sub(r"([\\`*<>\[\]#|$~])", r"\\\1", text)
     out = re.sub(r"(?<![\w`])([A-Za-z]\w*_\w*(?:->\w+|\.\w+)?)", r"`\1`", out)
     return re.sub(r"(?m)^(\s*)([-+]|\d+\.)(\s)", r"\1\\\2\3", out)
@@ -40,6 +43,9 @@ def describe(comment):
     out = []
     for lines in filter(None, paragraphs):
         match = SECTION.match(lines[0].strip())
+        if not match and all(line.startswith("  ") for line in lines):
+            out.append("```c\n" + textwrap.dedent("\n".join(lines)) + "\n```")
+            continue
         if not match:
             out.append(markdown(" ".join(line.strip() for line in lines)))
             continue
@@ -84,7 +90,7 @@ def items(text):
         if rest[0] == "#":
             line = re.match(r"#(?:[^\\\n]|\\\n|\\.)*", rest)[0]
             position += len(line)
-            if re.match(r"#\s*define\s+BST_\w+_H\b", line) or not re.match(r"#\s*define", line):
+            if re.match(r"#\s*define\s+\w+_H\s*$", line) or not re.match(r"#\s*define", line):
                 continue
             trailing = re.search(r"/\*.*?\*/\s*$", line, re.DOTALL)
             after = trailing[0] if trailing else ""
@@ -151,24 +157,25 @@ def page(header, text):
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
-    source, target = map(pathlib.Path, sys.argv[1:])
+    source, target = (pathlib.Path(word).resolve() for word in sys.argv[1:])
     headers = sorted(source.rglob("*.h"))
     if not headers:
         sys.exit(f"{source}: there are no headers here")
     target.mkdir(parents=True, exist_ok=True)
     listed = []
     for path in headers:
-        header = path.relative_to(source).as_posix()
-        out = header.replace("/", "_").removesuffix(".h")
+        name = path.relative_to(source).as_posix()
+        header = f"{source.name}/{name}"
+        out = name.replace("/", "_").removesuffix(".h")
         text = path.read_text(encoding="utf-8")
         (target / f"{out}.md").write_text(page(header, text), encoding="utf-8")
         match = re.match(r"\s*(/\*.*?\*/)", text, re.DOTALL)
-        purpose = re.split(r"(?<=[.:;])\s", " ".join(unwrap(match[1])))[0] if match else ""
+        purpose = re.split(r"(?<=\.)\s+(?=[A-Z])|\s{2,}", " ".join(unwrap(match[1])).strip())[0] if match else ""
         listed.append((header, out, purpose))
     rows = "\n".join(f"| [{header}]({out}.md) | {markdown(purpose)} |" for header, out, purpose in listed)
     toc = "\n".join(out for _, out, _ in listed)
     (target / "index.md").write_text(
-        "# C API\n\nThese pages are generated from the comment blocks of the installed headers. "
+        "# C API\n\nThese pages are generated from the comment blocks of the public headers. "
         "[Use Boresight as a library](../../how-to/library.md) shows how to compile and link.\n\n"
         f"| header | purpose |\n|---|---|\n{rows}\n\n```{{toctree}}\n:hidden:\n:maxdepth: 1\n{toc}\n```\n",
         encoding="utf-8")

@@ -117,6 +117,15 @@ class Docs(unittest.TestCase):
         self.assertGreater(count, 200)
         self.assertEqual(wrong, [])
 
+    def test_c_api_has_each_public_header(self):
+        """One page for each header of include/boresight, under the name that programs include, and no other."""
+        found = []
+        for path in glob.glob(self.source + "/reference/c_api/*.md"):
+            with open(path, encoding="utf-8") as file:
+                found += re.findall(r'^`#include "(.*)"`$', file.read(), re.MULTILINE)
+        public = [os.path.relpath(path, "include") for path in glob.glob("include/boresight/**/*.h", recursive=True)]
+        self.assertEqual(sorted(found), sorted(public))
+
     def test_paths_in_the_sources_exist(self):
         """What messages, help texts and comments call docs/... is there."""
         wrong = []
