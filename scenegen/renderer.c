@@ -160,7 +160,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_detector_keep_flags(ctx, r->detector);
     }
     if (status == BST_OK) {
-        r->law_degree = r->fourier        ? 0
+        r->law_degree = r->fourier          ? 0
                         : r->law_degree > 0 ? r->law_degree
                                             : bst_profile_law_degree(sigma_px);
         status =
@@ -251,8 +251,8 @@ static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_requ
         .margin_px = bst_renderer_margin_px(r),
         .bytes = r->most_bytes,
         .nodes = r->options.most_nodes};
-    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->budget, r->fourier,
-                                &limits, q));
+    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->budget, r->fourier, &limits,
+                                q));
     r->stats = (bst_render_stats){.sources = r->plan.count,
                                   .nodes = (long long)r->plan.blocks * BST_BLOCK,
                                   .nodes_bounded = r->plan.bounded,

@@ -216,9 +216,9 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                   .request = q,
                   .dark_e2 = dark_e2,
                   .most_nodes = limits->nodes > 0 ? limits->nodes : BST_SCENE_MOST_NODES,
-                  .beyond = fourier ? bst_fourier_render_band(fourier)->beyond * binning *
-                                            binning * q->track->time_s[q->track->count - 1]
-                                      : 0.0};
+                  .beyond = fourier ? bst_fourier_render_band(fourier)->beyond * binning * binning *
+                                          q->track->time_s[q->track->count - 1]
+                                    : 0.0};
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
     uint64_t most = limits->bytes < counted ? limits->bytes : counted;
     /* two blocks have a whole group of boxes */

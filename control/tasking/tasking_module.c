@@ -81,7 +81,7 @@ static bst_status step(void *self, struct bst_step *s) {
             *task = t->sensors[i].task;
         }
         bst_step_set_lookahead(s, bst_member_port(PORT_COUNT, i, PORT_TASK),
-                         bst_tasking_quiet_until(t, i));
+                               bst_tasking_quiet_until(t, i));
     }
     return report(t, s);
 }

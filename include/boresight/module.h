@@ -41,16 +41,18 @@ typedef struct bst_port {
 enum {
     BST_MODULE_READS_TRUTH = 1u << 0, /* gets env->world; onboard modules do not */
     BST_MODULE_NEEDS_DEVICE = 1u << 1,
-    BST_MODULE_DEFERRABLE = 1u << 2, /* deferrable: may step in another thread than modules that do not
-                                   read it. Shares only constant or locked data with them,
-                                   has no period and never requests a wake */
-    BST_MODULE_NEEDS_LINK = 1u << 3, /* gets env->link: another program takes its part */
-    BST_MODULE_MULTI_SENSOR = 1u << 4,      /* multi-sensor: one instance for all sensors, named beside the
-                                        observers. It has each port once per sensor
-                                        (bst_member_port); env->knowledge is NULL */
-    BST_MODULE_HAS_LOOKAHEAD = 1u << 5, /* BST_MODULE_MULTI_SENSOR with a lookahead (bst_step_set_lookahead), so that
-                                      sensors may run ahead. It has a period, never requests a
-                                      wake, and reads its queues to the end in each step */
+    BST_MODULE_DEFERRABLE =
+        1u << 2, /* deferrable: may step in another thread than modules that do not
+               read it. Shares only constant or locked data with them,
+               has no period and never requests a wake */
+    BST_MODULE_NEEDS_LINK = 1u << 3,   /* gets env->link: another program takes its part */
+    BST_MODULE_MULTI_SENSOR = 1u << 4, /* multi-sensor: one instance for all sensors, named beside
+                                   the observers. It has each port once per sensor
+                                   (bst_member_port); env->knowledge is NULL */
+    BST_MODULE_HAS_LOOKAHEAD =
+        1u << 5, /* BST_MODULE_MULTI_SENSOR with a lookahead (bst_step_set_lookahead), so that
+               sensors may run ahead. It has a period, never requests a
+               wake, and reads its queues to the end in each step */
 };
 
 /* One of the sensors that a BST_MODULE_MULTI_SENSOR module serves. */
@@ -93,8 +95,8 @@ typedef struct bst_module_env {
     double frame_latency_s; /* from an exposure's end until control has what it showed: the declared
                                delays in between */
     struct bst_link *link;  /* NULL unless the descriptor asks for it */
-    const bst_fleet_member *members; /* of a BST_MODULE_MULTI_SENSOR one: all sensors, in the order of the
-                                        scenario; else NULL */
+    const bst_fleet_member *members; /* of a BST_MODULE_MULTI_SENSOR one: all sensors, in the order
+                                        of the scenario; else NULL */
     int member_count;
 } bst_module_env;
 
@@ -117,9 +119,10 @@ typedef struct bst_module_desc {
     bst_status (*finish)(void *self, struct bst_step *step);
     /* May be NULL; only for BST_MODULE_DEFERRABLE. The engine may call it before a step, on another
      * thread, while earlier steps or their `ahead` are running. It does the work that depends only
-     * on that step's inputs from modules that are not BST_MODULE_DEFERRABLE, and reads no others. It
-     * publishes and counts nothing, and stores its results by bst_step_lane for the step. The step
-     * does the work itself if there is no stored result, so that an error here occurs there again.
+     * on that step's inputs from modules that are not BST_MODULE_DEFERRABLE, and reads no others.
+     * It publishes and counts nothing, and stores its results by bst_step_lane for the step. The
+     * step does the work itself if there is no stored result, so that an error here occurs there
+     * again.
      */
     bst_status (*ahead)(void *self, struct bst_step *step);
     /* May be NULL. Roles, NULL-terminated, that this module replaces if the sensor's
@@ -220,9 +223,9 @@ void bst_step_wake_at(struct bst_step *step, int64_t tick);
  *
  * Given:     port  index in desc->ports
  *            tick  absolute; an earlier one than declared before has no effect
- * Errors:    the step fails with BST_ERR_STATE if the module lacks BST_MODULE_HAS_LOOKAHEAD, or writes
- *            earlier after all
- * Reference: Fujimoto, Parallel and Distributed Simulation Systems, 2000, chapter 3 (lookahead) */
+ * Errors:    the step fails with BST_ERR_STATE if the module lacks BST_MODULE_HAS_LOOKAHEAD, or
+ * writes earlier after all Reference: Fujimoto, Parallel and Distributed Simulation Systems, 2000,
+ * chapter 3 (lookahead) */
 void bst_step_set_lookahead(struct bst_step *step, int port, int64_t tick);
 
 /* In step: records an event.

@@ -123,8 +123,8 @@ static nearest_light nearest_of(const bst_generator *g, const generator_source *
     return n;
 }
 
-/* Where a streak so faint is found that the top of the filters' output scatters along it. beside: of
- * the output there, what neighbours give that are found too. */
+/* Where a streak so faint is found that the top of the filters' output scatters along it. beside:
+ * of the output there, what neighbours give that are found too. */
 static void centroid_error(const bst_generator *g, const generator_source *s,
                            const generator_source *merged, int count, double beside,
                            generator_blend *out) {

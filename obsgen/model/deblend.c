@@ -9,8 +9,8 @@ static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* Image processing separates two sources where the saddle between them is so much lower than the
  * fainter one; and two places closer than this share of the FWHM are one. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
-/* It looks at what is above these shares of the threshold: the output of a source between four pixels
- * on one of them. */
+/* It looks at what is above these shares of the threshold: the output of a source between four
+ * pixels on one of them. */
 static const double LOOK_CORNER = 0.93, LOOK_SHARE = 0.65;
 /* Further apart than this, and their streaks, no two share a maximum. */
 static const double FAR_SIGMAS = 8.0;

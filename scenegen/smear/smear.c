@@ -436,7 +436,8 @@ static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *
     return cell->error[n];
 }
 
-/* The level for a star: the coarsest one that keeps its tolerance, tried from the level that the tolerance asks for. */
+/* The level for a star: the coarsest one that keeps its tolerance, tried from the level that the
+ * tolerance asks for. */
 static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_cell *cell,
                              const bst_smear_level **out, double *error) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);

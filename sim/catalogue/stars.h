@@ -90,7 +90,8 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
 bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
                           bst_star *out) BST_MUST_CHECK;
 
-/* Errors of the onboard star catalogue; what happens to a star follows from its identity and the seed. */
+/* Errors of the onboard star catalogue; what happens to a star follows from its identity and the
+ * seed. */
 typedef struct bst_star_errors_config {
     double dropped_fraction, displaced_fraction, displaced_sigma_arcsec;
     uint64_t seed;

@@ -130,7 +130,8 @@ bst_status bst_study_document_probed(bst_ctx *ctx, const bst_study *study,
 
 /* ------------------------------------------------------------------ the study */
 
-/* Makes numbers raw items whose text reads back as the same bits, which cJSON does not guarantee. */
+/* Makes numbers raw items whose text reads back as the same bits, which cJSON does not guarantee.
+ */
 static void make_exact(cJSON *node) {
     for (cJSON *item = node ? node->child : NULL; item;) {
         cJSON *next = item->next;

@@ -299,7 +299,8 @@ static void describe(const make *m, bst_module_desc descs[ROLES + 1]) {
     }
     all[CONTROL].port_count -= !m->closed; /* without the tracks */
     all[ROLES].port_count -= !m->link_tracks;
-    all[ROLES].flags = BST_MODULE_MULTI_SENSOR | (m->wakes ? 0u : (unsigned)BST_MODULE_HAS_LOOKAHEAD);
+    all[ROLES].flags =
+        BST_MODULE_MULTI_SENSOR | (m->wakes ? 0u : (unsigned)BST_MODULE_HAS_LOOKAHEAD);
     memcpy(descs, all, sizeof all);
 }
 

@@ -172,17 +172,18 @@ static const bst_port ahead_link_ports[] = {
 };
 enum { AHEAD_EXPOSURE = 1, AHEAD_TASK, AHEAD_PORTS };
 static const bst_module_desc ahead_sensor_module = FAKE_DESC(ahead_sensor_ports),
-                             ahead_link_module = {.abi = BST_MODULE_ABI,
-                                                  .role = "fake",
-                                                  .type = "ahead",
-                                                  .doc = "Links, and promises.",
-                                                  .flags = BST_MODULE_MULTI_SENSOR | BST_MODULE_HAS_LOOKAHEAD,
-                                                  .config_bytes = sizeof(fake *),
-                                                  .ports = ahead_link_ports,
-                                                  .port_count = AHEAD_PORTS,
-                                                  .create = fake_create,
-                                                  .step = fake_step,
-                                                  .destroy = fake_destroy};
+                             ahead_link_module = {
+                                 .abi = BST_MODULE_ABI,
+                                 .role = "fake",
+                                 .type = "ahead",
+                                 .doc = "Links, and promises.",
+                                 .flags = BST_MODULE_MULTI_SENSOR | BST_MODULE_HAS_LOOKAHEAD,
+                                 .config_bytes = sizeof(fake *),
+                                 .ports = ahead_link_ports,
+                                 .port_count = AHEAD_PORTS,
+                                 .create = fake_create,
+                                 .step = fake_step,
+                                 .destroy = fake_destroy};
 
 /* value2: as in busy_step. Tells of its task, and writes two exposures every third step. */
 static bst_status ahead_sensor_step(fake *self, struct bst_step *step) {
@@ -216,7 +217,8 @@ static bst_status ahead_link_step(fake *self, struct bst_step *step) {
             bst_task *task = bst_step_write(step, base + AHEAD_TASK, NULL);
             task->id = tick;
         }
-        bst_step_set_lookahead(step, base + AHEAD_TASK, (tick / holds + 1) * holds - (i == 2 ? 7 : 0));
+        bst_step_set_lookahead(step, base + AHEAD_TASK,
+                               (tick / holds + 1) * holds - (i == 2 ? 7 : 0));
     }
     return BST_OK;
 }

@@ -250,7 +250,8 @@ void bst_engine_release_read(bst_engine *engine, int process) {
 
 void bst_step_wake_at(struct bst_step *step, int64_t tick) {
     if (step->self->spec.desc->flags & BST_MODULE_HAS_LOOKAHEAD) {
-        fail_in_step(step, "asks to be woken, which a module with BST_MODULE_HAS_LOOKAHEAD may not");
+        fail_in_step(step,
+                     "asks to be woken, which a module with BST_MODULE_HAS_LOOKAHEAD may not");
     } else if (tick > step->tick && tick < step->self->wake) {
         step->self->wake = tick;
     }

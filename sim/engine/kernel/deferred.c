@@ -67,7 +67,8 @@ static void put_last(bst_engine *engine) {
 
 void bst_engine_set_deferred(bst_engine *engine) {
     for (int i = 0; i < engine->instance_count; i++) {
-        engine->instances[i]->deferred = engine->instances[i]->spec.desc->flags & BST_MODULE_DEFERRABLE;
+        engine->instances[i]->deferred =
+            engine->instances[i]->spec.desc->flags & BST_MODULE_DEFERRABLE;
     }
     for (bool changed = true; changed;) {
         changed = false;

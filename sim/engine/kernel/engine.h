@@ -94,11 +94,11 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Has bst_engine_run use `threads` threads, the calling one among them, by
  * docs/explanation/executor.md: sensors that share nothing but what multi-sensor modules link are
  * stepped at the same time (with one thread, or with pacing, the calling thread steps all of
- * them); deferred modules (BST_MODULE_DEFERRABLE that no other waits for), and the hooks `message` and
- * `event`, have a thread besides in any case, and a second one where a module looks ahead. Results
- * are those of one thread, to the bit. Modules of different sensors may share only what is constant
- * or locked. After bst_engine_load, and bst_engine_pace if it is called, and before the engine
- * runs. */
+ * them); deferred modules (BST_MODULE_DEFERRABLE that no other waits for), and the hooks `message`
+ * and `event`, have a thread besides in any case, and a second one where a module looks ahead.
+ * Results are those of one thread, to the bit. Modules of different sensors may share only what is
+ * constant or locked. After bst_engine_load, and bst_engine_pace if it is called, and before the
+ * engine runs. */
 bst_status bst_engine_parallel(bst_ctx *ctx, bst_engine *engine, int threads) BST_MUST_CHECK;
 
 /* Has bst_engine_run keep to the wall clock (BST_PACING_REALTIME), or only watch how long frames

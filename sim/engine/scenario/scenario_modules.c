@@ -70,7 +70,8 @@ static void list_names(const bst_scenario_registry *registry, const char *role, 
         if (role && strcmp(m->role, role) != 0) {
             continue;
         }
-        if (!role && (m->flags & BST_MODULE_MULTI_SENSOR || find_module(registry, m->role, NULL) != m)) {
+        if (!role &&
+            (m->flags & BST_MODULE_MULTI_SENSOR || find_module(registry, m->role, NULL) != m)) {
             continue; /* a role is listed once, and those that link sensors are not theirs */
         }
         size_t used = strlen(buffer);
@@ -129,7 +130,8 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
 }
 
 static bool fits(const bst_module_desc *desc, const bst_scenario_module_config *module) {
-    return (desc->flags & BST_MODULE_MULTI_SENSOR) == (module->observer < 0 ? BST_MODULE_MULTI_SENSOR : 0);
+    return (desc->flags & BST_MODULE_MULTI_SENSOR) ==
+           (module->observer < 0 ? BST_MODULE_MULTI_SENSOR : 0);
 }
 
 /* The descriptor that a block asks for; of a plug-in that is left unread, NULL. */
@@ -151,11 +153,12 @@ static bst_status find_desc(bst_ctx *ctx, const bst_json *json,
         bst_status status = bst_plugin_module(ctx, &plugin, module->name,
                                               *common->type ? common->type : NULL, &desc);
         if (status == BST_OK && !fits(desc, module)) {
-            status = bst_fail(ctx, BST_ERR_CONFIG, "plug-in %s: its module \"%s\" belongs %s",
-                              plugin.file, desc->type,
-                              desc->flags & BST_MODULE_MULTI_SENSOR ? "into \"tasking\", as it links "
-                                                               "sensors"
-                                                             : "into a sensor's modules");
+            status =
+                bst_fail(ctx, BST_ERR_CONFIG, "plug-in %s: its module \"%s\" belongs %s",
+                         plugin.file, desc->type,
+                         desc->flags & BST_MODULE_MULTI_SENSOR ? "into \"tasking\", as it links "
+                                                                 "sensors"
+                                                               : "into a sensor's modules");
         }
         if (status != BST_OK) {
             return bst_fail_prefix(ctx, status, "%s: %s", scenario->file, where);
