@@ -250,6 +250,7 @@ static void places_widen_by_what_is_not_known_of_the_path(void **state) {
      * flank and the noise in it, the 3/2 power; counted light makes it less */
     bst_assert_close(trembling[0] / straight[0], wider, 0.06);
     bst_assert_close(trembling[1] / straight[1], pow(wider, 1.5), 0.06);
+    close_scene(&s);
 }
 
 /* Places of streaks scatter by the bound along the path and across it, turned to x and y: with
