@@ -199,7 +199,9 @@ class Hostile(unittest.TestCase):
         done, words = result
         what = ([word[-200:] for word in words], done.stdout[-300:], done.stderr[-2000:])
         self.assertEqual(done.returncode, code, what)
-        lines = [line for line in done.stderr.splitlines() if not line.startswith("Try: ")]
+        # where the full star catalogue is not installed, the program says so first
+        lines = [line for line in done.stderr.splitlines()
+                 if not line.startswith(("Try: ", "boresight: warning: the full star catalogue"))]
         self.assertEqual(len(lines), 1, what)
         self.assertTrue(lines[0].startswith("boresight"), what)
         self.assertTrue(lines[0].isprintable(), what)
