@@ -1,4 +1,7 @@
 #include "control/control_internal.h"
+#include "sim/core/invariant.h"
+
+#include <assert.h>
 
 /* Half the interval over which a command's rate is taken: long against rounding, short against
  * the change of a line of sight's rate. */
@@ -51,6 +54,7 @@ static bst_status start_compensator(bst_ctx *ctx, bst_control *c) {
 
 bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
                             const bst_control_env *env) {
+    assert(control && config && env && env->tick_rate_hz > 0.0 && bst_is_positive(env->pixel_rad));
     if (config->period_s > 0.0 && config->exposure_s > config->period_s) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "exposure_s: %g s is longer than period_s of %g s; lower one or raise the "
@@ -132,6 +136,7 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
 
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
                                const bst_tracks *tracks) {
+    assert(c && tracks && tracks->count >= 0 && tracks->tick <= tick);
     bst_control_forget_aims(c); /* a new fix, and what is held may change */
     if (on_image_error(c)) {
         bst_image_loop_update(&c->image_loop, &c->pointing_error, tick, &tracks->attitude);
@@ -155,6 +160,7 @@ bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
 }
 
 void bst_control_retarget(bst_control *c, int64_t tick, const bst_region *region) {
+    assert(c && region);
     c->env.region = *region;
     c->held = c->lost = (bst_control_held){.id = 0};
     c->watch = (bst_control_watch){.jump_tick = tick};
@@ -188,6 +194,7 @@ static bst_status look(bst_ctx *ctx, bst_control *c, bool *arrived, double off_p
 
 bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *commanded,
                               bst_los_command *command, bst_control_status *status) {
+    assert(c && commanded && command && status && tick >= 0);
     if (c->mode == BST_MODE_IDLE) {
         BST_TRY(bst_control_start(ctx, c, tick));
     }

@@ -1,7 +1,9 @@
+#include <assert.h>
 #include <stdlib.h>
 
 #include "control/control.h"
 #include "control/modules.h"
+#include "sim/messages/message_invariants.h"
 
 enum {
     PORT_TRACKS,
@@ -74,6 +76,7 @@ static void destroy(void *self) {
 }
 
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    assert(env && env->knowledge && env->tick_rate_hz > 0 && config && self);
     module *m = calloc(1, sizeof *m);
     if (!m) {
         return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a controller");
@@ -136,11 +139,14 @@ static bst_status step(void *self, struct bst_step *s) {
     if (commanded) {
         bst_los_command *out = bst_step_write(s, PORT_COMMAND, NULL);
         *out = command;
+        assert(bst_los_command_is_valid(out));
     }
+    assert(bst_control_status_is_valid(status));
     if (!m->sensor_told) {
         bst_sensor_command *sensor = bst_step_write(s, PORT_SENSOR, NULL);
         *sensor = (bst_sensor_command){.exposure_s = c->config.exposure_s,
                                        .period_s = c->config.period_s};
+        assert(bst_sensor_command_is_valid(sensor));
         m->sensor_told = true;
     }
     for (int i = 0; i < c->transition_count; i++) {

@@ -1,5 +1,6 @@
 /* A line of sight that a peer of the link moves: an attitude simulator, or a payload processor that
  * says where it looks, how it exposes and what there is to see, and gets the frames. */
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -100,6 +101,7 @@ static bst_status make_outputs(bst_ctx *ctx, module *m) {
 }
 
 static bst_status prepare_external(const bst_module_env *env, const void *config_in, void *self) {
+    assert(env && env->world && env->link && config_in && self);
     const config *c = config_in;
     module *m = self;
     m->world = env->world;
@@ -169,6 +171,7 @@ static void take_pointing(module *m, struct bst_step *s, const bst_link_pointing
             now.tick = tick;
             m->samples[m->count++] = now;
         } else if (m->count <= MOST_ATTITUDES) {
+            assert(m->count < MOST_ATTITUDES + 1);
             m->samples[m->count++] = *sample;
         }
     }

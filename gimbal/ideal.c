@@ -1,8 +1,10 @@
 #include "gimbal/ideal.h"
 
+#include <assert.h>
 #include <math.h>
 
 bst_status bst_ideal_at(bst_ideal *ideal, bst_ctx *ctx, double seconds, bst_vec3 *direction) {
+    assert(ideal && direction && isfinite(seconds));
     double x = seconds * BST_IDEAL_NODES_PER_S;
     int64_t cell = (int64_t)floor(x);
     int64_t first = cell >= 1 || cell < 0 ? cell - 1 : cell;

@@ -1,8 +1,10 @@
+#include <assert.h>
 #include <string.h>
 
 #include "gimbal/ideal.h"
 #include "gimbal/modules.h"
 #include "gimbal/platform_step.h"
+#include "sim/messages/message_invariants.h"
 
 static const bst_port ports[BST_GIMBAL_PORTS] = {BST_GIMBAL_PORTS_ALL};
 
@@ -117,6 +119,7 @@ static bst_status step(void *self, struct bst_step *s) {
         *status = (bst_mount_status){.tick = bst_step_tick(s),
                                      .q_body_from_cam_at_zero = BST_QUAT_IDENTITY};
         bst_gimbal_publish_reading(s, &m->platform, &reading, status);
+        assert(bst_mount_status_is_valid(status));
     }
     return bst_gimbal_publish_nav(s, &m->base, n);
 }

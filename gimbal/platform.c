@@ -1,5 +1,9 @@
 #include "gimbal/platform.h"
 
+#include <assert.h>
+
+#include "sim/core/invariant.h"
+
 #define P bst_platform_config
 const bst_config_desc bst_platform_config_table[] = {
     BST_REALS(P, drift_arcsec_per_s, "arcsec/s", -3600, 3600, "[0, 0, 0]",
@@ -78,6 +82,7 @@ bst_status bst_platform_jitter_spectrum(bst_ctx *ctx, const bst_platform_config 
 
 bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
                              const bst_platform_config *config, const bst_platform_setup *setup) {
+    assert(platform && config && setup);
     bst_jitter_spectrum spectrum;
     const bst_quat q_nominal_from_gcrf = setup->q_nominal_from_gcrf;
     const double dt_s = setup->dt_s;
@@ -118,6 +123,7 @@ static bst_quat drifted(const bst_platform *platform, double seconds) {
 
 bst_status bst_platform_advance(bst_ctx *ctx, bst_platform *platform, int64_t n, double seconds,
                                 bst_vec3 reaction_nm) {
+    assert(platform && n >= 0 && isfinite(seconds) && bst_is_finite_vec3(reaction_nm));
     if (!platform->spacecraft) {
         platform->body.q_body_from_gcrf = drifted(platform, seconds);
         return BST_OK;
@@ -144,6 +150,8 @@ bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seco
 
 bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
                                           double seconds, bst_quat q_cam_from_body) {
+    assert(platform && n >= 0 && bst_is_share(fraction));
+    assert(bst_is_unit_quat(q_cam_from_body, 1.1e-6));
     double shake[2], next[2];
     bst_jitter_at(&platform->jitter, n, shake);
     if (fraction > 0.0) {
@@ -199,6 +207,7 @@ bst_status bst_platform_divider(bst_ctx *ctx, const char *key, double plant_rate
 
 void bst_platform_append_los(bst_los_history *history, int capacity, int64_t tick,
                              bst_quat q_cam_from_gcrf) {
+    assert(history && capacity > 0 && bst_is_unit_quat(q_cam_from_gcrf, 1.1e-6));
     history->capacity = capacity;
     bst_los_sample *sample = &history->items[history->written % capacity];
     sample->tick = tick;

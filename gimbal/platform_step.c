@@ -1,9 +1,12 @@
 #include "gimbal/platform_step.h"
+#include "sim/messages/message_invariants.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
 bst_status bst_gimbal_create(const bst_module_env *env, size_t bytes, bst_gimbal_prepare_fn prepare,
                              void (*destroy)(void *self), const void *config, void **self) {
+    assert(env && env->world && env->tick_rate_hz > 0 && prepare && destroy && config && self);
     if (env->period_ticks <= 0) {
         return bst_fail(env->ctx, BST_ERR_CONFIG, "a gimbal needs a rate: give rate_hz above zero");
     }
@@ -118,6 +121,7 @@ void bst_gimbal_publish_sight(struct bst_step *step, const bst_platform *platfor
     bst_los_history *history = bst_step_write(step, BST_GIMBAL_HISTORY, &capacity);
     history->jitter_rad2 = platform->unresolved_rad2;
     bst_platform_append_los(history, capacity, bst_step_tick(step), q_cam_from_gcrf);
+    assert(bst_los_history_is_valid(history));
 }
 
 bst_gimbal_reading bst_gimbal_exact(const bst_platform *platform, int64_t n,
@@ -142,6 +146,7 @@ void bst_gimbal_publish_reading(struct bst_step *step, const bst_platform *platf
                               .q_cam_from_gcrf = reading->q_cam_from_gcrf,
                               .axis_rad = {reading->axis_rad[0], reading->axis_rad[1]}};
     telemetry->written++;
+    assert(bst_pointing_telemetry_is_valid(telemetry));
     if (status) {
         bst_platform_add_status(platform, reading->q_body_from_gcrf, status);
     }
@@ -164,6 +169,7 @@ bst_status bst_gimbal_publish_nav(struct bst_step *step, const bst_gimbal_base *
                                .velocity_bary_mps = light.velocity_mps,
                                .sun_m = light.sun_m,
                                .moon_m = bst_vec3_sub(bodies.moon_m, state.position_m)};
+    assert(bst_nav_telemetry_is_valid(out));
     return BST_OK;
 }
 

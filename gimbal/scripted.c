@@ -1,8 +1,11 @@
 #include "gimbal/scripted.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+
+#include "sim/core/invariant.h"
 
 /* Two attitudes this close are one. */
 #define SAME_RAD 1e-9
@@ -47,6 +50,7 @@ static bst_status add(bst_ctx *ctx, bst_scripted *s, double tick, bst_quat q, co
         s->nodes = nodes;
         s->capacity = more;
     }
+    assert(s->count < s->capacity && bst_is_unit_quat(q, 1e-6));
     s->nodes[s->count++] = (node){tick, q};
     return BST_OK;
 }
@@ -97,6 +101,7 @@ bst_status bst_scripted_create(bst_ctx *ctx, const bst_frame_updates *updates,
                                const bst_camera *camera, const bst_exposure_config *exposure,
                                int64_t tick_rate_hz, bst_scripted_missing missing,
                                bst_scripted **out) {
+    assert(updates && camera && exposure && out && tick_rate_hz > 0);
     *out = NULL;
     bst_scripted *s = calloc(1, sizeof *s);
     if (!s) {

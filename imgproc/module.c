@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,7 @@
 #include "imgproc/imgproc.h"
 #include "imgproc/measure/discriminate.h"
 #include "imgproc/window_plan.h"
+#include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/onboard/nav_motion.h"
 #include "sim/optics/photometry.h"
@@ -150,6 +152,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
 }
 
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    assert(env && env->knowledge && env->tick_rate_hz > 0 && config && self);
     imgproc_module *m = calloc(1, sizeof *m);
     *self = NULL;
     if (!m) {
@@ -545,6 +548,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     if (out->lost > 0) {
         bst_step_count(step, "detections_overflow");
     }
+    assert(bst_detections_are_valid(out, capacity));
     return BST_OK;
 }
 

@@ -1,11 +1,13 @@
 #include "obsgen/calibration.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/invariant.h"
 #include "sim/io/manifest.h"
 
 const double bst_obsgen_lengths_px[BST_OBSGEN_LENGTHS] = {0.0, 5.0, 20.0, 60.0};
@@ -112,6 +114,7 @@ bst_status bst_obsgen_calibration_write(bst_ctx *ctx, const char *path,
 }
 
 double bst_obsgen_between(const double *nodes, const double *values, int count, double at) {
+    assert(nodes && values && count >= 2 && bst_is_ascending(nodes, count));
     if (at <= nodes[0]) {
         return values[0];
     }

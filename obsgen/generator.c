@@ -1,5 +1,6 @@
 #include "obsgen/generator.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,6 +25,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
                                 const bst_generator_settings *settings,
                                 const bst_obsgen_calibration *calibration, bst_rng_key key,
                                 bst_generator **out) {
+    assert(camera && knowledge && settings && calibration && out);
     *out = NULL;
     bst_generator *g = calloc(1, sizeof *g);
     if (!g) {
@@ -463,6 +465,7 @@ double bst_generator_draw(const bst_generator *g, const generator_source *s, int
 }
 
 void bst_generator_keep(bst_generator *g, const bst_obsgen_generated *item) {
+    assert(g && item && g->count >= 0);
     if (g->count < g->settings.capacity) {
         g->items[g->count++] = *item;
         return;
@@ -524,6 +527,8 @@ static int generated_by_row(const void *a, const void *b) {
 
 bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f,
                              bst_generator_result *out) {
+    assert(g && f && f->truth && out && f->truth->count >= 0 && f->exposure_s > 0.0);
+    assert(f->window.width > 0 && f->window.height > 0 && f->path_count >= 0);
     BST_TRY(set_frame(ctx, g, f));
     g->origin_x = f->window.x0 + 0.5 * (g->binning - 1);
     g->origin_y = f->window.y0 + 0.5 * (g->binning - 1);

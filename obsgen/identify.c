@@ -1,5 +1,6 @@
 #include "obsgen/identify.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "sim/optics/photometry.h"
@@ -102,6 +103,7 @@ static bst_status mistake(bst_ctx *ctx, const bst_identify_options *o, const bst
 bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
                                const bst_generator_frame *f, const bst_obsgen_generated *generated,
                                bst_detection *items, int count, int *identified) {
+    assert(o && f && identified && count >= 0 && ((generated && items) || count == 0));
     const bst_truth *t = f->truth;
     int found = 0;
     *identified = 0;
@@ -138,6 +140,7 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
 }
 
 void bst_obsgen_label(bst_detection *items, int count, bool found_stars, double streak_px) {
+    assert(count >= 0 && (items || count == 0));
     for (int i = 0; i < count; i++) {
         bst_detection *d = &items[i];
         bool unknown = d->label == BST_LABEL_UNKNOWN;

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,6 +8,7 @@
 #include "obsgen/identify.h"
 #include "obsgen/model/psf_bound.h"
 #include "obsgen/obsgen.h"
+#include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/optics/column_level.h"
 #include "sim/optics/photometry.h"
@@ -181,6 +183,7 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
 }
 
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    assert(env && env->world && env->knowledge && env->tick_rate_hz > 0 && self);
     obsgen *o = calloc(1, sizeof *o);
     *self = NULL;
     if (!o) {
@@ -379,6 +382,7 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
     if (truth->lost > 0) {
         bst_step_count(step, "truth_overflow");
     }
+    assert(bst_truth_is_valid(truth, capacity));
     pending *p = &o->waiting[e->id % PENDING];
     p->exposure_id = e->dropped ? -1 : e->id;
     if (e->dropped) {
@@ -514,6 +518,7 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
     if (out->lost > 0) {
         bst_step_count(step, "detections_overflow");
     }
+    assert(bst_detections_are_valid(out, capacity));
     return BST_OK;
 }
 

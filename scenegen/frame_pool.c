@@ -1,5 +1,6 @@
 #include "scenegen/frame_pool.h"
 
+#include <assert.h>
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -120,6 +121,7 @@ static const bst_frame_ops ops = {map, unmap, device_buffer, recycle};
 
 bst_status bst_frame_pool_create(bst_ctx *ctx, bst_device *device, int width, int height, int count,
                                  bst_frame_pool **out) {
+    assert(device && out && width > 0 && height > 0 && count > 0);
     *out = NULL;
     bst_frame_pool *pool = calloc(1, sizeof *pool + (size_t)count * sizeof *pool->frames);
     if (!pool) {
@@ -159,6 +161,7 @@ void bst_frame_pool_free(bst_frame_pool *pool) {
 
 bst_status bst_frame_pool_take(bst_ctx *ctx, bst_frame_pool *pool, int width, int height,
                                bst_frame **out, cl_mem *buffer) {
+    assert(pool && out && buffer && width > 0 && height > 0);
     pooled_frame *f = NULL;
     pthread_mutex_lock(&pool->lock);
     for (int i = 0; i < pool->count && !f; i++) {

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +10,7 @@
 #include "scenegen/module.h"
 #include "scenegen/planes.h"
 #include "scenegen/renderer.h"
+#include "sim/messages/message_invariants.h"
 #include "sim/optics/psf.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/scene/truth_list.h"
@@ -178,6 +180,7 @@ static bst_rng_key pattern_key(const bst_module_env *env, const bst_camera *came
 }
 
 static bst_status create(const bst_module_env *env, const void *config_object, void **self) {
+    assert(env && env->world && env->device && env->tick_rate_hz > 0 && config_object && self);
     const scenegen_config *c = config_object;
     scenegen *s = calloc(1, sizeof *s);
     *self = NULL;
@@ -298,6 +301,7 @@ static bst_status draw(scenegen *s, struct bst_step *step, const bst_exposure *e
                                    .window = e->window,
                                    .binning = e->binning > 1 ? e->binning : 1,
                                    .bits = (int)s->camera->bits};
+    assert(bst_frame_message_is_valid(message));
     return s->stage ? change_frame(ctx, s, message) : BST_OK;
 }
 
@@ -376,6 +380,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     if (truth->lost > 0) {
         bst_step_count(step, "truth_overflow");
     }
+    assert(bst_truth_is_valid(truth, capacity));
     if (!e->dropped && s->planes) {
         bst_planes *planes = bst_step_write(step, PORT_PLANES, NULL);
         BST_TRY(bst_plane_maker_render(ctx, s->planes, s->renderer, s->camera, &request,

@@ -1,5 +1,6 @@
 #include "scenegen/planes.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,6 +48,7 @@ static bool wants(const bst_plane_maker *m, bst_plane plane) {
 
 bst_status bst_plane_maker_create(bst_ctx *ctx, uint32_t planes, int width, int height,
                                   double threshold_sigma, bst_plane_maker **out) {
+    assert(out && width > 0 && height > 0 && threshold_sigma >= 0.0);
     *out = NULL;
     bst_plane_maker *m = calloc(1, sizeof *m);
     if (!m) {
@@ -334,6 +336,8 @@ static bst_status make_mask(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *rend
 bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                                   const bst_camera *camera, const bst_render_request *request,
                                   const int *item_source, int item_count, bst_planes *out) {
+    assert(m && renderer && camera && request && out && item_count >= 0);
+    assert(item_source || item_count == 0);
     int b = m->binning = request->binning > 1 ? request->binning : 1;
     m->width = request->window.width / b;
     m->height = request->window.height / b;

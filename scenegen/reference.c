@@ -1,5 +1,6 @@
 #include "scenegen/reference_internal.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -194,6 +195,7 @@ bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, cons
                                     bst_window window, const bst_los_track *track,
                                     const bst_scene_source *sources, int count, double tolerance,
                                     double *image) {
+    assert(camera && track && image && count >= 0 && (sources || count == 0) && tolerance > 0.0);
     size_t width = (size_t)window.width, height = (size_t)window.height;
     double sigma, *light = calloc(width * height, sizeof *light);
     if (!light) {

@@ -1,5 +1,6 @@
 #include "scenegen/renderer.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -124,6 +125,7 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
 
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
+    assert(device && camera && out);
     *out = NULL;
     BST_TRY(bst_render_camera_check(ctx, camera));
     bst_renderer *r = calloc(1, sizeof *r);
@@ -485,6 +487,7 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
 
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
                                bst_frame **out) {
+    assert(r && request && out && request->count >= 0 && (request->sources || request->count == 0));
     *out = NULL;
     BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     bst_frame *frame;
@@ -530,6 +533,7 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
 
 bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
                                           const bst_render_request *request, float *image) {
+    assert(r && request && image);
     BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
     BST_TRY(grow(ctx, r, &r->expected, bytes));
@@ -569,6 +573,7 @@ void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
 }
 
 double bst_renderer_peak_e(const bst_renderer *r, int index) {
+    assert(r && index >= 0);
     return r->rolled ? r->rolled_peak_e[index] : r->plan.peak_e[index];
 }
 

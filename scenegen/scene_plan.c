@@ -1,5 +1,6 @@
 #include "scenegen/scene_plan.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -194,6 +195,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                                bst_smear *smear, bst_error_budget *budget,
                                const bst_fourier_render *fourier,
                                const bst_scene_plan_limits *limits, const bst_render_request *q) {
+    assert(p && camera && smear && budget && limits && q && q->count >= 0);
     double read = camera->read_noise_e, brightest = 0.0;
     BST_TRY(reserve(ctx, p, q->count, fourier && bst_fourier_render_spectra(fourier) > 1));
     for (int i = 0; i < q->count; i++) {

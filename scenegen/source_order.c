@@ -1,5 +1,7 @@
 #include "scenegen/source_order.h"
 
+#include <assert.h>
+
 enum { SIDE = 64 }; /* cells along each axis */
 
 static int along(double from_centre, double centre, double pixels) {
@@ -14,6 +16,7 @@ static int cell_of(const bst_camera *camera, const bst_kernel_source_record *s) 
 
 void bst_source_order(const bst_camera *camera, const bst_kernel_source_record *list, int count,
                       bst_kernel_source_record *sorted) {
+    assert(camera && count >= 0 && ((list && sorted) || count == 0));
     int first[SIDE * SIDE + 1] = {0};
     for (int i = 0; i < count; i++) {
         first[cell_of(camera, &list[i]) + 1]++;

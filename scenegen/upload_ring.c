@@ -1,5 +1,6 @@
 #include "scenegen/upload_ring.h"
 
+#include <assert.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,6 +22,7 @@ struct bst_upload_ring {
 };
 
 bst_status bst_upload_ring_create(bst_ctx *ctx, bst_device *device, bst_upload_ring **out) {
+    assert(device && out);
     bst_upload_ring *s = calloc(1, sizeof *s);
     *out = s;
     if (!s) {
@@ -112,6 +114,7 @@ static bst_status grow(bst_ctx *ctx, bst_upload_ring *s, staged *p, size_t bytes
 
 bst_status bst_upload_ring_put(bst_ctx *ctx, bst_upload_ring *s, bst_upload_ring_part part,
                                const void *data, size_t bytes, cl_mem *buffer) {
+    assert(s && buffer && (data || bytes == 0));
     staged *p = &s->parts[s->present][part];
     BST_TRY(grow(ctx, s, p, bytes));
     if (!p->mapped) {

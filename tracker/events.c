@@ -1,4 +1,6 @@
 /* Manoeuvres and changes of brightness, told from the innovations of a track. */
+#include <assert.h>
+
 #include "tracker/mtt/multitarget_internal.h"
 
 static bool is_told(const bst_mtt_params *params) {
@@ -6,6 +8,7 @@ static bool is_told(const bst_mtt_params *params) {
 }
 
 double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s) {
+    assert(params && dt_s >= 0.0);
     if (!is_told(params)) {
         return 0.0;
     }
@@ -18,6 +21,8 @@ double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s) {
 
 bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
                              const bst_sky_innovation *innovation, double dt_s, double *statistic) {
+    assert(params && track && innovation && statistic);
+    assert(params->event_window >= 0 && params->event_window <= BST_MTT_EVENT_WINDOW);
     if (!is_told(params)) {
         return false;
     }
@@ -49,6 +54,8 @@ bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
 
 bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track, double z,
                              double dt_s, double *statistic) {
+    assert(params && track && statistic && !isnan(z));
+    assert(params->event_window >= 0 && params->event_window <= BST_MTT_EVENT_WINDOW);
     if (!is_told(params)) {
         return false;
     }

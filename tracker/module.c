@@ -1,7 +1,9 @@
 #include "tracker/module.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
+#include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "tracker/attitude/photocentre.h"
 #include "tracker/tracker.h"
@@ -73,6 +75,7 @@ static void destroy(void *self) {
 
 static bst_status create(const bst_module_env *env, const void *config, bst_filter_kind filter,
                          void **self) {
+    assert(env && env->knowledge && env->tick_rate_hz > 0 && config && self);
     bst_tracker_config with_filter = *(const bst_tracker_config *)config;
     with_filter.filter = filter;
     const bst_tracker_config *c = &with_filter;
@@ -189,6 +192,8 @@ static bst_status take(tracker_module *m, struct bst_step *step, const bst_detec
     bst_predictions *predictions = bst_step_write(step, PORT_PREDICTIONS, &prediction_room);
     bst_tracker_outcome outcome =
         bst_tracker_step(m->tracker, &input, tracks, track_room, predictions, prediction_room);
+    assert(bst_tracks_are_valid(tracks, track_room));
+    assert(bst_predictions_are_valid(predictions, prediction_room));
     if (outcome == BST_TRACKER_NO_ATTITUDE) {
         bst_step_count(step, "tracker_no_attitude");
     }

@@ -1,5 +1,7 @@
 #include "tracker/target.h"
 
+#include <assert.h>
+
 /* Adds x^T P^-1 x and ln det P of a 2-vector; INFINITY for a bad P or a misfit beyond `limit`. */
 static void add2(bst_target_fit *fit, const double x[2], double p11, double p12, double p22,
                  double limit) {
@@ -146,6 +148,7 @@ static void keep(bst_target *target, const bst_target_cue *cue, double seconds,
 
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count) {
+    assert(target && params && cue && count >= 0 && (tracks || count == 0));
     if (target->id != 0) {
         const bst_mtt_track *kept = find(tracks, count, target->id);
         if (kept && !kept->at_rest && !is_released(target, params, cue, kept)) {

@@ -1,5 +1,6 @@
 #include "tracker/tracker_internal.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -100,6 +101,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
 bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
                               const bst_camera *camera, int64_t tick_rate_hz,
                               bst_tracker_star_fn star, void *star_user, bst_tracker **out) {
+    assert(config && camera && star && out && tick_rate_hz > 0);
     *out = NULL;
     if (tick_rate_hz <= 0 || !star) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -284,6 +286,7 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
             continue;
         }
         bool bright = isfinite(item->v_mag) && isfinite(item->v_mag_sigma);
+        assert(count < t->max_detections);
         t->detections[count++] =
             (bst_mtt_detection){.sky = to_sky(t, item, attitude, light),
                                 .x_px = item->x_px,
@@ -461,6 +464,8 @@ bool bst_tracker_may_start_orbit(const bst_tracker *t) {
 bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity) {
+    assert(t && input && input->detections && input->nav && tracks && predictions);
+    assert(track_capacity >= 0 && prediction_capacity >= 0);
     const bst_detections *d = input->detections;
     int64_t tick = mid_tick(d);
     bst_tracker_outcome refusal = bst_tracker_check(t, d);

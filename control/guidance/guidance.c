@@ -1,5 +1,9 @@
 #include "control/guidance/guidance.h"
 
+#include <assert.h>
+
+#include "sim/core/invariant.h"
+
 /* Cones are widened for planning by this: aberration, and what mounts overshoot by. */
 #define WIDER_RAD (0.05 * BST_DEG_RAD)
 /* Half the interval over which a slew's rate and acceleration are taken. */
@@ -16,6 +20,7 @@
 
 void bst_guidance_init(bst_guidance *g, const bst_guidance_config *config,
                        const bst_guidance_env *env) {
+    assert(g && config && env);
     *g = (bst_guidance){
         .config = *config, .env = *env, .told_from_s = INFINITY, .told_until_s = INFINITY};
 }
@@ -418,6 +423,9 @@ void bst_guidance_see_sky(bst_guidance *g, const bst_nav_telemetry *nav, bst_qua
 
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) {
+    assert(g && command && give && bst_is_unit_vec3(command->direction_gcrf, BST_UNIT_TOLERANCE));
+    /* after the first command the boresight is not read */
+    assert(!boresight || g->commanded || bst_is_unit_vec3(*boresight, 1.1e-6));
     *give = true;
     if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =

@@ -1,4 +1,5 @@
 /* What guidance sees coming. */
+#include <assert.h>
 #include <stdio.h>
 
 #include "control/guidance/guidance.h"
@@ -124,6 +125,7 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
 }
 
 void bst_guidance_describe(const bst_guidance_event *event, char *text, size_t bytes) {
+    assert(event && text && bytes > 0);
     char until[48] = "for as long as is looked ahead";
     const char *why = bst_pointing_feasibility_reason(event->reason);
     if (isfinite(event->until_s)) {

@@ -1,8 +1,11 @@
 /* Where the body and the cones of keep-out are, by what guidance was told. */
+#include <assert.h>
+
 #include "control/guidance/guidance.h"
 
 int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,
                        bst_keep_out_zone zones[BST_ZONE_KINDS]) {
+    assert(g && nav && zones);
     const bst_guidance_config *c = &g->config;
     const bst_keep_out exclusion = {.sun_rad = c->sun_keep_out_deg * BST_DEG_RAD,
                                     .moon_rad = c->moon_keep_out_deg * BST_DEG_RAD,

@@ -1,12 +1,16 @@
 #include "control/guidance/keep_out.h"
 
+#include <assert.h>
+
 #include "sim/astro/bodies.h"
+#include "sim/core/invariant.h"
 
 /* Directions this far inside a cone's edge count as outside: paths run along edges. */
 #define EDGE_RAD 1e-9
 
 int bst_keep_out_zones(const bst_keep_out *exclusion, bst_vec3 position_m, bst_vec3 to_sun,
                        bst_vec3 to_moon, bst_keep_out_zone zones[BST_ZONE_KINDS]) {
+    assert(exclusion && zones && bst_is_finite_vec3(position_m));
     int count = 0;
     if (exclusion->sun_rad > 0.0 && bst_vec3_norm(to_sun) > 0.0) {
         zones[count++] =
@@ -30,6 +34,8 @@ int bst_keep_out_zones(const bst_keep_out *exclusion, bst_vec3 position_m, bst_v
 
 int bst_keep_out_inside(const bst_keep_out_zone *zones, int count, bst_vec3 direction,
                         double *depth_rad) {
+    assert((zones || count == 0) && count >= 0 && count <= BST_ZONES);
+    assert(bst_is_unit_vec3(direction, BST_UNIT_TOLERANCE));
     int deepest = -1;
     *depth_rad = EDGE_RAD;
     for (int i = 0; i < count; i++) {
@@ -91,6 +97,8 @@ static int with_products(bst_vec3 a, double p, bst_vec3 b, double q, bst_vec3 ou
 
 bool bst_keep_out_nearest(const bst_keep_out_zone *zones, int count, bst_vec3 direction,
                           bst_vec3 towards, bst_vec3 *out) {
+    assert((zones || count == 0) && out && count >= 0 && count <= BST_ZONES);
+    assert(bst_is_unit_vec3(direction, BST_UNIT_TOLERANCE));
     *out = direction;
     if (outside(zones, count, direction)) {
         return true;
@@ -314,6 +322,8 @@ static bool append(bst_keep_out_route *path, const bst_keep_out_arc *arc) {
 
 bool bst_keep_out_path(const bst_keep_out_zone *zones, int count, bst_vec3 from, bst_vec3 to,
                        bst_keep_out_route *out) {
+    assert(out && count >= 0 && (zones || count == 0));
+    assert(bst_is_unit_vec3(from, BST_UNIT_TOLERANCE) && bst_is_unit_vec3(to, BST_UNIT_TOLERANCE));
     *out = (bst_keep_out_route){.left_zone = -1, .target_zone = -1, .arcs = {{.from = from}}};
     if (count < 0 || count > BST_ZONES) {
         return false;
@@ -362,6 +372,7 @@ bool bst_keep_out_path(const bst_keep_out_zone *zones, int count, bst_vec3 from,
     }
     int chain[NODES], links = 0;
     for (int i = 1; g.nodes[i].before >= 0; i = g.nodes[i].before) {
+        assert(links < NODES);
         chain[links++] = i;
     }
     bool fits = true;
@@ -373,6 +384,7 @@ bool bst_keep_out_path(const bst_keep_out_zone *zones, int count, bst_vec3 from,
 
 bst_vec3 bst_keep_out_route_at(const bst_keep_out_route *path, double s_rad, bst_vec3 *tangent,
                                bst_vec3 *bend) {
+    assert(path && tangent && bend && path->count >= 0 && path->count <= BST_PATH_ARCS);
     *tangent = *bend = (bst_vec3){0.0, 0.0, 0.0};
     if (path->count == 0) {
         return path->arcs[0].from;

@@ -1,5 +1,7 @@
 #include "control/guidance/mount_inverse_kinematics.h"
 
+#include <assert.h>
+
 static const double turn_rad = 2.0 * BST_PI;
 
 /* Sine of the angle to the outer axis below which any outer angle points alike. */
@@ -69,6 +71,7 @@ static pair pair_of(const bst_mount_status *mount, bst_vec3 direction, const dou
 
 int bst_mount_angles(const bst_mount_status *mount, bst_vec3 direction_body,
                      const double near_rad[BST_MOUNT_AXES], double angle_rad[2][BST_MOUNT_AXES]) {
+    assert(mount && near_rad && angle_rad && mount->axes >= 0 && mount->axes <= BST_MOUNT_AXES);
     if (!bst_mount_steers(mount)) {
         return 0;
     }
@@ -178,6 +181,7 @@ static int served(const bst_mount_status *mount, const bst_vec3 *directions, int
 
 bool bst_mount_choose_turn(const bst_mount_status *mount, const bst_vec3 *directions_body,
                            int count, bst_mount_turn_choice *out) {
+    assert(mount && directions_body && out && count >= 1);
     double present[BST_MOUNT_AXES] = {0.0}, ways[2][BST_MOUNT_AXES];
     for (int i = 0; i < mount->axes; i++) {
         present[i] = mount->axis[i].angle_rad;

@@ -1,5 +1,7 @@
 #include "control/guidance/pointing_feasibility.h"
 
+#include <assert.h>
+
 #include "sim/astro/bodies.h"
 
 /* Half the interval over which rates are taken. */
@@ -211,6 +213,7 @@ bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
                                           const bst_pointing_feasibility_span *span,
                                           bst_pointing_feasibility_loss *losses, int most,
                                           int *count) {
+    assert(problem && span && losses && count && most >= 1);
     const bst_mount_status *mount = problem->mount;
     const double from_s = span->from_s;
     *count = 0;

@@ -1,9 +1,12 @@
 #include "control/guidance/slew.h"
 
+#include <assert.h>
 #include <math.h>
 
 bool bst_slew_axis_plan(double from_rad, double from_radps, double to_rad, double to_radps,
                         double rate_limit_radps, double accel_limit_radps2, bst_slew_axis *out) {
+    assert(out && isfinite(from_rad) && isfinite(to_rad));
+    assert(rate_limit_radps >= 0.0 && accel_limit_radps2 >= 0.0);
     double a = accel_limit_radps2;
     double limit = rate_limit_radps > 0.0 ? rate_limit_radps : INFINITY;
     double d = from_rad - to_rad, w = from_radps - to_radps;
@@ -33,6 +36,7 @@ bool bst_slew_axis_plan(double from_rad, double from_radps, double to_rad, doubl
 
 void bst_slew_axis_at(const bst_slew_axis *slew, double seconds, double *angle_rad,
                       double *rate_radps, double *accel_radps2) {
+    assert(slew && angle_rad && rate_radps && accel_radps2);
     *accel_radps2 = 0.0;
     if (seconds >= slew->duration_s) {
         *angle_rad = slew->to_rad + slew->to_radps * seconds;
@@ -127,6 +131,7 @@ static bool well_formed(const bst_slew_nodes *nodes, const bst_slew_limits *limi
 
 bool bst_slew_path_plan(const bst_slew_nodes *nodes, const bst_slew_limits *limits,
                         double start_rate, double end_rate, bst_slew_path *out) {
+    assert(nodes && limits && out);
     if (!well_formed(nodes, limits)) {
         return false;
     }

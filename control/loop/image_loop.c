@@ -1,5 +1,7 @@
 #include "control/loop/image_loop.h"
 
+#include <assert.h>
+
 #include "control/loop/tracking_loop.h"
 
 const char *const bst_control_compensators[] = {"pi", "pid", "lead_lag", "observer", NULL};
@@ -19,6 +21,7 @@ static double longest_wait_s(const bst_image_loop_env *env) {
 bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
                                const bst_compensator_config *config,
                                const bst_image_loop_env *env) {
+    assert(loop && config && env);
     *loop = (bst_image_loop){.env = *env, .frame_tick = INT64_MIN, .rest_tick = INT64_MIN};
     bst_aim_history_init(&loop->aims, env->tick_rate_hz,
                          longest_wait_s(env) + env->command_latency_s);
@@ -98,6 +101,7 @@ bool bst_image_loop_commanded(bst_image_loop *loop, bst_pointing_error *correcti
 
 bool bst_image_loop_update(bst_image_loop *loop, bst_pointing_error *correction, int64_t tick,
                            const bst_attitude_fix *fix) {
+    assert(loop && correction && fix);
     bst_vec3 aim;
     int64_t half = ticks_of(loop, 0.5 * loop->env.frame_exposure_s);
     if (!fix->valid || loop->slewing || fix->tick <= loop->frame_tick ||

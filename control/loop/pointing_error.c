@@ -1,11 +1,17 @@
 #include "control/loop/pointing_error.h"
 
+#include <assert.h>
+
+#include "sim/core/invariant.h"
+
 #define GATE_SIGMA 8.0
 #define REJECT_MAX 3
 
 void bst_pointing_error_init(bst_pointing_error *e, double disturbance_rms_rad,
                              double disturbance_cutoff_hz, double sigma_floor_rad,
                              double initial_sigma_rad, double initial_rate_sigma_radps) {
+    assert(e && bst_is_variance(disturbance_rms_rad) && bst_is_variance(sigma_floor_rad));
+    assert(bst_is_variance(initial_sigma_rad) && bst_is_variance(initial_rate_sigma_radps));
     double w = 2.0 * BST_PI * disturbance_cutoff_hz;
     *e = (bst_pointing_error){
         .density = disturbance_rms_rad * disturbance_rms_rad / 2.0 * w * w * w / 4.0,
@@ -33,6 +39,7 @@ static void restart(bst_pointing_error *e, int64_t tick, bst_quat error) {
 
 bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fix,
                                double tick_rate_hz) {
+    assert(e && fix && tick_rate_hz > 0.0);
     if (!fix->valid || (e->started && fix->tick < e->tick)) {
         return false;
     }

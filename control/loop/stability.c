@@ -1,5 +1,6 @@
 #include "control/loop/stability.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -226,6 +227,7 @@ static bst_status count_poles(bst_ctx *ctx, const bst_loop *loop, int turns, int
 }
 
 bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins *out) {
+    assert(loop && out);
     double end = BST_PI / loop->dt_s, omega = LOWEST_SHARE * end;
     enum { ROUND_HINT = 5 };
     static const double round_hint[ROUND_HINT] = {0.997, 0.9995, 1.0, 1.0005, 1.003};
@@ -236,6 +238,7 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins
     int stop_count = 0, stop = 0;
     for (int i = 0; i < loop->hints; i++) {
         for (int k = 0; k < ROUND_HINT; k++) {
+            assert(stop_count < loop->hints * ROUND_HINT);
             stops[stop_count++] = two_pi * loop->hint_hz[i] * round_hint[k];
         }
     }
@@ -291,6 +294,7 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins
 
 void bst_loop_step_response(const bst_loop *loop, int length, double zero_hz_response, double *out,
                             int count) {
+    assert(loop && out && length > 0 && count >= 0);
     /* impulse response by the inverse transform of the Hermitian spectrum, summed */
     double at_zero = isnan(zero_hz_response) ? 1.0 : zero_hz_response;
     for (int n = 0; n < count; n++) {

@@ -1,5 +1,6 @@
 #include "control/loop/tracking_loop.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -43,6 +44,7 @@ bst_status bst_tracking_loop_create(bst_ctx *ctx, const bst_tracking_timing *tim
                                     const bst_compensator *compensator,
                                     const bst_tracking_observer *observer,
                                     bst_tracking_loop **out) {
+    assert(timing && servo && out);
     *out = NULL;
     bst_tracking_loop *loop = calloc(1, sizeof *loop);
     if (!loop) {
@@ -246,6 +248,7 @@ enum { BAND_POINTS = 400, BAND_POINTS_MAX = 20000, NOISE_POINTS = 2000 };
 
 double bst_tracking_variance(const bst_tracking_loop *loop, const bst_tracking_band *bands,
                              int count) {
+    assert(loop && count >= 0 && (bands || count == 0));
     double sum = 0.0;
     for (int b = 0; b < count; b++) {
         double width = bands[b].high_hz - bands[b].low_hz;

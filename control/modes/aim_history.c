@@ -1,12 +1,16 @@
 #include "control/modes/aim_history.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stddef.h>
+
+#include "sim/core/invariant.h"
 
 /* Room for jumps, of which each takes a sample more. */
 enum { SPARE = 32 };
 
 void bst_aim_history_init(bst_aim_history *history, double tick_rate_hz, double reach_s) {
+    assert(history && tick_rate_hz > 0.0 && reach_s >= 0.0);
     *history = (bst_aim_history){.tick_rate_hz = tick_rate_hz};
     history->spacing_ticks =
         (int64_t)ceil(reach_s * tick_rate_hz / (BST_AIM_HISTORY_SAMPLES - SPARE));
@@ -35,6 +39,8 @@ static void keep(bst_aim_history *history, bst_aim_sample sample, bool joined) {
 
 void bst_aim_history_add(bst_aim_history *history, int64_t tick, bst_vec3 direction,
                          bst_vec3 rate_radps, bool jumped) {
+    assert(history && bst_is_unit_vec3(direction, BST_UNIT_TOLERANCE));
+    assert(bst_is_finite_vec3(rate_radps));
     bst_aim_sample sample = {tick, direction, rate_radps, false};
     const bst_aim_sample *newest = history->kept > 0 ? item(history, history->kept - 1) : NULL;
     bool again = history->any && tick <= history->last.tick;

@@ -1,4 +1,6 @@
 /* The search: what is searched, which place comes next, and which track is worth a look. */
+#include <assert.h>
+
 #include "control/control_internal.h"
 
 /* How finely a region's size on the sky is looked at: places along and across it, times. */
@@ -9,6 +11,7 @@ enum { ALONG = 5, ACROSS = 3, TIMES = 41 };
 #define OVERHEAD_S 5.0
 
 void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reason) {
+    assert(c && mode >= 0 && mode < BST_MODE_COUNT && reason);
     if (c->transition_count < BST_CONTROL_TRANSITIONS) {
         c->transitions[c->transition_count++] =
             (bst_control_transition){.from = c->mode, .to = mode, .reason = reason};

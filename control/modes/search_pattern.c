@@ -1,5 +1,6 @@
 #include "control/modes/search_pattern.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
@@ -34,6 +35,7 @@ static void insert(bst_search *search, bst_search_tile tile) {
 
 /* Columns -nx to nx and rows -ny to ny, the first index running faster, there and back. */
 static void lay_rows(bst_search *search, int nx, int ny, double dx, double dy, bool by_column) {
+    assert(nx >= 0 && ny >= 0 && (2 * nx + 1) * (2 * ny + 1) <= BST_SEARCH_MAX_TILES);
     int outer = by_column ? nx : ny, inner = by_column ? ny : nx;
     for (int j = -outer; j <= outer; j++) {
         for (int i = -inner; i <= inner; i++) {
@@ -45,6 +47,7 @@ static void lay_rows(bst_search *search, int nx, int ny, double dx, double dy, b
 }
 
 static void lay_spiral(bst_search *search, int nx, int ny, double dx, double dy) {
+    assert(nx >= 0 && ny >= 0 && (2 * nx + 1) * (2 * ny + 1) <= BST_SEARCH_MAX_TILES);
     static const int step[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
     int total = (2 * nx + 1) * (2 * ny + 1), x = 0, y = 0;
     for (int leg = 0; search->count < total; leg++) {
@@ -59,6 +62,7 @@ static void lay_spiral(bst_search *search, int nx, int ny, double dx, double dy)
 }
 
 void bst_search_plan(bst_search *search, bst_search_pattern pattern, const bst_search_area *area) {
+    assert(search && area);
     int nx = reach(area->half_x_rad, area->field_x_rad, area->step);
     int ny = reach(area->half_y_rad, area->field_y_rad, area->step);
     double dx = area->step * area->field_x_rad, dy = area->step * area->field_y_rad;

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -77,6 +78,7 @@ static bst_status take_members(bst_ctx *ctx, bst_tasking *t, const bst_fleet_mem
 bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *t, const bst_tasking_config *config,
                             const bst_fleet_member *members, int member_count,
                             double tick_rate_hz) {
+    assert(t && config && members && member_count > 0 && tick_rate_hz > 0.0);
     *t = (bst_tasking){.config = *config,
                        .tick_rate_hz = tick_rate_hz,
                        .sensor_count = member_count,
@@ -119,6 +121,7 @@ void bst_tasking_free(bst_tasking *t) {
 }
 
 void bst_tasking_tracks(bst_tasking *t, int sensor, const bst_tracks *tracks) {
+    assert(t && tracks && sensor >= 0 && sensor < t->sensor_count);
     bst_tasking_sensor *s = &t->sensors[sensor];
     if (s->task.object < 0 || tracks->tick <= s->task.tick) {
         return;
@@ -300,6 +303,7 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
 }
 
 bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
+    assert(t && given && sensor >= 0 && sensor < t->sensor_count);
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick);
     *given = false;

@@ -1,4 +1,6 @@
 /* Who can see what: the catalogue from where a spacecraft believes to be. */
+#include <assert.h>
+
 #include "control/guidance/pointing_feasibility.h"
 #include "control/tasking/tasking_internal.h"
 #include "sim/optics/streak_image.h"
@@ -36,6 +38,7 @@ static void cosines_of(const bst_keep_out_zone *zones, int count, double cosines
 
 void bst_tasking_telemetry(bst_tasking *t, int sensor, const bst_nav_telemetry *nav,
                            const bst_mount_status *mount) {
+    assert(t && sensor >= 0 && sensor < t->sensor_count);
     bst_tasking_sensor *s = &t->sensors[sensor];
     if (nav) {
         s->nav = *nav;
@@ -120,6 +123,7 @@ static bst_status mount_reaches(bst_ctx *ctx, const bst_tasking *t, const bst_ta
 
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
                             double seconds, bst_tasking_visibility *out) {
+    assert(t && out && sensor >= 0 && sensor < t->sensor_count);
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const double step_s = 1.0; /* over which the rate is taken */
     bst_ctx quiet = {0};       /* an orbit that has ended is no error here */

@@ -1,8 +1,10 @@
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "control/modules.h"
 #include "control/tasking/tasking.h"
+#include "sim/messages/message_invariants.h"
 
 enum { PORT_TRACKS, PORT_NAV, PORT_MOUNT, PORT_TASK, PORT_COUNT };
 
@@ -79,6 +81,7 @@ static bst_status step(void *self, struct bst_step *s) {
         if (given) {
             bst_task *task = bst_step_write(s, bst_member_port(PORT_COUNT, i, PORT_TASK), NULL);
             *task = t->sensors[i].task;
+            assert(bst_task_is_valid(task));
         }
         bst_step_set_lookahead(s, bst_member_port(PORT_COUNT, i, PORT_TASK),
                                bst_tasking_quiet_until(t, i));

@@ -1,9 +1,11 @@
 #include "gimbal/jitter/jitter.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
 #include "gimbal/jitter/jitter_more.h"
+#include "sim/core/invariant.h"
 #include "sim/core/simd.h"
 
 /* Rotation steps between two evaluations of the exact phase: rounding grows to about 1e-14. */
@@ -74,6 +76,7 @@ double bst_jitter_unresolved_rad2(const bst_jitter_spec *s, double dt_s) {
 
 void bst_jitter_init(bst_jitter *jitter, const bst_jitter_spec *spec, double dt_s,
                      bst_rng_key key) {
+    assert(jitter && spec && bst_is_positive(dt_s));
     *jitter = (bst_jitter){.dt_s = dt_s, .index = -1};
     jitter->silent = spec->low_rms_rad == 0.0 && spec->high_rms_rad == 0.0;
     const flat_band low = {0, BST_JITTER_LOW_LINES, spec->low_rms_rad * sqrt(0.5), 0.0,

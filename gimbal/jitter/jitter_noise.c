@@ -1,9 +1,11 @@
 #include "gimbal/jitter/jitter_noise.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
 #include "boresight/vec.h"
+#include "sim/core/invariant.h"
 
 enum { N = BST_NOISE_POINTS, HALF = N / 2 };
 
@@ -11,6 +13,7 @@ enum { N = BST_NOISE_POINTS, HALF = N / 2 };
 
 void bst_jitter_noise_init(bst_jitter_noise *noise, const bst_jitter_density *density,
                            double top_hz, double dt_s, bst_rng_key key) {
+    assert(noise && density && bst_is_positive(dt_s));
     memset(noise, 0, sizeof *noise);
     noise->key = key;
     noise->dt_s = dt_s;
@@ -104,6 +107,7 @@ static void node(bst_jitter_noise *noise, int64_t at, double out[2]) {
 }
 
 void bst_jitter_noise_at(bst_jitter_noise *noise, int64_t n, double out[2]) {
+    assert(noise && out && n >= 0);
     /* from the second block on, so that each node lies in two, and nodes before it exist */
     int64_t first = HALF + 2;
     if (noise->stride == 1) {

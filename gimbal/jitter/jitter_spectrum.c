@@ -1,5 +1,6 @@
 #include "gimbal/jitter/jitter_spectrum.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,6 +8,7 @@
 
 #include "boresight/vec.h"
 #include "gimbal/jitter/jitter_more.h"
+#include "sim/core/invariant.h"
 
 /* One band's table: inline or of a file, scaled; owned by *out. */
 static bst_status take_table(bst_ctx *ctx, const char *key, const bst_config_list *list,
@@ -48,6 +50,7 @@ static bst_status take_table(bst_ctx *ctx, const char *key, const bst_config_lis
 bst_status bst_jitter_spectrum_create(bst_ctx *ctx, const bst_jitter_spec *flat,
                                       const bst_jitter_psd_config *config, double pixel_rad,
                                       bst_jitter_spectrum *out) {
+    assert(flat && config && out && bst_is_positive(pixel_rad));
     double unit = config->unit == 0 ? pixel_rad : BST_ARCSEC_RAD;
     memset(out, 0, sizeof *out);
     out->flat = *flat;
@@ -65,6 +68,7 @@ bst_status bst_jitter_spectrum_create(bst_ctx *ctx, const bst_jitter_spec *flat,
         double turns = l->phase_deg / 360.0;
         for (int axis = 0; axis < 2; axis++) {
             if (l->axis == axis || l->axis == 2) {
+                assert(out->line_count < 2 * config->lines.count);
                 out->line[out->line_count++] = (bst_jitter_line){
                     .axis = axis,
                     .frequency_hz = l->frequency_hz,
@@ -177,6 +181,7 @@ bst_status bst_jitter_add(bst_ctx *ctx, bst_jitter *jitter, const bst_jitter_spe
         }
         more->turn_re[more->lines] = cos(2.0 * BST_PI * l.frequency_hz * dt_s);
         more->turn_im[more->lines] = sin(2.0 * BST_PI * l.frequency_hz * dt_s);
+        assert(more->lines < spectrum->line_count);
         more->line[more->lines++] = l;
     }
     jitter->more = more;

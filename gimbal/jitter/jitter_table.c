@@ -1,5 +1,6 @@
 #include "gimbal/jitter/jitter_table.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -74,6 +75,7 @@ double bst_jitter_density_at(const bst_jitter_density *d, double f) {
 }
 
 double bst_jitter_density_integral(const bst_jitter_density *d, double low_hz, double high_hz) {
+    assert(d && low_hz >= 0.0 && low_hz <= high_hz);
     double sum = 0.0;
     for (int i = 0; i + 1 < d->count; i++) {
         double low = fmax(low_hz, d->points[i].frequency_hz);

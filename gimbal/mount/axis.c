@@ -1,8 +1,10 @@
 #include "gimbal/mount/axis.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
+#include "sim/core/invariant.h"
 
 #define SHAPED_SHARE 0.95    /* of the limits, for the reference */
 #define BRAKE_SHARE 0.8      /* of the shaped acceleration, for the braking curve */
@@ -14,6 +16,7 @@ static double clamp(double x, double limit) {
 }
 
 void bst_axis_init(bst_axis *axis, const bst_axis_spec *spec) {
+    assert(axis && spec && bst_is_positive(spec->dt_s));
     *axis = (bst_axis){.spec = *spec};
     double h = spec->dt_s, wn = spec->natural_frequency_radps;
     axis->shaper_gain_per_s = fmin(SHAPER_GAIN_MAX, SHAPER_GAIN_STEP / h);
@@ -62,6 +65,7 @@ double bst_axis_shape(bst_axis *axis, double target_rad, double target_radps) {
 }
 
 void bst_axis_step(bst_axis *axis, double target_rad, double target_radps, double noise_rad) {
+    assert(axis && isfinite(target_rad) && isfinite(target_radps) && isfinite(noise_rad));
     const bst_axis_spec *spec = &axis->spec;
     double h = spec->dt_s, wn = spec->natural_frequency_radps;
     axis->limited = false;

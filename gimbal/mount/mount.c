@@ -1,6 +1,9 @@
 #include "gimbal/mount/mount.h"
 
+#include <assert.h>
 #include <string.h>
+
+#include "sim/core/invariant.h"
 
 #define ACCEL_SHARE 0.7 /* of what the motor can give, where the limit is left to the mount */
 #define RATE_MARGIN 0.1 /* of the rate limit: over it the motor's torque falls to zero */
@@ -49,6 +52,7 @@ static bst_status init_servo(bst_ctx *ctx, bst_mount *m, const bst_mount_config 
 
 bst_status bst_mount_init(bst_ctx *ctx, bst_mount *m, int type, const bst_mount_config *c,
                           double dt_s, bst_rng_key encoder_key) {
+    assert(m && c && bst_is_positive(dt_s));
     *m = (bst_mount){.type = type,
                      .encoder_step_rad = c->encoder.resolution_arcsec * BST_ARCSEC_RAD,
                      .encoder_noise_rad = c->encoder.noise_arcsec * BST_ARCSEC_RAD,
@@ -351,6 +355,8 @@ static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_
 
 void bst_mount_step(bst_mount *m, const bst_mount_body *body, const bst_los_command *command,
                     double command_age_s, bool measure) {
+    assert(m && body && bst_is_finite_vec3(body->rate_radps));
+    assert(!command || bst_is_unit_vec3(command->direction_gcrf, 1.1e-6)); /* of another program */
     int64_t n = m->steps;
     double torque[M] = {0.0};
     for (int k = 0; k < m->axes; k++) {
@@ -408,6 +414,7 @@ void bst_mount_step(bst_mount *m, const bst_mount_body *body, const bst_los_comm
 }
 
 void bst_mount_status_of(const bst_mount *m, int64_t tick, bst_mount_status *out) {
+    assert(m && out);
     *out = (bst_mount_status){
         .tick = tick, .axes = m->axes, .q_body_from_cam_at_zero = BST_QUAT_IDENTITY};
     for (int k = 0; k < m->axes; k++) {

@@ -1,5 +1,7 @@
 #include "gimbal/mount/mount_chain.h"
 
+#include <assert.h>
+
 enum { XX, YY, ZZ, XY, XZ, YZ };
 
 /* Turns a vector by an angle about the axis of stage k: frame k to frame k - 1. */
@@ -53,6 +55,8 @@ void bst_mount_chain_equations_at(const bst_mount_chain *chain, const bst_mount_
                                   const double cosine[BST_CHAIN_MOST],
                                   const bst_mount_chain_base *base,
                                   bst_mount_chain_equations *out) {
+    assert(chain && state && base && out);
+    assert(chain->stages >= 1 && chain->stages <= BST_CHAIN_MOST);
     int n = chain->stages;
     bst_vec3 rate = base->rate_radps, accel = base->accel_radps2, force[BST_CHAIN_MOST];
     double stiff[BST_CHAIN_MOST][6]; /* composite, without what hangs on the springs */

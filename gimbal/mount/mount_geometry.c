@@ -1,5 +1,9 @@
 #include "gimbal/mount/mount_geometry.h"
 
+#include <assert.h>
+
+#include "sim/core/invariant.h"
+
 /* Below this distance from the pole (rad) the outer angle is not defined well enough to follow. */
 #define POLE_RAD 1e-9
 
@@ -30,6 +34,7 @@ bst_quat bst_mount_attitude(int type, const double angle_rad[BST_MOUNT_MOST]) {
 
 bst_mount_pose bst_mount_solve(int type, bst_vec3 direction, bst_vec3 rate,
                                double outer_at_pole_rad) {
+    assert(bst_is_unit_vec3(direction, 1e-6) && bst_is_finite_vec3(rate));
     bst_vec3 b = base(type, direction), r = base(type, rate);
     double h2 = b.y * b.y + b.z * b.z, h = sqrt(h2);
     bst_mount_pose pose = {{outer_at_pole_rad, atan2(b.x, h), 0.0}, {0.0, 0.0, 0.0}};

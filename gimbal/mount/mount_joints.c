@@ -1,6 +1,9 @@
 #include "gimbal/mount/mount_joints.h"
 
+#include <assert.h>
 #include <string.h>
+
+#include "sim/core/invariant.h"
 
 #define PARTS 12 /* of a step, between events */
 
@@ -414,6 +417,8 @@ static void accept(bst_mount_joints *j, const bst_mount_chain_state *end) {
 
 void bst_mount_joints_step(bst_mount_joints *j, double dt_s, const double torque_nm[N],
                            bst_vec3 rate_before, bst_vec3 rate_after) {
+    assert(j && bst_is_positive(dt_s) && torque_nm);
+    assert(bst_is_finite_vec3(rate_before) && bst_is_finite_vec3(rate_after));
     motion m = {.torque_nm = torque_nm,
                 .rate = rate_before,
                 .slope = bst_vec3_scale(bst_vec3_sub(rate_after, rate_before), 1.0 / dt_s)};

@@ -1,6 +1,9 @@
+#include <assert.h>
+
 #include "gimbal/modules.h"
 #include "gimbal/mount/mount.h"
 #include "gimbal/platform_step.h"
+#include "sim/messages/message_invariants.h"
 
 enum { PORT_COMMAND = BST_GIMBAL_PORTS, PORT_COUNT };
 
@@ -93,6 +96,7 @@ static bst_status step(void *self, struct bst_step *s) {
         bst_mount_status *status = bst_step_write(s, BST_GIMBAL_MOUNT, NULL);
         bst_mount_status_of(mount, bst_step_tick(s), status);
         bst_gimbal_publish_reading(s, &m->platform, &reading, status);
+        assert(bst_mount_status_is_valid(status));
     }
     return bst_gimbal_publish_nav(s, &m->base, n);
 }

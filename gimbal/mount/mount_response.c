@@ -1,6 +1,9 @@
 #include "gimbal/mount/mount_response.h"
 
+#include <assert.h>
 #include <string.h>
+
+#include "sim/core/invariant.h"
 
 #define DEFAULT_CROSSOVER_HZ 10.0
 
@@ -50,6 +53,7 @@ static void exponential(double a[5][5], double out[5][5]) {
 void bst_mount_linearise(const bst_mount_joints *joints, int axis,
                          const double angle_rad[BST_CHAIN_MOST], double dt_s, int delay_steps,
                          double line_of_sight_share, bst_mount_linear *out) {
+    assert(joints && out && bst_is_positive(dt_s) && delay_steps >= 0);
     const bst_mount_chain *chain = &joints->chain;
     const bst_mount_joint *joint = &joints->joint[axis];
     double s[BST_CHAIN_MOST], c[BST_CHAIN_MOST];

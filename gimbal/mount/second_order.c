@@ -1,5 +1,9 @@
 #include "gimbal/mount/second_order.h"
 
+#include <assert.h>
+
+#include "sim/core/invariant.h"
+
 static const double two_pi = 2.0 * BST_PI;
 
 /* Sines and cosines are worked out anew where the axis is so far from where they are known. Targets
@@ -30,6 +34,8 @@ bst_status bst_mount_two_axis_init(bst_ctx *ctx, bst_mount_two_axis *plant,
                                    const bst_mount_two_axis_config *config,
                                    bst_quat q_nominal_from_gcrf, double pixel_rad, double dt_s,
                                    const bst_mount_two_axis_keys *keys) {
+    assert(plant && config && keys && bst_is_positive(pixel_rad) && bst_is_positive(dt_s));
+    assert(bst_is_unit_quat(q_nominal_from_gcrf, BST_UNIT_TOLERANCE));
     *plant = (bst_mount_two_axis){
         .encoder_noise_rad = config->encoder_noise_arcsec * BST_ARCSEC_RAD,
         .inner_travel_rad = config->inner_travel_deg * BST_DEG_RAD,
@@ -214,6 +220,7 @@ void bst_mount_two_axis_status(const bst_mount_two_axis *plant, int64_t tick,
 
 void bst_mount_two_axis_step(bst_mount_two_axis *plant, const bst_los_command *command,
                              double command_age_s, bool measure) {
+    assert(plant && (!command || bst_is_unit_vec3(command->direction_gcrf, 1.1e-6)));
     int64_t n = plant->steps++;
     double noise[2] = {0.0, 0.0};
     if (plant->encoder_noise_rad > 0.0) {

@@ -1,8 +1,10 @@
+#include <assert.h>
 #include <stdlib.h>
 
 #include "gimbal/modules.h"
 #include "gimbal/mount/second_order.h"
 #include "gimbal/platform_step.h"
+#include "sim/messages/message_invariants.h"
 
 enum { PORT_COMMAND = BST_GIMBAL_PORTS, PORT_COUNT };
 
@@ -56,6 +58,7 @@ static bst_status step(void *self, struct bst_step *s) {
         bst_mount_status *status = bst_step_write(s, BST_GIMBAL_MOUNT, NULL);
         bst_mount_two_axis_status(plant, bst_step_tick(s), status);
         bst_gimbal_publish_reading(s, &plant->platform, &reading, NULL);
+        assert(bst_mount_status_is_valid(status));
     }
     return bst_gimbal_publish_nav(s, &m->base, n);
 }

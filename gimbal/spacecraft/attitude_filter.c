@@ -1,12 +1,16 @@
 #include "gimbal/spacecraft/attitude_filter.h"
 
+#include <assert.h>
 #include <string.h>
 
+#include "sim/core/invariant.h"
 #include "sim/core/symmetric.h"
 
 void bst_attitude_filter_init(bst_attitude_filter *filter, bst_quat q_body_from_gcrf,
                               double sigma_rad, double bias_sigma_radps, double angle_walk,
                               double rate_walk) {
+    assert(filter && bst_is_unit_quat(q_body_from_gcrf, BST_UNIT_TOLERANCE));
+    assert(bst_is_variance(sigma_rad) && bst_is_variance(bias_sigma_radps));
     *filter = (bst_attitude_filter){
         .q_body_from_gcrf = q_body_from_gcrf, .angle_walk = angle_walk, .rate_walk = rate_walk};
     for (int i = 0; i < 3; i++) {
@@ -20,6 +24,7 @@ bst_vec3 bst_attitude_filter_error(bst_quat q, bst_quat estimate) {
 }
 
 void bst_attitude_filter_propagate(bst_attitude_filter *filter, bst_vec3 sample_rad, double dt_s) {
+    assert(filter && bst_is_finite_vec3(sample_rad) && bst_is_positive(dt_s));
     bst_vec3 turn = bst_vec3_axpy(sample_rad, -dt_s, filter->bias_radps);
     bst_quat step = bst_quat_from_rotvec(bst_vec3_scale(turn, -1.0));
     filter->q_body_from_gcrf = bst_quat_unit(bst_quat_mul(step, filter->q_body_from_gcrf));
@@ -95,6 +100,8 @@ static void joseph(double p[6][6], const double k[6][3], double age_s, const bst
 void bst_attitude_filter_update(bst_attitude_filter *filter, bst_vec3 error, double age_s,
                                 bst_quat q_now_from_then, const bst_mat3 *noise,
                                 bst_vec3 correction[2]) {
+    assert(filter && noise && bst_is_finite_vec3(error) && age_s >= 0.0);
+    assert(bst_is_covariance(&noise->m[0][0], 3));
     double(*p)[6] = filter->covariance;
     /* in the axes of now, where e then = e now + age b */
     const bst_mat3 c = bst_quat_to_mat3(q_now_from_then), back = bst_mat3_transpose(&c);

@@ -1,6 +1,9 @@
 #include "gimbal/spacecraft/attitude_sensors.h"
 
+#include <assert.h>
+
 #include "sim/astro/bodies.h"
+#include "sim/core/invariant.h"
 
 #define C bst_spacecraft_star_tracker_config
 const bst_config_desc bst_star_tracker_config_table[] = {
@@ -63,6 +66,7 @@ void bst_spacecraft_star_tracker_init(bst_spacecraft_star_tracker *tracker,
 bool bst_spacecraft_star_tracker_sees(const bst_spacecraft_star_tracker *tracker, double seconds,
                                       bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
                                       bst_vec3 position_m, bst_vec3 sun_m) {
+    assert(tracker && bst_is_unit_quat(q_body_from_gcrf, BST_UNIT_TOLERANCE));
     if ((seconds >= tracker->outage_s[0] && seconds < tracker->outage_s[1]) ||
         bst_vec3_norm(rate_radps) > tracker->rate_limit_radps) {
         return false;

@@ -1,8 +1,11 @@
 #include "gimbal/spacecraft/attitude_warm_up.h"
 
+#include <assert.h>
+
 #define MOST_STEPS 5000.0
 
 void bst_attitude_warm_up(const bst_attitude_past *past, bst_attitude_filter *filter) {
+    assert(past && filter && past->trackers >= 0);
     double fastest_hz = 1.0;
     for (int i = 0; i < past->trackers; i++) {
         fastest_hz = fmax(fastest_hz, past->rate_hz[i]);

@@ -1,11 +1,13 @@
 #include "gimbal/spacecraft/spacecraft.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "gimbal/jitter/jitter.h"
 #include "gimbal/mount/axis.h"
 #include "gimbal/spacecraft/attitude_warm_up.h"
+#include "sim/core/invariant.h"
 
 /* A measurement on its way from a star tracker. */
 typedef struct pending {
@@ -215,6 +217,7 @@ static void set_filter(bst_spacecraft *craft, const bst_spacecraft_config *confi
             if (all || bst_spacecraft_star_tracker_sees(tracker, 0.0, q, rate,
                                                         craft->sky.position_m, craft->sky.sun_m)) {
                 past.rate_hz[past.trackers] = 1.0 / ((double)craft->tracker_steps[i] * craft->dt_s);
+                assert(past.trackers < BST_TRACKERS_MOST);
                 past.tracker[past.trackers++] = tracker;
             }
         }
@@ -267,6 +270,7 @@ static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecr
 
 bst_status bst_spacecraft_create(bst_ctx *ctx, const bst_spacecraft_config *config,
                                  const bst_spacecraft_setup *setup, bst_spacecraft **out) {
+    assert(config && setup && out);
     bst_spacecraft *craft = calloc(1, sizeof *craft);
     if (!craft) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a spacecraft");
@@ -475,6 +479,7 @@ static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double
 
 bst_status bst_spacecraft_step(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double seconds,
                                bst_vec3 reaction_nm) {
+    assert(craft && n >= 0 && bst_is_finite_vec3(reaction_nm));
     if (n > 0) {
         move(craft, reaction_nm);
     }

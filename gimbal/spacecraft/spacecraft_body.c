@@ -1,6 +1,9 @@
 #include "gimbal/spacecraft/spacecraft_body.h"
 
+#include <assert.h>
 #include <string.h>
+
+#include "sim/core/invariant.h"
 
 bst_mat3 bst_spacecraft_inertia_matrix(const double i[6]) {
     return (bst_mat3){{{i[0], i[3], i[4]}, {i[3], i[1], i[5]}, {i[4], i[5], i[2]}}};
@@ -163,6 +166,7 @@ static void set_rate(bst_spacecraft_body *body) {
 bst_status bst_spacecraft_body_init(bst_ctx *ctx, bst_spacecraft_body *body,
                                     const bst_spacecraft_spec *spec, bst_quat q_body_from_gcrf,
                                     bst_vec3 rate_radps, const double *wheel_radps) {
+    assert(body && spec && bst_is_unit_quat(q_body_from_gcrf, BST_UNIT_TOLERANCE));
     *body = (bst_spacecraft_body){.spec = *spec,
                                   .inertia = bst_spacecraft_inertia_matrix(spec->inertia_kgm2)};
     BST_TRY(check_inertia(ctx, &body->inertia));
@@ -302,6 +306,7 @@ static void step_rk4(bst_spacecraft_body *body, bst_vec3 torque, const double *w
 
 void bst_spacecraft_body_step(bst_spacecraft_body *body, bst_vec3 torque_nm,
                               const double *wheel_torque_nm) {
+    assert(body && bst_is_finite_vec3(torque_nm));
     bst_vec3 torque = bst_quat_rotate(body->q_principal_from_body, torque_nm);
     if (body->spec.integrator == BST_INTEGRATE_RK4) {
         step_rk4(body, torque, wheel_torque_nm);

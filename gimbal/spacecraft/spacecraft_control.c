@@ -1,6 +1,9 @@
 #include "gimbal/spacecraft/spacecraft_control.h"
 
+#include <assert.h>
+
 #include "gimbal/spacecraft/attitude_filter.h"
+#include "sim/core/invariant.h"
 
 /* Share of the acceleration limit that a slew's braking curve uses, the rest being the feedback's.
  */
@@ -34,6 +37,7 @@ bst_vec3 bst_spacecraft_attitude_control_step(bst_spacecraft_attitude_control *c
                                               const bst_spacecraft_attitude_reference *reference,
                                               bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
                                               bst_vec3 wheel_momentum_nms, bool saturated) {
+    assert(control && reference && bst_is_unit_quat(q_body_from_gcrf, BST_UNIT_TOLERANCE));
     const bst_spacecraft_attitude_control_spec *spec = &control->spec;
     bst_quat q_body_from_wanted =
         bst_quat_mul(q_body_from_gcrf, bst_quat_conj(reference->q_body_from_gcrf));

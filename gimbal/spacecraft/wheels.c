@@ -1,5 +1,7 @@
 #include "gimbal/spacecraft/wheels.h"
 
+#include <assert.h>
+
 #define RPM_RADPS (BST_PI / 30.0)
 
 #define C bst_wheel_config
@@ -24,6 +26,7 @@ const bst_config_desc bst_wheel_config_table[] = {
 
 bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_wheel_config *config,
                            int count, bst_rng_key key) {
+    assert(wheels && count >= 0 && count <= BST_WHEELS_MOST && (config || count == 0));
     *wheels = (bst_wheels){.count = count};
     for (int i = 0; i < count; i++) {
         const bst_wheel_config *c = &config[i];

@@ -1,10 +1,12 @@
 #include "imgproc/calibrate/bad_rows.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
 bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity,
                                bst_bad_rows *out) {
+    assert(out && width > 0 && height > 0 && capacity >= 0);
     *out = (bst_bad_rows){.width = width, .height = height, .capacity = capacity};
     out->first = calloc((size_t)height + 1, sizeof *out->first);
     out->column = calloc((size_t)capacity + 1, sizeof *out->column);
@@ -27,6 +29,7 @@ void bst_bad_rows_begin(bst_bad_rows *rows) {
 }
 
 void bst_bad_rows_add(bst_bad_rows *rows, int32_t pixel) {
+    assert(rows && pixel >= 0 && pixel < rows->width * rows->height);
     if (rows->count < rows->capacity) {
         rows->first[pixel / rows->width + 1]++;
         rows->column[rows->count++] = pixel % rows->width;

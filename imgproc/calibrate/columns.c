@@ -1,5 +1,6 @@
 #include "imgproc/calibrate/columns.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -110,6 +111,7 @@ static void measure_blocks(void *user, int begin, int end) {
 
 void bst_columns_measure(bst_columns *columns, bst_parallel *pool, const bst_camera *camera,
                          const bst_imgproc_frame *frame) {
+    assert(columns && camera && frame && frame->pixels);
     int b = frame->binning;
     measuring m = {columns, camera, frame, frame->window.width / b, frame->window.height / b};
     double well = camera->full_well_e * b * b;

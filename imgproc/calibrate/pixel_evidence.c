@@ -1,9 +1,11 @@
 #include "imgproc/calibrate/pixel_evidence.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
 bst_status bst_pixel_shows_create(bst_ctx *ctx, int capacity, bst_pixel_shows *out) {
+    assert(out && capacity >= 0);
     *out = (bst_pixel_shows){.capacity = capacity};
     out->items = calloc((size_t)capacity + 1, sizeof *out->items);
     out->checks = calloc((size_t)capacity + 1, sizeof *out->checks);
@@ -94,6 +96,7 @@ static void add_cluster(const adder *a, int x, int y) {
 
 void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_imgproc_locator *l,
                          const bst_locate_frame *f, const bst_candidates *candidates) {
+    assert(shows && l && f && candidates && shows->count <= shows->capacity);
     adder a = {shows, l, f, 0.0};
     shows->maxima += candidates->count;
     for (int i = 0; i < candidates->count; i++) {

@@ -1,5 +1,6 @@
 #include "imgproc/calibrate/pixel_learner.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,6 +79,7 @@ const bst_config_desc bst_pixel_learner_config_table[] = {
 bst_status bst_pixel_learner_create(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_pixel_learner_config *config,
                                     bst_pixel_learner **out) {
+    assert(camera && config && out);
     *out = NULL;
     bst_pixel_learner *l = calloc(1, sizeof *l);
     if (!l) {
@@ -378,6 +380,7 @@ static const bst_pixel_check *check_of(const bst_pixel_shows *shows, int32_t pix
 
 void bst_pixel_learner_update(bst_pixel_learner *l, const bst_pixel_frame *f,
                               const bst_pixel_shows *shows) {
+    assert(l && f && shows && l->count <= l->capacity);
     follow_boresight(l, f);
     l->waits = false;
     /* at least one maximum of noise in ten million pixels; at most one in ten */
@@ -460,10 +463,12 @@ double bst_pixel_learner_suspicion(const bst_pixel_learner *l, const bst_pixel_m
 /* ---- the map ---- */
 
 const bst_pixel_map *bst_pixel_learner_map(const bst_pixel_learner *l, int slot) {
+    assert(l && slot >= 0 && slot < BST_STEP_LANES);
     return &l->maps[slot];
 }
 
 void bst_pixel_learner_publish(bst_pixel_learner *l, int slot, int64_t turn) {
+    assert(l && slot >= 0 && slot < BST_STEP_LANES);
     bst_pixel_map *map = &l->maps[slot];
     map->turn = turn;
     if (!l->changed[slot]) {

@@ -1,5 +1,6 @@
 #include "imgproc/detect/background.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +35,7 @@ static size_t band_stride(int width) {
 
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  int threads, bst_background *out) {
+    assert(out && mesh_px > 0 && max_width > 0 && max_height > 0 && threads >= 0);
     *out = (bst_background){.mesh_px = mesh_px,
                             .max_columns = (max_width + mesh_px - 1) / mesh_px,
                             .max_rows = (max_height + mesh_px - 1) / mesh_px};
@@ -517,12 +519,14 @@ BST_SIMD_INLINE bst_row_part next_part(const bst_background *b, part_walk *w) {
 }
 
 int bst_background_parts(const bst_background *b, int y, bst_row_part *parts) {
+    assert(b && parts && y >= 0);
     part_walk w = walk_parts(b, y);
     int count = 0, begin = 0;
     for (int i = 0; i <= b->columns; i++) {
         bst_row_part part = next_part(b, &w);
         if (part.end > begin) {
             begin = part.end;
+            assert(count <= b->columns);
             parts[count++] = part;
         }
     }
@@ -555,9 +559,11 @@ static double value_at(const bst_background *b, const float *values, double x_px
 }
 
 double bst_background_level_at(const bst_background *b, double x_px, double y_px) {
+    assert(b && isfinite(x_px) && isfinite(y_px));
     return value_at(b, b->level, x_px, y_px);
 }
 
 double bst_background_noise_at(const bst_background *b, double x_px, double y_px) {
+    assert(b && isfinite(x_px) && isfinite(y_px));
     return value_at(b, b->noise, x_px, y_px);
 }

@@ -1,5 +1,6 @@
 #include "imgproc/detect/candidates.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +13,7 @@ enum {
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bst_candidates *out) {
+    assert(out && max_width > 0 && max_height > 0);
     /* maxima of an 8-connected neighbourhood cannot be denser than one in four */
     *out = (bst_candidates){.capacity = ((max_width + 1) / 2) * ((max_height + 1) / 2)};
     size_t n = (size_t)out->capacity;
@@ -203,6 +205,7 @@ static void sort_by_cell(bst_candidates *c, int maxima, int cells) {
 
 void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f,
                          const bst_candidates_criteria *criteria) {
+    assert(c && f && criteria && f->width > 0 && f->height > 0);
     int maxima = 0, rows = (f->height + CELL_PX - 1) / CELL_PX;
     c->columns = (f->width + CELL_PX - 1) / CELL_PX;
     for (int y = 0; y < f->height; y++) {

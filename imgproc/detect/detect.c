@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "imgproc/measure/sensor_order.h"
 #include "imgproc/streak/streak_locate.h"
 #include "imgproc/streak/streak_motion.h"
+#include "sim/core/invariant.h"
 #include "sim/core/pages.h"
 #include "sim/core/threshold_statistics.h"
 #include "sim/optics/column_level.h"
@@ -71,6 +73,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
 bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
                               const bst_imgproc_config *config, const bst_imgproc_maps *maps,
                               bst_imgproc **out) {
+    assert(camera && config && out && bst_is_positive(electrons_per_s_v0));
     *out = NULL;
     if (camera->width_px < 1 || camera->height_px < 1 || camera->width_px > 32768 ||
         camera->height_px > 32768 || !(camera->psf_fwhm_px > 0.0) || camera->psf_fwhm_px > 16.0 ||
@@ -447,6 +450,7 @@ static void empty(bst_detections *out) {
 
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_camera_motion *motion, bst_detections *out, int capacity) {
+    assert(ip && frame && frame->pixels && out && capacity >= 0);
     BST_TRY(check_frame(ctx, ip, frame));
     /* a pool that has to wait for processors is slower than one thread that has one */
     bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
@@ -489,6 +493,8 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
                                       const bst_imgproc_windows *windows,
                                       const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) {
+    assert(ip && frame && frame->pixels && windows && out && capacity >= 0);
+    assert(windows->count >= 0 && (windows->items || windows->count == 0));
     BST_TRY(check_frame(ctx, ip, frame));
     double pixels = 0.0;
     bst_camera_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
@@ -524,6 +530,7 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
 
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
                         const bst_optics_zero_point *zero_point) {
+    assert(ip && detections && zero_point && index >= 0 && index < detections->count);
     bst_detection *item = &detections->items[index];
     const bst_imgproc_found *found = &ip->locator.found[ip->order[index]];
     if (ip->windowed || !found->rough) {

@@ -1,4 +1,5 @@
 /* What bst_imgproc gives to stacks of frames, and takes from them. */
+#include <assert.h>
 #include <math.h>
 
 #include "imgproc/detect/detect_internal.h"
@@ -14,6 +15,8 @@ bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
 
 void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
                               double reach_px, bst_detections *out, int capacity) {
+    assert(ip && out && count >= 0 && (found || count == 0));
+    assert(out->count >= 0 && out->count <= capacity && reach_px >= 0.0);
     int before = out->count;
     for (int i = 0; i < count; i++) {
         const bst_stack_found *f = &found[i];

@@ -1,5 +1,6 @@
 #include "imgproc/detect/filter.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,6 +24,7 @@ static bool has_known(const bst_filter *f) {
 
 bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_width,
                              int max_height, double streak_max_px, int threads, bst_filter *out) {
+    assert(out && max_width > 0 && max_height > 0 && streak_max_px >= 0.0);
     int pad = (int)ceil(0.5 * streak_max_px) + 2;
     /* what looks for maxima reads beyond a row */
     pad = pad > 2 * BST_ROW_LANES ? pad : 2 * BST_ROW_LANES;
@@ -343,6 +345,7 @@ static bool is_crowded(const bst_filter *f) {
 
 void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *input,
                     float threshold) {
+    assert(f && input && threshold > 0.0f);
     const int width = input->width, height = input->height;
     if (f->width != width || f->height != height) {
         f->width = width;

@@ -1,10 +1,12 @@
 /* The kernels of the matched filters, and what noise does to their outputs. */
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
 #include "imgproc/detect/filter.h"
 #include "imgproc/detect/low_rank.h"
 #include "imgproc/detect/row_kernels.h"
+#include "sim/core/invariant.h"
 
 enum { SIZE = 2 * BST_FILTER_MAX_RADIUS + 3, PLANE = SIZE * SIZE };
 
@@ -344,6 +346,7 @@ static void set_gaussian(bst_filter *f, double sigma_px) {
 }
 
 void bst_filter_set(bst_filter *f, double sigma_px, int binning, double dx_px, double dy_px) {
+    assert(f && bst_is_positive(sigma_px) && binning >= 1 && isfinite(dx_px) && isfinite(dy_px));
     bool same = f->made_sigma == sigma_px && f->made_binning == binning;
     if (same && f->made_dx == dx_px && f->made_dy == dy_px) {
         return;
@@ -375,6 +378,7 @@ void bst_filter_set(bst_filter *f, double sigma_px, int binning, double dx_px, d
 static const double SEEN = 0.97;
 
 double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
+    assert(f && false_alarms > 0.0 && pixels > 0.0);
     if (f->threshold > 0.0 && f->threshold_density == false_alarms / pixels) {
         return f->threshold;
     }

@@ -1,5 +1,6 @@
 #include "imgproc/detect/psf.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
@@ -106,6 +107,7 @@ static int node_count(const bst_imgproc_shape *shape) {
 
 void bst_imgproc_gauss_profile(const bst_imgproc_gauss *psf, double centre, double sigma, int side,
                                double *share, double *slope, double *curvature) {
+    assert(psf && share && side > 0 && sigma > 0.0);
     profile p;
     make_profile(psf, centre, sigma, side, &p);
     for (int i = 0; i < side; i++) {

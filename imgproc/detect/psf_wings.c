@@ -1,5 +1,6 @@
 #include "imgproc/detect/psf_wings.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -159,6 +160,7 @@ static double light_at(const bst_psf_wings *w, double x_px, double y_px) {
 
 void bst_psf_wings_label(const bst_psf_wings *w, bst_psf_wings_ground_fn ground, const void *user,
                          int binning, bst_detections *detections) {
+    assert(w && ground && detections && binning >= 1 && detections->count >= 0);
     double noise_e = detections->noise_e, threshold = detections->threshold_snr;
     for (int i = 0; i < detections->count && w->count > 0; i++) {
         bst_detection *d = &detections->items[i];

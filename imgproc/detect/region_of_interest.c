@@ -1,10 +1,13 @@
 #include "imgproc/detect/region_of_interest.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
 bool bst_region_of_interest_add(bst_region_of_interest *windows, const bst_window *frame,
                                 double x_px, double y_px, double half_x_px, double half_y_px) {
+    assert(windows && frame && windows->count >= 0 && windows->count <= BST_WINDOWS_MAX);
+    assert(half_x_px >= 0.0 && half_y_px >= 0.0);
     double x0 = fmax(floor(x_px - half_x_px), frame->x0);
     double y0 = fmax(floor(y_px - half_y_px), frame->y0);
     double x1 = fmin(ceil(x_px + half_x_px), frame->x0 + frame->width - 1.0);
@@ -90,6 +93,7 @@ bool bst_region_of_interest_hold(const bst_region_of_interest *windows, double x
 
 bst_imgproc_frame bst_region_of_interest_crop(const bst_imgproc_frame *frame, const bst_window *w,
                                               uint16_t *pixels) {
+    assert(frame && frame->pixels && w && pixels && frame->binning >= 1);
     int b = frame->binning;
     size_t stride = (size_t)(frame->window.width / b), width = (size_t)(w->width / b);
     size_t x = (size_t)((w->x0 - frame->window.x0) / b);

@@ -1,5 +1,6 @@
 #include "imgproc/identify/predicted_stars.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -8,6 +9,7 @@ static const double BRIGHTEST_V = -2.0;
 bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
                                       const bst_stars *stars, double julian_year, int capacity,
                                       bst_predicted_stars *out) {
+    assert(camera && stars && out && capacity > 0);
     *out = (bst_predicted_stars){
         .camera = camera, .stars = stars, .julian_year = julian_year, .capacity = capacity};
     out->found = calloc((size_t)capacity, sizeof *out->found);
@@ -38,6 +40,7 @@ static double seen_mag(const bst_camera *camera, const bst_star *star) {
 
 bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
                                       const bst_predicted_stars_query *query, int *count) {
+    assert(sky && query && count);
     const bst_quat q_cam_from_gcrf = query->q_cam_from_gcrf;
     const bst_light *light = query->light;
     const bst_window window = query->window;

@@ -1,5 +1,6 @@
 #include "imgproc/measure/cosmic_ray.h"
 
+#include <assert.h>
 #include <math.h>
 
 enum { MAX_CHARGE = 64 };
@@ -26,6 +27,7 @@ static int find_charge(const bst_imgproc_locator *l, const bst_locate_frame *f,
                     known = known || at[k] == v * f->width + u;
                 }
                 if (sharp > BST_SHARP_DEVIATION && !known) {
+                    assert(count < MAX_CHARGE && u >= 0 && u < f->width && v >= 0 && v < f->height);
                     at[count++] = v * f->width + u;
                     *sharpest = fmax(*sharpest, sharp);
                 }

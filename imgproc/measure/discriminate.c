@@ -1,5 +1,6 @@
 #include "imgproc/measure/discriminate.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -72,6 +73,7 @@ struct bst_imgproc_discriminator {
 
 bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
                                             bst_imgproc_discriminator **out) {
+    assert(camera && out && capacity > 0);
     *out = NULL;
     bst_imgproc_discriminator *d = calloc(1, sizeof *d);
     if (!d) {
@@ -435,6 +437,7 @@ static void label_source(bst_imgproc_discriminator *d, const bst_imgproc_frame_k
 
 void bst_imgproc_discriminator_label(bst_imgproc_discriminator *d,
                                      const bst_imgproc_frame_knowledge *f, bst_detections *out) {
+    assert(d && f && out && out->count >= 0 && out->count <= d->capacity);
     double unlisted = 0.0;
     for (int i = 0; i < out->count; i++) {
         bst_detection *item = &out->items[i];

@@ -1,5 +1,6 @@
 #include "imgproc/measure/fit.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,6 +18,7 @@ static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
 
 bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
                           const bst_source_profiles *profiles, int max_side, bst_fit *out) {
+    assert(psf && profiles && out && max_side > 0);
     size_t plane = (size_t)max_side * (size_t)bst_simd_layout_round_up(max_side);
     *out = (bst_fit){.psf = psf, .profiles = profiles, .max_side = max_side};
     out->value = calloc(plane, sizeof(float));
@@ -43,6 +45,7 @@ void bst_fit_free(bst_fit *fit) {
 
 bst_imgproc_stamp bst_fit_stamp(const bst_imgproc_source *source, double reach_px, int max_side,
                                 int width, int height) {
+    assert(source && reach_px > 0.0 && max_side > 0 && width > 0 && height > 0);
     const bst_imgproc_shape *s = &source->shape;
     double limit = 0.5 * (max_side - 2);
     double rx = fmin(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + reach_px, limit);
@@ -234,6 +237,8 @@ static void set_errors(const equations *e, bst_imgproc_source *out) {
 }
 
 bool bst_fit_run(bst_fit *fit, const bst_fit_request *r) {
+    assert(fit && r && r->data && r->stamp && r->free);
+    assert(r->free_count >= 1 && r->free_count <= BST_FIT_MAX_FREE && r->fixed_count >= 0);
     equations e;
     e.free_width = r->free_width && r->free_count == 1;
     e.parameters = 3 * r->free_count + (e.free_width ? 1 : 0);

@@ -1,5 +1,6 @@
 #include "imgproc/measure/locate.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +27,7 @@ static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
                                       const bst_imgproc_locator_limits *limits,
                                       bst_imgproc_locator *out) {
+    assert(limits && out && limits->capacity > 0);
     const int threads = limits->threads, capacity = limits->capacity;
     const int max_width = limits->max_width, max_height = limits->max_height;
     *out = (bst_imgproc_locator){.threads = threads,
@@ -409,6 +411,7 @@ static void choose(bst_imgproc_locator *l, const bst_candidates *candidates, int
     memcpy(l->from, order, (size_t)fits * sizeof *order);
     for (int k = 0, next = fits; k < candidates->count; k++) {
         if (l->chosen[k]) {
+            assert(next < l->capacity);
             l->from[next++] = k;
         }
     }
@@ -423,6 +426,7 @@ void bst_locate_prepare(bst_imgproc_locator *l, const bst_locate_frame *f) {
 
 void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
                 const bst_candidates *candidates) {
+    assert(l && f && candidates && f->width > 0 && f->height > 0 && f->binning >= 1);
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
     l->longest_px = 0.0;
     int fits = l->most_fits > 0 && l->most_fits < l->count ? l->most_fits : l->count;
@@ -456,6 +460,7 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
 }
 
 void bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) {
+    assert(l && f && i >= 0 && i < l->count);
     bst_imgproc_worker w = {l, f, &l->fits[0]};
     bst_imgproc_found found = l->found[i];
     if (!found.rough || found.dropped) {

@@ -1,5 +1,6 @@
 #include "imgproc/measure/sensor_order.h"
 
+#include <assert.h>
 #include <string.h>
 
 static int row_of(const bst_imgproc_found *found, int height) {
@@ -17,6 +18,7 @@ static bool before_on_sensor(const bst_imgproc_found *found, int a, int b) {
 
 void bst_sensor_order(const bst_imgproc_found *found, int count, int height, int *order, int *swap,
                       int *row) {
+    assert(found && order && swap && row && count >= 0 && height > 0);
     memset(row, 0, ((size_t)height + 1) * sizeof *row);
     for (int i = 0; i < count; i++) {
         row[row_of(&found[order[i]], height) + 1]++;

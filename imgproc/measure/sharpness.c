@@ -1,5 +1,6 @@
 #include "imgproc/measure/sharpness.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 
@@ -179,6 +180,7 @@ static double worst_of(const bst_sharpness *s, const surroundings *p, double noi
 
 double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, int height,
                         double noise_e, int x, int y) {
+    assert(s && signal && width > 0 && height > 0);
     if (x < 0 || y < 0 || x >= width || y >= height ||
         !(bst_sharpness_signal(s, signal[(long)y * width + x]) > 3.0 * noise_e)) {
         return 0.0;

@@ -1,11 +1,13 @@
 #include "imgproc/measure/source_moments.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "imgproc/measure/cosmic_ray.h"
 
 bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
                                 double wider) {
+    assert(w && found && i >= 0 && i < w->l->count);
     const bst_locate_frame *f = w->f;
     const bst_imgproc_shape *s = &found->source.shape;
     double base = s->sigma_px * s->sigma_px + fmax(found->source.widening_px2, 0.0);

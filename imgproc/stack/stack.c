@@ -1,11 +1,13 @@
 #include "imgproc/stack/stack.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "imgproc/measure/heapsort.h"
 #include "imgproc/stack/stack_internal.h"
+#include "sim/core/invariant.h"
 
 const bst_config_desc bst_stack_config_table[] = {
     BST_INT(bst_stack_config, frames, "", 0, BST_STACK_MAX_FRAMES, "0",
@@ -46,6 +48,7 @@ static bst_status allocate(bst_ctx *ctx, bst_stack *s, int threads) {
 
 bst_status bst_stack_create(bst_ctx *ctx, const bst_camera *camera, const bst_stack_config *config,
                             int threads, bst_stack **out) {
+    assert(camera && config && out);
     *out = NULL;
     int64_t frames = config->frames;
     if (frames < 4 || frames > BST_STACK_MAX_FRAMES || frames % 4 != 0 ||
@@ -104,6 +107,8 @@ static bool goes_on(const bst_stack *s, const bst_stack_frame *f) {
 }
 
 int bst_stack_add(bst_stack *s, const bst_stack_frame *f) {
+    assert(s && f && s->count >= 0 && s->count <= BST_STACK_MAX_FRAMES);
+    assert(bst_is_unit_quat(f->q_cam_from_gcrf, 1.1e-6));
     if (!goes_on(s, f)) {
         s->count = 0;
         s->width = f->width;
@@ -171,6 +176,7 @@ static int choose(bst_stack *s, int kept) {
     for (int tile = 0; tile < columns * rows; tile++) {
         s->followed += s->tile_followed[tile];
         for (int i = 0; i < s->tile_count[tile]; i++) {
+            assert(s->tile_count[tile] <= STACK_TILE_FOUND);
             s->order[count++] = tile * STACK_TILE_FOUND + i;
         }
     }

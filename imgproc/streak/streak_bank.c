@@ -1,5 +1,6 @@
 #include "imgproc/streak/streak_bank.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -390,6 +391,7 @@ static void run_tiles(void *user, int begin, int end) {
 
 int bst_streak_bank_run(bst_streak_bank *bank, bst_parallel *pool, const bst_streak_map *map,
                         int first_octave, double threshold) {
+    assert(bank && map && first_octave >= 0 && threshold > 0.0);
     if (map->sigma_px != bank->sigma_px) {
         set_scales(bank, map);
     }

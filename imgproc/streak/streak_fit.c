@@ -1,5 +1,6 @@
 #include "imgproc/streak/streak_fit.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -127,6 +128,7 @@ static double limited(double v, double limit) {
 bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data,
                         const bst_imgproc_stamp *stamp, const uint8_t *excluded,
                         bst_imgproc_source *source, double *norm) {
+    assert(fit && data && stamp && source && norm);
     if (stamp->width <= 0 || stamp->height <= 0 || stamp->width > fit->max_side ||
         stamp->height > fit->max_side) {
         return false;

@@ -1,5 +1,6 @@
 #include "imgproc/streak/streak_locate.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -79,6 +80,7 @@ static int drop_pieces(bst_streak_locator *l, bst_imgproc_locator *found, int co
         bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
         if (inside && !own && !f->dropped && !bst_cosmic_ray_label(f->label)) {
             f->dropped = true;
+            assert(pieces < found->capacity);
             l->pieces[pieces++] = i;
         }
     }
@@ -285,6 +287,7 @@ static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_imgpr
         found->found[l->pieces[k]].dropped = good;
     }
     if (good) {
+        assert(found->count < found->capacity);
         found->found[found->count++] = *streak;
     }
     return good;
@@ -377,6 +380,7 @@ static bool is_bright_point(const bst_locate_frame *f, const bst_imgproc_found *
 void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
                        const bst_candidates *candidates, double false_alarms,
                        bst_imgproc_locator *found) {
+    assert(l && f && candidates && found && false_alarms > 0.0);
     int points = found->count;
     bst_streak_search_fill(&l->search, f->signal, f->width, f->height, f->background, f->sigma_px);
     for (int i = 0; i < points; i++) {

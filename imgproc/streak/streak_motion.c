@@ -1,5 +1,6 @@
 #include "imgproc/streak/streak_motion.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -324,6 +325,7 @@ void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *f,
 bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *psf,
                              bst_source_profiles *profiles, const bst_camera *camera,
                              double length_px, double bend_px, bst_camera_motion *motion) {
+    assert(work && psf && profiles && camera && motion && length_px >= 0.0);
     star *stars = work->stars;
     int count = work->count, left = 0;
     double ex = work->ex, ey = work->ey, b = work->binning;

@@ -1,5 +1,6 @@
 #include "imgproc/streak/streak_search.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -112,6 +113,7 @@ static int choose(bst_streak_search *s, int hits) {
             known = same(&s->chosen[k], hit);
         }
         if (!known) {
+            assert(count < BST_STREAK_MAX_CANDIDATES);
             s->chosen[count++] = *hit;
         }
     }
@@ -120,6 +122,7 @@ static int choose(bst_streak_search *s, int hits) {
 
 void bst_streak_search_fill(bst_streak_search *s, const float *signal, int width, int height,
                             const bst_background *background, double sigma_px) {
+    assert(s && signal && background && width > 0 && height > 0 && sigma_px > 0.0);
     const bst_streak_map_input input = {signal, width, height, background, sigma_px};
     bst_streak_map_fill(&s->map, s->pool, &input);
 }

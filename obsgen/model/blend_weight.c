@@ -1,5 +1,6 @@
 #include "obsgen/model/blend_weight.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
@@ -55,6 +56,7 @@ void bst_blend_weight_row(const bst_blend_weights *w, double light,
 }
 
 double bst_blend_weight(const bst_blend_weights *w, double light, double overlap) {
+    assert(w && overlap >= 0.0);
     double far = 2.0 * PER_SIGMA * sqrt(-log(fmin(fmax(overlap, 1e-30), 1.0)));
     double bright = row_of(light);
     if (far >= BST_BLEND_DISTANCES - 1) {

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -63,6 +64,7 @@ void bst_generator_decide(bst_generator *g) {
             s->spread = sqrt(bst_generator_output_variance(g, s));
             s->level = s->amplitude + s->spread * s->noise / g->calibration.slope;
             generator_source pixel = {.x = round(s->x), .y = round(s->y)};
+            assert(ranks < g->source_count);
             g->ranks[ranks++] = (generator_rank){s->level * bst_generator_overlap(g, s, &pixel), i};
         }
     }
@@ -161,6 +163,7 @@ static void centroid_error(const bst_generator *g, const generator_source *s,
     for (int k = 0; k < count && used < BST_WANDER_SOURCES; k++) {
         const generator_source *m = &merged[k];
         double dx = m->x - s->x, dy = m->y - s->y;
+        assert(used < BST_WANDER_SOURCES);
         sources[used++] = (bst_streak_centroid_error_source){dx * c + dy * n, dy * c - dx * n,
                                                              own * m->flux_e / s->flux_e};
     }
@@ -245,6 +248,7 @@ static void take_for_streak(const bst_generator *g, const generator_source *s,
  * to several lands where the filter's output is greatest: found by moving to the mean weighted with
  * what each gives there (mean shift). */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
+    assert(g && i >= 0 && i < g->source_count);
     enum { MOST = 24, ROUNDS = 8 };
     const generator_source *s = &g->sources[i];
     generator_source merged[MOST];
@@ -268,6 +272,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
         } else if (count < MOST) {
             nearest_light n = nearest_of(g, s, o);
+            assert(count < MOST);
             generator_source *m = &merged[count++];
             *m = *o;
             m->x = s->x + n.dx;

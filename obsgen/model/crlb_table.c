@@ -1,5 +1,6 @@
 #include "obsgen/model/crlb_table.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -140,6 +141,7 @@ double bst_crlb_table_norm(const bst_crlb_table *b, double length_px) {
 
 bst_crlb_table_at bst_crlb_table_of(const bst_crlb_table *b, double flux_e, double noise_e,
                                     double length_px) {
+    assert(b && noise_e > 0.0 && length_px >= 0.0);
     double v = noise_e * noise_e, ratio = flux_e / v, pn;
     int n = length_node(b, length_px, &pn);
     double at = (log10(fmax(ratio, 1e-30)) - FIRST_RATIO) * PER_DECADE;

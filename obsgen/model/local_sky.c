@@ -1,5 +1,6 @@
 #include "obsgen/model/local_sky.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -51,6 +52,7 @@ static bst_status set_places(bst_ctx *ctx, bst_local_sky *sky) {
 
 bst_status bst_local_sky_begin(bst_ctx *ctx, bst_local_sky *sky, int width, int height, int mesh_px,
                                double sigma_px) {
+    assert(sky && width > 0 && height > 0 && mesh_px > 0 && sigma_px > 0.0);
     int half = mesh_px / 2, columns = (width + half) / mesh_px, rows = (height + half) / mesh_px;
     columns = columns > 0 ? columns : 1;
     rows = rows > 0 ? rows : 1;

@@ -1,5 +1,6 @@
 #include "obsgen/model/matched_filter_theory.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stddef.h>
 
@@ -97,6 +98,7 @@ static double maxima(double u, double roughness) {
 
 double bst_matched_threshold(double sigma_px, double length_px, double false_alarms, double pixels,
                              double *streak_share) {
+    assert(sigma_px > 0.0 && length_px >= 0.0 && false_alarms > 0.0 && pixels > 0.0);
     double s = sigma_px * sqrt(2.0), steep = 1.0 / (s * s), drawn = 0.0, shared = 1.0;
     if (length_px > 0.0) {
         double curve = length_px < 0.05 * s ? steep * along_itself(0.0, 0.0, s) / s

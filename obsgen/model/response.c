@@ -1,6 +1,7 @@
 #define _XOPEN_SOURCE 700 /* j0 */
 #include "obsgen/model/response.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
@@ -196,6 +197,7 @@ static bst_obsgen_image_width even(double variance_px2) {
 
 void bst_response_set(bst_response *out, const bst_response_side *source,
                       const bst_response_side *filter, int binning, double x_px, double y_px) {
+    assert(out && source && filter && binning >= 1);
     if (!source->psf && !filter->psf) {
         double scale = 1.0 / ((double)binning * binning);
         double s = source->sigma_px * source->sigma_px * scale + PIXEL_VARIANCE;

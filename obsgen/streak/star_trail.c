@@ -1,5 +1,6 @@
 #include "obsgen/streak/star_trail.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
@@ -59,6 +60,7 @@ static void add_node(laying *l, double x, double y, double time) {
     b->x1 = x > b->x1 ? x : b->x1;
     b->y0 = y < b->y0 ? y : b->y0;
     b->y1 = y > b->y1 ? y : b->y1;
+    assert(l->count < BST_ROUTE_NODES);
     l->nodes[l->count++] = (bst_star_trail_node){x, y, time, 0.0};
 }
 

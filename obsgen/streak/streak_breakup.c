@@ -1,5 +1,6 @@
 #include "obsgen/streak/streak_breakup.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -115,6 +116,7 @@ static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, 
             if (!is_on_frame(g, x, y)) {
                 continue;
             }
+            assert(w->shown_count < w->shown_room);
             w->shown[w->shown_count] = y * g->width + x;
             w->output[w->shown[w->shown_count++]] = value;
             if (is_top(s, count, k, r)) {

@@ -1,5 +1,6 @@
 #include "obsgen/streak/streak_light.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,6 +20,7 @@ enum {
 /* ---- runs ---- */
 
 void bst_streak_light_begin(bst_streak_light *l, int width, int height, bool by_row) {
+    assert(l && width > 0 && height > 0);
     l->width = width;
     l->height = height;
     l->by_row = by_row;

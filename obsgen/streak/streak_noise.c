@@ -1,5 +1,6 @@
 #include "obsgen/streak/streak_noise.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -122,6 +123,7 @@ static int rows_left(const bst_streak_noise *w, const bst_streak_section *s, int
 
 void bst_streak_noise_add(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_id,
                           bool by_row, double shot, bst_streak_section *s, int count) {
+    assert(w && count >= 0 && (s || count == 0) && shot >= 0.0);
     int most = rows_left(w, s, count), half = ROWS + most, rows = 2 * half + 1;
     float noise[LANES][WHITE] = {{0.0f}};
     for (int first = 0; first < count; first += LANES) {

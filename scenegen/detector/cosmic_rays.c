@@ -1,5 +1,6 @@
 #include "scenegen/detector/cosmic_rays.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -16,6 +17,7 @@ struct bst_cosmic_rays {
 
 bst_status bst_cosmic_rays_create(bst_ctx *ctx, const bst_detector_cosmic_ray_config *config,
                                   int width, int height, int stride, bst_cosmic_rays **out) {
+    assert(config && out && width > 0 && height > 0 && stride >= width);
     bst_cosmic_rays *h = calloc(1, sizeof *h);
     *out = h;
     if (!h) {
@@ -48,6 +50,7 @@ static bst_status add_pixel(bst_ctx *ctx, bst_cosmic_rays *h, int x, int y, doub
         h->pixels = more;
         h->capacity = capacity;
     }
+    assert(h->count < h->capacity);
     h->pixels[h->count++] = (bst_cosmic_rays_pixel){y * h->stride + x, (float)electrons};
     return BST_OK;
 }
@@ -99,6 +102,7 @@ bst_status bst_cosmic_rays_draw(bst_ctx *ctx, bst_cosmic_rays *h, bst_rng_key ke
                                 int64_t exposure_id, double collect_s,
                                 const bst_cosmic_rays_pixel **pixels,
                                 bst_cosmic_rays_summary *summary) {
+    assert(h && pixels && summary && collect_s >= 0.0);
     const bst_detector_cosmic_ray_config *c = &h->config;
     h->count = 0;
     *summary = (bst_cosmic_rays_summary){0};

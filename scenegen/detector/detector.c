@@ -1,5 +1,6 @@
 #include "scenegen/detector/detector.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -155,6 +156,7 @@ static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
 
 bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                bst_rng_key pattern, bst_detector **out) {
+    assert(device && camera && out);
     *out = NULL;
     bst_detector *d = calloc(1, sizeof *d);
     if (!d) {
@@ -275,6 +277,7 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
 
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage,
                               bst_rng_key key, int64_t exposure_id, double exposure_s) {
+    assert(d && stage && exposure_id >= 0 && exposure_s >= 0.0);
     const bst_detector_config *c = &d->camera.detector;
     uint64_t run = ((uint64_t)key.k[1] << 32) | key.k[0];
     d->summary = (bst_cosmic_rays_summary){0};

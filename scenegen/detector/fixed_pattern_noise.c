@@ -1,5 +1,6 @@
 #include "scenegen/detector/fixed_pattern_noise.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -62,6 +63,7 @@ static bst_status load_map(bst_ctx *ctx, const bst_camera *camera, const char *w
 
 bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
                                         int stride, float *gain) {
+    assert(camera && gain && stride >= (int)camera->width_px);
     const bst_detector_config *d = &camera->detector;
     int width = (int)camera->width_px, height = (int)camera->height_px;
     if (d->prnu_map[0]) {
@@ -93,6 +95,7 @@ bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, 
 
 bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
                                         int stride, float *dark) {
+    assert(camera && dark && stride >= (int)camera->width_px);
     const bst_detector_config *d = &camera->detector;
     double warm = bst_detector_dark_factor(d), mean = bst_camera_dark_e_per_s(camera);
     int width = (int)camera->width_px, height = (int)camera->height_px;

@@ -1,5 +1,6 @@
 #include "scenegen/detector/readout.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
 enum { TRANSFER, CHARGE, BLOOM, READ, KERNELS };
@@ -21,6 +22,7 @@ static bool wanted(const bst_readout *r, int kernel) {
 
 bst_status bst_readout_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                               cl_program program, bst_readout **out) {
+    assert(device && camera && program && out);
     static const char *const names[KERNELS] = {"bst_detector_transfer", "bst_detector_charge",
                                                "bst_detector_bloom", "bst_detector_read"};
     *out = NULL;
@@ -124,6 +126,7 @@ static bst_status start(bst_ctx *ctx, bst_readout *r, int kernel, const bst_kern
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *detector,
                            const bst_kernel_frame_params *params, bst_window window, int binning,
                            cl_mem frame, cl_mem saturated) {
+    assert(r && detector && params && window.width > 0 && window.height > 0);
     bst_window light = bst_readout_light_window(r, window);
     bst_kernel_frame_params p = *params;
     cl_mem maps[BST_DETECTOR_BUFFERS];

@@ -1,5 +1,6 @@
 #include "scenegen/fourier/alias_correction.h"
 
+#include <assert.h>
 #include <fftw3.h>
 #include <math.h>
 #include <stdlib.h>
@@ -118,6 +119,7 @@ bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spe
                                        const bst_alias_correction_axis *x,
                                        const bst_alias_correction_axis *y, bst_parallel *pool,
                                        bst_alias_correction **out) {
+    assert(psf && x && y && out && spectrum >= 0);
     *out = NULL;
     bst_alias_correction *w = calloc(1, sizeof *w);
     lattice l = {psf, spectrum, {x, y}, {0, 0}, NULL};

@@ -1,5 +1,6 @@
 #include "scenegen/fourier/batch_fft.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -56,6 +57,7 @@ static int split(int n, int radix[MOST_PASSES]) {
             if (order[i] == 8 && n % 16 == 0 && (n / 16) % 2 != 0) {
                 break;
             }
+            assert(count < MOST_PASSES);
             radix[count++] = order[i];
             n /= order[i];
         }
@@ -98,6 +100,7 @@ static bst_status make_pass(bst_ctx *ctx, fft_pass *p) {
 }
 
 bst_status bst_batch_fft_create(bst_ctx *ctx, int n, bst_batch_fft **out) {
+    assert(out && n >= 1);
     int radix[MOST_PASSES];
     *out = NULL;
     bst_batch_fft *f = calloc(1, sizeof *f);

@@ -1,5 +1,6 @@
 #include "scenegen/fourier/fourier_error.h"
 
+#include <assert.h>
 #include <fftw3.h>
 #include <math.h>
 #include <string.h>
@@ -100,6 +101,7 @@ static void take_node(lattice *l, int node, double peak, bst_fourier_error *out)
 
 bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_fourier_band *band,
                                      const bst_fourier_axis axis[2], bst_fourier_error *out) {
+    assert(psf && band && axis && out);
     lattice l = {.psf = psf,
                  .step = 2.0 * fmax(bst_psf_cutoff(psf), band->cutoff) / LATTICE,
                  .cutoff = band->cutoff,

@@ -1,5 +1,6 @@
 #include "scenegen/fourier/fourier_grid.h"
 
+#include <assert.h>
 #include <fftw3.h>
 #include <math.h>
 #include <stdlib.h>
@@ -231,6 +232,7 @@ static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex 
 
 bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
                                     bst_fourier_band *out) {
+    assert(psf && out && tolerance > 0.0);
     fftwf_complex *room = fftwf_malloc(sizeof *room * IMAGE * IMAGE);
     if (!room) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");

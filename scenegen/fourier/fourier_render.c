@@ -1,5 +1,6 @@
 #include "scenegen/fourier/fourier_render.h"
 
+#include <assert.h>
 #include <fftw3.h>
 #include <math.h>
 #include <stdio.h>
@@ -184,6 +185,7 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *
 bst_status bst_fourier_render_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                      const bst_psf *psf, const bst_fourier_render_options *options,
                                      bst_fourier_render **out) {
+    assert(device && camera && psf && out);
     *out = NULL;
     bst_fourier_render_options o = options ? *options : bst_fourier_render_default_options();
     if ((o.taps != 4 && o.taps != 6 && o.taps != 8) || !(o.tolerance > 0.0)) {
@@ -408,6 +410,7 @@ static bst_status deposit(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue 
 bst_status bst_fourier_render_frame(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue queue,
                                     bst_window window, const bst_fourier_render_nodes *nodes,
                                     bst_fourier_render_image *out) {
+    assert(l && queue && nodes && out && window.width > 0 && window.height > 0);
     setup *s;
     BST_TRY(find_setup(ctx, l, nodes->fine ? FINE : PLAIN, window, &s));
     size_t bytes = bst_otf_convolve_floats(s->fft) * sizeof(float);

@@ -1,5 +1,6 @@
 #include "scenegen/fourier/otf_convolve_internal.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,6 +63,7 @@ static bst_status find_strips(bst_ctx *ctx, bst_otf_convolve *f) {
             double fx = (double)nearest / x->pixels;
             double fy = sqrt(fmax(f->cutoff * f->cutoff - fx * fx, 0.0));
             int reach = (int)fmin(floor(fy * y->pixels), 0.5 * y->samples - 1.0);
+            assert((size_t)f->strip_count < most);
             f->strips[f->strip_count++] = (strip){k0, b, reach, numbers};
             numbers += 2 * (size_t)reach + 1;
             f->column_blocks = b + 1;
@@ -199,6 +201,7 @@ static bst_status make_wrap(bst_ctx *ctx, bst_otf_convolve *f) {
 bst_status bst_otf_convolve_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
                                    const bst_otf_convolve_layout *shape, bst_parallel *pool,
                                    bst_otf_convolve **out) {
+    assert(psf && shape && out && cutoff > 0.0);
     *out = NULL;
     bst_otf_convolve *f = calloc(1, sizeof *f);
     if (!f) {

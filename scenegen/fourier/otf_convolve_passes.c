@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -108,6 +109,7 @@ static void columns(void *user, int begin, int end) {
 }
 
 void bst_otf_convolve_add(bst_otf_convolve *f, int node, bool first, bool last, const float *grid) {
+    assert(f && grid && node >= 0);
     pass p = {.fft = f, .grid = grid, .node = node, .first = first, .last = last};
     bst_parallel_for(f->pool, (f->row_blocks + 1) / 2, 1, rows_forward, &p);
     bst_parallel_for(f->pool, f->column_blocks + (last && f->wraps), 1, columns, &p);
@@ -151,6 +153,7 @@ static void rows_inverse(void *user, int begin, int end) {
 }
 
 void bst_otf_convolve_finish(bst_otf_convolve *f, float *image) {
+    assert(f && image);
     pass p = {.fft = f, .image = image};
     bst_parallel_for(f->pool, (f->image_blocks + 1) / 2, 1, rows_inverse, &p);
 }

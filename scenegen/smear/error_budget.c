@@ -1,5 +1,6 @@
 #include "scenegen/smear/error_budget.h"
 
+#include <assert.h>
 #include <limits.h>
 #include <math.h>
 #include <stdint.h>
@@ -98,6 +99,7 @@ bst_error_budget_motion bst_error_budget_motion_of(const bst_smear_path_point *p
 }
 
 void bst_error_budget_begin(bst_error_budget *c, const bst_error_budget_motion *motion) {
+    assert(c && motion && motion->sigma_px > 0.0);
     c->motion = *motion;
     double psf = 3.0 * motion->sigma_px + 1.0;
     c->motion.overlap = fmin(
@@ -108,6 +110,7 @@ void bst_error_budget_begin(bst_error_budget *c, const bst_error_budget_motion *
 }
 
 void bst_error_budget_miss(bst_error_budget *c, double electrons) {
+    assert(c && electrons >= 0.0);
     c->missing_e += electrons;
     c->error = -1.0;
 }
@@ -135,6 +138,7 @@ bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
                             capacity);
         }
     }
+    assert(c->count < c->capacity);
     c->sources[c->count++] = *source;
     return BST_OK;
 }
@@ -217,6 +221,7 @@ static int fill_spots(bst_error_budget *c, float *apart) {
         spot *p = &c->spots[n];
         if (p->frame != c->frame) {
             *p = (spot){.key = key, .frame = c->frame, .x = s->x_px, .y = s->y_px};
+            assert(spots < c->capacity);
             c->used[spots++] = n;
         }
         p->peak += s->peak_e;

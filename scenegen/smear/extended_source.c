@@ -1,5 +1,6 @@
 #include "scenegen/smear/extended_source.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -50,6 +51,7 @@ static bst_status push(bst_ctx *ctx, bst_disc_points *list, double x, double y, 
         list->items = items;
         list->capacity = capacity;
     }
+    assert(list->count < list->capacity);
     list->items[list->count++] = (bst_disc_point){{x, y, 0.0}, share};
     return BST_OK;
 }
@@ -176,6 +178,7 @@ static bool thin(const bst_disc_aspect *aspect, double radius_px, double sigma_p
 bst_status bst_extended_source_points(bst_ctx *ctx, const bst_scene_source *source,
                                       const bst_extended_source_view *view, bst_disc_points *points,
                                       double *peak) {
+    assert(source && view && points && peak);
     points->count = 0;
     *peak = 1.0;
     const bst_scene_source_shape *shape = source->shape;
@@ -237,6 +240,7 @@ bst_status bst_extended_source_points(bst_ctx *ctx, const bst_scene_source *sour
 
 bst_status bst_extended_source_spread(bst_ctx *ctx, const bst_disc_points *points, double stretch,
                                       bst_smear_node_list *list) {
+    assert(points && list && points->count >= 0 && list->count >= 0);
     long long need = (long long)list->count * points->count;
     if (need > INT32_MAX / 64) {
         return bst_fail(ctx, BST_ERR_MEMORY,

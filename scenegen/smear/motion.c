@@ -1,5 +1,6 @@
 #include "scenegen/smear/motion.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -31,6 +32,7 @@ void bst_motion_to_shift(bst_smear_path_point *point, double scale_rad, double s
 
 bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_smear_path_point *path, int count,
                                 int parts, bst_smear_node_list *list) {
+    assert(path && list && count >= 2 && parts >= 1);
     if (list->count + parts > list->capacity) {
         int capacity = list->count + parts;
         bst_smear_node *items = realloc(list->items, (size_t)capacity * sizeof *items);

@@ -1,5 +1,6 @@
 #include "scenegen/smear/motion_map.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,6 +87,7 @@ static void measure_steps(bst_motion_map *map) {
 
 bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
                                 const bst_motion_map_frame *frame) {
+    assert(map && frame);
     if (frame->count > map->capacity) {
         free(map->turns);
         free(map->places);

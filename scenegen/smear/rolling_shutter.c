@@ -1,5 +1,6 @@
 #include "scenegen/smear/rolling_shutter.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -34,6 +35,7 @@ struct bst_rolling {
 
 bst_status bst_rolling_create(bst_ctx *ctx, const bst_camera *camera, double tolerance_sigma,
                               double peak_sigma_px, bool gaussian, bst_rolling **out) {
+    assert(camera && out && tolerance_sigma > 0.0 && peak_sigma_px > 0.0);
     bst_rolling *r = calloc(1, sizeof *r);
     *out = r;
     if (!r) {
@@ -182,6 +184,7 @@ static bst_status reserve(bst_ctx *ctx, bst_rolling *r, int sources, int parts, 
 
 bst_status bst_rolling_begin(bst_ctx *ctx, bst_rolling *r, const bst_render_request *q,
                              double margin_px) {
+    assert(r && q && q->track && q->count >= 0 && margin_px >= 0.0);
     int height = q->window.height, moving = 0;
     for (int i = 0; i < q->count; i++) {
         moving += q->sources[i].path || q->sources[i].rate;
@@ -231,6 +234,7 @@ bst_status bst_rolling_begin(bst_ctx *ctx, bst_rolling *r, const bst_render_requ
 }
 
 bst_status bst_rolling_next(bst_ctx *ctx, bst_rolling *r, bst_render_request *band, bool *more) {
+    assert(r && band && more);
     const bst_render_request *q = r->request;
     int first = r->next, height = q->window.height;
     *more = first < height;

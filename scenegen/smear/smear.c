@@ -1,5 +1,6 @@
 #include "scenegen/smear/smear.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "scenegen/smear/smear_internal.h"
 #include "scenegen/stamp/fixed_point_px.h"
 #include "scenegen/stamp/profile_law.h"
+#include "sim/core/invariant.h"
 
 /* Shares of the tolerance: for nodes, for the border of the stamp, and for a track that stars
  * share. */
@@ -340,6 +342,8 @@ static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
 }
 
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
+    assert(s && frame && frame->track && frame->track->count >= 2 && frame->sources >= 0);
+    assert(bst_is_ascending(frame->track->time_s, frame->track->count));
     const bst_los_track *track = frame->track;
     s->track = *track;
     s->window = frame->window;
@@ -376,6 +380,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
             const bst_quat *ends = &track->q_cam_from_gcrf[k];
             bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
             double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
+            assert(s->path_count < s->path_capacity && s->path_count < s->turn_capacity);
             s->turn[s->path_count] = q;
             bst_smear_path_point *p = &s->path[s->path_count++];
             *p = attitude_point(s, q, t * inverse);
@@ -398,6 +403,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
 }
 
 void bst_smear_restart(bst_smear *s, double aim) {
+    assert(s && aim > 0.0 && aim <= 1.0);
     s->aim = aim;
     s->table_blocks = s->levels[0].first_block + s->levels[0].blocks;
     for (int n = 1; n < BST_SMEAR_LEVELS; n++) {

@@ -1,11 +1,13 @@
 #include "scenegen/smear/smear_quadrature.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "boresight/vec.h"
 #include "scenegen/smear/smear_quadrature_internal.h"
+#include "sim/core/invariant.h"
 
 /* A group: the path from time `from` (in segment `first`) to `to`. */
 typedef struct group {
@@ -24,6 +26,7 @@ static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3
         list->items = items;
         list->capacity = capacity;
     }
+    assert(list->count < list->capacity && weight >= 0.0 && variance >= 0.0);
     list->items[list->count++] = (bst_smear_node){{p[0], p[1], p[2]}, weight, variance, error};
     return BST_OK;
 }
@@ -258,6 +261,8 @@ static double spread_of(const extent *e) {
 
 bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *path, int count,
                                      const bst_smear_node_aim *aim, bst_smear_node_list *list) {
+    assert(path && aim && list && count >= 2 && bst_is_positive(aim->psf_sigma_px));
+    assert(aim->tolerance > 0.0 && aim->widest >= 0.0 && aim->widest <= BST_NODE_WIDEST);
     double variance = aim->psf_sigma_px * aim->psf_sigma_px, tolerance = aim->tolerance;
     double wide = fmax(aim->wide_field, 1.0);
     bst_smear_maker m = {

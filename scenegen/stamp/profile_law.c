@@ -1,5 +1,6 @@
 #include "scenegen/stamp/profile_law.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -102,6 +103,7 @@ int bst_profile_law_floats(int degree, int reach) {
 }
 
 void bst_profile_law(double sigma_px, int degree, int reach, float *law) {
+    assert(law && sigma_px > 0.0 && degree % 2 == 1 && reach >= 0);
     const int counts[3] = {degree + 1, BST_LAW_FIRST, BST_LAW_SECOND};
     for (int d = 1; d <= reach; d++) {
         for (int order = 0; order < 3; order++) {

@@ -1,5 +1,7 @@
 #include "scenegen/stamp/stamp.h"
 
+#include <assert.h>
+
 #include "scenegen/reference.h"
 
 /* Mean over the sub-pixel phases of a profile's light on its two nearest pixels and r more on each
@@ -15,6 +17,7 @@ static double kept_light(double sigma_px, int r) {
 }
 
 void bst_stamp_init(bst_stamp *stamp, double sigma_px, bool whole) {
+    assert(stamp && sigma_px > 0.0);
     double centre = bst_reference_pixel_share(0.0, sigma_px, 0);
     for (int r = 0; r < BST_PLACE_TAPS / 2; r++) {
         stamp->tail[r] = whole ? 0.0 : bst_reference_pixel_share(0.0, sigma_px, r) / centre;

@@ -1,5 +1,7 @@
 #include "sim/astro/interpolate.h"
 
+#include <assert.h>
+
 int64_t bst_interpolate_find(const bst_astro_table_state *rows, int64_t count, double t_s) {
     int64_t low = 0, high = count;
     while (high - low > 1) {
@@ -15,6 +17,7 @@ int64_t bst_interpolate_find(const bst_astro_table_state *rows, int64_t count, d
 
 void bst_interpolate(const bst_astro_table_state *rows, int64_t count, double t_s, int points,
                      bool hermite, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
+    assert(rows && count >= 1 && points >= 1 && position_m && velocity_mps);
     enum { MOST = BST_INTERPOLATE_MAX_ROWS };
     hermite = hermite || count == 1; /* else a single row would stand still */
     int most = hermite ? MOST / 2 : MOST;

@@ -1,5 +1,6 @@
 #include "sim/astro/kepler.h"
 
+#include <assert.h>
 #include <stdbool.h>
 
 /* Stumpff's c2 and c3, by series where the closed forms cancel. */
@@ -76,6 +77,7 @@ static bool solve(double r0, double sigma0, double p, double alpha, double targe
 bst_status bst_kepler_propagate(bst_ctx *ctx, double mu, bst_vec3 position_m, bst_vec3 velocity_mps,
                                 double seconds, bst_vec3 *position_out_m,
                                 bst_vec3 *velocity_out_mps) {
+    assert(mu > 0.0 && position_out_m && velocity_out_mps);
     double r0 = bst_vec3_norm(position_m);
     double v2 = bst_vec3_dot(velocity_mps, velocity_mps);
     double h = bst_vec3_norm(bst_vec3_cross(position_m, velocity_mps));

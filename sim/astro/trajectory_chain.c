@@ -1,4 +1,5 @@
 /* A trajectory in one direction: steps, their window, way points. */
+#include <assert.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -212,6 +213,7 @@ static void keep_way_point(bst_trajectory_chain *chain) {
         chain->way_count = BST_CHAIN_WAY_POINTS / 2;
         chain->stride *= 2;
     }
+    assert(chain->way_count < BST_CHAIN_WAY_POINTS);
     chain->way[chain->way_count++] = chain->here;
 }
 

@@ -1,5 +1,6 @@
 #include "sim/catalogue/faint_stars.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
 #include "sim/catalogue/faint_internal.h"
@@ -270,6 +271,7 @@ static bst_status query_cell(bst_ctx *ctx, bst_faint_stars *f, const cone *q, in
 bst_status bst_faint_stars_query(bst_ctx *ctx, bst_faint_stars *f, bst_vec3 centre,
                                  double radius_rad, double v_limit, bst_star *out, int capacity,
                                  int *count) {
+    assert(f && count);
     *count = 0;
     if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) ||
         !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) || capacity < 0 || (!out && capacity > 0)) {

@@ -1,5 +1,6 @@
 #include "sim/catalogue/stars.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -323,6 +324,7 @@ static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_ra
 bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
                            double v_limit, double julian_year, bst_star *out, int capacity,
                            int *count) {
+    assert(stars && count);
     *count = 0;
     if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) || !isfinite(julian_year) ||
         !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) || capacity < 0 || (!out && capacity > 0)) {

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,6 +42,7 @@ static bst_status find_duplicate(bst_ctx *ctx, const cJSON *object, const char *
     }
     int n = 0;
     for (const cJSON *child = object->child; child; child = child->next) {
+        assert(n < count);
         keys[n++] = child->string;
     }
     qsort(keys, (size_t)n, sizeof *keys, compare_keys);

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* sched_getaffinity */
 #include "sim/core/parallel.h"
 
+#include <assert.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdbool.h>
@@ -98,6 +99,7 @@ int bst_parallel_threads(const bst_parallel *pool) {
 }
 
 void bst_parallel_for(bst_parallel *pool, int count, int grain, bst_parallel_fn fn, void *user) {
+    assert(count >= 0 && grain >= 1 && fn);
     if (!pool || pool->worker_count == 0 || count <= grain) {
         for (int begin = 0; begin < count;) {
             int end = count - begin > grain ? begin + grain : count;

@@ -1,4 +1,5 @@
 /* Normal deviates sixteen at a time, in operations that vectors have. */
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -48,6 +49,7 @@ static inline void turn_of(double u, double *cosine, double *sine) {
 
 BST_CLONES void bst_rng_normal_block(bst_rng_key key, uint64_t first,
                                      double out[2][BST_RNG_BLOCK]) {
+    assert(out);
     uint32_t c0[COUNT], c1[COUNT], c2[COUNT], c3[COUNT], key0 = key.k[0], key1 = key.k[1];
     for (int i = 0; i < COUNT; i++) {
         uint64_t a = first + (uint64_t)i;

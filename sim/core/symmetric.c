@@ -10,6 +10,7 @@
 enum { MOST = BST_SYMMETRIC_MOST };
 
 bool bst_symmetric_invert(int n, const double *a, double *out) {
+    assert(a && out);
     assert(n >= 1 && n <= MOST);
     double scale[MOST], l[MOST][MOST], m[MOST][MOST]; /* lower triangles: L and its inverse */
     for (int i = 0; i < n; i++) {

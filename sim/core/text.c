@@ -1,5 +1,6 @@
 #include "sim/core/text.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,6 +63,7 @@ bool bst_text_is_file_name(const char *word) {
 }
 
 void bst_text_of_number(double value, char *buffer, size_t bytes) {
+    assert(buffer && bytes > 0);
     for (int digits = 15; digits <= 17; digits++) {
         snprintf(buffer, bytes, "%.*g", digits, value);
         if (strtod(buffer, NULL) == value) {

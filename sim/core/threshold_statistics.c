@@ -1,10 +1,12 @@
 #include "sim/core/threshold_statistics.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
 
 double bst_threshold_maxima(double u, double density) {
+    assert(density >= 0.0);
     return density * u * exp(-0.5 * u * u) / (2.0 * BST_PI * sqrt(2.0 * BST_PI));
 }
 

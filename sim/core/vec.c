@@ -1,5 +1,7 @@
 #include "boresight/vec.h"
 
+#include <assert.h>
+
 bst_quat bst_quat_from_mat3(const bst_mat3 *a) {
     const double(*m)[3] = a->m;
     double trace = m[0][0] + m[1][1] + m[2][2];
@@ -59,6 +61,7 @@ bst_vec3 bst_quat_to_rotvec(bst_quat q) {
 }
 
 bst_quat bst_quat_slerp(bst_quat a, bst_quat b, double s) {
+    assert(isfinite(s));
     bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(b, bst_quat_conj(a)));
     return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, s)), a));
 }

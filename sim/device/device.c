@@ -1,5 +1,6 @@
 #include "sim/device/device.h"
 
+#include <assert.h>
 #include <ctype.h>
 #include <pthread.h>
 #include <stdbool.h>
@@ -446,6 +447,7 @@ exit:
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_device_kernel_source *const *sources, int count,
                             const char *options, cl_program *out) {
+    assert(device && sources && count >= 1 && options && out);
     pthread_mutex_lock(&device->lock);
     bst_status status = build(ctx, device, sources, count, options, out);
     pthread_mutex_unlock(&device->lock);

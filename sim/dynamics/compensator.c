@@ -1,5 +1,6 @@
 #include "boresight/compensator.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
@@ -57,6 +58,7 @@ static bst_status below_nyquist(bst_ctx *ctx, const char *key, double hz, double
 }
 
 static void add(bst_compensator *c, const double num[3], const double den[3], double prewarp_hz) {
+    assert(c->stages < (int)(sizeof c->stage / sizeof c->stage[0]));
     c->stage[c->stages++] = bst_dynamics_biquad_tustin(num, den, c->dt_s, prewarp_hz);
 }
 
@@ -213,6 +215,7 @@ static bst_status plug(bst_ctx *ctx, bst_compensator *c, const bst_stage_use *us
 
 bst_status bst_compensator_from_gains(bst_ctx *ctx, bst_compensator *c,
                                       const bst_compensator_config *config, double dt_s) {
+    assert(c && config && dt_s > 0.0);
     return config->plug.desc ? plug(ctx, c, &config->plug, dt_s) : build(ctx, c, config, dt_s);
 }
 
@@ -246,6 +249,7 @@ static double step_plug(bst_compensator *c, double error, double feed_forward) {
 }
 
 double bst_compensator_step(bst_compensator *c, double error, double feed_forward) {
+    assert(c && isfinite(error) && isfinite(feed_forward));
     if (c->plug) {
         return step_plug(c, error, feed_forward);
     }

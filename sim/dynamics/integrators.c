@@ -8,6 +8,7 @@ const char *const bst_integrator_names[] = {"symplectic", "symplectic4", "rk4", 
 
 void bst_dynamics_rk4_step(bst_dynamics_rate_fn rate, const void *user, int count, double dt_s,
                            double *y) {
+    assert(rate && y && count >= 1);
     assert(count <= BST_RK4_MOST);
     static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
     double stage[BST_RK4_MOST], slope[BST_RK4_MOST] = {0}, sum[BST_RK4_MOST] = {0};
@@ -58,6 +59,7 @@ static inline void turn_about(const bst_dynamics_free_body *body, int i, double 
 
 void bst_dynamics_turn_free_body(const bst_dynamics_free_body *body, double dt_s,
                                  bst_quat *q_from_gcrf, double pi[3]) {
+    assert(body && q_from_gcrf && pi && isfinite(dt_s));
     double q[4] = {q_from_gcrf->x, q_from_gcrf->y, q_from_gcrf->z, q_from_gcrf->w};
     turn_about(body, 0, 0.5 * dt_s, q, pi);
     turn_about(body, 1, 0.5 * dt_s, q, pi);

@@ -1,5 +1,6 @@
 #include "sim/engine/simulation.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -375,6 +376,7 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
 
 bst_status bst_simulation_create(bst_ctx *ctx, const bst_scenario *scenario,
                                  const bst_simulation_options *options, bst_simulation **out) {
+    assert(scenario && options && out);
     *out = NULL;
     bst_simulation *sim = calloc(1, sizeof *sim);
     if (!sim) {

@@ -1,5 +1,6 @@
 #include "sim/io/run_store.h"
 
+#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -222,6 +223,7 @@ static bst_status check_out(bst_ctx *ctx, const bst_run *run) {
 }
 
 bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bst_run **out) {
+    assert(out_path && out);
     *out = NULL;
     size_t length = out_path ? strlen(out_path) : 0;
     while (length > 1 && out_path[length - 1] == '/') {

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -179,6 +180,7 @@ static bst_status note_columns(bst_ctx *ctx, bst_run *run, const char *name, con
 
 bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
                                const bst_io_column *columns, int count, bst_io_table **out) {
+    assert(run && name && columns && out);
     *out = NULL;
     if (!is_name(name, sizeof((bst_io_table *)0)->name) || count < 1 || count > BST_TABLE_COLUMNS) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "table '%s' with %d columns cannot be made", name,
@@ -212,6 +214,7 @@ bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, con
 }
 
 bst_status bst_io_table_append(bst_ctx *ctx, bst_io_table *table, const bst_io_value *values) {
+    assert(table && values);
     bst_run *run = table->run;
     BST_TRY(begin_batch(ctx, run));
     for (int k = 0; k < table->columns; k++) {

@@ -1,7 +1,9 @@
 #include "sim/io/wcs.h"
 
+#include <assert.h>
 #include <math.h>
 
+#include "sim/core/invariant.h"
 #include "sim/io/tangent.h"
 
 #define GRID 9
@@ -64,6 +66,7 @@ static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat
 
 bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
                        const bst_light *light, bst_wcs *out) {
+    assert(camera && light && out && bst_is_unit_quat(q_cam_from_gcrf, 1.1e-6));
     if (bst_camera_distorted(camera)) {
         return fit_distorted(ctx, camera, q_cam_from_gcrf, light, out);
     }
@@ -126,6 +129,7 @@ double bst_wcs_distortion_misfit_px(const bst_camera *camera) {
 }
 
 bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning) {
+    assert(wcs && binning >= 1);
     bst_wcs w = *wcs;
     double b = binning > 1 ? binning : 1;
     /* full-sensor FITS pixel p covers (p - 0.5, p + 0.5) */

@@ -1,5 +1,6 @@
 #include "sim/link/external.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,6 +135,7 @@ static bst_status create(const bst_module_env *env, const bst_module_desc *desc,
         const bst_channel_type *type = bst_channel_type_find(port->channel);
         int items = type->item_bytes ? (int)config->max_items : 0;
         bst_env_set_capacity(env, p, items);
+        assert(m->output_count < (int)(sizeof m->outputs / sizeof m->outputs[0]));
         m->output_ports[m->output_count] = p;
         m->outputs[m->output_count++] = (bst_link_output){
             .type = bst_external_type(port->channel),

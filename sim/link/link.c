@@ -1,5 +1,6 @@
 #include "sim/link/link.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,6 +31,7 @@ const bst_config_desc bst_link_config_table[] = {
 
 bst_status bst_link_create(bst_ctx *ctx, const bst_link_config *config, const bst_link_run *run,
                            bst_link **out) {
+    assert(config && run && out);
     *out = NULL;
     bst_link *link = calloc(1, sizeof *link);
     if (!link) {
@@ -49,6 +51,7 @@ bst_status bst_link_create(bst_ctx *ctx, const bst_link_config *config, const bs
 }
 
 bst_status bst_link_add(bst_ctx *ctx, bst_link *link, const bst_link_part *part, int *number) {
+    assert(link && part && number);
     if (link->router) {
         return bst_fail(ctx, BST_ERR_STATE, "link: parts are added before it is opened");
     }

@@ -1,4 +1,5 @@
 /* A step of a part that a peer plays. */
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -107,6 +108,8 @@ static bool oldest_answer(bst_link *link, int number, bst_link_output *outputs, 
 
 bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
                          bst_link_output *outputs, int output_count, bool *more) {
+    assert(link && outputs && more && number >= 0 && number < link->part_count &&
+           output_count >= 0);
     *more = false;
     if (link->run.waiting == BST_LINK_AWAIT) {
         return BST_OK;
@@ -349,6 +352,7 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
 
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
                              const bst_link_messages *m, bool *answered) {
+    assert(link && m && answered && number >= 0 && number < link->part_count);
     if (bst_link_replays(link)) {
         *answered = true;
         return bst_link_tape_read(ctx, link, number, tick, m->outputs, m->output_count);

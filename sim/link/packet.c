@@ -1,5 +1,6 @@
 #include "sim/link/packet.h"
 
+#include <assert.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,6 +18,7 @@ void bst_link_header_seal(char *text, size_t bytes) {
 }
 
 size_t bst_link_header_write(const bst_link_header *h, char out[BST_LINK_HEADER_BYTES]) {
+    assert(h && out && h->parts >= 0 && h->parts <= BST_LINK_PARTS);
     size_t room = BST_LINK_HEADER_BYTES, n = 0;
     n += (size_t)snprintf(out, room, "{\"version\":%d,\"type\":\"%s\",\"tick\":%" PRId64 ",",
                           BST_LINK_VERSION, bst_wire_message_of(h->type)->name, h->tick);

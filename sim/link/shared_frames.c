@@ -1,5 +1,6 @@
 #include "sim/link/shared_frames.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdbool.h>
@@ -158,6 +159,7 @@ static unsigned char *slot_of(const bst_shared_frames *f, int64_t number) {
 
 void bst_shared_frames_write(bst_shared_frames *f, const char *header, size_t header_bytes,
                              const void *pixels, size_t bytes) {
+    assert(f && header && pixels && bytes <= (size_t)bst_shared_frames_slot_bytes(f));
     unsigned char *slot = slot_of(f, f->next);
     int64_t length = (int64_t)bytes;
     __atomic_store_n((int64_t *)(void *)slot, -1, __ATOMIC_RELAXED);

@@ -1,5 +1,6 @@
 #include "sim/link/wire.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -79,6 +80,7 @@ static size_t encode_record(const bst_wire_field *table, const char *from, uint8
 }
 
 size_t bst_wire_encode(const bst_wire_message *message, const void *payload, uint8_t *out) {
+    assert(message && payload && out);
     size_t bytes = encode_record(message->record, payload, out);
     int count = bst_wire_items(message, payload);
     for (int i = 0; i < count; i++) {
@@ -199,6 +201,7 @@ static bst_wire_fault decode_record(bst_ctx *ctx, const bst_wire_message *messag
 
 bst_wire_fault bst_wire_decode(bst_ctx *ctx, const bst_wire_message *message, const uint8_t *data,
                                size_t bytes, void *payload, int capacity, int *dropped) {
+    assert(message && (data || bytes == 0) && payload && capacity >= 0);
     size_t record = bst_wire_bytes(message->record), item = bst_wire_bytes(message->items);
     const bst_wire_field *counting = count_field(message);
     int32_t count = 0;

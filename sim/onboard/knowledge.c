@@ -1,5 +1,6 @@
 #include "sim/onboard/knowledge.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,6 +50,8 @@ static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *err
 
 bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                                 bst_knowledge **out) {
+    assert(world && out && observer >= 0 && observer < bst_world_observer_count(world));
+    assert(sensor >= 0 && sensor < bst_world_sensor_count(world, observer));
     *out = NULL;
     bst_knowledge *k = calloc(1, sizeof *k);
     if (!k) {
@@ -221,6 +224,7 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
 
 bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_onboard_cue *out) {
+    assert(view && out && isfinite(seconds));
     const bst_knowledge *k = view->knowledge;
     /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-11 rad/s */
     const double h = 0.5;
@@ -256,6 +260,7 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 
 bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                           bool *valid, bst_vec3 *direction) {
+    assert(view && valid && direction && isfinite(seconds));
     *valid = true;
     return direction_at(ctx, view, seconds, direction);
 }

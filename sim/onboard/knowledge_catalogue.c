@@ -1,4 +1,5 @@
 /* The onboard catalogue: the scenario's objects on their catalogued orbits, burns left out. */
+#include <assert.h>
 #include <string.h>
 
 #include "sim/onboard/knowledge_internal.h"
@@ -66,6 +67,7 @@ bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
                                   double seconds, bst_world_sight *out) {
+    assert(view && out && isfinite(seconds));
     const bst_world *world = view->knowledge->world;
     const bst_world_object_info *info = &world->objects[object].info;
     double t, emission_s;

@@ -1,5 +1,6 @@
 #include "sim/optics/photometry.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -39,6 +40,7 @@ void bst_optics_photometer_add(bst_optics_photometer *p, const bst_detection *st
     if (p->count < p->capacity && (star->flags & spoilt) == 0 && star->snr >= LEAST_SNR &&
         isfinite(noise) && isfinite(excess)) {
         p->excess[p->count] = excess;
+        assert(p->count < p->capacity);
         p->variance[p->count++] = noise * noise;
     }
 }

@@ -1,5 +1,6 @@
 #include "sim/optics/psf.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,6 +68,7 @@ static int grid_place(double at_px, double last_px, int nodes, double *upper) {
 }
 
 int bst_psf_weights(const bst_psf *psf, double x_px, double y_px, int node[4], double weight[4]) {
+    assert(psf && node && weight && isfinite(x_px) && isfinite(y_px));
     double u, v;
     int i = grid_place(x_px, psf->width_px - 1.0, psf->columns, &u);
     int j = grid_place(y_px, psf->height_px - 1.0, psf->rows, &v);

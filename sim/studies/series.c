@@ -1,4 +1,5 @@
 /* Series: several rows a run, such as a curve's points. */
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -89,6 +90,7 @@ static int statistics_columns(const bst_study_kind *kind, bst_io_column *columns
 
 static bst_status put_keyed(bst_ctx *ctx, const bst_study_kind *kind, int64_t setting,
                             const keyed *k, bst_table_out *t) {
+    assert(kind->series_count <= BST_SERIES_COLUMNS);
     bst_io_value row[4 * BST_SERIES_COLUMNS];
     int n = 0;
     double trials = 0.0;

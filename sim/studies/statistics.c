@@ -1,5 +1,6 @@
 #include "sim/studies/statistics.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -102,6 +103,7 @@ static void set_interval(double *means, int64_t n, bst_statistics *s) {
 
 bst_status bst_statistics_of(bst_ctx *ctx, const double *values, int64_t rows, int columns,
                              int64_t resamples, bst_rng_key key, bst_statistics *out) {
+    assert(values && out && rows >= 0 && columns >= 1 && resamples >= 0);
     size_t cells = (size_t)rows * (size_t)columns, wide = (size_t)columns;
     size_t most = (size_t)(rows > resamples ? rows : resamples);
     double *centred = malloc(cells * sizeof *centred + 1), *sums = malloc(wide * sizeof *sums + 1);

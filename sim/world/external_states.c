@@ -1,5 +1,6 @@
 #include "sim/world/external_states.h"
 
+#include <assert.h>
 #include <pthread.h>
 #include <stdlib.h>
 
@@ -37,6 +38,7 @@ void bst_external_states_free(bst_external_states *s) {
 
 bst_status bst_external_states_add(bst_ctx *ctx, bst_external_states *s, double seconds,
                                    const bst_world_state *state) {
+    assert(s && state && isfinite(seconds));
     pthread_mutex_lock(&s->lock);
     double last = s->count > 0 ? s->states[(s->count - 1) % KEPT].seconds : -INFINITY;
     bool later = seconds > last;

@@ -1,5 +1,6 @@
 #include "sim/world/frame_updates.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -400,6 +401,7 @@ int bst_frame_updates_count(const bst_frame_updates *updates) {
     return updates->count;
 }
 const bst_frame_update *bst_frame_updates_item(const bst_frame_updates *updates, int index) {
+    assert(updates && index >= 0 && index < updates->count);
     return &updates->items[index];
 }
 

@@ -51,6 +51,7 @@ int bst_name_index_find(const bst_name_index *index, const char *name) {
 }
 
 void bst_name_index_add(bst_name_index *index, const char *name, int number) {
+    assert(index && name && number >= 0);
     size_t i = slot_of(index, name);
     assert(!index->slot[i].name && 2 * (size_t)index->count < index->slots);
     index->slot[i].name = name;

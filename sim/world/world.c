@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -268,6 +269,7 @@ int bst_world_object_count(const bst_world *world) {
     return world->object_count;
 }
 const bst_world_object_info *bst_world_object(const bst_world *world, int object) {
+    assert(world && object >= 0 && object < bst_world_object_count(world));
     return &world->objects[object].info;
 }
 int bst_world_observer_count(const bst_world *world) {
@@ -289,6 +291,7 @@ bool bst_world_element_age(const bst_world *world, int body, double *seconds) {
 }
 
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor) {
+    assert(world && observer >= 0 && observer < bst_world_observer_count(world) && sensor >= 0);
     return &world->observers[observer].sensors[sensor].config.camera;
 }
 

@@ -60,9 +60,10 @@ static void test_momentum_of_both(void **state) {
     for (int64_t n = 0; n < 20000; n++) {
         double t = 1e-3 * (double)n;
         bst_assert_ok(&ctx, bst_spacecraft_step(&ctx, craft, n, t, mount.reaction_nm));
-        bst_los_command command = {.direction_gcrf = n < 6000    ? (bst_vec3){0.3, 0.5, 0.8}
+        bst_los_command command = {.direction_gcrf =
+                                       bst_vec3_unit(n < 6000    ? (bst_vec3){0.3, 0.5, 0.8}
                                                      : n < 12000 ? (bst_vec3){-0.2, 0.4, 0.9}
-                                                                 : (bst_vec3){0.1, -0.3, 0.9}};
+                                                                 : (bst_vec3){0.1, -0.3, 0.9})};
         bst_mount_body body = {now->body.rate_radps, now->q_believed_from_gcrf,
                                now->rate_believed_radps};
         bst_mount_step(&mount, &body, &command, 0.0, n % 10 == 0);
@@ -91,8 +92,9 @@ static void test_held_under_a_slew(void **state) {
     for (int64_t n = 0; n < 120000; n++) {
         bst_assert_ok(&ctx,
                       bst_spacecraft_step(&ctx, craft, n, 1e-3 * (double)n, mount.reaction_nm));
-        bst_los_command command = {.direction_gcrf =
-                                       n < 30000 ? (bst_vec3){0, 0, 1} : (bst_vec3){0.3, 0.5, 0.8}};
+        bst_los_command command = {
+            .direction_gcrf =
+                bst_vec3_unit(n < 30000 ? (bst_vec3){0, 0, 1} : (bst_vec3){0.3, 0.5, 0.8})};
         bst_mount_body body = {now->body.rate_radps, now->q_believed_from_gcrf,
                                now->rate_believed_radps};
         bst_mount_step(&mount, &body, &command, 0.0, n % 10 == 0);

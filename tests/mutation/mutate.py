@@ -110,7 +110,7 @@ class Coverage:
 
     def __init__(self, source, build, jobs, names):
         self.source, self.build = os.path.abspath(source), os.path.abspath(build)
-        flags = "-O1 --coverage -DNDEBUG"
+        flags = "-O1 --coverage"
         made = run(["cmake", "-S", self.source, "-B", self.build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Coverage",
                     f"-DCMAKE_C_FLAGS_COVERAGE={flags}", f"-DCMAKE_CXX_FLAGS_COVERAGE={flags}"])
         if made.returncode:

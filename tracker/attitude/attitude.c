@@ -1,5 +1,8 @@
 #include "tracker/attitude/attitude.h"
 
+#include <assert.h>
+
+#include "sim/core/invariant.h"
 #include "sim/core/symmetric.h"
 
 /* Residual of a star (measured - predicted) and its derivative by the camera rotation vector. */
@@ -247,6 +250,8 @@ static void measure_pull(const star_residual *s, const double covariance[3][3],
 void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *params,
                         bst_quat q_start, bst_attitude_star *stars, int count,
                         bst_attitude_solution *out) {
+    assert(camera && params && out && count >= 0 && (stars || count == 0));
+    assert(bst_is_unit_quat(q_start, 1.1e-6)); /* telemetry of another program */
     *out = (bst_attitude_solution){.q_cam_from_gcrf = q_start};
     if (count < 2) {
         return;

@@ -1,11 +1,14 @@
 #include "tracker/attitude/attitude_error.h"
 
+#include <assert.h>
 #include <string.h>
 
+#include "sim/core/invariant.h"
 #include "sim/core/symmetric.h"
 
 void bst_attitude_error_predict(bst_attitude_error *filter, const bst_attitude_error_params *params,
                                 double dt_s) {
+    assert(filter && params && isfinite(dt_s) && dt_s >= 0.0);
     if (!filter->started) {
         return;
     }
@@ -57,6 +60,8 @@ static void start(bst_attitude_error *filter, const bst_attitude_error_params *p
 bool bst_attitude_error_update(bst_attitude_error *filter, const bst_attitude_error_params *params,
                                bst_quat q_telemetry_from_gcrf, bst_vec3 e_cam_rad,
                                const double covariance_cam[3][3]) {
+    assert(filter && params && bst_is_finite_vec3(e_cam_rad));
+    assert(bst_is_covariance(&covariance_cam[0][0], 3));
     bst_mat3 gcrf_from_cam = bst_quat_to_mat3(bst_quat_conj(q_telemetry_from_gcrf));
     bst_vec3 e = bst_mat3_mul_vec(&gcrf_from_cam, e_cam_rad);
     double z[3] = {e.x, e.y, e.z}, r[3][3], s[3][3], inverse[3][3];

@@ -1,5 +1,6 @@
 #include "tracker/attitude/attitude_shared.h"
 
+#include <assert.h>
 #include <math.h>
 
 enum { FEWEST_STARS = 4 };
@@ -12,6 +13,7 @@ static const double MOST_LEVERAGE = 0.5;
 
 void bst_attitude_shared_update(bst_attitude_shared *shared, const bst_attitude_solution *solution,
                                 const bst_attitude_star *stars, int count) {
+    assert(shared && solution && count >= 0 && (stars || count == 0));
     if (solution->stars_used < FEWEST_STARS) {
         return;
     }

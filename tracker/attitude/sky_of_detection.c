@@ -1,9 +1,15 @@
 #include "tracker/attitude/sky_of_detection.h"
 
+#include <assert.h>
+
+#include "sim/core/invariant.h"
+
 bst_sky_measurement bst_sky_of_detection(const bst_camera *camera, const bst_detection *item,
                                          double extra_px2, bst_quat q_cam_from_gcrf,
                                          const double covariance_cam[3][3],
                                          const bst_light *light) {
+    assert(camera && item && light && bst_is_variance(extra_px2));
+    assert(bst_is_unit_quat(q_cam_from_gcrf, 1.1e-6));
     bst_vec3 v = bst_camera_unproject(camera, item->x_px, item->y_px);
     bst_quat back = bst_quat_conj(q_cam_from_gcrf);
     bst_vec3 apparent = bst_quat_rotate(back, v);

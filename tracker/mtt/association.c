@@ -1,4 +1,5 @@
 /* Which detection belongs to which track. */
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -72,6 +73,7 @@ static int collect(const bst_mtt *mtt, int t, double detection_sigma, int *colum
 }
 
 int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns) {
+    assert(mtt && columns && t >= 0 && t < mtt->track_count);
     double costs[BST_MTT_CANDIDATES];
     return collect(mtt, t, mtt->largest_sigma, columns, costs);
 }
@@ -136,6 +138,7 @@ static void assign_group(bst_mtt *mtt, bool tentative) {
 }
 
 void bst_mtt_associate(bst_mtt *mtt, bool partial) {
+    assert(mtt && mtt->now.count <= mtt->params.max_detections);
     mtt->largest_sigma = largest_sigma(&mtt->now);
     for (int t = 0; t < mtt->track_count; t++) {
         mtt->detection_of_track[t] = -1;

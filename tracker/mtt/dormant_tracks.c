@@ -1,5 +1,6 @@
 /* Tracks that were deleted after they had been confirmed: an eclipse or an occultation ends a
  * track, not an object. */
+#include <assert.h>
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
@@ -32,12 +33,14 @@ void bst_mtt_predict_memory(bst_mtt *m, const bst_mtt_frame *frame) {
 }
 
 void bst_mtt_remember(bst_mtt *m, const bst_mtt_track *track) {
+    assert(m && track && track->status != BST_TRACK_TENTATIVE);
     if (m->params.max_memory == 0) {
         return;
     }
     if (m->memory_count == m->params.max_memory) {
         forget(m, 0);
     }
+    assert(m->memory_count < m->params.max_memory);
     m->memory[m->memory_count++] = *track;
 }
 

@@ -1,6 +1,9 @@
 #include "tracker/mtt/filter.h"
 
+#include <assert.h>
 #include <string.h>
+
+#include "sim/core/invariant.h"
 
 /* Models of an IMM. */
 #define MODELS 2
@@ -28,6 +31,7 @@ static void factor(const double p[4][4], double l[4][4]) {
 }
 
 void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
+    assert(state && isfinite(dt_s) && noise_rad2ps3 >= 0.0);
     double l[4][4], weights[8];
     bst_sky_state points[8], start = *state;
     factor(state->covariance, l);
@@ -57,6 +61,7 @@ void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_r
 
 void bst_filter_start(const bst_filter_params *params, const bst_sky_state *state,
                       bst_filter_models *models) {
+    assert(params && models && state && bst_is_covariance(&state->covariance[0][0], 4));
     models->count = 0;
     if (params->kind != BST_FILTER_IMM) {
         return;
@@ -101,6 +106,8 @@ static void predict_one(const bst_filter_params *params, double dt_s, bst_sky_st
 
 void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_state *state,
                         bst_filter_models *models) {
+    assert(params && state && models && dt_s >= 0.0);
+    assert(models->count >= 0 && models->count <= BST_FILTER_COMPONENTS);
     if (models->count == 0) {
         predict_one(params, dt_s, state);
         return;
@@ -135,6 +142,7 @@ static double log_density(const bst_sky_innovation *innovation) {
 bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *state,
                          const bst_filter_models *models, const bst_filter_candidate *candidate,
                          bst_filter_fit *out) {
+    assert(params && state && models && candidate && candidate->measurement && out);
     bool imm = params->kind == BST_FILTER_IMM && models->count > 0;
     if (!bst_sky_innovate(imm ? &models->state[0] : state, candidate->measurement, candidate->extra,
                           &out->innovation)) {
@@ -167,6 +175,8 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
 static int spread(const bst_sky_state *state, double log_weight,
                   const bst_filter_evidence *evidence, bst_sky_state *hypotheses, double *logs,
                   int n) {
+    assert(evidence->count >= 0 && evidence->count <= BST_FILTER_CANDIDATES);
+    assert(n >= 0 && n <= (BST_FILTER_COMPONENTS - 1) * (BST_FILTER_CANDIDATES + 1));
     if (evidence->miss_weight > 0.0) {
         hypotheses[n] = *state;
         logs[n++] = log_weight + log(evidence->miss_weight);
@@ -254,6 +264,9 @@ static void update_mixture(const bst_sky_state *state, bst_filter_models *models
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
                        bst_filter_models *models, const bst_filter_evidence *evidence,
                        int components) {
+    assert(params && state && models && evidence);
+    assert(evidence->count >= 0 && evidence->count <= BST_FILTER_CANDIDATES);
+    assert(components >= 1 && components <= BST_FILTER_COMPONENTS);
     if (params->kind == BST_FILTER_IMM && models->count > 0) {
         update_models(models, evidence);
         combine(models, state);

@@ -1,4 +1,5 @@
 /* New tracks from pairs of detections. */
+#include <assert.h>
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
@@ -68,6 +69,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
     /* of what was taken for charge the like may have been taken for light */
     double alarms = mtt->clutter_density * mtt->params.field_sr + (double)mtt->charged;
+    assert(dt > 0.0 && mtt->track_count < mtt->params.max_tracks + mtt->params.max_stars);
     bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
     *track = (bst_mtt_track){
         .id = mtt->next_id++,

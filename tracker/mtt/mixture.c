@@ -1,6 +1,7 @@
 /* Mixtures of states: moments, and reduction to fewer components. */
 #include "tracker/mtt/mixture.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -66,6 +67,7 @@ static bst_sky_state state_of(const bst_sky_state *base, const component *c) {
 
 void bst_sky_mix(const bst_sky_state *states, const double *weights, int count,
                  bst_sky_state *out) {
+    assert(states && weights && out && count >= 1);
     int heaviest = 0;
     double total = 0.0;
     for (int i = 0; i < count; i++) {
@@ -119,6 +121,7 @@ static double price(const component *a, const component *b) {
 }
 
 int bst_sky_reduce(bst_sky_state *states, double *weights, int count, int keep) {
+    assert(states && weights && count >= 1 && keep >= 1);
     component list[MOST];
     int heaviest = 0, n = 0;
     double total = 0.0;

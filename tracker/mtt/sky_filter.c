@@ -1,6 +1,9 @@
 #include "tracker/mtt/sky_filter.h"
 
+#include <assert.h>
 #include <string.h>
+
+#include "sim/core/invariant.h"
 
 /* Both 2-blocks of the covariance in axes turned by (c, s). */
 static void turn_blocks(double p[4][4], double c, double s) {
@@ -57,6 +60,8 @@ void bst_sky_add_noise(bst_sky_state *state, double dt_s, double noise_rad2ps3) 
 }
 
 void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
+    assert(state && isfinite(dt_s) && noise_rad2ps3 >= 0.0);
+    assert(bst_is_unit_vec3(state->direction, BST_UNIT_TOLERANCE));
     bst_vec3 d0 = state->direction, r0 = state->rate_radps;
     double speed = bst_vec3_norm(r0);
     double angle = speed * dt_s;
@@ -112,6 +117,8 @@ void bst_sky_shift(bst_sky_state *state, bst_vec3 direction_rad, bst_vec3 rate_r
 
 bool bst_sky_innovate(const bst_sky_state *state, const bst_sky_measurement *measurement,
                       const double extra[3], bst_sky_innovation *out) {
+    assert(state && measurement && out &&
+           bst_is_unit_vec3(measurement->direction, BST_UNIT_TOLERANCE));
     bst_vec3 d = state->direction;
     bst_tangent axes = bst_tangent_at(d), own = bst_tangent_at(measurement->direction);
     bst_vec3 step = bst_tangent_log(d, measurement->direction);
@@ -170,6 +177,7 @@ void bst_sky_update(bst_sky_state *state, const bst_sky_innovation *innovation) 
 
 void bst_sky_from_pair(const bst_sky_measurement *first, const bst_sky_measurement *second,
                        double dt_s, double noise_rad2ps3, bst_sky_state *out) {
+    assert(first && second && out && dt_s > 0.0 && noise_rad2ps3 >= 0.0);
     bst_vec3 back = bst_tangent_log(second->direction, first->direction);
     out->direction = second->direction;
     out->rate_radps = bst_vec3_scale(back, -1.0 / dt_s);
@@ -226,6 +234,7 @@ static double quadratic_inverse(double p[4][4], const double x[4]) {
 }
 
 double bst_sky_distance2(const bst_sky_state *a, const bst_sky_state *b) {
+    assert(a && b);
     if (!(bst_vec3_dot(a->direction, b->direction) > 0.98)) {
         return INFINITY;
     }

@@ -1,6 +1,8 @@
 /* What there is to see of tracks: the Earth's shadow and the Earth itself hide objects. */
 #include "tracker/mtt/visibility.h"
 
+#include <assert.h>
+
 #include "tracker/mtt/multitarget_internal.h"
 
 /* The Earth is taken to be larger by this share for what may be hidden: its atmosphere, and errors
@@ -81,6 +83,7 @@ static bool has_faded(const bst_mtt *m, const bst_mtt_track *track) {
 }
 
 void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
+    assert(m && frame && t >= 0 && t < m->track_count);
     bst_mtt_track *track = &m->tracks[t];
     track->sight = BST_MTT_CLEAR;
     track->light = (bst_mtt_light){.sunlight = 1.0};

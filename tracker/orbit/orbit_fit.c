@@ -1,5 +1,6 @@
 #include "tracker/orbit/orbit_fit.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -506,6 +507,7 @@ static bst_status fit(work *w, const bst_od_state *first, double *scratch, bst_o
 bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int count,
                       const bst_od_options *options, const bst_od_state *first,
                       double *residual_chi2, bst_od_solution *out) {
+    assert(options && first && out && count >= 0 && (observations || count == 0));
     *out = (bst_od_solution){0};
     if (count < BST_OD_LEAST) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%d observations are too few: an orbit needs %d",

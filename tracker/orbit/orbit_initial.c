@@ -1,5 +1,6 @@
 #include "tracker/orbit/orbit_initial.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -347,6 +348,7 @@ static void choose_samples(search *s) {
         int index = (int)((int64_t)i * (s->count - 1) / (SAMPLES - 1));
         if (s->samples == 0 ||
             s->items[index].observer.time_s > s->items[s->sample[s->samples - 1]].observer.time_s) {
+            assert(s->samples < SAMPLES && index >= 0 && index < s->count);
             s->sample[s->samples++] = index;
         }
     }
@@ -354,6 +356,7 @@ static void choose_samples(search *s) {
 
 bst_status bst_od_initial(bst_ctx *ctx, const bst_od_observation *observations, int count,
                           bst_od_candidate candidates[BST_OD_CANDIDATES], int *found) {
+    assert(candidates && found && count >= 0 && (observations || count == 0));
     search s = {.items = observations, .count = count, .best = candidates};
     *found = 0;
     if (count < BST_OD_LEAST) {

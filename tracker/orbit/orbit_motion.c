@@ -1,5 +1,6 @@
 #include "tracker/orbit/orbit_motion.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,6 +8,7 @@
 #include "sim/astro/sgp4_fit.h"
 
 #include "sim/astro/kepler.h"
+#include "sim/core/invariant.h"
 #include "tracker/mtt/tangent.h"
 
 struct bst_od_path {
@@ -85,6 +87,7 @@ static bst_status sgp4_state(bst_ctx *ctx, const bst_od_path *path, double time_
 
 bst_status bst_od_path_create(bst_ctx *ctx, const bst_od_motion *motion, const bst_od_state *state,
                               bst_od_path **out) {
+    assert(motion && state && out);
     *out = NULL;
     bst_od_path *path = malloc(sizeof *path);
     if (!path) {
@@ -123,6 +126,7 @@ void bst_od_path_free(bst_od_path *path) {
 
 bst_status bst_od_path_state(bst_ctx *ctx, const bst_od_path *path, double time_s,
                              bst_od_state *out) {
+    assert(path && out && isfinite(time_s));
     out->time_s = time_s;
     if (path->sgp4) {
         return sgp4_state(ctx, path, time_s, out);
@@ -136,6 +140,7 @@ bst_status bst_od_path_state(bst_ctx *ctx, const bst_od_path *path, double time_
 }
 
 void bst_od_see(const bst_od_state *state, const bst_od_observer *observer, bst_od_sight *out) {
+    assert(state && observer && out);
     const bst_vec3 r = state->position_m, v = state->velocity_mps;
     double distance = bst_vec3_norm(r), u = BST_EARTH_MU_M3PS2 / (distance * distance * distance);
     bst_vec3 a = bst_vec3_scale(r, -u);
@@ -178,6 +183,7 @@ static double step_of(const bst_od_state *s, int axis) {
 bst_status bst_od_propagate(bst_ctx *ctx, const bst_od_motion *motion, const bst_od_state *state,
                             const double covariance[6][6], double time_s, bst_od_state *out,
                             double covariance_out[6][6]) {
+    assert(motion && state && out && bst_is_covariance(&covariance[0][0], 6));
     double transition[6][6], half[6][6];
     for (int i = -1; i < 12; i++) {
         int axis = i / 2;
@@ -271,6 +277,8 @@ bst_status bst_od_predict(bst_ctx *ctx, const bst_od_motion *motion, const bst_o
 void bst_od_from_track(const bst_od_observer *observer, bst_vec3 direction, bst_vec3 rate_radps,
                        const double sky_covariance[4][4], const bst_orbit_range *range,
                        bst_od_state *out, double covariance[6][6]) {
+    assert(observer && range && out && range->range_m > 0.0);
+    assert(bst_is_unit_vec3(direction, BST_UNIT_TOLERANCE));
     const double range_m = range->range_m, range_rate_mps = range->range_rate_mps;
     double tau = range_m / BST_LIGHT_SPEED_MPS;
     bst_tangent axes = bst_tangent_at(direction);

@@ -1,4 +1,5 @@
 /* The whole way from directions to an orbit. */
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -246,6 +247,7 @@ static bst_status solve(bst_ctx *ctx, const arc *a, double *residual_chi2, bst_o
 bst_status bst_od_determine(bst_ctx *ctx, const bst_od_observation *observations, int count,
                             const bst_od_options *options, double *residual_chi2,
                             bst_od_solution *out, bst_od_report *report) {
+    assert(options && out && count >= 0 && (observations || count == 0));
     bst_od_report unused;
     report = report ? report : &unused;
     *report = (bst_od_report){.other_chi2 = INFINITY};

@@ -1,9 +1,11 @@
 #include "tracker/orbit/orbit_track.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
 #include "sim/astro/bodies.h"
+#include "sim/core/invariant.h"
 #include "sim/core/symmetric.h"
 #include "tracker/mtt/mixture.h"
 
@@ -26,6 +28,7 @@ static void look(bst_orbit_track *t, const bst_od_observer *observer) {
 
 void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *observer,
                            const bst_orbit_range *range, bst_orbit_track *out) {
+    assert(sky && observer && range && out && range->range_m > 0.0);
     *out = (bst_orbit_track){.valid = true};
     bst_od_from_track(observer, sky->direction, sky->rate_radps, sky->covariance, range,
                       &out->state, out->covariance);
@@ -68,6 +71,7 @@ static bst_status move(bst_ctx *ctx, bst_orbit_track *t, double to_s) {
 
 bool bst_orbit_track_predict(bst_orbit_track *t, double noise_m2ps3,
                              const bst_od_observer *observer) {
+    assert(t && t->valid && observer && noise_m2ps3 >= 0.0);
     bst_ctx quiet = {0}; /* an orbit that ends is no failure of the run */
     double dt = fabs(observer->time_s - t->state.time_s);
     t->valid = t->valid && move(&quiet, t, observer->time_s) == BST_OK;
@@ -102,6 +106,8 @@ static void compare(const bst_sky_state *a, const bst_sky_state *b, double diffe
 }
 
 bool bst_orbit_track_update(bst_orbit_track *t, const bst_sky_state *posterior) {
+    assert(t && t->valid && posterior &&
+           bst_is_unit_vec3(posterior->direction, BST_UNIT_TOLERANCE));
     double d[4], after[4][4], inverse[4][4], gain[6][4], half[6][4];
     t->valid = t->valid && bst_symmetric_invert(4, t->sky.covariance[0], inverse[0]);
     if (!t->valid) {

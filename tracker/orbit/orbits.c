@@ -1,4 +1,5 @@
 /* Tracks that move along orbits. */
+#include <assert.h>
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
@@ -14,6 +15,7 @@ bool bst_mtt_predict_orbit(const bst_mtt *m, bst_mtt_track *track, const bst_mtt
 }
 
 void bst_mtt_update_orbits(bst_mtt *m, const bst_mtt_frame *frame) {
+    assert(m && frame);
     for (int t = 0; m->params.orbits && frame->observer && t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
         bst_orbit_track *orbit = &track->orbit;

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -56,6 +57,7 @@ static bst_sample sample_at(struct bst_step *step, const port_state *port, int64
 }
 
 bst_sample bst_step_latest(struct bst_step *step, int port_index) {
+    assert(step && port_index >= 0);
     const port_state *port = &step->self->ports[port_index];
     if (!port->log) {
         return no_sample;

@@ -1,5 +1,6 @@
 #include "sim/engine/kernel/engine.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,7 @@
 #include "sim/engine/kernel/engine_internal.h"
 
 bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) {
+    assert(out);
     *out = NULL;
     if (tick_rate_hz < 1 || tick_rate_hz > 1000000) {
         return bst_fail(ctx, BST_ERR_CONFIG, "tick rate %lld Hz: allowed are 1 to 1000000",
@@ -67,6 +69,8 @@ void bst_engine_set_hooks(bst_engine *engine, const bst_engine_hooks *hooks) {
 }
 
 bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_spec *spec) {
+    assert(engine && spec && spec->desc && spec->scope && spec->instance);
+    assert(spec->delay_count >= 0 && spec->delay_count <= BST_MAX_DELAYS);
     if (engine->loaded) {
         return bst_fail(ctx, BST_ERR_STATE, "%s: modules are added before loading", spec->instance);
     }
@@ -246,6 +250,7 @@ static bst_status finish_instances(bst_ctx *ctx, bst_engine *engine) {
 }
 
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
+    assert(engine && until_tick >= 0);
     if (!engine->loaded) {
         return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
     }

@@ -1,9 +1,11 @@
 #include "sim/engine/kernel/exposure_clock.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
 #include "sim/engine/kernel/engine_internal.h"
+#include "sim/messages/message_invariants.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
@@ -254,6 +256,7 @@ static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) 
                           .binning = clock->binning,
                           .pixel_scale_arcsec = clock->pixel_scale_arcsec,
                           .dropped = late || lost};
+    assert(bst_exposure_is_valid(out));
     if (clock->updates.updates) {
         bst_frame_cursor_next(&clock->updates);
     }

@@ -1,6 +1,7 @@
 /* Which modules make up a logical process, and the inputs between processes. Sensors are separate
  * where nothing passes between them but through multi-sensor modules, with a delay on the way
  * back. */
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -129,6 +130,7 @@ static bst_status fill_process(bst_ctx *ctx, bst_executor *x, int number) {
         instance *member = engine->instances[i];
         if (member->process == number) {
             self->kind = kind_of(x, member);
+            assert((size_t)self->member_count < room);
             self->members[self->member_count++] = i;
             ports += (size_t)member->port_count;
             member->heap = &self->heap;

@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -106,6 +107,7 @@ static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
                                 type->name);
             }
             if (port->flags & BST_PORT_TRIGGER) {
+                assert(reader->trigger_count < reader->port_count);
                 reader->triggers[reader->trigger_count++] = p;
             }
             if (state->delay_ticks > 0 && type->in_place) {
@@ -164,6 +166,7 @@ static bst_status report_cycle(bst_ctx *ctx, const bst_engine *engine, const boo
         current++;
     }
     while (repeated < 0) {
+        assert(length < engine->instance_count);
         path[length++] = current;
         for (int a = 0; a < n; a++) {
             if (!placed[a] && must_follow(engine, a, current)) {

@@ -1,5 +1,6 @@
 #include "sim/engine/recorder/recorder.h"
 
+#include <assert.h>
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -191,6 +192,7 @@ static bst_status flush_frames(bst_ctx *ctx, void *user) {
 
 bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config,
                                const bst_recorder_info *info, bst_recorder **out) {
+    assert(run && config && info && out);
     *out = NULL;
     if (info->sensor_count < 1 || info->tick_rate_hz < 1) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "a record needs a sensor and a tick rate");
@@ -403,6 +405,7 @@ static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
 
 bst_status bst_recorder_channel(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                 const char *channel, const void *payload, int64_t written_tick) {
+    assert(recorder && channel && payload && sensor >= 0);
     if (sensor < 0 || sensor >= recorder->sensor_count) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "sensor %d of %d is not recorded", sensor,
                         recorder->sensor_count);

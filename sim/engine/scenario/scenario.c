@@ -1,5 +1,6 @@
 #include "sim/engine/scenario/scenario.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -190,6 +191,7 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json,
 
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
                              const bst_scenario_registry *registry, bst_scenario *out) {
+    assert(json && registry && out);
     bst_status status = read_scenario(ctx, json, registry, out);
     if (status != BST_OK) {
         bst_json_name_file(ctx, json);

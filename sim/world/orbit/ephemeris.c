@@ -1,10 +1,12 @@
 #include "sim/world/orbit/ephemeris.h"
 
+#include <assert.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/invariant.h"
 #include "sim/core/parallel.h"
 #include "sim/core/simd.h"
 
@@ -198,6 +200,7 @@ static inline void make_knots(bst_ephemeris *e, body *b, int64_t first, int64_t 
 
 bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *position_m,
                       bst_vec3 *velocity_mps) {
+    assert(e && index >= 0 && index < e->body_count && position_m);
     body *b = &e->bodies[index];
     if (!b->orbit || !(fabs(seconds) <= 1e9)) {
         return false;
@@ -372,6 +375,7 @@ BST_CLONES_256 static void distances(const table *t, int begin, int n, const sea
 
 int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_cone *cone,
                        int *indices) {
+    assert(e && cone && indices && bst_is_unit_vec3(cone->axis, 1e-6));
     int count = 0;
     if (!(fabs(seconds) <= 1e9)) {
         for (int i = 0; i < e->object_count; i++) {

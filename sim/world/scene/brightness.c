@@ -1,5 +1,6 @@
 #include "sim/world/scene/brightness.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -212,6 +213,7 @@ static double ratio_of(double v_mag) {
 }
 
 void bst_brightness_at(const bst_brightness *b, const bst_scene_lighting *l, bst_scene_glow *out) {
+    assert(l && out);
     static const bst_brightness plain = {.config = {.model = BST_BRIGHTNESS_SPHERE}};
     b = b ? b : &plain;
     const bst_brightness_config *c = &b->config;

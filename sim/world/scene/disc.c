@@ -1,5 +1,6 @@
 #include "sim/world/scene/disc.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -54,6 +55,7 @@ static bst_status push(bst_ctx *ctx, bst_disc_points *list, bst_vec3 offset, dou
         list->items = items;
         list->capacity = capacity;
     }
+    assert(list->count < list->capacity);
     list->items[list->count++] = (bst_disc_point){offset, share};
     return BST_OK;
 }

@@ -1,8 +1,10 @@
 #include "sim/world/scene/field.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/messages/message_invariants.h"
 #include "sim/optics/psf.h"
 #include "sim/world/scene/field_internal.h"
 #include "sim/world/scene/field_objects.h"
@@ -17,6 +19,7 @@
 
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                             bst_field **out) {
+    assert(world && out && observer >= 0 && sensor >= 0);
     *out = NULL;
     bst_field *field = calloc(1, sizeof *field);
     if (!field) {
@@ -70,6 +73,7 @@ void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
 bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history *history,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_los_track *out) {
+    assert(field && history && out && start_tick <= end_tick && tick_rate_hz > 0);
     return bst_los_track_cut(ctx, &field->track, history, start_tick, end_tick, tick_rate_hz, out);
 }
 
@@ -448,6 +452,8 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_window window, const bst_field_options *options, bst_truth *truth,
                            const bst_scene_source **sources, int *count) {
+    assert(field && track && track->count >= 2 && options && truth && sources && count);
+    assert(start_tick <= end_tick && tick_rate_hz > 0 && bst_window_is_valid(&window));
     query q = {.start_s = (double)start_tick / (double)tick_rate_hz,
                .end_s = (double)end_tick / (double)tick_rate_hz,
                .window = window,

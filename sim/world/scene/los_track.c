@@ -1,5 +1,6 @@
 #include "sim/world/scene/los_track.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
 static const bst_los_sample *ring_sample(const bst_los_history *history, int64_t number) {
@@ -40,6 +41,7 @@ static bst_status reserve(bst_ctx *ctx, bst_los_track_store *store, int count) {
 bst_status bst_los_track_cut(bst_ctx *ctx, bst_los_track_store *store,
                              const bst_los_history *history, int64_t start_tick, int64_t end_tick,
                              int64_t tick_rate_hz, bst_los_track *out) {
+    assert(store && history && out && start_tick <= end_tick && tick_rate_hz > 0);
     int64_t newest = history->written - 1;
     int64_t oldest =
         history->written > history->capacity ? history->written - history->capacity : 0;
@@ -87,6 +89,7 @@ bst_status bst_los_track_cut(bst_ctx *ctx, bst_los_track_store *store,
 }
 
 bst_quat bst_los_track_attitude(const bst_los_track *track, double time_s) {
+    assert(track && track->count >= 1 && isfinite(time_s));
     int k = 0, high = track->count - 2; /* the first stretch that ends at time_s or later */
     while (k < high) {
         int middle = (k + high) / 2;
@@ -103,6 +106,7 @@ bst_quat bst_los_track_attitude(const bst_los_track *track, double time_s) {
 
 bst_status bst_los_track_part(bst_ctx *ctx, bst_los_track_store *store, const bst_los_track *track,
                               double from_s, double to_s, bst_los_track *out) {
+    assert(store && track && out && from_s <= to_s);
     BST_TRY(reserve(ctx, store, track->count + 2));
     int count = 0;
     store->time_s[count] = 0.0;

@@ -1,5 +1,7 @@
 #include "sim/world/scene/row_exposure.h"
 
+#include <assert.h>
+
 #include "sim/world/scene/los_track.h"
 
 double bst_row_start_s(const bst_row_times *rows, const bst_los_track *track, double y_px) {
@@ -62,6 +64,7 @@ static void rate_during(const bst_scene_source *source, double u0, double u1,
             knots[count++] = r->u[k];
         }
     }
+    assert(count < BST_RATE_KNOTS && u0 <= u1);
     knots[count++] = u1;
     part->rate.count = count;
     for (int k = 0; k < count; k++) {

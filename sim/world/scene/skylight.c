@@ -1,7 +1,9 @@
 #include "sim/world/scene/skylight.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
+#include "sim/messages/message_invariants.h"
 #include "sim/world/scene/stray.h"
 #include "sim/world/scene/zodiacal.h"
 #include "sim/world/world_internal.h"
@@ -308,6 +310,7 @@ static void prepare(painter *p) {
 
 bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surroundings *around,
                              bst_window window, const bst_skylight_map **out) {
+    assert(b && around && out && bst_window_is_valid(&window));
     painter p = {.b = b, .around = around};
     prepare(&p);
     BST_TRY(paint_sky(ctx, &p, b, window));

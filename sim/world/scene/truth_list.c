@@ -1,5 +1,6 @@
 #include "sim/world/scene/truth_list.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -66,6 +67,8 @@ static double binned_share(const bst_camera *camera, int binning, const bst_trut
 
 bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_truth_request *q,
                                bst_truth *truth, int capacity, int *source_of) {
+    assert(list && q && truth && capacity >= 0 && q->count >= 0);
+    assert(q->sources || q->count == 0);
     truth->count = q->count < capacity ? q->count : capacity;
     truth->lost = q->count - truth->count;
     if (truth->lost > 0) {

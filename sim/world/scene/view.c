@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -105,11 +106,13 @@ static bst_status state_of(bst_ctx *ctx, bst_world_view *view, int body, double 
 
 bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int object,
                                        double seconds, bst_world_state *out) {
+    assert(view && out && object >= 0 && isfinite(seconds));
     return state_of(ctx, view, object, seconds, FROM_EPHEMERIS, out);
 }
 
 bst_status bst_world_view_observer_state(bst_ctx *ctx, bst_world_view *view, int observer,
                                          double seconds, bst_world_state *out) {
+    assert(view && out && observer >= 0 && isfinite(seconds));
     return state_of(ctx, view, view->world->object_count + observer, seconds, FROM_EPHEMERIS, out);
 }
 
