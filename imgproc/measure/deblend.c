@@ -1,15 +1,32 @@
 #include "imgproc/measure/deblend.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "imgproc/measure/cosmic_ray.h"
 
+/* Of a Gaussian's light 6e-4 lies outside of a square of this half side, in sigmas. */
+static const double REACH_SIGMAS = 3.6, LEAST_REACH_PX = 3.0;
+/* A centre moves by at most LIMIT_PX, one sigma and LIMIT_PER_PATH of the path. Calibrated by
+ * tests/imgproc/calibrate_deblend.c: of fits beside neighbours 99 % move by less than a third of
+ * it, and the farthest of points by all of it, of streaks by 0.3 of it. */
+static const double LIMIT_PX = 1.5, LIMIT_PER_PATH = 0.4;
+/* Fits that end this near to one another are of one source: sqrt(2) sigma, where the images of two
+ * equal sources have a correlation of exp(-1/2) (Gaussian: exp(-d^2 / (4 sigma^2))). */
+static const double SAME_FWHM = 0.6;
+
 double bst_deblend_reach(const bst_locate_frame *f) {
-    return fmax(3.0, ceil(3.6 * f->sigma_px));
+    return fmax(LEAST_REACH_PX, ceil(REACH_SIGMAS * f->sigma_px));
 }
 
 double bst_deblend_fit_limit(const bst_locate_frame *f, double path_px) {
-    return 1.5 + f->sigma_px + 0.4 * path_px;
+    return LIMIT_PX + f->sigma_px + LIMIT_PER_PATH * path_px;
+}
+
+/* How far the longest path of the frame (half its length and its bend: longest_px) reaches from its
+ * maximum, without the limit of a point: half the path, and LIMIT_PER_PATH of all of it. */
+static double path_margin(const bst_imgproc_locator *l) {
+    return (1.0 + 2.0 * LIMIT_PER_PATH) * l->longest_px;
 }
 
 bst_imgproc_stamp bst_deblend_stamp(const bst_imgproc_locator *l, const bst_locate_frame *f,
@@ -18,6 +35,7 @@ bst_imgproc_stamp bst_deblend_stamp(const bst_imgproc_locator *l, const bst_loca
 }
 
 void bst_deblend_index(bst_imgproc_locator *l, const bst_locate_frame *f) {
+    assert(l && f && l->count >= 0 && l->count <= l->capacity && f->width > 0 && f->height > 0);
     l->columns = f->width / BST_LOCATE_CELL_PX + 1;
     l->rows = f->height / BST_LOCATE_CELL_PX + 1;
     for (int i = 0; i < l->columns * l->rows; i++) {
@@ -42,12 +60,12 @@ static void cell_range(double from, double to, double margin_px, int cells, int 
 void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f, int i,
                         const bst_imgproc_source *own, const bst_imgproc_stamp *stamp,
                         bst_deblend *out) {
+    assert(l && f && own && stamp && out && i >= 0 && i < l->count);
     out->free[0] = own;
     out->free_count = 1;
     out->fixed_count = 0;
-    /* a fit moves a source from its maximum by its limit at most */
-    double margin =
-        bst_deblend_reach(f) + 1.8 * l->longest_px + bst_deblend_fit_limit(f, 0.0) + 1.0;
+    /* a fit moves a source from its maximum by its limit at most; a pixel for rounding */
+    double margin = bst_deblend_reach(f) + path_margin(l) + bst_deblend_fit_limit(f, 0.0) + 1.0;
     int first_column, last_column, first_row, last_row;
     cell_range(stamp->x0, stamp->x0 + stamp->width, margin, l->columns, &first_column,
                &last_column);
@@ -97,6 +115,7 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
 
 bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
                      const bst_imgproc_stamp *stamp, bool free_width) {
+    assert(w && found && stamp && i >= 0 && i < w->l->count);
     const bst_locate_frame *f = w->f;
     bst_deblend c;
     bst_deblend_gather(w->l, f, i, &found->source, stamp, &c);
@@ -137,8 +156,10 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
 }
 
 void bst_deblend_drop_doubles(bst_imgproc_locator *l, const bst_locate_frame *f, int end) {
-    double radius = 0.6 * BST_FWHM_PER_SIGMA * f->sigma_px;
-    double margin = radius + 1.8 * l->longest_px + 2.0 * bst_deblend_fit_limit(f, 0.0);
+    assert(l && f && end >= 0 && end <= l->count);
+    double radius = SAME_FWHM * BST_FWHM_PER_SIGMA * f->sigma_px;
+    /* both may have moved by their limits */
+    double margin = radius + path_margin(l) + 2.0 * bst_deblend_fit_limit(f, 0.0);
     for (int i = 0; i < end; i++) {
         const bst_imgproc_shape *a = &l->found[i].source.shape;
         int x0, x1, y0, y1;
