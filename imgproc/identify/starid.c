@@ -1,10 +1,12 @@
 #include "imgproc/identify/starid.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "imgproc/measure/heapsort.h"
+#include "sim/core/arena.h"
 #include "sim/optics/photometry.h"
 
 enum { VOTERS = 150, PASSES = 5 };
@@ -14,6 +16,7 @@ static const double CHANCE = 0.01;
 static const double ROLL_SIGMA_RAD = 3e-3; /* onboard knowledge of the roll, as a weak prior */
 
 struct bst_starid {
+    bst_arena arena;                      /* of all arrays below */
     int max_stars, max_detections, cells; /* cells per side of the vote map */
     uint16_t *votes;
     int *by_y;         /* stars in order of y */
@@ -24,8 +27,20 @@ struct bst_starid {
     double *distance;  /* [stars] of its detection */
 };
 
+static void lay_out(bst_starid *s) {
+    int most = s->max_stars > s->max_detections ? s->max_stars : s->max_detections;
+    size_t stars = (size_t)s->max_stars + 1;
+    BST_ARENA_TAKE(&s->arena, s->votes, (size_t)s->cells * (size_t)s->cells);
+    BST_ARENA_TAKE(&s->arena, s->by_y, stars);
+    BST_ARENA_TAKE(&s->arena, s->bright, 2 * (size_t)most + 1);
+    BST_ARENA_TAKE(&s->arena, s->star_of, (size_t)s->max_detections + 1);
+    BST_ARENA_TAKE(&s->arena, s->detection_of, stars);
+    BST_ARENA_TAKE(&s->arena, s->distance, stars);
+}
+
 bst_status bst_starid_create(bst_ctx *ctx, int max_stars, int max_detections, double max_radius_px,
                              bst_starid **out) {
+    assert(out && max_stars >= 0 && max_detections >= 0 && max_radius_px > 0.0);
     *out = NULL;
     bst_starid *s = calloc(1, sizeof *s);
     if (!s) {
@@ -34,17 +49,13 @@ bst_status bst_starid_create(bst_ctx *ctx, int max_stars, int max_detections, do
     s->max_stars = max_stars;
     s->max_detections = max_detections;
     s->cells = 2 * (int)ceil(max_radius_px / CELL_PX) + 2;
-    size_t most = (size_t)(max_stars > max_detections ? max_stars : max_detections);
-    s->votes = calloc((size_t)s->cells * (size_t)s->cells, sizeof *s->votes);
-    s->by_y = calloc((size_t)max_stars + 1, sizeof *s->by_y);
-    s->bright = calloc(2 * most + 1, sizeof *s->bright);
-    s->star_of = calloc((size_t)max_detections + 1, sizeof *s->star_of);
-    s->detection_of = calloc((size_t)max_stars + 1, sizeof *s->detection_of);
-    s->distance = calloc((size_t)max_stars + 1, sizeof *s->distance);
-    if (!s->votes || !s->by_y || !s->bright || !s->star_of || !s->detection_of || !s->distance) {
+    lay_out(s);
+    bst_status status = bst_arena_alloc(ctx, &s->arena, "star identification");
+    if (status != BST_OK) {
         bst_starid_free(s);
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory to identify %d stars", max_stars);
+        return status;
     }
+    lay_out(s);
     *out = s;
     return BST_OK;
 }
@@ -53,12 +64,7 @@ void bst_starid_free(bst_starid *s) {
     if (!s) {
         return;
     }
-    free(s->votes);
-    free(s->by_y);
-    free(s->bright);
-    free(s->star_of);
-    free(s->detection_of);
-    free(s->distance);
+    bst_arena_free(&s->arena);
     free(s);
 }
 
@@ -295,6 +301,8 @@ static void refine(const bst_starid *s, const problem *p, int matched, bst_stari
 void bst_starid_match(bst_starid *s, const bst_starid_options *o,
                       const bst_imgproc_expected_star *stars, int star_count, bst_detection *items,
                       int count, bst_starid_result *out) {
+    assert(s && o && out && star_count >= 0 && count >= 0);
+    assert((stars || star_count == 0) && (items || count == 0));
     *out = (bst_starid_result){0};
     s->matched_of = 0;
     star_count = star_count < s->max_stars ? star_count : s->max_stars;

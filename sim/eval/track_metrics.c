@@ -1,9 +1,11 @@
 #include "sim/eval/track_metrics.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/arena.h"
 #include "sim/eval/gospa.h"
 
 typedef struct object_record {
@@ -17,6 +19,7 @@ typedef struct track_record {
 } track_record;
 
 struct bst_track_metrics {
+    bst_arena arena; /* of all arrays below */
     int objects, max_tracks, max_at_once;
     double cutoff;
     int64_t frames;
@@ -29,6 +32,18 @@ struct bst_track_metrics {
     int *row, *pair, *identity;
 };
 
+static void lay_out(bst_track_metrics *m) {
+    size_t objects = (size_t)m->objects + 1, tracks = (size_t)m->max_tracks;
+    size_t now = (size_t)m->max_at_once;
+    BST_ARENA_TAKE(&m->arena, m->object, objects);
+    BST_ARENA_TAKE(&m->arena, m->track, tracks);
+    BST_ARENA_TAKE(&m->arena, m->paired, tracks * objects);
+    BST_ARENA_TAKE(&m->arena, m->distance, objects * now);
+    BST_ARENA_TAKE(&m->arena, m->row, objects);
+    BST_ARENA_TAKE(&m->arena, m->pair, objects);
+    BST_ARENA_TAKE(&m->arena, m->identity, now);
+}
+
 bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, int max_tracks, int max_at_once,
                                     double cutoff_rad, bst_track_metrics **out) {
     *out = NULL;
@@ -40,36 +55,24 @@ bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, int max_tracks, i
     if (!m) {
         return bst_fail(ctx, BST_ERR_MEMORY, "track metrics: out of memory");
     }
-    size_t o = (size_t)objects + 1, t = (size_t)max_tracks, now = (size_t)max_at_once;
     m->objects = objects;
     m->max_tracks = max_tracks;
     m->max_at_once = max_at_once;
     m->cutoff = cutoff_rad;
-    m->object = calloc(o, sizeof *m->object);
-    m->track = calloc(t, sizeof *m->track);
-    m->paired = calloc(t * o, sizeof *m->paired);
-    m->distance = calloc(o * now, sizeof *m->distance);
-    m->row = calloc(o, sizeof *m->row);
-    m->pair = calloc(o, sizeof *m->pair);
-    m->identity = calloc(now, sizeof *m->identity);
-    if (!m->object || !m->track || !m->paired || !m->distance || !m->row || !m->pair ||
-        !m->identity) {
+    lay_out(m);
+    bst_status status = bst_arena_alloc(ctx, &m->arena, "the figures of tracks");
+    if (status != BST_OK) {
         bst_track_metrics_free(m);
-        return bst_fail(ctx, BST_ERR_MEMORY, "track metrics: out of memory");
+        return status;
     }
+    lay_out(m);
     *out = m;
     return BST_OK;
 }
 
 void bst_track_metrics_free(bst_track_metrics *m) {
     if (m) {
-        free(m->object);
-        free(m->track);
-        free(m->paired);
-        free(m->distance);
-        free(m->row);
-        free(m->pair);
-        free(m->identity);
+        bst_arena_free(&m->arena);
         free(m);
     }
 }
@@ -121,6 +124,7 @@ bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *m, double se
         for (int t = 0; t < tracks; t++) {
             m->distance[rows * tracks + t] = bst_vec3_angle(truth[o], track_directions[t]);
         }
+        assert(rows < m->objects);
         m->row[rows++] = o;
         if (m->object[o].visible++ == 0) {
             m->object[o].first_seen_s = seconds;

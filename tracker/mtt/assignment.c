@@ -1,10 +1,15 @@
 #include "tracker/mtt/assignment.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 
+#include "sim/core/arena.h"
+
 struct bst_assignment {
+    bst_arena arena; /* of all arrays below */
     int max_rows, max_columns;
     double *row_dual;
     double *column_dual;
@@ -15,6 +20,17 @@ struct bst_assignment {
     int *touched;       /* columns reached in this search */
 };
 
+static void lay_out(bst_assignment *w) {
+    size_t rows = (size_t)w->max_rows + 1, columns = (size_t)w->max_columns + 1;
+    BST_ARENA_TAKE(&w->arena, w->row_dual, rows);
+    BST_ARENA_TAKE(&w->arena, w->column_dual, columns);
+    BST_ARENA_TAKE(&w->arena, w->distance, columns);
+    BST_ARENA_TAKE(&w->arena, w->row_of_column, columns);
+    BST_ARENA_TAKE(&w->arena, w->from_row, columns);
+    BST_ARENA_TAKE(&w->arena, w->settled, columns);
+    BST_ARENA_TAKE(&w->arena, w->touched, columns);
+}
+
 bst_status bst_assignment_create(bst_ctx *ctx, int rows, int columns, bst_assignment **out) {
     *out = NULL;
     if (rows < 0 || columns < 0) {
@@ -24,22 +40,17 @@ bst_status bst_assignment_create(bst_ctx *ctx, int rows, int columns, bst_assign
     if (!w) {
         return bst_fail(ctx, BST_ERR_MEMORY, "assignment: out of memory");
     }
-    size_t nr = (size_t)rows + 1, nc = (size_t)columns + 1;
     w->max_rows = rows;
     w->max_columns = columns;
-    w->row_dual = calloc(nr, sizeof *w->row_dual);
-    w->column_dual = calloc(nc, sizeof *w->column_dual);
-    w->distance = calloc(nc, sizeof *w->distance);
-    w->row_of_column = calloc(nc, sizeof *w->row_of_column);
-    w->from_row = calloc(nc, sizeof *w->from_row);
-    w->settled = calloc(nc, sizeof *w->settled);
-    w->touched = calloc(nc, sizeof *w->touched);
-    if (!w->row_dual || !w->column_dual || !w->distance || !w->row_of_column || !w->from_row ||
-        !w->settled || !w->touched) {
+    lay_out(w);
+    char what[64];
+    snprintf(what, sizeof what, "an assignment of %d x %d", rows, columns);
+    bst_status status = bst_arena_alloc(ctx, &w->arena, what);
+    if (status != BST_OK) {
         bst_assignment_free(w);
-        return bst_fail(ctx, BST_ERR_MEMORY, "assignment: out of memory for %d x %d", rows,
-                        columns);
+        return status;
     }
+    lay_out(w);
     *out = w;
     return BST_OK;
 }
@@ -48,13 +59,7 @@ void bst_assignment_free(bst_assignment *w) {
     if (!w) {
         return;
     }
-    free(w->row_dual);
-    free(w->column_dual);
-    free(w->distance);
-    free(w->row_of_column);
-    free(w->from_row);
-    free(w->settled);
-    free(w->touched);
+    bst_arena_free(&w->arena);
     free(w);
 }
 
@@ -74,8 +79,10 @@ static void place(bst_assignment *w, int root, const bst_assignment_problem *p,
         }
         for (int e = first[row]; e < first[row + 1]; e++) {
             int c = columns[e];
+            assert(c >= 0 && c < p->columns);
             double d = row_distance + costs[e] - w->row_dual[row] - w->column_dual[c];
             if (isinf(w->distance[c])) {
+                assert(touched < w->max_columns);
                 w->touched[touched++] = c;
             }
             if (!w->settled[c] && d < w->distance[c]) {
@@ -133,6 +140,9 @@ static void place(bst_assignment *w, int root, const bst_assignment_problem *p,
 }
 
 void bst_assignment_solve(bst_assignment *w, const bst_assignment_problem *p, int *column_of_row) {
+    assert(w && p && (p->rows == 0 || (column_of_row && p->first && p->miss)));
+    assert(p->rows >= 0 && p->rows <= w->max_rows && p->columns >= 0 &&
+           p->columns <= w->max_columns);
     for (int c = 0; c < p->columns; c++) {
         w->column_dual[c] = 0.0;
         w->distance[c] = INFINITY;

@@ -1,23 +1,15 @@
 /* The detections of a frame: which of them are near a direction, and what their brightness says of
  * a track. */
-#include <stdlib.h>
+#include <assert.h>
 
 #include "tracker/mtt/multitarget_internal.h"
 
-bool bst_mtt_pool_create(bst_mtt_pool *pool, int capacity) {
+void bst_mtt_pool_lay_out(bst_mtt_pool *pool, int capacity, bst_arena *arena) {
     size_t n = (size_t)capacity + 1;
-    pool->order = calloc(n, sizeof *pool->order);
-    pool->key = calloc(n, sizeof *pool->key);
-    pool->items = calloc(n, sizeof *pool->items);
-    pool->used = calloc(n, sizeof *pool->used);
-    return pool->order && pool->key && pool->items && pool->used;
-}
-
-void bst_mtt_pool_free(bst_mtt_pool *pool) {
-    free(pool->order);
-    free(pool->key);
-    free(pool->items);
-    free(pool->used);
+    BST_ARENA_TAKE(arena, pool->order, n);
+    BST_ARENA_TAKE(arena, pool->key, n);
+    BST_ARENA_TAKE(arena, pool->items, n);
+    BST_ARENA_TAKE(arena, pool->used, n);
 }
 
 static double component(bst_vec3 v, int axis) {
@@ -98,6 +90,7 @@ static int lower_bound(const bst_mtt_pool *pool, double key) {
 
 void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double chord, int *begin,
                         int *end) {
+    assert(pool && begin && end && chord >= 0.0);
     double centre = component(direction, pool->axis);
     *begin = lower_bound(pool, centre - chord);
     *end = *begin;

@@ -1,9 +1,23 @@
 #include "tracker/mtt/multitarget.h"
 
+#include <assert.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
+
+/* Two tracks are of one object if their states agree to the 99 % quantile of chi-square with 4
+ * degrees of freedom, 13.277. NEAR_COSINE, 4.5 mrad, only spares the comparison: a pair at that
+ * distance agrees only with a standard deviation of 4.5 mrad / sqrt(2 SAME_CHI2) = 180 arcsec,
+ * three times the default max_sigma_arcsec, at which a track is deleted. */
+static const double SAME_CHI2 = 13.3, NEAR_COSINE = 0.99999;
+/* Gain of the exponential mean of the clutter: memory of 1 / gain = 10 frames, variance of a
+ * frame's count times gain / (2 - gain) = 1 / 19. */
+static const double CLUTTER_GAIN = 0.1;
+/* A tentative track is deleted after so many windows of N frames in which it was not confirmed. In
+ * the first it needs M hits (M of N); its score and chi-square have the second and the third. */
+enum { TENTATIVE_WINDOWS = 3 };
 
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
@@ -29,7 +43,37 @@ static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     return BST_OK;
 }
 
+/* The tracker's arrays. */
+static void lay_out(bst_mtt *m) {
+    const bst_mtt_params *p = &m->params;
+    size_t nt = (size_t)p->max_tracks + (size_t)p->max_stars + 1, ne = nt * BST_MTT_CANDIDATES;
+    bst_arena *a = &m->arena;
+    BST_ARENA_TAKE(a, m->tracks, nt);
+    BST_ARENA_TAKE(a, m->memory, (size_t)p->max_memory + 1);
+    BST_ARENA_TAKE(a, m->events, 4 * nt);
+    BST_ARENA_TAKE(a, m->edge_order, ne);
+    BST_ARENA_TAKE(a, m->edge_row, ne);
+    BST_ARENA_TAKE(a, m->edge_key, ne);
+    BST_ARENA_TAKE(a, m->owner, (size_t)p->max_detections);
+    BST_ARENA_TAKE(a, m->rows, nt);
+    BST_ARENA_TAKE(a, m->first, nt);
+    BST_ARENA_TAKE(a, m->column_of_row, nt);
+    BST_ARENA_TAKE(a, m->miss_costs, nt);
+    BST_ARENA_TAKE(a, m->edge_columns, ne);
+    BST_ARENA_TAKE(a, m->edge_costs, ne);
+    BST_ARENA_TAKE(a, m->detection_of_track, nt);
+    BST_ARENA_TAKE(a, m->extra, nt);
+    BST_ARENA_TAKE(a, m->shared, nt);
+    BST_ARENA_TAKE(a, m->observable, nt);
+    BST_ARENA_TAKE(a, m->departed_chi2, nt);
+    bst_mtt_pool_lay_out(&m->now, p->max_detections, a);
+    for (int h = 0; h < BST_MTT_HISTORY; h++) {
+        bst_mtt_pool_lay_out(&m->history[h], p->max_detections, a);
+    }
+}
+
 bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) {
+    assert(params && out);
     *out = NULL;
     BST_TRY(check(ctx, params));
     bst_mtt *m = calloc(1, sizeof *m);
@@ -45,39 +89,16 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
     m->next_id = 1;
     m->clutter = params->false_alarms_per_frame;
     m->clutter_density = params->false_alarms_per_frame / params->field_sr;
-    size_t nt = (size_t)params->max_tracks + (size_t)params->max_stars + 1,
-           ne = nt * BST_MTT_CANDIDATES;
-    m->tracks = calloc(nt, sizeof *m->tracks);
-    m->memory = calloc((size_t)params->max_memory + 1, sizeof *m->memory);
-    m->events = calloc(4 * nt, sizeof *m->events);
-    m->edge_order = calloc(ne, sizeof *m->edge_order);
-    m->edge_row = calloc(ne, sizeof *m->edge_row);
-    m->edge_key = calloc(ne, sizeof *m->edge_key);
-    m->owner = calloc((size_t)params->max_detections, sizeof *m->owner);
-    m->rows = calloc(nt, sizeof *m->rows);
-    m->first = calloc(nt, sizeof *m->first);
-    m->column_of_row = calloc(nt, sizeof *m->column_of_row);
-    m->miss_costs = calloc(nt, sizeof *m->miss_costs);
-    m->edge_columns = calloc(ne, sizeof *m->edge_columns);
-    m->edge_costs = calloc(ne, sizeof *m->edge_costs);
-    m->detection_of_track = calloc(nt, sizeof *m->detection_of_track);
-    m->extra = calloc(nt, sizeof *m->extra);
-    m->shared = calloc(nt, sizeof *m->shared);
-    m->observable = calloc(nt, sizeof *m->observable);
-    m->departed_chi2 = calloc(nt, sizeof *m->departed_chi2);
-    bool ok = m->tracks && m->memory && m->events && m->edge_order && m->edge_row && m->edge_key &&
-              m->owner && m->rows && m->first && m->column_of_row && m->miss_costs &&
-              m->edge_columns && m->edge_costs && m->detection_of_track && m->extra && m->shared &&
-              m->observable && m->departed_chi2 &&
-              bst_mtt_pool_create(&m->now, params->max_detections);
-    for (int h = 0; ok && h < BST_MTT_HISTORY; h++) {
-        ok = bst_mtt_pool_create(&m->history[h], params->max_detections);
+    char what[80];
+    snprintf(what, sizeof what, "%d tracks, %d detections of the tracker", params->max_tracks,
+             params->max_detections);
+    lay_out(m);
+    bst_status status = bst_arena_alloc(ctx, &m->arena, what);
+    if (status == BST_OK) {
+        lay_out(m);
+        status = bst_assignment_create(ctx, params->max_tracks + params->max_stars,
+                                       params->max_detections, &m->assignment);
     }
-    bst_status status =
-        ok ? bst_assignment_create(ctx, params->max_tracks + params->max_stars,
-                                   params->max_detections, &m->assignment)
-           : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory for %d tracks, %d detections",
-                      params->max_tracks, params->max_detections);
     if (status != BST_OK) {
         bst_mtt_free(m);
         return status;
@@ -90,34 +111,14 @@ void bst_mtt_free(bst_mtt *m) {
     if (!m) {
         return;
     }
-    free(m->tracks);
-    free(m->memory);
-    free(m->events);
-    free(m->edge_order);
-    free(m->edge_row);
-    free(m->edge_key);
-    free(m->owner);
-    free(m->rows);
-    free(m->first);
-    free(m->column_of_row);
-    free(m->miss_costs);
-    free(m->edge_columns);
-    free(m->edge_costs);
-    free(m->detection_of_track);
-    free(m->extra);
-    free(m->shared);
-    free(m->observable);
-    free(m->departed_chi2);
-    bst_mtt_pool_free(&m->now);
-    for (int h = 0; h < BST_MTT_HISTORY; h++) {
-        bst_mtt_pool_free(&m->history[h]);
-    }
+    bst_arena_free(&m->arena);
     bst_assignment_free(m->assignment);
     free(m);
 }
 
 static void record(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *track,
                    double statistic) {
+    assert(m->event_count < 4 * (m->params.max_tracks + m->params.max_stars + 1));
     m->events[m->event_count++] =
         (bst_mtt_event){.kind = kind, .statistic = statistic, .track = *track};
 }
@@ -294,7 +295,8 @@ static void hit(bst_mtt *m, int t) {
 
 /* 99.9 % quantile of chi-square (Wilson and Hilferty 1931). */
 static double chi2_limit(int dof) {
-    double v = 2.0 / (9.0 * dof), c = 1.0 - v + 3.0902 * sqrt(v);
+    const double quantile = 3.0902; /* 99.9 % of the normal distribution */
+    double v = 2.0 / (9.0 * dof), c = 1.0 - v + quantile * sqrt(v);
     return dof * c * c * c;
 }
 
@@ -309,8 +311,8 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     for (int u = 0; u < m->track_count; u++) {
         const bst_mtt_track *other = &m->tracks[u];
         if (other != track && !other->asleep && other->status != BST_TRACK_TENTATIVE &&
-            bst_vec3_dot(other->state.direction, track->state.direction) > 0.99999 &&
-            bst_sky_distance2(&other->state, &track->state) < 13.3) { /* 99 %, 4 dof */
+            bst_vec3_dot(other->state.direction, track->state.direction) > NEAR_COSINE &&
+            bst_sky_distance2(&other->state, &track->state) < SAME_CHI2) {
             return false;
         }
     }
@@ -346,7 +348,7 @@ static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool obser
     int allowed = p->confirm_frames - p->confirm_hits;
     return (observed && track->misses_in_row > allowed) ||
            (track->frames >= p->confirm_frames && track->hits < p->confirm_hits) ||
-           track->frames >= 3 * p->confirm_frames;
+           track->frames >= TENTATIVE_WINDOWS * p->confirm_frames;
 }
 
 static void become_star(bst_mtt *m, bst_mtt_track *track) {
@@ -439,6 +441,8 @@ static void remember(bst_mtt *m) {
 }
 
 void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
+    assert(m && frame && frame->count >= 0 && (frame->detections || frame->count == 0));
+    assert(!m->started || frame->seconds > m->seconds);
     predict(m, frame);
     load_detections(m, frame);
     double floor = m->params.false_alarms_per_frame;
@@ -455,7 +459,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     for (int i = 0; i < m->now.count; i++) {
         unused += !m->now.used[i];
     }
-    m->clutter += frame->partial ? 0.0 : 0.1 * (unused - m->clutter);
+    m->clutter += frame->partial ? 0.0 : CLUTTER_GAIN * (unused - m->clutter);
     bst_mtt_update_orbits(m, frame);
     judge(m, frame);
     bst_mtt_initiate(m, frame);
@@ -463,6 +467,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
 }
 
 void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
+    assert(m && frame && (!m->started || frame->seconds > m->seconds));
     predict(m, frame);
     m->now.count = 0;
     for (int t = 0; t < m->track_count; t++) {

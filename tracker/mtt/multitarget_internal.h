@@ -2,6 +2,7 @@
 #ifndef BST_TRACKER_MTT_MULTITARGET_INTERNAL_H
 #define BST_TRACKER_MTT_MULTITARGET_INTERNAL_H
 
+#include "sim/core/arena.h"
 #include "tracker/mtt/assignment.h"
 #include "tracker/mtt/multitarget.h"
 
@@ -35,6 +36,7 @@ typedef struct bst_mtt_pool {
 } bst_mtt_pool;
 
 struct bst_mtt {
+    bst_arena arena; /* of all arrays below */
     bst_mtt_params params;
     bst_filter_params filter;
     bst_mtt_track *tracks;
@@ -82,11 +84,8 @@ struct bst_mtt {
         *departed_chi2; /* chi2 of a manoeuvre found in this frame with the wider gate; 0: none */
 };
 
-/* A pool with room for `capacity` detections; false without memory. Either way freed by
- * bst_mtt_pool_free. */
-bool bst_mtt_pool_create(bst_mtt_pool *pool, int capacity);
-/* Frees what bst_mtt_pool_create made. */
-void bst_mtt_pool_free(bst_mtt_pool *pool);
+/* Takes the arrays of a pool for `capacity` detections from an arena. */
+void bst_mtt_pool_lay_out(bst_mtt_pool *pool, int capacity, bst_arena *arena);
 /* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
  * library sort that may allocate. */
 void bst_mtt_sort(double *key, int *order, int count);
