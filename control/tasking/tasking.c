@@ -1,5 +1,6 @@
 #include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -75,6 +76,19 @@ static bst_status take_members(bst_ctx *ctx, bst_tasking *t, const bst_fleet_mem
     return BST_OK;
 }
 
+/* Returns the number of elements per object array. */
+static size_t lay_out(bst_tasking *t) {
+    size_t n = (size_t)t->object_count + 1, sensors = (size_t)t->sensor_count;
+    BST_ARENA_TAKE(&t->arena, t->sensors, sensors);
+    BST_ARENA_TAKE(&t->arena, t->line, n);
+    BST_ARENA_TAKE(&t->arena, t->seen_s, n);
+    BST_ARENA_TAKE(&t->arena, t->holder, n);
+    BST_ARENA_TAKE(&t->arena, t->not_before, n * sensors);
+    BST_ARENA_TAKE(&t->arena, t->place_m[0], 3 * n);
+    BST_ARENA_TAKE(&t->arena, t->choices, n);
+    return n;
+}
+
 bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *t, const bst_tasking_config *config,
                             const bst_fleet_member *members, int member_count,
                             double tick_rate_hz) {
@@ -83,19 +97,11 @@ bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *t, const bst_tasking_conf
                        .tick_rate_hz = tick_rate_hz,
                        .sensor_count = member_count,
                        .object_count = bst_knowledge_object_count(members[0].knowledge)};
-    size_t n = (size_t)t->object_count + 1;
-    t->sensors = calloc((size_t)member_count, sizeof *t->sensors);
-    t->line = calloc(n, sizeof *t->line);
-    t->seen_s = calloc(n, sizeof *t->seen_s);
-    t->holder = calloc(n, sizeof *t->holder);
-    t->not_before = calloc(n * (size_t)member_count, sizeof *t->not_before);
-    t->place_m[0] = calloc(3 * n, sizeof *t->place_m[0]);
-    t->choices = calloc(n, sizeof *t->choices);
-    if (!t->sensors || !t->line || !t->seen_s || !t->holder || !t->not_before || !t->place_m[0] ||
-        !t->choices) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the tasks of %d objects",
-                        t->object_count);
-    }
+    (void)lay_out(t);
+    char what[64];
+    snprintf(what, sizeof what, "the tasks of %d objects", t->object_count);
+    BST_TRY(bst_arena_alloc(ctx, &t->arena, what));
+    size_t n = lay_out(t);
     t->place_m[1] = t->place_m[0] + n;
     t->place_m[2] = t->place_m[1] + n;
     for (int i = 0; i < t->object_count; i++) {
@@ -110,13 +116,7 @@ void bst_tasking_free(bst_tasking *t) {
     for (int s = 0; t->sensors && s < t->sensor_count; s++) {
         bst_knowledge_view_free(t->sensors[s].view);
     }
-    free(t->sensors);
-    free(t->line);
-    free(t->seen_s);
-    free(t->holder);
-    free(t->not_before);
-    free(t->place_m[0]);
-    free(t->choices);
+    bst_arena_free(&t->arena);
     *t = (bst_tasking){.sensor_count = 0};
 }
 

@@ -14,6 +14,7 @@
 #include "boresight/config.h"
 #include "boresight/module.h"
 #include "control/guidance/keep_out.h"
+#include "sim/core/arena.h"
 #include "sim/onboard/knowledge.h"
 
 /* A line of the list of targets: an object, or all whose apsides lie within bounds. */
@@ -83,6 +84,7 @@ typedef struct bst_tasking_choice {
 } bst_tasking_choice;
 
 typedef struct bst_tasking {
+    bst_arena arena; /* of all arrays below */
     bst_tasking_config config;
     double tick_rate_hz;
     bst_tasking_sensor *sensors;

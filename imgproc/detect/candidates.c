@@ -2,6 +2,7 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,40 +13,34 @@ enum {
 
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
+static void lay_out(bst_candidates *c, size_t cells) {
+    size_t n = (size_t)c->capacity;
+    BST_ARENA_TAKE(&c->arena, c->items, n);
+    BST_ARENA_TAKE(&c->arena, c->order, n);
+    BST_ARENA_TAKE(&c->arena, c->maxima, n);
+    BST_ARENA_TAKE(&c->arena, c->by_cell, n);
+    BST_ARENA_TAKE(&c->arena, c->cell, cells);
+    BST_ARENA_TAKE(&c->arena, c->stands, n);
+    BST_ARENA_TAKE(&c->arena, c->order_swap, n);
+    BST_ARENA_TAKE(&c->arena, c->key, n);
+    BST_ARENA_TAKE(&c->arena, c->key_swap, n);
+}
+
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bst_candidates *out) {
     assert(out && max_width > 0 && max_height > 0);
     /* maxima of an 8-connected neighbourhood cannot be denser than one in four */
     *out = (bst_candidates){.capacity = ((max_width + 1) / 2) * ((max_height + 1) / 2)};
-    size_t n = (size_t)out->capacity;
-    out->items = calloc(n, sizeof *out->items);
-    out->order = calloc(n, sizeof *out->order);
-    out->maxima = calloc(n, sizeof *out->maxima);
-    out->by_cell = calloc(n, sizeof *out->by_cell);
-    out->cell = calloc((size_t)(max_width / CELL_PX + 1) * (size_t)(max_height / CELL_PX + 1) + 1,
-                       sizeof *out->cell);
-    out->stands = calloc(n, sizeof *out->stands);
-    out->order_swap = calloc(n, sizeof *out->order_swap);
-    out->key = calloc(n, sizeof *out->key);
-    out->key_swap = calloc(n, sizeof *out->key_swap);
-    if (!out->items || !out->order || !out->maxima || !out->by_cell || !out->cell || !out->stands ||
-        !out->order_swap || !out->key || !out->key_swap) {
-        bst_candidates_free(out);
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
-                        max_width, max_height);
-    }
+    size_t cells = (size_t)(max_width / CELL_PX + 1) * (size_t)(max_height / CELL_PX + 1) + 1;
+    char what[64];
+    snprintf(what, sizeof what, "the candidates of a %d x %d frame", max_width, max_height);
+    lay_out(out, cells);
+    BST_TRY(bst_arena_alloc(ctx, &out->arena, what));
+    lay_out(out, cells);
     return BST_OK;
 }
 
 void bst_candidates_free(bst_candidates *c) {
-    free(c->items);
-    free(c->order);
-    free(c->maxima);
-    free(c->by_cell);
-    free(c->cell);
-    free(c->stands);
-    free(c->order_swap);
-    free(c->key);
-    free(c->key_swap);
+    bst_arena_free(&c->arena);
     *c = (bst_candidates){0};
 }
 

@@ -4,6 +4,7 @@
 #define BST_IMGPROC_DETECT_CANDIDATES_H
 
 #include "imgproc/detect/filter.h"
+#include "sim/core/arena.h"
 
 typedef struct bst_candidate {
     int x, y; /* the maximum's pixel */
@@ -11,6 +12,7 @@ typedef struct bst_candidate {
 } bst_candidate;
 
 typedef struct bst_candidates {
+    bst_arena arena; /* of all arrays below */
     bst_candidate *items;
     int *order; /* of items: SNR falling, then y, then x */
     int count, capacity;

@@ -8,6 +8,7 @@
 #include "imgproc/calibrate/pixel_learner.h"
 #include "imgproc/measure/cosmic_ray.h"
 #include "imgproc/measure/heapsort.h"
+#include "sim/core/arena.h"
 #include "sim/optics/photometry.h"
 
 enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
@@ -53,6 +54,7 @@ typedef struct outcome {
 } outcome;
 
 struct bst_imgproc_discriminator {
+    bst_arena arena; /* of all arrays below */
     bst_camera camera;
     int capacity, room;
     remembered *sources; /* [room] */
@@ -71,6 +73,17 @@ struct bst_imgproc_discriminator {
     bst_window window, charge_window;
 };
 
+static void lay_out(bst_imgproc_discriminator *d) {
+    size_t room = (size_t)d->room, capacity = (size_t)d->capacity;
+    BST_ARENA_TAKE(&d->arena, d->sources, room);
+    BST_ARENA_TAKE(&d->arena, d->charge, room);
+    BST_ARENA_TAKE(&d->arena, d->merged, room);
+    BST_ARENA_TAKE(&d->arena, d->keys, capacity);
+    BST_ARENA_TAKE(&d->arena, d->keys_order, capacity);
+    BST_ARENA_TAKE(&d->arena, d->again, capacity);
+    BST_ARENA_TAKE(&d->arena, d->band, (size_t)d->bands);
+}
+
 bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
                                             bst_imgproc_discriminator **out) {
     assert(camera && out && capacity > 0);
@@ -83,19 +96,13 @@ bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *came
     d->capacity = capacity;
     d->room = 3 * capacity;
     d->bands = (int)camera->height_px / BAND + 1;
-    size_t room = (size_t)d->room;
-    d->sources = calloc(room, sizeof *d->sources);
-    d->charge = calloc(room, sizeof *d->charge);
-    d->merged = calloc(room, sizeof *d->merged);
-    d->keys = calloc((size_t)capacity, sizeof *d->keys);
-    d->keys_order = calloc((size_t)capacity, sizeof *d->keys_order);
-    d->again = calloc((size_t)capacity, sizeof *d->again);
-    d->band = calloc((size_t)d->bands, sizeof *d->band);
-    if (!d->sources || !d->charge || !d->merged || !d->keys || !d->keys_order || !d->again ||
-        !d->band) {
+    lay_out(d);
+    bst_status status = bst_arena_alloc(ctx, &d->arena, "the memory of earlier detections");
+    if (status != BST_OK) {
         bst_imgproc_discriminator_free(d);
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory to remember %d detections", capacity);
+        return status;
     }
+    lay_out(d);
     *out = d;
     return BST_OK;
 }
@@ -104,13 +111,7 @@ void bst_imgproc_discriminator_free(bst_imgproc_discriminator *d) {
     if (!d) {
         return;
     }
-    free(d->sources);
-    free(d->charge);
-    free(d->merged);
-    free(d->keys);
-    free(d->keys_order);
-    free(d->again);
-    free(d->band);
+    bst_arena_free(&d->arena);
     free(d);
 }
 
