@@ -230,7 +230,7 @@ static void print_bytes(FILE *out, const uint8_t *bytes, size_t count) {
     }
 }
 
-/* A command as it goes over the wire. */
+/* Prints an example of a command as packet bytes. */
 static void print_example(FILE *out) {
     const bst_wire_message *m = bst_wire_message_of(BST_LINK_LOS_COMMAND);
     bst_los_command command = {.tick = 12600,

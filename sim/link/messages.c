@@ -1,4 +1,4 @@
-/* The tables of all messages. */
+/* Field tables of all link messages. */
 #include <math.h>
 #include <string.h>
 
