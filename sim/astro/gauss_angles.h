@@ -1,13 +1,13 @@
-/* Gauss's method: an orbit from three directions. */
+/* Gauss's method: initial orbit from three directions. */
 #ifndef BST_ASTRO_GAUSS_ANGLES_H
 #define BST_ASTRO_GAUSS_ANGLES_H
 
 #include "boresight/status.h"
 #include "boresight/vec.h"
 
-enum { BST_GAUSS_ROOTS = 3 }; /* an equation of these signs has no more positive roots */
+enum { BST_GAUSS_ROOTS = 3 }; /* maximum number of positive roots of an equation with these signs */
 
-/* A direction (unit) to the body, seen from `observer_m` (from the centre of attraction). */
+/* A direction (unit) to the body from `observer_m` (relative to the centre of attraction). */
 typedef struct bst_gauss_sight {
     double time_s;
     bst_vec3 direction;

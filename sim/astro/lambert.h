@@ -1,4 +1,4 @@
-/* Lambert's problem: the two-body orbit between two places in a given time. */
+/* Lambert's problem: the two-body orbit between two positions in a given time. */
 #ifndef BST_ASTRO_LAMBERT_H
 #define BST_ASTRO_LAMBERT_H
 
@@ -8,9 +8,9 @@
 #include "boresight/vec.h"
 
 typedef struct bst_lambert_way {
-    bool long_way;    /* through more than half a turn about the centre */
-    int revolutions;  /* whole ones in addition, 0 or more */
-    bool high_energy; /* with revolutions: the one of two orbits with the longer semi-major axis */
+    bool long_way;    /* transfer angle above 180 degrees */
+    int revolutions;  /* additional whole revolutions, 0 or more */
+    bool high_energy; /* with revolutions: of two orbits, the one with the larger semi-major axis */
 } bst_lambert_way;
 
 /* Velocities (m/s) at r1 and r2 (m, from the centre) of the orbit that takes `seconds` > 0 between

@@ -1,10 +1,10 @@
-/* CCSDS Orbit Ephemeris Messages (OEM, KVN; 502.0-B-1 to -3): reading and interpolating. */
+/* Reads and interpolates CCSDS Orbit Ephemeris Messages (OEM, KVN; 502.0-B-1 to -3). */
 #ifndef BST_ASTRO_OEM_H
 #define BST_ASTRO_OEM_H
 
 #include "sim/astro/sky_clock.h"
 
-/* The states of one file; immutable once made, shareable between threads. */
+/* The states of one OEM file; immutable, shareable between threads. */
 typedef struct bst_oem bst_oem;
 
 /* Reads a file of any number of segments and objects. Every segment needs OBJECT_NAME, OBJECT_ID,
@@ -32,7 +32,7 @@ bst_status bst_oem_read_buffer(bst_ctx *ctx, const char *name, const char *data,
 
 void bst_oem_free(bst_oem *oem); /* NULL allowed */
 
-/* Objects are told apart by name and identifier, and numbered as they come first in the file. */
+/* Number of objects; objects are distinguished by name and identifier, in file order. */
 int bst_oem_object_count(const bst_oem *oem);
 
 /* OBJECT_NAME of an object; it belongs to the ephemeris.
@@ -45,15 +45,15 @@ const char *bst_oem_object_name(const bst_oem *oem, int object);
  * Given:     object  index, 0 to one less than the number of objects */
 const char *bst_oem_object_id(const bst_oem *oem, int object);
 
-/* The object whose OBJECT_NAME or OBJECT_ID is `name`; with "" the only one. BST_ERR_NOT_FOUND
- * when there is none, or several, with what the file has. */
+/* Finds the object with OBJECT_NAME or OBJECT_ID `name`; "": the only object. BST_ERR_NOT_FOUND
+ * lists the objects. */
 bst_status bst_oem_find(bst_ctx *ctx, const bst_oem *oem, const char *name,
                         int *object) BST_MUST_CHECK;
 
-/* First and last instant at which the object has a state; there may be gaps between segments. */
+/* First and last time at which the object has a state; gaps between segments are possible. */
 void bst_oem_span(const bst_oem *oem, int object, bst_time *start, bst_time *stop);
 
-/* Whether the object has a state at every instant from `from` to `to`. */
+/* True if the object has a state at all times from `from` to `to`. */
 bool bst_oem_covers(const bst_oem *oem, int object, bst_time from, bst_time to);
 
 /* State at t in GCRF, m and m/s, of the position that the file's own method interpolates in the

@@ -1,4 +1,4 @@
-/* Two-line element sets: reading, checking, writing. */
+/* Two-line element sets: parsing, checks, formatting. */
 #ifndef BST_ASTRO_TLE_H
 #define BST_ASTRO_TLE_H
 
@@ -27,8 +27,8 @@ enum { BST_TLE_CHARS = 69 };
 bst_status bst_tle_format(bst_ctx *ctx, const bst_elements *set, char line1[BST_TLE_CHARS + 1],
                           char line2[BST_TLE_CHARS + 1]) BST_MUST_CHECK;
 
-/* Five digits, or Alpha-5: a letter for the two leading digits 10 to 33, without I and O. Reads
- * five characters at text; false when they are no number. */
+/* Parses a catalogue number of five characters: digits, or Alpha-5, a letter for the leading digits
+ * 10 to 33, without I and O. False: no number. */
 bool bst_tle_decode_number(const char *text, int *out);
 
 typedef bst_elements_options bst_tle_options;

@@ -22,7 +22,7 @@ static const double usual_k[2][2] = {{2700.0, 22000.0}, {200.0, 22000.0}};
 enum { STEPS = 1024, RINGS = 200, C = BST_PSF_COLOURS };
 
 struct bst_psf_colours {
-    double least, per_step;    /* 1 / temperature: of the hottest, and between entries */
+    double least, per_step;    /* 1 / temperature: smallest value, and step between entries */
     float share[STEPS + 1][C]; /* spectra 1, 2, 3 */
     double error;
 };
@@ -31,7 +31,7 @@ double bst_psf_anchor_k(bool thermal, int spectrum) {
     return anchor_k[thermal][spectrum];
 }
 
-/* Photons of a black body through the band, together 1. */
+/* Photons of a black body through the band, normalised to 1. */
 static void photons_of(const bst_psf_rule *rule, double temperature_k, double *out) {
     double sum = 0.0;
     for (int k = 0; k < rule->count; k++) {
@@ -44,7 +44,7 @@ static void photons_of(const bst_psf_rule *rule, double temperature_k, double *o
     }
 }
 
-/* Means of the powers 1, 2, 3 of the wavelength, which goes from -1 to 1. */
+/* Moments 1, 2, 3 of the wavelength, scaled to -1 .. 1. */
 static void moments_of(const bst_psf_rule *rule, const double *photons, double out[C]) {
     double first = rule->wavelength_m[0], last = rule->wavelength_m[rule->count - 1];
     double middle = 0.5 * (first + last), half = 0.5 * (last - first);
@@ -60,14 +60,13 @@ static void moments_of(const bst_psf_rule *rule, const double *photons, double o
     }
 }
 
-/* What the moments of spectra 1, 2, 3 have beyond those of spectrum 0. */
+/* Moments of spectra 1, 2, 3 relative to spectrum 0. */
 typedef struct anchors {
     double sun[C], more[C][C]; /* more[moment][spectrum - 1] */
 } anchors;
 
-/* The smallest shares among those that keep the moments: in a band so narrow, or of so few
- * wavelengths, that the spectra do not differ in some combination of moments, none of it is
- * wanted. Regularised least squares (Tikhonov). */
+/* Smallest fractions that preserve the moments. In a narrow band the spectra do not differ in some
+ * combinations of moments; these get no weight. Regularised least squares (Tikhonov). */
 static void shares_of(const anchors *a, const double moments[C], double out[C]) {
     double m[C][C + 1];
     for (int i = 0; i < C; i++) {
@@ -78,7 +77,7 @@ static void shares_of(const anchors *a, const double moments[C], double out[C]) 
             }
         }
     }
-    for (int i = 0; i < C; i++) { /* symmetric and positive: no pivots */
+    for (int i = 0; i < C; i++) { /* symmetric and positive definite: no pivoting */
         for (int r = 0; r < C; r++) {
             double factor = r == i ? 0.0 : m[r][i] / m[i][i];
             for (int j = i; j <= C; j++) {
@@ -106,8 +105,7 @@ static void make_anchors(const bst_psf_rule *rule, anchors *a) {
     }
 }
 
-/* Rings of the frequency plane, the pixel's own transfer function with them: frequency times OTF.
- */
+/* Frequency times OTF, including the pixel, on rings of the frequency plane. */
 static void fill_rings(const bst_psf_rule *rule, const double *q, double inner, double *h) {
     double least_q = INFINITY;
     for (int k = 0; k < rule->count; k++) {
@@ -121,7 +119,8 @@ static void fill_rings(const bst_psf_rule *rule, const double *q, double inner, 
     }
 }
 
-/* bst_psf_mixing_error. h: [RINGS][wavelengths], frequency times OTF. */
+/* Error of mixing spectra, see bst_psf_mixing_error. h: [RINGS][wavelengths], frequency times
+ * OTF. */
 static double mixing_error(const bst_psf_rule *rule, const anchors *a, const double *h) {
     enum { COLOURS = 48 };
     double photons[BST_PSF_SPECTRA][BST_PSF_WAVELENGTHS], worst = 0.0;

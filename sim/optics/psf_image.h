@@ -1,10 +1,10 @@
-/* The image of a point: the PSF integrated over pixels, on a grid finer than the pixels. */
+/* Image of a point source: the PSF integrated over pixels, sampled finer than the pixels. */
 #ifndef BST_OPTICS_PSF_IMAGE_H
 #define BST_OPTICS_PSF_IMAGE_H
 
 #include "sim/optics/psf.h"
 
-/* Samples of bst_psf_image along an axis. */
+/* Samples per axis of bst_psf_image. */
 static inline int bst_psf_image_side(int per_px, int reach_px) {
     return 2 * per_px * reach_px + 1;
 }
