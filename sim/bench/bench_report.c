@@ -46,7 +46,8 @@ static bool has_knob(const bst_bench_error_curve *curve, const char *knob) {
     return false;
 }
 
-/* Points of one knob, all scenes, with the best ones ringed; false: there is none. */
+/* Plots the points of one renderer option for all scenes, with the best ones marked; false:
+ * none. */
 static bst_status plot_knob(bst_ctx *ctx, const bst_bench_report *r, const char *knob,
                             const char *path, bool *made) {
     bst_plot plot;
