@@ -21,7 +21,7 @@ bool bst_astro_time_system_find(const char *name, size_t length, bst_astro_time_
 /* Reads "YYYY-MM-DDThh:mm:ss[.d...][Z]" or "YYYY-DDDThh:mm:ss[.d...][Z]" (CCSDS 301.0-B-4, ASCII
  * time codes A and B) of `length` characters, in a time system; second 60 in a leap second of UTC
  * only. TDB - TT to 10 us (Kaplan, USNO Circular 179, equation 2.6). Errors: BST_ERR_FORMAT with
- * the text and what is allowed; BST_ERR_RANGE for UTC as bst_time_from_utc. */
+ * the text and the allowed form; BST_ERR_RANGE for UTC as bst_time_from_utc. */
 bst_status bst_ccsds_time(bst_ctx *ctx, const char *text, size_t length,
                           bst_astro_time_system system, bst_time *out) BST_MUST_CHECK;
 

@@ -53,7 +53,7 @@ bst_status bst_elements_load(bst_ctx *ctx, const char *path, const bst_elements_
                              bst_elements **out, int *count) BST_MUST_CHECK;
 
 /* As bst_elements_load, from memory: `bytes` bytes at data (any bytes, no terminator needed);
- * `name` stands for the path in messages. */
+ * `name`: file name for messages. */
 bst_status bst_elements_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                     const bst_elements_options *options, bst_elements **out,
                                     int *count) BST_MUST_CHECK;

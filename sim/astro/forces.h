@@ -44,19 +44,19 @@ bst_status bst_forces_create(bst_ctx *ctx, const bst_force_model *model, bst_tim
 void bst_forces_free(bst_forces *forces); /* NULL allowed */
 
 /* Acceleration (m/s^2, GCRF) at a geocentric position and velocity (GCRF), `seconds` after the
- * epoch. Harmonics turn with the Earth (rotation worked out every hour, linear in between but for
- * the Earth's own turn: 1e-10 rad); Sun and Moon are worked out every hour, cubic in between (1 m).
+ * epoch. Harmonics rotate with the Earth (computed every hour, interpolated linearly except for the
+ * Earth rotation angle: 1e-10 rad); Sun and Moon are computed every hour, with cubic interpolation
+ * (1 m).
  * Sun and Moon: Battin's form of the third-body term, free of cancellation (Battin, An Introduction
  * to the Mathematics and Methods of Astrodynamics, section 8.4). Sunlight: cannonball, times
  * bst_astro_sun_fraction (Montenbruck and Gill 3.75). Drag: Montenbruck and Gill 3.97.
  * Errors: those of bst_astro_eop_at at the full hours on both sides, where the Earth's rotation
- * counts.
- */
+ * counts. */
 bst_status bst_forces_at(bst_ctx *ctx, bst_forces *forces, double seconds, bst_vec3 position_m,
                          bst_vec3 velocity_mps, bst_vec3 *acceleration_mps2) BST_MUST_CHECK;
 
-/* Visible fraction of the Sun's disc at a position, as used for radiation pressure; 1 if the model
- * has none. */
+/* Visible fraction of the Sun's disc at a position, as used for solar radiation pressure; 1 if the
+ * force model has none. */
 double bst_forces_sunlight(bst_forces *forces, double seconds, bst_vec3 position_m);
 
 #endif

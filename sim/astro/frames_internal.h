@@ -14,10 +14,10 @@ typedef struct bst_astro_eop_prediction {
     double rest_arcsec[2];     /* difference between last row and fit */
 } bst_astro_eop_prediction;
 
-/* Fits what follows a table's rows (at least 2): the pole as the secular pole with an offset, a
- * year and Chandler's wobble, the rest of the last row fading; UT1-TAI with the mean rate of the
- * last half year and the conventional seasons. Continuous at the last row. BST_ERR_NUMERIC for
- * values that are no numbers. Source: the form of IERS Bulletin A; McCarthy and Luzum, Bulletin
+/* Fits the prediction after a table's rows (at least 2): the pole as secular pole with an offset,
+ * annual and Chandler terms, and a decaying difference to the last row; UT1-TAI with the mean rate
+ * of the last half year and the conventional seasons. Continuous at the last row. BST_ERR_NUMERIC
+ * for values that are no numbers. Source: the form of IERS Bulletin A; McCarthy and Luzum, Bulletin
  * Geodesique 65 (1991) 18. */
 bst_status bst_astro_eop_prediction_fit(bst_ctx *ctx, int first_mjd, int count,
                                         const bst_astro_eop_values *rows,

@@ -38,7 +38,7 @@ bst_status bst_gravity_builtin(bst_ctx *ctx, int degree, int order,
  * Foerste, The ICGEM format (GFZ Potsdam, 2011). */
 bst_status bst_gravity_load(bst_ctx *ctx, const char *path, int degree, int order,
                             bst_gravity **out) BST_MUST_CHECK;
-/* As bst_gravity_load, from memory; `name` stands for the path in messages. */
+/* As bst_gravity_load, from memory; `name`: file name for messages. */
 bst_status bst_gravity_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                    int degree, int order, bst_gravity **out) BST_MUST_CHECK;
 

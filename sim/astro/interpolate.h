@@ -18,9 +18,9 @@ enum { BST_INTERPOLATE_MAX_ROWS = 32 };
 /* Index of the last row with rows[].t_s <= t_s; 0 if none. Times increase; count >= 1. */
 int64_t bst_interpolate_find(const bst_astro_table_state *rows, int64_t count, double t_s);
 
-/* The polynomial through `points` (taken into 1 to BST_INTERPOLATE_MAX_ROWS, half of it with
- * velocities, and count) rows around t_s: through positions, and with `hermite`, or where
- * there is one row only, also through velocities. Position and its derivative at t_s. The rows
+/* Interpolates with the polynomial through `points` rows around t_s (limited to 1 ..
+ * BST_INTERPOLATE_MAX_ROWS, half of it with velocities, and count): through positions, and with
+ * `hermite` or a single row also through velocities. Position and its derivative at t_s. The rows
  * reach equally far to both sides of the interval that holds t_s, shifted where the table ends.
  * Extrapolates outside the table. */
 void bst_interpolate(const bst_astro_table_state *rows, int64_t count, double t_s, int points,

@@ -24,8 +24,8 @@ void bst_sgp4_set_plane(const bst_sgp4_constants *k, double sin_i, double cos_i,
 }
 
 /* Solves u = E - ax sin E + ay cos E for the eccentric longitude E by Newton's method from E = u;
- * gives sin E and cos E. A step d leaves an error of at most d^2 / (2 (1 - e cos E)), so the last
- * step is known by its size without one more evaluation. */
+ * gives sin E and cos E. A step d leaves an error of at most d^2 / (2 (1 - e cos E)), so that the
+ * size of a step decides whether it is the last one. */
 static void solve_kepler(double u, double ax, double ay, double *sin_e, double *cos_e) {
     double s = sin(u), c = cos(u);
     double delta = 0.0;

@@ -23,13 +23,13 @@ typedef enum bst_sgp4_error {
 /* An initialised satellite; immutable. */
 typedef struct bst_sgp4 bst_sgp4;
 
-/* Makes a propagator from an element set; *out is freed with bst_sgp4_free, NULL on error. Orbits
- * of 225 minutes or longer get the deep-space model. BST_ERR_NUMERIC with the code in the message
- * for an eccentricity outside 0 <= e < 1 or a mean motion that is not above 0 (also once Kozai's is
- * turned to Brouwer's); BST_ERR_ARGUMENT for values that are not finite or an inclination outside 0
- * to pi. Equations: Hoots and Roehrich, Spacetrack Report 3 (1980), with the corrections and
- * constants of Vallado et al., AIAA 2006-6753; BST_SGP4_AFSPC takes that paper's sidereal time and
- * node of the operational code. */
+/* Creates an SGP4 propagator from an element set; *out is freed with bst_sgp4_free, NULL on error.
+ * Orbits of 225 minutes or longer get the deep-space model. BST_ERR_NUMERIC with the code in the
+ * message for an eccentricity outside 0 <= e < 1 or a mean motion that is not above 0 (also once
+ * Kozai's is turned to Brouwer's); BST_ERR_ARGUMENT for values that are not finite or an
+ * inclination outside 0 to pi. Equations: Hoots and Roehrich, Spacetrack Report 3 (1980), with the
+ * corrections and constants of Vallado et al., AIAA 2006-6753; BST_SGP4_AFSPC takes that paper's
+ * sidereal time and node of the operational code. */
 bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
                            bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
 /* Frees a propagator; NULL is allowed. */

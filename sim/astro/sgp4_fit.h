@@ -11,14 +11,14 @@ typedef struct bst_sgp4_place {
     bst_vec3 position_teme_m;
 } bst_sgp4_place;
 
-/* Fits the six mean elements of `elements`, whose epoch, names and bstar are the caller's, so that
- * SGP4 (WGS-72, improved mode) comes nearest to `count` (at least 6) places in the sense of least
- * squares. `position_teme_m`, `velocity_teme_mps`: the state at the epoch, which the iteration
- * starts from. Mean motion, eccentricity vector, inclination vector and mean longitude are what is
- * varied: regular for circular and equatorial orbits. *rms_m: of the distances that remain.
- * BST_ERR_NUMERIC when the state is on no ellipse or within 0.1 degree of 180 degrees of
- * inclination, or without convergence; BST_ERR_ARGUMENT for too few places.
- * Vallado and Crawford, SGP4 orbit determination, AIAA 2008-6770. */
+/* Fits the six mean elements of `elements` by least squares, so that SGP4 (WGS-72, improved mode)
+ * follows `count` (at least 6) positions; the caller sets epoch, names and bstar.
+ * `position_teme_m`, `velocity_teme_mps`: state at the epoch, the initial value. Mean motion,
+ * eccentricity vector, inclination vector and mean longitude are varied: regular for circular and
+ * equatorial orbits. *rms_m: of the residual distances. BST_ERR_NUMERIC when the state is on no
+ * ellipse or within 0.1 degree of 180 degrees of inclination, or without convergence;
+ * BST_ERR_ARGUMENT for too few positions. Vallado and Crawford, SGP4 orbit determination, AIAA
+ * 2008-6770. */
 bst_status bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count,
                         bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps,
                         bst_elements *elements, double *rms_m) BST_MUST_CHECK;

@@ -40,8 +40,8 @@ void bst_sky_clock_free(bst_sky_clock *clock); /* NULL allowed */
 
 /* Values at t. Against bst_astro_earth_frames_at and bst_bodies_at: rotations to 1 mm at a
  * geostationary distance, Sun, Moon and Earth to 15 m, the Earth's velocity to 1e-5 m/s. About 0.2
- * us; a step into the next 120 s of the grid works out one exact value (about 0.1 ms). Error:
- * BST_ERR_RANGE where bst_astro_eop_at has it, and in the last 120 s of the table. */
+ * us; each new grid interval of 120 s needs one exact value (about 0.1 ms). Error: BST_ERR_RANGE
+ * where bst_astro_eop_at has it, and in the last 120 s of the table. */
 bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t,
                             bst_sky_rotation *out) BST_MUST_CHECK;
 

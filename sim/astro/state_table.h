@@ -20,7 +20,7 @@ bst_status bst_state_table_load(bst_ctx *ctx, const char *path, bst_time epoch,
                                 bst_state_table **out) BST_MUST_CHECK;
 
 /* As bst_state_table_load, from memory: `bytes` bytes at data (any bytes, no terminator needed);
- * `name` stands for the path in messages. */
+ * `name`: file name for messages. */
 bst_status bst_state_table_read_buffer(bst_ctx *ctx, const char *name, const char *data,
                                        size_t bytes, bst_time epoch,
                                        bst_state_table **out) BST_MUST_CHECK;

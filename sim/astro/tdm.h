@@ -36,8 +36,8 @@ typedef struct bst_tdm bst_tdm;
  * there is none; BST_ERR_IO when it cannot be read or is no regular file; BST_ERR_MEMORY. */
 bst_status bst_tdm_load(bst_ctx *ctx, const char *path, bst_tdm **out) BST_MUST_CHECK;
 
-/* As bst_tdm_load, from memory: `bytes` bytes at data (any bytes, no terminator needed); `name`
- * stands for the path in messages. */
+/* As bst_tdm_load, from memory: `bytes` bytes at data (any bytes, no terminator needed); `name`:
+ * file name for messages. */
 bst_status bst_tdm_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                bst_tdm **out) BST_MUST_CHECK;
 

@@ -75,7 +75,7 @@ const char *bst_text_split_keyword(const bst_text_line *line, bst_text_span *key
                                    bst_text_span *value, const char **expected);
 
 /* [sign]digits[.digits][(e|E)[sign]digits], also with no digits on one side of the point; the
- * nearest double, in any locale. False for anything else and for what is beyond double. */
+ * nearest double, in any locale. False for other text and for numbers beyond double. */
 bool bst_text_number(bst_text_span span, double *out);
 /* Parses digits only, at most `maximum` (at least 0). */
 bool bst_text_count(bst_text_span span, int maximum, int *out);

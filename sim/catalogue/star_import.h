@@ -9,8 +9,8 @@
 #include "sim/catalogue/star_index.h"
 
 #define BST_STAR_TYCHO2_COUNT 2557501LL /* main table and supplement 1 */
-#define BST_STAR_TYCHO2_COMPLETE_V 11.0 /* magnitude to which the catalogue has 98 % of all stars \
-                                         */
+/* magnitude to which the catalogue has 98 % of all stars */
+#define BST_STAR_TYCHO2_COMPLETE_V 11.0
 #define BST_STAR_TYCHO2_SOURCE "Tycho-2"
 
 /* Progress callback: current activity and amount done; total 0: unknown. */
@@ -41,13 +41,14 @@ bst_status bst_star_subset_read(bst_ctx *ctx, const char *path,
 bst_status bst_star_subset_read_buffer(bst_ctx *ctx, const char *name, const char *data,
                                        size_t bytes, bst_star_subset *out) BST_MUST_CHECK;
 
-/* Reads one row without its newline. Rows of 206 bytes are of the main table, of 122 bytes of
- * supplement 1. Positions are brought to J2000: the main table's mean positions are there already;
- * a row without one (flag X) gives its observed position as it is; a double star's component whose
- * mean position is the pair's photocentre (flag P) gives its own observed position, moved on by the
- * pair's proper motion; supplement 1 gives J1991.25, moved on where the row has a proper motion.
- * A row with one of BT and VT only (and the supplement's Hp, taken as VT) is given BT-VT = 0.7, a
- * typical star's, and marked as without colour. BST_ERR_FORMAT says which bytes are wrong. */
+/* Parses one row of Tycho-2 without its newline. Rows of 206 bytes are of the main table, of 122
+ * bytes of supplement 1. Positions are brought to J2000: the main table's mean positions are there
+ * already; a row without one (flag X) gives its observed position as it is; a double star's
+ * component whose mean position is the pair's photocentre (flag P) gives its own observed position,
+ * moved on by the pair's proper motion; supplement 1 gives J1991.25, moved on where the row has a
+ * proper motion. A row with one of BT and VT only (and the supplement's Hp, taken as VT) is given
+ * BT-VT = 0.7, a typical star's, and marked as without colour. BST_ERR_FORMAT says which bytes are
+ * wrong. */
 bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes,
                               bst_star_values *out) BST_MUST_CHECK;
 

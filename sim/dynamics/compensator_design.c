@@ -12,8 +12,8 @@ static const double two_pi = 2.0 * BST_PI;
 #define DERIVATIVE_FILTER_RATIO 10.0
 #define DERIVATIVE_FILTER_RATE 0.2
 #define LOWEST_SHARE 1e-4 /* lowest searched frequency relative to the requested one */
-#define PHASE_POINTS 1500 /* about 1 % apart up to half the rate, finer than the phase of a delay \
-                           */
+/* about 1 % apart up to half the rate, finer than the phase of a delay */
+#define PHASE_POINTS 1500
 
 typedef struct design {
     const bst_compensator_config *config;

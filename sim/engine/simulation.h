@@ -12,7 +12,7 @@ typedef struct bst_simulation_options {
     int threads;               /* 0: all processors */
     bool pace;                 /* use the scenario's "pacing"; false: lockstep */
     bool replay;               /* answers of peers come from a recording: no wall clock */
-    bool parallel;             /* as bst_engine_parallel: another thread may call the hooks */
+    bool parallel;             /* as bst_engine_parallel: another thread may call the observers */
     struct bst_device *opened; /* an open device to use; the caller closes it; NULL: none */
     /* NULL, or the only module ("observer/sensor/module") that steps. The module `source`, named
      * "observer/sensor/source", replaces all others: it writes the inputs, which are visible at

@@ -27,7 +27,7 @@ typedef struct bst_run_metric_figures {
     double detected_fraction; /* detected_frames over in_field_frames; NAN: never in the field */
     int64_t detections;       /* detections of any source */
     /* error of the track of interest (confirmed or coasting) to the target's true direction, px:
-     * frames with tracks of their own and the target in the field and in track; NAN without any */
+     * frames with tracks, and the target in the field and in track; NAN without any */
     int64_t track_frames;
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
     /* confirmed tracks by identity; false: no object nearby in most of its frames */

@@ -78,7 +78,7 @@ static bst_status make_set_folders(bst_ctx *ctx, bst_export_parts *r, char sets[
     return BST_OK;
 }
 
-/* Everything that is asked for of an open run. */
+/* Executes all requested exports of an open run. */
 bst_status bst_export_run(bst_ctx *ctx, bst_export_parts *r) {
     bst_export *e = &r->e;
     char folder[4096], sets[3][4096];

@@ -3,9 +3,9 @@
 
 #include "sim/io/fits_internal.h"
 
-#define DIGITS (-15)     /* significant digits of real values */
-#define MJD_DIGITS (-16) /* digits of a modified Julian date: 1e-11 d, the resolution of a double \
-                          */
+#define DIGITS (-15) /* significant digits of real values */
+/* digits of a modified Julian date: 1e-11 d, the resolution of a double */
+#define MJD_DIGITS (-16)
 
 static void put_real(fitsfile *file, const char *key, double value, const char *comment,
                      int *code) {

@@ -36,8 +36,7 @@ typedef struct bst_link_welcome {
     int64_t tick_rate_hz;
     int64_t duration_ticks;
     double timeout_s;       /* time-out of the simulation for each step */
-    char shared_memory[64]; /* name of the shared memory with frames; "": frames come by the socket
-                             */
+    char shared_memory[64]; /* name of the shared memory; "": frames come by the socket */
     int64_t slot_bytes;
     int32_t slots;
     int32_t count;

@@ -23,8 +23,8 @@ typedef struct bst_curve {
 } bst_curve;
 
 /* Reads a file of 1 to BST_CURVE_POINTS_MAX rows. BST_ERR_NOT_FOUND, BST_ERR_IO, or BST_ERR_FORMAT
- * with file, line, what is wrong and what is expected. The caller frees with bst_curve_free, also
- * after an error. */
+ * with file, line, problem and expected form. The caller frees with bst_curve_free, also after an
+ * error. */
 bst_status bst_curve_load(bst_ctx *ctx, const char *path, const bst_curve_format *format,
                           bst_curve *out) BST_MUST_CHECK;
 /* Frees the memory of a curve and clears the struct, which belongs to the caller. */

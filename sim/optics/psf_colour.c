@@ -4,14 +4,13 @@
 #include "sim/optics/band.h"
 #include "sim/optics/psf_internal.h"
 
-/* A PSF is linear in the normalised spectrum. Black bodies of four temperatures span, by weights
- * that may be negative, those of all others in a band as far as a PSF can tell: with weights that
- * keep the mean, mean square and mean cube of the wavelength, the mix differs from the PSF of the
- * spectrum itself by what the OTF has beyond a cubic of the wavelength, on what the spectrum has
- * beyond the mix. */
+/* A PSF is linear in the normalised spectrum. Mixing the PSFs of four black bodies approximates
+ * that of any other one in the band; weights may be negative. The weights preserve mean, mean
+ * square and mean cube of the wavelength. The error is the part of the OTF beyond a cubic of the
+ * wavelength, on the difference of the spectra. */
 
-/* The Sun's effective temperature (IAU 2015 resolution B3), then the others: of stars, and in
- * thermal bands of what is warm. */
+/* temperatures: the Sun's (IAU 2015 resolution B3), then others: of stars, and in thermal bands of
+ * warm bodies */
 static const double anchor_k[2][BST_PSF_SPECTRA] = {{5772.0, 2800.0, 3900.0, 16000.0},
                                                     {5772.0, 200.0, 300.0, 500.0}};
 /* Bounds of what a source's spectrum can be, K, and of the temperatures that stars have or that

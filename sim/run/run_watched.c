@@ -11,7 +11,7 @@ static bool is_one_of(const char *channel, const char *const *names, int count) 
     return false;
 }
 
-/* Frames at the beginning and end that may be pictured, and one of so many in between in case of an
+/* Frames at the beginning and end that may be pictured, and every n-th in between in case of an
  * interrupt. A retained frame occupies the frame pool: the number is small. */
 enum { FIRST_SHOWN = 64, LAST_SHOWN = 16, SHOWN_EVERY = 64 };
 

@@ -78,7 +78,7 @@ typedef struct bst_engine_hooks {
 bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) BST_MUST_CHECK;
 /* Stops the engine's threads and frees it with its modules and channels; NULL is allowed. */
 void bst_engine_free(bst_engine *engine);
-/* Sets the observers (hooks) of an engine. The struct is copied. Not during bst_engine_run or
+/* Sets the observers of an engine. The struct is copied. Not during bst_engine_run or
  * bst_engine_advance. */
 void bst_engine_set_hooks(bst_engine *engine, const bst_engine_hooks *hooks);
 
@@ -98,7 +98,8 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
  * Given:     threads  including the calling thread
  * Notes:     Sensors that only multi-sensor modules connect are stepped concurrently. With one
  *            thread, or with pacing, the calling thread steps all sensors.
- *            Deferred modules and the hooks `message` and `event` always have an additional thread,
+ *            Deferred modules and the observers `message` and `event` always have an additional
+ *            thread,
  *            and a second one if a module has `ahead`.
  *            Modules of different sensors may share only what is constant or locked.
  *            Call it after bst_engine_load and bst_engine_pace, before the engine runs. */

@@ -58,8 +58,7 @@ typedef struct channel {
 typedef enum port_copies {
     BST_COPY_NONE,    /* same process: it reads the channel's log */
     BST_COPY_EACH,    /* every message is copied when it is published */
-    BST_COPY_SAMPLED, /* the writer's process copies the visible messages at each step of the reader
-                       */
+    BST_COPY_SAMPLED, /* the writer's process copies visible messages at each reader step */
 } port_copies;
 
 /* State of one port of a module instance. */
@@ -150,7 +149,7 @@ struct bst_step {
     bst_ctx *ctx;
     int64_t tick;
     int writing;            /* ports whose payload was handed out and not yet published */
-    bst_status hook_status; /* first failure of a hook during this step */
+    bst_status hook_status; /* first failure of an observer during this step */
     int lane;
     int64_t *ahead; /* [port] cursors of a call of `ahead`; NULL: a regular step */
 };
@@ -168,8 +167,8 @@ bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) BST_MU
 
 /* Publishes what a step has written (channel.c).
  *
- * Errors:    the first error of a hook during the step, and those of hooks that observe the
- *            messages */
+ * Errors:    the first error of an observer during the step, and errors of observers of
+ *            its messages */
 bst_status bst_engine_commit(struct bst_step *step) BST_MUST_CHECK;
 /* Releases the messages that all readers have read, on the channels that a logical
  * process writes. */
@@ -252,19 +251,19 @@ void bst_executor_free(bst_engine *engine);
 /* Runs the logical processes up to a tick, and calls the observers of all their messages.
  *
  * Given:     until_tick  exclusive
- * Errors:    those of modules and hooks; BST_ERR_INTERRUPTED */
+ * Errors:    those of modules and observers; BST_ERR_INTERRUPTED */
 bst_status bst_executor_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
 /* Copies a published message to an input of another logical process (logical_process.c). */
 bst_status bst_process_reach(struct bst_step *step, const channel *ch, const slot *s,
                              channel_reader reader) BST_MUST_CHECK;
 
-/* Records a message of a step for the hooks, which are called later (observers.c).
+/* Records a message of a step for the observers, which are called later (observers.c).
  *
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_observers_message(struct bst_step *step, const channel *ch,
                                  const void *payload) BST_MUST_CHECK;
 
-/* Records an event of a step for the hooks, which are called later.
+/* Records an event of a step for the observers, which are called later.
  *
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_observers_event(struct bst_step *step, const char *kind,

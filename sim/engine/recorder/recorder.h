@@ -46,7 +46,7 @@ extern const bst_config_desc bst_record_config_table[];
 bst_status bst_recorder_config_check(bst_ctx *ctx,
                                      const bst_recorder_config *config) BST_MUST_CHECK;
 
-/* Whether frames are Rice compressed: "auto" does so for extensions. */
+/* True if frames are Rice compressed: "auto" compresses extensions. */
 bool bst_recorder_compresses(const bst_recorder_config *config);
 
 /* A sensor whose channels are recorded. The recorder copies the names and uses the camera in create
@@ -71,7 +71,7 @@ typedef struct bst_recorder_info {
 
 typedef struct bst_recorder bst_recorder;
 
-/* Makes the tables in `run` (which must outlive the recorder). The first frame creates the FITS
+/* Creates the tables in `run` (which must outlive the recorder). The first frame creates the FITS
  * files: frames.fits, or frames_<observer>_<sensor>.fits when there are several sensors. */
 bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config,
                                const bst_recorder_info *info, bst_recorder **out) BST_MUST_CHECK;
