@@ -12,6 +12,7 @@
 #include "sim/cli/outputs.h"
 #include "sim/cli/plugins.h"
 #include "sim/link/external.h"
+#include "sim/registry/registry.h"
 
 /* Makes a module external: its type changes, and of its other keys those stay that all modules have
  * or that tell how frames are commanded. */
@@ -174,7 +175,7 @@ static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const bst_
 
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
                              bst_json **json, bst_scenario *out) {
-    BST_TRY(bst_json_load_extended(ctx, path, json));
+    BST_TRY(bst_json_load_described(ctx, path, bst_registry_tables(), json));
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {
         status = bst_plugins_scenario_read(ctx, *json, out);

@@ -4,6 +4,7 @@
 #ifndef BST_STUDIES_STUDY_H
 #define BST_STUDIES_STUDY_H
 
+#include "sim/core/former_names.h"
 #include "sim/studies/study_config.h"
 
 struct cJSON;
@@ -72,6 +73,7 @@ typedef struct bst_study_population_file {
 } bst_study_population_file;
 
 typedef struct bst_study {
+    const bst_document_tables *tables; /* of scenarios; NULL: none */
     bst_study_config config;
     char file[512];
     bst_json *json;
@@ -104,8 +106,10 @@ typedef struct bst_study_place {
 } bst_study_place;
 
 /* Reads a study and the scenarios that it names. Errors name file, JSON path and what is allowed.
- * Nothing is written. Free with bst_study_close, also after an error. */
-bst_status bst_study_open(bst_ctx *ctx, const char *file, bst_study *out) BST_MUST_CHECK;
+ * Nothing is written. Free with bst_study_close, also after an error. `tables`: those of scenarios,
+ * for former names of their keys, which live as long as the study; NULL: none are replaced. */
+bst_status bst_study_open(bst_ctx *ctx, const char *file, const bst_document_tables *tables,
+                          bst_study *out) BST_MUST_CHECK;
 /* Frees everything that a study holds and clears it. */
 void bst_study_close(bst_study *study);
 

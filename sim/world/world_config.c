@@ -66,7 +66,7 @@ static const bst_config_desc burn_table[] = {
     BST_CONFIG_END,
 };
 
-static const bst_config_desc object_table[] = {
+const bst_config_desc bst_object_config_table[] = {
     BST_STRING(bst_object_config, name, NULL, "Name, unique in the scenario."),
     BST_OBJECT(bst_object_config, orbit, orbit_table, NULL, "The object's orbit."),
     BST_REAL(bst_object_config, area_m2, "m2", 0, 1e6, "4",
@@ -150,7 +150,7 @@ const bst_config_desc bst_world_config_table[] = {
              "Sunlight on objects at the edge of the Earth's shadow is refracted, weakened and "
              "reddened by the air; false: an Earth without air. The column sunlit_fraction is the "
              "geometric one in both cases."),
-    BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
+    BST_LIST(bst_world_config, objects, bst_object_config, bst_object_config_table, 0, 100000, "[]",
              "The space objects."),
     BST_LIST(bst_world_config, catalogues, bst_catalogue_config, catalogue_table, 0, 16, "[]",
              "Files of element sets whose satellites are there as well."),

@@ -353,7 +353,7 @@ static void test_digest(void **state) {
     char *text = cJSON_Print(echo);
     fixture_write(folder, "resolved.json", text);
     snprintf(path, sizeof path, "%s/resolved.json", folder);
-    bst_assert_ok(&ctx, bst_study_open(&ctx, path, &again));
+    bst_assert_ok(&ctx, bst_study_open(&ctx, path, NULL, &again));
     assert_string_equal(again.digest, digest);
     free(text);
     cJSON_Delete(echo);

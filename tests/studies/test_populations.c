@@ -331,7 +331,7 @@ static void test_satellites(void **state) {
     char *text = cJSON_Print(echo);
     fixture_write(folder, "resolved.json", text);
     snprintf(path, sizeof path, "%s/resolved.json", folder);
-    bst_assert_ok(&ctx, bst_study_open(&ctx, path, &again));
+    bst_assert_ok(&ctx, bst_study_open(&ctx, path, NULL, &again));
     assert_string_equal(again.digest, s.digest);
     char *a = text_of(&s, 17), *b = text_of(&again, 17);
     assert_string_equal(a, b);
@@ -345,7 +345,7 @@ static void test_satellites(void **state) {
     strcpy(digest, s.digest);
     bst_study_close(&s);
     write_sets(SATELLITES + 1);
-    bst_assert_ok(&ctx, bst_study_open(&ctx, path, &again));
+    bst_assert_ok(&ctx, bst_study_open(&ctx, path, NULL, &again));
     assert_string_not_equal(again.digest, digest);
     bst_study_close(&again);
 }

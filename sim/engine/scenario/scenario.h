@@ -74,7 +74,19 @@ typedef struct bst_scenario {
 
 extern const bst_config_desc bst_scenario_table[];
 
-/* Reads and checks a scenario (bst_json_load_extended); nothing is opened or written but the JSON.
+/* Tables of the modules of a scenario: function `inside` of a bst_document_tables whose root is
+ * bst_scenario_table.
+ *
+ * Given:     registry   bst_scenario_registry
+ *            the others as bst_document_tables
+ * Returned:  common table and those of all modules of the role, or of the module that node's "type"
+ *            names; NULL after the last one */
+const bst_config_desc *bst_scenario_tables_inside(const void *registry, const char *raw,
+                                                  const char *key, const struct cJSON *node,
+                                                  int index);
+
+/* Reads and checks a scenario (bst_json_load_extended, or bst_json_load_described where former
+ * names are to be accepted in "set" and in overrides too); nothing is opened or written but the JSON.
  * Paths of files that exist are made absolute; a file that a module's table names (BST_CONFIG_PATH,
  * outside of lists) has to. Plug-ins are loaded into the process: see bst_plugin_open. Free with
  * bst_scenario_free, also after an error. */
