@@ -131,7 +131,7 @@ static const char transport[] =
     "this connection |\n"
     "| `link_takeover` | `hello` for a part that another peer plays | the new one plays it |\n"
     "| `link_left` | `end`, or a connection that is gone | the part waits for a `hello` |\n"
-    "| `link_unanswered` | nothing right within `timeout_s` | `on_silence`: the run ends with an "
+    "| `link_unanswered` | nothing right within `timeout_s` | `on_timeout`: the run ends with an "
     "error, or goes on without |\n"
     "| `link_connected`, `link_disconnected` | connections; a part of more than 16 MiB breaks one "
     "| "

@@ -23,7 +23,7 @@ typedef struct bst_link_config {
     char keys_file[512];      /* "": the link asks for none */
     double timeout_s;         /* for the answer to a step */
     double connect_timeout_s; /* for a peer that plays a part, at its first step */
-    int32_t on_silence;       /* bst_link_silence */
+    int32_t on_timeout;       /* bst_link_silence */
     bool shared_memory;
 } bst_link_config;
 
@@ -98,7 +98,7 @@ typedef struct bst_link_messages {
 } bst_link_messages;
 
 /* One step of a part: sends the inputs (at most 63), waits for the answer. *answered false: there
- * was none in time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one
+ * was none in time, and on_timeout is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one
  * said that it has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                              const bst_link_messages *messages, bool *answered) BST_MUST_CHECK;

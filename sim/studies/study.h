@@ -25,8 +25,8 @@ typedef struct bst_study_axis {
     char name[BST_STUDY_NAME_BYTES]; /* of its column: unique, letters, digits, underscores */
     char where[64];                  /* "/sweeps/0/axes/1", for messages */
     const char *path;
-    const struct cJSON *also;   /* pointers that get the same value; NULL: none */
-    const struct cJSON *values; /* NULL: a range */
+    const struct cJSON *linked_paths; /* pointers that get the same value; NULL: none */
+    const struct cJSON *values;       /* NULL: a range */
     int value_count;
     const bst_study_axis_config *axis;             /* NULL: not of a sweep */
     const bst_study_dispersion_config *dispersion; /* NULL: no dispersion */

@@ -37,7 +37,7 @@ def scenario(folder):
     sensor["cue"].update(offset_deg=0.1, offset_axis="y", offset_angle_deg=20, sigma_deg=0.1)
     sensor["knowledge"] = {"camera": {"throughput_error": THROUGHPUT_ERROR},
                            "orbit": {"position_rtn_m": NAV_RTN_M.tolist(), "velocity_rtn_mps": NAV_RTN_MPS.tolist(),
-                                     "along_track_mps": NAV_GROWTH_MPS}}
+                                     "along_track_drift_mps": NAV_GROWTH_MPS}}
     gimbal = sensor["modules"]["gimbal"]
     gimbal["type"], gimbal["third_axis"] = "cross_elevation", True
     gimbal["platform"]["drift_arcsec_per_s"] = [0, 0, 0]

@@ -16,21 +16,21 @@ enum { BST_PD_POINTS = 200, BST_PD_PHASES = 10 };
 typedef struct bst_pd_options {
     double low, high, step; /* SNR; with by_magnitude V */
     bool by_magnitude;
-    int64_t trials;        /* per point */
-    int64_t empty_frames;  /* without targets; 0: for 400 false alarms, 50 to 400 */
-    double streak_px;      /* 0: targets at rest in the frame */
-    bool known_rate;       /* the camera turns and image processing is told how */
-    double false_alarms;   /* per frame; <= 0: as the scenario says */
-    double background_e;   /* sky per pixel and exposure; < 0: the scenario's */
-    double jitter_px;      /* blur per axis; < 0: what image processing is set to */
-    double apart_px;       /* least distance between targets beyond their own length */
-    double cell_px;        /* of the grid of targets; 0: apart_px + length + 40 */
-    bool stars;            /* the scenario's stars and sky behind the targets */
-    int64_t stack;         /* frames that are searched together; 0: each by itself */
-    double rates_px;       /* per frame: targets of a stack move, up to this in x and in y */
-    double star_streak_px; /* the camera turns, so that stars streak and targets do not */
-    bool by_module;        /* step the scenario's module also where a function would do */
-    const char *sensor;    /* "observer/sensor"; NULL: the first */
+    int64_t trials;           /* per point */
+    int64_t empty_frames;     /* without targets; 0: for 400 false alarms, 50 to 400 */
+    double streak_px;         /* 0: targets at rest in the frame */
+    bool known_rate;          /* the camera turns and image processing is told how */
+    double false_alarms;      /* per frame; <= 0: as the scenario says */
+    double background_e;      /* sky per pixel and exposure; < 0: the scenario's */
+    double jitter_px;         /* blur per axis; < 0: what image processing is set to */
+    double min_separation_px; /* least distance between targets beyond their own length */
+    double cell_px;           /* of the grid of targets; 0: min_separation_px + length + 40 */
+    bool stars;               /* the scenario's stars and sky behind the targets */
+    int64_t stack;            /* frames that are searched together; 0: each by itself */
+    double rates_px;          /* per frame: targets of a stack move, up to this in x and in y */
+    double star_streak_px;    /* the camera turns, so that stars streak and targets do not */
+    bool by_module;           /* step the scenario's module also where a function would do */
+    const char *sensor;       /* "observer/sensor"; NULL: the first */
     const char *device;
     int threads;
     bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
@@ -81,7 +81,7 @@ typedef struct bst_pd_scene {
     bst_pd_image *image;  /* of targets; NULL: the PSF is that Gaussian */
     struct bst_psf *seen; /* that it is made from */
     double *sharpness;    /* of a streak, by its angle from an axis; NULL: targets are at rest */
-    double cell_px, apart_px;
+    double cell_px, min_separation_px;
     int columns, rows;
     int points;
     double snr[BST_PD_POINTS];    /* at the boresight */

@@ -93,7 +93,7 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
 static bst_status resolve_state(bst_ctx *ctx, const bst_scenario *s, const char *list, int index,
                                 bst_orbit_config *orbit) {
     bool keplerian =
-        orbit->source == BST_ORBIT_NUMERICAL && orbit->state.from == BST_STATE_KEPLERIAN;
+        orbit->source == BST_ORBIT_NUMERICAL && orbit->state.source == BST_STATE_KEPLERIAN;
     if (keplerian && bst_keplerian_resolve(ctx, &orbit->state) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/%d/orbit/state", s->file, list, index);
     }

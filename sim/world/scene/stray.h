@@ -14,7 +14,7 @@ typedef struct bst_scene_pst bst_scene_pst;
 
 /* *out is NULL where the block has no table. `base_dir` is the folder that relative paths start
  * from. BST_ERR_CONFIG with the key below `background`, when the angles do not ascend, both tables
- * are given, or there is no pixel pitch (pixel_um, the optics' one). */
+ * are given, or there is no pixel pitch (pixel_pitch_um, the optics' one). */
 bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *config,
                                 double optics_pixel_um, const char *base_dir,
                                 bst_scene_pst **out) BST_MUST_CHECK;
