@@ -173,8 +173,8 @@ static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const bst_
     return status;
 }
 
-bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
-                             bst_json **json, bst_scenario *out) {
+static bst_status load(bst_ctx *ctx, const char *path, const bst_load_options *options,
+                       bst_json **json, bst_scenario *out) {
     BST_TRY(bst_json_load_described(ctx, path, bst_registry_tables(), json));
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {
@@ -190,5 +190,15 @@ bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_opti
         bst_json_free(*json);
         *json = NULL;
     }
+    return status;
+}
+
+bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
+                             bst_json **json, bst_scenario *out) {
+    /* the commands that are quiet later on warn of former names too */
+    bst_log_level level = ctx->log_level;
+    ctx->log_level = level < BST_LOG_WARNING ? BST_LOG_WARNING : level;
+    bst_status status = load(ctx, path, options, json, out);
+    ctx->log_level = level;
     return status;
 }

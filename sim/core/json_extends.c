@@ -187,8 +187,8 @@ static bst_status load(bst_ctx *ctx, const char *path, const bst_document_tables
                                  "a string, the file that this one changes");
     } else {
         char *file = beside(path, extends->valuestring);
-        status =
-            file ? load(ctx, file, tables, chain, &base) : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+        status = file ? load(ctx, file, tables, chain, &base)
+                      : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
         free(file);
         if (status != BST_OK) {
             bst_fail_prefix(ctx, status, "%.400s: /extends", path);

@@ -84,8 +84,8 @@ static bst_status rename_lists(bst_ctx *ctx, const bst_study *study,
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next, index++) {
         char where[80];
         snprintf(where, sizeof where, "/%s/%d/%s", list, index, key);
-        BST_TRY(rename_axes(ctx, study, tables, cJSON_GetObjectItemCaseSensitive(item, key),
-                            where));
+        BST_TRY(
+            rename_axes(ctx, study, tables, cJSON_GetObjectItemCaseSensitive(item, key), where));
     }
     return BST_OK;
 }
@@ -121,9 +121,8 @@ bst_status bst_study_rename(bst_ctx *ctx, const bst_study *study) {
     BST_TRY(bst_json_describe(ctx, study->json, &study_tables, true));
     BST_TRY(rename_set(ctx, study));
     BST_TRY(rename_lists(ctx, study, NULL, "sweeps", "axes"));
-    BST_TRY(rename_axes(
-        ctx, study, NULL,
-        cJSON_GetObjectItemCaseSensitive(bst_json_root(study->json), "dispersions"),
-        "/dispersions"));
+    BST_TRY(rename_axes(ctx, study, NULL,
+                        cJSON_GetObjectItemCaseSensitive(bst_json_root(study->json), "dispersions"),
+                        "/dispersions"));
     return rename_lists(ctx, study, &object_tables, "populations", "dispersions");
 }

@@ -43,7 +43,7 @@ def scenario(folder):
     gimbal["platform"]["drift_arcsec_per_s"] = [0, 0, 0]
     gimbal["platform"]["spacecraft"] = rigid[runs.SENSOR + "/modules/gimbal/platform/spacecraft"]
     sensor["modules"]["obsgen"]["calibration_file"] = os.path.abspath("scenarios/calibration/neossat.obsgen")
-    sensor["modules"]["control"]["guidance"] = {"acceleration": True}
+    sensor["modules"]["control"]["guidance"] = {"acceleration_feed_forward": True}
     scene["duration_s"] = DURATION_S
     scene["record"] = {"frames": "extensions", "compression": "none", "telemetry_hz": TELEMETRY_HZ}
     path = os.path.join(folder, "skewed.json")

@@ -86,10 +86,10 @@ const bst_config_desc *bst_scenario_tables_inside(const void *registry, const ch
                                                   int index);
 
 /* Reads and checks a scenario (bst_json_load_extended, or bst_json_load_described where former
- * names are to be accepted in "set" and in overrides too); nothing is opened or written but the JSON.
- * Paths of files that exist are made absolute; a file that a module's table names (BST_CONFIG_PATH,
- * outside of lists) has to. Plug-ins are loaded into the process: see bst_plugin_open. Free with
- * bst_scenario_free, also after an error. */
+ * names are to be accepted in "set" and in overrides too); nothing is opened or written but the
+ * JSON. Paths of files that exist are made absolute; a file that a module's table names
+ * (BST_CONFIG_PATH, outside of lists) has to. Plug-ins are loaded into the process: see
+ * bst_plugin_open. Free with bst_scenario_free, also after an error. */
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
                              const bst_scenario_registry *registry,
                              bst_scenario *out) BST_MUST_CHECK;
