@@ -101,7 +101,7 @@ static void warn(const renamer *r, const char *path, const char *name) {
 static bst_status given_twice(const renamer *r, const char *path, const char *name) {
     return bst_fail(r->ctx, BST_ERR_CONFIG,
                     "%s: %s: former name of %s, which is given too (allowed: %s alone)",
-                    r->json    ? bst_json_name(r->json)
+                    r->json    ? r->json->name
                     : r->where ? r->where
                                : "document",
                     path, name, name);

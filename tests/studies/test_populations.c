@@ -421,7 +421,7 @@ static void test_errors(void **state) {
          "/populations/0/number: from 3 to 2 is no range"},
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"number\": {\"distribution\": "
          "\"poisson\", \"mean\": 5, \"max\": 4}}",
-         "/populations/0/number/most: less than the mean (found 4"},
+         "/populations/0/number/max: less than the mean (found 4"},
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"dispersions\": [{\"path\": \"area\", "
          "\"to\": 1}]}",
          "/populations/0/dispersions/0/path: no JSON pointer (found \"area\"; allowed: a JSON "
