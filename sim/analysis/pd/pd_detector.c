@@ -47,6 +47,7 @@ static const bst_port feed_ports[PORT_COUNT] = {
     [PORT_NAV] = {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_OUT, 0, 0.0, 0},
 };
 
+/* Creates the module that feeds rendered frames to an image processing module. */
 static bst_status create_feed(const bst_module_env *env, const void *config, void **self) {
     (void)env;
     *self = *(feed *const *)config;
@@ -71,6 +72,7 @@ static void tell_pointing(const feed *f, bst_pointing_telemetry *t, int capacity
     }
 }
 
+/* Publishes one frame with its exposure, pointing and navigation telemetry. */
 static bst_status step_feed(void *self, struct bst_step *step) {
     feed *f = self;
     if (!f->frame) {
@@ -169,6 +171,7 @@ static bst_status open_engine(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *d)
     return BST_OK;
 }
 
+/* Opens the built-in image processing with a capacity for all artificial targets. */
 static bst_status open_function(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *d) {
     d->config = *(const bst_imgproc_config *)s->imgproc->config;
     if (s->options.false_alarms > 0.0) {
