@@ -68,6 +68,7 @@ bool bst_module_substitution_delayed(const bst_scenario *s,
     return false;
 }
 
+/* Copies settings of the substituted modules; rejects keys given twice. */
 static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scenario *s,
                                 bst_scenario_module_config *module) {
     for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
@@ -93,6 +94,7 @@ static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scena
     return BST_OK;
 }
 
+/* True if the module writes the channel. */
 static bool writes(const bst_module_desc *desc, const char *channel) {
     for (int p = 0; p < desc->port_count; p++) {
         if (desc->ports[p].direction == BST_PORT_OUT &&
@@ -116,6 +118,7 @@ static bool is_inner(const bst_scenario *s, const bst_scenario_module_config *mo
     return false;
 }
 
+/* Adds a delay to an input of the substituting module. */
 static bst_status add_delay(bst_ctx *ctx, bst_scenario_module_config *module, int port,
                             int64_t ticks) {
     for (int i = 0; i < module->delay_count; i++) {
@@ -178,6 +181,7 @@ static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s,
     return BST_OK;
 }
 
+/* Adds the default observation generator module to a sensor. */
 static bst_status make_default(bst_ctx *ctx, const bst_scenario_registry *registry, int observer,
                                int sensor, bst_scenario *s, bst_scenario_module_config **out) {
     const bst_module_desc *desc = NULL;
