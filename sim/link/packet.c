@@ -237,13 +237,13 @@ bst_wire_fault bst_link_header_read(bst_ctx *ctx, const char *bytes, size_t coun
                      "\"crc32c\":\"xxxxxxxx\"}");
     }
     text t = {bytes + count - 11, bytes + count, false}; /* "xxxxxxxx"} */
-    uint32_t told = read_hex(&t);
+    uint32_t stated = read_hex(&t);
     need(&t, '}');
     if (t.bad) {
         return fault(ctx, BST_WIRE_BAD_HEADER,
                      "its crc32c is no 8 hexadecimal digits in lower case");
     }
-    if (bst_crc32c(bytes, count - ENDING_BYTES) != told) {
+    if (bst_crc32c(bytes, count - ENDING_BYTES) != stated) {
         return fault(ctx, BST_WIRE_BAD_CRC, "its checksum is wrong");
     }
     t = (text){bytes, bytes + count, false};

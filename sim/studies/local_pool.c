@@ -36,7 +36,7 @@ typedef struct pool {
 
 typedef struct reporter {
     int fd;
-    double told;
+    double reported_s; /* wall time of the last report */
 } reporter;
 
 /* Writes all bytes to a pipe between driver and worker; false: closed. */
@@ -59,8 +59,8 @@ static bool send_bytes(int fd, const void *data, size_t bytes) {
 static void report(void *user, const bst_study_shard_news *news) {
     reporter *r = user;
     double now = bst_wall_seconds();
-    if (now - r->told >= 0.1) {
-        r->told = now;
+    if (now - r->reported_s >= 0.1) {
+        r->reported_s = now;
         if (!send_bytes(r->fd, news, sizeof *news)) {
             raise(SIGTERM);
         }
@@ -194,7 +194,8 @@ static bst_status start_one(bst_ctx *ctx, pool *p, const bst_study_shard_job *jo
         w->job = *job;
         /* the next poll notices a worker that has died */
         if (!send_bytes(w->to, job, sizeof *job) && errno != EPIPE) {
-            return bst_fail(ctx, BST_ERR_IO, "a worker cannot be told: %s", strerror(errno));
+            return bst_fail(ctx, BST_ERR_IO, "a shard cannot be sent to a worker: %s",
+                            strerror(errno));
         }
         return BST_OK;
     }

@@ -118,12 +118,12 @@ static void what_is_said_twice_is_refused(void **state) {
     const char *const twice[] = {SENSOR "/observation_source=generator", SENSOR
                                  "/modules/obsgen={\"type\": \"statistical\", \"v_limit\": 12}"};
     refuse(twice, 2,
-           "/modules/obsgen/v_limit: said twice (found 12; allowed: nothing here: it is "
+           "/modules/obsgen/v_limit: given twice (found 12; allowed: nothing here: it is "
            "the \"v_limit\" of this sensor's scenegen");
     const char *const delayed[] = {SENSOR
                                    "/modules/obsgen={\"type\": \"statistical\", \"delay_s\": "
                                    "{\"exposure\": 1}}"};
-    refuse(delayed, 1, "/modules/obsgen/delay_s: said twice");
+    refuse(delayed, 1, "/modules/obsgen/delay_s: given twice");
     const char *const unknown[] = {SENSOR "/observation_source=film"};
     refuse(unknown, 1, "/observation_source: ");
     const char *const file[] = {

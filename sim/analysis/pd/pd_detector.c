@@ -35,7 +35,7 @@ struct bst_pd_detector {
     int64_t period_ticks, steps;
     bst_detections *out; /* detections of the current frame */
     int capacity;
-    bool told; /* the module has published them */
+    bool published; /* the module has published them */
 };
 
 enum { PORT_EXPOSURE, PORT_FRAME, PORT_POINTING, PORT_NAV, PORT_COUNT };
@@ -124,7 +124,7 @@ static bst_status keep_detections(void *user, const char *scope, const char *cha
     d->out->count = kept;
     d->out->lost += found->count - kept;
     memcpy(d->out->items, found->items, (size_t)kept * sizeof found->items[0]);
-    d->told = true;
+    d->published = true;
     return BST_OK;
 }
 
@@ -272,7 +272,7 @@ bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *d, const bst_pd_scene *s
     if (d->ip) {
         return detect_by_function(ctx, d, s, frame, targets);
     }
-    d->told = false;
+    d->published = false;
     bst_frame_retain(frame);
     d->feed.frame = frame;
     d->feed.targets = targets;
@@ -282,7 +282,7 @@ bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *d, const bst_pd_scene *s
     bst_frame_release(d->feed.frame); /* NULL after publication */
     d->feed.frame = NULL;
     BST_TRY(status);
-    if (!d->told) {
+    if (!d->published) {
         return bst_fail(ctx, BST_ERR_STATE,
                         "%s/%s published no detections within %.3g s of a frame: pd can measure "
                         "only detectors that answer each frame",

@@ -83,10 +83,10 @@ static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scena
             snprintf(path, sizeof path, "/observers/%d/sensors/%d/modules/%s/%s", module->observer,
                      module->sensor, module->name, d->key);
             snprintf(allowed, sizeof allowed,
-                     "nothing here: it is the \"%s\" of this sensor's %s, for which this module "
-                     "stands in",
+                     "nothing here: it is the \"%s\" of this sensor's %s, which this module "
+                     "replaces",
                      d->key, other->desc->role);
-            return bst_config_fail(ctx, s->file, path, said, "said twice", allowed);
+            return bst_config_fail(ctx, s->file, path, said, "given twice", allowed);
         }
         memcpy((char *)module->config + d->offset, (const char *)other->config + theirs->offset,
                d->size);
@@ -129,8 +129,7 @@ static bst_status add_delay(bst_ctx *ctx, bst_scenario_module_config *module, in
     }
     if (module->delay_count == BST_MAX_DELAYS) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "/observers/%d/sensors/%d/modules: too many delays for the %s that stands "
-                        "in",
+                        "/observers/%d/sensors/%d/modules: too many delays for the module %s",
                         module->observer, module->sensor, module->name);
     }
     module->delays[module->delay_count++] = (bst_input_delay){port, ticks};
@@ -148,9 +147,9 @@ static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s,
     }
     if (module->delay_count > 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "%s: /observers/%d/sensors/%d/modules/%s/delay_s: said twice (allowed: "
-                        "nothing here: delays are those of the modules for which this one stands "
-                        "in)",
+                        "%s: /observers/%d/sensors/%d/modules/%s/delay_s: given twice (allowed: "
+                        "nothing here: delays are those of the modules that this one "
+                        "replaces)",
                         s->file, module->observer, module->sensor, module->name);
     }
     for (int p = 0; p < own->port_count; p++) {
