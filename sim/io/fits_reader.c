@@ -89,6 +89,7 @@ static bst_status read_at(bst_ctx *ctx, const bst_fits_reader *reader, void *out
     return BST_OK;
 }
 
+/* True if the header block contains the END card. */
 static bool has_end(const char *cards, size_t bytes) {
     for (size_t at = 0; at < bytes; at += BST_FITS_CARD) {
         if (memcmp(cards + at, "END     ", 8) == 0) {
@@ -247,12 +248,14 @@ static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
     return BST_OK;
 }
 
+/* Reads and interprets the FITS header at the position of an HDU. */
 static bst_status look(bst_ctx *ctx, bst_fits_reader *reader, hdu *h, bool *whole) {
     bst_fits_cards cards;
     BST_TRY(load_header(ctx, reader, h, &cards));
     return interpret(ctx, reader, &cards, h, whole);
 }
 
+/* Adds the HDU of a frame to the index of the file. */
 static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h) {
     bst_fits_file_info *info = &reader->info;
     if ((size_t)info->frames == reader->frame_room) {
@@ -318,6 +321,7 @@ static void find_ids(bst_fits_reader *reader, const hdu *cube) {
     reader->id_count = cards.axes[1];
 }
 
+/* Stores size and frame count of a FITS cube. */
 static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, bool whole) {
     bst_fits_file_info *info = &reader->info;
     uint64_t plane = (uint64_t)h->size[0] * (uint64_t)h->size[1] * 2;
@@ -340,6 +344,7 @@ static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h,
                           : BST_OK;
 }
 
+/* Counts the frames of the file: a cube, or image extensions. */
 static bst_status count_frames(bst_ctx *ctx, bst_fits_reader *reader) {
     hdu h = {.number = 1};
     bool whole = true;
@@ -492,6 +497,7 @@ bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t ind
     return read_id(ctx, reader, index, exposure_id);
 }
 
+/* Provides a pixel buffer for a frame. */
 static bst_status make_room(bst_ctx *ctx, bst_fits_reader *reader, size_t count) {
     if (reader->capacity < count) {
         free(reader->pixels);
