@@ -1,4 +1,4 @@
-/* Where the body and the cones of keep-out are, by what guidance was told. */
+/* Body attitude and keep-out cones from guidance's latest inputs. */
 #include "control/guidance/guidance.h"
 
 int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,
