@@ -11,11 +11,11 @@
 """
 
 import collections
-import os
 import re
 import sys
 
-FOLDERS = ["include", "sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
+from c_sources import files, prototypes, without_comments
+
 ALLOWED = {"call cycles": 5, "long functions": 0, "long parameter lists": 30, "copies": 0, "namesakes": 0}
 LONGEST = 80
 MOST_PARAMETERS = 7
@@ -23,24 +23,6 @@ MOST_PARAMETERS = 7
 HEAD = re.compile(r"^(?!typedef|struct|enum|union|extern|#)((?:[A-Za-z_][\w\*]*[ \t\n\*]+)+)(\w+)\(", re.M)
 CALL = re.compile(r"\b([a-z_]\w+)\s*\(")
 TYPE = re.compile(r"^\}\s*(bst_\w+);", re.M)
-PROTOTYPE = re.compile(r"^(?!static\b|typedef\b)[A-Za-z_][\w \t\*]*?[\s\*](bst_\w+)\s*\(", re.M)
-
-
-def sources(suffixes):
-    for folder in FOLDERS:
-        for place, _, names in sorted(os.walk(folder)):
-            for name in sorted(names):
-                if name.endswith(suffixes):
-                    yield os.path.join(place, name)
-
-
-def without_comments(text):
-    """The text with blanks in place of comments, texts, characters and preprocessor lines: lines and places stay the same."""
-    blank = lambda m: re.sub(r"[^\n]", " ", m.group(0))
-    text = re.sub(r"/\*.*?\*/|//[^\n]*", blank, text, flags=re.S)
-    text = re.sub(r'"(?:\\.|[^"\\\n])*"', blank, text)
-    text = re.sub(r"'(?:\\.|[^'\\\n])+'", blank, text)
-    return re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", blank, text, flags=re.M)
 
 
 def closing(text, at, pair):
@@ -112,21 +94,19 @@ def circles(edges):
 
 def namesakes():
     places = collections.defaultdict(set)
-    for path in sources((".h",)):
+    for path in files((".h",)):
         with open(path, encoding="utf-8") as file:
             text = without_comments(file.read())
         for name in TYPE.findall(text):
             places[name].add(path)
-        for match in PROTOTYPE.finditer(text):
-            end = closing(text, match.end() - 1, "()")
-            if re.compile(r"[^;{]*;").match(text, end + 1):
-                places[match.group(1)].add(path)
+        for name, _, _ in prototypes(text):
+            places[name].add(path)
     return [f"{name}: {', '.join(sorted(paths))}" for name, paths in sorted(places.items()) if len(paths) > 1]
 
 
 def main():
     sys.setrecursionlimit(10000)
-    everything = [f for path in sources((".c", ".inc")) for f in functions(path)]
+    everything = [f for path in files((".c", ".inc")) for f in functions(path)]
     if len(everything) < 1000:
         sys.exit(f"only {len(everything)} functions found: run this from the root of the sources")
     owner = {f.name: f.path for f in everything if not f.static and f.path.endswith(".c")}
