@@ -88,7 +88,7 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
 /* Position with error and covariance, along and across the path. */
 static void measure_place(const bst_generator *g, const generator_source *s,
                           const generator_blend *b, const bst_crlb_table_at *truth,
-                          const bst_crlb_table_at *told, double snr, double length,
+                          const bst_crlb_table_at *crlb, double snr, double length,
                           bst_detection *d) {
     const bst_obsgen_calibration *cal = &g->calibration;
     double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr);
@@ -127,8 +127,8 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     shared_bias(g, s, s->as_streak && !b->point, b->flux_e * truth->norm * g->fit_light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
-    double scale = g->binning, a2 = told->var_along_px2 * widen_along * scale * scale,
-           b2 = told->var_across_px2 * widen_across * scale * scale;
+    double scale = g->binning, a2 = crlb->var_along_px2 * widen_along * scale * scale,
+           b2 = crlb->var_across_px2 * widen_across * scale * scale;
     d->x_px = g->origin_x + scale * x;
     d->y_px = g->origin_y + scale * y;
     d->cov_xx = c * c * a2 + n * n * b2;
@@ -200,12 +200,12 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     if (b->drawn) {
         d.flux_e = b->snr * g->noise_e / fitted.norm;
     }
-    bst_crlb_table_at told = bound_of_model(g, d.flux_e, length);
-    d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
+    bst_crlb_table_at crlb = bound_of_model(g, d.flux_e, length);
+    d.flux_sigma_e = sqrt(crlb.flux_variance * b->widen / seen);
     double norm = bst_crlb_table_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
     d.snr = d.flux_e * (g->onboard_bound ? bst_crlb_table_norm(g->onboard_bound, length) : norm) /
             g->noise_e;
-    measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
+    measure_place(g, s, b, &truth, &crlb, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);
     d.flags |= b->near ? BST_DETECTION_BLEND : 0u;

@@ -19,8 +19,8 @@ void bst_stamp_init(bst_stamp *stamp, double sigma_px, bool whole);
  * added. */
 double bst_stamp_excess(const bst_stamp *stamp, int radius);
 
-/* Stamp radius beyond the two nearest pixels, 1 to `most`. Light outside is below limit_e per pixel
- * for a source of peak_e, and so is what it adds inside. */
+/* Smallest stamp radius in pixels, 1 to `most`, for a source of peak_e electrons. The light outside
+ * and the excess inside are at most limit_e electrons per pixel, unless `most` is reached. */
 int bst_stamp_radius(const bst_stamp *stamp, double peak_e, double limit_e, int most);
 
 #endif

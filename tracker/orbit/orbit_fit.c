@@ -260,16 +260,16 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
         BST_TRY(residual_jacobian(w, c));
         normal_equations(w, n, b);
         bool better = false;
-        double foreseen = INFINITY;
+        double predicted = INFINITY;
         for (int attempt = 0; attempt < 12 && !better; attempt++) {
             if (!factor_damped(n, damping, 1e-16, l, size)) {
                 damping = fmax(10.0 * damping, 1e-12);
                 continue;
             }
             solve(l, size, b, x);
-            foreseen = 0.0; /* predicted decrease of the sum of squares by the step */
+            predicted = 0.0; /* of the decrease of chi2 by this step */
             for (int i = 0; i < PARAMETERS; i++) {
-                foreseen += b[i] * x[i];
+                predicted += b[i] * x[i];
             }
             limit_step(x);
             chart next = moved(c, x);
@@ -280,17 +280,17 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
                 better = true;
                 *c = next;
                 memcpy(w->residual, w->side[0], (size_t)w->count * sizeof *w->residual);
-                foreseen = fmax(foreseen, cost - then);
+                predicted = fmax(predicted, cost - then);
                 cost = then;
                 damping = fmax(0.1 * damping, 1e-14);
             } else {
-                if (foreseen < 1e-6 + 1e-9 * cost) {
+                if (predicted < 1e-6 + 1e-9 * cost) {
                     break; /* converged */
                 }
                 damping = fmax(10.0 * damping, 1e-12);
             }
         }
-        if (foreseen < 1e-6 + 1e-9 * cost) {
+        if (predicted < 1e-6 + 1e-9 * cost) {
             return BST_OK;
         }
         if (!better) {
