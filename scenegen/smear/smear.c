@@ -483,8 +483,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     s->disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
-    /* a star brought into the field by a wide rotation only: its float offset would be inaccurate
-     */
+    /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
     double wide = 4.0 * (s->far_px + s->disc_px);
     moving = moving || !front || x * x + y * y > wide * wide;
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
