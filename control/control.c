@@ -31,7 +31,7 @@ static bst_status start_compensator(bst_ctx *ctx, bst_control *c) {
                               .frame_latency_s = c->env.frame_latency_s,
                               .command_latency_s = config->command_latency_s,
                               .servo_lag_s = config->servo_lag_s,
-                              .jump_rad = config->arrive_tolerance_px * c->env.pixel_rad};
+                              .jump_rad = config->arrival_tolerance_px * c->env.pixel_rad};
     bst_status status = BST_OK;
     if (on_image_error(c)) {
         status = bst_image_loop_init(ctx, &c->image_loop, &config->compensator, &env);
@@ -181,7 +181,7 @@ static bst_status look(bst_ctx *ctx, bst_control *c, bool *arrived, double off_p
     bst_vec3 v = bst_quat_rotate(c->pointing.q_cam_from_gcrf, wanted);
     off_px[0] = bst_atan2(v.x, v.z) / c->env.pixel_rad;
     off_px[1] = bst_atan2(v.y, v.z) / c->env.pixel_rad;
-    double tolerance = c->config.arrive_tolerance_px;
+    double tolerance = c->config.arrival_tolerance_px;
     *arrived = c->settled && off_px[0] * off_px[0] + off_px[1] * off_px[1] <= tolerance * tolerance;
     return BST_OK;
 }
@@ -217,7 +217,7 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
     *command = (bst_los_command){.tick = effect,
                                  .direction_gcrf = bst_vec3_unit(d),
                                  .rate_gcrf_radps = bst_vec3_axpy(rate, -bst_vec3_dot(rate, d), d)};
-    if (c->config.guidance.acceleration) {
+    if (c->config.guidance.acceleration_feed_forward) {
         double per_s2 = c->env.tick_rate_hz / (double)half;
         bst_vec3 bend = bst_vec3_axpy(bst_vec3_add(ahead, behind), -2.0, d);
         command->accel_gcrf_radps2 = bst_vec3_scale(bend, per_s2 * per_s2);

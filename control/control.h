@@ -47,7 +47,7 @@ typedef struct bst_control_config {
     double disturbance_px_rms, disturbance_cutoff_hz;
     double fix_sigma_floor_px;
     double attitude_sigma_arcsec, drift_sigma_arcsec_per_s;
-    double arrive_tolerance_px;
+    double arrival_tolerance_px;
     int32_t search_pattern; /* bst_search_pattern */
     int32_t search_rate;    /* bst_control_dwell_rate */
     double search_sigmas, search_max_deg, search_step, search_timeout_s;
@@ -55,7 +55,7 @@ typedef struct bst_control_config {
     double dwell_timeout_s;
     int64_t candidate_hits;
     double candidate_rate_sigmas, candidate_score;
-    double acquire_timeout_s, track_entry_px;
+    double acquire_timeout_s, track_handover_px;
     double reacquire_coast_s, reacquire_extent_deg;
     bst_guidance_config guidance;
 } bst_control_config;

@@ -21,7 +21,7 @@ typedef struct bst_imgproc_bad_pixel {
 
 typedef struct bst_imgproc_config {
     int64_t capacity;              /* detections per frame */
-    int64_t most_fits;             /* of them, the brightest, located by fits; 0: all */
+    int64_t max_fits;              /* of them, the brightest, located by fits; 0: all */
     int64_t mesh_px;               /* side of a background mesh */
     double false_alarms_per_frame; /* on noise alone */
     double jitter_px;              /* RMS per axis by which the PSF is expected to be widened */
@@ -29,10 +29,10 @@ typedef struct bst_imgproc_config {
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
     bool track_windows; /* look only at windows while a target is followed */
-    int64_t window_px, window_stars, full_every, full_frames;
+    int64_t window_px, window_stars, full_frame_period, full_frame_count;
     bst_stack_config stack;
     bst_pixel_learner_config bad_pixel_learning;
-    int column_level;           /* see sim/optics/column_level.h */
+    int column_correction;      /* see sim/optics/column_level.h */
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_imgproc_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
@@ -97,7 +97,7 @@ void bst_imgproc_free(bst_imgproc *ip);
  * any direction and length up to that (streak_locate.h); points and streaks then have half of the
  * false alarms each, and threshold_snr is that of points.
  *
- * With config.most_fits, of more detections the fainter ones stand where the matched filter's
+ * With config.max_fits, of more detections the fainter ones stand where the matched filter's
  * output is the greatest, between the pixels; their covariance is that of the filter for a source
  * alone.
  *
@@ -136,7 +136,7 @@ void bst_imgproc_use_map(bst_imgproc *ip, const struct bst_pixel_map *map);
 const struct bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip);
 
 /* Fits detection `index` of the latest bst_imgproc_detect if the matched filter placed it (see
- * most_fits), and sets all of it but label, label_probability and star_id; the magnitude is put on
+ * max_fits), and sets all of it but label, label_probability and star_id; the magnitude is put on
  * zero_point. In windows all are fitted.
  */
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,

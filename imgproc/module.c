@@ -200,7 +200,8 @@ typedef struct exposure {
 static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
                                bst_quat q_cam_from_gcrf) {
     const bst_frame_message *message = e->message;
-    if (!l->ip || message->exposure_id % m->config->full_every < m->config->full_frames) {
+    if (!l->ip ||
+        message->exposure_id % m->config->full_frame_period < m->config->full_frame_count) {
         return BST_OK;
     }
     double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);

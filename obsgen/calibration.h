@@ -16,18 +16,18 @@ typedef struct bst_obsgen_calibration {
     char made_from[400];                   /* for people: scenarios and program */
     double threshold_offset;               /* image processing's threshold less theory's */
     double noise_factor;                   /* its noise over theory's */
-    double background_share;               /* of the light below its clip that its background has */
+    double background_fraction;            /* of the light below its clip that its background has */
     double crowding;                       /* share of that light's square that its noise has */
     double gain[BST_OBSGEN_LENGTHS];       /* SNR at the filter over the ideal, by streak length */
     double slope;                          /* of the probit of Pd by SNR; ideal: 1 */
     double false_alarm_factor;             /* rate over what the threshold was set for */
-    double false_alarm_tail;               /* P(SNR > u) = exp(-tail (u^2 - T^2) / 2) */
+    double false_alarm_steepness;          /* P(SNR > u) = exp(-tail (u^2 - T^2) / 2) */
     double across_factor[BST_OBSGEN_SNRS]; /* RMS of the place over the bound: points, across */
     double along_factor[BST_OBSGEN_SNRS];  /* along a streak */
     double phase_bias_px;                  /* amplitude of the bias by place in the pixel */
     double blend_distance_factor;          /* of the distance at which two sources are told apart */
     double star_id_probability;            /* that a catalogue star is identified, stars found */
-    double hit_told_probability;           /* that a radiation hit is told from a source */
+    double cosmic_ray_flag_probability;    /* that a radiation hit is told from a source */
 } bst_obsgen_calibration;
 
 extern const bst_config_desc bst_obsgen_calibration_table[];

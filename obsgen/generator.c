@@ -34,7 +34,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     g->onboard_sigma_px = hypot(bst_camera_psf_sigma_px(knowledge), settings->jitter_px);
     g->settings = *settings;
     g->settings.mesh_px = settings->mesh_px > 0 ? settings->mesh_px : 64;
-    g->levels_columns = bst_column_level_wanted(settings->column_level, knowledge);
+    g->levels_columns = bst_column_level_wanted(settings->column_correction, knowledge);
     g->calibration = *calibration;
     bst_blend_weights_init(&g->blend_weights);
     g->key = key;
@@ -255,12 +255,12 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     double added = (double)g->binning * g->binning;
     double level = (f->truth->background_e + f->truth->dark_e) * added;
     double uneven_dark = f->truth->dark_e * d->dsnu_rms;
-    double variance = level + c->read_noise_e * c->read_noise_e +
-                      c->gain_e_per_dn * c->gain_e_per_dn / 12.0 + d->row_noise_e * d->row_noise_e +
-                      d->row_offset_rms_e * d->row_offset_rms_e + bst_generator_column_variance(g) +
-                      d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
-                      level * level * d->prnu_rms * d->prnu_rms / added +
-                      added * uneven_dark * uneven_dark;
+    double variance =
+        level + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0 +
+        d->row_noise_e * d->row_noise_e + d->row_offset_rms_e * d->row_offset_rms_e +
+        bst_generator_column_variance(g) +
+        d->telegraph_noise_fraction * d->telegraph_noise_rms_e * d->telegraph_noise_rms_e +
+        level * level * d->prnu_rms * d->prnu_rms / added + added * uneven_dark * uneven_dark;
     g->background_e = level;
     g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
 }
@@ -293,7 +293,7 @@ static void add_crowding(bst_generator *g) {
         g->faint_light_e += light / pixels;
         g->faint_square_e2 += square / pixels;
     }
-    g->background_bias_e = g->calibration.background_share * g->faint_light_e;
+    g->background_bias_e = g->calibration.background_fraction * g->faint_light_e;
     g->background_e += g->background_bias_e;
     g->noise_e = sqrt(before * before + g->calibration.crowding * g->faint_square_e2);
     for (int i = 0; i < g->source_count; i++) {

@@ -17,7 +17,7 @@ typedef struct bst_generator_settings {
     double jitter_px;                    /* RMS per axis, sensor px: widens the onboard PSF */
     double streak_min_px, streak_max_px; /* star streaks that are filtered for */
     int mesh_px;                         /* side of the meshes of background and noise; 0: 64 */
-    int column_level;                    /* see sim/optics/column_level.h */
+    int column_correction;               /* see sim/optics/column_level.h */
 } bst_generator_settings;
 
 /* A detection with where it comes from. */

@@ -19,11 +19,11 @@
 typedef struct obsgen_config {
     char calibration_file[512];
     /* those of scenegen and imgproc where the sensor has them */
-    double v_limit, margin_px;
+    double star_limit_v_mag, margin_px;
     int64_t truth_capacity, capacity, mesh_px;
     double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
         match_tolerance_px;
-    int column_level;
+    int column_correction;
 } obsgen_config;
 
 static const char *const no_file[] = {"theory", NULL};
@@ -33,8 +33,9 @@ static const bst_config_desc config_table[] = {
     BST_PATH_OR(obsgen_config, calibration_file, no_file, "\"theory\"",
                 "Calibration that `boresight calibrate-obsgen` wrote, or theory: no measured "
                 "factors."),
-    BST_REAL(obsgen_config, v_limit, "mag", -30.0, 30.0, "16",
+    BST_REAL(obsgen_config, star_limit_v_mag, "mag", -30.0, 30.0, "16",
              "Stars fainter than this are left out" OF_OTHERS "."),
+    BST_FORMER("v_limit", "star_limit_v_mag"),
     BST_REAL(obsgen_config, margin_px, "px", 0.0, 1e4, "0",
              "Sources this far outside the window count too" OF_OTHERS "."),
     BST_INT(obsgen_config, truth_capacity, "", 1, 1048576, "4096",
@@ -55,8 +56,9 @@ static const bst_config_desc config_table[] = {
              "Greatest pointing error over which stars are identified" OF_OTHERS "."),
     BST_REAL(obsgen_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift" OF_OTHERS "."),
-    BST_ENUM(obsgen_config, column_level, bst_column_level_words, "\"auto\"",
+    BST_ENUM(obsgen_config, column_correction, bst_column_level_words, "\"auto\"",
              "Whether each column's level over the others' is taken off" OF_OTHERS "."),
+    BST_FORMER("column_level", "column_correction"),
     BST_CONFIG_END,
 };
 
@@ -168,7 +170,7 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
                                              .streak_min_px = c->streak_min_px,
                                              .streak_max_px = c->streak_max_px,
                                              .mesh_px = (int)c->mesh_px,
-                                             .column_level = c->column_level};
+                                             .column_correction = c->column_correction};
     BST_TRY(bst_generator_create(env->ctx, o->world_camera, bst_knowledge_camera(env->knowledge),
                                  &settings, &o->calibration, o->key, &o->generator));
     BST_TRY(bst_generator_reserve_streaks(env->ctx, o->generator, (int)o->world_camera->width_px,
@@ -351,7 +353,7 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
     BST_TRY(bst_field_track(ctx, o->field, history, e->start_tick - lead, e->end_tick + lead,
                             o->tick_rate_hz, &track));
     const bst_field_options options = {
-        .v_limit = o->config->v_limit,
+        .v_limit = o->config->star_limit_v_mag,
         .margin_px = fmax(o->config->margin_px, ceil(6.0 * o->sigma_px)),
         .lead_s = (double)lead / (double)o->tick_rate_hz};
     int capacity, count;

@@ -15,13 +15,13 @@
 
 typedef struct fidelity_config {
     double tolerance_sigma;
-    int64_t most_nodes, temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree,
+    int64_t max_nodes, temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree,
         fft_taps;
 } fidelity_config;
 
 typedef struct scenegen_config {
     int renderer;
-    double v_limit, margin_px;
+    double star_limit_v_mag, margin_px;
     fidelity_config fidelity;
     int64_t truth_capacity, pool_frames;
     bst_stage_use frame_stage;
@@ -39,10 +39,11 @@ static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
              "Error of the image that is allowed in any pixel, in that pixel's noise. "
              "Nodes and stamps follow from it."),
-    BST_INT(fidelity_config, most_nodes, "", 0, 67108864, "0",
+    BST_INT(fidelity_config, max_nodes, "", 0, 67108864, "0",
             "Nodes (weighted points along the smear) that a frame may have beyond 16 for each "
             "source, 4 times as many where the paths of a slew need them; 0: 16777216. Where the "
             "tolerance asks for more, sources are drawn coarser (counter nodes_bounded)."),
+    BST_FORMER("most_nodes", "max_nodes"),
     BST_INT(fidelity_config, temporal_oversample, "", 0, 100000, "0",
             "Equal parts of the exposure whose middles stand for it, for comparison with other "
             "renderers; 0: as the tolerance needs. The error is not predicted then."),
@@ -65,8 +66,9 @@ static const bst_config_desc fidelity_table[] = {
 static const char *const renderers[] = {"auto", "single_kernel", "multi_kernel", NULL};
 
 static const bst_config_desc config[] = {
-    BST_REAL(scenegen_config, v_limit, "mag", -30.0, 30.0, "16",
+    BST_REAL(scenegen_config, star_limit_v_mag, "mag", -30.0, 30.0, "16",
              "Stars fainter than this are not drawn."),
+    BST_FORMER("v_limit", "star_limit_v_mag"),
     BST_REAL(scenegen_config, margin_px, "px", 0.0, 1e4, "0",
              "Sources this far outside the window are drawn too; at least what the PSF needs."),
     BST_ENUM(scenegen_config, renderer, renderers, "\"auto\"",
@@ -190,7 +192,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
     options.motion = (bst_smear_star_motion)c->renderer;
-    options.most_nodes = c->fidelity.most_nodes;
+    options.max_nodes = c->fidelity.max_nodes;
     options.temporal_oversample = (int)c->fidelity.temporal_oversample;
     options.spatial_oversample = (int)c->fidelity.spatial_oversample;
     options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
@@ -223,7 +225,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
         destroy(s);
         return status;
     }
-    s->options.v_limit = c->v_limit;
+    s->options.v_limit = c->star_limit_v_mag;
     s->options.margin_px = fmax(c->margin_px, bst_renderer_margin_px(s->renderer));
     bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
     *self = s;

@@ -250,7 +250,7 @@ static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_requ
         .tolerance_sigma = foreseen(r) ? r->tolerance_sigma : INFINITY,
         .margin_px = bst_renderer_margin_px(r),
         .bytes = r->most_bytes,
-        .nodes = r->options.most_nodes};
+        .nodes = r->options.max_nodes};
     BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->budget, r->fourier, &limits,
                                 q));
     r->stats = (bst_render_stats){.sources = r->plan.count,

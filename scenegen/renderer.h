@@ -29,7 +29,7 @@ typedef struct bst_renderer_options {
     /* Nodes that a frame may have beyond 16 for each source, 0: 2^24; BST_SCENE_SLEW times as many
      * where the paths of a slew need them (scenegen/scene_plan.h). Where the tolerance asks for
      * more, sources are drawn coarser. */
-    long long most_nodes;
+    long long max_nodes;
     bool saturation_flags;              /* kept of the latest frame, for bst_renderer_flags */
     int pool_frames;                    /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
@@ -77,7 +77,7 @@ typedef struct bst_render_stats {
                                spatial_oversample or four fft_taps */
     bool tolerance_missed;  /* that is above the tolerance: the Fourier path's grid, or as many
                                nodes as may be, are too coarse */
-    bool nodes_bounded;     /* the tolerance asks for more nodes than most_nodes */
+    bool nodes_bounded;     /* the tolerance asks for more nodes than max_nodes */
     bool single_kernel;     /* the stars followed one track */
     int hits;               /* radiation hits on the sensor */
     double hits_e;          /* their charge */

@@ -58,7 +58,7 @@ typedef struct planning {
     double dark_e2;
     double beyond; /* light that a pixel gets of a source beyond the margin, s */
     int blocks;    /* at most */
-    int64_t most_nodes;
+    int64_t max_nodes;
     bool fine;         /* with the finer grid */
     double grid_sigma; /* largest error by the grid */
 } planning;
@@ -140,14 +140,14 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
     static const double LESS = 0.97, GAIN = 0.98, MOST_STEP = 0.2, LEAST_STEP = 0.85,
                         GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
     p->bounded = false;
-    m->blocks = blocks_of(m->most_nodes, m->request->count, most_blocks);
+    m->blocks = blocks_of(m->max_nodes, m->request->count, most_blocks);
     double aim = m->request->count > CROWD ? CROWD_AIM : 1.0, before = INFINITY;
     bool fits, coarse = false;
     bst_smear_restart(m->smear, aim);
     BST_TRY(plan_sources(ctx, p, m, &fits));
     if (!fits) { /* crowds along the paths of a slew, which no tolerance makes shorter */
         coarse = p->bounded = true;
-        m->blocks = blocks_of(BST_SCENE_SLEW * m->most_nodes, m->request->count, most_blocks);
+        m->blocks = blocks_of(BST_SCENE_SLEW * m->max_nodes, m->request->count, most_blocks);
         bst_smear_restart(m->smear, aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
     }
@@ -156,13 +156,14 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
         BST_TRY(plan_sources(ctx, p, m, &fits));
     }
     if (!fits) {
-        return bst_fail(ctx, BST_ERR_RANGE,
-                        "the sources move too far in one exposure to be drawn: %d of %d need %.0f "
-                        "million points already, %.3g million are allowed; expose for a shorter "
-                        "time, turn more slowly, draw fewer stars (v_limit), or allow more points "
-                        "(fidelity.most_nodes) if the device has the memory",
-                        p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks,
-                        1e-6 * BST_BLOCK * m->blocks);
+        return bst_fail(
+            ctx, BST_ERR_RANGE,
+            "the sources move too far in one exposure to be drawn: %d of %d need %.0f "
+            "million points already, %.3g million are allowed; expose for a shorter "
+            "time, turn more slowly, draw fewer stars (star_limit_v_mag), or allow more points "
+            "(fidelity.max_nodes) if the device has the memory",
+            p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks,
+            1e-6 * BST_BLOCK * m->blocks);
     }
     /* the errors of very many sources take as long to add up as the frame to draw: at CROWD_AIM the
      * prediction, made when it is asked for, says what came of it */
@@ -215,7 +216,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                   .fourier = fourier,
                   .request = q,
                   .dark_e2 = dark_e2,
-                  .most_nodes = limits->nodes > 0 ? limits->nodes : BST_SCENE_MOST_NODES,
+                  .max_nodes = limits->nodes > 0 ? limits->nodes : BST_SCENE_MOST_NODES,
                   .beyond = fourier ? bst_fourier_render_band(fourier)->beyond * binning * binning *
                                           q->track->time_s[q->track->count - 1]
                                     : 0.0};

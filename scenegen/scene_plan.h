@@ -21,7 +21,7 @@ typedef struct bst_scene_plan {
     int capacity;
 } bst_scene_plan;
 
-/* More nodes than MOST (or the renderer's most_nodes), beyond a block for each source, are not
+/* More nodes than MOST (or the renderer's max_nodes), beyond a block for each source, are not
  * spent on the tolerance. Where the paths of a slew need more whatever the tolerance is, SLEW times
  * as many are drawn: sources then get what the first plan gave them, or fewer. */
 enum { BST_SCENE_MOST_NODES = 1 << 24, BST_SCENE_SLEW = 4 };

@@ -158,7 +158,7 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
         target->id = 0;
     }
     bst_sky_state memory = target->memory;
-    bool bound = target->remembered && seconds - target->lost_seconds <= params->memory_s;
+    bool bound = target->remembered && seconds - target->lost_seconds <= params->max_dormant_s;
     if (bound) {
         bst_sky_predict(&memory, seconds - target->memory_seconds, params->memory_noise_rad2ps3);
     }
@@ -168,7 +168,7 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
         bst_target_fit fit = bst_target_misfit(params, cue, &tracks[i]);
         if (bound && fit.chi2 < INFINITY) {
             double distance2 = bst_sky_distance2(&memory, &tracks[i].state);
-            fit.chi2 = distance2 <= params->memory_chi2 ? fit.chi2 + distance2 : INFINITY;
+            fit.chi2 = distance2 <= params->dormant_gate_chi2 ? fit.chi2 + distance2 : INFINITY;
         }
         double misfit = fit.chi2 + fit.log_det;
         if (misfit < lowest) {

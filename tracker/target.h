@@ -18,10 +18,11 @@ typedef struct bst_target_params {
     /* least hits of a track; one more is required for every 2 of its chi-square, so that a poor
      * candidate waits for a better one */
     int min_hits;
-    double margin;      /* log-likelihood by which the best must lead the second ... */
-    int margin_hits;    /* ... unless it has this many hits */
-    double memory_s;    /* time for which a lost target's prediction restricts the next choice, s */
-    double memory_chi2; /* its largest misfit, 4 degrees of freedom */
+    double margin;   /* log-likelihood by which the best must lead the second ... */
+    int margin_hits; /* ... unless it has this many hits */
+    double
+        max_dormant_s; /* time for which a lost target's prediction restricts the next choice, s */
+    double dormant_gate_chi2;    /* its largest misfit, 4 degrees of freedom */
     double memory_noise_rad2ps3; /* acceleration that a lost target may have */
 } bst_target_params;
 

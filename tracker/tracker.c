@@ -19,7 +19,7 @@ static double square(double v) {
 
 static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_params *mtt) {
     double scale = bst_camera_scale_rad(&t->camera);
-    t->attitude_params = (bst_attitude_params){.floor_px = c->star_floor_px,
+    t->attitude_params = (bst_attitude_params){.floor_px = c->star_systematic_px,
                                                .reject_chi2 = c->star_reject_chi2,
                                                .max_cross_rad = c->max_attitude_sigma_px * scale,
                                                .max_roll_rad = arcsec(c->max_roll_sigma_arcsec)};
@@ -28,29 +28,29 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
                                     .noise_rad2ps3 = square(arcsec(c->drift_noise_arcsec_per_s15)),
                                     .jitter_rad = c->jitter_px * scale,
                                     .gate_chi2 = c->telemetry_gate_chi2,
-                                    .gate_patience = (int)c->telemetry_patience,
+                                    .gate_patience = (int)c->max_telemetry_rejections,
                                     .telemetry_sigma_rad = arcsec(c->telemetry_sigma_arcsec)};
     t->target_params = (bst_target_params){
         .direction_chi2 = c->target_direction_chi2,
         .rate_chi2 = c->target_rate_chi2,
         .magnitude_chi2 = c->target_magnitude_chi2,
         .release_chi2 = c->target_release_chi2,
-        .rate_floor_radps = arcsec(c->target_rate_floor_arcsec_per_s),
+        .rate_floor_radps = arcsec(c->target_rate_systematic_arcsec_per_s),
         .max_rate_sigma_radps = arcsec(c->target_max_rate_sigma_arcsec_per_s),
         .max_chi2 = c->target_max_chi2,
         .min_hits = (int)c->target_min_hits,
         .margin = c->target_margin,
         .margin_hits = (int)c->target_margin_hits,
-        .memory_s = c->target_memory_s,
-        .memory_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
+        .max_dormant_s = c->target_dormant_s,
+        .dormant_gate_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
         /* what was lost may have manoeuvred: ten times the usual acceleration */
         .memory_noise_rad2ps3 = square(10.0 * arcsec(c->process_noise_arcsec_per_s15))};
     t->orbits = c->motion == 1;
     t->assumed_range_m = 1e3 * c->assumed_range_km;
     t->range_sigma = c->range_sigma;
     t->range_rate_sigma_mps = c->range_rate_sigma_mps;
-    t->floor_variance_px2 = square(c->object_floor_px);
-    t->blend_variance_px2 = square(c->blend_sigma_px);
+    t->floor_variance_px2 = square(c->object_systematic_px);
+    t->blend_variance_px2 = square(c->blended_systematic_px);
     t->max_variance_px2 = square(c->max_attitude_sigma_px);
     t->edge_margin_px = c->edge_margin_px;
     t->max_attitude_sigma_rad = c->max_attitude_sigma_px * scale;
@@ -62,16 +62,16 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .association = (bst_mtt_association)c->association,
         .noise_rad2ps3 = square(arcsec(c->process_noise_arcsec_per_s15)),
         .manoeuvre_noise_rad2ps3 = square(arcsec(c->manoeuvre_noise_arcsec_per_s15)),
-        .quiet_s = c->quiet_s,
-        .manoeuvre_s = c->manoeuvre_s,
-        .brightness_floor_mag = c->brightness_floor_mag,
-        .brightness_walk_mag = c->brightness_walk_mag,
+        .quiescent_sojourn_s = c->quiescent_sojourn_s,
+        .manoeuvre_sojourn_s = c->manoeuvre_sojourn_s,
+        .brightness_systematic_mag = c->brightness_systematic_mag,
+        .brightness_random_walk_mag = c->brightness_random_walk_mag,
         .event_window = (int)c->event_window,
         .false_events_per_hour = c->false_events_per_hour,
-        .max_memory = (int)c->max_memory,
-        .memory_s = c->memory_s,
-        .memory_sigma_rad = c->memory_sigma_deg * BST_DEG_RAD,
-        .memory_chi2 = c->memory_chi2,
+        .max_dormant_tracks = (int)c->max_dormant_tracks,
+        .max_dormant_s = c->max_dormant_s,
+        .memory_sigma_rad = c->max_dormant_sigma_deg * BST_DEG_RAD,
+        .dormant_gate_chi2 = c->dormant_gate_chi2,
         .orbits = c->motion == 1,
         .orbit_noise_m2ps3 = square(c->orbit_noise_mps15),
         .gate_chi2 = c->gate_chi2,
@@ -88,13 +88,13 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .max_misses = (int)c->max_misses,
         .max_coast_s = c->max_coast_s,
         .max_sigma_rad = arcsec(c->max_sigma_arcsec),
-        .merge_rad = c->merge_px * scale,
-        .merge_floor_rad = c->merge_floor_px * scale,
-        .max_merged = (int)c->max_merged,
-        .feed_forward_rad = c->feed_forward_deg * BST_DEG_RAD,
-        .star_rate_radps = arcsec(c->star_rate_arcsec_per_s),
+        .merge_rad = c->merge_distance_px * scale,
+        .merge_floor_rad = c->merged_systematic_px * scale,
+        .max_merged_frames = (int)c->max_merged_frames,
+        .feed_forward_rad = c->cue_acceleration_radius_deg * BST_DEG_RAD,
+        .star_rate_radps = arcsec(c->stationary_rate_arcsec_per_s),
         .motion_chi2 = c->motion_chi2,
-        .max_stars = (int)c->max_stars};
+        .max_stationary_tracks = (int)c->max_stationary_tracks};
 }
 
 bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
@@ -124,7 +124,7 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     t->stars = calloc(MAX_STARS, sizeof *t->stars);
     t->detections = calloc((size_t)t->max_detections, sizeof *t->detections);
     /* each track may be confirmed, lost, and change in two ways; four more for the target */
-    t->event_capacity = 4 * ((size_t)mtt.max_tracks + (size_t)mtt.max_stars + 1) + 4;
+    t->event_capacity = 4 * ((size_t)mtt.max_tracks + (size_t)mtt.max_stationary_tracks + 1) + 4;
     t->events = calloc(t->event_capacity, sizeof *t->events);
     bst_status status = t->cache && t->stars && t->detections && t->events
                             ? bst_mtt_create(ctx, &mtt, &t->mtt)

@@ -15,29 +15,30 @@
 /* Values of a scenario's tracker block; the table says what each is. */
 typedef struct bst_tracker_config {
     bst_filter_kind filter; /* not in the table, which leaves BST_FILTER_EKF: set by the caller */
-    double star_floor_px, star_reject_chi2, max_attitude_sigma_px, max_roll_sigma_arcsec;
+    double star_systematic_px, star_reject_chi2, max_attitude_sigma_px, max_roll_sigma_arcsec;
     double drift_sigma_arcsec_per_s, drift_noise_arcsec_per_s15, jitter_px, telemetry_sigma_arcsec;
     double process_noise_arcsec_per_s15, gate_chi2, detection_probability, false_alarms_per_frame;
     int64_t confirm_hits, confirm_frames;
     double confirm_score, max_rate_arcsec_per_s, cue_rate_margin_arcsec_per_s, initiation_gap_s;
     int64_t max_misses;
     double max_coast_s, max_sigma_arcsec;
-    double merge_px, merge_floor_px, object_floor_px, blend_sigma_px, edge_margin_px;
-    double feed_forward_deg;
+    double merge_distance_px, merged_systematic_px, object_systematic_px, blended_systematic_px,
+        edge_margin_px;
+    double cue_acceleration_radius_deg;
     double target_direction_chi2, target_rate_chi2, target_magnitude_chi2, target_release_chi2,
-        target_rate_floor_arcsec_per_s, target_max_rate_sigma_arcsec_per_s, target_memory_s;
-    double star_rate_arcsec_per_s, motion_chi2;
-    int64_t target_min_hits, max_tracks, max_stars, max_detections;
+        target_rate_systematic_arcsec_per_s, target_max_rate_sigma_arcsec_per_s, target_dormant_s;
+    double stationary_rate_arcsec_per_s, motion_chi2;
+    int64_t target_min_hits, max_tracks, max_stationary_tracks, max_detections;
     int32_t association; /* bst_mtt_association */
     int32_t motion;      /* 1: orbit */
     double assumed_range_km, range_sigma, range_rate_sigma_mps, orbit_noise_mps15;
-    double manoeuvre_noise_arcsec_per_s15, quiet_s, manoeuvre_s;
-    double brightness_floor_mag, brightness_walk_mag;
+    double manoeuvre_noise_arcsec_per_s15, quiescent_sojourn_s, manoeuvre_sojourn_s;
+    double brightness_systematic_mag, brightness_random_walk_mag;
     int64_t event_window;
     double false_events_per_hour;
-    int64_t max_memory;
-    double memory_s, memory_sigma_deg, memory_chi2;
-    int64_t max_merged, telemetry_patience;
+    int64_t max_dormant_tracks;
+    double max_dormant_s, max_dormant_sigma_deg, dormant_gate_chi2;
+    int64_t max_merged_frames, max_telemetry_rejections;
     double telemetry_gate_chi2, target_max_chi2, target_margin;
     int64_t target_margin_hits;
 } bst_tracker_config;

@@ -7,7 +7,8 @@
 /* Places along a motion of the axes that are looked at for cones, and a path's nodes. */
 #define SAMPLES 96
 #define PATH_NODES 385
-/* Of limits_share, along paths: their nodes hold the limits, what lies between to a few percent. */
+/* Of limit_fraction, along paths: their nodes hold the limits, what lies between to a few percent.
+ */
 #define PATH_SHARE 0.9
 /* Angles that tell which way and turn is meant are worked out anew this far on. */
 #define NEAR_RAD 1e-4
@@ -72,8 +73,8 @@ static bst_status target_angles(bst_ctx *ctx, const bst_guidance *g, int64_t tic
                                 double angle[BST_MOUNT_AXES], bool *found) {
     bst_vec3 coming[COMING] = {bst_quat_rotate(bst_guidance_body(g, tick), direction)};
     int count = 1;
-    double step = g->config.look_ahead_s / (COMING - 1);
-    for (; g->config.look_ahead_s > 0.0 && count < COMING; count++) {
+    double step = g->config.prediction_horizon_s / (COMING - 1);
+    for (; g->config.prediction_horizon_s > 0.0 && count < COMING; count++) {
         int64_t then = tick + (int64_t)llround(count * step * g->env.tick_rate_hz);
         bool valid;
         BST_TRY(g->env.aim(g->env.user, ctx, then, &valid, &direction));
@@ -170,7 +171,7 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec
         slew.arrival = end.direction;
         for (int i = 0; i < g->mount.axes; i++) {
             const bst_mount_axis *axis = &g->mount.axis[i];
-            double share = g->config.limits_share, limit = share * axis->rate_limit_radps;
+            double share = g->config.limit_fraction, limit = share * axis->rate_limit_radps;
             /* near the pole the aim may be faster than the axis: then it is met at rest */
             double moving = (ways[0][i] - to[i]) / 0.1;
             moving = limit > 0.0 && fabs(moving) > 0.9 * limit ? 0.0 : moving;
@@ -208,7 +209,7 @@ static void path_nodes(const bst_guidance *g, const bst_keep_out_route *path, in
     nodes->step = path->length_rad / (PATH_NODES - 1);
     *limits = (bst_slew_limits){.axes = steers ? g->mount.axes : 1};
     for (int i = 0; i < limits->axes; i++) {
-        double share = PATH_SHARE * g->config.limits_share;
+        double share = PATH_SHARE * g->config.limit_fraction;
         double hard = steers ? share * g->mount.axis[i].accel_limit_radps2 : 0.0;
         limits->rate_radps[i] = steers ? share * g->mount.axis[i].rate_limit_radps : 0.0;
         limits->accel_radps2[i] = hard > 0.0 ? hard : 1.0;
@@ -325,15 +326,16 @@ static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, bst_vec3 fro
         g->slew.start_tick + (int64_t)llround(g->slew.duration_s * g->env.tick_rate_hz);
     aim now;
     BST_TRY(aim_at(ctx, g, arrival, from, &now));
-    *out = now.valid &&
-           bst_vec3_angle(now.direction, g->slew.arrival) <= g->config.slew_above_deg * BST_DEG_RAD;
+    *out = now.valid && bst_vec3_angle(now.direction, g->slew.arrival) <=
+                            g->config.min_planned_slew_deg * BST_DEG_RAD;
     return BST_OK;
 }
 
 /* Whether there is a choice among turns to be made. */
 static bool turns_matter(const bst_guidance *g) {
     bool matter = false;
-    for (int i = 0; g->config.look_ahead_s > 0.0 && g->mount_known && i < g->mount.axes; i++) {
+    for (int i = 0; g->config.prediction_horizon_s > 0.0 && g->mount_known && i < g->mount.axes;
+         i++) {
         matter = matter || g->mount.axis[i].max_rad - g->mount.axis[i].min_rad > 2.0 * BST_PI;
     }
     return matter;
@@ -378,7 +380,7 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight
     bool inside = bst_keep_out_inside(g->zones, g->zone_count, target, &depth) >= 0;
     bool blocked = inside && !bst_keep_out_nearest(g->zones, g->zone_count, target, from, &target);
     bool made = false;
-    if (!blocked && is_beyond(from, target, g->config.slew_above_deg * BST_DEG_RAD)) {
+    if (!blocked && is_beyond(from, target, g->config.min_planned_slew_deg * BST_DEG_RAD)) {
         BST_TRY(plan_axes(ctx, g, tick, from, &made));
         if (!made) {
             BST_TRY(plan_path(ctx, g, tick, from, from_rate, &made));
@@ -419,9 +421,9 @@ void bst_guidance_see_sky(bst_guidance *g, const bst_nav_telemetry *nav, bst_qua
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) {
     *give = true;
-    if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
+    if (g->config.prediction_horizon_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =
-            command->tick + (int64_t)llround(g->config.look_ahead_every_s * g->env.tick_rate_hz);
+            command->tick + (int64_t)llround(g->config.prediction_interval_s * g->env.tick_rate_hz);
         BST_TRY(bst_guidance_look_ahead(ctx, g, command->tick));
     }
     BST_TRY(shape(ctx, g, boresight, command, give));

@@ -20,9 +20,9 @@ typedef struct bst_guidance_config {
     bool earth_keep_out;
     double earth_limb_keep_out_deg, earth_limb_altitude_km;
     int32_t slews;
-    double slew_above_deg, limits_share;
-    double look_ahead_s, look_ahead_every_s, loss_tolerance_px;
-    bool acceleration, body_roll;
+    double min_planned_slew_deg, limit_fraction;
+    double prediction_horizon_s, prediction_interval_s, loss_tolerance_px;
+    bool acceleration_feed_forward, body_roll;
 } bst_guidance_config;
 
 extern const bst_config_desc bst_guidance_config_table[];
@@ -54,7 +54,7 @@ typedef enum bst_guidance_event_kind {
 typedef struct bst_guidance_event {
     int kind;
     int reason;             /* bst_pointing_feasibility */
-    double from_s, until_s; /* seconds since the epoch; INFINITY: not within look_ahead_s */
+    double from_s, until_s; /* seconds since the epoch; INFINITY: not within prediction_horizon_s */
     double length_rad;      /* of a detour, a roll */
 } bst_guidance_event;
 
@@ -119,9 +119,9 @@ void bst_guidance_see_sky(bst_guidance *guidance, const bst_nav_telemetry *nav, 
  *            *give    false: send none, because a slew is needed and the boresight is unknown
  * Errors:    those of the aim's function
  * Notes:     the command stays as it is unless keep-out cones are set, slews are planned or mount
- *            angles must be chosen, and the aim is within a cone or farther than slew_above_deg
- *            from the last command (at first from the boresight). When due, the function also
- *            predicts the reachability of the aim. Events are appended; the caller clears them
+ *            angles must be chosen, and the aim is within a cone or farther than
+ * min_planned_slew_deg from the last command (at first from the boresight). When due, the function
+ * also predicts the reachability of the aim. Events are appended; the caller clears them
  *            (event_count = 0). */
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) BST_MUST_CHECK;
@@ -147,8 +147,8 @@ bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *guidance,
                                     const bst_pointing_feasibility_problem *problem,
                                     double horizon_s, bool *found) BST_MUST_CHECK;
 
-/* Predicts the reachability of the aim for look_ahead_s and appends its changes to the events
- * (guidance_ahead.c). */
+/* Predicts the reachability of the aim for prediction_horizon_s and appends its changes to the
+ * events (guidance_ahead.c). */
 bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *guidance,
                                    int64_t tick) BST_MUST_CHECK;
 

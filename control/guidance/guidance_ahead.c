@@ -72,8 +72,8 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
     const bst_pointing_feasibility_problem problem = {.look = look,
                                                       .user = &user,
                                                       .mount = g->mount_known ? &g->mount : NULL,
-                                                      .limits_share = g->config.limits_share};
-    double horizon = g->config.look_ahead_s, now_s = (double)tick / g->env.tick_rate_hz;
+                                                      .limit_fraction = g->config.limit_fraction};
+    double horizon = g->config.prediction_horizon_s, now_s = (double)tick / g->env.tick_rate_hz;
     double step = fmin(fmax(1e-3 * horizon, LEAST_STEP_S), MOST_STEP_S);
     bst_pointing_feasibility reach;
     bst_pointing_feasibility_change lost, back;

@@ -36,7 +36,7 @@ bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *g,
     bool given = g->roll_given;
     double before = g->roll_rad, from = given ? before : roll->angle_rad;
     bst_pointing_feasibility_problem careful = *problem;
-    careful.limits_share *= SHARE;
+    careful.limit_fraction *= SHARE;
     const bst_pointing_feasibility_search unreached = {0.0, horizon_s, 0.5, false};
     const bst_pointing_feasibility_span span = {0.0, horizon_s,
                                                 g->config.loss_tolerance_px * g->env.pixel_rad};

@@ -69,7 +69,7 @@ static bst_pointing_feasibility follows(const bst_pointing_feasibility_problem *
     double sky = bst_vec3_norm(bst_vec3_sub(body[2], body[0])) / (2.0 * HALF_S);
     bst_pointing_feasibility worst = BST_REACH_OK;
     for (int i = 0; i < mount->axes; i++) {
-        double share = problem->limits_share, limit = share * mount->axis[i].rate_limit_radps;
+        double share = problem->limit_fraction, limit = share * mount->axis[i].rate_limit_radps;
         double hard = share * mount->axis[i].accel_limit_radps2;
         double rate = fabs(angle[2][i] - angle[0][i]) / (2.0 * HALF_S);
         double accel = fabs(angle[2][i] - 2.0 * angle[1][i] + angle[0][i]) / (HALF_S * HALF_S);
@@ -242,7 +242,7 @@ bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
                 if (!started) {
                     axes[i] = (follower){to[i] + share * (next[i] - to[i]), rate};
                 } else {
-                    follow(&axes[i], &mount->axis[i], problem->limits_share, goal, rate);
+                    follow(&axes[i], &mount->axis[i], problem->limit_fraction, goal, rate);
                 }
                 angle[i] = axes[i].angle;
             }

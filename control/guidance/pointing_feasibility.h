@@ -41,7 +41,7 @@ typedef struct bst_pointing_feasibility_problem {
     bst_pointing_feasibility_fn look;
     void *user;
     const bst_mount_status *mount; /* NULL: one that follows at once */
-    double limits_share;           /* of the rate and acceleration limits that may be used */
+    double limit_fraction;         /* of the rate and acceleration limits that may be used */
 } bst_pointing_feasibility_problem;
 
 /* Whether what is expected at a time can be followed there, or the first reason in the order of

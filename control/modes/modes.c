@@ -112,13 +112,13 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
     bool other = was_target && target->id != c->held.id;
     BST_TRY(hold(ctx, c, track, tracks->tick));
     double off = off_boresight_px(c, tracks, track);
-    if (c->mode == BST_MODE_ACQUIRE && target && off <= c->config.track_entry_px) {
+    if (c->mode == BST_MODE_ACQUIRE && target && off <= c->config.track_handover_px) {
         bst_control_enter(c, BST_MODE_TRACK, tick, "the target is centred");
     } else if (c->mode == BST_MODE_COAST) {
-        bool centred = off <= c->config.track_entry_px;
+        bool centred = off <= c->config.track_handover_px;
         bst_control_enter(c, centred ? BST_MODE_TRACK : BST_MODE_ACQUIRE, tick,
                           "the target is seen again");
-    } else if (other && off > c->config.arrive_tolerance_px) {
+    } else if (other && off > c->config.arrival_tolerance_px) {
         bst_control_enter(c, BST_MODE_ACQUIRE, tick, "the tracker names another target");
     }
     return BST_OK;
@@ -238,7 +238,7 @@ static bst_status watch_cue(bst_ctx *ctx, bst_control *c, int64_t tick) {
         bst_vec3 rate =
             bst_vec3_scale(bst_vec3_sub(w->direction, w->direction_before), 1.0 / before);
         double off = bst_vec3_norm(bst_vec3_sub(now, bst_vec3_axpy(w->direction, dt, rate)));
-        jumped = jumped || off > c->config.arrive_tolerance_px * c->env.pixel_rad +
+        jumped = jumped || off > c->config.arrival_tolerance_px * c->env.pixel_rad +
                                      CUE_ACCEL_RADPS2 * dt * (dt + before);
     }
     if (valid) {

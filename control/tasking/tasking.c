@@ -294,7 +294,7 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
         if (*given) {
             give(t, sensor, tick, before, NULL, NULL);
         }
-        s->next_plan_s = now_s + t->config.idle_s;
+        s->next_plan_s = now_s + t->config.replan_interval_s;
     }
     return BST_OK;
 }

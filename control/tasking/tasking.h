@@ -30,7 +30,7 @@ typedef struct bst_tasking_config {
     double sun_keep_out_deg, moon_keep_out_deg, earth_limb_keep_out_deg, earth_limb_altitude_km;
     double min_snr, max_rate_arcsec_per_s;
     double slew_rate_deg_per_s, settle_s;
-    double find_timeout_s, retry_s, idle_s;
+    double find_timeout_s, retry_s, replan_interval_s;
     double sigma_deg, rate_sigma_arcsec_per_s, v_mag_sigma;
     double report_every_s;
 } bst_tasking_config;

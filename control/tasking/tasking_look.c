@@ -111,7 +111,7 @@ static bst_status mount_reaches(bst_ctx *ctx, const bst_tasking *t, const bst_ta
     }
     reach_user user = {t, s, object};
     bst_pointing_feasibility_problem problem = {
-        .look = reach_look, .user = &user, .mount = &s->mount, .limits_share = 0.9};
+        .look = reach_look, .user = &user, .mount = &s->mount, .limit_fraction = 0.9};
     bst_pointing_feasibility reach;
     BST_TRY(bst_pointing_feasibility_at(ctx, &problem, seconds, &reach));
     *reached = reach == BST_REACH_OK;

@@ -71,7 +71,7 @@ bst_status bst_mount_init(bst_ctx *ctx, bst_mount *m, int type, const bst_mount_
                         "another");
     }
     for (int k = 0; k < m->axes; k++) {
-        m->sight_share[k] = c->flexible.line_of_sight_share[k];
+        m->sight_share[k] = c->flexible.line_of_sight_fraction[k];
         m->model.flex_inertia[k] = m->model.flex_stiffness[k] = m->model.flex_damping[k] = 0.0;
         m->travel_min_rad[k] = m->joints.joint[k].min_rad;
         m->travel_max_rad[k] = m->joints.joint[k].max_rad;

@@ -40,10 +40,12 @@ static const bst_config_desc flexible_table[] = {
               "Of the mode about each axis with the joint held (the antiresonance from torque to "
               "encoder); 0: rigid. With the joint free it is higher by 1 / sqrt(1 - share)."),
     BST_REALS(M, damping, "", 0, 1, "[0.005, 0.005, 0.005]", "Damping ratio with the joint held."),
-    BST_REALS(M, inertia_share, "", 0, 0.95, "[0.2, 0.2, 0.2]",
+    BST_REALS(M, inertia_fraction, "", 0, 0.95, "[0.2, 0.2, 0.2]",
               "Share that swings, of the axis' inertia at zero angles."),
-    BST_REALS(M, line_of_sight_share, "", -10, 10, "[1, 1, 1]",
+    BST_FORMER("inertia_share", "inertia_fraction"),
+    BST_REALS(M, line_of_sight_fraction, "", -10, 10, "[1, 1, 1]",
               "How far the line of sight follows the swinging part's angle."),
+    BST_FORMER("line_of_sight_share", "line_of_sight_fraction"),
     BST_CONFIG_END};
 #undef M
 
@@ -152,16 +154,16 @@ static bst_status put_flexible(bst_ctx *ctx, const bst_mount_flexible_config *f,
             continue;
         }
         double w = 2.0 * BST_PI * f->frequency_hz[k];
-        double swings = f->inertia_share[k] * eq.mass[k][k];
+        double swings = f->inertia_fraction[k] * eq.mass[k][k];
         double own = chain->inertia[k][k == 1 ? 1 : 0];
         if (swings <= 0.0 || swings >= 0.98 * own) {
             return bst_fail(ctx, BST_ERR_CONFIG,
-                            "flexible/inertia_share: %g of the %s axis' %g kg m^2 must be above "
+                            "flexible/inertia_fraction: %g of the %s axis' %g kg m^2 must be above "
                             "zero and less than the %g kg m^2 of its own stage: at most %.3g",
-                            f->inertia_share[k], axis_names[k], eq.mass[k][k], own,
+                            f->inertia_fraction[k], axis_names[k], eq.mass[k][k], own,
                             0.98 * own / eq.mass[k][k]);
         }
-        double free_hz = f->frequency_hz[k] / sqrt(1.0 - f->inertia_share[k]);
+        double free_hz = f->frequency_hz[k] / sqrt(1.0 - f->inertia_fraction[k]);
         double longest_s = 1.0 / (STEPS_PER_PERIOD * free_hz);
         if (dt_s > longest_s * (1.0 + 1e-9)) {
             return bst_fail(ctx, BST_ERR_CONFIG,

@@ -21,7 +21,7 @@ typedef struct bst_mount_encoder_config {
 } bst_mount_encoder_config;
 
 typedef struct bst_mount_flexible_config {
-    double frequency_hz[3], damping[3], inertia_share[3], line_of_sight_share[3];
+    double frequency_hz[3], damping[3], inertia_fraction[3], line_of_sight_fraction[3];
 } bst_mount_flexible_config;
 
 typedef struct bst_mount_servo_config {

@@ -49,7 +49,7 @@ static void exponential(double a[5][5], double out[5][5]) {
 
 void bst_mount_linearise(const bst_mount_joints *joints, int axis,
                          const double angle_rad[BST_CHAIN_MOST], double dt_s, int delay_steps,
-                         double line_of_sight_share, bst_mount_linear *out) {
+                         double line_of_sight_fraction, bst_mount_linear *out) {
     const bst_mount_chain *chain = &joints->chain;
     const bst_mount_joint *joint = &joints->joint[axis];
     double s[BST_CHAIN_MOST], c[BST_CHAIN_MOST];
@@ -67,7 +67,7 @@ void bst_mount_linearise(const bst_mount_joints *joints, int axis,
     *out = (bst_mount_linear){.inertia_kgm2 = all,
                               .dt_s = dt_s,
                               .delay_steps = delay_steps,
-                              .line_of_sight_share = line_of_sight_share};
+                              .line_of_sight_fraction = line_of_sight_fraction};
     double k = chain->flex_stiffness[axis], d = chain->flex_damping[axis];
     double a[5][5] = {{0, 1, 0, 0, 0},
                       {-joint->spring_nm / own, -joint->viscous_nms / own, k / own, d / own,
@@ -145,7 +145,7 @@ double complex bst_mount_linear_encoder(const bst_mount_linear *linear, double o
 double complex bst_mount_linear_sight(const bst_mount_linear *linear, double omega_radps) {
     double complex x[4];
     driven(linear, omega_radps, x);
-    return (x[0] + linear->line_of_sight_share * x[2]) * late(linear, omega_radps);
+    return (x[0] + linear->line_of_sight_fraction * x[2]) * late(linear, omega_radps);
 }
 
 static double complex plant_of(const void *user, double omega_radps) {
@@ -174,7 +174,7 @@ bst_status bst_mount_axis_model_init(bst_ctx *ctx, int type, const bst_mount_con
                         joints.chain.stages, axis);
     }
     bst_mount_linearise(&joints, axis, angle_rad, dt_s, (int)config->servo.delay_steps,
-                        config->flexible.line_of_sight_share[axis], &out->linear);
+                        config->flexible.line_of_sight_fraction[axis], &out->linear);
     out->reference_feed_forward = config->servo.compensator.feed_forward;
     out->model_feed_forward = config->servo.model_feed_forward;
     out->viscous_nms = joints.joint[axis].viscous_nms;

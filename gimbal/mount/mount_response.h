@@ -16,13 +16,13 @@ typedef struct bst_mount_linear {
     double dt_s;
     int delay_steps;
     double step[4][4], drive[4];
-    double line_of_sight_share; /* of the flex angle */
+    double line_of_sight_fraction; /* of the flex angle */
 } bst_mount_linear;
 
 /* Linearises axis k of the joints at angles; exact for the step dt_s (matrix exponential). */
 void bst_mount_linearise(const bst_mount_joints *joints, int axis,
                          const double angle_rad[BST_CHAIN_MOST], double dt_s, int delay_steps,
-                         double line_of_sight_share, bst_mount_linear *out);
+                         double line_of_sight_fraction, bst_mount_linear *out);
 
 /* Sampled frequency response of the axis from the commanded acceleration to the encoder angle.
  *

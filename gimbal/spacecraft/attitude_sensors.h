@@ -14,7 +14,7 @@
 typedef struct bst_spacecraft_star_tracker_config {
     double axis[3];
     double noise_arcsec, noise_about_axis_arcsec;
-    double alignment_arcsec[3];
+    double misalignment_arcsec[3];
     double rate_hz, latency_s;
     double sun_exclusion_deg, earth_exclusion_deg;
     double rate_limit_degps;
@@ -27,7 +27,7 @@ typedef struct bst_spacecraft_gyro_config {
     double rate_random_walk_deg_rth3;
     double bias_degph[3], bias_sigma_degph;
     double scale_factor_ppm[3];
-    double alignment_arcsec[3];
+    double misalignment_arcsec[3];
 } bst_spacecraft_gyro_config;
 
 extern const bst_config_desc bst_star_tracker_config_table[];

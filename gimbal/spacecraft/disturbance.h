@@ -9,7 +9,7 @@
 
 typedef struct bst_disturbance_config {
     bool gravity_gradient;
-    double solar_area_m2, solar_coefficient, solar_lever_m[3];
+    double srp_area_m2, cr, centre_of_pressure_m[3];
     double residual_dipole_am2[3];
     double constant_torque_nm[3];
     double unload_dipole_am2;

@@ -201,10 +201,10 @@ static void set_filter(bst_spacecraft *craft, const bst_spacecraft_config *confi
     bst_attitude_filter_init(&craft->filter, bst_quat_unit(bst_quat_turn_frame(q, error)), sigma,
                              config->gyro.bias_sigma_degph * BST_DEG_RAD / 3600.0,
                              craft->gyro.angle_walk, craft->gyro.rate_walk);
-    if (config->running_s <= 0.0) {
+    if (config->filter_warm_up_s <= 0.0) {
         return;
     }
-    bst_attitude_past past = {.seconds = config->running_s,
+    bst_attitude_past past = {.seconds = config->filter_warm_up_s,
                               .q_body_from_gcrf = q,
                               .rate_radps = rate,
                               .gyro = &craft->gyro,
@@ -242,7 +242,8 @@ static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecr
     craft->grid =
         (bst_spacecraft_sky_grid){.sky_at = setup->sky_at, .user = setup->user, .law = &craft->law};
     BST_TRY(bst_spacecraft_sky_grid_at(&craft->grid, ctx, 0.0, &craft->sky, &craft->now.reference));
-    bst_vec3 turn = bst_vec3_scale(bst_vec3_from_array(config->initial_turn_deg), BST_DEG_RAD);
+    bst_vec3 turn =
+        bst_vec3_scale(bst_vec3_from_array(config->initial_attitude_error_deg), BST_DEG_RAD);
     bst_quat q = bst_quat_unit(bst_quat_turn_frame(craft->now.reference.q_body_from_gcrf, turn));
     bst_vec3 rate = bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(turn, -1.0)),
                                     craft->now.reference.rate_radps);

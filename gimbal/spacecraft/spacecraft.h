@@ -22,7 +22,7 @@ typedef struct bst_spacecraft_setup {
 } bst_spacecraft_setup;
 
 /* Of type `rigid_body`. At step 0 it has the attitude and rate of its pointing law, turned by
- * initial_turn_deg and with initial_rate_degps on top. BST_ERR_CONFIG: what
+ * initial_attitude_error_deg and with initial_rate_degps on top. BST_ERR_CONFIG: what
  * bst_spacecraft_body_init and bst_wheels_init refuse; rates that do not divide; parallel axes of
  * the law; a law other than `free` without wheels about three axes; passes on errors of sky_at. */
 bst_status bst_spacecraft_create(bst_ctx *ctx, const bst_spacecraft_config *config,

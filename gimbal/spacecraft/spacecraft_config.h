@@ -30,8 +30,8 @@ typedef struct bst_spacecraft_config {
     int32_t type;       /* bst_spacecraft_type */
     int32_t integrator; /* bst_integrator */
     double inertia_kgm2[6];
-    double initial_turn_deg[3], initial_rate_degps[3];
-    double initial_knowledge_arcsec, running_s;
+    double initial_attitude_error_deg[3], initial_rate_degps[3];
+    double initial_knowledge_arcsec, filter_warm_up_s;
     bst_config_list wheels, modes, star_trackers;
     bst_spacecraft_gyro_config gyro;
     bst_disturbance_config disturbances;

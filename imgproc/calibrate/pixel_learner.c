@@ -70,8 +70,9 @@ const bst_config_desc bst_pixel_learner_config_table[] = {
         "Learn which pixels are bad from frames in which the sky moves and a maximum does not."),
     BST_INT(bst_pixel_learner_config, capacity, "", 16, 4000000, "65536",
             "Room for bad pixels and pixels under suspicion; 130 bytes each."),
-    BST_REAL(bst_pixel_learner_config, false_rate, "", 1e-12, 0.01, "1e-5",
+    BST_REAL(bst_pixel_learner_config, false_alarm_probability, "", 1e-12, 0.01, "1e-5",
              "Greatest chance that a good pixel under suspicion is taken for bad."),
+    BST_FORMER("false_rate", "false_alarm_probability"),
     BST_CONFIG_END,
 };
 
@@ -85,7 +86,7 @@ bst_status bst_pixel_learner_create(bst_ctx *ctx, const bst_camera *camera,
     }
     l->camera = *camera;
     l->capacity = (int)config->capacity;
-    l->bad_from = -log(config->false_rate);
+    l->bad_from = -log(config->false_alarm_probability);
     l->moved_rad = bst_camera_scale_rad(camera) * fmax(MOVED_PX, MOVED_FWHM * camera->psf_fwhm_px);
     l->items = calloc((size_t)l->capacity, sizeof *l->items);
     l->merged = calloc((size_t)l->capacity, sizeof *l->merged);

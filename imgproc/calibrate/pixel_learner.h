@@ -14,11 +14,11 @@
  * - Shape. The deviation from light is normal about 0 for light, about its value for the pixel's
  *   charge alone for a defect; a share of light, measured on identified stars, has any.
  *
- * The pixel is bad when the least of the three sums reaches log(1 / false_rate). Because each sum
- * is the logarithm of a likelihood ratio whose mean is 1 for its cause, the chance that a good
- * pixel ever gets there is at most false_rate (Ville 1939; Wald, Sequential Analysis, 1947, eq.
- * 3:12). A bad pixel is looked at again while it is left out; it is good again when the sum of
- * those looks falls to 0.
+ * The pixel is bad when the least of the three sums reaches log(1 / false_alarm_probability).
+ * Because each sum is the logarithm of a likelihood ratio whose mean is 1 for its cause, the chance
+ * that a good pixel ever gets there is at most false_alarm_probability (Ville 1939; Wald,
+ * Sequential Analysis, 1947, eq. 3:12). A bad pixel is looked at again while it is left out; it is
+ * good again when the sum of those looks falls to 0.
  *
  * While the sky is at rest nothing is learned. */
 #ifndef BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_H

@@ -6,8 +6,9 @@
 
 typedef struct bst_pixel_learner_config {
     bool enabled;
-    int64_t capacity;  /* pixels under suspicion and bad ones */
-    double false_rate; /* greatest chance that a good pixel under suspicion is taken for bad */
+    int64_t capacity;               /* pixels under suspicion and bad ones */
+    double false_alarm_probability; /* greatest chance that a good pixel under suspicion is taken
+                                       for bad */
 } bst_pixel_learner_config;
 
 extern const bst_config_desc bst_pixel_learner_config_table[];

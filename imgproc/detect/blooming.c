@@ -189,7 +189,7 @@ static void begin_source(const bst_locate_frame *f, const bleed_set *set, bst_im
 }
 
 void bst_blooming_join(bst_imgproc_locator *l, const bst_locate_frame *f) {
-    if (f->camera->detector.full_well != BST_WELL_BLOOM) {
+    if (f->camera->detector.saturation != BST_WELL_BLOOM) {
         return;
     }
     bleed_set set;

@@ -48,7 +48,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
-    if (bst_column_level_wanted(ip->config.column_level, &ip->camera)) {
+    if (bst_column_level_wanted(ip->config.column_correction, &ip->camera)) {
         BST_TRY(bst_columns_create(ctx, width, &ip->columns));
     }
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
@@ -61,7 +61,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
                                                height, side};
     const bst_streak_locator_limits streaks = {width, height, fwhm, ip->config.streak_search_px};
     BST_TRY(bst_imgproc_locator_create(ctx, ip->known, &limits, &ip->locator));
-    ip->locator.most_fits = (int)ip->config.most_fits;
+    ip->locator.max_fits = (int)ip->config.max_fits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, &streaks, &ip->streaks)
@@ -199,7 +199,7 @@ static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) 
 static double saturation_e(const bst_imgproc *ip, int saturated_dn) {
     const bst_camera *c = &ip->camera;
     double level = (saturated_dn - c->offset_dn) * c->gain_e_per_dn;
-    bool overflows = c->detector.full_well == BST_WELL_BLOOM;
+    bool overflows = c->detector.saturation == BST_WELL_BLOOM;
     return overflows ? 0.0 : fmax(level - (double)ip->background.median_level, 0.0);
 }
 

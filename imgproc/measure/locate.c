@@ -425,7 +425,7 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
                 const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
     l->longest_px = 0.0;
-    int fits = l->most_fits > 0 && l->most_fits < l->count ? l->most_fits : l->count;
+    int fits = l->max_fits > 0 && l->max_fits < l->count ? l->max_fits : l->count;
     choose(l, candidates, fits);
     loop p = {l, f, candidates, NULL, 0};
     bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_some, &p);

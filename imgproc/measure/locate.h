@@ -59,7 +59,7 @@ typedef struct bst_imgproc_locator {
     bst_sharpness sharpness;
     bst_imgproc_peak_law law[2]; /* of a point, and of a star's streak on the middle of the frame */
     int max_side, capacity;
-    int most_fits;                   /* so many of the brightest are fitted; 0: all */
+    int max_fits;                    /* so many of the brightest are fitted; 0: all */
     bst_imgproc_found *found, *next; /* [capacity]; next: what a loop makes of them */
     int *from;                       /* [capacity]: the candidate of each */
     uint8_t *chosen;                 /* for each candidate that a frame may have */
@@ -126,7 +126,7 @@ static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak)
  * is measured on sources of SNR 20 and more and its mean is used for the fainter ones. A point that
  * turns out elongated is fitted again as a streak of its own length and angle.
  *
- * With locator->most_fits, fainter ones than so many stand at the top of the filter's output
+ * With locator->max_fits, fainter ones than so many stand at the top of the filter's output
  * (peak_centroid.h), unless charge lies on them.
  *
  * Pixels that are sharper than light are left out first. What the others then do not show to be a

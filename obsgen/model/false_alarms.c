@@ -159,7 +159,7 @@ void bst_false_alarms_draw(bst_generator *g) {
         double y = g->height * uniform(g, draw + 2) - 0.5;
         bool streak = g->streak > 0.0 && uniform(g, draw + 4) < g->streak_share;
         const bst_generator_filter *filter = &g->filters[streak];
-        double energy = -2.0 * log(uniform(g, draw + 3)) / g->calibration.false_alarm_tail;
+        double energy = -2.0 * log(uniform(g, draw + 3)) / g->calibration.false_alarm_steepness;
         double snr = sqrt(filter->threshold * filter->threshold + filter->variance * energy);
         if (g->smeared) {
             bst_generator_keep_rough(g, (int)lround(x), (int)lround(y), snr, -1);
@@ -174,13 +174,13 @@ void bst_false_alarms_draw(bst_generator *g) {
 }
 
 void bst_false_alarms_cosmic_rays(bst_generator *g) {
-    const bst_detector_cosmic_ray_config *h = &g->camera->detector.hits;
+    const bst_detector_cosmic_ray_config *h = &g->camera->detector.cosmic_rays;
     if (!(h->rate_per_cm2_s > 0.0)) {
         return;
     }
     double pixel_cm2 = h->pixel_pitch_um * h->pixel_pitch_um * 1e-8 * g->binning * g->binning;
     double expected =
-        h->rate_per_cm2_s * pixel_cm2 * g->width * g->height * (g->exposure_s + h->frame_s);
+        h->rate_per_cm2_s * pixel_cm2 * g->width * g->height * (g->exposure_s + h->readout_s);
     /* a point of one electron at the filter's output: its kernel's greatest value over the noise */
     double kernel = 1.0 / (2.0 * BST_PI * g->total_sigma * g->total_sigma) /
                     bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
@@ -213,7 +213,7 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
         bst_detection *d = &item.detection;
         double hottest = charge / fmax(length, 1.0) / g->noise_e;
         bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;
-        if (stands_out && uniform(g, draw + 7) < g->calibration.hit_told_probability) {
+        if (stands_out && uniform(g, draw + 7) < g->calibration.cosmic_ray_flag_probability) {
             d->label = BST_LABEL_HIT;
         }
         if (length > 1.5 * d->width_px / g->binning) {

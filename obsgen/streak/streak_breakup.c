@@ -237,7 +237,7 @@ static bst_status set_sky(bst_ctx *ctx, bst_generator *g) {
             }
         }
     }
-    bst_local_sky_settle(&w->sky, g->calibration.background_share, g->calibration.crowding);
+    bst_local_sky_settle(&w->sky, g->calibration.background_fraction, g->calibration.crowding);
     return BST_OK;
 }
 

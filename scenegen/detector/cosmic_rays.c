@@ -108,10 +108,11 @@ bst_status bst_cosmic_rays_draw(bst_ctx *ctx, bst_cosmic_rays *h, bst_rng_key ke
     double pixel_cm2 = c->pixel_pitch_um * c->pixel_pitch_um * 1e-8;
     double expected = c->rate_per_cm2_s * pixel_cm2 * width * height * collect_s;
     if (expected > MOST_HITS) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "detector.hits: %.3g hits are expected in one exposure; allowed are up to "
-                        "%d: lower rate_per_cm2_s or the exposure time",
-                        expected, MOST_HITS);
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "detector.cosmic_rays: %.3g hits are expected in one exposure; allowed are up to "
+            "%d: lower rate_per_cm2_s or the exposure time",
+            expected, MOST_HITS);
     }
     double arrival = 0.0;
     for (uint64_t i = 0;; i++) {

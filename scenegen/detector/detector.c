@@ -27,7 +27,7 @@ double bst_detector_near_full_e(double full_well_e) {
 }
 
 bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name) {
-    return bst_rng_make_key(camera->detector.pattern_seed, 0, name, "pattern");
+    return bst_rng_make_key(camera->detector.fixed_pattern_seed, 0, name, "pattern");
 }
 
 bool bst_detector_whole_columns(const bst_detector *detector) {
@@ -59,9 +59,9 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
         snprintf(bend, sizeof bend, " -DNONLINEAR -DC1=%.9ef -DC2=%.9ef -DC3=%.9ef", n[0], n[1],
                  n[2]);
     }
-    if (d->read_tail_fraction > 0.0 && d->read_tail_rms_e > 0.0) {
+    if (d->telegraph_noise_fraction > 0.0 && d->telegraph_noise_rms_e > 0.0) {
         snprintf(tail, sizeof tail, " -DTAIL -DTAIL_GAP=%.9ef -DTAIL_RMS=%.9ef",
-                 -0.5 / log1p(-d->read_tail_fraction), d->read_tail_rms_e);
+                 -0.5 / log1p(-d->telegraph_noise_fraction), d->telegraph_noise_rms_e);
     }
     if (d->frame_transfer_s > 0.0) {
         snprintf(transfer, sizeof transfer, " -DTRANSFER_ROW_S=%.9ef",
@@ -74,7 +74,7 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
         detector->gain ? " -DGAIN_MAP" : "", detector->dark ? " -DDARK_MAP" : "",
         detector->overlay ? " -DOVERLAY" : "", detector->offsets ? " -DOFFSETS" : "",
         detector->codes ? " -DCODES" : "", bend, tail, transfer,
-        d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
+        d->saturation == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
 }
 
 static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, const void *data,
@@ -145,9 +145,9 @@ static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
     if (c->quantisation.model != BST_QUANTISE_UNIFORM) {
         BST_TRY(make_codes(ctx, d));
     }
-    if (c->hits.rate_per_cm2_s > 0.0) {
+    if (c->cosmic_rays.rate_per_cm2_s > 0.0) {
         BST_TRY(make_map(ctx, d, NULL, &d->overlay));
-        BST_TRY(bst_cosmic_rays_create(ctx, &c->hits, (int)d->camera.width_px,
+        BST_TRY(bst_cosmic_rays_create(ctx, &c->cosmic_rays, (int)d->camera.width_px,
                                        (int)d->camera.height_px, d->stride, &d->hits));
     }
     return BST_OK;
@@ -280,7 +280,7 @@ bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *st
     d->summary = (bst_cosmic_rays_summary){0};
     if (d->hits) {
         BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
-                           exposure_s + c->hits.frame_s));
+                           exposure_s + c->cosmic_rays.readout_s));
     }
     if (c->row_noise_e > 0.0) {
         BST_TRY(begin_rows(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "row_noise"),

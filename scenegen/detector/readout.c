@@ -16,7 +16,7 @@ struct bst_readout {
 static bool wanted(const bst_readout *r, int kernel) {
     const bst_detector_config *d = &r->camera.detector;
     return kernel == TRANSFER ? d->frame_transfer_s > 0.0
-                              : kernel != BLOOM || d->full_well == BST_WELL_BLOOM;
+                              : kernel != BLOOM || d->saturation == BST_WELL_BLOOM;
 }
 
 bst_status bst_readout_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,

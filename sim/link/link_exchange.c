@@ -59,7 +59,7 @@ static bst_status handle_silence(bst_link *link, link_exchange *x, double waited
     for (int i = 0; i < x->answer.output_count; i++) {
         x->answer.outputs[i].given = false; /* discard an incomplete answer */
     }
-    if (link->config.on_silence == BST_LINK_GO_ON) {
+    if (link->config.on_timeout == BST_LINK_GO_ON) {
         if (peer >= 0) {
             bst_link_unassign(link, peer); /* until the next `hello` */
         }
@@ -68,7 +68,7 @@ static bst_status handle_silence(bst_link *link, link_exchange *x, double waited
     if (peer >= 0) {
         return bst_fail(x->ctx, BST_ERR_IO,
                         "link: \"%s\" has not answered step %lld of %s within %.3g s; "
-                        "/link/timeout_s allows more, /link/on_silence \"go_on\" does without",
+                        "/link/timeout_s allows more, /link/on_timeout \"go_on\" does without",
                         link->peers[peer].name, (long long)part->step - 1, part->about.instance,
                         waited_s);
     }
@@ -313,8 +313,8 @@ static bst_status exchange_awaited(bst_ctx *ctx, bst_link *link, int number, int
     sending s = {.inputs = m->inputs, .count = m->input_count};
     double began = bst_wall_seconds();
     bool first = !part->had_peer;
-    /* with on_silence = go on, do not wait again for a lost peer */
-    bool waits = part->peer >= 0 || first || link->config.on_silence == BST_LINK_STOP;
+    /* with on_timeout = go on, do not wait again for a lost peer */
+    bool waits = part->peer >= 0 || first || link->config.on_timeout == BST_LINK_STOP;
     double limit = !waits ? 0.0 : first ? link->config.connect_timeout_s : link->config.timeout_s;
     double end = began + limit, last = began + LINK_EXTENSIONS * link->config.timeout_s;
     *answered = true;

@@ -350,7 +350,7 @@ static const bst_wire_field control_status[] = {
 static const bst_wire_field target_states[] = {COUNT(bst_link_target_states, "States."), END};
 
 static const bst_wire_field target_state_items[] = {
-    TEXT(bst_link_target_state, object, "Its name in the scenario; its `steered` is true."),
+    TEXT(bst_link_target_state, object, "Its name in the scenario; its `external_states` is true."),
     TICK(bst_link_target_state, tick, "From when on: not before the step's, in order."),
     VECTOR(bst_link_target_state, position_gcrf_m, "m", "Geocentric."),
     VECTOR(bst_link_target_state, velocity_gcrf_mps, "m/s", "Geocentric."), END};

@@ -38,7 +38,7 @@ static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *err
     bst_camera *c = &k->camera;
     c->pixel_scale_arcsec *= 1.0 + 1e-6 * errors->scale_error_ppm;
     c->rotation_deg += errors->rotation_error_deg;
-    c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
+    c->distortion = errors->override_distortion ? errors->distortion : c->distortion;
     c->throughput *= 1.0 + errors->throughput_error;
     know_psf(c, errors->psf_fwhm_px, &k->psf);
     bst_status status = bst_camera_prepare(ctx, c);
@@ -73,7 +73,8 @@ bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observ
     }
     bst_status status = alter_camera(ctx, &config->knowledge.camera, k);
     const bst_star_errors_config *errors = &config->knowledge.stars;
-    if (status == BST_OK && (errors->dropped_fraction > 0.0 || errors->displaced_fraction > 0.0)) {
+    if (status == BST_OK &&
+        (errors->missing_fraction > 0.0 || errors->position_error_fraction > 0.0)) {
         status = bst_stars_with_errors(ctx, k->own_stars ? k->own_stars : world->stars, errors,
                                        &k->altered);
     }

@@ -324,7 +324,7 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
                      .diffusion_px = optics->diffusion_px,
                      .nodes = nodes};
     for (int k = 0; k < 2; k++) {
-        psf->fill[k] = optics->pixel_fill[k] > 0.0 ? optics->pixel_fill[k] : 1.0;
+        psf->fill[k] = optics->fill_factor[k] > 0.0 ? optics->fill_factor[k] : 1.0;
     }
     bst_status status = fill_in(ctx, camera, inputs, psf);
     if (status != BST_OK) {

@@ -132,8 +132,8 @@ static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
     double per_m = 1.0 / (camera->aperture_m * bst_camera_scale_rad(camera));
     if (o->q > 0.0) {
         per_m = o->q / middle_m;
-    } else if (o->f_number > 0.0 && o->pixel_um > 0.0) {
-        per_m = o->f_number / (1e-6 * o->pixel_um);
+    } else if (o->f_number > 0.0 && o->pixel_pitch_um > 0.0) {
+        per_m = o->f_number / (1e-6 * o->pixel_pitch_um);
     }
     b->q_least = INFINITY;
     for (int k = 0; k < rule->count; k++) {

@@ -347,7 +347,7 @@ static bst_status put_all(bst_ctx *ctx, FILE *out, const bst_run_reader *run, do
         "SELECT custody_fraction FROM sightings WHERE sensor IS NULL AND detected > 0",
         "object custody, %", 100.0,
         "Object custody (share of the time that the last detection is no older than "
-        "record.custody_s) of the objects that were seen.");
+        "record.custody_timeout_s) of the objects that were seen.");
     if (status == BST_OK) {
         status = put_histogram(
             ctx, out, run,

@@ -116,7 +116,7 @@ void bst_run_losses_report_counter(const char *name, int64_t count, bst_run_loss
          "the image's predicted error (error_sigma) is above fidelity.tolerance_sigma", "frame",
          "frames"},
         {"nodes_bounded", BST_SEVERITY_NOTE,
-         "the tolerance asks for more nodes than fidelity.most_nodes allows: the image is coarser",
+         "the tolerance asks for more nodes than fidelity.max_nodes allows: the image is coarser",
          "frame", "frames"},
         {"saturated", BST_SEVERITY_NOTE, "full pixels in the image", "frame", "frames"},
     };

@@ -62,7 +62,7 @@ static const bst_io_column sum_columns[] = {
     REAL("revisit_most_s", "s", "longest of these gaps"),
     REAL("longest_gap_s", "s",
          "longest time without a detection, including start and end of the run"),
-    REAL("custody_s", "s", "object custody: time within record/custody_s after a detection"),
+    REAL("custody_s", "s", "object custody: time within record/custody_timeout_s after a detection"),
     REAL("custody_fraction", "", "the same over the run's length"),
     REAL("snr", "", "greatest true signal to noise of a frame"),
     ERRORS,
@@ -166,8 +166,8 @@ bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for who sees what");
     }
     s->world = world;
-    bst_status status = bst_sightings_create(ctx, world, tick_rate_hz, record->custody_s, take_pass,
-                                             s, &s->sightings);
+    bst_status status = bst_sightings_create(ctx, world, tick_rate_hz, record->custody_timeout_s,
+                                             take_pass, s, &s->sightings);
     if (status == BST_OK && store) {
         status = bst_io_table_create(ctx, store, "passes", "Objects in the field of a sensor.",
                                      pass_columns, sizeof pass_columns / sizeof *pass_columns,

@@ -228,7 +228,7 @@ static const bst_study_metric metrics[ALL_METRICS] = {
                      BST_METRIC_VALUE},
     [OBJECT_CUSTODY] = {"object_custody", "",
                         "Share of the time in which an object's last detection was no older than "
-                        "record.custody_s, mean of all objects.",
+                        "record.custody_timeout_s, mean of all objects.",
                         BST_METRIC_VALUE},
     [OBJECT_CUSTODY_SEEN] = {"object_custody_seen", "", "The same of those that were detected.",
                              BST_METRIC_VALUE},

@@ -80,7 +80,7 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         world->object_count = i + 1;
         BST_TRY(bst_world_orbit_build(b, &config->orbit, &config->burns, path, object->info.name,
                                       &object->orbit, &object->info.norad));
-        if (config->steered) {
+        if (config->external_states) {
             BST_TRY(bst_external_states_create(b->ctx, &object->orbit.external));
         }
         bst_name_index_add(world->object_names, object->info.name, i);

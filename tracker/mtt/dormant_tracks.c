@@ -24,7 +24,8 @@ void bst_mtt_predict_memory(bst_mtt *m, const bst_mtt_frame *frame) {
             bst_filter_predict(&m->filter, dt_s, &track->state, &track->models);
         }
         double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
-        if (variance <= limit2 && m->seconds + dt_s - track->last_update_s <= m->params.memory_s) {
+        if (variance <= limit2 &&
+            m->seconds + dt_s - track->last_update_s <= m->params.max_dormant_s) {
             m->memory[kept++] = *track;
         }
     }
@@ -32,10 +33,10 @@ void bst_mtt_predict_memory(bst_mtt *m, const bst_mtt_frame *frame) {
 }
 
 void bst_mtt_remember(bst_mtt *m, const bst_mtt_track *track) {
-    if (m->params.max_memory == 0) {
+    if (m->params.max_dormant_tracks == 0) {
         return;
     }
-    if (m->memory_count == m->params.max_memory) {
+    if (m->memory_count == m->params.max_dormant_tracks) {
         forget(m, 0);
     }
     m->memory[m->memory_count++] = *track;
@@ -56,7 +57,7 @@ static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *b
             before->v_mag_variance + track->v_mag_variance + DIMMING_MAG * DIMMING_MAG;
         chi2 += (track->v_mag - dimmed) * (track->v_mag - dimmed) / variance;
     }
-    if (!(chi2 <= m->params.memory_chi2)) {
+    if (!(chi2 <= m->params.dormant_gate_chi2)) {
         return;
     }
     double misfit = chi2 + bst_mixture_log_det4(before->state.covariance);

@@ -65,7 +65,8 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
     for (int m = 0; m < MODELS; m++) {
         models->state[m] = *state;
     }
-    models->probability[1] = params->manoeuvre_s / (params->quiet_s + params->manoeuvre_s);
+    models->probability[1] =
+        params->manoeuvre_sojourn_s / (params->quiescent_sojourn_s + params->manoeuvre_sojourn_s);
     models->probability[0] = 1.0 - models->probability[1];
 }
 
@@ -74,7 +75,8 @@ static void combine(const bst_filter_models *models, bst_sky_state *state) {
 }
 
 static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_models *models) {
-    double start = 1.0 / params->quiet_s, end = 1.0 / params->manoeuvre_s, both = start + end;
+    double start = 1.0 / params->quiescent_sojourn_s, end = 1.0 / params->manoeuvre_sojourn_s,
+           both = start + end;
     double settled = -expm1(-both * dt_s) / both;
     double change[2] = {start * settled, end * settled}; /* away from model 0, from model 1 */
     bst_filter_models before = *models;

@@ -17,8 +17,8 @@ typedef struct bst_filter_params {
     double noise_rad2ps3; /* acceleration's power spectral density; of the quiet model */
     /* the rest: IMM only */
     double manoeuvre_noise_rad2ps3;
-    double quiet_s, manoeuvre_s; /* mean times between the ends and the starts of manoeuvres, and of
-                                    a manoeuvre; > 0 */
+    double quiescent_sojourn_s, manoeuvre_sojourn_s; /* mean times between the ends and the starts
+                                    of manoeuvres, and of a manoeuvre; > 0 */
 } bst_filter_params;
 
 /* Most components of a mixture that a filter keeps. */

@@ -64,7 +64,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
                         const bst_mtt_frame *frame) {
     double dt = mtt->now.seconds - pool->seconds;
     double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
-    double floor = mtt->params.brightness_floor_mag;
+    double floor = mtt->params.brightness_systematic_mag;
     double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
     /* of what was taken for charge the like may have been taken for light */
     double alarms = mtt->clutter_density * mtt->params.field_sr + (double)mtt->charged;

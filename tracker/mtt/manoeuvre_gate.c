@@ -29,7 +29,7 @@ static void widen(const bst_mtt *m, const bst_mtt_track *track, hypothesis *h) {
     double more = m->params.manoeuvre_noise_rad2ps3 - m->params.noise_rad2ps3;
     h->state = track->state;
     h->models = track->models;
-    h->log_prior = log(-expm1(-dt / m->params.quiet_s));
+    h->log_prior = log(-expm1(-dt / m->params.quiescent_sojourn_s));
     bst_sky_add_noise(&h->state, dt, more);
     for (int i = 0; i < h->models.count; i++) {
         bst_sky_add_noise(&h->models.state[i], dt, more);
@@ -72,7 +72,7 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
     const bst_mtt_params *p = &m->params;
     double before = m->history_count > 0 ? m->history[0].seconds : m->now.seconds;
     double allowed = bst_mtt_event_probability(p, m->now.seconds - before);
-    bool asked = p->filter != BST_FILTER_IMM && allowed > 0.0 && p->quiet_s > 0.0 &&
+    bool asked = p->filter != BST_FILTER_IMM && allowed > 0.0 && p->quiescent_sojourn_s > 0.0 &&
                  p->manoeuvre_noise_rad2ps3 > p->noise_rad2ps3;
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
@@ -88,7 +88,7 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
         }
         track->state = h.state;
         track->models = h.models;
-        track->manoeuvre_end_s = m->now.seconds + p->manoeuvre_s;
+        track->manoeuvre_end_s = m->now.seconds + p->manoeuvre_sojourn_s;
         m->detection_of_track[t] = best.column;
         m->now.used[best.column] = true;
         m->owner[best.column] = t;

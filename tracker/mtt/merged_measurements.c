@@ -180,7 +180,7 @@ void bst_mtt_share(bst_mtt *mtt) {
             continue;
         }
         bst_mtt_track *other = &mtt->tracks[partner];
-        int column = mtt->detection_of_track[partner], most = mtt->params.max_merged;
+        int column = mtt->detection_of_track[partner], most = mtt->params.max_merged_frames;
         bool alike = same(mtt, missed, other);
         bool long_since = missed->merged_in_row >= most && other->merged_in_row >= most;
         bool hides = !other->star && one_hides(missed, other);

@@ -7,10 +7,12 @@
 
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
-        p->confirm_frames < p->confirm_hits || p->max_stars < 0 || !(p->field_sr > 0.0) ||
+        p->confirm_frames < p->confirm_hits || p->max_stationary_tracks < 0 ||
+        !(p->field_sr > 0.0) ||
         !(p->detection_probability > 0.0 && p->detection_probability < 1.0) ||
         !(p->false_alarms_per_frame > 0.0) || !(p->gate_chi2 > 0.0) || !(p->noise_rad2ps3 >= 0.0) ||
-        p->max_memory < 0 || p->event_window < 0 || p->event_window > BST_MTT_EVENT_WINDOW) {
+        p->max_dormant_tracks < 0 || p->event_window < 0 ||
+        p->event_window > BST_MTT_EVENT_WINDOW) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "tracker: parameters out of range (need at least one track and detection, "
                         "2 <= confirm_hits <= confirm_frames, detection_probability in (0, 1), "
@@ -22,9 +24,11 @@ static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
                         "tracker: motion \"orbit\" does not go with type \"imm\"; use \"ekf\"");
     }
     if (p->filter == BST_FILTER_IMM &&
-        !(p->manoeuvre_noise_rad2ps3 >= 0.0 && p->quiet_s > 0.0 && p->manoeuvre_s > 0.0)) {
+        !(p->manoeuvre_noise_rad2ps3 >= 0.0 && p->quiescent_sojourn_s > 0.0 &&
+          p->manoeuvre_sojourn_s > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "tracker: imm needs manoeuvre noise >= 0, quiet_s > 0 and manoeuvre_s > 0");
+                        "tracker: imm needs manoeuvre noise >= 0, quiescent_sojourn_s > 0 and "
+                        "manoeuvre_sojourn_s > 0");
     }
     return BST_OK;
 }
@@ -40,15 +44,15 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
     m->filter = (bst_filter_params){.kind = params->filter,
                                     .noise_rad2ps3 = params->noise_rad2ps3,
                                     .manoeuvre_noise_rad2ps3 = params->manoeuvre_noise_rad2ps3,
-                                    .quiet_s = params->quiet_s,
-                                    .manoeuvre_s = params->manoeuvre_s};
+                                    .quiescent_sojourn_s = params->quiescent_sojourn_s,
+                                    .manoeuvre_sojourn_s = params->manoeuvre_sojourn_s};
     m->next_id = 1;
     m->clutter = params->false_alarms_per_frame;
     m->clutter_density = params->false_alarms_per_frame / params->field_sr;
-    size_t nt = (size_t)params->max_tracks + (size_t)params->max_stars + 1,
+    size_t nt = (size_t)params->max_tracks + (size_t)params->max_stationary_tracks + 1,
            ne = nt * BST_MTT_CANDIDATES;
     m->tracks = calloc(nt, sizeof *m->tracks);
-    m->memory = calloc((size_t)params->max_memory + 1, sizeof *m->memory);
+    m->memory = calloc((size_t)params->max_dormant_tracks + 1, sizeof *m->memory);
     m->events = calloc(4 * nt, sizeof *m->events);
     m->edge_order = calloc(ne, sizeof *m->edge_order);
     m->edge_row = calloc(ne, sizeof *m->edge_row);
@@ -74,7 +78,7 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
         ok = bst_mtt_pool_create(&m->history[h], params->max_detections);
     }
     bst_status status =
-        ok ? bst_assignment_create(ctx, params->max_tracks + params->max_stars,
+        ok ? bst_assignment_create(ctx, params->max_tracks + params->max_stationary_tracks,
                                    params->max_detections, &m->assignment)
            : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory for %d tracks, %d detections",
                       params->max_tracks, params->max_detections);
@@ -196,7 +200,7 @@ static void load_detections(bst_mtt *m, const bst_mtt_frame *frame) {
 
 static void take_brightness(bst_mtt *m, bst_mtt_track *track, const bst_mtt_detection *detection,
                             double dt_s) {
-    double floor = m->params.brightness_floor_mag, walk = m->params.brightness_walk_mag;
+    double floor = m->params.brightness_systematic_mag, walk = m->params.brightness_random_walk_mag;
     double r = floor * floor + detection->v_mag_sigma * detection->v_mag_sigma;
     if (!isfinite(r) || !isfinite(detection->v_mag)) {
         return;
@@ -284,7 +288,7 @@ static void hit(bst_mtt *m, int t) {
     } else if (track->status != BST_TRACK_TENTATIVE && !track->star &&
                bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
         record(m, BST_MTT_MANOEUVRE, track, statistic);
-        track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_s;
+        track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_sojourn_s;
     }
     if (!outshines) { /* the other one's light is in it */
         take_brightness(m, track, detection, dt);
@@ -322,7 +326,7 @@ static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool obser
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
     if (track->asleep) {
-        return m->seconds - track->last_update_s > p->memory_s ||
+        return m->seconds - track->last_update_s > p->max_dormant_s ||
                !(variance < p->memory_sigma_rad * p->memory_sigma_rad) ||
                track->misses_in_row > p->max_misses;
     }
@@ -368,7 +372,7 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         /* what is known to be hidden by its neighbour's light is not missed */
         bool taken =
             m->detection_of_track[t] >= 0 &&
-            (track->merged_in_row <= m->params.max_merged || m->shared[t] == BST_MTT_HIDDEN);
+            (track->merged_in_row <= m->params.max_merged_frames || m->shared[t] == BST_MTT_HIDDEN);
         track->frames += m->observable[t];
         if (track->may_miss && !taken) {
             track->misses_in_row++;

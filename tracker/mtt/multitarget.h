@@ -41,7 +41,7 @@ typedef struct bst_mtt_params {
     bst_mtt_association association;
     double noise_rad2ps3; /* acceleration's power spectral density; of a quiet object */
     /* of a manoeuvring one, and mean times between manoeuvres and of one: IMM only */
-    double manoeuvre_noise_rad2ps3, quiet_s, manoeuvre_s;
+    double manoeuvre_noise_rad2ps3, quiescent_sojourn_s, manoeuvre_sojourn_s;
     double gate_chi2; /* 2 degrees of freedom */
     double detection_probability;
     double false_alarms_per_frame; /* least density of clutter that is believed */
@@ -59,13 +59,14 @@ typedef struct bst_mtt_params {
     double max_sigma_rad;         /* a track with a direction worse than this is deleted */
     double merge_rad;             /* closer than this two objects may share one detection */
     double merge_floor_rad;       /* 1 sigma per axis added to a shared detection */
-    int max_merged;               /* frames in a row that a track may live on shared detections */
+    int max_merged_frames;        /* frames in a row that a track may live on shared detections */
     double feed_forward_rad;      /* tracks this close to the cue follow the cue's acceleration */
     double star_rate_radps;       /* rate of the slowest object; 0: no track is taken for a star */
-    double motion_chi2; /* chi2 of a rate above which a track moves, 2 degrees of freedom */
-    int max_stars;      /* room for tracks at rest */
-    double brightness_floor_mag; /* 1 sigma added to every magnitude */
-    double brightness_walk_mag;  /* 1 sigma by which an object's brightness changes per frame */
+    double motion_chi2;        /* chi2 of a rate above which a track moves, 2 degrees of freedom */
+    int max_stationary_tracks; /* room for tracks at rest */
+    double brightness_systematic_mag; /* 1 sigma added to every magnitude */
+    double
+        brightness_random_walk_mag; /* 1 sigma by which an object's brightness changes per frame */
     /* Manoeuvres and changes of brightness are detected in the innovations of the latest
      * event_window hits (at most BST_MTT_EVENT_WINDOW). false_events_per_hour bounds the false
      * events of either kind per track; 0: no detection of events. */
@@ -73,10 +74,10 @@ typedef struct bst_mtt_params {
     double false_events_per_hour;
     /* Deleted tracks that had been confirmed are kept. A new confirmed track whose direction and
      * rate fit the prediction of a kept one takes over its identity. */
-    int max_memory;          /* most tracks kept; 0: none */
-    double memory_s;         /* time that they are kept, s */
-    double memory_sigma_rad; /* and while their direction is known to this, 1 sigma */
-    double memory_chi2;      /* largest misfit of direction and rate, 4 degrees of freedom */
+    int max_dormant_tracks;   /* most tracks kept; 0: none */
+    double max_dormant_s;     /* time that they are kept, s */
+    double memory_sigma_rad;  /* and while their direction is known to this, 1 sigma */
+    double dormant_gate_chi2; /* largest misfit of direction and rate, 4 degrees of freedom */
 } bst_mtt_params;
 
 #define BST_MTT_EVENT_WINDOW 16

@@ -8,7 +8,7 @@
 #define RATE_SIGMAS 3.0
 
 bool bst_mtt_has_room(const bst_mtt *m, bool at_rest, int reserve) {
-    return at_rest ? m->rest_count < m->params.max_stars
+    return at_rest ? m->rest_count < m->params.max_stationary_tracks
                    : m->track_count - m->rest_count + reserve < m->params.max_tracks;
 }
 

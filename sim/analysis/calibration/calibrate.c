@@ -29,7 +29,7 @@ bst_status bst_calibration_fitter_begin(bst_ctx *ctx, bst_calibration_fitter *c,
                                         const bst_calibration_path *path) {
     bst_obsgen_calibration theory;
     bst_obsgen_calibration_theory(&theory);
-    theory.crowding = theory.background_share = 0.0;
+    theory.crowding = theory.background_fraction = 0.0;
     const bst_generator_settings settings = {.capacity = CAPACITY,
                                              .false_alarms_per_frame = path->false_alarms_per_frame,
                                              .jitter_px = path->jitter_px,

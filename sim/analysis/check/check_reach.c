@@ -112,10 +112,11 @@ static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *pr
 static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double tolerance_rad,
                         found *f) {
     f->duration_s = duration_s;
-    const bst_pointing_feasibility_problem problem = {.look = look,
-                                                      .user = s,
-                                                      .mount = s->mount.axes > 0 ? &s->mount : NULL,
-                                                      .limits_share = s->guidance->limits_share};
+    const bst_pointing_feasibility_problem problem = {
+        .look = look,
+        .user = s,
+        .mount = s->mount.axes > 0 ? &s->mount : NULL,
+        .limit_fraction = s->guidance->limit_fraction};
     double step = fmin(fmax(1e-3 * duration_s, LEAST_STEP_S), MOST_STEP_S);
     double at = 0.0;
     for (int i = 0; i < MOST_SPANS && at < duration_s; i++) {

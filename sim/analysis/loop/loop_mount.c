@@ -21,7 +21,7 @@ static bst_status build_servo(bst_ctx *ctx, int type, const bst_mount_config *co
     BST_TRY(bst_mount_axis_model_init(ctx, type, config, angle, dt_s, k, &servo->mount));
     servo->there = true;
     double mode = config->flexible.frequency_hz[k];
-    double share = config->flexible.inertia_share[k];
+    double share = config->flexible.inertia_fraction[k];
     /* flexible mode with locked and free joint */
     servo->hint_hz[0] = mode;
     servo->hint_hz[1] = mode / sqrt(1.0 - share);
@@ -51,7 +51,7 @@ static double step_axis(axis_run *run, int n, double target_rad, double target_r
     shaper->reference_rad += dt * rate;
     shaper->reference_radps += dt * accel;
     run->reference[(n + linear->delay_steps + 1) % 32] = shaper->reference_rad;
-    double sight = run->state[0] + linear->line_of_sight_share * run->state[2];
+    double sight = run->state[0] + linear->line_of_sight_fraction * run->state[2];
     double error = run->reference[n % 32] - run->state[0];
     /* torque from this measurement: acts delay_steps later for one step */
     double asked = bst_compensator_step(&run->compensator, error, accel) +

@@ -62,6 +62,26 @@ static const bst_module_desc *find_module(const bst_scenario_registry *registry,
     return NULL;
 }
 
+const bst_config_desc *bst_scenario_tables_inside(const void *user, const char *raw,
+                                                  const char *key, const cJSON *node, int index) {
+    const bst_scenario_registry *registry = user;
+    bool tasking = strcmp(raw, "tasking") == 0;
+    const char *role = tasking && !key ? raw : !tasking && key ? key : NULL;
+    const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(node, "type"));
+    if (!role || !(tasking || strcmp(raw, "modules") == 0)) {
+        return NULL;
+    }
+    for (int i = 0; i < registry->count; i++) {
+        const bst_module_desc *m = registry->modules[i];
+        if (m->config && strcmp(m->role, role) == 0 &&
+            (!type || strcmp(m->type, type) == 0 || (m->also && strcmp(m->also, type) == 0)) &&
+            index-- == 0) {
+            return m->config;
+        }
+    }
+    return index == 0 ? bst_module_common_table : NULL;
+}
+
 /* Lists the types of a role for error messages: "a", "b", "c"; role NULL: all roles. */
 static void list_names(const bst_scenario_registry *registry, const char *role, char *buffer,
                        size_t bytes) {

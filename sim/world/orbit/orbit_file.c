@@ -195,7 +195,7 @@ static bst_status check_axes(bst_ctx *ctx, const char *scenario, const bst_world
         &world->observers[observer].sensors[sensor].config.knowledge.orbit;
     bool across = e->position_rtn_m[1] != 0.0 || e->position_rtn_m[2] != 0.0 ||
                   e->velocity_rtn_mps[1] != 0.0 || e->velocity_rtn_mps[2] != 0.0 ||
-                  e->along_track_mps != 0.0;
+                  e->along_track_drift_mps != 0.0;
     if (!across || (orbit->source != BST_ORBIT_OEM && orbit->source != BST_ORBIT_INJECTED)) {
         return BST_OK;
     }
