@@ -89,7 +89,6 @@ static bst_status read_at(bst_ctx *ctx, const bst_fits_reader *reader, void *out
     return BST_OK;
 }
 
-/* True if the header block contains the END card. */
 static bool has_end(const char *cards, size_t bytes) {
     for (size_t at = 0; at < bytes; at += BST_FITS_CARD) {
         if (memcmp(cards + at, "END     ", 8) == 0) {
@@ -321,7 +320,6 @@ static void find_ids(bst_fits_reader *reader, const hdu *cube) {
     reader->id_count = cards.axes[1];
 }
 
-/* Stores size and frame count of a FITS cube. */
 static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, bool whole) {
     bst_fits_file_info *info = &reader->info;
     uint64_t plane = (uint64_t)h->size[0] * (uint64_t)h->size[1] * 2;
@@ -344,7 +342,6 @@ static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h,
                           : BST_OK;
 }
 
-/* Counts the frames of the file: a cube, or image extensions. */
 static bst_status count_frames(bst_ctx *ctx, bst_fits_reader *reader) {
     hdu h = {.number = 1};
     bool whole = true;
@@ -497,7 +494,6 @@ bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t ind
     return read_id(ctx, reader, index, exposure_id);
 }
 
-/* Provides a pixel buffer for a frame. */
 static bst_status make_room(bst_ctx *ctx, bst_fits_reader *reader, size_t count) {
     if (reader->capacity < count) {
         free(reader->pixels);
