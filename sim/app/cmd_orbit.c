@@ -44,8 +44,5 @@ int bst_cmd_orbit(int argc, char **argv) {
         return bst_options_misuse(&ctx, "orbit");
     }
     bst_status status = bst_orbit_determine(&ctx, &q.determination, argv[1]);
-    if (status != BST_OK) {
-        fprintf(stderr, "boresight orbit: %s\n", ctx.message);
-    }
-    return status == BST_OK ? BST_EXIT_OK : BST_EXIT_FAILED;
+    return bst_command_line_end_as("orbit", &ctx, status);
 }

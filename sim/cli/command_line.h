@@ -22,9 +22,18 @@ typedef struct bst_command_line {
 bool bst_command_line_read(bst_ctx *ctx, const bst_command_line *line, int argc, char **argv,
                            int *arguments, int *code);
 
-/* Ends a command: prints the message of an error to the standard error.
+/* Ends a command: prints "boresight: message" of an error to the standard error.
  *
  * Returned:  exit status of the command: BST_EXIT_OK, BST_EXIT_INTERRUPTED or BST_EXIT_FAILED */
 int bst_command_line_end(const bst_ctx *ctx, bst_status status);
+
+/* The same with the command's name: "boresight NAME: message". */
+int bst_command_line_end_as(const char *name, const bst_ctx *ctx, bst_status status);
+
+/* Ends a command with parts of its own (boresight NAME PART) that was called wrongly: prints
+ * `what`, the word it is about (NULL: none), and where help is.
+ *
+ * Returned:  BST_EXIT_USAGE */
+int bst_command_line_misuse(const char *name, const char *what, const char *word);
 
 #endif
