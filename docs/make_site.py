@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 """Builds the documentation: copies docs/, adds the generated pages, runs Sphinx.
 
-usage: docs/make_site.py BORESIGHT HEADERS_FOLDER SOURCE_FOLDER [HTML_FOLDER]
+usage: docs/make_site.py BORESIGHT SOURCE_FOLDER [HTML_FOLDER]
 
-HEADERS_FOLDER is the installed include/boresight. SOURCE_FOLDER receives the pages that Sphinx reads.
-Without HTML_FOLDER nothing but these is made. No step needs a network.
+SOURCE_FOLDER receives the pages that Sphinx reads. Without HTML_FOLDER nothing but these is made. No step needs a network.
 """
 import pathlib
 import re
@@ -41,7 +40,7 @@ def write_tables(program, path):
         path.write_text(output_of(sys.executable, str(DOCS / "make_tables.py"), str(run / "run.sqlite")), encoding="utf-8")
 
 
-def generate(program, headers, source):
+def generate(program, source):
     if source.exists():
         shutil.rmtree(source)
     shutil.copytree(DOCS, source, ignore=shutil.ignore_patterns("make_*.py", "__pycache__", "*.1"))
@@ -51,20 +50,20 @@ def generate(program, headers, source):
     output_of(*keys, str(reference / "study_keys"), input=output_of(program, "study", "--schema"))
     write_commands(program, reference / "commands.md")
     write_tables(program, reference / "database.md")
-    output_of(sys.executable, str(DOCS / "make_c_api.py"), str(headers), str(reference / "c_api"))
+    output_of(sys.executable, str(DOCS / "make_c_api.py"), str(ROOT / "include" / "boresight"), str(reference / "c_api"))
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     (source / "changes.md").write_text(changes.replace("](docs/", "]("), encoding="utf-8")
 
 
 def main():
-    if len(sys.argv) not in (4, 5):
+    if len(sys.argv) not in (3, 4):
         sys.exit(__doc__)
-    program, headers, source = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-    generate(str(program), headers, source)
-    if len(sys.argv) == 5:
+    program, source = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
+    generate(str(program), source)
+    if len(sys.argv) == 4:
         # -W: a warning is an error; -n: so is a link that leads nowhere
         subprocess.run([sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-n", "-b", "html",
-                        "-d", str(source.with_name(source.name + "-doctrees")), str(source), sys.argv[4]], check=True)
+                        "-d", str(source.with_name(source.name + "-doctrees")), str(source), sys.argv[3]], check=True)
 
 
 if __name__ == "__main__":

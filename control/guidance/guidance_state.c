@@ -1,4 +1,4 @@
-/* Where the body and the cones of keep-out are, by what guidance was told. */
+/* Attitude of the body and keep-out cones, from the telemetry that guidance receives. */
 #include "control/guidance/guidance.h"
 
 int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,

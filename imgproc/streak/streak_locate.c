@@ -133,7 +133,7 @@ static void claim_line(const bst_locate_frame *f, const bst_streak_line *line,
     s->flux_variance = s->flux_e * s->flux_e / (line->snr * line->snr);
 }
 
-/* The source that a line tells of. */
+/* The source that a line of the search shows. */
 typedef struct measured {
     bst_imgproc_found streak;
     bst_imgproc_stamp stamp;

@@ -8,39 +8,24 @@
 - long parameter lists: 8 parameters or more
 - copies: a static function of three lines or more that stands in several files with the same name and text
 - namesakes: a function or type that several headers declare under one name
+- long command files: files of sim/app with 150 lines or more; what a command does belongs into the libraries
 """
 
 import collections
-import os
 import re
 import sys
 
-FOLDERS = ["include", "sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
-ALLOWED = {"call cycles": 5, "long functions": 0, "long parameter lists": 30, "copies": 0, "namesakes": 0}
+from c_sources import files, prototypes, without_comments
+
+ALLOWED = {"call cycles": 5, "long functions": 0, "long parameter lists": 30, "copies": 0, "namesakes": 0,
+           "long command files": 0}
 LONGEST = 80
 MOST_PARAMETERS = 7
+LONGEST_COMMAND = 149
 
 HEAD = re.compile(r"^(?!typedef|struct|enum|union|extern|#)((?:[A-Za-z_][\w\*]*[ \t\n\*]+)+)(\w+)\(", re.M)
 CALL = re.compile(r"\b([a-z_]\w+)\s*\(")
 TYPE = re.compile(r"^\}\s*(bst_\w+);", re.M)
-PROTOTYPE = re.compile(r"^(?!static\b|typedef\b)[A-Za-z_][\w \t\*]*?[\s\*](bst_\w+)\s*\(", re.M)
-
-
-def sources(suffixes):
-    for folder in FOLDERS:
-        for place, _, names in sorted(os.walk(folder)):
-            for name in sorted(names):
-                if name.endswith(suffixes):
-                    yield os.path.join(place, name)
-
-
-def without_comments(text):
-    """The text with blanks in place of comments, texts, characters and preprocessor lines: lines and places stay the same."""
-    blank = lambda m: re.sub(r"[^\n]", " ", m.group(0))
-    text = re.sub(r"/\*.*?\*/|//[^\n]*", blank, text, flags=re.S)
-    text = re.sub(r'"(?:\\.|[^"\\\n])*"', blank, text)
-    text = re.sub(r"'(?:\\.|[^'\\\n])+'", blank, text)
-    return re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", blank, text, flags=re.M)
 
 
 def closing(text, at, pair):
@@ -112,21 +97,30 @@ def circles(edges):
 
 def namesakes():
     places = collections.defaultdict(set)
-    for path in sources((".h",)):
+    for path in files((".h",)):
         with open(path, encoding="utf-8") as file:
             text = without_comments(file.read())
         for name in TYPE.findall(text):
             places[name].add(path)
-        for match in PROTOTYPE.finditer(text):
-            end = closing(text, match.end() - 1, "()")
-            if re.compile(r"[^;{]*;").match(text, end + 1):
-                places[match.group(1)].add(path)
+        for name, _, _ in prototypes(text):
+            places[name].add(path)
     return [f"{name}: {', '.join(sorted(paths))}" for name, paths in sorted(places.items()) if len(paths) > 1]
+
+
+def long_commands():
+    found = []
+    for path in files((".c",)):
+        if path.startswith("sim/app/"):
+            with open(path, encoding="utf-8") as file:
+                lines = len(file.readlines())
+            if lines > LONGEST_COMMAND:
+                found.append(f"{path}: {lines} lines")
+    return found
 
 
 def main():
     sys.setrecursionlimit(10000)
-    everything = [f for path in sources((".c", ".inc")) for f in functions(path)]
+    everything = [f for path in files((".c", ".inc")) for f in functions(path)]
     if len(everything) < 1000:
         sys.exit(f"only {len(everything)} functions found: run this from the root of the sources")
     owner = {f.name: f.path for f in everything if not f.static and f.path.endswith(".c")}
@@ -147,6 +141,7 @@ def main():
                                  if f.parameters > MOST_PARAMETERS],
         "copies": [f"{name}: {', '.join(sorted(paths))}" for (name, _), paths in sorted(copies.items()) if len(paths) > 1],
         "namesakes": namesakes(),
+        "long command files": long_commands(),
     }
     for what, found in cases.items():
         print(f"{what}: {len(found)}, at most {ALLOWED[what]}")

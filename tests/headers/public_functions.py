@@ -5,29 +5,13 @@ it. libboresight shows the functions and data that include/boresight declares, a
     public_functions.py [LIBRARY]     from the root of the sources; LIBRARY: libboresight.so, when it was built
 """
 
-import os
 import re
 import subprocess
 import sys
 
-FOLDERS = ["include", "sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
-FUNCTION = re.compile(r"^(?!static\b|typedef\b|return\b|else\b)[A-Za-z_][\w \t\*]*?[\s\*](bst_\w+)\s*\(", re.M)
+from c_sources import files, prototypes, without_comments
+
 DATA = re.compile(r"^extern\s+[\w\s\*]*?\b(bst_\w+)\s*(?:\[[^\]]*\]\s*)*(?:,\s*(bst_\w+)\s*)?;", re.M)
-
-
-def headers(folders):
-    for folder in folders:
-        for place, _, names in sorted(os.walk(folder)):
-            for name in sorted(names):
-                if name.endswith(".h"):
-                    yield os.path.join(place, name)
-
-
-def blanked(text):
-    """The text with the letters of comments and preprocessor lines as blanks, so that places in it stay the same."""
-    blank = lambda m: re.sub(r"[^\n]", " ", m.group(0))
-    text = re.sub(r"/\*.*?\*/|//[^\n]*", blank, text, flags=re.S)
-    return re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", blank, text, flags=re.M)
 
 
 def is_documented(text, code, start, end):
@@ -47,12 +31,9 @@ def declarations(path):
     """(name, documented, line) of the functions that a header declares, then of its data."""
     with open(path, encoding="utf-8") as file:
         text = file.read()
-    code = blanked(text)
-    for match in FUNCTION.finditer(code):
-        end = re.compile(r"[;{]").search(code, match.end())
-        if end and end.group(0) == ";":
-            line = code.count("\n", 0, match.start()) + 1
-            yield match.group(1), is_documented(text, code, match.start(), end.start()), line
+    code = without_comments(text)
+    for name, start, end in prototypes(code):
+        yield name, is_documented(text, code, start, end), code.count("\n", 0, start) + 1
     for match in DATA.finditer(code):
         for name in match.groups():
             if name:
@@ -69,7 +50,7 @@ def exported(library):
 def main():
     wrong = []
     count = 0
-    for path in headers(FOLDERS):
+    for path in files(".h"):
         for name, documented, line in declarations(path):
             count += 1
             if not documented:
@@ -77,7 +58,7 @@ def main():
     if count < 1000:
         sys.exit(f"only {count} declarations found: run this from the root of the sources")
     if len(sys.argv) > 1:
-        declared = {name for path in headers(["include"]) for name, _, _ in declarations(path)}
+        declared = {name for path in files(".h", ["include"]) for name, _, _ in declarations(path)}
         shown = exported(sys.argv[1])
         wrong += [f"{name} is declared in include/boresight and not in the library" for name in sorted(declared - shown)]
         wrong += [f"{name} is seen in the library and not declared in include/boresight" for name in sorted(shown - declared)]

@@ -9,6 +9,8 @@ import re
 import subprocess
 import sys
 
+import c_sources
+
 # pattern (whole words, any case) -> the term
 WORDS = {
     r"company|companion light": "neighbours, deblend",
@@ -24,7 +26,7 @@ WORDS = {
     r"BST_MODULE_(APART|LINKS|PROMISES)": "BST_MODULE_DEFERRABLE, _MULTI_SENSOR, _HAS_LOOKAHEAD",
     r"fft_light|light_wrap|light_grid|growing\.c|crowd\.c|hits\.c|borrow\.h|lanes\.h": "see docs: names of files",
 }
-FOLDERS = ["include", "sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen", "python", "docs", "README.md"]
+FOLDERS = c_sources.FOLDERS + ["python", "docs", "README.md"]
 FILES = re.compile(r"\.(c|h|inc|cl|cpp|py|md|txt)$")
 
 

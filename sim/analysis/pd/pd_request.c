@@ -64,7 +64,7 @@ const bst_option bst_pd_option_table[] = {
     {.name = "known-rate",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(bst_pd_request, options.known_rate),
-     .doc = "the camera turns, each frame in its own direction, and image processing is told"},
+     .doc = "the camera turns, each frame in its own direction, and image processing knows it"},
     {.name = "false-alarms",
      .kind = BST_OPTION_REAL,
      .offset = offsetof(bst_pd_request, options.false_alarms),
@@ -117,7 +117,7 @@ const bst_option bst_pd_option_table[] = {
      .offset = offsetof(bst_pd_request, options.star_streak_px),
      .argument = "PX",
      .doc = "the camera turns with the targets, each frame in a direction of its own, so that "
-            "stars streak by this; image processing is told (default 0)",
+            "stars streak by this; image processing knows it (default 0)",
      .minimum = 0,
      .maximum = 1000},
     {.name = "module",

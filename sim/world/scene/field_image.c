@@ -132,67 +132,98 @@ static double roughness(const double *x, const double *y, int count) {
     return sum;
 }
 
+/* A path as straight pieces, each with a share of the light: its corners, px. */
+enum { MOST_PIECES = 64 };
+
+typedef struct light_path {
+    int count;
+    double x[MOST_PIECES + 1], y[MOST_PIECES + 1], light[MOST_PIECES];
+} light_path;
+
+/* The path in `count` pieces of equal time; false when a corner is behind the camera. */
+static bool path_in_pieces(const bst_camera *camera, const bst_los_track *track,
+                           const bst_scene_source *source, const double u01[2], int count,
+                           light_path *path) {
+    double duration = track->time_s[track->count - 1], before = 0.0;
+    path->count = count;
+    for (int k = 0; k <= count; k++) {
+        double u = u01[0] + (u01[1] - u01[0]) * k / count;
+        bst_quat q = bst_los_track_attitude(track, u * duration);
+        double after = bst_scene_source_light(source, u);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
+                                &path->x[k], &path->y[k])) {
+            return false;
+        }
+        if (k > 0) {
+            path->light[k - 1] = after - before;
+        }
+        before = after;
+    }
+    return true;
+}
+
+/* Light per px^2 of a straight piece of uniform light at the place (dx, dy) from its middle,
+ * blurred by a Gaussian of variance 2 v. */
+static double light_of_piece(double light, double step_x, double step_y, double dx, double dy,
+                             double v) {
+    double length2 = step_x * step_x + step_y * step_y;
+    if (length2 < 0.09 * v) { /* as a point: right to 0.09 / 96 */
+        return light * exp(-0.25 * (dx * dx + dy * dy) / v) / (4.0 * BST_PI * v);
+    }
+    double length = sqrt(length2), along = (dx * step_x + dy * step_y) / length;
+    double across = (dy * step_x - dx * step_y) / length, scale = 0.5 / sqrt(v);
+    return light / length * exp(-0.25 * across * across / v) / sqrt(16.0 * BST_PI * v) *
+           (erf((0.5 * length - along) * scale) + erf((0.5 * length + along) * scale));
+}
+
+/* The integral of the squared light of a path that is blurred by a Gaussian of variance v: the sum
+ * over its pieces of their light times the light of all pieces, blurred twice, in their middles. */
+static double squared_light_of_path(const light_path *path, double v) {
+    const double far = 12.0 * sqrt(v); /* where a point's light has fallen to exp(-36) */
+    double x[MOST_PIECES], y[MOST_PIECES], near2[MOST_PIECES];
+    double total = 0.0, sum = 0.0;
+    for (int k = 0; k < path->count; k++) {
+        double dx = path->x[k + 1] - path->x[k], dy = path->y[k + 1] - path->y[k];
+        double near = 0.5 * sqrt(dx * dx + dy * dy) + far;
+        x[k] = path->x[k] + 0.5 * dx;
+        y[k] = path->y[k] + 0.5 * dy;
+        near2[k] = near * near;
+    }
+    for (int k = 0; k < path->count; k++) {
+        double light = 0.0;
+        for (int i = 0; i < path->count; i++) {
+            double dx = x[k] - x[i], dy = y[k] - y[i];
+            if (dx * dx + dy * dy < near2[i]) {
+                light += light_of_piece(path->light[i], path->x[i + 1] - path->x[i],
+                                        path->y[i + 1] - path->y[i], dx, dy, v);
+            }
+        }
+        total += path->light[k];
+        sum += path->light[k] * light;
+    }
+    return total > 0.0 ? sum / (total * total) : NAN;
+}
+
 double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_track *track,
                                     const bst_scene_source *source, const double u01[2],
                                     const bst_scene_image_moments *moments, double excess_px2,
                                     double variance_px2) {
-    enum { COARSE = 9, FEWEST = 20, MOST = 256 };
-    const double step_px = 1.5;
-    const double u0 = u01[0], u1 = u01[1];
-    double x[MOST], y[MOST], w[MOST], total = 0.0, length = 0.0, line = 0.0;
-    double duration = track->time_s[track->count - 1], before = bst_scene_source_light(source, u0);
-    for (int k = 0; k < COARSE; k++) { /* most jitter shows in a few places */
-        double u = u0 + (u1 - u0) * ((k + 0.5) / COARSE);
-        bst_quat q = bst_los_track_attitude(track, u * duration);
-        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
-                                &x[k], &y[k])) {
-            return NAN;
-        }
-    }
-    if (roughness(x, y, COARSE) > 0.5 * excess_px2) {
+    enum { COARSE = 8, FEWEST = 20 };
+    const double piece_px = 3.0;
+    light_path path;
+    /* most jitter shows in a few places */
+    if (!path_in_pieces(camera, track, source, u01, COARSE, &path) ||
+        roughness(path.x, path.y, COARSE + 1) > 0.5 * excess_px2) {
         return NAN;
     }
-    /* twice the length of a straight path with these moments */
-    double wanted = 2.0 * sqrt(12.0 * (moments->xx + moments->yy)) / step_px;
-    int count = wanted < FEWEST ? FEWEST : wanted < MOST ? (int)wanted : MOST;
-    for (int k = 0; k < count; k++) {
-        double u = u0 + (u1 - u0) * ((k + 0.5) / count);
-        double after = bst_scene_source_light(source, u0 + (u1 - u0) * ((k + 1.0) / count));
-        bst_quat q = bst_los_track_attitude(track, u * duration);
-        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
-                                &x[k], &y[k])) {
-            return NAN;
-        }
-        w[k] = after - before;
-        total += w[k];
-        before = after;
-        double h = k > 0 ? hypot(x[k] - x[k - 1], y[k] - y[k - 1]) : 0.0;
-        length += h;
-        if (h > 0.0) {
-            double part = 0.5 * (w[k] + w[k - 1]);
-            line += part * part / h;
-        }
-    }
-    if (!(total > 0.0)) {
+    /* pieces of a straight path with these moments */
+    double wanted = sqrt(12.0 * (moments->xx + moments->yy)) / piece_px;
+    int count = wanted < FEWEST ? FEWEST : wanted < MOST_PIECES ? (int)wanted : MOST_PIECES;
+    if (!path_in_pieces(camera, track, source, u01, count, &path) ||
+        roughness(path.x, path.y, count + 1) > 0.5 * excess_px2) {
         return NAN;
     }
-    if (roughness(x, y, count) > 0.5 * excess_px2) {
-        return NAN;
-    }
-    double norm = 1.0 / (total * total);
-    if (length > step_px * (count - 1)) {
-        return norm * line / (2.0 * sqrt(BST_PI * variance_px2));
-    }
-    double sum = 0.0, far = 36.0 * 2.0 * variance_px2;
-    for (int k = 0; k < count; k++) {
-        double row = 0.5 * w[k];
-        for (int i = k + 1; i < count; i++) {
-            double dx = x[i] - x[k], dy = y[i] - y[k], d2 = dx * dx + dy * dy;
-            row += d2 < far ? w[i] * exp(-0.25 * d2 / variance_px2) : 0.0;
-        }
-        sum += 2.0 * w[k] * row;
-    }
-    return norm * sum / (4.0 * BST_PI * variance_px2);
+    return squared_light_of_path(&path, variance_px2);
 }
 
 double bst_image_blur(const bst_camera *camera, const bst_scene_source *source,

@@ -29,13 +29,12 @@ void bst_scene_image_centroid(const bst_camera *camera, const bst_scene_source *
 void bst_scene_image_add_disc(const bst_camera *camera, bst_quat q_mid,
                               const bst_scene_source *source, bst_scene_image_moments *m);
 
-/* The same of any path: that of the source from time u01[0] to u01[1] of the track (0 to 1: all of
- * it), weighted by its light, blurred by a circular Gaussian of this variance (px^2): the double
- * integral over the path of the Gaussian's autocorrelation between its places. `moments` are the
- * path's. Paths so long that 256 places on them are more than 1.5 px apart count as ones that do
- * not meet themselves: 1 / (2 sqrt(pi) sigma) times the integral of the squared light per px. NAN
- * when a place is behind the camera, and when jitter faster than the places makes more than half of
- * `excess_px2`, what the moments have beyond a straight path: that is as good as Gaussian. */
+/* Integral of the squared light of an image, 1/px^2, of light 1: the path of the source from time
+ * u01[0] to u01[1] of the track (0 to 1: all of it), weighted by its light, blurred by a circular
+ * Gaussian of this variance (px^2). The path is taken as 20 to 64 straight pieces of equal time and
+ * uniform light; it may turn back and cross itself. `moments` are the path's. NAN when a place is
+ * behind the camera, and when jitter faster than the pieces makes more than half of `excess_px2`,
+ * what the moments have beyond a straight path: that is as good as Gaussian. */
 double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_track *track,
                                     const bst_scene_source *source, const double u01[2],
                                     const bst_scene_image_moments *moments, double excess_px2,
