@@ -33,9 +33,9 @@ extern const bst_option bst_propagate_options[];
 /* Reads the texts of the request and checks that its options fit together: fills in
  * request->states. Rows run from --start in steps of SI seconds up to and with --stop.
  *
- * Errors:    BST_ERR_ARGUMENT: --elements is missing, a frame that the format or --eop does not
- *            go with, a catalogue number or time that cannot be read, a step that is not whole
- *            microseconds, or too many rows */
+ * Errors:    BST_ERR_ARGUMENT: --elements is missing, a frame that does not go with the format or
+ *            --eop, a wrong catalogue number, --stop before --start, a step that is not whole
+ *            microseconds, or too many rows; those of bst_time_from_utc */
 bst_status bst_propagate_request_settle(bst_ctx *ctx,
                                         bst_propagate_request *request) BST_MUST_CHECK;
 
