@@ -61,7 +61,7 @@ static int command(bst_ctx *ctx, const bst_study_request *r, const char *given) 
         status = bst_study_emit(ctx, &study, kind, r->emit, stdout, stderr);
     } else {
         snprintf(file, sizeof file, "%.4000s/study.json", out);
-        bool checked = r->shard && access(file, F_OK) == 0; /* when it was made */
+        bool checked = r->shard && access(file, F_OK) == 0; /* when the folder was made */
         status = checked ? BST_OK : bst_study_check(ctx, &study, kind);
         study.notes = plugins.notes;
         study.note_count = plugins.count;
