@@ -1,5 +1,5 @@
-/* The block `background` of a camera: the light that fills its pixels between the sources. All zero
- * is a uniform sky of background_mag_arcsec2. */
+/* Configuration block `background` of a camera: light between the sources. All zero: uniform sky of
+ * background_mag_arcsec2. */
 #ifndef BORESIGHT_BACKGROUND_CONFIG_H
 #define BORESIGHT_BACKGROUND_CONFIG_H
 
@@ -20,10 +20,10 @@ typedef struct bst_background_config {
     int32_t model; /* BST_BACKGROUND_... */
     bool zodiacal, starlight;
     double diffuse_galactic_fraction;
-    bool earth, moon, sun; /* their discs and, in `sky` through the PST, their stray light */
+    bool earth, moon, sun; /* discs, and in model `sky` with a PST their stray light */
     double earth_albedo, earth_night_mag_arcsec2, earth_temperature_k, limb_scale_height_m;
     bst_config_list pst; /* bst_optics_pst_point; empty: no stray light */
-    char pst_file[512];  /* the same from a CSV file; "": none */
+    char pst_file[512];  /* PST from a CSV file; "": none */
     double pixel_um;     /* pitch, for stray light; 0: that of the optics */
     /* added in either model: with u, v from -1 to 1 over the sensor's columns and rows,
      * stray + gradient . (u, v) + curvature . (u^2, u v, v^2) */

@@ -63,7 +63,7 @@ typedef struct bst_sim_observer {
     void *user; /* first argument of the functions */
     /* A message was published on `channel` ("detections") of the sensor `scope`
      * ("observer/sensor"). The payload has the type of its channel (boresight/messages.h) and is
-     * lent for the call. */
+     * borrowed for the call. */
     bst_status (*message)(void *user, const char *scope, const char *channel, const void *payload,
                           int64_t tick);
     /* Something happened in a module ("observer/sensor/module"): a word for its kind, and a text.

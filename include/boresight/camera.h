@@ -1,5 +1,5 @@
-/* The camera: focal-plane geometry, radiometry and detector numbers, one description for rendering,
- * truth and the onboard side. */
+/* The camera: focal-plane geometry, radiometry and detector parameters; one description for
+ * rendering, truth and onboard knowledge. */
 #ifndef BORESIGHT_CAMERA_H
 #define BORESIGHT_CAMERA_H
 
@@ -31,14 +31,14 @@ typedef struct bst_camera_geometry {
     double cos_rotation, sin_rotation;
     double domain;       /* tangent radius, undistorted, within which the map is one to one */
     double image_radius; /* tangent radius, distorted, within which every point has an original */
-    double stretch, shrink; /* bounds of the local scale over that of the boresight, in the field */
-    double curvature;       /* bound of the map's second derivative in the field */
+    double stretch, shrink; /* limits of the local scale relative to the boresight, in the field */
+    double curvature;       /* upper limit of the map's second derivative in the field */
 } bst_camera_geometry;
 
 typedef struct bst_camera {
     int64_t width_px, height_px;
     double pixel_scale_arcsec;                 /* at the boresight; tangent (gnomonic) projection */
-    double focal_length_m, f_number, pixel_um; /* NAN: not known; they serve the scale alone */
+    double focal_length_m, f_number, pixel_um; /* NAN: unknown; used for the scale only */
     double aperture_m;                         /* diameter of the entrance pupil */
     double obscuration;                        /* fraction of the pupil's area that is blocked */
     double throughput;                         /* optics, 0..1 */
@@ -53,19 +53,18 @@ typedef struct bst_camera {
     double offset_dn;
     int64_t bits;
     double rotation_deg; /* of the focal plane about the boresight, from camera +x towards +y */
-    double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
+    double boresight_offset_px[2]; /* position of the boresight relative to the sensor's centre */
     bst_camera_distortion distortion;
     bst_optics_config optics;  /* PSF (see psf.h) and vignetting */
-    const struct bst_psf *psf; /* made of this camera, lent to its copies, or NULL; a copy whose
-                                  optics, aperture or scale are changed must clear it */
+    const struct bst_psf *psf; /* made from this camera, borrowed by its copies, or NULL; a copy
+                                  with other optics, aperture or scale must clear it */
     bst_detector_config detector;
     bst_band_config band;
-    const struct bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
-                                 photon_flux_v0_per_s_m2, the same for all colours */
+    const struct bst_band *spectrum; /* made from `band`, owned by the world; NULL: V band of
+                                        photon_flux_v0_per_s_m2, equal for all colours */
     bst_background_config background;
-    const struct bst_scene_pst *pst; /* made from `background` and kept by the world; NULL: none */
-    bst_camera_geometry
-        geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
+    const struct bst_scene_pst *pst; /* made from `background`, owned by the world; NULL: none */
+    bst_camera_geometry geometry; /* by bst_camera_prepare; all zero: no rotation, no distortion */
 } bst_camera;
 
 extern const bst_config_desc bst_camera_config[];

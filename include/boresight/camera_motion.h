@@ -10,14 +10,14 @@
 #pragma GCC visibility push(default)
 
 typedef struct bst_camera_motion {
-    bst_quat q_cam_from_gcrf; /* mean over the exposure, so that a streak's centroid agrees */
+    bst_quat q_cam_from_gcrf; /* mean over the exposure: consistent with the centroid of a streak */
     bst_vec3 turn_cam_rad;    /* rotation vector, camera axes: the attitude at the exposure's end is
                                  bst_quat_from_rotvec(turn / 2) * q_cam_from_gcrf, at its start with
                                  -turn / 2 */
     bst_vec3 bend_cam_rad; /* coefficient of (3 u^2 - 1) / 2, u from -1 to 1 over the exposure: the
                               departure from uniform motion */
-    double bend_sigma_rad; /* 1 sigma per axis of the bend, from the telemetry's noise; 0 where
-                              there are too few samples */
+    double
+        bend_sigma_rad; /* 1 sigma of the bend per axis, from telemetry noise; 0: too few samples */
 } bst_camera_motion;
 
 /* Estimates the camera's motion during one exposure from pointing telemetry.

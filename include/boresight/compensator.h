@@ -58,7 +58,7 @@ typedef struct bst_dynamics_notch_config {
  * times the notches, times w^2 / (s^2 + sqrt(2) w s + w^2) for low_pass_hz. kp = proportional and
  * so on have the unit of the output per unit of the error. */
 typedef struct bst_compensator_config {
-    int32_t type; /* bst_compensator_type; a user's own table may have more names after these */
+    int32_t type; /* bst_compensator_type; a user's table may have additional names after these */
     double bandwidth_hz, crossover_hz, phase_margin_deg, integral_ratio;
     double proportional, integral_per_s, derivative_s, derivative_filter_hz;
     double gain, lead_zero_hz, lead_pole_hz, lag_zero_hz, lag_pole_hz;
@@ -67,7 +67,7 @@ typedef struct bst_compensator_config {
     double feed_forward;
     double output_limit, output_rate_limit_per_s, anti_windup_s;
     double gain_scale, delay_s;
-    bst_stage_use plug; /* desc not NULL: a plug-in instead; the members above are defaults */
+    bst_stage_use plug; /* desc not NULL: a plug-in replaces it; the members above are defaults */
 } bst_compensator_config;
 
 #define BST_STAGE_COMPENSATOR "compensator"
@@ -77,11 +77,11 @@ enum { BST_COMPENSATOR_STATE_BYTES = 4096 };
 /* Functions of a plug-in's compensator; each axis has a state. The plug-in implements its own
  * limits and delay: those of the block "compensator" do not apply to it. */
 typedef struct bst_compensator_stage {
-    size_t state_bytes; /* at most BST_COMPENSATOR_STATE_BYTES, of plain data: copies of it are
-                           independent compensators */
-    /* Fills the state of a compensator at rest, stepped every dt_s. */
+    size_t state_bytes; /* at most BST_COMPENSATOR_STATE_BYTES of plain data: copies are independent
+                           compensators */
+    /* Initialises the state of a compensator at rest with time step dt_s. */
     bst_status (*init)(bst_ctx *ctx, const void *config, double dt_s, void *state);
-    /* The output for this sample's error. */
+    /* Output for the error of this sample. */
     double (*step)(void *state, double error);
     /* Bumpless transfer (bst_compensator_set); NULL: the state stays as it is. */
     void (*set)(void *state, double error, double output);
@@ -177,15 +177,15 @@ typedef struct bst_compensator {
     bst_dynamics_biquad stage[BST_COMPENSATOR_STAGES];
     double state[BST_COMPENSATOR_STAGES][2]; /* direct form II transposed */
     bool integrates;                         /* the last stage has a pole at 1 */
-    double back; /* share of a limited output's excess that goes back into the last stage */
-    double feed_forward, limit, rate_limit; /* limits: INFINITY none; rate_limit a step */
-    double output;                          /* the latest, limited, before the delay */
-    bool limited;                           /* the latest output met a limit */
-    int delay_whole; /* the output comes so many steps later, and delay_part of one */
+    double back; /* fraction of the excess over a limit that is fed back into the last stage */
+    double feed_forward, limit, rate_limit; /* limits: INFINITY: none; rate_limit: per step */
+    double output;                          /* latest output, limited, before the delay */
+    bool limited;                           /* the latest output reached a limit */
+    int delay_whole;                        /* delay in steps: integer and fractional part */
     double delay_part;
-    int delay_next; /* where `past` is written next */
+    int delay_next; /* next write position in `past` */
     double past[BST_COMPENSATOR_DELAY];
-    const bst_compensator_stage *plug; /* not NULL: this one with its state, and no stages */
+    const bst_compensator_stage *plug; /* not NULL: plug-in with its state; no stages */
     _Alignas(16) unsigned char plug_state[BST_COMPENSATOR_STATE_BYTES];
 } bst_compensator;
 

@@ -16,7 +16,7 @@ typedef enum bst_config_type {
     BST_CONFIG_INT,     /* int64_t */
     BST_CONFIG_REAL,    /* double */
     BST_CONFIG_STRING,  /* char[size], size in the descriptor */
-    BST_CONFIG_PATH,    /* the same: a file; a scenario's are made absolute when it is read */
+    BST_CONFIG_PATH,    /* char[size]: file path; a scenario's paths become absolute when read */
     BST_CONFIG_ENUM,    /* int32_t, index into choices */
     BST_CONFIG_CHOICES, /* uint32_t, bit k for choices[k]; in JSON a list of names */
     BST_CONFIG_SEED,    /* uint64_t: "0x...", a decimal string, or an integer */
@@ -38,13 +38,14 @@ typedef struct bst_config_list {
 typedef struct bst_config_desc {
     const char *key;
     bst_config_type type;
-    const char *unit;        /* "s", "arcsec", "" ... for the schema and the reference page */
-    double minimum, maximum; /* numbers and each element of REALS; list: number of items */
+    const char *unit; /* "s", "arcsec", "" ... for the schema and the reference page */
+    double minimum,
+        maximum;          /* range of numbers and of each element of REALS; list: number of items */
     const char *fallback; /* default as JSON text ("0.5", "\"ideal\"", "[0, 0, 1]"); NULL: the key
                              is required */
     const char *doc;      /* one sentence */
     size_t offset, size;  /* of the member in its struct */
-    const char *const *choices; /* ENUM: names, PATH: words that are no file; NULL-terminated */
+    const char *const *choices; /* ENUM: names; PATH: keywords that are no file; NULL-terminated */
     const struct bst_config_desc *children; /* OBJECT, LIST */
     size_t item_bytes;                      /* LIST: size of one struct */
 } bst_config_desc;
@@ -56,7 +57,7 @@ typedef struct bst_config_desc {
         .key = #m, .type = BST_CONFIG_REAL, .unit = unit_, .minimum = min_, .maximum = max_, \
         .fallback = def_, .doc = doc_, BST_FIELD_(s, m)                                      \
     }
-/* A number that may be left open: null, the default, is NAN in the struct. */
+/* An optional number: null, the default, is NAN in the struct. */
 #define BST_OPEN_REAL(s, m, unit_, min_, max_, doc_) \
     BST_REAL(s, m, unit_, min_, max_, BST_CONFIG_OPEN, doc_)
 #define BST_CONFIG_OPEN "null"
@@ -80,7 +81,7 @@ typedef struct bst_config_desc {
         .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \
         BST_FIELD_(s, m)                                                               \
     }
-/* A file, or one of a NULL-terminated list of words. */
+/* A file path, or one of a NULL-terminated list of keywords. */
 #define BST_PATH_OR(s, m, words_, def_, doc_)                                          \
     {                                                                                  \
         .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \

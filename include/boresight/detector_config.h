@@ -1,5 +1,4 @@
-/* What the detector does beyond the camera's plain numbers: block `camera.detector`. Every effect
- * is off by default. */
+/* Configuration block `camera.detector`: detector effects. Every effect is off by default. */
 #ifndef BORESIGHT_DETECTOR_CONFIG_H
 #define BORESIGHT_DETECTOR_CONFIG_H
 
@@ -7,26 +6,25 @@
 
 #pragma GCC visibility push(default)
 
-/* What happens to charge above the full well. */
+/* Charge above the full well. */
 enum { BST_WELL_CLIP, BST_WELL_BLOOM };
-/* From the converter's numbers to the frame's. */
+/* Coding of the converter's numbers. */
 enum { BST_QUANTISE_UNIFORM, BST_QUANTISE_SQUARE_ROOT, BST_QUANTISE_TABLE };
 
-/* Energetic particles. */
+/* Hits of energetic particles (cosmic rays). */
 typedef struct bst_detector_cosmic_ray_config {
-    double rate_per_cm2_s;           /* through the detector's surface, both sides together */
-    double pixel_pitch_um, depth_um; /* of a pixel: its side, and the sensitive layer's thickness */
+    double rate_per_cm2_s;           /* through the detector's surface, from both sides */
+    double pixel_pitch_um, depth_um; /* pixel side, and thickness of the sensitive layer */
     double e_per_um;                 /* most probable charge per path */
     double straggling; /* width of the Landau-like spread over the most probable value */
-    double frame_s; /* time in which the detector collects hits besides the exposure: transfer and
-                       read-out */
+    double frame_s;    /* additional collection time of hits: transfer and read-out */
 } bst_detector_cosmic_ray_config;
 
 typedef struct bst_detector_quantisation_config {
     int32_t model;   /* BST_QUANTISE_... */
     int64_t bits;    /* of the codes, square root */
-    char table[512]; /* file: the converter's number at which each code begins */
-    bool expand;     /* the frame holds the middle of each code's numbers, not the code */
+    char table[512]; /* file: first converter number of each code */
+    bool expand;     /* the frame has the mean converter number of each code instead of the code */
 } bst_detector_quantisation_config;
 
 typedef struct bst_detector_config {

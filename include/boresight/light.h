@@ -48,7 +48,7 @@ typedef struct bst_light_aberration {
     double inverse_gamma, share, potential; /* share: 1 / (1 + inverse_gamma) */
 } bst_light_aberration;
 
-/* Computes what aberration needs of observer and Sun, once for many directions. */
+/* Computes the quantities of aberration by observer and Sun, once for many directions. */
 bst_light_aberration bst_light_aberration_of(const bst_light *light);
 
 /* bst_light_aberrate with the precomputed quantities of bst_light_aberration_of.

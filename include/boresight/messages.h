@@ -38,13 +38,13 @@ typedef struct bst_channel_type {
     bst_channel_kind kind;
     size_t header_bytes;
     size_t item_bytes; /* 0: no items */
-    bool in_place;     /* a ring that its writer extends in place: cannot be read with a delay */
+    bool in_place;     /* a ring that its writer extends in place; it cannot be read with a delay */
     void (*release)(
-        void *payload); /* frees what a slot owns before it is overwritten; may be NULL */
-    void (*retain)(
-        void *payload); /* takes references for a copy of the payload; set if release is */
-    bool lends; /* the payload points to memory of its writer that the next message overwrites */
-    int (*count)(const void *payload); /* items in use, the first ones; NULL: any may be */
+        void *payload); /* releases the resources of a slot before it is overwritten; may be NULL */
+    void (*retain)(void *payload); /* retains the resources for a copy of the payload; set together
+                                      with release */
+    bool lends; /* the payload refers to memory of the writer, valid until its next message */
+    int (*count)(const void *payload); /* number of items in use, from the first; NULL: all items */
 } bst_channel_type;
 
 /* Type of a channel.

@@ -1,4 +1,4 @@
-/* What a module is: a static descriptor, a configuration table, ports, and three functions. */
+/* The module interface: a static descriptor, a configuration table, ports, and three functions. */
 #ifndef BORESIGHT_MODULE_H
 #define BORESIGHT_MODULE_H
 
@@ -10,16 +10,16 @@
 
 #define BST_MODULE_ABI 3
 
-struct bst_world;     /* sim/world: what is true */
-struct bst_knowledge; /* sim/world: what the onboard side knows */
+struct bst_world;     /* sim/world: the truth */
+struct bst_knowledge; /* sim/world: onboard knowledge */
 struct bst_device;    /* sim/device */
 struct bst_link;      /* sim/link */
-struct bst_step;      /* sim/engine; reached through the functions below */
+struct bst_step;      /* sim/engine; accessed through the functions below */
 
 typedef enum bst_port_direction {
     BST_PORT_IN,
     BST_PORT_OUT,
-    BST_PORT_MODIFY, /* changes in place what another module wrote, before any reader sees it */
+    BST_PORT_MODIFY, /* modifies the message of another module before any reader gets it */
 } bst_port_direction;
 
 enum {
@@ -45,7 +45,7 @@ enum {
         1u << 2, /* deferrable: may step in another thread than modules that do not
                read it. Shares only constant or locked data with them,
                has no period and never requests a wake */
-    BST_MODULE_NEEDS_LINK = 1u << 3,   /* gets env->link: another program takes its part */
+    BST_MODULE_NEEDS_LINK = 1u << 3,   /* gets env->link: another program replaces the module */
     BST_MODULE_MULTI_SENSOR = 1u << 4, /* multi-sensor: one instance for all sensors, named beside
                                    the observers. It has each port once per sensor
                                    (bst_member_port); env->knowledge is NULL */
@@ -84,26 +84,27 @@ typedef struct bst_module_env {
     const struct bst_knowledge *knowledge; /* of this sensor */
     struct bst_device *device;             /* NULL unless the descriptor asks for it */
     int observer, sensor;                  /* indices in the world */
-    double exposure_s;                     /* the longest of this sensor that the scenario sets: its
-                                              own, or exposure_s of a module that commands it; from
-                                              the first to the last row of a rolling shutter */
-    int64_t los_period_ticks, los_offset_ticks; /* when this sensor's los_history is written */
-    uint32_t planes;                            /* bit k: the bst_plane k is recorded */
-    double mask_threshold_sigma; /* least light of a pixel of the segmentation mask */
+    double
+        exposure_s; /* longest exposure of this sensor: its own setting, or exposure_s of a module
+                       that commands it; from the first to the last row of a rolling shutter */
+    int64_t los_period_ticks,
+        los_offset_ticks;        /* steps at which this sensor's los_history is written */
+    uint32_t planes;             /* bit k: the bst_plane k is recorded */
+    double mask_threshold_sigma; /* minimum light of a pixel in the segmentation mask */
     void *engine_private;
-    double frame_exposure_s, frame_period_s; /* of this sensor's frames, as set and commanded */
-    double frame_latency_s; /* from an exposure's end until control has what it showed: the declared
-                               delays in between */
+    double frame_exposure_s, frame_period_s; /* of this sensor's frames, as set or commanded */
+    double frame_latency_s; /* from the end of an exposure until control has its tracks: sum of the
+                               declared delays */
     struct bst_link *link;  /* NULL unless the descriptor asks for it */
-    const bst_fleet_member *members; /* of a BST_MODULE_MULTI_SENSOR one: all sensors, in the order
-                                        of the scenario; else NULL */
+    const bst_fleet_member *
+        members; /* of a BST_MODULE_MULTI_SENSOR module: all sensors in scenario order; else NULL */
     int member_count;
 } bst_module_env;
 
 typedef struct bst_module_desc {
     uint32_t abi;     /* BST_MODULE_ABI */
     const char *role; /* "gimbal", "scenegen", "imgproc", "tracker", "control", ... */
-    const char *type; /* "second_order": what a scenario writes as "type" */
+    const char *type; /* name in a scenario's "type", such as "second_order" */
     const char *doc;
     unsigned flags;
     const bst_config_desc *config;
@@ -130,7 +131,7 @@ typedef struct bst_module_desc {
      * with theirs take their values. Its last trigger is delayed by the sum of the delays between
      * them. */
     const char *const *substitutes_for;
-    const char *also; /* another name that a scenario may write as "type"; NULL: none */
+    const char *also; /* alternative name for "type"; NULL: none */
 } bst_module_desc;
 
 /* In create: sets the number of items that an output's payload holds.

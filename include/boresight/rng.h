@@ -47,8 +47,7 @@ double bst_rng_uniform(bst_rng_key key, uint64_t a, uint64_t b);
  * Reference: Box and Muller 1958 */
 void bst_rng_normal2(bst_rng_key key, uint64_t a, uint64_t b, double out[2]);
 
-/* bst_rng_normal2 for the counters (first, 0), (first + 1, 0), ... to rounding (1e-15), the first
- * deviates in out[0]; at a sixth of the cost for each. */
+/* number of deviates in a block */
 #define BST_RNG_BLOCK 16
 
 /* bst_rng_normal2 for the 16 counters (first, 0), (first + 1, 0), ..., six times as fast.

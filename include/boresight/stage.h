@@ -12,7 +12,7 @@
 typedef struct bst_stage_desc {
     uint32_t abi;     /* BST_STAGE_ABI */
     const char *kind; /* BST_STAGE_DETECTOR, ... */
-    const char *type; /* the plug-in's own name for it */
+    const char *type; /* the plug-in's name of the stage */
     const char *doc;
     const bst_config_desc *config; /* keys that a scenario may set beside "plugin"; NULL: none */
     size_t config_bytes;
@@ -35,7 +35,7 @@ typedef struct bst_stage_use {
         BST_FIELD_(s, m)                                                                       \
     }
 
-/* The same in a table that fills a bst_stage_use and nothing else. */
+/* As BST_STAGE, in a table that fills only a bst_stage_use. */
 #define BST_STAGE_ALONE(kinds_, doc_)                                                          \
     {                                                                                          \
         .key = "plugin", .type = BST_CONFIG_STAGE, .unit = "", .doc = doc_, .choices = kinds_, \

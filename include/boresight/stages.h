@@ -18,17 +18,17 @@
  * include/boresight/compensator.h */
 #define BST_STAGE_FRAME "frame_stage" /* of scenegen: bst_frame_stage */
 
-extern const char *const bst_stage_kinds[]; /* these, then NULL */
+extern const char *const bst_stage_kinds[]; /* all kinds of stages, then NULL */
 
 /* ---- detector: finds the sources in a frame. imgproc then identifies stars, calibrates photometry
  * and assigns labels. */
 
 typedef struct bst_detector_env {
-    const bst_camera *camera;  /* as the onboard side knows it; outlives the stage */
-    double electrons_per_s_v0; /* detected of a source of V = 0, e-/s */
-    int capacity;              /* most detections of a frame */
-    /* maps on the full sensor, [height_px][width_px], NULL: none: dark signal's departure from its
-     * mean (e-/s), relative response, and what is not zero is a bad pixel */
+    const bst_camera *camera;  /* onboard camera model; outlives the stage */
+    double electrons_per_s_v0; /* detected electrons per second of a source of V = 0 */
+    int capacity;              /* maximum number of detections per frame */
+    /* onboard calibration maps on the full sensor, [height_px][width_px]; NULL: none: dark current
+     * minus its mean (e-/s), relative response, bad pixels (not zero) */
     const float *dark_e_per_s, *flat;
     const uint8_t *bad;
 } bst_detector_env;
@@ -58,7 +58,7 @@ typedef struct bst_detector_stage {
 /* ---- frame_stage: changes a rendered frame before any module or the recorder reads it. */
 
 typedef struct bst_frame_stage_env {
-    const bst_camera *camera; /* the true one; outlives the stage */
+    const bst_camera *camera; /* the true camera; outlives the stage */
     const char *instance;     /* "observer/sensor/scenegen" */
     uint64_t seed, run;       /* for bst_rng_make_key */
 } bst_frame_stage_env;

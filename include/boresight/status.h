@@ -19,12 +19,12 @@ typedef enum bst_status {
     BST_ERR_IO,          /* the operating system refused a file operation */
     BST_ERR_FORMAT,      /* a file's content is not what its format allows */
     BST_ERR_CONFIG,      /* a scenario is wrong */
-    BST_ERR_RANGE,       /* a date or value outside what the data cover */
+    BST_ERR_RANGE,       /* a date or value outside the range of the data */
     BST_ERR_NOT_FOUND,   /* a name, file or number that does not exist */
     BST_ERR_DEVICE,      /* OpenCL failed */
     BST_ERR_NUMERIC,     /* an iteration did not converge or a matrix is not positive definite */
     BST_ERR_STATE,       /* a call in the wrong order */
-    BST_ERR_INTERRUPTED, /* the user asked to stop */
+    BST_ERR_INTERRUPTED, /* the user requested a stop */
     BST_STATUS_COUNT
 } bst_status;
 
@@ -51,7 +51,7 @@ typedef void (*bst_log_fn)(void *user, bst_log_level level, const char *message)
 /* Per-run context. Zero-initialise ({0}) or call bst_ctx_init; owns nothing.
  * A context belongs to one run and is written by one thread at a time. */
 typedef struct bst_ctx {
-    char message[BST_MESSAGE_BYTES]; /* why the last failing call failed; "" when none did */
+    char message[BST_MESSAGE_BYTES]; /* reason of the last failure; "": none */
     bst_log_fn log;                  /* NULL: log lines are dropped */
     void *log_user;
     bst_log_level log_level; /* lines above this level are dropped */

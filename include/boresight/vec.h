@@ -28,8 +28,7 @@ typedef struct bst_mat3 {
 
 #define BST_QUAT_IDENTITY ((bst_quat){0.0, 0.0, 0.0, 1.0})
 
-/* atan2(y, x), rad; uses its series, exact to rounding, if |y| < 0.01 x, which is a few times as
- * fast. */
+/* atan2(y, x), rad; by series, accurate to rounding, if |y| < 0.01 x: a few times as fast. */
 static inline double bst_atan2(double y, double x) {
     if (fabs(y) < 0.01 * x) {
         double t = y / x, t2 = t * t;
@@ -37,7 +36,7 @@ static inline double bst_atan2(double y, double x) {
     }
     return atan2(y, x);
 }
-/* The same angle in (-pi, pi], rad. */
+/* Reduces an angle to (-pi, pi], rad. */
 static inline double bst_wrap_angle(double angle_rad) {
     const double two_pi = 2.0 * BST_PI;
     return angle_rad - two_pi * ceil(angle_rad / two_pi - 0.5);
@@ -193,7 +192,7 @@ static inline bst_quat bst_quat_from_rotvec(bst_vec3 r) {
     if (!(square < 2e-4)) {
         return bst_quat_from_large_rotvec(r);
     }
-    /* sin(a/2)/a and cos(a/2) by their series, exact to rounding: most turns are small, and the
+    /* series of sin(a/2)/a and cos(a/2), accurate to rounding for the usual small angles, where the
      * quotient would lose digits */
     double s = 0.5 - square * (1.0 / 12.0 - square * (1.0 / 240.0 - square * (1.0 / 10080.0)));
     double c =

@@ -1,4 +1,4 @@
-/* The version of the library that is running. */
+/* Version of the running library. */
 #ifndef BORESIGHT_VERSION_H
 #define BORESIGHT_VERSION_H
 

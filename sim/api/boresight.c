@@ -10,13 +10,13 @@
 struct bst_model {
     bst_json *json;
     bst_scenario scenario;
-    bool read; /* the scenario is to be freed */
+    bool read; /* the scenario must be freed */
 };
 
 struct bst_sim {
     const bst_model *model;
     bst_simulation *simulation;
-    int64_t tick; /* reached, exclusive */
+    int64_t tick; /* end of the stepped time, exclusive */
 };
 
 static bst_status read_model(bst_ctx *ctx, const char *path, const char *const *assignments,
@@ -25,7 +25,7 @@ static bst_status read_model(bst_ctx *ctx, const char *path, const char *const *
     for (int i = 0; i < count; i++) {
         BST_TRY(bst_json_set(ctx, model->json, assignments[i]));
     }
-    model->read = true; /* to be freed after an error too */
+    model->read = true; /* free it after an error too */
     return bst_scenario_read(ctx, model->json, bst_registry_shipped(), &model->scenario);
 }
 
@@ -108,7 +108,8 @@ bst_status bst_sim_run_until(bst_ctx *ctx, bst_sim *sim, double until_s) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "cannot run until %g s: allowed is up to %g s",
                         until_s, 9e15 / (double)sim->model->scenario.tick_rate_hz);
     }
-    int64_t until = (int64_t)ceil(ticks - 1e-6); /* a time that rounding has put behind its tick */
+    int64_t until =
+        (int64_t)ceil(ticks - 1e-6); /* tolerance for a time rounded to just above its tick */
     if (until <= sim->tick) {
         return BST_OK;
     }

@@ -48,7 +48,7 @@ double bst_astro_height_m(bst_vec3 p) {
     if (!(r2 > 0.0)) {
         return -BST_EARTH_RADIUS_M;
     }
-    /* where the radius meets the ellipsoid */
+    /* distance at which the radius intersects the ellipsoid */
     double surface2 = BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M * r2 / (across2 + p.z * p.z / squash);
     return sqrt(r2) - sqrt(surface2);
 }
@@ -64,7 +64,7 @@ double bst_atmosphere_density_kgpm3(double height_m) {
     double y0 = log(low->density_kgpm3), y1 = log(high->density_kgpm3);
     double slope = (y1 - y0) / width, b = (km - low->height_km) / width, a = 1.0 - b;
     double y;
-    if (b > 1.0) { /* above all: the spline's last slope; its curvature ends at 0 */
+    if (b > 1.0) { /* above all layers: constant slope; the spline's curvature ends at 0 */
         y = y1 + (km - high->height_km) * (slope + width / 6.0 * low->curvature);
     } else if (b < 0.0) {
         y = y0 + (km - low->height_km) * (slope - width / 6.0 * high->curvature);

@@ -1,4 +1,4 @@
-/* Density of the upper atmosphere. */
+/* Density of the upper atmosphere, for drag. */
 #ifndef BST_ASTRO_ATMOSPHERE_H
 #define BST_ASTRO_ATMOSPHERE_H
 
@@ -11,9 +11,8 @@ double bst_astro_height_m(bst_vec3 position_itrf_m);
 /* Mean density (kg/m^3) at a height (m), of moderate solar activity: the base densities of the
  * exponential layers of Vallado, Fundamentals of Astrodynamics and Applications, table 8-4 (US
  * Standard Atmosphere 1976 below 25 km, CIRA-72 above), joined by a natural cubic spline in the
- * logarithm, so that an integrator finds no corners; above 1000 km the logarithm goes on in a
- * straight line, below 0 too. Real densities at 500 km swing by a factor of ten over a solar cycle.
- */
+ * logarithm, which is smooth for an integrator; above 1000 km and below 0 the logarithm is linear.
+ * Real densities at 500 km vary by a factor of ten over a solar cycle. */
 double bst_atmosphere_density_kgpm3(double height_m);
 
 #endif

@@ -10,7 +10,7 @@ static bst_vec3 scaled(const double v[3], double scale) {
 void bst_bodies_at(bst_time t, bst_bodies *out) {
     double tt1, tt2, earth_helio[2][3], earth_bary[2][3], moon[2][3], of_date[3][3];
     bst_time_tt(t, &tt1, &tt2);
-    /* Its status warns of dates outside 1900..2100, where the model only loses accuracy. */
+    /* its status warns of dates outside 1900..2100, where only the accuracy is lower */
     (void)eraEpv00(tt1, tt2, earth_helio, earth_bary);
     eraMoon98(tt1, tt2, moon);
     out->sun_m = scaled(earth_helio[0], -BST_AU_M);

@@ -1,4 +1,4 @@
-/* Sun, Moon, Earth: places, light, shadow and occultation. Vectors in GCRF axes, metres. */
+/* Sun, Moon and Earth: positions, illumination, shadow and occultation. GCRF axes, metres. */
 #ifndef BST_ASTRO_BODIES_H
 #define BST_ASTRO_BODIES_H
 
@@ -24,28 +24,28 @@ typedef struct bst_bodies {
 
 /* Sun and Earth by eraEpv00 (heliocentric 14 km, barycentric 8 mm/s at most against DE405), Moon by
  * eraMoon98 (about 3 arcsec rms). The pole is the mean one of date (eraPmat06): nutation moves it
- * by 9 arcsec, the limb by less than 2 m. TT serves as TDB. */
+ * by 9 arcsec, the limb by less than 2 m. TT is used as TDB. */
 void bst_bodies_at(bst_time t, bst_bodies *out);
 
-/* Where the sunlight comes from that arrives at the Earth: the Sun at the time when the light left
- * it, seen from the moving Earth. It stands 20.5 arcsec beside the geometric Sun, so that the
- * shadow at geostationary distance lies up to 4 km beside the line of the centres. GCRF axes, m. */
+/* Apparent origin of sunlight at the Earth: the Sun at the time of emission, seen from the moving
+ * Earth. It is 20.5 arcsec from the geometric Sun; the shadow at geostationary distance is up to 4
+ * km off the line of centres. GCRF axes, m. */
 static inline bst_vec3 bst_bodies_sunlight_from(const bst_bodies *b) {
     return bst_vec3_axpy(b->sun_m, bst_vec3_norm(b->sun_m) / BST_LIGHT_SPEED_MPS,
                          b->earth_bary_mps);
 }
 
-/* The pole where the date is not known: that of J2000. In 2030 the limb is off by 60 m at most. */
+/* Pole for unknown dates: that of J2000. In 2030 the limb error is at most 60 m. */
 #define BST_EARTH_POLE_J2000 ((bst_vec3){0.0, 0.0, 1.0})
 
-/* Depth in Earth radii, 1 cm, up to which a point or a line only touches the Earth. */
+/* depth in Earth radii (1 cm) up to which a line counts as tangent to the Earth */
 #define BST_EARTH_TOUCH 1.5e-9
 
-/* Fraction of the Sun's disc by area, 0 to 1, that a point sees past the WGS-84 ellipsoid without
- * air.
+/* Visible fraction of the Sun's disc by area, 0 to 1, at a point, with the WGS-84 ellipsoid and
+ * without atmosphere.
  *
  * Given:    position_m  geocentric, GCRF axes
- *           sun_m       geocentric place that the sunlight comes from (bst_bodies_sunlight_from)
+ *           sun_m       geocentric origin of the sunlight (bst_bodies_sunlight_from)
  *           pole        the Earth's axis, unit
  * Returned: 1 in full light, 0 in umbra and inside the Earth, the uncovered area in between and in
  *           annular eclipse.
@@ -54,7 +54,7 @@ static inline bst_vec3 bst_bodies_sunlight_from(const bst_bodies *b) {
  * (tests/astro/test_shadow_rays.c). */
 double bst_astro_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole);
 
-/* Wavelengths of bst_astro_sunlight; the second stands for V. */
+/* wavelengths of bst_astro_sunlight; the second one represents V */
 enum { BST_SUNLIGHT_COLOURS = 4, BST_SUNLIGHT_V = 1 };
 extern const double bst_sunlight_wavelength_m[BST_SUNLIGHT_COLOURS];
 
@@ -66,35 +66,33 @@ typedef struct bst_astro_sunlight {
 /* Sunlight at a point, with the Sun's limb darkening and, if asked for, the refraction and
  * extinction of the Earth's atmosphere.
  *
- * Given:    as bst_astro_sun_fraction; atmosphere: whether the Earth has air
+ * Given:    as bst_astro_sun_fraction; atmosphere: include the Earth's atmosphere
  * Returned: *out
  * Notes: rays are bent and spread as in geometric optics, weakened by Rayleigh scattering and
- * ozone, and end at the cloud tops (8 km). What passes below 12 km, most of the light
- * in the inner penumbra of low orbits and in all umbrae, depends on clouds and aerosols of
- * the place, which are not known: it may be wrong by a factor of 2. Within the air (below 80 km)
- * there is no refraction.
+ * ozone, and end at the cloud tops (8 km). Light below 12 km (most of the light in the inner
+ * penumbra of low orbits and in all umbrae) depends on clouds and aerosols, which are unknown: an
+ * error by a factor of 2 is possible. At points below 80 km refraction is omitted.
  * Reference: Baum and Code, AJ 58, 108 (1953); Link, Eclipse Phenomena in
  * Astronomy (1969), chapter 2; limb darkening: Cox, Allen's Astrophysical Quantities (4th edition),
  * table 14.17. */
 void bst_astro_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
                            bst_astro_sunlight *out);
 
-/* Angle (rad) of a direction from the WGS-84 ellipsoid's limb, seen from position_m; negative where
- * the Earth is in the way, pi where the direction is more than a right angle beyond, -pi inside of
- * the Earth. Exact at the limb. */
+/* Angle (rad) of a direction from the limb of the WGS-84 ellipsoid, at position_m. Negative: the
+ * Earth occults it; pi: more than 90 degrees beyond; -pi: inside the Earth. Exact at the limb. */
 double bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction);
 
-/* True when the segment between two geocentric points (GCRF) passes through the WGS-84 ellipsoid
- * about `pole`, also when an end lies inside it. A touch less than 1 cm deep does not count, so
- * that a point on the surface sees what is above its horizon. */
+/* True if the segment between two geocentric points (GCRF) intersects the WGS-84 ellipsoid with
+ * axis `pole`, also if an end is inside. Intersections less than 1 cm deep do not count: a point on
+ * the surface sees objects above its horizon. */
 bool bst_astro_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole);
 
-/* Light of an observer with geocentric GCRF position and velocity. */
+/* Aberration and light deflection for an observer with geocentric GCRF position and velocity. */
 bst_light bst_light_at(const bst_bodies *bodies, bst_vec3 position_m, bst_vec3 velocity_mps);
 
-/* The vector from observer to object that bst_light_aberrate wants, from geocentric GCRF
- * positions of the object at emission, tau_s before the observer's instant. The Earth's own motion
- * during tau counts: 20 arcsec, which aberration by the Earth's velocity takes back. */
+/* Vector from observer to object for bst_light_aberrate, from the geocentric GCRF position of the
+ * object at emission, tau_s earlier. It includes the Earth's motion during tau, 20 arcsec, which
+ * aberration by the Earth's velocity cancels. */
 static inline bst_vec3 bst_light_path(const bst_bodies *bodies, bst_vec3 object_at_emission_m,
                                       bst_vec3 observer_m, double tau_s) {
     return bst_vec3_axpy(bst_vec3_sub(object_at_emission_m, observer_m), -tau_s,

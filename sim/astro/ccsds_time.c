@@ -26,7 +26,7 @@ bool bst_astro_time_system_find(const char *name, size_t length, bst_astro_time_
     return false;
 }
 
-/* Takes exactly `digits` digits, then the character `after` unless that is 0. */
+/* Parses exactly `digits` digits, then the character `after` unless it is 0. */
 static bool take(bst_text_span *s, size_t digits, char after, int *value) {
     size_t bytes = digits + (after != 0);
     if (s->length < bytes || (after && s->text[digits] != after) ||
@@ -59,8 +59,8 @@ static bool read_calendar(bst_text_span s, calendar *c) {
     }
     c->second = (double)whole;
     if (s.length > 0) {
-        /* the two digits before the point again, so that seconds are rounded once; digits beyond
-         * those of a double cannot matter, however many there are */
+        /* parses the seconds with their decimals, so that they are rounded once; digits beyond
+         * double precision are ignored */
         char text[48];
         for (size_t i = 1; i < s.length; i++) {
             if (s.text[i] < '0' || s.text[i] > '9') {
@@ -81,7 +81,7 @@ static bst_status fail_date(bst_ctx *ctx, bst_text_span s, const char *problem) 
     return bst_fail(ctx, BST_ERR_FORMAT, "%s %s", quoted, problem);
 }
 
-/* Day of the year to month and day. */
+/* Converts day of year to month and day. */
 static bst_status resolve_day(bst_ctx *ctx, bst_text_span s, calendar *c) {
     double mjd0, mjd, fraction;
     if (c->month != 0) {
@@ -97,7 +97,7 @@ static bst_status resolve_day(bst_ctx *ctx, bst_text_span s, calendar *c) {
     return BST_OK;
 }
 
-/* Two-part Julian date in the system itself, quasi-JD for UTC. */
+/* Two-part Julian date in the given time system, quasi-JD for UTC. */
 static bst_status read_jd(bst_ctx *ctx, bst_text_span s, bool utc, double *jd1, double *jd2) {
     calendar c;
     if (!read_calendar(s, &c)) {
@@ -164,5 +164,5 @@ bst_status bst_ccsds_utc_jd(bst_ctx *ctx, const char *text, size_t length, doubl
                             double *jd2) {
     bst_time t;
     BST_TRY(read_jd(ctx, (bst_text_span){text, length}, true, jd1, jd2));
-    return bst_time_from_utc_jd(ctx, *jd1, *jd2, &t); /* for its range */
+    return bst_time_from_utc_jd(ctx, *jd1, *jd2, &t); /* checks the range */
 }

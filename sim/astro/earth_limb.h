@@ -1,12 +1,12 @@
-/* The Earth's limb as a point outside of it sees it: one figure for shadow and occultation. Inside
- * of sim/astro. */
+/* The Earth's limb as seen from a point outside, for shadow and occultation. Internal to
+ * sim/astro. */
 #ifndef BST_ASTRO_EARTH_LIMB_H
 #define BST_ASTRO_EARTH_LIMB_H
 
 #include "sim/astro/bodies.h"
 
-/* Coordinates in which the WGS-84 ellipsoid, grown by height_m along its axes, is the unit sphere.
- */
+/* Coordinates in which the WGS-84 ellipsoid, enlarged by height_m along its axes, is the unit
+ * sphere. */
 static inline bst_vec3 bst_earth_unit_sphere(bst_vec3 gcrf_m, bst_vec3 pole, double height_m) {
     double a = BST_EARTH_RADIUS_M + height_m;
     double b = BST_EARTH_RADIUS_M * (1.0 - BST_EARTH_FLATTENING) + height_m;
@@ -15,33 +15,33 @@ static inline bst_vec3 bst_earth_unit_sphere(bst_vec3 gcrf_m, bst_vec3 pole, dou
     return bst_vec3_axpy(p, along * (1.0 / b - 1.0 / a), pole);
 }
 
-/* Height above the ellipsoid along the radius, in Earth radii; below 0 where the point lies deeper
- * than a touch inside. */
+/* Height above the ellipsoid along the radius, in Earth radii; negative: deeper inside than the
+ * tangent tolerance. */
 static inline double bst_earth_depth(bst_vec3 position_m, bst_vec3 pole) {
     return bst_vec3_norm(bst_earth_unit_sphere(position_m, pole, 0.0)) - 1.0 + BST_EARTH_TOUCH;
 }
 
-/* The circle that osculates the limb at the place nearest to a direction, in the plane that is
- * tangent to the sky at that direction (unit: its distance). */
+/* Osculating circle of the limb at its point nearest to a direction, in the tangent plane of the
+ * sky at that direction (unit: its distance). */
 typedef struct bst_earth_limb {
-    double beyond;    /* of the direction outside of the limb; negative: the Earth hides it */
+    double beyond;    /* distance of the direction outside the limb; negative: occulted */
     double curvature; /* of the limb, 0 for a straight one */
 } bst_earth_limb;
 
-/* Limb of the ellipsoid grown by height_m (m; negative: shrunk) about the unit vector `towards`.
+/* Limb of the ellipsoid enlarged by height_m (m; negative: reduced) near the unit vector `towards`.
  *
  * Given:    position_m  geocentric, on or outside of that ellipsoid, GCRF axes
  *           pole        the Earth's axis, unit, GCRF axes
- * Returned: false where the direction is more than a right angle from the limb, so that there is no
- *           tangent plane to draw the limb on: the Earth does not hide it, nor what is near it.
- * Notes: exact at the limb's nearest place. Away from it by an angle u the ellipse leaves the
+ * Returned: false if the direction is more than 90 degrees from the limb, where the
+ *           tangent plane is undefined: no occultation there
+ * Notes: exact at the nearest point of the limb. Away from it by an angle u the ellipse leaves the
  * circle by flattening * u^3 / radius^2 at most, radius being that of the limb (rad): 2e-8 rad at
  * the Sun's edge from geostationary orbit. */
 bool bst_earth_limb_at(bst_vec3 position_m, bst_vec3 pole, double height_m, bst_vec3 towards,
                        bst_earth_limb *out);
 
-/* Area share of a disc of radius `disc` about the direction that lies outside of the limb, 0..1;
- * all in the tangent plane's unit. */
+/* Fraction of the area of a disc with radius `disc` around the direction that is outside the limb,
+ * 0..1; units of the tangent plane. */
 double bst_earth_limb_share(const bst_earth_limb *limb, double disc);
 
 #endif

@@ -16,7 +16,7 @@ static bool starts_with(const bst_text_line *line, const char *text) {
     return line->length >= length && memcmp(line->text, text, length) == 0;
 }
 
-/* The form of a file from its first line that says something. */
+/* Detects the format of an element-set file from its first non-empty line. */
 static form recognise(const char *data, size_t bytes, bst_text_line *line) {
     bst_text_cursor cursor = bst_text_start(data, bytes);
     while (bst_text_next_line(&cursor, line)) {
@@ -30,7 +30,7 @@ static form recognise(const char *data, size_t bytes, bst_text_line *line) {
         if (s.text[0] == '<' || starts_with(line, "CCSDS_")) {
             return FORM_OTHER;
         }
-        /* a header row: one of its columns has one of these names */
+        /* a CSV header row contains one of these column names */
         while (s.length > 0) {
             const char *comma = memchr(s.text, ',', s.length);
             size_t length = comma ? (size_t)(comma - s.text) : s.length;

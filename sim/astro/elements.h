@@ -1,4 +1,4 @@
-/* Mean orbital elements for SGP4, and files of them in every form that is read. */
+/* Mean orbital elements for SGP4, and readers for all supported file formats. */
 #ifndef BST_ASTRO_ELEMENTS_H
 #define BST_ASTRO_ELEMENTS_H
 
@@ -25,11 +25,11 @@ typedef struct bst_elements {
 } bst_elements;
 
 typedef struct bst_elements_options {
-    bool skip_bad_sets; /* true: a bad set is logged as a warning with its place and skipped */
-    int norad;          /* only this number, sets of others are not checked; 0: all */
+    bool skip_bad_sets; /* true: invalid sets are logged with their position and skipped */
+    int norad;          /* only this catalogue number, others are not checked; 0: all */
 } bst_elements_options;
 
-/* Reads a file of element sets in the form that its content shows:
+/* Reads a file of element sets; the content determines the format:
  * - two or three lines each (sim/astro/tle.h);
  * - CCSDS OMM (502.0-B-3) as JSON, one object or an array of them: text beginning with { or [;
  * - CCSDS OMM as CSV with a header row: a first line with the column EPOCH or NORAD_CAT_ID.
@@ -53,7 +53,7 @@ bst_status bst_elements_load(bst_ctx *ctx, const char *path, const bst_elements_
                              bst_elements **out, int *count) BST_MUST_CHECK;
 
 /* As bst_elements_load, from memory: `bytes` bytes at data (any bytes, no terminator needed);
- * `name` stands for the path in messages. */
+ * `name`: file name for messages. */
 bst_status bst_elements_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                     const bst_elements_options *options, bst_elements **out,
                                     int *count) BST_MUST_CHECK;

@@ -1,4 +1,4 @@
-/* What the readers of element sets share: the list that grows, and what becomes of bad sets. */
+/* Internal parts of the element-set readers: growing list, and treatment of invalid sets. */
 #ifndef BST_ASTRO_ELEMENTS_INTERNAL_H
 #define BST_ASTRO_ELEMENTS_INTERNAL_H
 
@@ -10,8 +10,8 @@ typedef struct bst_elements_reader {
     bst_elements_options options;
     bst_elements *sets;
     int count, capacity;
-    int skipped; /* bad sets */
-    int others;  /* sets of other satellites than the one asked for */
+    int skipped; /* number of invalid sets */
+    int others;  /* sets of other satellites than requested */
 } bst_elements_reader;
 
 /* A reader of element sets without sets.
@@ -26,11 +26,11 @@ bst_elements_reader bst_elements_start(bst_ctx *ctx, const char *name,
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_elements_append(bst_elements_reader *reader, const bst_elements *set) BST_MUST_CHECK;
 
-/* A format error stops reading, or is logged and counted where the caller asked for that. */
+/* Handles a format error: stops reading, or logs and counts it if the options permit. */
 bst_status bst_elements_tolerate(bst_elements_reader *reader, bst_status status) BST_MUST_CHECK;
 
-/* Hands the list over, or frees it and fails when status is not BST_OK or there is no set in it.
- * `expected` says what the file should hold. */
+/* Returns the list, or frees it and fails if status is not BST_OK or the list is empty. `expected`:
+ * content that the file should have. */
 bst_status bst_elements_finish(bst_elements_reader *reader, bst_status status, bool empty,
                                const char *expected, bst_elements **out, int *count) BST_MUST_CHECK;
 

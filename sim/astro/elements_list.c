@@ -1,4 +1,4 @@
-/* The list of element sets that a reader fills. */
+/* Growing list of element sets, filled by the readers. */
 #include <stdlib.h>
 
 #include "sim/astro/elements_internal.h"

@@ -51,7 +51,7 @@ void bst_astro_eop_free(bst_astro_eop *eop) {
     }
 }
 
-/* Reads up to `wanted` numbers, each a word of its own; returns how many there were. */
+/* Parses up to `wanted` numbers separated by blanks; returns their number. */
 static int read_numbers(const char *text, double *values, int wanted) {
     int n = 0;
     while (n < wanted) {
@@ -67,7 +67,8 @@ static int read_numbers(const char *text, double *values, int wanted) {
     return n;
 }
 
-/* One data row: year month day [hour] MJD x y UT1-UTC ...; the hour tells the 20 C04 series. */
+/* Parses a data row: year month day [hour] MJD x y UT1-UTC ...; the hour column identifies the 20
+ * C04 series. */
 static bst_status read_row(bst_ctx *ctx, const char *line, int *mjd, bst_astro_eop_values *row) {
     double v[8];
     int n = read_numbers(line, v, 8);
@@ -149,12 +150,12 @@ static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, si
         const char *text = line + strspn(line, " \t");
         bool numeric = *text >= '0' && *text <= '9';
         if (!numeric && (eop->count == 0 || *text == '#' || *text == '\0')) {
-            continue; /* the heading, a comment */
+            continue; /* header or comment */
         }
         int mjd = 0;
         bst_astro_eop_values row = {0};
         bst_status status = read_row(ctx, line, &mjd, &row);
-        /* a file that was cut short may end within a number */
+        /* a truncated file may end inside a number */
         int words = count_words(line);
         columns = columns ? columns : words;
         if (status == BST_OK && words != columns) {
@@ -207,7 +208,7 @@ bst_status bst_astro_eop_load(bst_ctx *ctx, const char *path, bst_astro_eop **ou
     return status;
 }
 
-/* Days after the last row that are predicted. */
+/* days of prediction after the last row */
 static const double PREDICTED_DAYS = 365.25 * BST_EOP_PREDICTED_YEARS;
 
 static bst_status fail_outside(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t) {
@@ -225,7 +226,7 @@ static bst_status fail_outside(bst_ctx *ctx, const bst_astro_eop *eop, bst_time 
                     BST_EOP_PREDICTED_YEARS);
 }
 
-/* Days after the first row, in two parts. */
+/* Days after the first row, integer and fraction. */
 static double day_of(const bst_astro_eop *eop, bst_time t, double *fraction) {
     double utc1;
     bst_time_utc(t, &utc1, fraction);
@@ -247,7 +248,7 @@ bst_status bst_astro_eop_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
         return BST_OK;
     }
     const bst_astro_eop_values *a = &eop->rows[(int)day], *b = a + 1;
-    /* A leap second at the end of the day moves UT1-UTC by a whole second at b. */
+    /* A leap second at the end of the day changes UT1-UTC by one second. */
     double step = b->ut1_minus_utc_s - a->ut1_minus_utc_s;
     step -= round(step);
     out->ut1_minus_utc_s = a->ut1_minus_utc_s + f * step;

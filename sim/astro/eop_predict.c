@@ -1,25 +1,24 @@
-/* Earth orientation after the end of a table. */
+/* Predicts Earth orientation after the end of its table. */
 #include <erfa.h>
 #include <erfam.h>
 
 #include "sim/astro/frames_internal.h"
 #include "sim/core/cholesky.h"
 
-/* A year of the seasons and the period of Chandler's wobble, days (IERS Bulletin A). */
+/* annual and Chandler period, days (IERS Bulletin A) */
 static const double PERIODS[2] = {365.25, 435.0};
-/* The rest of the table's last pole over the fit fades in so many days. */
+/* decay time of the difference between the last row and the fit, days */
 static const double FADE_DAYS = 60.0;
-/* Rows count for the fit of the pole by exp(-age / this), days; older ones than MOST_ROWS not. */
+/* Weight of a row in the fit of the pole: exp(-age / this), days; rows older than MOST_ROWS are
+ * ignored. */
 static const double MEMORY_DAYS = 730.5;
 enum { TERMS = 5, MOST_ROWS = 2190, RATE_ROWS = 180 };
-/* What the pole's terms are before there are rows: the mean pole's offset, then cosine and sine of
- * a year and of Chandler's period, with these standard deviations, arcsec; and that of a row. */
+/* Prior standard deviations of the pole's terms, arcsec: offset of the mean pole; cosine and sine,
+ * annual and Chandler; and of a row. */
 static const double PRIOR_ARCSEC[TERMS] = {0.05, 0.1, 0.1, 0.2, 0.2};
 static const double ROW_ARCSEC = 0.05;
-/* UT1-TAI without its seasons runs so many seconds a day over decades (1972 to 2020); a table's own
- * rate counts as so many days of that. Rates of tables are within the bound (of 1962 to 2025: 4
- * ms).
- */
+/* Long-term rate of UT1-TAI without seasonal terms, s/day (1972 to 2020), and its weight in days of
+ * the table's own rate. Rates above MOST_RATE are rejected (1962 to 2025: 4 ms). */
 static const double MEAN_RATE = -0.0008, MEAN_RATE_DAYS = 20.0, MOST_RATE = 0.01;
 
 /* The secular pole of the IERS (Conventions 2010, version 1.2.0, eq. 21), arcsec. */
@@ -29,7 +28,7 @@ static void secular_pole(double mjd, double out[2]) {
     out[1] = 0.3205 + 0.003460 * years;
 }
 
-/* UT1 - UT2, the conventional seasons of the Earth's rotation, s (IERS Bulletin A; Explanatory
+/* UT1 - UT2: conventional seasonal terms of the Earth's rotation, s (IERS Bulletin A; Explanatory
  * Supplement to the Astronomical Almanac 1992, 2.582). */
 static double seasons_s(double mjd) {
     double x = ERFA_D2PI * (mjd - 51544.03) / 365.2422;
@@ -85,13 +84,13 @@ static bool fit_pole(int first_mjd, int count, const bst_astro_eop_values *rows,
     return true;
 }
 
-/* Slope of UT1-TAI without its seasons, s a day: least squares over the last rows. */
+/* Rate of UT1-TAI without seasonal terms, s/day: least squares over the last rows. */
 static double rate_of(int first_mjd, int count, const bst_astro_eop_values *rows) {
     int rows_used = count < RATE_ROWS + 1 ? count : RATE_ROWS + 1, last = count - 1;
     double middle = -0.5 * (rows_used - 1), sum_tt = 0.0, sum_ty = 0.0, y = 0.0;
     for (int back = 0; back < rows_used; back++) {
         int i = last - back;
-        if (back > 0) { /* leap seconds taken out */
+        if (back > 0) { /* removes leap seconds */
             double step = rows[i + 1].ut1_minus_utc_s - rows[i].ut1_minus_utc_s;
             y -= step - round(step);
         }
@@ -104,7 +103,7 @@ static double rate_of(int first_mjd, int count, const bst_astro_eop_values *rows
     return fmax(-MOST_RATE, fmin(MOST_RATE, rate));
 }
 
-/* TAI-UTC on a day; what ERFA has for years after its own tables, the last value known. */
+/* TAI-UTC on a day; after ERFA's tables the last known value. */
 static double tai_minus_utc_s(double mjd) {
     int year, month, day;
     double fraction, seconds = 0.0;
@@ -154,10 +153,10 @@ static const struct {
               {365.0, 0.0801, 0.0282},  {730.0, 0.2034, 0.0380}, {1095.0, 0.3724, 0.0457},
               {1461.0, 0.5715, 0.0466}, {1825.0, 0.8050, 0.0477}};
 enum { ERROR_ROWS = sizeof ERRORS / sizeof *ERRORS };
-/* A table that is too short for the pole's two periods, or for the rate of UT1. */
+/* minimum rows for the pole's two periods, and for the rate of UT1 */
 enum { POLE_ROWS = 730, UT1_ROWS = 60 };
-/* Stated over rms: 98 % of those predictions, and 95 % of the ones for 2023 to 2025, when
- * Chandler's wobble had nearly vanished. */
+/* ratio of stated uncertainty to RMS: covers 98 % of those predictions, and 95 % of those for 2023
+ * to 2025, when the Chandler wobble had almost vanished */
 static const double STATED = 2.5;
 static const double SHORT_POLE_ARCSEC = 0.12, SHORT_UT1 = 3.0;
 
@@ -168,7 +167,7 @@ void bst_astro_eop_prediction_error(const bst_astro_eop_prediction *p, double mj
     while (i < ERROR_ROWS - 2 && days > ERRORS[i + 1].days) {
         i++;
     }
-    /* beyond the last row: UT1 on by the slope between the last two, the pole as there */
+    /* interpolates log(error) over log(days) */
     double f = (x - log(ERRORS[i].days)) / log(ERRORS[i + 1].days / ERRORS[i].days);
     double ut1 = ERRORS[i].ut1_s * pow(ERRORS[i + 1].ut1_s / ERRORS[i].ut1_s, f);
     double pole = ERRORS[i].pole_arcsec *

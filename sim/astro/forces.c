@@ -8,7 +8,7 @@
 #include "sim/astro/frames_internal.h"
 
 #define NODE_STEP_S 3600.0
-/* Enough for the longest step of an integrator with its neighbours. */
+/* grid nodes for the longest integrator step, with neighbours */
 #define NODES 16
 
 typedef struct node {
@@ -21,8 +21,8 @@ typedef struct node {
 struct bst_forces {
     bst_force_model model;
     bst_time epoch;
-    bool turns;            /* the Earth's rotation counts */
-    bool has_bodies;       /* the Sun's or Moon's place counts */
+    bool turns;            /* the Earth's rotation is modelled */
+    bool has_bodies;       /* Sun or Moon is modelled */
     double light_accel_au; /* m/s^2 at 1 au */
     bst_vec3 pole;         /* at the epoch */
     double drag_factor;    /* m^2/kg: cd A / (2 m), times density_scale */
@@ -66,7 +66,7 @@ bst_status bst_forces_create(bst_ctx *ctx, const bst_force_model *model, bst_tim
     f->has_bodies = model->sun || model->moon || model->solar_pressure;
     bst_bodies bodies;
     bst_bodies_at(epoch, &bodies);
-    f->pole = bodies.pole; /* it moves by 0.06 arcsec a day, the limb by 6 mm */
+    f->pole = bodies.pole; /* constant: it moves by 0.06 arcsec per day, the limb by 6 mm */
     const bst_astro_spacecraft *s = &model->spacecraft;
     if (model->solar_pressure) {
         f->light_accel_au =
@@ -122,7 +122,7 @@ static void split(double seconds, int64_t *index, double *f) {
     *f = steps - whole;
 }
 
-/* Cubic through the four nearest grid values (Lagrange). */
+/* Sun and Moon by cubic Lagrange interpolation in the four nearest grid values. */
 static void sun_and_moon(bst_forces *forces, double seconds, bst_vec3 *sun, bst_vec3 *moon) {
     int64_t index;
     double f;
@@ -137,7 +137,7 @@ static void sun_and_moon(bst_forces *forces, double seconds, bst_vec3 *sun, bst_
     }
 }
 
-/* Battin's third-body term: body at s, spacecraft at r, both from the Earth. */
+/* Third-body acceleration by Battin's formula: body at s, spacecraft at r, both geocentric. */
 static bst_vec3 third_body(double gm, bst_vec3 r, bst_vec3 s) {
     bst_vec3 d = bst_vec3_sub(r, s);
     double q = bst_vec3_dot(r, bst_vec3_axpy(r, -2.0, s)) / bst_vec3_dot(s, s);

@@ -9,7 +9,7 @@
 /* Rate of the Earth rotation angle, rad per SI second of UT1 (IERS Conventions 2010, eq. 5.15). */
 #define EARTH_RATE_RADPS (2.0 * BST_PI * 1.00273781191135448 / 86400.0)
 
-/* R3(angle) a: the axes of a's result turned by angle about z. */
+/* R3(angle) a: rotates the axes of a's result by angle about z. */
 static bst_mat3 turn_z_mul(double angle_rad, const bst_mat3 *a) {
     double c = cos(angle_rad), s = sin(angle_rad);
     bst_mat3 r = *a;
@@ -20,7 +20,7 @@ static bst_mat3 turn_z_mul(double angle_rad, const bst_mat3 *a) {
     return r;
 }
 
-/* TAI to UT1 in seconds at t. */
+/* UT1 - TAI in seconds at t. */
 static bst_status ut1_minus_tai(bst_ctx *ctx, bst_time t, const bst_astro_eop_values *eop,
                                 double *seconds) {
     double utc1, utc2, fraction, tai_minus_utc_s = 0.0;
@@ -48,8 +48,8 @@ bst_status bst_astro_earth_parts_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_
     eraPom00(values.xp_rad, values.yp_rad, tio_rad, m);
     memcpy(out->itrf_from_tirs.m, m, sizeof m);
     out->era_rad = eraEra00(ut1, ut2);
-    /* TEME reaches ITRF by GMST82 and polar motion without the TIO locator; what is left of the way
-     * back to CIRS is one turn about z. */
+    /* TEME to ITRF uses GMST82 and polar motion without the TIO locator; the remaining rotation to
+     * CIRS is about z */
     out->teme_turn_rad = eraAnpm(eraGmst82(ut1, ut2) - out->era_rad - tio_rad);
     return BST_OK;
 }

@@ -1,4 +1,4 @@
-/* Earth orientation and the rotations between TEME, GCRF and ITRF. */
+/* Earth orientation, and rotations between TEME, GCRF and ITRF. */
 #ifndef BST_ASTRO_FRAMES_H
 #define BST_ASTRO_FRAMES_H
 
@@ -7,7 +7,7 @@
 #include "boresight/vec.h"
 #include "sim/astro/time.h"
 
-/* Table of Earth-orientation parameters; immutable once made, shareable between threads. */
+/* Table of Earth orientation parameters; immutable, shareable between threads. */
 typedef struct bst_astro_eop bst_astro_eop;
 
 typedef struct bst_astro_eop_values {
@@ -15,13 +15,13 @@ typedef struct bst_astro_eop_values {
     double xp_rad, yp_rad; /* coordinates of the pole */
 } bst_astro_eop_values;
 
-/* Makes the table that is part of the program: IERS EOP 20 C04, 2020-01-01 to 2026-01-01, 0h UTC.
- * Freed with bst_astro_eop_free. */
+/* Creates the built-in table: IERS EOP 20 C04, 2020-01-01 to 2026-01-01, 0h UTC. Free it with
+ * bst_astro_eop_free. */
 bst_status bst_astro_eop_builtin(bst_ctx *ctx, bst_astro_eop **out) BST_MUST_CHECK;
 /* Reads an IERS EOP C04 file, of the 20 C04 series (hour column) or the 14 C04 series (none). Rows
  * are one a day at 0h UTC, without gaps; at most 64 MiB. Errors carry file and line number. */
 bst_status bst_astro_eop_load(bst_ctx *ctx, const char *path, bst_astro_eop **out) BST_MUST_CHECK;
-/* The same from memory; `name` stands for the path in messages. */
+/* Reads a table of Earth orientation from memory; `name`: file name for messages. */
 bst_status bst_astro_eop_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                      bst_astro_eop **out) BST_MUST_CHECK;
 void bst_astro_eop_free(bst_astro_eop *eop); /* NULL allowed */
@@ -33,20 +33,19 @@ bst_status bst_astro_eop_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
                             bst_astro_eop_values *out) BST_MUST_CHECK;
 enum { BST_EOP_PREDICTED_YEARS = 30 };
 
-/* What predicted values are uncertain by: 2.5 times the root mean square of past predictions'
- * errors, which at least 95 % of them kept. Leap seconds that are not announced yet are not in it:
- * they change UT1-UTC by whole seconds, and what UTC calls an instant, but not where the Earth is
- * at an instant of TAI. */
+/* Uncertainty of predicted Earth orientation: 2.5 times the RMS error of past predictions, which
+ * covers at least 95 % of them. Unannounced leap seconds are excluded: they change UT1-UTC and UTC
+ * by whole seconds, but not the orientation of the Earth at an instant of TAI. */
 typedef struct bst_astro_eop_uncertainty {
     double days;        /* after the table's last row */
-    double ut1_s;       /* 15 arcsec of the Earth's rotation a second */
+    double ut1_s;       /* 1 s of UT1 is 15 arcsec of Earth rotation */
     double pole_arcsec; /* per axis */
 } bst_astro_eop_uncertainty;
-/* True, and *out set, where t is after the table; false (all 0) in the table or before it. */
+/* Uncertainty of Earth orientation at t. False (all 0) within or before the table. */
 bool bst_astro_eop_uncertainty_at(const bst_astro_eop *eop, bst_time t,
                                   bst_astro_eop_uncertainty *out);
-/* Logs a warning with the uncertainty at `last` where that is after the table; `where` ("file: ")
- * stands before it. */
+/* Logs a warning with the uncertainty at `last` if it is after the table; `where`: prefix ("file:
+ * "). */
 void bst_astro_eop_warn(bst_ctx *ctx, const bst_astro_eop *eop, bst_time last, const char *where);
 
 /* Rotations at one instant, for positions and velocities alike. The frames TEME and GCRF turn
@@ -67,9 +66,8 @@ typedef struct bst_astro_earth_frames {
 bst_status bst_astro_earth_frames_at(bst_ctx *ctx, const bst_astro_eop *eop, bst_time t,
                                      bst_astro_earth_frames *out) BST_MUST_CHECK;
 
-/* The Earth's rotation vector, rad/s in GCRF: a point fixed in ITRF at r (GCRF axes) has GCRF
- * velocity rate x r. Along the celestial intermediate pole, at the nominal rate of the Earth
- * rotation angle. */
+/* Earth rotation vector, rad/s, GCRF axes: a point fixed in ITRF at r has GCRF velocity rate x r.
+ * Along the celestial intermediate pole, nominal rate of the Earth rotation angle. */
 bst_vec3 bst_astro_earth_rate_gcrf(const bst_astro_earth_frames *frames);
 
 #endif

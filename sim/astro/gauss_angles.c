@@ -7,13 +7,13 @@ static double octic(double a, double b, double c, double x) {
     return x3 * x3 * (x * x + a) + b * x3 + c;
 }
 
-/* The quintic whose positive zeros are those of the octic's slope. */
+/* Quintic whose positive zeros are those of the octic's derivative. */
 static double quintic(double a, double b, double c, double x) {
     (void)c;
     return x * x * x * (8.0 * x * x + 6.0 * a) + 3.0 * b;
 }
 
-/* A polynomial with its coefficients. */
+/* A polynomial and its coefficients. */
 typedef struct polynomial {
     double (*f)(double a, double b, double c, double x);
     double a, b, c;
@@ -23,7 +23,7 @@ static double value_of(const polynomial *p, double x) {
     return p->f(p->a, p->b, p->c, x);
 }
 
-/* The zero between two places where its signs differ. */
+/* Zero between two points with opposite signs, by bisection. */
 static double bisect(const polynomial *p, double low, double high) {
     bool rising = value_of(p, high) > 0.0;
     for (int i = 0; i < 200; i++) {
@@ -40,7 +40,7 @@ static double bisect(const polynomial *p, double low, double high) {
     return 0.5 * (low + high);
 }
 
-/* Adds the sign changes between neighbours of `knots` to `zeros`. */
+/* Adds sign changes between consecutive `knots` to `zeros`. */
 static int zeros_between(const polynomial *p, const double *knots, int count, double *zeros,
                          int room) {
     int found = 0;
@@ -54,7 +54,7 @@ static int zeros_between(const polynomial *p, const double *knots, int count, do
 }
 
 int bst_gauss_roots(double a, double b, double c, double roots[BST_GAUSS_ROOTS]) {
-    /* in units in which no coefficient is above 1 every root is at most 2 (Lagrange's bound) */
+    /* scaled so that no coefficient exceeds 1: all roots are at most 2 (Lagrange's bound) */
     double unit = fmax(fmax(sqrt(fabs(a)), pow(fabs(b), 0.2)), pow(fabs(c), 0.125));
     if (!(unit > 0.0) || !isfinite(unit)) {
         return 0;
@@ -81,10 +81,10 @@ int bst_gauss_roots(double a, double b, double c, double roots[BST_GAUSS_ROOTS])
     return found;
 }
 
-/* What does not depend on the root. */
+/* Quantities that do not depend on the root. */
 typedef struct triangle {
-    double mu, t1, t3, span; /* times after the second */
-    double d0, d[3][3];      /* of observers with the normals of pairs of directions */
+    double mu, t1, t3, span; /* times relative to the second */
+    double d0, d[3][3]; /* products of observer positions with normals of pairs of directions */
 } triangle;
 
 static void solve_ranges(const triangle *k, double r, double a, double b, double range[3]) {
@@ -132,7 +132,7 @@ bst_status bst_gauss_angles(bst_ctx *ctx, double mu, const bst_gauss_sight s[3],
     bst_vec3 q1 = s[0].direction, q2 = s[1].direction, q3 = s[2].direction;
     const bst_vec3 p[3] = {bst_vec3_cross(q2, q3), bst_vec3_cross(q1, q3), bst_vec3_cross(q1, q2)};
     k.d0 = bst_vec3_dot(q1, p[0]);
-    /* how far a plane arc as long as this one bends away from a great circle at the least */
+    /* minimum deviation of a plane arc of this length from a great circle */
     double spread = bst_vec3_norm(p[1]);
     if (!(fabs(k.d0) > 1e-9 * spread * bst_vec3_norm(p[0]) * bst_vec3_norm(p[2]))) {
         return bst_fail(ctx, BST_ERR_NUMERIC,

@@ -1,13 +1,13 @@
-/* Gauss's method: an orbit from three directions. */
+/* Gauss's method: initial orbit from three directions. */
 #ifndef BST_ASTRO_GAUSS_ANGLES_H
 #define BST_ASTRO_GAUSS_ANGLES_H
 
 #include "boresight/status.h"
 #include "boresight/vec.h"
 
-enum { BST_GAUSS_ROOTS = 3 }; /* an equation of these signs has no more positive roots */
+enum { BST_GAUSS_ROOTS = 3 }; /* maximum number of positive roots of an equation with these signs */
 
-/* A direction (unit) to the body, seen from `observer_m` (from the centre of attraction). */
+/* A direction (unit) to the body from `observer_m` (relative to the centre of attraction). */
 typedef struct bst_gauss_sight {
     double time_s;
     bst_vec3 direction;
@@ -26,17 +26,16 @@ typedef struct bst_gauss_orbit {
  * function is monotonous: each root is bracketed, none is missed but a double one. */
 int bst_gauss_roots(double a, double b, double c, double roots[BST_GAUSS_ROOTS]);
 
-/* The orbits about a centre of gravitational parameter mu (m^3/s^2) that Gauss's method gives for
- * three directions at rising times: one for each positive root of its equation of 8th degree at
- * which all three ranges are positive. First order in mu/r^3, so near for arcs of up to some 20
- * degrees, and the ranges are to be refined (tracker/orbit/orbit_initial.h). *count may be 0.
- * Light time and aberration are the caller's. BST_ERR_ARGUMENT for times that do not rise or
- * numbers that are not finite; BST_ERR_NUMERIC when the three directions lie in one plane (to 1e-9
- * of their spread), as they do when the observer is in the body's orbital plane: then they do not
- * determine the ranges.
- * Curtis, Orbital Mechanics for Engineering Students, algorithm 5.5; Escobal, Methods of Orbit
- * Determination, section 7.3; Vallado, Fundamentals of Astrodynamics and Applications, section 7.3.
- */
+/* Initial orbits by Gauss's method from three directions at increasing times, about a centre of
+ * gravitational parameter mu (m^3/s^2): one for each positive root of its equation of 8th degree at
+ * which all three ranges are positive. First order in mu/r^3, so accurate for arcs of up to about
+ * 20 degrees; refine the ranges (tracker/orbit/orbit_initial.h). *count may be 0. The caller
+ * corrects for light time and aberration. BST_ERR_ARGUMENT for times that do not increase or
+ * non-finite numbers; BST_ERR_NUMERIC when the three directions lie in one plane (to 1e-9 of their
+ * spread), as they do when the observer is in the body's orbital plane: then they do not determine
+ * the ranges. Curtis, Orbital Mechanics for Engineering Students, algorithm 5.5; Escobal, Methods
+ * of Orbit Determination, section 7.3; Vallado, Fundamentals of Astrodynamics and Applications,
+ * section 7.3. */
 bst_status bst_gauss_angles(bst_ctx *ctx, double mu, const bst_gauss_sight sights[3],
                             bst_gauss_orbit orbits[BST_GAUSS_ROOTS], int *count) BST_MUST_CHECK;
 

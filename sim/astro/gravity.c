@@ -3,8 +3,8 @@
 #include "sim/astro/gravity_internal.h"
 
 /* The solid harmonics of degree n, order m, V and W (Montenbruck and Gill 3.29), normalised, follow
- * from those of lower degree by `a` and `b`; what they weigh in the three components of the
- * acceleration and in the potential is gathered from all coefficients that they come with. */
+ * from those of lower degree by `a` and `b`; the weights for acceleration and potential collect all
+ * coefficients that multiply them. */
 typedef struct term {
     double a, b;
     double xv, xw, yv, yw, zv, zw;
@@ -14,7 +14,7 @@ typedef struct term {
 struct bst_gravity {
     double gm, radius;
     int degree, order;
-    double *diagonal; /* by order: from V, W of order m - 1 to order m */
+    double *diagonal; /* by order: recursion from V, W of order m - 1 to order m */
     /* Column by column: order 0 to order + 1, in it degree m to degree + 1. NULL: point mass. */
     term *terms;
 };
@@ -118,8 +118,8 @@ int bst_gravity_order(const bst_gravity *gravity) {
     return gravity->order;
 }
 
-/* Walks over the harmonics once: the disturbing acceleration over gm / radius^2 into *a, or (a
- * NULL) the disturbing potential over gm / radius as the result. */
+/* Evaluates all harmonics: the disturbing acceleration over gm / radius^2 into *a, or (a NULL) the
+ * disturbing potential over gm / radius as result. */
 static inline double walk(const bst_gravity *g, bst_vec3 p, double r2, bst_vec3 *a) {
     double to_unit = g->radius / r2, u = 0.0;
     double x = p.x * to_unit, y = p.y * to_unit, z = p.z * to_unit, rho = g->radius * to_unit;

@@ -1,4 +1,4 @@
-/* The Earth's gravity: point mass, zonal and tesseral harmonics, in Earth-fixed axes. */
+/* Earth gravity field: point mass, zonal and tesseral harmonics, Earth-fixed axes. */
 #ifndef BST_ASTRO_GRAVITY_H
 #define BST_ASTRO_GRAVITY_H
 
@@ -8,14 +8,14 @@
 #include "boresight/vec.h"
 
 enum {
-    BST_GRAVITY_BUILTIN_DEGREE = 20, /* the most that bst_gravity_builtin has */
-    BST_GRAVITY_MAX_DEGREE = 360     /* the most that is read from a file */
+    BST_GRAVITY_BUILTIN_DEGREE = 20, /* maximum degree of bst_gravity_builtin */
+    BST_GRAVITY_MAX_DEGREE = 360     /* maximum degree read from a file */
 };
 
-/* One field to a degree and order; never changes once made, threads may share it. */
+/* A gravity field to a degree and order; immutable, shareable between threads. */
 typedef struct bst_gravity bst_gravity;
 
-/* A point mass of gravitational parameter gm_m3ps2 alone. */
+/* Creates the field of a point mass with gravitational parameter gm_m3ps2. */
 bst_status bst_gravity_point(bst_ctx *ctx, double gm_m3ps2, bst_gravity **out) BST_MUST_CHECK;
 
 /* The field that is part of the program, EGM2008 (tide-free; GM 3.986004415e14 m^3/s^2 and
@@ -38,13 +38,13 @@ bst_status bst_gravity_builtin(bst_ctx *ctx, int degree, int order,
  * Foerste, The ICGEM format (GFZ Potsdam, 2011). */
 bst_status bst_gravity_load(bst_ctx *ctx, const char *path, int degree, int order,
                             bst_gravity **out) BST_MUST_CHECK;
-/* As bst_gravity_load, from memory; `name` stands for the path in messages. */
+/* As bst_gravity_load, from memory; `name`: file name for messages. */
 bst_status bst_gravity_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                    int degree, int order, bst_gravity **out) BST_MUST_CHECK;
 
 void bst_gravity_free(bst_gravity *gravity); /* NULL allowed */
 
-double bst_gravity_gm(const bst_gravity *gravity); /* m^3/s^2 */
+double bst_gravity_gm(const bst_gravity *gravity); /* gravitational parameter, m^3/s^2 */
 /* Highest degree of the field's coefficients in use. */
 int bst_gravity_degree(const bst_gravity *gravity);
 /* Highest order of the field's coefficients in use. */
@@ -55,7 +55,7 @@ int bst_gravity_order(const bst_gravity *gravity);
  * Montenbruck and Gill, Satellite Orbits, equations 3.29 to 3.33) in fully normalised form. Below
  * degree 2 this is the point mass. About 1 us at degree and order 20. */
 bst_vec3 bst_gravity_acceleration(const bst_gravity *gravity, bst_vec3 position_itrf_m);
-/* Its potential (m^2/s^2, positive near the Earth: the acceleration is its gradient). */
+/* Gravitational potential (m^2/s^2, positive near the Earth: its gradient is the acceleration). */
 double bst_gravity_potential(const bst_gravity *gravity, bst_vec3 position_itrf_m);
 
 #endif

@@ -1,4 +1,4 @@
-/* Gravity fields in the ICGEM format. */
+/* Reads gravity fields in ICGEM format. */
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +15,7 @@ typedef struct reader {
     const char *name;
     const char *next, *end;
     int line_number;
-    char line[LINE_BYTES]; /* the present line, cut into words */
+    char line[LINE_BYTES]; /* current line, split into words */
     char *words[MAX_WORDS];
     int word_count;
     double gm, radius;
@@ -36,7 +36,7 @@ static bool is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\r';
 }
 
-/* The next line as words; false at the end of the data. Words beyond MAX_WORDS are dropped. */
+/* Splits the next line into words; false: end of data. Words beyond MAX_WORDS are dropped. */
 static bst_status next_line(reader *r, bool *there) {
     *there = r->next < r->end;
     if (!*there) {
@@ -71,7 +71,7 @@ static bst_status next_line(reader *r, bool *there) {
     return BST_OK;
 }
 
-/* A finite decimal number; the exponent's letter may be E or D. */
+/* Parses a finite decimal number; the exponent letter may be E or D. */
 static bst_status read_real(const reader *r, const char *word, const char *what, double *out) {
     char text[64];
     size_t length = strlen(word);
@@ -130,7 +130,7 @@ static bst_status read_header(reader *r) {
             }
         }
     }
-    /* Of the Earth within a per cent: what the rest of the program takes the body to be. */
+    /* must be the Earth, within 1 % */
     if (!(fabs(r->gm / 3.986004415e14 - 1.0) < 0.01)) {
         return bst_fail(r->ctx, BST_ERR_FORMAT,
                         "%.400s:%d: the header must give earth_gravity_constant, about 3.986e14 "
@@ -150,7 +150,8 @@ static bst_status read_header(reader *r) {
     return BST_OK;
 }
 
-/* Fully normalised over unnormalised: sqrt((n + m)! / ((2 - delta_0m) (2n + 1) (n - m)!)). */
+/* Ratio of fully normalised to unnormalised coefficients: sqrt((n + m)! / ((2 - delta_0m) (2n + 1)
+ * (n - m)!)). */
 static double normalisation(int n, int m) {
     double product = 1.0;
     for (int k = n - m + 1; k <= n + m; k++) {

@@ -16,18 +16,17 @@ int64_t bst_interpolate_find(const bst_astro_table_state *rows, int64_t count, d
 void bst_interpolate(const bst_astro_table_state *rows, int64_t count, double t_s, int points,
                      bool hermite, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     enum { MOST = BST_INTERPOLATE_MAX_ROWS };
-    hermite = hermite || count == 1; /* else a single row would stand still */
+    hermite = hermite || count == 1; /* a single row needs its velocity */
     int most = hermite ? MOST / 2 : MOST;
     points = points < 1 ? 1 : points > most ? most : points;
     int64_t n = points < count ? points : count;
     int64_t near = bst_interpolate_find(rows, count, t_s);
-    /* whatever the number of points, the set changes at a row, where old and new polynomial agree
-     */
+    /* the set of rows changes at a row, where the old and the new polynomial agree */
     int64_t first = near - (n - 1) / 2;
     first = first > count - n ? count - n : first;
     first = first < 0 ? 0 : first;
-    /* times relative to t_s in units of the points' span, positions relative to a near one: what is
-     * rounded is small; from the nearest row outwards: what is added is smaller and smaller */
+    /* for small rounding errors: times in units of the points' span, positions relative to a near
+     * row, terms added from the nearest row outwards */
     const bst_astro_table_state *origin = &rows[near];
     double span = rows[first + n - 1].t_s - rows[first].t_s, unit = span > 0.0 ? span : 1.0;
     double z[MOST];

@@ -1,4 +1,4 @@
-/* Interpolation between tabulated states. */
+/* Interpolation between tabulated orbit states. */
 #ifndef BST_ASTRO_INTERPOLATE_H
 #define BST_ASTRO_INTERPOLATE_H
 
@@ -7,7 +7,7 @@
 
 #include "boresight/vec.h"
 
-/* A tabulated state, m and m/s in any axes, `t_s` seconds after any instant. */
+/* A tabulated state, m and m/s in any axes, at `t_s` seconds after a reference time. */
 typedef struct bst_astro_table_state {
     double t_s;
     bst_vec3 position_m, velocity_mps;
@@ -15,12 +15,12 @@ typedef struct bst_astro_table_state {
 
 enum { BST_INTERPOLATE_MAX_ROWS = 32 };
 
-/* The row with the greatest t_s <= t_s, 0 when there is none. Rows rise in t_s; count >= 1. */
+/* Index of the last row with rows[].t_s <= t_s; 0 if none. Times increase; count >= 1. */
 int64_t bst_interpolate_find(const bst_astro_table_state *rows, int64_t count, double t_s);
 
-/* The polynomial through `points` (taken into 1 to BST_INTERPOLATE_MAX_ROWS, half of it with
- * velocities, and count) rows around t_s: through positions, and with `hermite`, or where
- * there is one row only, also through velocities. Position and its derivative at t_s. The rows
+/* Interpolates with the polynomial through `points` rows around t_s (limited to 1 ..
+ * BST_INTERPOLATE_MAX_ROWS, half of it with velocities, and count): through positions, and with
+ * `hermite` or a single row also through velocities. Position and its derivative at t_s. The rows
  * reach equally far to both sides of the interval that holds t_s, shifted where the table ends.
  * Extrapolates outside the table. */
 void bst_interpolate(const bst_astro_table_state *rows, int64_t count, double t_s, int points,

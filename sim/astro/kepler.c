@@ -2,7 +2,7 @@
 
 #include <stdbool.h>
 
-/* Stumpff's c2 and c3, by series where the closed forms cancel. */
+/* Stumpff functions c2 and c3; series where the closed forms lose precision. */
 static void stumpff(double z, double *c2, double *c3) {
     if (fabs(z) < 0.1) {
         double t2 = 0.5, t3 = 1.0 / 6.0;
@@ -25,16 +25,17 @@ static void stumpff(double z, double *c2, double *c3) {
     }
 }
 
-/* How far chi can get on a hyperbola: the way takes least time for its change of anomaly, 2 y, when
- * it is symmetric about the pericentre, and then n t = 2 (e sinh y - y) >= 2 (e - 1) sinh y. */
+/* Upper limit of chi on a hyperbola: for a change of anomaly 2 y the time is shortest when
+ * symmetric about the pericentre, n t = 2 (e sinh y - y) >= 2 (e - 1) sinh y. */
 static double hyperbolic_limit(double p, double alpha, double target) {
     double e2_1 = -alpha * p, e_1 = e2_1 / (1.0 + sqrt(1.0 + e2_1)); /* e^2 - 1, e - 1 */
     double root = sqrt(-alpha);
     return 2.0 * asinh(0.5 * fabs(target) * -alpha * root / e_1) / root;
 }
 
-/* Solves Kepler's universal equation f(chi) = 0. Its slope is the radius, so f only rises: steps of
- * Laguerre's that leave the bracket give way to bisection. Ends where f is nothing but rounding. */
+/* Solves Kepler's universal equation f(chi) = 0, which is monotonic because its derivative is the
+ * radius. Laguerre steps that leave the bracket are replaced by bisection. Ends at rounding
+ * level. */
 static bool solve(double r0, double sigma0, double p, double alpha, double target, double *chi) {
     double limit = alpha < 0.0 ? hyperbolic_limit(p, alpha, target) : INFINITY;
     double low = target < 0.0 ? -limit : 0.0, high = target > 0.0 ? limit : 0.0;
@@ -63,7 +64,7 @@ static bool solve(double r0, double sigma0, double p, double alpha, double targe
         double next = x - n * f / (df + root);
         if (!(next > low && next < high)) {
             next = isfinite(low) && isfinite(high) ? 0.5 * (low + high) : 2.0 * x;
-            if (next == low || next == high) { /* neighbours: as near as can be */
+            if (next == low || next == high) { /* adjacent numbers: exact */
                 *chi = x;
                 return true;
             }
@@ -87,7 +88,7 @@ bst_status bst_kepler_propagate(bst_ctx *ctx, double mu, bst_vec3 position_m, bs
     double sigma0 = bst_vec3_dot(position_m, velocity_mps) / root_mu;
     double alpha = 2.0 / r0 - v2 / mu; /* 1 / semi-major axis */
     if (alpha > 0.0) {
-        /* whole revolutions change nothing but would cost digits */
+        /* remove whole revolutions, which would cost digits */
         double period = 2.0 * BST_PI / (root_mu * alpha * sqrt(alpha));
         seconds = remainder(seconds, period);
     }

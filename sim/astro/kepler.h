@@ -1,4 +1,4 @@
-/* Two-body motion in closed form. */
+/* Two-body (Kepler) motion in closed form. */
 #ifndef BST_ASTRO_KEPLER_H
 #define BST_ASTRO_KEPLER_H
 
@@ -7,9 +7,9 @@
 
 /* State after `seconds` (either sign) of two-body motion about a centre of gravitational parameter
  * mu (m^3/s^2), for any conic: universal variables with Stumpff functions, solved by
- * Laguerre-Conway iteration (Conway 1986) within a bracket. Rounding grows as (r / q)^2 on the way
- * in from a distance r to a pericentre q far smaller. Errors: BST_ERR_NUMERIC for a state at
- * the centre, a rectilinear orbit, or no convergence. */
+ * Laguerre-Conway iteration (Conway 1986) within a bracket. The rounding error grows as (r / q)^2
+ * for motion from a distance r to a much smaller pericentre q. Errors: BST_ERR_NUMERIC for a state
+ * at the centre, a rectilinear orbit, or no convergence. */
 bst_status bst_kepler_propagate(bst_ctx *ctx, double mu, bst_vec3 position_m, bst_vec3 velocity_mps,
                                 double seconds, bst_vec3 *position_out_m,
                                 bst_vec3 *velocity_out_mps) BST_MUST_CHECK;

@@ -1,12 +1,13 @@
 #include "sim/astro/lambert.h"
 
-/* The path's shape: lambda of the paper, and whole revolutions. */
+/* Geometry of the transfer: lambda of the paper, and revolutions. */
 typedef struct path {
     double lambda;
     int turns;
 } path;
 
-/* 2F1(3, 1; 5/2; z) for the short argument that Battin's series has near the parabola. */
+/* Hypergeometric function 2F1(3, 1; 5/2; z) for small arguments: Battin's series near the
+ * parabola. */
 static double battin_series(double z) {
     double sum = 1.0, term = 1.0;
     for (int k = 0; k < 60 && fabs(term) > 1e-17 * fabs(sum); k++) {
@@ -16,7 +17,7 @@ static double battin_series(double z) {
     return sum;
 }
 
-/* Time of flight, in sqrt(s^3 / (2 mu)), at x. */
+/* Time of flight at x, in units of sqrt(s^3 / (2 mu)). */
 static double flight_time(const path *p, double x) {
     double lambda = p->lambda, e = x * x - 1.0, rho = fabs(e);
     double z = sqrt(1.0 + lambda * lambda * e);
@@ -46,7 +47,7 @@ static double flight_time(const path *p, double x) {
     return (x - lambda * z - d / y) / e;
 }
 
-/* First three derivatives of the time of flight `t` at x. */
+/* First three derivatives of the time of flight `t` with respect to x. */
 static void slopes(const path *p, double x, double t, double d[3]) {
     double l2 = p->lambda * p->lambda, l3 = l2 * p->lambda, u = 1.0 - x * x;
     double y = sqrt(1.0 - l2 * u), y2 = y * y, y3 = y2 * y;
@@ -76,11 +77,11 @@ static bool solve(const path *p, double target, double *x) {
             return true;
         }
     }
-    /* rounding may keep the last digits moving */
+    /* rounding may prevent convergence of the last digits */
     return fabs(flight_time(p, *x) - target) <= 1e-9 * target;
 }
 
-/* Where the time of flight with whole turns is least. */
+/* Minimum time of flight with whole revolutions. */
 static double least_time(const path *p, double *x) {
     for (int i = 0; i < 30; i++) {
         double t = flight_time(p, *x), d[3];
@@ -124,7 +125,7 @@ static bst_status find_x(bst_ctx *ctx, const path *p, double target, bool high_e
         *x = (k - 1.0) / (k + 1.0);
         found = solve(p, target, x) && (high_energy ? *x >= bottom : *x <= bottom);
         if (!found) {
-            /* from just beside the bottom, where the curve is a parabola */
+            /* start near the minimum, where the curve is a parabola */
             double t = flight_time(p, bottom), d[3];
             slopes(p, bottom, t, d);
             double away = sqrt(2.0 * fmax(0.0, target - t) / d[1]);

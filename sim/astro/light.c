@@ -7,8 +7,8 @@ bst_light bst_light_at(const bst_bodies *bodies, bst_vec3 position_m, bst_vec3 v
                        bst_vec3_sub(bodies->sun_m, position_m)};
 }
 
-/* Direction of a star behind the Sun's field. Close to the Sun's centre the deflection is held
- * down as in eraLdsun: no observer sees a star there. */
+/* Direction of a star after light deflection by the Sun. Near the Sun's centre the deflection is
+ * limited as in eraLdsun. */
 static bst_vec3 deflect(const bst_light *light, bst_vec3 p) {
     double distance = bst_vec3_norm(light->sun_m);
     double distance_au = distance * (1.0 / BST_AU_M);
@@ -39,8 +39,8 @@ bst_vec3 bst_light_aberrate(const bst_light *light, bst_vec3 direction) {
     return aberrate(light, direction);
 }
 
-/* Solves forward(light, p) = apparent. Each step shrinks the error by the deflection's or
- * aberration's gradient: 1e-4, and 0.02 in front of the Sun's disc. */
+/* Inverts forward(light, p) = apparent by iteration. Each step reduces the error by the gradient of
+ * deflection or aberration: 1e-4, and 0.02 in front of the Sun's disc. */
 static bst_vec3 invert(bst_vec3 (*forward)(const bst_light *, bst_vec3), const bst_light *light,
                        bst_vec3 apparent) {
     bst_vec3 p = apparent;

@@ -1,4 +1,4 @@
-/* OEM files: lines to segments of states. */
+/* Parses OEM files into segments of states. */
 #include "sim/astro/oem.h"
 
 #include <erfa.h>
@@ -57,7 +57,7 @@ static const char *const head_names[] = {"CCSDS_OEM_VERS", "CREATION_DATE", "ORI
 
 typedef enum place { IN_HEAD, IN_META, IN_DATA, IN_COVARIANCE } place;
 
-/* A matrix of covariances: the lines that came of it. */
+/* A covariance matrix: lines read so far. */
 typedef struct covariance {
     bool has_epoch;
     int rows;
@@ -67,10 +67,10 @@ typedef struct reader {
     bst_text_source source;
     bst_oem *oem;
     place where;
-    bst_text_line line; /* the one that is read */
+    bst_text_line line; /* current line */
     bool head[HEAD_KEYS];
-    /* of the segment that is read */
-    bst_text_line meta[META_KEYS]; /* `text` NULL: absent; the value only */
+    /* metadata of the current segment */
+    bst_text_line meta[META_KEYS]; /* value of each key; `text` NULL: absent */
     bst_oem_segment_rows segment;
     bst_astro_time_system system;
     bst_time start, stop, use_start, use_stop;
@@ -127,7 +127,7 @@ static bst_status split(const reader *r, bst_text_span *name, bst_text_span *val
     return problem ? fail_line(r, problem, expected) : BST_OK;
 }
 
-/* Index of the keyword in `names`, a NULL-terminated list; an error suggests the nearest one. */
+/* Index of a keyword in `names`, a NULL-terminated list; the error suggests the nearest one. */
 static bst_status find_key(const reader *r, bst_text_span name, const char *const *names,
                            int *out) {
     char word[64], expected[96];
@@ -190,7 +190,7 @@ static bst_status fail_meta(const reader *r, key k, const char *problem, const c
     return bst_text_fail_at(&r->source, value, text, value->text, value->length, expected);
 }
 
-/* Without regard to case, which the standard leaves open for values. */
+/* Compares a metadata value, ignoring case, which the standard does not define. */
 static bool meta_is(const reader *r, key k, const char *word) {
     return r->meta[k].length == strlen(word) &&
            strncasecmp(r->meta[k].text, word, r->meta[k].length) == 0;
@@ -264,7 +264,7 @@ static bst_status read_meta_date(const reader *r, key k, bst_time *out) {
     return line->text ? read_date(r, line, (bst_text_span){line->text, line->length}, out) : BST_OK;
 }
 
-/* META_STOP: what the keywords say. */
+/* Completes the metadata at META_STOP. */
 static bst_status finish_meta(reader *r) {
     for (int k = 0; k < NEEDED_KEYS; k++) {
         if (!r->meta[k].text) {
@@ -361,7 +361,7 @@ static bst_status read_row(reader *r) {
     return append_row(r, &row);
 }
 
-/* The end of a segment's states. */
+/* Completes a segment after its last state. */
 static bst_status finish_segment(reader *r) {
     bst_oem_segment_rows *s = &r->segment;
     bst_ctx *ctx = r->source.ctx;
@@ -371,7 +371,7 @@ static bst_status finish_segment(reader *r) {
                         s->line);
     }
     double last_s = r->oem->rows[r->oem->row_count - 1].t_s;
-    /* dates in the metadata may be rounded to a second */
+    /* metadata dates may be rounded to a second */
     double allowed_s = fmax(r->largest_step_s, 1.0);
     if (bst_time_diff(s->base, r->start) > allowed_s ||
         bst_time_diff(r->stop, s->base) - last_s > allowed_s) {

@@ -1,4 +1,4 @@
-/* What the reader of OEM files and their evaluation share. */
+/* Internal types of the OEM reader and its interpolation. */
 #ifndef BST_ASTRO_OEM_INTERNAL_H
 #define BST_ASTRO_OEM_INTERNAL_H
 
@@ -13,8 +13,8 @@ typedef struct bst_oem_segment_rows {
     int line;              /* of META_START */
     bst_oem_axes axes;
     bool hermite;
-    int points;          /* rows that the interpolation takes */
-    bst_time base;       /* rows[].t_s counts from here */
+    int points;          /* number of rows for the interpolation */
+    bst_time base;       /* reference time of rows[].t_s */
     int64_t first, rows; /* in bst_oem.rows */
     double from_s, to_s; /* usable span, after base */
 } bst_oem_segment_rows;
@@ -28,14 +28,14 @@ struct bst_oem {
     char *name; /* of the file, for messages */
     bst_astro_table_state *rows;
     int64_t row_count, row_capacity;
-    bst_oem_segment_rows *segments; /* by object, then by time */
+    bst_oem_segment_rows *segments; /* sorted by object, then by time */
     int segment_count, segment_capacity;
     bst_oem_object *objects;
     int object_count;
 };
 
-/* Numbers objects as they come first in the file, and puts their segments in the order of time.
- * BST_ERR_FORMAT when usable spans of one object overlap. */
+/* Numbers objects in file order and sorts their segments by time. BST_ERR_FORMAT: usable spans of
+ * one object overlap. */
 bst_status bst_oem_sort(bst_ctx *ctx, bst_oem *oem) BST_MUST_CHECK;
 
 #endif

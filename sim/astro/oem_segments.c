@@ -1,4 +1,4 @@
-/* The segments of an OEM, by object and time. */
+/* Sorts the segments of an OEM by object and time. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,7 +32,7 @@ static int by_time(const void *x, const void *y) {
 bst_status bst_oem_sort(bst_ctx *ctx, bst_oem *oem) {
     int n = oem->segment_count, objects = 0;
     bst_oem_segment_rows *s = oem->segments;
-    /* the line of an object's first segment stands for it until all are known */
+    /* the line of an object's first segment identifies it until all are numbered */
     qsort(s, (size_t)n, sizeof *s, by_object);
     for (int i = 0; i < n; i++) {
         s[i].object = i > 0 && compare_objects(&s[i - 1], &s[i]) == 0 ? s[i - 1].object : s[i].line;

@@ -2,7 +2,7 @@
 
 #include "sim/astro/oem_internal.h"
 
-/* What a time may lie outside a span by: epochs in files are rounded. */
+/* tolerance outside a time span: epochs in files are rounded */
 #define SLACK_S 1e-6
 
 int bst_oem_object_count(const bst_oem *oem) {
@@ -48,7 +48,7 @@ void bst_oem_span(const bst_oem *oem, int object, bst_time *start, bst_time *sto
     *stop = bst_time_add(last->base, last->to_s);
 }
 
-/* The last segment of the object that starts at t or before, else the first. */
+/* Last segment of the object that starts at or before t, else the first one. */
 static const bst_oem_segment_rows *segment_at(const bst_oem *oem, const bst_oem_object *o,
                                               bst_time t) {
     int low = o->first, high = o->first + o->count;
@@ -107,7 +107,7 @@ bst_status bst_oem_state(bst_ctx *ctx, const bst_oem *oem, int object, bst_sky_c
     const bst_oem_object *o = &oem->objects[object];
     const bst_oem_segment_rows *s = segment_at(oem, o, t);
     if (!within(s, t)) {
-        /* a segment may start within the slack */
+        /* a segment may start within the tolerance */
         bool last = s == oem->segments + o->first + o->count - 1;
         if (last || !within(s + 1, t)) {
             return fail_outside(ctx, oem, object, t);

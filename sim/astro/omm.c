@@ -1,4 +1,4 @@
-/* CCSDS Orbit Mean-elements Messages (502.0-B-3) as JSON and CSV. */
+/* Reads CCSDS Orbit Mean-elements Messages (502.0-B-3) as JSON and CSV. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,17 +42,17 @@ static const char *const key_names[KEYS] = {
     "MEAN_MOTION_DDOT",  "ELEMENT_SET_NO", "REV_AT_EPOCH", "EPHEMERIS_TYPE",
     "CENTER_NAME",       "REF_FRAME",      "TIME_SYSTEM",  "MEAN_ELEMENT_THEORY"};
 
-/* One message: the texts of its keys, and where it stands in the file. */
+/* One message: texts of its keys and its position in the file. */
 typedef struct record {
     const bst_text_source *source;
     int line;                  /* CSV; 0: JSON */
-    int index;                 /* JSON: in the array; -1: the object alone */
+    int index;                 /* JSON: index in the array; -1: a single object */
     bst_text_span value[KEYS]; /* text NULL: absent */
-    bool is_number[KEYS];      /* JSON: `number` is what it says */
+    bool is_number[KEYS];      /* JSON: the value is a number */
     double number[KEYS];
 } record;
 
-/* "file:12: KEY" or "file: /3/KEY". */
+/* Position for messages: "file:12: KEY" or "file: /3/KEY". */
 static void locate(const record *r, const char *name, char *where, size_t bytes) {
     if (r->line > 0) {
         snprintf(where, bytes, "%.400s:%d: %s", r->source->name, r->line, name);
@@ -137,7 +137,8 @@ static bst_status read_text(const record *r, key k, char *out, size_t bytes) {
     return BST_OK;
 }
 
-/* "2019-081A" as a TLE has it, "19081A"; anything else as it is. */
+/* Shortens an international designator to TLE form: "2019-081A" to "19081A"; others are
+ * unchanged. */
 static void shorten_designator(char *d) {
     if (strlen(d) >= 9 && strspn(d, "0123456789") == 4 && d[4] == '-' &&
         strspn(d + 5, "0123456789") == 3) {
@@ -254,7 +255,7 @@ static bst_status read_object(bst_elements_reader *reader, const cJSON *object, 
         return bst_fail(reader->source.ctx, BST_ERR_FORMAT,
                         "%s: is not an object (expected an orbit mean-elements message)", where);
     }
-    /* numbers as texts, for messages */
+    /* numbers as text, for messages */
     char numbers[KEYS][32];
     for (const cJSON *item = object->child; item; item = item->next) {
         int k = find_key((bst_text_span){item->string, strlen(item->string)});
@@ -302,7 +303,7 @@ bst_status bst_astro_omm_read_json(bst_elements_reader *reader, const char *data
 
 enum { MAX_COLUMNS = 256, MAX_LINE = 65536 };
 
-/* Which key each column holds, -1 for none. */
+/* Assigns a key to each CSV column; -1: unknown. */
 static bst_status read_header(const bst_text_source *source, const bst_text_line *line,
                               const bst_text_span *fields, int count, int *columns) {
     bool seen[KEYS] = {false};

@@ -5,7 +5,7 @@
 
 enum { TERMS = BST_RADAU_TERMS, MOST_ITERATIONS = 12 };
 
-/* Zeros of (P7 + P8) / (1 + x), P Legendre polynomials, brought to [0, 1]. */
+/* zeros of (P7 + P8) / (1 + x), P: Legendre polynomials, scaled to [0, 1] */
 const double bst_radau_node[TERMS + 1] = {0.0,
                                           0.05626256053692214647,
                                           0.18024069173689236499,
@@ -66,8 +66,8 @@ void bst_radau_state(const bst_radau_step *step, double s, bst_vec3 *position_m,
     }
 }
 
-/* The last step's polynomial, carried on to this step and corrected by how wrong it was then (their
- * equations 13 and 14). False where there was none or it is worth nothing: far outside of it. */
+/* Predicts the polynomial of this step from that of the last step, corrected by its last prediction
+ * error (equations 13 and 14). False: no last step, or far outside of it. */
 static bool predict(const bst_radau_point *from, double h, bst_vec3 b[TERMS]) {
     double q = from->h_s != 0.0 ? h / from->h_s : 0.0;
     if (!(q > 0.0 && q < 8.0)) {
@@ -89,7 +89,7 @@ static bool predict(const bst_radau_point *from, double h, bst_vec3 b[TERMS]) {
 }
 
 static double largest(double a, double b) {
-    return a > b ? a : b; /* a NaN in b is lost, in a kept: callers look at NaN themselves */
+    return a > b ? a : b; /* loses a NaN in b, keeps one in a: callers check for NaN */
 }
 
 bst_status bst_radau_try(const bst_radau *radau, const bst_radau_point *from, double h,
@@ -102,7 +102,7 @@ bst_status bst_radau_try(const bst_radau *radau, const bst_radau_point *from, do
     step->velocity_low_mps = from->velocity_low_mps;
     BST_TRY(force(user, 0.0, from->position_m, from->velocity_mps, &step->acceleration_mps2));
     if (predict(from, h, step->b)) {
-        for (int k = 0; k < TERMS; k++) { /* what the last prediction had missed by */
+        for (int k = 0; k < TERMS; k++) { /* error of the last prediction */
             step->b[k] = bst_vec3_add(step->b[k], bst_vec3_sub(from->b[k], from->predicted[k]));
         }
     }
@@ -139,7 +139,7 @@ bst_status bst_radau_try(const bst_radau *radau, const bst_radau_point *from, do
         if (!(change < INFINITY)) {
             return BST_OK;
         }
-        /* settled, or nothing but rounding is left */
+        /* converged, or at rounding level */
         converged = change < 1e-16 || (change < 1e-11 && change >= last_change);
         last_change = change;
     }
@@ -149,7 +149,7 @@ bst_status bst_radau_try(const bst_radau *radau, const bst_radau_point *from, do
     return BST_OK;
 }
 
-/* Adds to a sum whose rounding errors are kept in *low (Neumaier's form of Kahan's sum). */
+/* Adds to a compensated sum; *low holds its rounding errors (Neumaier's form of Kahan's sum). */
 static void add(double *sum, double *low, double term) {
     double s = *sum + term;
     *low += fabs(*sum) >= fabs(term) ? (*sum - s) + term : (term - s) + *sum;
@@ -162,14 +162,14 @@ static void add_vec(bst_vec3 *sum, bst_vec3 *low, bst_vec3 term) {
     add(&sum->z, &low->z, term.z);
 }
 
-/* Brings what has gathered in *low back into the sum. */
+/* Merges the accumulated rounding errors *low into the sum. */
 static void settle(bst_vec3 *sum, bst_vec3 *low) {
     bst_vec3 gathered = *low;
     *low = (bst_vec3){0.0, 0.0, 0.0};
     add_vec(sum, low, gathered);
 }
 
-/* The rounding error of the product h v. */
+/* Rounding error of the product h v. */
 static bst_vec3 product_error(double h, bst_vec3 v, bst_vec3 product) {
     return (bst_vec3){fma(h, v.x, -product.x), fma(h, v.y, -product.y), fma(h, v.z, -product.z)};
 }
@@ -193,7 +193,7 @@ void bst_radau_advance(bst_radau_point *p, const bst_radau_step *step) {
     add_vec(&p->velocity_mps, &p->velocity_low_mps, bst_vec3_scale(step->acceleration_mps2, h));
     add_vec(&p->velocity_mps, &p->velocity_low_mps, bst_vec3_scale(v, h));
     settle(&p->velocity_mps, &p->velocity_low_mps);
-    /* what this step's polynomial had been predicted to be, for the next prediction */
+    /* predicted polynomial of this step, for the next prediction */
     bst_vec3 predicted[TERMS];
     bool known = predict(p, h, predicted);
     memcpy(p->predicted, known ? predicted : step->b, sizeof p->predicted);

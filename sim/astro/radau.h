@@ -1,4 +1,4 @@
-/* One step of a 15th-order implicit integrator for motion under forces. */
+/* One step of a 15th-order implicit integrator for orbits. */
 #ifndef BST_ASTRO_RADAU_H
 #define BST_ASTRO_RADAU_H
 
@@ -14,19 +14,19 @@ enum { BST_RADAU_TERMS = 7 };
 
 /* Constants of the scheme. */
 typedef struct bst_radau {
-    /* a polynomial's coefficients from its divided differences, and back */
+    /* conversion between polynomial coefficients and divided differences */
     double power_from_newton[BST_RADAU_TERMS][BST_RADAU_TERMS];
     double newton_from_power[BST_RADAU_TERMS][BST_RADAU_TERMS];
 } bst_radau;
 
-/* Computes the tables of an integrator from its nodes; needed once, before the first step. */
+/* Computes the constants of the scheme; required once, before the first step. */
 void bst_radau_init(bst_radau *radau);
 
-/* Motion inside of one step; h may be negative. */
+/* Motion within one step; h may be negative. */
 typedef struct bst_radau_step {
     double h_s;
     bst_vec3 position_m, velocity_mps, acceleration_mps2; /* at s = 0 */
-    bst_vec3 position_low_m, velocity_low_mps;            /* what their rounding left out */
+    bst_vec3 position_low_m, velocity_low_mps;            /* compensation of rounding errors */
     bst_vec3 b[BST_RADAU_TERMS];
 } bst_radau_step;
 
@@ -34,29 +34,29 @@ typedef struct bst_radau_step {
 void bst_radau_state(const bst_radau_step *step, double s, bst_vec3 *position_m,
                      bst_vec3 *velocity_mps);
 
-/* Where an integration stands: all that its next step depends on. Zero but for position and
- * velocity at the start. */
+/* State of an integration, on which its next step depends. Zero except for position and velocity at
+ * the start. */
 typedef struct bst_radau_point {
     bst_vec3 position_m, velocity_mps;
     bst_vec3 position_low_m, velocity_low_mps; /* compensated sums (Kahan) */
-    /* last step's polynomial and what it had been predicted to be; h_s 0: there was none */
+    /* polynomial of the last step and its prediction; h_s 0: no last step */
     double h_s;
     bst_vec3 b[BST_RADAU_TERMS], predicted[BST_RADAU_TERMS];
 } bst_radau_point;
 
-/* The acceleration `offset_s` after the step's start. */
+/* Callback: acceleration at `offset_s` after the start of the step. */
 typedef bst_status (*bst_radau_force)(void *user, double offset_s, bst_vec3 position_m,
                                       bst_vec3 velocity_mps, bst_vec3 *acceleration_mps2);
 
-/* Works a step of h_s out, from where the integration stands; *error is |b6| over the largest
- * acceleration (their equation 8), INFINITY when the iteration did not converge. */
+/* Computes a step of h_s. *error: |b6| over the largest acceleration (equation 8); INFINITY: the
+ * iteration did not converge. */
 bst_status bst_radau_try(const bst_radau *radau, const bst_radau_point *from, double h_s,
                          bst_radau_force force, void *user, bst_radau_step *step,
                          double *error) BST_MUST_CHECK;
-/* Moves on to the step's end. */
+/* Advances the state to the end of the step. */
 void bst_radau_advance(bst_radau_point *point, const bst_radau_step *step);
 
-/* The nodes, 0 first. */
+/* nodes of the scheme, 0 first */
 extern const double bst_radau_node[BST_RADAU_TERMS + 1];
 
 #endif

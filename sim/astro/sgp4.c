@@ -1,8 +1,8 @@
-/* SGP4: creation's front door and propagation. */
+/* SGP4: public creation function and propagation. */
 #include "sim/astro/sgp4_internal.h"
 
-/* Beyond 1,900 years the polynomials in time mean nothing, and a resonant orbit would integrate for
- * long. */
+/* limit of 1,900 years: beyond it the polynomials in time are meaningless, and resonant orbits
+ * would take long to integrate */
 #define MAX_MINUTES 1e9
 
 #define KEPLER_STEPS 10
@@ -24,8 +24,8 @@ void bst_sgp4_set_plane(const bst_sgp4_constants *k, double sin_i, double cos_i,
 }
 
 /* Solves u = E - ax sin E + ay cos E for the eccentric longitude E by Newton's method from E = u;
- * gives sin E and cos E. A step d leaves an error of at most d^2 / (2 (1 - e cos E)), so the last
- * step is known by its size without one more evaluation. */
+ * gives sin E and cos E. A step d leaves an error of at most d^2 / (2 (1 - e cos E)), so that the
+ * size of a step decides whether it is the last one. */
 static void solve_kepler(double u, double ax, double ay, double *sin_e, double *cos_e) {
     double s = sin(u), c = cos(u);
     double delta = 0.0;
@@ -84,8 +84,8 @@ static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, d
     *a *= root_a_ratio * root_a_ratio;
     x->e -= e_loss;
     x->m += l_gain;
-    /* Summed and wrapped as the reference does: after years the rounding of this sum, at perigee of
-     * an eccentric orbit, is the largest of all. */
+    /* Summed and wrapped like the reference implementation: after years the rounding of this sum is
+     * the largest error at perigee of an eccentric orbit. */
     x->m = fmod(x->m + x->argp + x->raan, BST_SGP4_TWO_PI) - x->argp - x->raan;
     if (!(x->e < 1.0 && x->e >= -0.001)) {
         return BST_SGP4_MEAN_ECCENTRICITY;
@@ -96,7 +96,7 @@ static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, d
     return BST_SGP4_OK;
 }
 
-/* Disturbed elements with the plane that they lie in. */
+/* Perturbed elements with the orbital plane. */
 typedef struct disturbed {
     bst_sgp4_mean x;
     double a, ax, ay, u; /* ax, ay: eccentricity vector; u: mean argument of latitude */
@@ -105,8 +105,8 @@ typedef struct disturbed {
     bst_sgp4_plane plane;
 } disturbed;
 
-/* Sun and Moon, then the long periodics by J3; the node drops out of the argument of Kepler's
- * equation. */
+/* Adds the luni-solar terms, then the long periodics by J3. The node drops out of the argument of
+ * Kepler's equation. */
 static bst_sgp4_error add_long_periodics(const bst_sgp4 *s, double t, disturbed *d) {
     bst_sgp4_mean *x = &d->x;
     d->plane = s->plane;
@@ -132,13 +132,13 @@ static bst_sgp4_error add_long_periodics(const bst_sgp4 *s, double t, disturbed 
     return d->p >= 0.0 ? BST_SGP4_OK : BST_SGP4_SEMI_LATUS_RECTUM;
 }
 
-/* Radius, speeds and angles with the short periodics. */
+/* Radius, velocity components and angles after short periodics. */
 typedef struct osculating {
     double r, v_radial, v_along;
     double sin_u, cos_u, sin_i, cos_i, sin_raan, cos_raan;
 } osculating;
 
-/* By J2, lengths in Earth radii, speeds in units of ke. */
+/* Short periodics by J2; lengths in Earth radii, velocities in units of ke. */
 static osculating add_short_periodics(const bst_sgp4 *s, const disturbed *d) {
     const bst_sgp4_plane *plane = &d->plane;
     const bst_sgp4_mean *x = &d->x;

@@ -10,7 +10,7 @@ typedef enum bst_sgp4_mode {
     BST_SGP4_AFSPC
 } bst_sgp4_mode; /* opsmode 'i' and 'a' */
 
-/* The error codes of the published reference (Vallado et al., AIAA 2006-6753). */
+/* Error codes of the published reference (Vallado et al., AIAA 2006-6753). */
 typedef enum bst_sgp4_error {
     BST_SGP4_OK = 0,
     BST_SGP4_MEAN_ECCENTRICITY = 1,
@@ -20,34 +20,34 @@ typedef enum bst_sgp4_error {
     BST_SGP4_DECAYED = 6
 } bst_sgp4_error;
 
-/* One initialised satellite. Never changes once made. */
+/* An initialised satellite; immutable. */
 typedef struct bst_sgp4 bst_sgp4;
 
-/* Makes a propagator from an element set; *out is freed with bst_sgp4_free, NULL on error. Orbits
- * of 225 minutes or longer get the deep-space model. BST_ERR_NUMERIC with the code in the message
- * for an eccentricity outside 0 <= e < 1 or a mean motion that is not above 0 (also once Kozai's is
- * turned to Brouwer's); BST_ERR_ARGUMENT for values that are not finite or an inclination outside 0
- * to pi. Equations: Hoots and Roehrich, Spacetrack Report 3 (1980), with the corrections and
- * constants of Vallado et al., AIAA 2006-6753; BST_SGP4_AFSPC takes that paper's sidereal time and
- * node of the operational code. */
+/* Creates an SGP4 propagator from an element set; *out is freed with bst_sgp4_free, NULL on error.
+ * Orbits of 225 minutes or longer get the deep-space model. BST_ERR_NUMERIC with the code in the
+ * message for an eccentricity outside 0 <= e < 1 or a mean motion that is not above 0 (also once
+ * Kozai's is turned to Brouwer's); BST_ERR_ARGUMENT for values that are not finite or an
+ * inclination outside 0 to pi. Equations: Hoots and Roehrich, Spacetrack Report 3 (1980), with the
+ * corrections and constants of Vallado et al., AIAA 2006-6753; BST_SGP4_AFSPC takes that paper's
+ * sidereal time and node of the operational code. */
 bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
                            bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
 /* Frees a propagator; NULL is allowed. */
 void bst_sgp4_free(bst_sgp4 *sgp4);
 
 /* State at `minutes` after the element epoch (UTC taken as uniform, as the theory does): TEME, km
- * and km/s. Pure: no state is kept between calls, so any order of times gives the same bits and
- * threads may share one propagator. position/velocity are still written on BST_SGP4_DECAYED, else
+ * and km/s. No state is kept between calls: the result does not depend on the order of times, and
+ * threads may share a propagator. position/velocity are still written on BST_SGP4_DECAYED, else
  * untouched on error. Times beyond 1e9 minutes or not finite give BST_SGP4_MEAN_MOTION. Resonant
  * orbits are integrated from the epoch each time, in steps of half a day. */
 bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *sgp4, double minutes, double position_teme_km[3],
                                   double velocity_teme_kmps[3]);
 
-/* Minutes between the steps in which a resonant orbit is integrated: at every multiple of this from
- * the element epoch but 0 the position jumps a little, by up to metres. 0: no such orbit. */
+/* Integration step of a resonant orbit, minutes: at each multiple from the element epoch except 0
+ * the position is discontinuous by up to metres. 0: not resonant. */
 double bst_sgp4_step_minutes(const bst_sgp4 *sgp4);
 
-/* What an error code means, in words. */
+/* Description of an SGP4 error code. */
 const char *bst_sgp4_error_text(bst_sgp4_error error);
 
 #endif

@@ -4,12 +4,12 @@
 
 #define EARTH_RATE_RADPMIN 4.37526908801129966e-3
 #define STEP_MIN 720.0
-/* Below 3 degrees from the equator, Sun and Moon's secular effect on the node is left out. */
+/* below 3 degrees of inclination the luni-solar secular effect on the node is omitted */
 #define NODE_SECULAR_MIN_I 5.2359877e-2
-/* Below 0.2 rad the periodics of node and perigee are applied as Lyddane (1963) does. */
+/* below 0.2 rad the periodics of node and perigee follow Lyddane (1963) */
 #define LYDDANE_I 0.2
 
-/* A disturbing body as the theory sees it: where its orbit lies and how strongly it pulls. */
+/* A perturbing body: orbit and strength. */
 typedef struct perturber {
     double strength;                 /* STR3's C, rad/min */
     double rate, eccentricity;       /* mean motion of its orbit, rad/min */
@@ -64,7 +64,7 @@ static forms evaluate_forms(const orbit_vector *u, const orbit_vector *v, double
     return f;
 }
 
-/* Adds one body's secular rates to `deep` and sets its periodic coefficients. */
+/* Adds the secular rates of one perturbing body to `deep` and sets its periodic coefficients. */
 static void set_body(const bst_sgp4 *s, const perturber *body, double anomaly0, bst_sgp4_deep *deep,
                      bst_sgp4_body *out) {
     const bst_sgp4_plane *plane = &s->plane;
@@ -114,7 +114,7 @@ static void set_body(const bst_sgp4 *s, const perturber *body, double anomaly0, 
     }
 }
 
-/* Orbits of Sun and Moon at the epoch and what they do to the satellite. */
+/* Computes the orbits of Sun and Moon at the epoch and their perturbations of the satellite. */
 static void set_sun_and_moon(bst_sgp4 *s, double days) {
     const double sin_raan = sin(s->raan0), cos_raan = cos(s->raan0);
     const double sin_obliquity = 0.39785416, cos_obliquity = 0.91744867;
@@ -279,7 +279,8 @@ void bst_sgp4_deep_init(bst_sgp4 *s, double days_1900, double sidereal0) {
     }
 }
 
-/* Force on the mean motion at resonance angle lambda, and its derivative by lambda. */
+/* Acceleration of the mean motion at resonance angle lambda, and its derivative with respect to
+ * lambda. */
 static void resonance_force(const bst_sgp4_deep *d, double lambda, bst_sgp4_complex perigee,
                             double *force, double *slope) {
     bst_sgp4_complex e1 = {cos(lambda), sin(lambda)};
@@ -303,7 +304,7 @@ static void resonance_force(const bst_sgp4_deep *d, double lambda, bst_sgp4_comp
 }
 
 /* Integrates mean motion and resonance angle from the epoch to t by Taylor steps of 720 min. The
- * theory restarts at the epoch when time turns back, so doing so always gives the same states. */
+ * reference restarts at the epoch if time reverses; always doing so gives unique states. */
 static void integrate_resonance(const bst_sgp4 *s, double t, double *n_out, double *lambda_out) {
     const bst_sgp4_deep *d = &s->deep;
     const double step = t < 0.0 ? -STEP_MIN : STEP_MIN;
@@ -400,7 +401,7 @@ void bst_sgp4_deep_periodic(const bst_sgp4 *s, double t, bst_sgp4_mean *x, doubl
         } else if (node - moved > BST_PI) {
             moved += BST_SGP4_TWO_PI;
         }
-        /* The longitude M + perigee + node cos i takes its own change as a whole. */
+        /* the change of the longitude M + perigee + node cos i is applied as a whole */
         x->argp += change[BST_SGP4_G] - d_i * node * sin_i + cos_i * (node - moved);
         x->m += change[BST_SGP4_L];
         x->raan = moved;

@@ -5,7 +5,7 @@
 
 enum { ELEMENTS = 6, MAX_ITERATIONS = 40 };
 
-/* WGS-72, m^3/s^2, as SGP4 has it. */
+/* WGS-72, m^3/s^2, as used by SGP4 */
 static const double MU_72 = 3.986008e14;
 
 bst_astro_kepler_elements bst_astro_kepler_elements_of(double mu, bst_vec3 r, bst_vec3 v) {
@@ -42,8 +42,8 @@ bst_astro_kepler_elements bst_astro_kepler_elements_of(double mu, bst_vec3 r, bs
     return k;
 }
 
-/* x: mean motion (rad/min), e cos and e sin of the longitude of perigee, tan(i/2) cos and sin of
- * the node, mean longitude. False for what is no ellipse. */
+/* Converts the fit parameters to elements. x: mean motion (rad/min), e cos and e sin of the
+ * longitude of perigee, tan(i/2) cos and sin of the node, mean longitude. False: not an ellipse. */
 static bool to_elements(const double x[ELEMENTS], bst_elements *out) {
     double e = hypot(x[1], x[2]);
     double node = atan2(x[4], x[3]), perigee = atan2(x[2], x[1]), turn = 2.0 * BST_PI;
@@ -60,8 +60,8 @@ static bool to_elements(const double x[ELEMENTS], bst_elements *out) {
     return true;
 }
 
-/* SGP4 less the places, three numbers (m) each, and the sum of their squares; false when SGP4 has
- * no state at one of them. */
+/* Residuals of SGP4 against the positions (three numbers each, m) and their sum of squares; false:
+ * no SGP4 state at one of them. */
 static bool differences(const bst_elements *elements, const bst_sgp4_place *places, int count,
                         double *out, double *sum2) {
     bst_sgp4 *sgp4;
@@ -170,8 +170,7 @@ static bst_status fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, dou
     return bst_fail(ctx, BST_ERR_NUMERIC, "the fit of mean elements does not converge");
 }
 
-/* What both functions start from; false for what is no ellipse or turns backwards in the equator.
- */
+/* Initial parameters from an osculating state; false: not an ellipse, or retrograde equatorial. */
 static bool start_from(bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps, double x[ELEMENTS]) {
     bst_astro_kepler_elements k =
         bst_astro_kepler_elements_of(MU_72, position_teme_m, velocity_teme_mps);
@@ -211,7 +210,8 @@ bst_status bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count,
 }
 
 bool bst_sgp4_motion(const bst_sgp4 *sgp4, double minutes, bst_vec3 *r, bst_vec3 *v) {
-    const double h = 4.0; /* s: truncation 1e-7 m/s in low orbits, rounding 1e-8 m/s in high ones */
+    const double h =
+        4.0; /* time step, s: truncation 1e-7 m/s in low orbits, rounding 1e-8 m/s in high ones */
     static const double weight[5] = {1.0 / 12.0, -8.0 / 12.0, 0.0, 8.0 / 12.0, -1.0 / 12.0};
     *v = (bst_vec3){0.0, 0.0, 0.0};
     for (int i = 0; i < 5; i++) {
@@ -228,7 +228,7 @@ bool bst_sgp4_motion(const bst_sgp4 *sgp4, double minutes, bst_vec3 *r, bst_vec3
     return true;
 }
 
-/* State at the epoch, as six numbers in m: places, and velocities times `time_s`. */
+/* State at the epoch as six numbers in m: position, and velocity times `time_s`. */
 static bool state_of(const bst_elements *elements, double time_s, double out[ELEMENTS]) {
     bst_sgp4 *sgp4;
     bst_vec3 r, v;
@@ -244,7 +244,7 @@ static bool state_of(const bst_elements *elements, double time_s, double out[ELE
     return good;
 }
 
-/* Newton's step for `miss`, wanted less found; false when SGP4 has no orbit near. */
+/* Newton step for `miss`, wanted minus found; false: no SGP4 orbit nearby. */
 static bool newton(const double x[ELEMENTS], const bst_elements *elements, double time_s,
                    const double miss[ELEMENTS], double step[ELEMENTS]) {
     double slope[ELEMENTS][ELEMENTS], a[ELEMENTS][ELEMENTS + 1], size[ELEMENTS];
@@ -279,7 +279,7 @@ static bool newton(const double x[ELEMENTS], const bst_elements *elements, doubl
     return true;
 }
 
-/* Wanted less what the elements of x give, and its square; false when SGP4 has no state there. */
+/* Wanted state minus the state of x, and its square; false: no SGP4 state. */
 static bool miss_of(const double x[ELEMENTS], double time_s, const double wanted[ELEMENTS],
                     bst_elements *elements, double miss[ELEMENTS], double *sum2) {
     double here[ELEMENTS];
@@ -309,7 +309,7 @@ bst_status bst_sgp4_through(bst_ctx *ctx, bst_vec3 r, bst_vec3 v, bst_elements *
         if (!newton(x, elements, time_s, miss, step)) {
             break;
         }
-        /* shorter where the theory bends: near the equator in deep space */
+        /* reduce the step where the model is nonlinear: near the equator in deep space */
         for (int k = 0; k < HALVINGS && !better; k++, share *= 0.5) {
             double y[ELEMENTS], then[ELEMENTS];
             for (int j = 0; j < ELEMENTS; j++) {
@@ -324,7 +324,7 @@ bst_status bst_sgp4_through(bst_ctx *ctx, bst_vec3 r, bst_vec3 v, bst_elements *
         }
         sum2 = better ? sum2 : before;
         if (!better || sum2 > 0.25 * before) {
-            /* as far as rounding lets it come */
+            /* at rounding level */
             if (sum2 < 1e-6) {
                 return BST_OK;
             }

@@ -1,9 +1,9 @@
-/* SGP4: constants of one satellite, from its element set. */
+/* SGP4 initialisation: constants of one satellite from its element set. */
 #include <stdlib.h>
 
 #include "sim/astro/sgp4_internal.h"
 
-/* Orbits of this period or longer feel Sun and Moon, min (STR3). */
+/* minimum period with luni-solar perturbations, min (STR3) */
 #define DEEP_SPACE_PERIOD_MIN 225.0
 
 /* VCHK table of gravity constants; GM in km^3/s^2. */
@@ -116,7 +116,7 @@ static void set_drag(bst_sgp4 *s, double bstar) {
     s->sin_m0 = sin(s->m0);
     s->cube_m0 = w * w * w;
     s->e_drag_sin = bstar * c5;
-    if (e > 1e-4) { /* both carry 1 / e (VCHK) */
+    if (e > 1e-4) { /* both contain 1 / e (VCHK) */
         double c3 = -2.0 * q_xi4 * xi * s->k.j3_over_j2 * n * s->plane.sin_i / e;
         s->argp_drag = bstar * c3 * cos(s->argp0);
         s->m_drag = -(2.0 / 3.0) * q_xi4 * bstar / e_eta;
@@ -183,8 +183,8 @@ bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_
     set_secular_rates(s);
     set_drag(s, el->bstar);
     if (s->deep_space) {
-        /* Summed to one double first, as the reference does: the Moon moves 1e-10 rad in its
-         * rounding, which shows in 1e-6 km at the farthest orbits. */
+        /* summed to one double first, like the reference: rounding moves the Moon by 1e-10 rad,
+         * 1e-6 km at the highest orbits */
         double days_1950 = (el->epoch_utc_jd1 + el->epoch_utc_jd2) - 2433281.5;
         bst_sgp4_deep_init(s, days_1950 + 18261.5, sidereal_time(days_1950, s->afspc));
     }

@@ -1,4 +1,4 @@
-/* What the SGP4 files share: the initialised satellite and small helpers.
+/* Internal types of SGP4: the initialised satellite and small helper functions.
  *
  * Units inside the model: Earth radii, minutes, radians. Sources, cited by these names:
  * STR3: Hoots and Roehrich, "Models for propagation of NORAD element sets", Spacetrack Report 3,
@@ -20,7 +20,7 @@ typedef struct bst_sgp4_complex {
     double re, im;
 } bst_sgp4_complex;
 
-/* One gravity set with the combinations that the equations use. */
+/* A gravity model with the constants that the equations use. */
 typedef struct bst_sgp4_constants {
     double radius_km;  /* equatorial radius */
     double ke;         /* sqrt(GM), Earth radii^1.5 / min */
@@ -29,7 +29,7 @@ typedef struct bst_sgp4_constants {
     double speed_kmps; /* km/s of one Earth radius times ke per minute */
 } bst_sgp4_constants;
 
-/* Functions of the inclination that the long and short periodics need. */
+/* Functions of the inclination for long and short periodics. */
 typedef struct bst_sgp4_plane {
     double sin_i, cos_i;
     double y_long;      /* long-period term in e sin(perigee), times 1 / p */
@@ -39,11 +39,11 @@ typedef struct bst_sgp4_plane {
     double seven_c2_m1; /* 7 cos^2 i - 1 */
 } bst_sgp4_plane;
 
-/* The elements that Sun and Moon disturb, in the order of the coefficient table. */
+/* elements with luni-solar periodics, in the order of the coefficient table */
 enum { BST_SGP4_E, BST_SGP4_I, BST_SGP4_L, BST_SGP4_G, BST_SGP4_H, BST_SGP4_TERMS };
 
-/* Periodic disturbance by Sun or Moon: element k changes by
- * c[k][0] (sin^2 f / 2 - 1/4) - c[k][1] (sin f cos f) / 2 + c[k][2] sin f. */
+/* Periodic perturbation by Sun or Moon: element k changes by c[k][0] (sin^2 f / 2 - 1/4) - c[k][1]
+ * (sin f cos f) / 2 + c[k][2] sin f. */
 typedef struct bst_sgp4_body {
     double anomaly0, anomaly_rate; /* mean anomaly at the epoch, rad, and its rate, rad/min */
     double two_e;                  /* twice the eccentricity of its orbit */
@@ -56,7 +56,7 @@ typedef enum bst_sgp4_resonance {
     BST_SGP4_HALF_DAY
 } bst_sgp4_resonance;
 
-/* Deep-space part: mean elements move by Sun and Moon and by resonance with the geopotential. */
+/* Deep-space part: mean elements change by Sun, Moon and resonance with the geopotential. */
 typedef struct bst_sgp4_deep {
     double e_rate, i_rate, m_rate, argp_rate, raan_rate; /* secular, by Sun and Moon */
     bst_sgp4_body body[2];                               /* Sun, Moon */
@@ -92,8 +92,8 @@ typedef struct bst_sgp4_mean {
     double n, e, i, m, argp, raan;
 } bst_sgp4_mean;
 
-/* sin and cos of angle + turn, given those of angle; total = angle + turn. Small turns by their
- * series, to 1e-17. */
+/* sin and cos of angle + turn from those of angle; total = angle + turn. Small rotations by series,
+ * accurate to 1e-17. */
 static inline void bst_sgp4_turn(double total, double turn, double *sine, double *cosine) {
     if (!(fabs(turn) < 0.125)) {
         *sine = sin(total);

@@ -1,7 +1,7 @@
 #include "sim/astro/earth_limb.h"
 
-/* A limb flatter than this is drawn as a circle of the radius 1000 rad, which leaves the straight
- * line by 1e-8 rad over the Sun's disc. */
+/* curvature limit: a flatter limb is treated as a circle of radius 1000 rad, which deviates from a
+ * straight line by 1e-8 rad over the Sun's disc */
 #define FLATTEST 1e-3
 
 /* Area of a circle's segment: radius r, half its opening angle. */
@@ -9,9 +9,8 @@ static double segment_area(double r, double half_angle) {
     return r * r * (half_angle - 0.5 * sin(2.0 * half_angle));
 }
 
-/* Area common to circles of radii a and b whose centres are b + gap apart, |a - b| < b + gap < a +
- * b. The half chord comes from Heron's product of differences, which stays exact where the circles
- * touch. */
+/* Area common to circles of radii a and b with centres b + gap apart, |a - b| < b + gap < a + b.
+ * The half chord uses Heron's formula, which stays precise near tangency. */
 static double lens_area(double a, double b, double gap) {
     double c = b + gap;
     double heron = (a + b + c) * (a - gap) * (a + gap) * (b + c - a);
@@ -52,7 +51,7 @@ static bst_vec3 times(const form *f, bst_vec3 v) {
     return bst_vec3_axpy(bst_vec3_scale(v, f->across), along, f->pole);
 }
 
-/* N, its gradient and second derivatives by the coordinates x and y of d = z + x e1 + y e2. */
+/* N, its gradient and second derivatives with respect to x and y of d = z + x e1 + y e2. */
 typedef struct slope {
     double n, x, y, xx, xy, yy;
 } slope;
@@ -71,7 +70,7 @@ static slope slope_at(const form *f, bst_vec3 d, bst_vec3 e1, bst_vec3 e2) {
 
 bool bst_earth_limb_at(bst_vec3 position_m, bst_vec3 pole, double height_m, bst_vec3 towards,
                        bst_earth_limb *out) {
-    /* lengths in units of the position's, so that N is an angle */
+    /* lengths in units of the position: N is an angle */
     double r = bst_vec3_norm(position_m);
     double a = (BST_EARTH_RADIUS_M + height_m) / r;
     double b = (BST_EARTH_RADIUS_M * (1.0 - BST_EARTH_FLATTENING) + height_m) / r;
@@ -79,7 +78,7 @@ bool bst_earth_limb_at(bst_vec3 position_m, bst_vec3 pole, double height_m, bst_
     bst_vec3 up = bst_vec3_scale(position_m, 1.0 / r);
     f.p = times(&f, up);
     f.inside = sqrt(fmax(bst_vec3_dot(up, f.p) - 1.0, 0.0));
-    /* the way to the limb: to or from the Earth's middle */
+    /* search direction to the limb: radial in the sky */
     bst_vec3 across = bst_vec3_axpy(up, -bst_vec3_dot(up, towards), towards);
     if (bst_vec3_dot(across, across) < 1e-24) {
         across = bst_vec3_perpendicular(towards);
@@ -107,12 +106,12 @@ bool bst_earth_limb_at(bst_vec3 position_m, bst_vec3 pole, double height_m, bst_
         return false;
     }
     double g2 = s.x * s.x + s.y * s.y, g = sqrt(g2);
-    /* From (x, 0) on the limb the distance of the origin, to second order along the tangent: the
-     * limb's normal is off e1 by an angle of the order of the flattening. */
+    /* Distance of the origin from (x, 0) on the limb, to second order along the tangent: the limb's
+     * normal deviates from e1 by the order of the flattening. */
     double normal = x * s.x / g, tangent = x * s.y / g;
     out->curvature = -(s.xx * s.y * s.y - 2.0 * s.xy * s.x * s.y + s.yy * s.x * s.x) / (g2 * g);
     double square = tangent * tangent, k = out->curvature;
-    /* circle of curvature k: its centre lies 1 / k inside along the normal */
+    /* circle of curvature k: its centre is 1 / k inside along the normal */
     double gap = normal + 0.5 * k * (normal * normal + square);
     out->beyond = 2.0 * gap / (1.0 + sqrt(fmax(1.0 + 2.0 * k * gap, 0.0)));
     return true;
@@ -125,11 +124,11 @@ double bst_astro_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole
         return 0.0;
     }
     if (sun_distance <= BST_SUN_RADIUS_M || sun_distance < distance) {
-        return 1.0; /* the Sun is nearer than the Earth, which cannot cover it */
+        return 1.0; /* the Sun is nearer than the Earth: no occultation */
     }
     if (bst_vec3_dot(position_m, to_sun) > 0.0 && distance > 1.0001 * BST_EARTH_RADIUS_M &&
         sun_distance > 200.0 * BST_SUN_RADIUS_M) {
-        return 1.0; /* the Earth fills less than a half of the sky, on the other side */
+        return 1.0; /* the Earth subtends less than half of the sky, on the other side */
     }
     bst_earth_limb limb;
     if (!bst_earth_limb_at(position_m, pole, 0.0, bst_vec3_scale(to_sun, 1.0 / sun_distance),
@@ -152,7 +151,7 @@ bool bst_astro_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole) {
     bst_vec3 near = bst_earth_unit_sphere(a_m, pole, 0.0);
     bst_vec3 far = bst_earth_unit_sphere(b_m, pole, 0.0);
     if (bst_vec3_dot(far, far) < bst_vec3_dot(near, near)) {
-        bst_vec3 swap = near; /* measured from the nearer end, rounding is that of its distance */
+        bst_vec3 swap = near; /* measure from the nearer end, for small rounding errors */
         near = far;
         far = swap;
     }

@@ -7,15 +7,15 @@
 #include "sim/astro/frames_internal.h"
 
 #define STEPS_PER_DAY 720
-/* Enough that look-backs over a grid point do not push out what the present needs. */
+/* grid nodes kept: queries slightly back in time must not displace current nodes */
 #define NODES 4
-/* The same for clocks that are not at the same place of the run. */
+/* grid nodes kept for clocks at different times of a run */
 #define SHARED_NODES 16
 
 typedef struct node {
     int64_t index;
     bool valid;
-    bool beyond; /* the Earth-orientation table */
+    bool beyond; /* after the end of the Earth orientation table */
     bst_astro_earth_parts parts;
     bst_bodies bodies;
 } node;
@@ -28,9 +28,9 @@ struct bst_sky_clock_grid {
 
 struct bst_sky_clock {
     const bst_astro_eop *eop;
-    bst_sky_clock_grid *grid; /* NULL: works its values out itself */
+    bst_sky_clock_grid *grid; /* NULL: computes its own grid values */
     node nodes[NODES];
-    bool asked; /* before, for the instant `last` */
+    bool asked; /* `last` holds the time of the previous call */
     bst_time last;
     bst_sky_rotation sky;
 };
@@ -75,8 +75,8 @@ void bst_sky_clock_free(bst_sky_clock *clock) {
     free(clock);
 }
 
-/* Works out the grid value of an index. Beyond the Earth-orientation table it has the values of its
- * end, for instants just before. */
+/* Computes the grid value of an index. After the Earth orientation table it uses the values of its
+ * end, for times just before. */
 static bst_status make_node(bst_ctx *ctx, const bst_astro_eop *eop, int64_t index, node *n) {
     int64_t day = index / STEPS_PER_DAY, step = index % STEPS_PER_DAY;
     bst_time t = {(double)day + 0.5, (double)step / STEPS_PER_DAY};
@@ -95,7 +95,7 @@ static bst_status make_node(bst_ctx *ctx, const bst_astro_eop *eop, int64_t inde
     return BST_OK;
 }
 
-/* The same by way of the shared grid. */
+/* Takes a grid value from the shared grid, computing it if missing. */
 static bst_status shared_node(bst_ctx *ctx, bst_sky_clock_grid *grid, int64_t index, node *out) {
     node *n = &grid->nodes[index % SHARED_NODES];
     bst_status status = BST_OK;
@@ -108,7 +108,7 @@ static bst_status shared_node(bst_ctx *ctx, bst_sky_clock_grid *grid, int64_t in
     return status;
 }
 
-/* The grid value of an index, from its slot or worked out anew. */
+/* Grid value of an index, from the cache or computed. */
 static bst_status node_at(bst_ctx *ctx, bst_sky_clock *clock, int64_t index, const node **out) {
     node *n = &clock->nodes[index % NODES];
     if (!n->valid || n->index != index) {
@@ -124,8 +124,7 @@ static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double f) {
     return bst_vec3_axpy(a, f, bst_vec3_sub(b, a));
 }
 
-/* Linear in their elements, rotations that are so near to each other stay rotations to double
- * precision. */
+/* Linear interpolation of matrix elements: nearby rotations stay orthogonal to double precision. */
 static bst_mat3 lerp_rotation(const bst_mat3 *a, const bst_mat3 *b, double f) {
     bst_mat3 r;
     for (int i = 0; i < 3; i++) {
@@ -157,7 +156,7 @@ bst_astro_earth_parts bst_astro_earth_parts_between(const bst_astro_earth_parts 
 }
 
 bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_sky_rotation *out) {
-    /* one instant is asked for several times in a row */
+    /* repeated calls for one time are common */
     if (clock->asked && t.jd1 == clock->last.jd1 && t.jd2 == clock->last.jd2) {
         *out = clock->sky;
         return BST_OK;

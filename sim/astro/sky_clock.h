@@ -1,4 +1,4 @@
-/* Frames and bodies at any instant, cheap enough for a plant at 1 kHz. */
+/* Earth rotation and body positions at any time, fast enough for a plant at 1 kHz. */
 #ifndef BST_ASTRO_SKY_CLOCK_H
 #define BST_ASTRO_SKY_CLOCK_H
 
@@ -10,13 +10,12 @@ typedef struct bst_sky_rotation {
     bst_bodies bodies;
 } bst_sky_rotation;
 
-/* Interpolates between exact values on a fixed grid of TAI. Its memory is fixed for a run of any
- * length: a few grid values, worked out when first needed. Results depend on the instant alone,
- * never on the order of the calls. One user (thread) at a time. */
+/* Interpolates between exact values on a fixed time grid (TAI). Constant memory. Results depend on
+ * time only, not on the order of calls. One thread at a time. */
 typedef struct bst_sky_clock bst_sky_clock;
 
-/* The grid's values for several clocks, which then work each out once between them. Its memory is
- * fixed too. Clocks on it may run in different threads. eop is borrowed and must outlive it. */
+/* Grid values shared by several clocks, which may run in different threads; each value is computed
+ * once. Constant memory. eop is borrowed and must outlive it. */
 typedef struct bst_sky_clock_grid bst_sky_clock_grid;
 
 /* Creates a grid of values that several sky clocks share; its functions lock it.
@@ -28,19 +27,21 @@ bst_status bst_sky_clock_grid_create(bst_ctx *ctx, const bst_astro_eop *eop,
                                      bst_sky_clock_grid **out) BST_MUST_CHECK;
 void bst_sky_clock_grid_free(bst_sky_clock_grid *grid); /* NULL allowed; after its clocks */
 
-/* Makes a clock on a grid, which is borrowed and must outlive it. Freed with bst_sky_clock_free. */
+/* Creates a clock on a shared grid, which is borrowed and must outlive it. Free with
+ * bst_sky_clock_free. */
 bst_status bst_sky_clock_create_on(bst_ctx *ctx, bst_sky_clock_grid *grid,
                                    bst_sky_clock **out) BST_MUST_CHECK;
 
-/* Makes a clock of its own; eop is borrowed and must outlive it. Freed with bst_sky_clock_free. */
+/* Creates a clock with its own grid; eop is borrowed and must outlive it. Free with
+ * bst_sky_clock_free. */
 bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_astro_eop *eop,
                                 bst_sky_clock **out) BST_MUST_CHECK;
 void bst_sky_clock_free(bst_sky_clock *clock); /* NULL allowed */
 
 /* Values at t. Against bst_astro_earth_frames_at and bst_bodies_at: rotations to 1 mm at a
  * geostationary distance, Sun, Moon and Earth to 15 m, the Earth's velocity to 1e-5 m/s. About 0.2
- * us; a step into the next 120 s of the grid works out one exact value (about 0.1 ms). Error:
- * BST_ERR_RANGE where bst_astro_eop_at has it, and in the last 120 s of the table. */
+ * us; each new grid interval of 120 s needs one exact value (about 0.1 ms). Error: BST_ERR_RANGE
+ * where bst_astro_eop_at has it, and in the last 120 s of the table. */
 bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t,
                             bst_sky_rotation *out) BST_MUST_CHECK;
 

@@ -17,7 +17,7 @@ enum { MAX_COLUMNS = 64, MAX_LINE = 65536 };
 
 typedef enum column {
     COLUMN_OBJECT,
-    COLUMN_STATES, /* start position, velocity, end position, velocity: 12 columns */
+    COLUMN_STATES, /* columns of start position, velocity, end position, velocity: 12 */
     COLUMN_START_S = COLUMN_STATES + 12,
     COLUMN_END_S,
     COLUMN_START_UTC,
@@ -30,7 +30,7 @@ static const char *const column_names[COLUMNS] = {
     "start_vz_mps", "end_x_m",   "end_y_m",   "end_z_m",   "end_vx_mps",   "end_vy_mps",
     "end_vz_mps",   "start_s",   "end_s",     "start_utc", "end_utc"};
 
-/* One row of the file. */
+/* One row of a state table: an object in a frame. */
 typedef struct frame {
     bst_text_span name; /* in the file's text */
     int line;
@@ -44,7 +44,7 @@ typedef struct object {
 
 struct bst_state_table {
     char *name;                    /* of the file, for messages */
-    bst_astro_table_state *states; /* start and end of each frame, by object, then by time */
+    bst_astro_table_state *states; /* start and end of each frame, sorted by object, then by time */
     object *objects;
     int object_count;
 };
@@ -52,7 +52,7 @@ struct bst_state_table {
 typedef struct reader {
     bst_text_source source;
     bst_time epoch;
-    int columns[MAX_COLUMNS]; /* which column of ours each of the file's is */
+    int columns[MAX_COLUMNS]; /* our column of each column in the file */
     bool has[COLUMNS];
     int width;
     frame *frames;
@@ -66,7 +66,7 @@ static bst_status fail_column(const reader *r, const bst_text_line *line, int c,
     return bst_text_fail_at(&r->source, line, text, found.text, found.length, expected);
 }
 
-/* Index of a column of ours, with the nearest name in the message when there is none. */
+/* Index of a column name; the error suggests the nearest name. */
 static bst_status find_column(const reader *r, const bst_text_line *line, bst_text_span name,
                               int *out) {
     char word[64];
@@ -230,7 +230,7 @@ static int compare_frames(const void *x, const void *y) {
     return order ? order : (a->line > b->line) - (a->line < b->line);
 }
 
-/* The frames, by object, as states; frames of one object must follow each other in time. */
+/* Builds the table: sorts frames by object; frames of one object must follow each other in time. */
 static bst_status build(reader *r, bst_state_table *out) {
     qsort(r->frames, (size_t)r->count, sizeof *r->frames, compare_frames);
     int objects = 0;

@@ -1,11 +1,11 @@
-/* States given frame by frame by another program: at the start and at the end of each exposure. */
+/* Table of object states per frame from another program: at start and end of each exposure. */
 #ifndef BST_ASTRO_STATE_TABLE_H
 #define BST_ASTRO_STATE_TABLE_H
 
 #include "boresight/vec.h"
 #include "sim/astro/time.h"
 
-/* The states of one file; immutable once made, shareable between threads. */
+/* The states of one file; immutable, shareable between threads. */
 typedef struct bst_state_table bst_state_table;
 
 /* Reads a file of comma-separated values with a header row (docs/reference/file_formats.md,
@@ -20,7 +20,7 @@ bst_status bst_state_table_load(bst_ctx *ctx, const char *path, bst_time epoch,
                                 bst_state_table **out) BST_MUST_CHECK;
 
 /* As bst_state_table_load, from memory: `bytes` bytes at data (any bytes, no terminator needed);
- * `name` stands for the path in messages. */
+ * `name`: file name for messages. */
 bst_status bst_state_table_read_buffer(bst_ctx *ctx, const char *name, const char *data,
                                        size_t bytes, bst_time epoch,
                                        bst_state_table **out) BST_MUST_CHECK;
@@ -28,13 +28,13 @@ bst_status bst_state_table_read_buffer(bst_ctx *ctx, const char *name, const cha
 /* An object's states in one frame, seconds after the epoch. */
 typedef struct bst_state_table_frame {
     const char *object; /* borrowed for the call; at most 63 bytes */
-    int64_t number;     /* ascends; for messages */
+    int64_t number;     /* increasing; for messages */
     double start_s, end_s;
     bst_vec3 start_position_m, start_velocity_mps, end_position_m, end_velocity_mps;
 } bst_state_table_frame;
 
-/* The same from states already read. BST_ERR_FORMAT when there are none, or an object's frames
- * overlap or do not follow each other in time. */
+/* Creates a table from states in memory. BST_ERR_FORMAT: none, or frames of an object overlap or
+ * are not in order of time. */
 bst_status bst_state_table_create(bst_ctx *ctx, const char *name,
                                   const bst_state_table_frame *frames, int64_t count,
                                   bst_state_table **out) BST_MUST_CHECK;
@@ -49,12 +49,11 @@ int bst_state_table_object_count(const bst_state_table *injected);
  * Given:     object  index, 0 to one less than the number of objects */
 const char *bst_state_table_object_name(const bst_state_table *injected, int object);
 
-/* The object of this name; with "" the only one. BST_ERR_NOT_FOUND when there is none, or several,
- * with what the file has. */
+/* Finds an object by name; "": the only object. BST_ERR_NOT_FOUND lists the objects. */
 bst_status bst_state_table_find(bst_ctx *ctx, const bst_state_table *injected, const char *name,
                                 int *object) BST_MUST_CHECK;
 
-/* Start of the object's first frame and end of its last, seconds after the epoch. */
+/* Start of the object's first frame and end of its last frame, seconds after the epoch. */
 void bst_state_table_span(const bst_state_table *injected, int object, double *start_s,
                           double *end_s);
 

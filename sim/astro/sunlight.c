@@ -3,7 +3,7 @@
 
 const double bst_sunlight_wavelength_m[BST_SUNLIGHT_COLOURS] = {0.40e-6, 0.55e-6, 0.70e-6, 1.00e-6};
 
-/* What sunlight of one wavelength meets. */
+/* Optical properties of the atmosphere and limb darkening at one wavelength. */
 typedef struct colour {
     double u, v;            /* limb darkening: I = 1 - u - v + u mu + v mu^2, the middle 1 (Cox,
                                table 14.17) */
@@ -29,7 +29,7 @@ static const double ring_place[RINGS] = {0.0694318442029737, 0.3300094782075719,
 static const double ring_weight[RINGS] = {0.1739274225687269, 0.3260725774312731,
                                           0.3260725774312731, 0.1739274225687269};
 
-/* Share of the Sun's light that comes from outside of a limb, by colour. */
+/* Fraction of the Sun's light from outside a limb, by wavelength. */
 static void share_outside(const bst_earth_limb *limb, double disc,
                           double out[BST_SUNLIGHT_COLOURS]) {
     if (limb->beyond >= disc) {
@@ -57,15 +57,14 @@ static void share_outside(const bst_earth_limb *limb, double disc,
     }
 }
 
-/* Part of the light of rays at least height_km (row k) high that air lets through. */
+/* Transmission of the atmosphere for rays with minimum height of at least height_km (row k). */
 static double transmission(const colour *c, int k) {
     return exp(-c->rayleigh_per_km * limb_rows[k].air_km - c->ozone_per_du * limb_rows[k].ozone_du);
 }
 
-/* Light through the air. The rays that pass at the height h and the impact parameter b come from
- * where straight ones would have passed at g = b - way * bending: between two rows all the light
- * that comes from between their g, times by how much the bundle is thinned along and across the
- * limb. */
+/* Light through the atmosphere. Rays at height h with impact parameter b appear at g = b - way *
+ * bending. Between two rows all the light between their g is counted, times the divergence of the
+ * bundle along and across the limb. */
 static void through_air(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, double disc,
                         bst_astro_sunlight *out) {
     double distance = bst_vec3_norm(position_m);
@@ -78,7 +77,7 @@ static void through_air(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, do
         double g = impact - way * tan(limb_rows[k].bending_rad);
         bst_earth_limb limb;
         if (BST_EARTH_RADIUS_M + g < 0.1 * BST_EARTH_RADIUS_M) {
-            break; /* rays that cross the axis of the shadow: beyond the Moon */
+            break; /* rays that cross the shadow axis: beyond the Moon */
         }
         if (!bst_earth_limb_at(position_m, pole, g, towards, &limb)) {
             limb = (bst_earth_limb){.beyond = bst_vec3_dot(position_m, towards) > 0.0 ? 1.0 : -1.0};
@@ -101,7 +100,7 @@ static void through_air(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, do
         g_above = g;
         impact_above = impact;
         if (above[BST_SUNLIGHT_V] >= 1.0) {
-            break; /* nothing comes from below */
+            break; /* no light from below */
         }
     }
 }

@@ -32,12 +32,12 @@ struct bst_tdm {
     int count, capacity;
 };
 
-/* What the metadata of a segment say. */
+/* Metadata of a TDM segment. */
 typedef struct metadata {
     char participant[PARTICIPANTS][80], ephemeris[PARTICIPANTS][256];
     bool has_system, radec, has_type, has_frame, eme2000, bad_frame, transmitted, applied;
     bst_astro_time_system system;
-    int observer, object;                   /* numbers of participants, from 0 */
+    int observer, object;                   /* numbers of the participants, from 0 */
     double integration_s, integration_part; /* START: +1/2, END: -1/2, MIDDLE: 0 */
     double correction[KINDS];
     int line;
@@ -62,7 +62,7 @@ static bool same(bst_text_span span, const char *word) {
     return span.length == strlen(word) && strncasecmp(span.text, word, span.length) == 0;
 }
 
-/* Whether a name is `stem` followed by one digit from 1 on; *index counts from 0. */
+/* Checks whether a name is `stem` with one digit from 1; *index counts from 0. */
 static bool numbered(bst_text_span name, const char *stem, int *index) {
     size_t n = strlen(stem);
     if (name.length != n + 1 || memcmp(name.text, stem, n) != 0) {
@@ -96,7 +96,7 @@ static bst_status read_number(const reader *r, bst_text_span text, double *out) 
     return bst_text_number(text, out) ? BST_OK : fail(r, "the value is no number", "a number");
 }
 
-/* "2,1": the last is who receives, the one before where it came from. */
+/* Parses PATH, such as "2,1": the last participant receives, the one before transmits. */
 static bst_status read_path(reader *r, bst_text_span path) {
     metadata *m = &r->meta;
     int last = -1, before = -1;
@@ -234,7 +234,7 @@ static bst_status fail_pair(const reader *r, const value *v) {
                     kind_names[v->kind == ANGLE_1 ? ANGLE_2 : ANGLE_1]);
 }
 
-/* Joins what belongs to one time; `items` has room for all values. */
+/* Combines values of one time; `items` has room for all values. */
 static bst_status join(const reader *r, bst_tdm_angles *items, int64_t *count) {
     bst_mat3 bias = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (r->meta.eme2000) {
@@ -256,13 +256,13 @@ static bst_status join(const reader *r, bst_tdm_angles *items, int64_t *count) {
             return fail_pair(r, ra ? ra : dec);
         }
         if (!ra) {
-            continue; /* a magnitude alone */
+            continue; /* a magnitude without angles */
         }
         bst_tdm_angles *out = &items[(*count)++];
         bst_vec3 d = bst_vec3_from_radec(ra->value * BST_DEG_RAD, dec->value * BST_DEG_RAD);
         *out = (bst_tdm_angles){.time = first->time,
                                 .mag = at[MAGNITUDE] ? at[MAGNITUDE]->value : NAN};
-        /* eraBp06's matrix leads from ICRF to EME2000 */
+        /* the matrix of eraBp06 rotates from ICRF to EME2000 */
         bst_vec3_to_radec(bst_mat3_transpose_mul_vec(&bias, d), &out->ra_rad, &out->dec_rad);
     }
     return BST_OK;

@@ -1,4 +1,4 @@
-/* CCSDS Tracking Data Messages (TDM, KVN; 503.0-B-1 and -2): the angles and magnitudes in them. */
+/* Reads angles and magnitudes from CCSDS Tracking Data Messages (TDM, KVN; 503.0-B-1 and -2). */
 #ifndef BST_ASTRO_TDM_H
 #define BST_ASTRO_TDM_H
 
@@ -6,21 +6,21 @@
 
 /* One direction to the body, right ascension and declination in ICRF. */
 typedef struct bst_tdm_angles {
-    bst_time time;          /* of reception, middle of the exposure where the file says how long */
-    double ra_rad, dec_rad; /* as the file gives them, corrections that it asks for added */
+    bst_time time;          /* of reception; mid-exposure if the file gives the exposure time */
+    double ra_rad, dec_rad; /* from the file, with requested corrections added */
     double mag;             /* NAN: none at that time */
 } bst_tdm_angles;
 
-/* A pair of participants. */
+/* Angles of one pair of participants. */
 typedef struct bst_tdm_pair {
-    char observer[80];           /* the last participant of PATH, who receives */
-    char object[80];             /* the one before */
-    char ephemeris[256];         /* EPHEMERIS_NAME of the observer; "" when none */
-    const bst_tdm_angles *items; /* by rising time */
+    char observer[80];           /* last participant of PATH: receives */
+    char object[80];             /* the participant before it */
+    char ephemeris[256];         /* EPHEMERIS_NAME of the observer; "": none */
+    const bst_tdm_angles *items; /* sorted by time */
     int64_t count;               /* 0: the segment has no angles */
 } bst_tdm_pair;
 
-/* The angles of one file; immutable once made. */
+/* The angles of one TDM file; immutable. */
 typedef struct bst_tdm bst_tdm;
 
 /* Reads a file of any number of segments. Every segment needs TIME_SYSTEM (UTC, TAI, TT, TDB or
@@ -36,8 +36,8 @@ typedef struct bst_tdm bst_tdm;
  * there is none; BST_ERR_IO when it cannot be read or is no regular file; BST_ERR_MEMORY. */
 bst_status bst_tdm_load(bst_ctx *ctx, const char *path, bst_tdm **out) BST_MUST_CHECK;
 
-/* As bst_tdm_load, from memory: `bytes` bytes at data (any bytes, no terminator needed); `name`
- * stands for the path in messages. */
+/* As bst_tdm_load, from memory: `bytes` bytes at data (any bytes, no terminator needed); `name`:
+ * file name for messages. */
 bst_status bst_tdm_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                bst_tdm **out) BST_MUST_CHECK;
 
@@ -45,7 +45,7 @@ void bst_tdm_free(bst_tdm *tdm); /* NULL allowed */
 
 /* Number of pairs of angles of a TDM. */
 int bst_tdm_pair_count(const bst_tdm *tdm);
-/* Lent; index from 0, in the order of the file. */
+/* A pair of a TDM, borrowed; index from 0 in file order. */
 const bst_tdm_pair *bst_tdm_pair_at(const bst_tdm *tdm, int index);
 
 #endif

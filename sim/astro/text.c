@@ -121,7 +121,7 @@ bool bst_text_is_plain(bst_text_span span) {
     return true;
 }
 
-/* Bytes of the digits at the start. */
+/* Number of digits at the start. */
 static size_t digits_at(const char *text, size_t length) {
     size_t i = 0;
     while (i < length && bst_text_is_digit(text[i])) {
@@ -191,7 +191,7 @@ bool bst_text_number(bst_text_span span, double *out) {
     if (i != n) {
         return false;
     }
-    /* up to 15 digits and a power of ten up to 1e15 are exact, so that one division rounds */
+    /* up to 15 digits and powers of ten up to 1e15 are exact: one division rounds once */
     static const double tens[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                   1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
     if (whole + decimals <= 15 && !has_exponent) {
@@ -203,7 +203,7 @@ bool bst_text_number(bst_text_span span, double *out) {
         *out = c[0] == '-' ? -value : value;
         return true;
     }
-    /* strtod wants the locale's own decimal point */
+    /* strtod uses the decimal point of the locale */
     char text[LONGEST + 32];
     if (has_point) {
         snprintf(text, sizeof text, "%.*s%.16s%.*s", (int)point, c, localeconv()->decimal_point,

@@ -7,29 +7,28 @@
 #include <stdio.h>
 
 #define DAY_S 86400.0
-/* The start of UTC. ERFA judges by the following day, and so lets the day before pass. */
+/* Start of UTC. ERFA checks the following day, and accepts the day before. */
 #define FIRST_YEAR 1960
 #define FIRST_JD 2436934.5
-/* Years after ERFA's own tables count the leap seconds that it knows; beyond this a date is taken
- * for a slip. */
+/* after ERFA's tables its known leap seconds hold; a later date is treated as a typing error */
 #define LAST_YEAR 2099
 #define END_JD 2488069.5 /* 2100-01-01 */
 
-/* jd1 + jd2 as a midnight and a fraction in [0, 1). */
+/* Normalises jd1 + jd2 to a midnight and a fraction in [0, 1). */
 static bst_time normalised(double jd1, double jd2) {
     double midnight = floor(jd1 - 0.5) + 0.5;
     double fraction = (jd1 - midnight) + jd2;
     double days = floor(fraction);
     midnight += days;
     fraction -= days;
-    if (fraction >= 1.0) { /* a negative fraction too small to be told from a whole day */
+    if (fraction >= 1.0) { /* a tiny negative fraction may round to a whole day */
         midnight += 1.0;
         fraction = 0.0;
     }
     return (bst_time){midnight, fraction};
 }
 
-/* Reads exactly `digits` decimal digits; false when there are fewer. */
+/* Parses exactly `digits` decimal digits; false: fewer. */
 static bool read_digits(const char **text, int digits, int *value) {
     int v = 0;
     for (int i = 0; i < digits; i++) {
@@ -52,7 +51,7 @@ static bool read_char(const char **text, char c) {
     return true;
 }
 
-/* The digits after a decimal point; those beyond the 15th are read and cannot matter. */
+/* Parses the digits after a decimal point; those beyond the 15th are ignored. */
 static bool read_fraction(const char **text, double *value) {
     int64_t mantissa = 0, scale = 1;
     int digits = 0;
@@ -199,7 +198,7 @@ void bst_time_tt(bst_time t, double *jd1, double *jd2) {
 void bst_time_utc(bst_time t, double *jd1, double *jd2) {
     double utc1 = t.jd1, utc2 = t.jd2;
     if (eraTaiutc(t.jd1, t.jd2, &utc1, &utc2) < 0) {
-        utc1 = t.jd1; /* no calendar that far: the scales are alike there */
+        utc1 = t.jd1; /* beyond the calendar: treat the scales as equal */
         utc2 = t.jd2;
     }
     bst_time utc = normalised(utc1, utc2);

@@ -1,4 +1,4 @@
-/* One two-line element set: columns to elements. */
+/* Parses one two-line element set. */
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,7 +8,7 @@
 
 #define LINE_CHARS 69
 
-/* A run of columns of one line of a set. Columns count from 1, as the format is documented. */
+/* A range of columns of one line; columns count from 1, as documented. */
 typedef struct field {
     const bst_text_source *source;
     const bst_text_line *line;
@@ -91,7 +91,7 @@ static bst_status read_decimal(const field *f, double low, double high, const ch
     return BST_OK;
 }
 
-/* A whole number after blanks; a blank field is 0. */
+/* Parses an integer after blanks; a blank field is 0. */
 static bst_status read_count(const field *f, int *out) {
     const char *c = field_text(f);
     int length = field_length(f), i = 0;
@@ -108,8 +108,8 @@ static bst_status read_count(const field *f, int *out) {
     return BST_OK;
 }
 
-/* "[sign]ddddd[sign]d": a decimal point before the digits and a power of ten after them. Files also
- * have a point before the digits, a blank for the exponent's + and zeros without an exponent. */
+/* Parses "[sign]ddddd[sign]d": implied decimal point before the digits, and a power of ten. Files
+ * also have a point, a blank for the exponent's +, and zeros without exponent. */
 static bst_status read_implied(const field *f, double *out) {
     const char *expected = "the form \"-12345-6\" for -0.12345e-6";
     const char *c = field_text(f), *end = c + field_length(f);
@@ -204,7 +204,7 @@ static bst_status read_number(const field *f, int *out) {
     return BST_OK;
 }
 
-/* Year of two digits and day of the year with fraction, as a Julian date in two parts. */
+/* Parses two-digit year and day of year with fraction into a two-part Julian date. */
 static bst_status read_epoch(const bst_text_source *source, const bst_text_line *line,
                              bst_elements *out) {
     field year_field = {source, line, 19, 20, "epoch year"};
@@ -223,7 +223,7 @@ static bst_status read_epoch(const bst_text_source *source, const bst_text_line 
     }
     int64_t scale = (int64_t)power_of_ten(decimals);
     int64_t whole = digits / scale;
-    bool leap = year % 4 == 0; /* right from 1901 to 2099 */
+    bool leap = year % 4 == 0; /* valid from 1901 to 2099 */
     if (negative || whole < 1 || whole > (leap ? 366 : 365)) {
         return fail_field(&day_field, "is out of range",
                           leap ? "1 to 366.99999999" : "1 to 365.99999999 in this year");
@@ -234,7 +234,7 @@ static bst_status read_epoch(const bst_text_source *source, const bst_text_line 
     return BST_OK;
 }
 
-/* What both lines have: length, characters, checksum and blank columns. */
+/* Checks a line: length, characters, checksum and blank columns. */
 static bst_status check_line(const bst_text_source *source, const bst_text_line *line, char role,
                              const int *blank_columns) {
     for (size_t i = 0; i < line->length; i++) {

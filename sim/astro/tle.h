@@ -1,4 +1,4 @@
-/* Two-line element sets: reading, checking, writing. */
+/* Two-line element sets: parsing, checks, formatting. */
 #ifndef BST_ASTRO_TLE_H
 #define BST_ASTRO_TLE_H
 
@@ -8,10 +8,10 @@
  * Checked: length 69, printable ASCII, blank separator columns, checksums, equal catalogue numbers,
  * number formats, and the ranges: inclination 0 to 180 degrees, other angles 0 to 360, epoch day
  * within its year (57 to 99: 1957 to 1999; 00 to 56: 2000 to 2056), mean motion above 0. Blanks
- * count as zeros in the eccentricity and as 0 in blank B*, derivative, set and revolution
- * fields. Errors: BST_ERR_FORMAT with line 1 or 2, column, what was found and what was expected;
- * *out is then undefined. Format: Hoots and Roehrich, Spacetrack Report 3; Alpha-5 numbers as
- * space-track.org documents them (A to Z without I and O stand for 10 to 33). */
+ * count as zeros in the eccentricity and as 0 in blank B*, derivative, set and revolution fields.
+ * Errors: BST_ERR_FORMAT with line 1 or 2, column, what was found and what was expected; *out is
+ * then undefined. Format: Hoots and Roehrich, Spacetrack Report 3; Alpha-5 numbers as
+ * space-track.org documents them (A to Z without I and O mean 10 to 33). */
 bst_status bst_tle_parse(bst_ctx *ctx, const char *line1, const char *line2,
                          bst_elements *out) BST_MUST_CHECK;
 
@@ -27,8 +27,8 @@ enum { BST_TLE_CHARS = 69 };
 bst_status bst_tle_format(bst_ctx *ctx, const bst_elements *set, char line1[BST_TLE_CHARS + 1],
                           char line2[BST_TLE_CHARS + 1]) BST_MUST_CHECK;
 
-/* Five digits, or Alpha-5: a letter for the two leading digits 10 to 33, without I and O. Reads
- * five characters at text; false when they are no number. */
+/* Parses a catalogue number of five characters: digits, or Alpha-5, a letter for the leading digits
+ * 10 to 33, without I and O. False: no number. */
 bool bst_tle_decode_number(const char *text, int *out);
 
 typedef bst_elements_options bst_tle_options;
@@ -44,8 +44,8 @@ typedef bst_elements_options bst_tle_options;
 bst_status bst_tle_load(bst_ctx *ctx, const char *path, const bst_tle_options *options,
                         bst_elements **out, int *count) BST_MUST_CHECK;
 
-/* As bst_tle_load, from memory: `bytes` bytes at data (any bytes, no terminator needed); `name`
- * stands for the path in messages. */
+/* As bst_tle_load, from memory: `bytes` bytes at data (any bytes, no terminator needed); `name`:
+ * file name for messages. */
 bst_status bst_tle_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                const bst_tle_options *options, bst_elements **out,
                                int *count) BST_MUST_CHECK;

@@ -1,4 +1,4 @@
-/* Element-set files: lines to sets. */
+/* Reads files of two-line element sets. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,7 +33,7 @@ static bst_status read_set(bst_elements_reader *r, const bst_text_line *name,
     return bst_elements_append(r, &set);
 }
 
-/* Walks over the lines; `name` and `line1` wait for what must follow them. */
+/* Processes the lines; `name` and `line1` wait for the following lines. */
 static bst_status read_lines(bst_elements_reader *r, const char *data, size_t bytes) {
     const bst_text_line none = {NULL, 0, 0};
     bst_text_line name = none, line1 = none, line = none;

@@ -1,4 +1,4 @@
-/* Element sets as two lines. */
+/* Formats element sets as two lines. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,7 +8,7 @@
 
 enum { ALPHA5_FIRST = 100000, ALPHA5_END = 340000 };
 
-/* Modulo 10 sum of digits, a minus counting 1. */
+/* Appends the checksum: sum of digits modulo 10, a minus counts 1. */
 static void put_checksum(char *line) {
     int sum = 0;
     for (int i = 0; i < BST_TLE_CHARS - 1; i++) {
@@ -27,7 +27,7 @@ static void number_text(int norad, char out[8]) {
     }
 }
 
-/* " 12345-3": a decimal point before the digits, an exponent of one digit; sign '+' of 0. */
+/* Formats " 12345-3": implied decimal point, one-digit exponent; the sign of 0 is '+'. */
 static bool implied_text(double value, char out[32]) {
     double size = fabs(value);
     int exponent = size > 0.0 ? (int)floor(log10(size)) + 1 : 0;
@@ -42,7 +42,7 @@ static bool implied_text(double value, char out[32]) {
     return exponent <= 9;
 }
 
-/* "-.00000123" */
+/* Formats a derivative: "-.00000123". */
 static bool derivative_text(double value, char out[16]) {
     char digits[16];
     snprintf(digits, sizeof digits, "%.8f", fabs(value));
@@ -50,20 +50,20 @@ static bool derivative_text(double value, char out[16]) {
     return fabs(value) < 0.999999995;
 }
 
-/* Four decimals, 360 as 0. */
+/* Degrees with four decimals; 360 becomes 0. */
 static double degrees_of(double angle_rad) {
     double degrees = round(angle_rad / BST_DEG_RAD * 1e4) * 1e-4;
     degrees = fmod(degrees, 360.0);
     return degrees < 0.0 ? degrees + 360.0 : degrees;
 }
 
-/* Days from 1 January 1900 (JD 2415020.5) to that of a year; every fourth year is a leap year,
- * right from 1901 to 2099. */
+/* Days from 1 January 1900 (JD 2415020.5) to 1 January of a year; every fourth year is a leap year,
+ * valid from 1901 to 2099. */
 static double first_day(int year) {
     return 365.0 * (year - 1900) + floor((year - 1901) / 4.0);
 }
 
-/* Year and day of the year. */
+/* Formats year and day of year of the epoch. */
 static void epoch_text(const bst_elements *set, char out[16], int *year) {
     double whole = floor(set->epoch_utc_jd1 - 2415020.5), fraction = set->epoch_utc_jd2;
     fraction += set->epoch_utc_jd1 - 2415020.5 - whole;

@@ -9,12 +9,12 @@
 #define DEFAULT_TOLERANCE 1e-9
 #define LAST_TIME_S 1e10
 
-/* All that changes, behind the mutex. */
+/* Mutable state, protected by the mutex. */
 typedef struct core {
     mtx_t mutex;
     bst_trajectory_chain_context context;
     bst_trajectory_chain forward;
-    bst_trajectory_chain *backward; /* NULL until it is wanted */
+    bst_trajectory_chain *backward; /* NULL until needed */
 } core;
 
 struct bst_trajectory {

@@ -1,10 +1,10 @@
-/* Numerically integrated orbits with burns. */
+/* Numerically integrated orbits with burns, evaluated at any time. */
 #ifndef BST_ASTRO_TRAJECTORY_H
 #define BST_ASTRO_TRAJECTORY_H
 
 #include "sim/astro/forces.h"
 
-/* Below this height above the ellipsoid (m) a trajectory ends: nothing is in orbit there. */
+/* Height above the ellipsoid (m) at which a trajectory ends. */
 #define BST_TRAJECTORY_FLOOR_M 80000.0
 
 /* A change of velocity along radius, transverse and normal (R along the position, N along position
@@ -16,28 +16,29 @@ typedef struct bst_astro_thrust {
     bst_vec3 dv_rtn_mps;
 } bst_astro_thrust;
 
-/* An orbit that is integrated when it is asked for. To its users it never changes: the state at any
- * time is a pure function of time, equal to the bit whatever has been asked before, and threads may
- * share it (a mutex is inside). Memory is fixed (40 kB, twice that once a time before the initial
- * one is asked for): the steps around the times asked for and some way points. So times that run on
- * cost one step's work now and then, and a look far back costs the way from the nearest way point
- * (1/32 of the whole way at most). */
+/* A numerically integrated orbit, integrated on demand.
+ *
+ * Notes:     The state is a pure function of time, equal to the bit for any order of
+ *            queries. Threads may share it (internal mutex).
+ *            Constant memory (40 kB, twice that for times before the initial one): recent steps and
+ *            checkpoints. Increasing times cost one step now and then; a query far back costs at
+ *            most 1/32 of the whole arc, from the nearest checkpoint. */
 typedef struct bst_trajectory bst_trajectory;
 
 typedef struct bst_trajectory_options {
-    bst_force_model forces;            /* what it borrows must outlive the trajectory */
-    bst_time epoch;                    /* what seconds count from */
+    bst_force_model forces;            /* its borrowed data must outlive the trajectory */
+    bst_time epoch;                    /* reference of all seconds */
     double at_s;                       /* time of the initial state */
-    bst_vec3 position_m, velocity_mps; /* GCRF, before a burn at that very time */
-    const bst_astro_thrust *burns;     /* in any order, they may overlap; copied */
+    bst_vec3 position_m, velocity_mps; /* GCRF, before a burn at that time */
+    const bst_astro_thrust *burns;     /* any order, may overlap; copied */
     int burn_count;
-    double
-        tolerance; /* of a step, 1e-11 to 1e-3, see docs/explanation/equations/orbits.md; 0: 1e-9 */
+    double tolerance; /* relative error of a step, 1e-11 to 1e-3, see
+                         docs/explanation/equations/orbits.md; 0: 1e-9 */
 } bst_trajectory_options;
 
-/* Makes a trajectory; nothing is integrated yet. BST_ERR_ARGUMENT for values that are not finite,
- * times beyond 1e10 s, negative durations, an initial state below BST_TRAJECTORY_FLOOR_M, or a
- * wrong force model. */
+/* Creates a trajectory without integrating. BST_ERR_ARGUMENT: values not finite, times beyond 1e10
+ * s, negative durations, an initial state below BST_TRAJECTORY_FLOOR_M, or an invalid force
+ * model. */
 bst_status bst_trajectory_create(bst_ctx *ctx, const bst_trajectory_options *options,
                                  bst_trajectory **out) BST_MUST_CHECK;
 void bst_trajectory_free(bst_trajectory *trajectory); /* NULL allowed */

@@ -1,4 +1,4 @@
-/* A trajectory in one direction: steps, their window, way points. */
+/* Integration of a trajectory in one time direction: steps, their window, checkpoints. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,10 +7,9 @@
 
 #define LONGEST_STEP_S 21600.0
 #define SHORTEST_STEP_S 1e-6
-/* A step may grow and shrink by this; beyond it the estimate is not to be trusted. */
+/* limit of the change in step size; beyond it the error estimate is unreliable */
 #define LARGEST_CHANGE 4.0
-/* How well the edges of the shadow and the end are found, and how near to a step's start they do
- * not count again. */
+/* accuracy of shadow edges and of the end, s; closer to the start of a step they do not count */
 #define EDGE_S 1e-4
 
 static bst_vec3 from_rtn(bst_vec3 r, bst_vec3 v, bst_vec3 rtn) {
@@ -20,16 +19,16 @@ static bst_vec3 from_rtn(bst_vec3 r, bst_vec3 v, bst_vec3 rtn) {
                          normal);
 }
 
-/* The velocity before an impulse from the one after it: the radius is the same, the transverse
- * direction follows from transverse^2 + normal^2 of the horizontal speed. */
+/* Velocity before an impulse from that after it: the radius is the same; the transverse direction
+ * follows from transverse^2 + normal^2 of the horizontal speed. */
 static bst_status undo_impulse(bst_ctx *ctx, bst_vec3 r, bst_vec3 dv, bst_vec3 *v) {
     bst_vec3 radial = bst_vec3_unit(r);
     double v_radial = bst_vec3_dot(*v, radial);
     bst_vec3 flat = bst_vec3_axpy(*v, -v_radial, radial);
     double speed = bst_vec3_norm(flat), root2 = speed * speed - dv.z * dv.z;
-    double after = root2 >= 0.0 ? sqrt(root2) : -1.0; /* transverse, after the burn */
+    double after = root2 >= 0.0 ? sqrt(root2) : -1.0; /* transverse component after the burn */
     if (-after - dv.y >= 0.0) {
-        after = -after; /* a burn that turned the orbit round, from the slower of two */
+        after = -after; /* the burn reversed the direction of a slower orbit */
     }
     if (!(root2 >= 0.0) || !(after - dv.y >= 0.0) || !(speed > 0.0)) {
         return bst_fail(ctx, BST_ERR_NUMERIC, "no orbit before a burn leads to the one after it");
@@ -45,7 +44,7 @@ static bst_vec3 kick(const bst_radau_point *p, bst_vec3 dv_rtn) {
     return bst_vec3_add(p->velocity_mps, from_rtn(p->position_m, p->velocity_mps, dv_rtn));
 }
 
-/* Crosses the edge that the chain stands at. */
+/* Applies the edge (burn start or end) at the current time. */
 static bst_status cross_edge(bst_ctx *ctx, const bst_trajectory_chain_context *context,
                              double direction, bst_trajectory_chain_point *p) {
     const bst_trajectory_edge *edge = &context->edges->items[p->edge];
@@ -59,7 +58,7 @@ static bst_status cross_edge(bst_ctx *ctx, const bst_trajectory_chain_context *c
         }
     }
     p->edge += direction > 0.0 ? 1 : -1;
-    p->motion.h_s = 0.0; /* what came before says nothing about what comes */
+    p->motion.h_s = 0.0; /* restart the prediction after a discontinuity */
     return BST_OK;
 }
 
@@ -71,7 +70,7 @@ static bool at_edge(const bst_trajectory_chain_context *context,
 
 static bst_vec3 thrust_now(const bst_trajectory_chain_context *context, double direction,
                            const bst_trajectory_chain_point *p) {
-    int last = direction > 0.0 ? p->edge - 1 : p->edge; /* the last edge before the step */
+    int last = direction > 0.0 ? p->edge - 1 : p->edge; /* the previous edge */
     return last >= 0 && last < context->edges->count ? context->edges->items[last].thrust_rtn_mps2
                                                      : (bst_vec3){0.0, 0.0, 0.0};
 }
@@ -101,19 +100,19 @@ void bst_trajectory_chain_start(bst_trajectory_chain *chain,
     }
     if (direction > 0.0) {
         if (at_edge(context, p)) {
-            (void)cross_edge(NULL, context, direction, p); /* forward never fails */
+            (void)cross_edge(NULL, context, direction, p); /* forward it cannot fail */
         }
     } else {
         p->edge--;
     }
-    /* a twentieth of the time scales of falling and of flying by */
+    /* one twentieth of the time scales of free fall and fly-by */
     double r = bst_vec3_norm(position_m), v = bst_vec3_norm(velocity_mps);
     double fall = sqrt(r * r * r / 3.986e14);
     p->h_s = direction * fmin(0.05 * (v > 0.0 ? fmin(fall, r / v) : fall), LONGEST_STEP_S);
     chain->furthest = *p;
 }
 
-/* What the force callback needs. */
+/* Context of the force callback. */
 typedef struct step_forces {
     bst_ctx *ctx;
     bst_trajectory_chain_context *context;
@@ -132,7 +131,7 @@ static bst_status force(void *user, double offset_s, bst_vec3 r, bst_vec3 v, bst
     return BST_OK;
 }
 
-/* 0 in umbra, 1 in penumbra, 2 in full sunlight. */
+/* Illumination of the spacecraft: 0 umbra, 1 penumbra, 2 full sunlight. */
 static int light_zone(const step_forces *f, const bst_radau_step *step, double s) {
     bst_vec3 r;
     bst_radau_state(step, s, &r, NULL);
@@ -144,11 +143,12 @@ static int light_zone(const step_forces *f, const bst_radau_step *step, double s
 static bool below_floor(const bst_radau_step *step, double s) {
     bst_vec3 r;
     bst_radau_state(step, s, &r, NULL);
-    /* GCRF's pole for the Earth's own: 0.1 km at most */
+    /* uses GCRF's pole instead of the Earth's: an error of 0.1 km at most */
     return !(bst_astro_height_m(r) >= BST_TRAJECTORY_FLOOR_M);
 }
 
-/* Where between s = low and high zone() leaves what it is at low, to EDGE_S, on the far side. */
+/* First time between s = low and high at which zone() differs from its value at low, accurate to
+ * EDGE_S. */
 static double bisect(const step_forces *f, const bst_radau_step *step, double low, double high,
                      bool light) {
     int at_low = light ? light_zone(f, step, low) : below_floor(step, low);
@@ -167,8 +167,8 @@ static double bisect(const step_forces *f, const bst_radau_step *step, double lo
     return high;
 }
 
-/* The first change of light in a step, as s; 1 when there is none. One right at the start is the
- * edge that the step began at. */
+/* First change of illumination within a step, as s; 1: none. A change at the start is the edge at
+ * which the step began. */
 static double shadow_edge(const step_forces *f, const bst_radau_step *step) {
     double before = 0.0;
     int zone = light_zone(f, step, 0.0);
@@ -187,7 +187,7 @@ static double shadow_edge(const step_forces *f, const bst_radau_step *step) {
     return 1.0;
 }
 
-/* The first time in a step at which the orbit is below the floor, as s; 2 when it never is. */
+/* First time within a step at which the orbit is below the floor, as s; 2: never. */
 static double floor_crossing(const step_forces *f, const bst_radau_step *step) {
     double before = 0.0;
     for (int i = 1; i <= BST_RADAU_TERMS + 1; i++) {
@@ -200,8 +200,9 @@ static double floor_crossing(const step_forces *f, const bst_radau_step *step) {
     return 2.0;
 }
 
-/* Keeps way points at even distances in steps; when there is no more room every other one goes. */
-static void keep_way_point(bst_trajectory_chain *chain) {
+/* Stores checkpoints at equal numbers of steps; when the array is full, every second one is
+ * dropped. */
+static void keep_checkpoint(bst_trajectory_chain *chain) {
     if (chain->here.step != chain->way_count * chain->stride) {
         return;
     }
@@ -215,21 +216,22 @@ static void keep_way_point(bst_trajectory_chain *chain) {
     chain->way[chain->way_count++] = chain->here;
 }
 
-/* What a step leads to. */
+/* Result of a step. */
 typedef struct step_end {
-    double next_h_s; /* what the next one tries */
-    bool to_edge;    /* it ends at an edge of the thrust */
-    double floor_s;  /* share of it after which the path is below the floor; above 1: never */
+    double next_h_s; /* proposed size of the next step */
+    bool to_edge;    /* it ends at the start or end of a burn */
+    double
+        floor_s; /* fraction of the step after which the path is below the floor; above 1: never */
 } step_end;
 
-/* A step that the forces, the error and the shadow agree to. */
+/* Computes a step limited by force evaluation, error and shadow edges. */
 static bst_status work_step(bst_ctx *ctx, bst_trajectory_chain *chain,
                             bst_trajectory_chain_context *context,
                             const bst_trajectory_chain_point *p, bst_radau_step *step,
                             step_end *end) {
     step_forces f = {ctx, context, p->time_s, p->time_low_s,
                      thrust_now(context, chain->direction, p)};
-    double h = p->h_s, h_natural = 0.0; /* what the next step may try after a shadow's edge */
+    double h = p->h_s, h_natural = 0.0; /* step size to try after a shadow edge */
     bool edge_found = false;
     for (;;) {
         end->to_edge = false;
@@ -246,7 +248,7 @@ static bst_status work_step(bst_ctx *ctx, bst_trajectory_chain *chain,
         if (status != BST_OK && status != BST_ERR_RANGE) {
             return status;
         }
-        /* the error goes with the seventh power of the step (Rein and Spiegel, equation 11) */
+        /* the error scales with the seventh power of the step (Rein and Spiegel, equation 11) */
         double change = status != BST_OK || !(error < INFINITY)
                             ? 1.0 / LARGEST_CHANGE
                             : pow(context->tolerance / fmax(error, 1e-300), 1.0 / 7.0);
@@ -281,7 +283,7 @@ static bst_status work_step(bst_ctx *ctx, bst_trajectory_chain *chain,
 static void extend(bst_ctx *ctx, bst_trajectory_chain *chain,
                    bst_trajectory_chain_context *context) {
     bst_trajectory_chain_point *p = &chain->here;
-    keep_way_point(chain);
+    keep_checkpoint(chain);
     step_end end = {.floor_s = 2.0};
     bst_radau_step motion;
     bst_status status = work_step(ctx, chain, context, p, &motion, &end);
@@ -328,13 +330,13 @@ static void extend(bst_ctx *ctx, bst_trajectory_chain *chain,
     }
 }
 
-/* Whether `seconds` lies before a point on the chain's way (at it: not, forward; yes, backward:
- * the state at a burn is the one after it). */
+/* Checks whether `seconds` is before a point of the chain (at it: forward no, backward yes, because
+ * the state at a burn is that after it). */
 static bool before(const bst_trajectory_chain *chain, double seconds, double point_s) {
     return chain->direction > 0.0 ? seconds < point_s : seconds >= point_s;
 }
 
-/* The latest point known from which `seconds` lies ahead. */
+/* Moves to the latest stored point before `seconds`. */
 static void stand_before(bst_trajectory_chain *chain, double seconds) {
     const bst_trajectory_chain_point *best = NULL;
     for (int i = 0; i < chain->way_count; i++) {
@@ -370,7 +372,7 @@ bst_status bst_trajectory_chain_find(bst_ctx *ctx, bst_trajectory_chain *chain,
         return bst_fail(ctx, chain->why, "%s", chain->message);
     }
     int64_t low = chain->first_kept, high = chain->here.step - 1;
-    while (low < high) { /* the first step that ends after it */
+    while (low < high) { /* finds the first step that ends after it */
         int64_t middle = low + (high - low) / 2;
         if (before(chain, seconds, chain->window[middle % BST_CHAIN_WINDOW].end_s)) {
             high = middle;

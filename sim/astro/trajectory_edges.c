@@ -1,4 +1,4 @@
-/* Burns as edges in time. */
+/* Burns of a trajectory as edges in time: discontinuities of acceleration or velocity. */
 #include <stdlib.h>
 
 #include "sim/astro/trajectory_internal.h"
@@ -9,7 +9,7 @@ static int by_time(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* When a burn ends; its start for an impulse, also one too short for the clock to tell. */
+/* End time of a burn; its start for an impulse, or if the duration is below the time resolution. */
 static double end_of(const bst_astro_thrust *burn) {
     return burn->time_s + burn->duration_s;
 }

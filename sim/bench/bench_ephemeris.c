@@ -10,7 +10,7 @@
 #include "sim/world/scene/field.h"
 #include "sim/world/world_config.h"
 
-/* Thousands of objects and three observers: field queries without stars, one a second from each. */
+/* Field queries without stars: thousands of objects, three observers, one query per second each. */
 enum { OBSERVERS = 3, FRAMES = 1000, CHECKED_FRAMES = 20, CHECKED_OBJECTS = 250, RATE = 1000 };
 
 static const char scenario[] =
@@ -33,8 +33,8 @@ static const bst_config_desc scene_table[] = {
              NULL, "Observers."),
     BST_CONFIG_END};
 
-/* A population like the catalogued one: how many in a hundred, height of perigee and apogee (km)
- * and inclination (degrees) from ... to. */
+/* A population of orbits like the catalogued ones: percentage, ranges of perigee and apogee height
+ * (km) and inclination (degrees). */
 typedef struct family {
     int percent;
     double perigee_km[2], apogee_km[2], inclination_deg[2], bstar;
@@ -75,7 +75,7 @@ static bst_elements synthetic_set(int i) {
                           .mean_motion_radpmin = 60.0 * sqrt(3.986008e5 / (a * a * a))};
 }
 
-/* Two lines of a set; the checksum of a line is the sum of its digits and minus signs. */
+/* Terminates a TLE line with its checksum: sum of digits and minus signs. */
 static void end_line(FILE *file, char *line) {
     int sum = 0;
     for (const char *c = line; *c; c++) {
@@ -113,8 +113,8 @@ static void write_set(FILE *file, const bst_elements *s, int number) {
     end_line(file, line);
 }
 
-/* `count` sets: those of the user's file, again and again with other mean anomalies, or synthetic
- * ones. */
+/* Writes `count` element sets: those of the user's file repeated with other mean anomalies, or
+ * synthetic ones. */
 static bst_status write_sets(bst_ctx *ctx, const bst_bench_options *options, int count,
                              FILE *file) {
     bst_elements *sets = NULL;
@@ -145,7 +145,7 @@ static bst_status make_file(bst_ctx *ctx, const bst_bench_options *options, int 
     return status;
 }
 
-/* The file's sets as objects, three of them as observers; epoch: that of the newest set. */
+/* Creates a world with the sets as objects, three of them as observers; epoch: newest set. */
 static bst_status make_world(bst_ctx *ctx, const bst_bench_options *options, const char *path,
                              bst_time epoch, int count, bst_bench_result *out, bst_world **world) {
     char text[4000], observers[3000] = "";
@@ -174,7 +174,7 @@ static bst_status make_world(bst_ctx *ctx, const bst_bench_options *options, con
     return status;
 }
 
-/* Where the camera looks: it sweeps over the sky, half a degree a second. */
+/* Camera attitude: scans the sky at half a degree per second. */
 static bst_quat attitude(int who, double seconds) {
     double ra = 2.0 * who + 0.5 * BST_DEG_RAD * seconds;
     return bst_quat_look(bst_vec3_from_radec(ra, 0.3 * sin(0.1 * ra)), (bst_vec3){0, 0, 1});
@@ -231,8 +231,8 @@ static bst_status largest_difference(bst_ctx *ctx, const bst_world *world, bst_w
     return BST_OK;
 }
 
-/* The largest difference, of object and observer alike, as seen from the shortest distance at which
- * orbits are interpolated. */
+/* Largest angular error of object and observer positions, at the shortest range with
+ * interpolation. */
 static bst_status measure_error(bst_ctx *ctx, const bst_world *world, const bst_elements *sets,
                                 bst_bench_result *out) {
     bst_world_view *view;

@@ -10,7 +10,8 @@
 #include "sim/cli/shipped.h"
 #include "sim/engine/simulation.h"
 
-/* 1,000 satellites (the file's sets in turn) at 1,000 epochs over the week after their own. */
+/* Propagates 1,000 satellites (sets of the file in turn) at 1,000 epochs over the week after their
+ * epochs. */
 bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) {
     (void)self;
@@ -30,7 +31,7 @@ bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_o
                             ? BST_OK
                             : bst_fail(ctx, BST_ERR_MEMORY, "no element sets to measure with");
     for (int i = 0; status == BST_OK && i < SATELLITES; i++) {
-        /* an even choice over the file */
+        /* evenly spaced over the file */
         int set = (int)((long long)i * count / SATELLITES) % count;
         set = count < SATELLITES ? i % count : set;
         status = bst_sgp4_create(ctx, &sets[set], BST_SGP4_WGS72, BST_SGP4_IMPROVED, &models[i]);
@@ -61,7 +62,7 @@ bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_o
     return status;
 }
 
-/* Cones that hold a 1.5 degree square field, all over the sky, catalogue warm. */
+/* Cones that contain a 1.5 degree square field, all over the sky, with a warm catalogue. */
 bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options, bst_bench_result *out) {
     (void)self;
@@ -74,9 +75,9 @@ bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
     double radius = 0.75 * sqrt(2.0) * BST_DEG_RAD;
     bst_bench_clock clock = {.count = 0};
     for (int round = 0; status == BST_OK && round < 2; round++) {
-        clock.count = 0; /* the first round warms the file */
+        clock.count = 0; /* the first round loads the file */
         for (int i = 0; status == BST_OK && i < FIELDS; i++) {
-            /* golden-angle spiral: even over the sphere */
+            /* golden-angle spiral: uniform over the sphere */
             double z = 1.0 - (2.0 * i + 1.0) / FIELDS;
             bst_vec3 centre =
                 bst_vec3_from_radec(fmod(2.399963229728653 * i, 2.0 * BST_PI), asin(z));
@@ -93,9 +94,9 @@ bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
     return status;
 }
 
-/* The closed loop of the scenario, nothing recorded: time per frame of rendering, processing,
- * tracking, control and plant. */
-/* Runs a scenario in parts of part_s, each of `frames`; the first is warm-up. */
+/* Closed loop of the scenario without recording: time per frame of rendering, processing, tracking,
+ * control and plant. */
+/* Runs a scenario in parts of part_s with `frames` each; the first is warm-up. */
 static bst_status run_in_parts(bst_ctx *ctx, const bst_bench_options *options, const char *file,
                                double duration_s, int part_s, int frames, bst_bench_result *out) {
     bst_load_options load = BST_LOAD_DEFAULTS;

@@ -61,7 +61,7 @@ static bst_status add(bst_ctx *ctx, const errand *e, const char *what, double si
     return BST_OK;
 }
 
-/* Least squares of (offset + slope x) / y - 1. */
+/* Fits time against size by least squares of relative errors, (offset + slope x) / y - 1. */
 void bst_bench_growth_law_fit(bst_bench_growth_law *g) {
     double a = 0.0, b = 0.0, c = 0.0, u = 0.0, v = 0.0;
     for (int i = 0; i < g->count; i++) {

@@ -1,4 +1,5 @@
-/* Image processing on the frames of the rendering scenes: rendered once, then processed in turn. */
+/* Benchmark of image processing: frames of the rendering scenes are rendered once, then processed
+ * repeatedly. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,7 +9,7 @@
 #include "sim/device/device.h"
 
 enum { KEPT = 4, WARM_UP = 4, CALLS = 24, SMALL_CALLS = 2000, SMALL_PX = 512 * 512 };
-enum { FITS = 2048, ALL = 40000 }; /* FITS: the default capacity too */
+enum { FITS = 2048, ALL = 40000 }; /* FITS: also the default capacity */
 
 static const char PREFIX[] = "imgproc_", CROWDED[] = "imgproc_crowded";
 
@@ -22,7 +23,7 @@ typedef struct shots {
     shot items[KEPT];
 } shots;
 
-/* What perfect telemetry would say of the frame that was set last. */
+/* Camera motion of the last frame, as perfect telemetry would give it. */
 static bst_status motion_of(bst_ctx *ctx, const bst_bench_view *v, bst_camera_motion *out) {
     int count = v->track.count;
     bst_pointing_telemetry *ring =
@@ -43,7 +44,7 @@ static bst_status motion_of(bst_ctx *ctx, const bst_bench_view *v, bst_camera_mo
 static bst_status keep_frame(bst_ctx *ctx, bst_renderer *renderer, shots *s, int n) {
     size_t bytes = (size_t)s->view.window.width * (size_t)s->view.window.height * sizeof(uint16_t);
     bst_bench_view_set(&s->view, n);
-    s->items[n].pixels = bst_pages_alloc(bytes); /* as those of a device are */
+    s->items[n].pixels = bst_pages_alloc(bytes); /* allocated like those of a device */
     if (!s->items[n].pixels) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the frames of a scene");
     }

@@ -17,7 +17,7 @@ typedef struct answer {
     bst_los_sample samples[2];
 } answer;
 
-/* Of every pixel. */
+/* Sum of all pixels. */
 static uint32_t sum_of(const uint16_t *pixels) {
     uint32_t sum = 0;
     for (int i = 0; i < PIXELS; i++) {
@@ -26,8 +26,8 @@ static uint32_t sum_of(const uint16_t *pixels) {
     return sum;
 }
 
-/* Looks at every pixel and answers with where the camera looks at the start and the end; the sum of
- * the pixels comes back in the ticks. */
+/* Peer: reads every pixel and answers with the camera's pointing at start and end; returns the sum
+ * of pixels in the ticks. */
 static bst_status play(bst_ctx *ctx, bst_link_peer *peer) {
     bst_link_received got;
     uint32_t sum = 0;

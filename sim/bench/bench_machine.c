@@ -33,7 +33,7 @@ bst_status bst_bench_describe_device(bst_ctx *ctx, const bst_bench_options *opti
     return bst_bench_apart(ctx, describe, &copy, out, sizeof *out);
 }
 
-/* The value of the first line of a file that begins with `key`; "" when there is none. */
+/* Value of the first line of a file that begins with `key`; "": none. */
 static void find_line(const char *path, const char *key, const char *end, char *out, size_t bytes) {
     char line[512];
     FILE *file = fopen(path, "r");
@@ -85,7 +85,7 @@ cJSON *bst_bench_machine(const bst_bench_device *device) {
     }
     double load[3];
     FILE *file = fopen("/proc/loadavg", "r");
-    if (file) { /* of others: times of a busy machine are worth little */
+    if (file) { /* load by other processes: timings on a busy machine are unreliable */
         if (fscanf(file, "%lf %lf %lf", &load[0], &load[1], &load[2]) == 3) {
             cJSON_AddNumberToObject(node, "load_before", load[0]);
         }

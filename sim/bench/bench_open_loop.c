@@ -1,4 +1,4 @@
-#define _GNU_SOURCE /* processors of a process */
+#define _GNU_SOURCE /* processor affinity */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -22,10 +22,10 @@ extern char **environ;
 
 enum { ROUNDS = 3, SHORT_S = 1, LONG_S = 61, PATH_BYTES = 4096 };
 
-/* Overlapped; stage after stage, each on all processors; the same with one processor for all. */
+/* Pipelined; serial with all processors; serial with one processor. */
 typedef enum kind { OVERLAPPED, SERIAL, ONE_PROCESSOR, KINDS } kind;
 
-/* Of one run as a whole. */
+/* Times of one complete run. */
 typedef struct run_time {
     double wall_ms, cpu_ms;
 } run_time;
@@ -37,8 +37,7 @@ static double children_cpu_ms(void) {
            1e-3 * (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-/* Leaves this process, and what it starts, the first processor that it may use; `all` is what it
- * had. */
+/* Restricts this process and its children to the first available processor; `all`: previous set. */
 static bool hold_one_processor(cpu_set_t *all, cpu_set_t *one) {
     if (sched_getaffinity(0, sizeof *all, all) != 0) {
         return false;
@@ -52,7 +51,7 @@ static bool hold_one_processor(cpu_set_t *all, cpu_set_t *one) {
     return sched_setaffinity(0, sizeof *one, one) == 0;
 }
 
-/* `boresight run` of so many seconds in a process of its own. */
+/* Executes `boresight run` for that many seconds in a child process. */
 static bst_status one_run(bst_ctx *ctx, const bst_bench_options *options, const char *folder,
                           kind of, int seconds, run_time *out) {
     char duration[16], threads[16];
@@ -96,7 +95,7 @@ static bst_status one_run(bst_ctx *ctx, const bst_bench_options *options, const 
                : bst_fail(ctx, BST_ERR_STATE, "a run of %s did not end well", arguments[2]);
 }
 
-/* Removes a run's folder, which has no folders in it, and the one it is in. */
+/* Removes a run's folder, which has no subfolders, and its parent. */
 static void clear(const char *folder, const char *run) {
     DIR *dir = opendir(run);
     for (struct dirent *e; dir && (e = readdir(dir));) {
@@ -115,7 +114,7 @@ static bst_status measure(bst_ctx *ctx, const bst_bench_options *options, const 
                           bst_bench_result *out) {
     const double frames = LONG_S - SHORT_S;
     double ms[KINDS][ROUNDS], cpu_ms[KINDS][ROUNDS], ends_ms = INFINITY;
-    run_time first; /* may have to build the kernels */
+    run_time first; /* it may have to build the kernels */
     BST_TRY(one_run(ctx, options, run, OVERLAPPED, SHORT_S, &first));
     for (int n = 0; n < ROUNDS; n++) {
         for (int k = 0; k < KINDS; k++) {
@@ -132,7 +131,7 @@ static bst_status measure(bst_ctx *ctx, const bst_bench_options *options, const 
                                                 {"one_processor", "one_processor_least"}};
     int at = 0;
     for (int k = 0; k < KINDS; k++) {
-        double median = bst_bench_median(ms[k], ROUNDS); /* sorts them */
+        double median = bst_bench_median(ms[k], ROUNDS); /* sorts the times */
         double told[2] = {median, ms[k][0]};
         for (int i = 0; i < 2; i++, at++) {
             snprintf(out->phases[at].name, sizeof out->phases[at].name, "%s", names[k][i]);

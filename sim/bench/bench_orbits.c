@@ -6,8 +6,8 @@
 
 enum { STATES = 1440 };
 
-/* A state a minute of one day of a low orbit through the shadow, with all forces; places: STATES of
- * them. */
+/* Computes a state per minute of one day of a low orbit through the shadow with all forces; places:
+ * [STATES]. */
 static bst_status one_day(bst_ctx *ctx, bst_trajectory_options *options, double tolerance,
                           bst_vec3 *places) {
     options->tolerance = tolerance;

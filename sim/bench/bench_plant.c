@@ -7,7 +7,7 @@
 enum { PLANT_ROUNDS = 40, PLANT_STEPS = 25000, TELEMETRY_STEPS = 10 };
 #define PLANT_DT 1e-3
 
-/* The platform of scenarios/neossat_geo_track.json. */
+/* Platform of scenarios/neossat_geo_track.json. */
 static bst_platform_config demo_platform(bst_platform_config c) {
     c.drift_arcsec_per_s[0] = 3.0;
     c.drift_arcsec_per_s[1] = -4.0;
@@ -16,7 +16,7 @@ static bst_platform_config demo_platform(bst_platform_config c) {
     return c;
 }
 
-/* A target that moves like a geostationary one from a low orbit, commanded 20 times a second. */
+/* Line-of-sight command for a geostationary target seen from a low orbit, 20 times a second. */
 static bst_los_command command_at(double t) {
     double rate = 15.0 * BST_ARCSEC_RAD;
     return (bst_los_command){.direction_gcrf = {sin(rate * t), 0.01, cos(rate * t)},

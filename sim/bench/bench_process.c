@@ -79,7 +79,7 @@ double bst_bench_peak_rss_mib(void) {
     return (double)usage.ru_maxrss / 1024.0;
 }
 
-/* What goes through the pipe before the task's data. */
+/* Header in the pipe before the data of the task. */
 typedef struct outcome {
     bst_status status;
     char message[sizeof((bst_ctx *)0)->message];

@@ -15,8 +15,8 @@ static const struct knob {
 } knobs[] = {
     {"tolerance_sigma", "The error that is allowed, from which all else follows."},
     {"temporal_oversample", "Equal parts of the exposure, one point of light each."},
-    {"renderer", "Whose track the stars follow."},
-    {"spatial_oversample", "Parts of a pixel to whose centres light is moved."},
+    {"renderer", "Common track of all stars, or one per star."},
+    {"spatial_oversample", "Subpixels per pixel; light is moved to their centres."},
     {"stamp_radius_px", "Reach of all stamps beyond the two nearest pixels."},
     {"psf_degree", "Degree of the polynomials of the PSF's profile."},
     {"fft_taps", "Taps per axis of the spreading on the grid, for a PSF that is no Gaussian."},
@@ -46,7 +46,8 @@ static bool has_knob(const bst_bench_error_curve *curve, const char *knob) {
     return false;
 }
 
-/* Points of one knob, all scenes, with the best ones ringed; false: there is none. */
+/* Plots the points of one renderer option for all scenes, with the best ones marked; false:
+ * none. */
 static bst_status plot_knob(bst_ctx *ctx, const bst_bench_report *r, const char *knob,
                             const char *path, bool *made) {
     bst_plot plot;
@@ -169,7 +170,7 @@ static void write_knob(FILE *f, const bst_bench_report *r, const struct knob *k,
 
 static void write_factors(FILE *f, const bst_bench_report *r) {
     fprintf(f,
-            "## Temporal factor and whose track\n\n"
+            "## Temporal factor and star track\n\n"
             "The classic table: the exposure in equal parts, all stars on one track "
             "(`single_kernel`) or each on its own (`multi_kernel`). Milliseconds per frame "
             "(least) and largest error in σ.\n\n| factor | renderer |");

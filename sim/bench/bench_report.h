@@ -1,4 +1,4 @@
-/* Speed against error and size: points that were measured, and the report on them. */
+/* Report of speed against error and size: measured points, tables and plots. */
 #ifndef BST_BENCH_BENCH_REPORT_H
 #define BST_BENCH_BENCH_REPORT_H
 
@@ -17,18 +17,18 @@ enum {
 typedef struct bst_bench_error_curve_point {
     char knob[24], value[24];
     double ms_min, ms_median, cpu_ms, error_sigma_max, predicted_sigma, flux_error_rel;
-    bool best; /* no other point of the scene is both quicker and nearer to the truth */
+    bool best; /* no other point of the scene is both faster and more accurate */
 } bst_bench_error_curve_point;
 
-/* One scene's points: those of a knob follow each other. */
+/* Points of one scene, grouped by renderer option. */
 typedef struct bst_bench_error_curve {
     char scene[40];
     bst_bench_error_curve_point points[BST_CURVE_POINTS];
     int count;
 } bst_bench_error_curve;
 
-/* The classic table: error and time by equal parts of the exposure and by whose track stars follow
- * (0: one for all, 1: each its own). */
+/* Table of error and time by number of exposure intervals and by star track (0: common, 1:
+ * individual). */
 typedef struct bst_bench_factor_column {
     char scene[40];
     double ms[BST_FACTORS][2], error_sigma[BST_FACTORS][2];
@@ -39,8 +39,8 @@ typedef struct bst_bench_growth_law {
     double size[BST_GROWTH_POINTS], ms_min[BST_GROWTH_POINTS], cpu_ms[BST_GROWTH_POINTS],
         peak_rss_mib[BST_GROWTH_POINTS];
     int count;
-    double offset_ms, slope_ms, worst_rel; /* fit ms = offset + slope size; of its misses the
-                                              largest, over the measured time */
+    double offset_ms, slope_ms, worst_rel; /* fit ms = offset + slope size; largest residual
+                                              relative to the measured time */
 } bst_bench_growth_law;
 
 typedef struct bst_bench_report {
@@ -51,18 +51,18 @@ typedef struct bst_bench_report {
     bool has_growth;
 } bst_bench_report;
 
-/* Time per frame by number of stars, and by length of their streaks; each point in a process of its
- * own, so that its memory is its own. */
+/* Measures time per frame by number of stars and by streak length; each point in a process of its
+ * own to measure its memory. */
 bst_status bst_bench_growth(bst_ctx *ctx, const bst_bench_options *options,
                             bst_bench_growth_law *stars,
                             bst_bench_growth_law *streak) BST_MUST_CHECK;
 
-/* Marks the points that no other of the curve beats in time and error. */
+/* Marks the points of a curve that no other point beats in both time and error. */
 void bst_bench_error_curve_mark_best(bst_bench_error_curve *curve);
-/* Straight line through times by size that weighs relative misses alike. */
+/* Fits a straight line to times by size with equal weight of relative errors. */
 void bst_bench_growth_law_fit(bst_bench_growth_law *growth);
 
-/* Writes folder/speed_error.md and folder/images/speed_error_*.png. Folders are made. */
+/* Writes folder/speed_error.md and folder/images/speed_error_*.png. Creates the folders. */
 bst_status bst_bench_report_write(bst_ctx *ctx, const bst_bench_report *report,
                                   const cJSON *machine, const char *folder) BST_MUST_CHECK;
 

@@ -44,7 +44,7 @@ static const bst_bench_scene scenes[] = {
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
 enum { WARM_UP = 3, FRAMES = 40, SMALL_FRAMES = 400, TONES = 24, SAMPLES_PER_S = 1000 };
-/* Frames of up to so many pixels are quick: more of them are timed. */
+/* limit of small frames, of which more are timed, pixels */
 enum { SMALL_PX = 512 * 512 };
 
 static const double BRIGHTEST_E_PER_S = 1e6;
@@ -75,8 +75,8 @@ static bst_camera bench_camera(int side) {
                         .bits = 16};
 }
 
-/* Every effect that a detector of this kind has beside the others; what only other kinds have is
- * off: blooming, frame transfer, a rolling shutter, codes. */
+/* Enables every detector effect that combines with the others; off: blooming, frame transfer,
+ * rolling shutter, codes. */
 static void set_detector(bst_camera *camera) {
     camera->detector = (bst_detector_config){.temperature_c = -10.0,
                                              .reference_temperature_c = 20.0,
@@ -103,8 +103,8 @@ static void set_detector(bst_camera *camera) {
     camera->dark_current_e_per_s = 0.05;
 }
 
-/* An aperture of which 35 % of the diameter is obstructed, with defocus, astigmatism, coma and
- * trefoil that together are 0.07 waves RMS at 550 nm, over the visual band. */
+/* Sets an aperture with 35 % obstruction by diameter, and defocus, astigmatism, coma and trefoil of
+ * together 0.07 waves RMS at 550 nm, in the visual band. */
 static void set_diffraction(bst_camera *camera, double q) {
     static const double sign[6] = {1, -1, 1, 1, -1, 1};
     camera->optics.psf = BST_PSF_DIFFRACTION;
@@ -139,7 +139,7 @@ static double jitter(const tones *t, int axis, double time_s) {
     return t->amplitude_px * sum;
 }
 
-/* Attitudes of one frame: the pointing of each frame differs by up to a pixel. */
+/* Sets the attitudes of one frame; the pointing differs by up to a pixel between frames. */
 static void move(bst_bench_view *v, int frame) {
     const bst_bench_scene *s = &v->scene;
     double scale = bst_camera_scale_rad(&v->camera), diagonal = s->travel_px / sqrt(2.0), start[2];
@@ -176,8 +176,7 @@ static void make_stars(bst_bench_view *v) {
     }
 }
 
-/* Targets are elsewhere in every frame; those at rest move against the stars so that they stay in
- * their pixel. */
+/* Moves the targets for a frame; targets at rest move against the stars to stay in their pixel. */
 static void place_targets(bst_bench_view *v, int frame) {
     const bst_bench_scene *s = &v->scene;
     bst_rng_key key = bst_rng_make_key(1, 0, "bench", "targets");
@@ -241,7 +240,7 @@ void bst_bench_view_set(bst_bench_view *v, int frame) {
                                       .exposure_id = frame};
 }
 
-/* What differs between the frames of a view, made before the clock runs. */
+/* Per-frame inputs of a view, prepared before timing. */
 typedef struct pose {
     bst_quat *q;
     bst_scene_source targets[BST_BENCH_TARGETS];
@@ -279,7 +278,7 @@ static bst_status map_and_release(bst_ctx *ctx, bst_frame *frame) {
     return status;
 }
 
-/* Times from one mapped frame to the next vary with who is scheduled when: means over so many. */
+/* number of consecutive frame times that are averaged, because scheduling makes single ones vary */
 enum { TOGETHER = 4 };
 
 static bst_status time_poses(bst_ctx *ctx, bst_renderer *renderer, bst_bench_view *v,
@@ -290,7 +289,7 @@ static bst_status time_poses(bst_ctx *ctx, bst_renderer *renderer, bst_bench_vie
     int together = ahead ? TOGETHER : 1, latencies = 0;
     bst_status status = BST_OK;
     for (int f = 0; f < count && status == BST_OK; f++) {
-        int n = ahead ? f - 1 : f; /* the frame that is waited for */
+        int n = ahead ? f - 1 : f; /* the frame to wait for */
         take_pose(v, &poses[f]);
         asked_s[f % 2] = bst_bench_wall_s();
         status = bst_renderer_render(ctx, renderer, &v->request, &frames[f % 2]);
@@ -370,7 +369,7 @@ bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
             bst_bench_view_time(ctx, renderer, &view, small ? SMALL_FRAMES : FRAMES, true, out);
     }
     if (status == BST_OK) {
-        /* before the reference takes its memory */
+        /* before the reference allocates its memory */
         out->peak_rss_mib = bst_bench_peak_rss_mib();
         status = bst_bench_truth_make(ctx, &view, &truth);
     }

@@ -8,7 +8,7 @@
 enum { CRAFT_ROUNDS = 40, CRAFT_STEPS = 25000 };
 #define CRAFT_DT 1e-3
 
-/* A circular orbit of 7000 km, the Sun in its plane. */
+/* Environment of a circular orbit of 7000 km with the Sun in its plane. */
 static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_spacecraft_sky *out) {
     (void)user;
     (void)ctx;
@@ -21,8 +21,8 @@ static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_spacecraf
     return BST_OK;
 }
 
-/* Four wheels with friction and imbalance, two modes, gravity gradient and sunlight, two star
- * trackers and gyro, pointing at nadir. */
+/* Creates a nadir-pointing spacecraft: four wheels with friction and imbalance, two flexible modes,
+ * gravity gradient, radiation pressure, two star trackers and a gyro. */
 static bst_status make(bst_ctx *ctx, bst_spacecraft **out) {
     bst_spacecraft_config c;
     BST_TRY(bst_config_defaults(ctx, bst_spacecraft_config_table, &c));

@@ -1,5 +1,5 @@
-/* Stacks of 16 frames of noise, 2048 x 2048 pixels, rates to 3 px per frame: what a frame costs,
- * the search's share included. */
+/* Benchmark of stacking: 16 frames of noise, 2048 x 2048 pixels, rates to 3 px per frame; time per
+ * frame, including its part of the search. */
 #include <stdlib.h>
 
 #include "boresight/rng.h"
@@ -10,7 +10,7 @@
 enum { SIDE = 2048, FRAMES = 16, STACKS = 4, APART = 64 };
 
 typedef struct noise {
-    float *values; /* frames begin APART rows from one another, so that none moves as a path does */
+    float *values; /* consecutive frames start APART rows from each other: no motion along a path */
     bst_background background;
     bst_stack *stack;
 } noise;
@@ -34,7 +34,7 @@ static bst_status make(bst_ctx *ctx, const bst_bench_options *options, noise *n)
     BST_TRY(bst_background_create(ctx, 64, SIDE, SIDE, 1, &n->background));
     bst_background_estimate(&n->background, n->values, SIDE, SIDE, 1e-3f);
     for (int i = 0; i < n->background.columns * n->background.rows; i++) {
-        n->background.noise[i] = 1.0f; /* of all frames, not of the first */
+        n->background.noise[i] = 1.0f; /* of all frames */
     }
     return bst_stack_create(ctx, &camera, &config, options->threads, &n->stack);
 }
@@ -46,7 +46,7 @@ bst_status bst_bench_stack(bst_ctx *ctx, const bst_bench *self, const bst_bench_
     bst_status status = make(ctx, options, &n);
     bst_bench_clock clock = {.count = 0};
     double found = 0.0;
-    for (int s = 0; s < 1 + STACKS && status == BST_OK; s++) { /* the first to warm up */
+    for (int s = 0; s < 1 + STACKS && status == BST_OK; s++) { /* the first is warm-up */
         int count;
         bst_bench_start(&clock);
         for (int i = 0; i < FRAMES; i++) {

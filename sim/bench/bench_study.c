@@ -1,5 +1,5 @@
-/* A study of 100,000 runs that keep only their summary: expansion into documents, rows of shards,
- * aggregation; the runs themselves are a few random numbers. */
+/* Benchmark of a study with 100,000 runs that only record their summary: expansion into documents,
+ * shard rows, aggregation; a run draws a few random numbers. */
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@
 #include "scenegen/reference.h"
 #include "sim/bench/bench_scenes.h"
 
-/* A Gaussian's light beyond so many standard deviations is below 1e-20. */
+/* radius in sigma beyond which a Gaussian's light is below 1e-20 */
 #define REACH_SIGMAS 9.5
 
 static int compare_rates(const void *a, const void *b) {
@@ -13,7 +13,7 @@ static int compare_rates(const void *a, const void *b) {
     return (p < q) - (p > q);
 }
 
-/* Targets, the brightest stars and an even choice of the others. */
+/* Selects targets, the brightest stars and an even selection of the others. */
 static bst_status choose_sources(bst_ctx *ctx, const bst_bench_view *v, bst_bench_truth *t) {
     int stars = v->scene.stars, want = v->scene.error_sources, brightest = want / 8 + 1;
     bst_scene_source *sorted = malloc((size_t)v->count * sizeof *sorted);
@@ -36,8 +36,8 @@ static bst_status choose_sources(bst_ctx *ctx, const bst_bench_view *v, bst_benc
     return BST_OK;
 }
 
-/* Pixels that a source's light touches in the exposure, clipped to the window; false when it
- * touches none. *inside: no clipping was needed. */
+/* Box of pixels that a source's light reaches in the exposure, clipped to the window; false: none.
+ * *inside: not clipped. */
 static bool box_of(const bst_bench_view *v, const bst_scene_source *s, bst_window *box,
                    bool *inside) {
     double x0 = INFINITY, y0 = INFINITY, x1 = -INFINITY, y1 = -INFINITY;
@@ -70,7 +70,7 @@ static void add_to_moment(struct bst_bench_moment *m, int x, int y, double elect
     m->y += electrons * y;
 }
 
-/* The image of one source with a Gaussian PSF, and its moments. */
+/* Adds the reference image of one source with a Gaussian PSF, and its moments. */
 static bst_status add_source(bst_ctx *ctx, bst_bench_truth *t, int i) {
     const bst_bench_view *v = t->view;
     struct bst_bench_moment *m = &t->moments[i];
@@ -110,7 +110,8 @@ bst_status bst_bench_truth_make(bst_ctx *ctx, bst_bench_view *v, bst_bench_truth
                      : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the sources' places");
     }
     if (status == BST_OK && v->scene.q > 0.0) {
-        /* wings over all of the frame: of one source after the other it would take too long */
+        /* PSF wings extend over the whole frame: rendering sources one by one would take too
+         * long */
         status = bst_reference_render(ctx, &v->camera, v->window, &v->track, t->sources, t->count,
                                       1e-9, t->image);
     }
@@ -130,7 +131,7 @@ void bst_bench_truth_free(bst_bench_truth *t) {
     *t = (bst_bench_truth){.count = 0};
 }
 
-/* Largest shift of a source's first moment, each drawn by itself; errors of the sum of light. */
+/* Largest centroid shift of a source, each rendered alone, and error of its total light. */
 static bst_status compare_moments(bst_ctx *ctx, bst_renderer *renderer, const bst_bench_truth *t,
                                   double faintest_e_per_s, float *image, bst_bench_result *out) {
     double fast = 0.0, exact = 0.0, shift = -1.0;

@@ -14,7 +14,7 @@
 
 extern char **environ;
 
-/* The steps whose ends the fresh process tells, in this order. */
+/* Steps whose ends the new process reports, in order. */
 static const char *const steps[] = {"process", "device", "kernels", "scene", "first_frame"};
 enum { STEPS = sizeof steps / sizeof *steps, PROCESSES = 9 };
 
@@ -58,7 +58,7 @@ bst_status bst_bench_first_frame(bst_ctx *ctx, const bst_bench_options *options)
     return status;
 }
 
-/* Starts this program anew and takes in what it tells. */
+/* Starts this program in a new process and reads its times. */
 static bst_status one_process(bst_ctx *ctx, const bst_bench_options *options, double *start,
                               double ends[STEPS]) {
     char threads[16];
@@ -111,7 +111,7 @@ bst_status bst_bench_cold_start(bst_ctx *ctx, const bst_bench *self,
     (void)self;
     bst_bench_clock clock = {.count = 0};
     double steps_ms[STEPS][PROCESSES], cpu_ms = 0.0;
-    for (int n = -1; n < PROCESSES; n++) { /* the first fills the kernel cache */
+    for (int n = -1; n < PROCESSES; n++) { /* the first process fills the kernel cache */
         double start = 0.0, ends[STEPS] = {0};
         struct rusage before, after;
         getrusage(RUSAGE_CHILDREN, &before);

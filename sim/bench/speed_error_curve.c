@@ -15,12 +15,12 @@ static const char *const factor_scenes[BST_FACTOR_SCENES] = {
 static const char *const curve_scenes[BST_CURVE_SCENES] = {
     "worst_case", "rate_track_medium", "galactic_core", "worst_case_diffraction_q2"};
 
-/* One scene in work. */
+/* State of measuring one scene. */
 typedef struct sweep {
     const bst_bench_options *options;
     const char *name;
     bst_device *device;
-    bst_bench_view view, timed; /* the frame of the reference, and those that are timed */
+    bst_bench_view view, timed; /* frame of the reference; timed frames */
     bst_bench_truth truth;
 } sweep;
 
@@ -46,7 +46,7 @@ static void sweep_close(sweep *s) {
     bst_device_close(s->device);
 }
 
-/* Time and error of one choice. */
+/* Measures time and error of one option set. */
 static bst_status measure(bst_ctx *ctx, sweep *s, const bst_renderer_options *options,
                           double faintest_e_per_s, bst_bench_result *out) {
     bst_renderer *renderer;
@@ -84,7 +84,7 @@ static bst_status add_point(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve
     return BST_OK;
 }
 
-/* Numbers to put into one of the renderer's options. */
+/* Measures points for several values of an integer renderer option. */
 static bst_status vary_int(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve, const char *knob,
                            size_t offset, const int *values) {
     for (; *values > 0; values++) {
@@ -121,7 +121,7 @@ static bst_status vary_motion(bst_ctx *ctx, sweep *s, bst_bench_error_curve *cur
     return BST_OK;
 }
 
-/* Keeps the stars of at least that rate. */
+/* Keeps the stars with at least that rate. */
 static void drop_faint(bst_bench_view *v, double faintest_e_per_s) {
     int kept = 0;
     for (int i = 0; i < v->scene.stars; i++) {
@@ -133,7 +133,7 @@ static void drop_faint(bst_bench_view *v, double faintest_e_per_s) {
     v->count = kept + v->scene.targets;
 }
 
-/* Last of all: the stars that are timed grow fewer. */
+/* runs last, because it removes stars from the timed scene */
 static bst_status vary_faint_limit(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve) {
     double brightest = 0.0;
     for (int i = 0; i < s->view.scene.stars; i++) {
@@ -155,7 +155,7 @@ static bst_status vary_all(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve)
     static const int temporal[] = {15, 51, 151, 501, 1501, 0}, spatial[] = {1, 3, 5, 11, 33, 99, 0},
                      stamp[] = {1, 2, 3, 4, 5, 6, 0}, degree[] = {1, 3, 5, 7, 9, 0},
                      taps[] = {4, 6, 8, 0};
-    bool large = s->view.count > LARGE; /* its cheap knobs only */
+    bool large = s->view.count > LARGE; /* only its fast options */
     bool stamps = s->view.scene.q == 0.0;
     BST_TRY(vary_tolerance(ctx, s, curve));
     if (!large) {

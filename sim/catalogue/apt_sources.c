@@ -1,4 +1,4 @@
-/* apt's sources, in both formats, into source-package entries for Debian's own. */
+/* Converts apt's sources, in both formats, to deb-src entries of Debian's own repositories. */
 #include <ctype.h>
 #include <dirent.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 
 #include "sim/catalogue/star_fetch.h"
 
-/* True when `word` is one of the blank-separated words of `text`. */
+/* Checks whether `word` is one of the blank-separated words of `text`. */
 static bool has_word(const char *text, const char *word) {
     size_t length = strlen(word);
     for (const char *p = text; *p;) {
@@ -21,7 +21,7 @@ static bool has_word(const char *text, const char *word) {
     return false;
 }
 
-/* A foreign repository names its own key; Debian's need not name any. */
+/* Identifies Debian's own repositories: others name their key; Debian's may name none. */
 static bool is_debians(const char *uris, const char *components, const char *signed_by) {
     if (!has_word(components, "main")) {
         return false;
@@ -32,7 +32,7 @@ static bool is_debians(const char *uris, const char *components, const char *sig
     return signed_by[strspn(signed_by, " \t\n")] == '\0' && strstr(uris, "debian") != NULL;
 }
 
-/* "deb [options] uri suite component..." */
+/* Converts a one-line entry "deb [options] uri suite component...". */
 static void convert_line(char *line, FILE *out, int *count) {
     line[strcspn(line, "#\r\n")] = '\0';
     char *p = line + strspn(line, " \t");
@@ -77,7 +77,7 @@ static void convert_list(FILE *in, FILE *out, int *count) {
     free(line);
 }
 
-/* Puts the value of a deb822 field, continuation lines and all, into value; "" when missing. */
+/* Reads the value of a deb822 field with its continuation lines; "" if missing. */
 static void field_value(const char *stanza, const char *name, char *value, size_t bytes) {
     size_t length = strlen(name), used = 0;
     bool inside = false;
@@ -167,7 +167,7 @@ static bst_status convert_file(bst_ctx *ctx, const char *path, FILE *list, FILE 
                                int *count) {
     FILE *in = fopen(path, "r");
     if (!in) {
-        /* Some machines hide single sources from their users: the others do. */
+        /* some machines make single source files unreadable for users: use the others */
         return BST_OK;
     }
     bst_status status = BST_OK;

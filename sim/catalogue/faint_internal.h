@@ -32,14 +32,15 @@ struct bst_faint_sky {
     double complete_to_v;
     faint_patch *patches;
     int patch_count;
-    float (*kept)[FAINT_QUARTERS]; /* [FAINT_ZONES + patches]: share of the stars that are kept */
+    float (*kept)[FAINT_QUARTERS]; /* [FAINT_ZONES + patches]: fraction of statistical stars that
+                                      are kept */
 };
 
 typedef struct faint_cell {
     double ra_rad, width_rad; /* western edge, extent */
     double sin_dec_min, sin_dec_max;
     bst_vec3 centre;
-    double radius_rad; /* of a cap that holds it */
+    double radius_rad; /* of a cap that contains it */
     double area_deg2;
 } faint_cell;
 
@@ -59,7 +60,7 @@ faint_cell bst_faint_cell(const bst_faint_sky *sky, int band, uint32_t cell);
 /* Zone of a direction (ICRS). */
 int bst_faint_zone(bst_vec3 icrs);
 
-/* The first patch that holds a direction, -1 when none does, and how far the catalogue is complete
+/* The first catalogue patch that contains a direction, -1: none, and the completeness limit
  * there. */
 int bst_faint_patch(const bst_faint_sky *sky, bst_vec3 icrs, double *complete_to_v);
 

@@ -4,8 +4,8 @@
 #include "sim/catalogue/star_index.h"
 #include "sim/catalogue/stars.h"
 
-/* Tycho-2 has 98 % of the stars at V 11 and 76 % at 11.5: no catalogue made from it is complete
- * beyond, whatever its patches say. */
+/* Tycho-2 has 98 % of the stars at V 11 and 76 % at 11.5: a catalogue made from it is complete at
+ * most to this limit, whatever its patches state. */
 #define SOURCE_COMPLETE_V 11.0
 
 #define DEG2_PER_SR (1.0 / (BST_DEG_RAD * BST_DEG_RAD))
@@ -19,7 +19,7 @@ faint_cell bst_faint_cell(const bst_faint_sky *sky, int band, uint32_t cell) {
                     .sin_dec_min = band == 0 ? -1.0 : sin(south),
                     .sin_dec_max = band == FAINT_BANDS - 1 ? 1.0 : sin(north)};
     c.centre = bst_vec3_from_radec(c.ra_rad + 0.5 * width, south + 0.5 * FAINT_BAND_RAD);
-    /* by the side that is nearer to the equator: an arc of the parallel is longer than the chord */
+    /* use the side nearer to the equator: an arc of the parallel is longer than the chord */
     double cos_dec = band < FAINT_BANDS / 2 ? cos(north) : cos(south);
     c.radius_rad = 0.5 * (width * cos_dec + FAINT_BAND_RAD);
     c.area_deg2 = width * (c.sin_dec_max - c.sin_dec_min) * DEG2_PER_SR;
@@ -48,8 +48,8 @@ int bst_faint_patch(const bst_faint_sky *sky, bst_vec3 icrs, double *complete_to
     return found;
 }
 
-/* Expected stars of the table in each quarter of a magnitude beyond complete_to_v, added to
- * expected[] for an area around `icrs`. */
+/* Adds the expected stars in each quarter of a magnitude beyond complete_to_v, for an area around
+ * `icrs`, by the table of star counts. */
 static void expect(bst_vec3 icrs, double area_deg2, double complete_to_v, double *expected) {
     bst_star_counts counts;
     bst_star_counts_at(icrs, &counts);
@@ -64,7 +64,7 @@ static void expect(bst_vec3 icrs, double area_deg2, double complete_to_v, double
     }
 }
 
-/* A lattice over a cap that is equal in area, leaving out what belongs to an earlier patch. */
+/* Expected stars of a patch, by an equal-area grid over its cap, without earlier patches. */
 static void expect_patch(const bst_faint_sky *sky, int patch, double *expected) {
     enum { RINGS = 24, SPOKES = 24 };
     const faint_patch *p = &sky->patches[patch];
@@ -101,12 +101,13 @@ static void expect_zone(const bst_faint_sky *sky, int zone, double *expected) {
     }
 }
 
-/* What the catalogue has beyond its limits, by zone or patch and quarter of a magnitude. */
+/* Counts the catalogue's stars beyond its completeness limit, by zone or patch and quarter of a
+ * magnitude. */
 static void count_catalogue(const bst_faint_sky *sky, const bst_star_view *view,
                             double (*seen)[FAINT_QUARTERS]) {
     for (uint32_t c = 0; c < view->header->cell_count; c++) {
         const bst_star_record *first = view->records + view->cells[c].first;
-        /* brightest first: from the faint end until all are within the limit */
+        /* sorted brightest first: go from the faint end until all are within the limit */
         for (const bst_star_record *r = first + view->cells[c].count; r-- > first;) {
             double v = bst_star_record_v(r) / 1e5;
             if (v <= sky->complete_to_v) {
@@ -126,6 +127,7 @@ static void count_catalogue(const bst_faint_sky *sky, const bst_star_view *view,
     }
 }
 
+/* Computes the fraction of statistical stars to keep in each zone and patch. */
 static bst_status weigh(bst_ctx *ctx, bst_faint_sky *sky, const bst_star_view *view) {
     int regions = FAINT_ZONES + sky->patch_count;
     double(*seen)[FAINT_QUARTERS] = calloc((size_t)regions, sizeof *seen);
@@ -151,8 +153,8 @@ static bst_status weigh(bst_ctx *ctx, bst_faint_sky *sky, const bst_star_view *v
     return BST_OK;
 }
 
-/* Gives each cell a range of identities with room for all stars to BST_FAINT_LIMIT_V: 8 standard
- * deviations above the mean. The sum stays below 2^31, see the test. */
+/* Assigns each cell a range of identities with capacity for all stars to BST_FAINT_LIMIT_V: 8
+ * standard deviations above the mean. The sum stays below 2^31, see the test. */
 static bst_status number_cells(bst_ctx *ctx, bst_faint_sky *sky) {
     sky->first_id = malloc((faint_cells(sky) + 1u) * sizeof *sky->first_id);
     if (!sky->first_id) {
@@ -231,7 +233,7 @@ double bst_faint_sky_undrawn(const bst_faint_sky *sky, bst_vec3 icrs, double v_l
     int patch = bst_faint_patch(sky, icrs, &complete_to_v);
     const float *kept = sky->kept[patch < 0 ? bst_faint_zone(icrs) : FAINT_ZONES + patch];
     double from = fmax(faint_limit, complete_to_v);
-    /* the catalogue's own: all there are where it is complete, its share beyond */
+    /* catalogue stars: all where it is complete, its fraction beyond */
     double sum =
         v_limit < complete_to_v ? bst_star_counts_light(&counts, v_limit, complete_to_v) : 0.0;
     sum += bst_star_counts_light(&counts, fmax(from, BST_FAINT_LIMIT_V), INFINITY);

@@ -4,17 +4,17 @@
 
 #include "sim/catalogue/faint_internal.h"
 
-/* Counters of a cell's random words: draws of stars are numbered (cell, bin), draws of how many
- * there are (cell, bin + COUNT_DRAW). */
+/* Random counters of a cell: stars are drawn at (cell, bin), numbers of stars at (cell, bin +
+ * COUNT_DRAW). */
 #define CELL_SHIFT 8
 #define COUNT_DRAW 128u
 
 #define NO_CELL UINT32_MAX
 
-/* A cell that is in the cache. */
+/* A cache slot with the stars of a cell. */
 typedef struct slot {
     uint32_t cell;
-    int bins; /* magnitude bins that it holds, from the brightest */
+    int bins; /* number of magnitude bins in the slot, from the brightest */
     int64_t used;
     bst_star *stars;
     int count, capacity;
@@ -25,7 +25,7 @@ struct bst_faint_stars {
     slot *slots;
     int slot_count, slot_capacity;
     int empty_slots;       /* slots without a cell */
-    int32_t *slot_of_cell; /* -1: not in the cache */
+    int32_t *slot_of_cell; /* -1: not cached */
     int64_t query;
     int64_t stars_held, stars_limit;
 };
@@ -62,13 +62,12 @@ void bst_faint_stars_free(bst_faint_stars *f) {
     }
 }
 
-/* 32 random bits to the open interval (0, 1). */
+/* Converts 32 random bits to the open interval (0, 1). */
 static double unit(uint32_t word) {
     return ((double)word + 0.5) * (1.0 / 4294967296.0);
 }
 
-/* A Poisson deviate, exact, as the sum of deviates of at most 200, each by inversion: the sum of
- * the probabilities from zero on. */
+/* Exact Poisson deviate: sum of deviates with means up to 200, each by inversion. */
 static int poisson(bst_rng_key key, uint64_t a, double mean) {
     const double piece = 200.0;
     int total = 0;
@@ -99,8 +98,8 @@ static bst_status reserve_stars(bst_ctx *ctx, slot *s, int count) {
     return BST_OK;
 }
 
-/* Share of the stars of a cell's bins that may be kept, by the cell's zone; NULL near a patch,
- * where each star's own place decides. */
+/* Fraction of a cell's stars to keep per bin, by its zone; NULL near a patch, where each star's
+ * position decides. */
 static const float *share_of_cell(const bst_faint_sky *sky, const faint_cell *c) {
     for (int i = 0; i < sky->patch_count; i++) {
         const faint_patch *p = &sky->patches[i];
@@ -123,7 +122,7 @@ static bool is_kept(const bst_faint_sky *sky, const float *share, bst_vec3 icrs,
     return v > complete_to_v && unit(word) < (double)share[q];
 }
 
-/* Draws a cell's first `bins` bins into the slot. */
+/* Draws the stars of the first `bins` magnitude bins of a cell. */
 static bst_status draw_cell(bst_ctx *ctx, const bst_faint_sky *sky, int band, uint32_t cell,
                             int bins, slot *s) {
     faint_cell c = bst_faint_cell(sky, band, cell);
@@ -144,7 +143,7 @@ static bst_status draw_cell(bst_ctx *ctx, const bst_faint_sky *sky, int band, ui
         uint32_t first = number;
         number += (uint32_t)drawn;
         if (brighter + 1.0 <= sky->complete_to_v) {
-            continue; /* the catalogue has them all */
+            continue; /* the catalogue contains all of them */
         }
         BST_TRY(reserve_stars(ctx, s, s->count + drawn));
         double per_decade = 1.0 / (counts.log_n[k + 1] - counts.log_n[k]);
@@ -167,7 +166,7 @@ static bst_status draw_cell(bst_ctx *ctx, const bst_faint_sky *sky, int band, ui
     return BST_OK;
 }
 
-/* A slot without a cell, else a new one; -1 when there is no memory. */
+/* An empty cache slot, else a new one; -1: out of memory. */
 static int empty_slot(bst_faint_stars *f) {
     for (int i = 0; f->empty_slots > 0 && i < f->slot_count; i++) {
         if (f->slots[i].cell == NO_CELL) {
@@ -188,8 +187,8 @@ static int empty_slot(bst_faint_stars *f) {
     return f->slot_count++;
 }
 
-/* Lets go of the cells that were looked at longest ago, not by this query, until the cache is
- * within its limit. The memory of one of them is kept for the cell to come. */
+/* Removes the least recently used cells that this query does not need, until the cache is within
+ * its limit. The memory of one is reused. */
 static void make_room(bst_faint_stars *f) {
     bool keep_memory = true;
     while (f->stars_held >= f->stars_limit) {
@@ -298,7 +297,7 @@ bst_status bst_faint_stars_query(bst_ctx *ctx, bst_faint_stars *f, bst_vec3 cent
            north = fmin(dec + radius_rad + 0.5 * BST_PI, BST_PI);
     int first_band = (int)(south / FAINT_BAND_RAD), last_band = (int)(north / FAINT_BAND_RAD);
     last_band = last_band < FAINT_BANDS ? last_band : FAINT_BANDS - 1;
-    /* the cone's largest difference in right ascension: sin(dra) = sin(r) / cos(dec) */
+    /* half width of the cone in right ascension: sin(dra) = sin(r) / cos(dec) */
     double half = fabs(dec) + radius_rad < 0.5 * BST_PI - 1e-6
                       ? asin(fmin(1.0, sin(radius_rad) / cos(dec)))
                       : BST_PI;

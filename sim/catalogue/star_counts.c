@@ -41,7 +41,7 @@ void bst_star_counts_at(bst_vec3 icrs, bst_star_counts *out) {
     }
 }
 
-/* The segment of the table that v lies in, the first or last one when it is outside. */
+/* Segment of the table that contains v; outside, the first or last one. */
 static int segment(double v) {
     double at = v - BST_COUNT_FIRST_V;
     return at <= 0.0 ? 0 : at >= BST_COUNT_NODES - 1 ? BST_COUNT_NODES - 2 : (int)at;
@@ -66,7 +66,7 @@ double bst_star_counts_light(const bst_star_counts *counts, double v_from, doubl
         if (a >= v_to) {
             break;
         }
-        /* dN = ln10 s N dV, so the integrand is 10^(log N0 - 0.4 base + (s - 0.4) (V - base)) */
+        /* dN = ln10 s N dV: the integrand is 10^(log N0 - 0.4 base + (s - 0.4) (V - base)) */
         double s = slope(counts, k), e = s - 0.4;
         double scale = s * pow(10.0, counts->log_n[k] - 0.4 * base);
         double upper = isinf(b) ? 0.0 : pow(10.0, e * (b - base));

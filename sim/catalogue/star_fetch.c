@@ -37,8 +37,8 @@ bst_status bst_star_fetch_verify(bst_ctx *ctx, const char *path, const char *sha
     return BST_OK;
 }
 
-/* The private apt configuration and sources in `folder`. The hooks that a system may run after an
- * update (containers delete the system's package cache there) are switched off. */
+/* Writes the private apt configuration and sources into `folder`. It disables hooks after an update
+ * (containers delete the system's package cache there). */
 static bst_status write_apt_files(bst_ctx *ctx, const char *folder) {
     static const char *const folders[] = {"apt/sources.d", "apt/state/lists/partial",
                                           "apt/cache/archives/partial", "apt/log"};
@@ -85,7 +85,7 @@ static bst_status write_apt_files(bst_ctx *ctx, const char *folder) {
     return status;
 }
 
-/* The last line of a text file, for an error message. */
+/* Reads the last line of a text file, for an error message. */
 static void last_line(const char *path, char *out, size_t bytes) {
     char line[512];
     snprintf(out, bytes, "no message");
@@ -102,7 +102,8 @@ static void last_line(const char *path, char *out, size_t bytes) {
     fclose(f);
 }
 
-/* Runs apt-get with the private configuration, in `folder`, reporting the size of `watched`. */
+/* Runs apt-get with the private configuration in `folder`; reports the size of `watched` as
+ * progress. */
 static bst_status run_apt(bst_ctx *ctx, const char *folder, const char *const command[3],
                           const char *what, const char *watched, bst_star_progress_fn progress,
                           void *progress_user) {
@@ -149,7 +150,7 @@ bst_status bst_star_fetch_tarball(bst_ctx *ctx, const char *folder, bst_star_pro
     BST_TRY(write_apt_files(ctx, folder));
     static const char *const update[3] = {"update", NULL, NULL};
     static const char *const source[3] = {"source", "--download-only", "tycho2"};
-    /* One unreachable source of several makes update fail; the package may still be found. */
+    /* one unreachable source makes the update fail; the package may still be found */
     bst_status updated =
         run_apt(ctx, folder, update, "reading Debian's lists", NULL, progress, progress_user);
     bst_status status =
@@ -215,7 +216,7 @@ bst_status bst_star_fetch(bst_ctx *ctx, const char *out_path, bst_star_progress_
     options.progress = progress;
     options.progress_user = progress_user;
     BST_TRY(bst_star_import_tarball(ctx, tarball, &options, out_path, NULL));
-    /* What cannot be removed only takes room. */
+    /* failures only leave files behind */
     (void)nftw(folder, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
     return BST_OK;
 }

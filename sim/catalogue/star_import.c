@@ -31,7 +31,7 @@ bst_star_import_options bst_star_import_all(void) {
     return o;
 }
 
-/* One line that is not blank, without its comment. */
+/* Parses a non-empty line of a subset description, without its comment. */
 static bool read_subset_line(const char *line, int *sky_lines, bst_star_subset *out) {
     bst_star_patch p;
     double v;
@@ -170,7 +170,8 @@ static int compare_u32(uint32_t a, uint32_t b) {
     return (a > b) - (a < b);
 }
 
-/* By cell, brightest first, ties by identity; position last, so that the order is total. */
+/* Sorts stars by cell, brightest first, ties by identity; position last, so that the order is
+ * total. */
 static int compare_stars(const void *pa, const void *pb) {
     const import_star *a = pa, *b = pb;
     int c = compare_u32(a->cell, b->cell);
@@ -186,7 +187,7 @@ static int compare_stars(const void *pa, const void *pb) {
     return c ? c : compare_u32((uint32_t)a->record.dec, (uint32_t)b->record.dec);
 }
 
-/* Puts the cap around stars first to first + count - 1 into *cell. */
+/* Computes the cap around stars first to first + count - 1 of *cell. */
 static void bound_cell(const import_star *stars, bst_star_cell *cell) {
     bst_vec3 sum = {0.0, 0.0, 0.0};
     for (uint32_t i = 0; i < cell->count; i++) {
@@ -198,18 +199,18 @@ static void bound_cell(const import_star *stars, bst_star_cell *cell) {
         const bst_star_record *r = &stars[i].record;
         bst_vec3 now = bst_star_record_direction(r, 0.0);
         radius = fmax(radius, bst_vec3_angle(centre, now));
-        /* The tangent of the angle gone in a year is the proper motion. */
+        /* proper motion is the tangent of the angle moved in a year */
         motion = fmax(motion, tan(bst_vec3_angle(now, bst_star_record_direction(r, 1.0))));
     }
     cell->centre[0] = (float)centre.x;
     cell->centre[1] = (float)centre.y;
     cell->centre[2] = (float)centre.z;
-    /* Room for the rounding to float. */
+    /* margin for rounding to float */
     cell->radius_rad = (float)(radius + 1e-6);
     cell->pm_max_radpyr = (float)(motion * (1.0 + 1e-6));
 }
 
-/* The whole file in memory; *out is the caller's to free. */
+/* Builds the catalogue file in memory; the caller frees *out. */
 static bst_status build_image(bst_ctx *ctx, const import_list *list, const bst_star_subset *subset,
                               unsigned char **out, size_t *out_bytes) {
     size_t patch_bytes = (size_t)subset->patch_count * sizeof(bst_star_patch);
@@ -284,7 +285,7 @@ static bst_status write_atomically(bst_ctx *ctx, const char *path, const void *d
     return BST_OK;
 }
 
-/* Sorts, indexes and writes what has been read. */
+/* Sorts, indexes and writes the imported stars. */
 static bst_status write_catalogue(bst_ctx *ctx, import_list *list,
                                   const bst_star_import_options *options, const char *out_path) {
     if (list->count == 0) {
@@ -331,7 +332,7 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
     import_list list = {0};
     bst_status status = read_rows(ctx, tar.output, options, &list);
     int code = bst_subprocess_wait(&tar);
-    /* A reader that stops early ends tar by a closed pipe: then its own message counts. */
+    /* a reader that stops early closes tar's pipe: then report the reader's error */
     if (code != 0 && (status == BST_OK || list.count == 0)) {
         status = bst_fail(ctx, BST_ERR_FORMAT,
                           "cannot unpack %s (tar ended with %d): it must be Debian's "

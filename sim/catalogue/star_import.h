@@ -1,5 +1,5 @@
-/* Tycho-2 (Hog et al. 2000, A&A 355, L27; byte format in the catalogue's ReadMe, CDS I/259) into
- * this project's star catalogue file. */
+/* Imports Tycho-2 (Hog et al. 2000, A&A 355, L27; byte format in the catalogue's ReadMe, CDS I/259)
+ * into a star catalogue file. */
 #ifndef BST_CATALOGUE_STAR_IMPORT_H
 #define BST_CATALOGUE_STAR_IMPORT_H
 
@@ -9,13 +9,14 @@
 #include "sim/catalogue/star_index.h"
 
 #define BST_STAR_TYCHO2_COUNT 2557501LL /* main table and supplement 1 */
-#define BST_STAR_TYCHO2_COMPLETE_V 11.0 /* 98 % of all stars are in the catalogue */
+/* magnitude to which the catalogue has 98 % of all stars */
+#define BST_STAR_TYCHO2_COMPLETE_V 11.0
 #define BST_STAR_TYCHO2_SOURCE "Tycho-2"
 
-/* Called now and then with what is being done and how far it is; total 0 when unknown. */
+/* Progress callback: current activity and amount done; total 0: unknown. */
 typedef void (*bst_star_progress_fn)(void *user, const char *what, long long done, long long total);
 
-/* Which stars to keep: those to v_limit, and in each patch those to its own limit. */
+/* Stars to keep: those to v_limit, and in each patch those to its own limit. */
 typedef struct bst_star_subset {
     double v_limit; /* INFINITY keeps all */
     int patch_count;
@@ -24,29 +25,30 @@ typedef struct bst_star_subset {
 
 typedef struct bst_star_import_options {
     bst_star_subset subset;
-    long long expected_rows;       /* error unless so many were read; 0: any number */
+    long long expected_rows;       /* an error unless this many rows are read; 0: any number */
     bst_star_progress_fn progress; /* may be NULL */
     void *progress_user;
 } bst_star_import_options;
 
-/* Everything, all 2,557,501 rows demanded, no progress. */
+/* Import options: all stars, all 2,557,501 rows required, no progress callback. */
 bst_star_import_options bst_star_import_all(void);
 
-/* Reads a subset's description: lines "sky V" (once) and "cone RA DEC RADIUS V" (degrees, ICRS),
- * '#' starts a comment. BST_ERR_FORMAT names file and line. */
+/* Reads a subset description: lines "sky V" (once) and "cone RA DEC RADIUS V" (degrees, ICRS); '#'
+ * starts a comment. BST_ERR_FORMAT names file and line. */
 bst_status bst_star_subset_read(bst_ctx *ctx, const char *path,
                                 bst_star_subset *out) BST_MUST_CHECK;
-/* The same from memory; `name` stands for the path in messages. */
+/* Reads a subset description from memory; `name`: file name for messages. */
 bst_status bst_star_subset_read_buffer(bst_ctx *ctx, const char *name, const char *data,
                                        size_t bytes, bst_star_subset *out) BST_MUST_CHECK;
 
-/* Reads one row without its newline. Rows of 206 bytes are of the main table, of 122 bytes of
- * supplement 1. Positions are brought to J2000: the main table's mean positions are there already;
- * a row without one (flag X) gives its observed position as it is; a double star's component whose
- * mean position is the pair's photocentre (flag P) gives its own observed position, moved on by the
- * pair's proper motion; supplement 1 gives J1991.25, moved on where the row has a proper motion.
- * A row with one of BT and VT only (and the supplement's Hp, taken as VT) is given BT-VT = 0.7, a
- * typical star's, and marked as without colour. BST_ERR_FORMAT says which bytes are wrong. */
+/* Parses one row of Tycho-2 without its newline. Rows of 206 bytes are of the main table, of 122
+ * bytes of supplement 1. Positions are brought to J2000: the main table's mean positions are there
+ * already; a row without one (flag X) gives its observed position as it is; a double star's
+ * component whose mean position is the pair's photocentre (flag P) gives its own observed position,
+ * moved on by the pair's proper motion; supplement 1 gives J1991.25, moved on where the row has a
+ * proper motion. A row with one of BT and VT only (and the supplement's Hp, taken as VT) is given
+ * BT-VT = 0.7, a typical star's, and marked as without colour. BST_ERR_FORMAT says which bytes are
+ * wrong. */
 bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes,
                               bst_star_values *out) BST_MUST_CHECK;
 
@@ -55,7 +57,7 @@ bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes,
 bst_status bst_star_import_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_options *options,
                                 const char *out_path, long long *stars_written) BST_MUST_CHECK;
 
-/* The same from Debian's tycho2_2.orig.tar.xz, unpacked through tar and xz. */
+/* Imports rows from Debian's tycho2_2.orig.tar.xz, unpacked by tar and xz. */
 bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
                                    const bst_star_import_options *options, const char *out_path,
                                    long long *stars_written) BST_MUST_CHECK;

@@ -14,7 +14,7 @@ static uint32_t pack_pm(int pm) {
     return (uint32_t)pm << 14;
 }
 
-/* The upper 18 bits as a signed number. */
+/* Unpacks the upper 18 bits as a signed number. */
 static int32_t unpack_pm(uint32_t word) {
     return (int32_t)(word >> 14) - (word >> 31 ? 1 << 18 : 0);
 }
@@ -32,7 +32,7 @@ bst_status bst_star_pack(bst_ctx *ctx, const bst_star_values *v, bst_star_record
     }
     double ra_turn = v->ra_rad / (2.0 * BST_PI);
     ra_turn -= floor(ra_turn);
-    /* Rounding up to a whole turn wraps to 0 through the conversion. */
+    /* rounding up to a whole turn wraps to 0 in the conversion */
     out->ra = (uint32_t)(uint64_t)floor(ra_turn / TURN_PER_UNIT + 0.5);
     out->dec = (int32_t)lround(v->dec_rad / (2.0 * BST_PI) / TURN_PER_UNIT);
     out->tyc_vt = (v->id & 0xFFFFu) | (uint32_t)vt << 16;
@@ -50,7 +50,7 @@ bst_vec3 bst_star_record_direction(const bst_star_record *r, double years) {
     bst_vec3 p = {cos_dec * cos_ra - east * sin_ra - north * sin_dec * cos_ra,
                   cos_dec * sin_ra + east * cos_ra - north * sin_dec * sin_ra,
                   sin_dec + north * cos_dec};
-    /* u and mu are perpendicular, so |u + t mu| needs no sum of squares of p. */
+    /* u and mu are perpendicular: |u + t mu| needs no sum of squares of p */
     return bst_vec3_scale(p, 1.0 / sqrt(1.0 + east * east + north * north));
 }
 

@@ -1,9 +1,9 @@
-/* The star catalogue's file format: what is mapped, what is embedded and what the importer writes.
+/* File format of the star catalogue, for mapped files, the embedded catalogue and the importer.
  *
  * header | patches | cells | records, in the byte order of the machine that wrote it (checked). The
  * sky cells are the 9,537 regions of the Guide Star Catalog that Tycho-2 numbers its stars by
- * (TYC1), so a star's identity names its cell. Each cell carries the cap that holds its stars, and
- * its stars lie brightest first. */
+ * (TYC1), so a star's identity names its cell. Each cell stores the cap that contains its stars,
+ * which are sorted brightest first. */
 #ifndef BST_CATALOGUE_STAR_INDEX_H
 #define BST_CATALOGUE_STAR_INDEX_H
 
@@ -32,7 +32,7 @@ typedef struct bst_star_header {
     char source[40];          /* zero-terminated */
 } bst_star_header;
 
-/* A cap of the sky in which the file goes fainter than elsewhere. */
+/* A cap of the sky in which the catalogue has fainter stars. */
 typedef struct bst_star_patch {
     double ra_deg;
     double dec_deg;
@@ -42,13 +42,13 @@ typedef struct bst_star_patch {
 
 typedef struct bst_star_cell {
     float centre[3];     /* ICRS unit vector */
-    float radius_rad;    /* every star of the cell lies within it, J2000 */
+    float radius_rad;    /* all stars of the cell are within it, J2000 */
     float pm_max_radpyr; /* largest total proper motion in the cell */
     uint32_t first;      /* index of the cell's first record */
     uint32_t count;
 } bst_star_cell;
 
-/* One star in 20 bytes. Magnitudes and proper motions are the catalogue's own digits. */
+/* One star in 20 bytes. Magnitudes and proper motions have the catalogue's digits. */
 typedef struct bst_star_record {
     uint32_t ra;           /* ICRS, J2000, 2^32 to the turn (0.30 mas) */
     int32_t dec;           /* the same unit */
@@ -78,7 +78,7 @@ typedef struct bst_star_values {
     uint32_t id;     /* bst_star_id_make */
 } bst_star_values;
 
-/* Pointers into a catalogue's bytes; lends, owns nothing. */
+/* Pointers into the bytes of a catalogue; owns nothing. */
 typedef struct bst_star_view {
     const bst_star_header *header;
     const bst_star_patch *patches;
@@ -86,33 +86,33 @@ typedef struct bst_star_view {
     const bst_star_record *records;
 } bst_star_view;
 
-/* Packs one star. BST_ERR_RANGE when a value does not fit the record's fields (VT -3 to 62 mag,
- * BT-VT -4 to 12 mag, proper motion up to 13.1 arcsec/yr per axis). */
+/* Packs one star into a record. BST_ERR_RANGE: a value exceeds its field (VT -3 to 62 mag, BT-VT -4
+ * to 12 mag, proper motion up to 13.1 arcsec/yr per axis). */
 bst_status bst_star_pack(bst_ctx *ctx, const bst_star_values *values,
                          bst_star_record *out) BST_MUST_CHECK;
 
-/* V in units of 1e-5 mag, exact: V = VT - 0.090 (BT - VT) (Tycho-2 ReadMe, note 7). */
+/* V magnitude of a record in 1e-5 mag, exact: V = VT - 0.090 (BT - VT) (Tycho-2 ReadMe, note 7). */
 static inline int32_t bst_star_record_v(const bst_star_record *r) {
     return (int32_t)(r->tyc_vt >> 16) * 100 - 100 * BST_STAR_VT_OFFSET -
            9 * ((int32_t)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET);
 }
 
-/* ICRS unit vector at `years` Julian years after J2000: (u + t mu) / |u + t mu|, the motion of a
- * star on a straight line without radial velocity. */
+/* Direction of a star (ICRS unit vector) `years` Julian years after J2000: (u + t mu) / |u + t mu|,
+ * uniform straight motion without radial velocity. */
 bst_vec3 bst_star_record_direction(const bst_star_record *r, double years);
 
-/* Checksum of `bytes` bytes: four interleaved multiply-xor lanes of 64-bit words, folded. Any
- * change within a single 8-byte word changes it. */
+/* Checksum of a catalogue file: four interleaved multiply-xor lanes of 64-bit words. It detects any
+ * change within one 8-byte word. */
 uint64_t bst_star_checksum(const void *data, size_t bytes);
 
-/* Checks a catalogue of `bytes` bytes (aligned to 8) and points *out into it. `label` names it in
- * messages. BST_ERR_FORMAT: foreign, of another version or byte order, truncated or damaged; the
- * message says how to make it again. */
+/* Verifies a catalogue of `bytes` bytes (aligned to 8) and points *out into it. `label`: name for
+ * messages. BST_ERR_FORMAT: foreign, other version or byte order, truncated or damaged; the message
+ * states how to recreate it. */
 bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
                               bst_star_view *out) BST_MUST_CHECK;
 
 struct bst_stars;
-/* The catalogue's cells and records; lent. */
+/* Cells and records of a catalogue, borrowed. */
 const bst_star_view *bst_stars_records(const struct bst_stars *stars);
 
 #endif

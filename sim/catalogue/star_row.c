@@ -1,4 +1,5 @@
-/* One row of Tycho-2 into one star. Byte ranges below are 1-based, as in the catalogue's ReadMe. */
+/* Parses one row of Tycho-2 into a star. Byte ranges below are 1-based, as in the catalogue's
+ * ReadMe. */
 #include <string.h>
 
 #include "sim/catalogue/star_import.h"
@@ -12,7 +13,7 @@
 typedef struct row_reader {
     bst_ctx *ctx;
     const char *row;
-    bst_status status; /* the first failure sticks */
+    bst_status status; /* the first error is kept */
 } row_reader;
 
 static void bad_bytes(row_reader *r, int first, int last) {
@@ -22,8 +23,8 @@ static void bad_bytes(row_reader *r, int first, int last) {
     }
 }
 
-/* A fixed-point number with `decimals` decimals in bytes first to last, times 10^decimals, exact.
- * Returns false when the field is blank. */
+/* Parses a fixed-point number with `decimals` decimals in bytes first to last, times 10^decimals,
+ * exactly. False: blank field. */
 static bool read_fixed(row_reader *r, int first, int last, int decimals, long long *out) {
     const char *p = r->row + first - 1, *end = r->row + last;
     while (p < end && *p == ' ') {
@@ -82,7 +83,7 @@ static void read_position(row_reader *r, int ra_first, int dec_first, bst_star_v
     out->dec_rad = (double)dec * 1e-8 * BST_DEG_RAD;
 }
 
-/* Both components of the proper motion in bytes 42-48 and 50-56, or none. */
+/* Parses both components of the proper motion in bytes 42-48 and 50-56, or none. */
 static bool read_motion(row_reader *r, bst_star_values *out) {
     long long ra = 0, dec = 0;
     if (!read_fixed(r, 42, 48, 1, &ra) || !read_fixed(r, 50, 56, 1, &dec)) {
@@ -105,7 +106,7 @@ static void read_magnitudes(row_reader *r, int bt_first, int vt_first, bst_star_
     out->vt_mmag = has_vt ? (int)vt : (int)bt - ASSUMED_COLOUR_MMAG;
 }
 
-/* Moves a position and its proper motion along the straight line by `years`. */
+/* Propagates position and proper motion by `years` on a straight line. */
 static void move_epoch(bst_star_values *v, double years) {
     const double unit = 1e-4 * BST_ARCSEC_RAD;
     double sa = sin(v->ra_rad), ca = cos(v->ra_rad);

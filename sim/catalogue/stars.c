@@ -18,8 +18,8 @@
 extern const unsigned char bst_stars_embedded_begin[];
 extern const unsigned char bst_stars_embedded_end[];
 
-/* A point and a distance from it that hold all cells of a group: cells of consecutive numbers are
- * neighbours, so that a query passes by most of the sky a group at a time. */
+/* Cap that contains all cells of a group. Cells with consecutive numbers are neighbours: a query
+ * skips most of the sky group by group. */
 typedef struct cell_group {
     double centre[3], radius, pm_max_radpyr;
 } cell_group;
@@ -29,10 +29,10 @@ enum { GROUP = 32, GROUPS = (BST_STAR_CELLS + GROUP - 1) / GROUP };
 struct bst_stars {
     bst_star_view view;
     cell_group groups[GROUPS];
-    void *mapping; /* NULL when embedded */
+    void *mapping; /* NULL: embedded */
     size_t mapping_bytes;
     char path[512];
-    bool borrowed; /* the mapping is another catalogue's */
+    bool borrowed; /* another catalogue owns the mapping */
     bool altered;
     bst_star_errors_config errors;
     bst_rng_key key;
@@ -43,7 +43,7 @@ static void group_cells(bst_stars *s) {
         cell_group *group = &s->groups[g];
         uint32_t first = g * GROUP, last = first + GROUP;
         uint32_t end = last < BST_STAR_CELLS ? last : BST_STAR_CELLS;
-        *group = (cell_group){.radius = -1.0}; /* no star */
+        *group = (cell_group){.radius = -1.0}; /* no stars */
         int filled = 0;
         for (uint32_t c = first; c < end; c++) {
             const bst_star_cell *cell = &s->view.cells[c];
@@ -69,13 +69,13 @@ static void group_cells(bst_stars *s) {
     }
 }
 
-/* Beyond this many standard deviations nothing is drawn: Box and Muller of 53 bits end at 8.6. */
+/* limit of normal deviates, in sigma: Box-Muller with 53 bits ends at 8.6 */
 #define MOST_SIGMAS 9.0
 
-/* Draws of one star. */
+/* random draws per star */
 enum { DRAW_DROPPED, DRAW_DISPLACED, DRAW_OFFSET };
 
-/* Gives a star the errors of this catalogue; false when it is dropped. */
+/* Applies the errors of an onboard catalogue to a star; false: it is missing. */
 static bool alter(const bst_stars *s, uint32_t id, bst_vec3 *direction) {
     const bst_star_errors_config *e = &s->errors;
     if (bst_rng_uniform(s->key, id, DRAW_DROPPED) < e->dropped_fraction) {
@@ -118,7 +118,7 @@ bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) {
     const char *data = getenv("XDG_DATA_HOME");
     const char *home = getenv("HOME");
     int n;
-    /* The XDG base directory specification: a relative path is to be ignored. */
+    /* XDG base directory specification: relative paths are ignored */
     if (data && data[0] == '/') {
         n = snprintf(buffer, bytes, "%s/boresight/tycho2.stars", data);
     } else if (home && home[0] == '/') {
@@ -145,7 +145,7 @@ static bst_status open_file(bst_ctx *ctx, const char *path, bst_stars *s) {
         return bst_fail_prefix(ctx, status, "star catalogue");
     }
     if (bytes < 8) {
-        /* An empty file cannot be mapped; a zero header gives the message for a foreign one. */
+        /* an empty file cannot be mapped; a zero header causes the message for a foreign file */
         uint64_t none = 0;
         status = bst_star_view_init(ctx, path, &none, sizeof none, &s->view);
     } else {
@@ -178,7 +178,7 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
     bool use_default = strcmp(name, "default") == 0;
     if (use_default) {
         status = bst_stars_default_path(ctx, s->path, sizeof s->path);
-        /* Without a home directory there is no full catalogue either. */
+        /* without a home directory there is no full catalogue */
         if (status != BST_OK || access(s->path, F_OK) != 0) {
             s->path[0] = '\0';
             status = BST_OK;
@@ -261,8 +261,8 @@ double bst_stars_complete_to(const bst_stars *stars, bst_vec3 centre, double rad
     return best;
 }
 
-/* A box in stored right ascension and declination that holds the cone of radius_rad around centre:
- * integer comparisons drop most of a cell's stars before any trigonometry. */
+/* Box in stored right ascension and declination that contains a cone: integer comparisons reject
+ * most stars of a cell before trigonometry. */
 typedef struct radec_box {
     int64_t dec_min, dec_max;
     uint32_t ra_min, ra_width;
@@ -272,11 +272,11 @@ static radec_box box_around(bst_vec3 centre, double radius_rad) {
     const double unit = 4294967296.0 / (2.0 * BST_PI);
     double ra, dec;
     bst_vec3_to_radec(centre, &ra, &dec);
-    radius_rad += 1e-8; /* rounding of the stored positions and of what follows */
+    radius_rad += 1e-8; /* rounding of the stored positions and of the following steps */
     radec_box box = {(int64_t)floor((dec - radius_rad) * unit),
                      (int64_t)ceil((dec + radius_rad) * unit), 0, UINT32_MAX};
     if (fabs(dec) + radius_rad < BST_PI / 2.0 - 1e-6) {
-        /* The cone's largest difference in right ascension: sin(dra) = sin(r) / cos(dec). */
+        /* half width of the cone in right ascension: sin(dra) = sin(r) / cos(dec) */
         double half = asin(fmin(1.0, sin(radius_rad) / cos(dec))) * unit + 2.0;
         if (half < 2147483647.0) {
             box.ra_min = (uint32_t)(int64_t)floor(ra * unit - half);
@@ -286,10 +286,10 @@ static radec_box box_around(bst_vec3 centre, double radius_rad) {
     return box;
 }
 
-/* Tycho-2's V less the published one, at most. */
+/* largest difference of Tycho-2's V and the published one, mag */
 #define MOST_WRONG_MAG 0.5
 
-/* Whether the star has its magnitudes from the table of bright stars. */
+/* Unpacks a star. True: its magnitudes are from the table of bright stars. */
 static bool unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, bst_star *out) {
     int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
     out->icrs = direction;
@@ -297,13 +297,13 @@ static bool unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, 
     /* B-V = 0.850 (BT-VT): Tycho-2 ReadMe, note 7. */
     out->b_minus_v = r->pm_dec_flags & BST_STAR_NO_COLOUR ? NAN : (float)(0.850 * colour / 1000.0);
     out->id = tyc1 << 16 | (r->tyc_vt & 0xFFFFu);
-    /* a file may have been imported before there was a table */
+    /* a file may have been imported without the table */
     return (double)out->v_mag < BST_BRIGHT_STARS_V &&
            bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
 }
 
-/* Moves the last of count stars to its place among them, brightest first; Tycho-2's order is that
- * but for stars of the table. */
+/* Moves the last of count stars to its position by brightness; only stars of the table are out of
+ * order. */
 static void put_in_order(bst_star *stars, int count) {
     for (int k = count - 1; k > 0 && stars[k - 1].v_mag > stars[k].v_mag; k--) {
         bst_star swap = stars[k];
@@ -312,7 +312,8 @@ static void put_in_order(bst_star *stars, int count) {
     }
 }
 
-/* Whether a star of the group may lie within radius_rad of a unit vector after so many years. */
+/* Checks whether a star of the group can be within radius_rad of a direction after that many
+ * years. */
 static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_rad, double years) {
     double reach = radius_rad + group->radius + group->pm_max_radpyr * years;
     bst_vec3 d = {centre.x - group->centre[0], centre.y - group->centre[1],
@@ -333,9 +334,9 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
     }
     double years = julian_year - BST_STAR_EPOCH_YEAR;
     double chord = 2.0 * sin(radius_rad / 2.0);
-    /* Rounding must not lose the antipode. */
+    /* rounding must not exclude the antipode */
     double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
-    /* what is displaced may come from outside */
+    /* displaced stars may come from outside */
     double slack = stars->altered && stars->errors.displaced_fraction > 0.0
                        ? MOST_SIGMAS * stars->errors.displaced_sigma_arcsec * BST_ARCSEC_RAD
                        : 0.0;
@@ -351,7 +352,7 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
         double reach = radius_rad + cell->radius_rad + drift + slack;
         bst_vec3 d = {centre.x - cell->centre[0], centre.y - cell->centre[1],
                       centre.z - cell->centre[2]};
-        /* A chord is shorter than its angle: no cell is missed. */
+        /* a chord is shorter than its angle: no cell is missed */
         if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
             continue;
         }
@@ -363,7 +364,7 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
             double v_mag = bst_star_record_v(r) / 1e5;
             if (v_mag > v_limit &&
                 (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG)) {
-                break; /* brightest first */
+                break; /* sorted brightest first */
             }
             if (r->dec < box.dec_min || r->dec > box.dec_max || r->ra - box.ra_min > box.ra_width) {
                 continue;

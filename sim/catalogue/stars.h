@@ -1,4 +1,4 @@
-/* The star catalogue: one memory-mapped, sky-indexed file, or the stars embedded in the program. */
+/* The star catalogue: a memory-mapped file with a sky index, or the embedded stars. */
 #ifndef BST_CATALOGUE_STARS_H
 #define BST_CATALOGUE_STARS_H
 
@@ -9,11 +9,11 @@
 #include "boresight/status.h"
 #include "boresight/vec.h"
 
-/* A star as a query returns it. */
+/* A star in the result of a query. */
 typedef struct bst_star {
-    bst_vec3 icrs; /* unit vector, ICRS, barycentric, proper motion applied to the query's epoch */
-    float v_mag;   /* Johnson V */
-    float b_minus_v; /* Johnson B-V; NAN where the catalogue has one colour only */
+    bst_vec3 icrs;   /* unit vector, ICRS, barycentric, at the query's epoch */
+    float v_mag;     /* Johnson V */
+    float b_minus_v; /* Johnson B-V; NAN: unknown */
     uint32_t id;     /* Tycho-2 identity, see bst_star_id_make */
 } bst_star;
 
@@ -35,39 +35,37 @@ typedef struct bst_stars_info {
     char source[64];          /* "Tycho-2" or "embedded default" */
     char path[512];           /* "" when embedded */
     long long count;          /* stars */
-    double complete_to_v_mag; /* whole sky */
-    int patches;              /* caps of the sky in which it goes fainter, see bst_stars_patch */
+    double complete_to_v_mag; /* of the whole sky */
+    int patches;              /* caps with fainter stars, see bst_stars_patch */
     bool embedded;
 } bst_stars_info;
 
-/* Opens a catalogue: "embedded", "default" (the user's full catalogue when it is there, else the
- * embedded one, which is logged as a warning that says how to fetch the full one), or a path. The
- * file's checksum is verified. *out is the caller's, to be closed with bst_stars_close.
- * BST_ERR_NOT_FOUND: no such file; BST_ERR_FORMAT: not a catalogue, truncated or damaged. */
+/* Opens a catalogue: "embedded"; "default" (the user's full catalogue, else the embedded one with a
+ * warning); or a path. The file's checksum is verified. Close *out with bst_stars_close.
+ * BST_ERR_NOT_FOUND: no such file; BST_ERR_FORMAT: no catalogue, truncated or damaged. */
 bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) BST_MUST_CHECK;
 
-/* Another handle on an open catalogue, which is to be closed after it. */
+/* Creates another handle of an open catalogue, which must be closed last. */
 bst_status bst_stars_share(bst_ctx *ctx, const bst_stars *stars, bst_stars **out) BST_MUST_CHECK;
 
 /* Closes a catalogue; NULL is allowed. */
 void bst_stars_close(bst_stars *stars);
 
-/* What a catalogue is and how far it goes. */
+/* Description of a catalogue: source, number of stars, completeness. */
 void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out);
 
-/* Cap number `index` (0 to info.patches - 1): its centre (unit, ICRS), radius in rad, and the V to
- * which all of the source's stars in it are there. */
+/* Patch number `index` (0 to info.patches - 1): centre (unit, ICRS), radius (rad), and V to which
+ * it is complete. */
 void bst_stars_patch(const bst_stars *stars, int index, bst_vec3 *centre, double *radius_rad,
                      double *v_mag);
 
-/* The V to which the catalogue is complete all over the cone of radius_rad around `centre` (unit,
- * ICRS): the whole sky's, or that of a single patch that holds the whole cone. A cone that only
- * several patches together cover gets the whole sky's. */
+/* V to which the catalogue is complete in the cone of radius_rad around `centre` (unit, ICRS): the
+ * whole sky's limit, or that of a single patch that contains the cone. */
 double bst_stars_complete_to(const bst_stars *stars, bst_vec3 centre, double radius_rad);
 
-/* The path of the user's full catalogue, whether or not it exists: tycho2.stars in
- * $XDG_DATA_HOME/boresight or ~/.local/share/boresight. BST_ERR_NOT_FOUND when neither variable is
- * set, BST_ERR_ARGUMENT when the buffer is too small. */
+/* Path of the user's full catalogue, existing or not: tycho2.stars in $XDG_DATA_HOME/boresight or
+ * ~/.local/share/boresight. BST_ERR_NOT_FOUND: neither variable is set; BST_ERR_ARGUMENT: buffer
+ * too small. */
 bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) BST_MUST_CHECK;
 
 /* Stars within radius_rad (0 to pi) of `centre` (unit, ICRS) that are not fainter than v_limit,
@@ -86,19 +84,19 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
                            double v_limit, double julian_year, bst_star *out, int capacity,
                            int *count) BST_MUST_CHECK;
 
-/* Looks a star up by identity (the brighter one where two share it); BST_ERR_NOT_FOUND. */
+/* Finds a star by identity (the brighter one if two share it); BST_ERR_NOT_FOUND. */
 bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
                           bst_star *out) BST_MUST_CHECK;
 
-/* Errors of the onboard star catalogue; what happens to a star follows from its identity and the
+/* Errors of the onboard star catalogue; the error of a star follows from its identity and the
  * seed. */
 typedef struct bst_star_errors_config {
     double dropped_fraction, displaced_fraction, displaced_sigma_arcsec;
     uint64_t seed;
 } bst_star_errors_config;
 
-/* The same stars with errors: those of `stars` that are dropped are not found, the displaced ones
- * lie elsewhere. Shares the memory of `stars`, which must outlive *out. */
+/* Creates a catalogue with errors: stars are missing or displaced. It shares the memory of `stars`,
+ * which must outlive *out. */
 bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
                                  const bst_star_errors_config *errors,
                                  bst_stars **out) BST_MUST_CHECK;

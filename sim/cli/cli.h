@@ -1,4 +1,4 @@
-/* What all commands share: exit codes and the log on standard error. */
+/* Common parts of all commands: exit codes and the log on standard error. */
 #ifndef BST_CLI_CLI_H
 #define BST_CLI_CLI_H
 
@@ -8,7 +8,7 @@ enum {
     BST_EXIT_OK = 0,
     BST_EXIT_FAILED = 1,
     BST_EXIT_USAGE = 2,
-    BST_EXIT_RUNS_FAILED = 4, /* a study is complete, but some of its runs failed by themselves */
+    BST_EXIT_RUNS_FAILED = 4, /* a study is complete, but some runs failed */
     BST_EXIT_INTERRUPTED = 130
 };
 

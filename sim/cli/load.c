@@ -13,8 +13,8 @@
 #include "sim/cli/plugins.h"
 #include "sim/link/external.h"
 
-/* Makes a module external: its type changes, and of its other keys those stay that all modules have
- * or that tell how frames are commanded. */
+/* Makes a module external: changes its type; keeps keys that are common to all modules or define
+ * how frames are commanded. */
 static void make_external(cJSON *module) {
     static const char *const kept[] = {"rate_hz",  "offset_s",    "delay_s", "exposure_s",
                                        "period_s", "description", "platform"};
@@ -34,7 +34,7 @@ static void make_external(cJSON *module) {
     cJSON_AddStringToObject(module, "type", "external");
 }
 
-/* `names`: "imgproc,control" of all sensors, or "observer/sensor/imgproc". */
+/* Applies --external: "imgproc,control" of all sensors, or "observer/sensor/imgproc". */
 static bst_status apply_external(bst_ctx *ctx, const char *names, bst_json *json) {
     while (*names) {
         int length = (int)strcspn(names, ","), found = 0;
@@ -152,8 +152,8 @@ static bst_status spare_named(bst_ctx *ctx, const bst_option *table, const cJSON
     return BST_OK;
 }
 
-/* No output is a file that the scenario extends or names; the paths of files that exist are full
- * ones in the resolved scenario. */
+/* Checks that no output is an input file of the scenario; existing files have absolute paths in the
+ * resolved scenario. */
 static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const bst_json *json,
                                const bst_scenario *scenario) {
     if (!table) {

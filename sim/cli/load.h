@@ -1,28 +1,29 @@
-/* Reading a scenario as the command line asks: file, overrides, shortcuts. */
+/* Reads a scenario for a command: file, overrides, shortcuts. */
 #ifndef BST_CLI_LOAD_H
 #define BST_CLI_LOAD_H
 
 #include "sim/cli/options.h"
 #include "sim/engine/scenario/scenario.h"
 
-/* What several commands take. */
+/* Options shared by several commands. */
 typedef struct bst_load_options {
     bst_option_list set;
     const char *seed;
-    double duration_s;       /* < 0: as the scenario says */
-    int64_t run;             /* < 0: as the scenario says */
-    const char *link;        /* address of the link; NULL: as the scenario says */
-    const char *link_keys;   /* file; NULL: as the scenario says */
-    const char *external;    /* modules that become "external", with commas between; NULL: none */
-    const char *pacing;      /* mode; NULL: as the scenario says */
-    const bst_option *table; /* of the command, for its outputs; bst_load_check sets it */
+    double duration_s;     /* < 0: from the scenario */
+    int64_t run;           /* < 0: from the scenario */
+    const char *link;      /* address of the link; NULL: from the scenario */
+    const char *link_keys; /* key file; NULL: from the scenario */
+    const char *external;  /* modules that become "external", comma-separated; NULL: none */
+    const char *pacing;    /* mode; NULL: from the scenario */
+    const bst_option
+        *table; /* option table of the command, for its outputs; set by bst_load_check */
 } bst_load_options;
 
-/* Where the entries below put their values: in a variable, or by a table of constant data, which
- * gives a macro of its own with .offset. */
+/* Target of the option entries below: a variable, or, in a constant table, a macro that sets
+ * .offset. */
 #define BST_OPTION_TARGET(variable) .target = &(variable)
 
-/* The same of those runs that can have modules outside. */
+/* Option entries for commands that support external modules. */
 #define BST_LINK_OPTIONS_AT(PLACE, load)                                                   \
     {.name = "link",                                                                       \
      .kind = BST_OPTION_TEXT,                                                              \
@@ -46,7 +47,7 @@ typedef struct bst_load_options {
     }
 #define BST_LINK_OPTIONS(load) BST_LINK_OPTIONS_AT(BST_OPTION_TARGET, load)
 
-/* Entries of an options table that fill a bst_load_options named `load`. */
+/* Option entries that fill a bst_load_options named `load`. */
 #define BST_LOAD_OPTIONS_AT(PLACE, load)                                                       \
     {.name = "set",                                                                            \
      .kind = BST_OPTION_LIST,                                                                  \
@@ -75,8 +76,8 @@ typedef struct bst_load_options {
 #define BST_LOAD_DEFAULTS \
     { .duration_s = -1.0, .run = -1 }
 
-/* Entries of an options table that choose the OpenCL device: `device_` is a const char *,
- * `threads_` an int64_t. */
+/* Option entries that select the OpenCL device: `device_` is a const char *, `threads_` an
+ * int64_t. */
 #define BST_DEVICE_OPTIONS_AT(PLACE, device_, threads_)                                      \
     {.name = "device",                                                                       \
      .kind = BST_OPTION_TEXT,                                                                \
@@ -90,20 +91,19 @@ typedef struct bst_load_options {
 #define BST_DEVICE_OPTIONS(device_, threads_) \
     BST_DEVICE_OPTIONS_AT(BST_OPTION_TARGET, device_, threads_)
 
-/* Whether the overrides have the form /path=value; BST_ERR_ARGUMENT when one has not: the command
- * was called wrongly. `table`: the command's options, kept in *options: bst_load_scenario looks at
- * its outputs. */
+/* Checks that overrides have the form /path=value; BST_ERR_ARGUMENT. `table`: options of the
+ * command, stored in *options for the output checks of bst_load_scenario. */
 bst_status bst_load_check(bst_ctx *ctx, bst_load_options *options,
                           const bst_option *table) BST_MUST_CHECK;
 
-/* Whether a scenario has the sensor OBSERVER/SENSOR; BST_ERR_NOT_FOUND with the names of those that
- * it has. `name` may be NULL: BST_OK. */
+/* Checks that a scenario has the sensor OBSERVER/SENSOR; BST_ERR_NOT_FOUND lists the sensors.
+ * `name` may be NULL: BST_OK. */
 bst_status bst_load_check_sensor(bst_ctx *ctx, const bst_scenario *scenario,
                                  const char *name) BST_MUST_CHECK;
 
-/* Loads `path`, applies the options, reads the scenario. *json is kept for as long as the scenario;
- * free both. BST_ERR_ARGUMENT also when an output of the command is a file that the scenario is
- * made of or names. */
+/* Loads `path`, applies the options and reads the scenario. *json must live as long as the
+ * scenario; free both. BST_ERR_ARGUMENT also if an output of the command is an input file of the
+ * scenario. */
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
                              bst_json **json, bst_scenario *out) BST_MUST_CHECK;
 

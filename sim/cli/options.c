@@ -38,7 +38,7 @@ static bst_status read_number(bst_ctx *ctx, const bst_option *o, const char *tex
     char *end;
     double value = strtod(text, &end);
     bool is_int = o->kind == BST_OPTION_INT;
-    /* strtod also takes spaces before the number, hexadecimal digits, names */
+    /* strtod also accepts leading spaces, hexadecimal digits and names */
     bool decimal = text[strspn(text, "+-.0123456789eE")] == '\0';
     if (decimal && end != text && !*end && isfinite(value) && !(is_int && value != floor(value)) &&
         value >= o->minimum && value <= o->maximum) {
@@ -103,8 +103,7 @@ static bst_status store(bst_ctx *ctx, const bst_option *o, const char *value) {
     return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s: option of unknown kind", o->name);
 }
 
-/* Reads the option at argv[*i], and its value where it has one, leaving *i at the last word used.
- */
+/* Parses the option at argv[*i] with its value; *i: last word used. */
 static bst_status read_option(bst_ctx *ctx, const bst_option *table, int argc, char **argv, int *i,
                               const bst_option **out) {
     const char *word = argv[*i];
@@ -130,8 +129,8 @@ static bst_status read_option(bst_ctx *ctx, const bst_option *table, int argc, c
     return store(ctx, o, value);
 }
 
-/* An option that names a file or folder without saying whether it is written is refused whatever is
- * given, so that no table can forget it. */
+/* Rejects a table in which a file option does not declare whether it is written: a programming
+ * error that must be found early. */
 static bst_status check_table(bst_ctx *ctx, const bst_option *table) {
     static const char *const names[] = {"FILE", "FOLDER", "RUN", "PATH"};
     for (const bst_option *o = table; o->name; o++) {
@@ -161,7 +160,7 @@ static bool names_option(const char *list, const char *name) {
     return false;
 }
 
-/* "--frames, --coco or --yolo" of "frames|coco|yolo" */
+/* Formats alternatives: "--frames, --coco or --yolo" from "frames|coco|yolo". */
 static void list_needed(const char *needs, char *out, size_t bytes) {
     size_t used = 0;
     for (const char *word = needs; *word && used < bytes;) {
@@ -174,7 +173,7 @@ static void list_needed(const char *needs, char *out, size_t bytes) {
     }
 }
 
-/* What is given against what else is given. */
+/* Checks combinations of options: duplicates and required ones. */
 static bst_status check_together(bst_ctx *ctx, const bst_option *table, const bool *given) {
     for (const bst_option *o = table; o->name; o++) {
         if (o->required && !given[o - table]) {

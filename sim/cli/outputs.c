@@ -13,11 +13,11 @@
 
 enum { PATH_BYTES = 4096 };
 
-/* One output, taken apart. */
+/* An output path, split into folder and name. */
 typedef struct output {
     const bst_option *option;
     const char *path;
-    char folder[PATH_BYTES], name[256]; /* of the folder above; without it */
+    char folder[PATH_BYTES], name[256]; /* parent folder; file name */
     struct stat above, there;
     bool exists;
 } output;
@@ -54,7 +54,7 @@ static bst_status check_characters(bst_ctx *ctx, const output *o) {
     return BST_OK;
 }
 
-/* The folder above and the name; slashes at the end do not count. */
+/* Splits a path into parent folder and name; trailing slashes are ignored. */
 static bst_status split(bst_ctx *ctx, output *o) {
     size_t length = strlen(o->path);
     while (length > 1 && o->path[length - 1] == '/') {
@@ -77,7 +77,7 @@ static bst_status split(bst_ctx *ctx, output *o) {
     return BST_OK;
 }
 
-/* runs/ and studies/ of the working folder, which `run` and `study` make by themselves. */
+/* runs/ and studies/ in the working folder are created by `run` and `study`. */
 static bool is_made_anyway(const output *o) {
     const char *folder = strncmp(o->folder, "./", 2) == 0 ? o->folder + 2 : o->folder;
     return o->option->path == BST_PATH_OUTPUT_FOLDER &&
@@ -149,7 +149,7 @@ static bst_status fail_read(bst_ctx *ctx, const output *o, const char *input, co
                     *why ? ": " : "", why);
 }
 
-/* Files of a run or study that is read, where another name of one of them is given. */
+/* Protects the files of a run or study that the command reads. */
 static bst_status spare_folder(bst_ctx *ctx, const output *o, const char *folder) {
     DIR *dir = opendir(folder);
     bst_status status = BST_OK;
@@ -169,7 +169,7 @@ static bst_status spare_folder(bst_ctx *ctx, const output *o, const char *folder
     return status;
 }
 
-/* Files that a JSON document names by their full paths. */
+/* Protects files that a JSON document names by absolute paths. */
 static bst_status spare_named(bst_ctx *ctx, const output *o, const cJSON *node, const char *by) {
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
         struct stat info;
@@ -190,7 +190,7 @@ static bst_status spare(bst_ctx *ctx, const output *o, const char *input) {
         return BST_OK;
     }
     if (same(&info, &o->there)) {
-        /* a page goes into the folder that it is about */
+        /* a page goes into the folder that it describes */
         return o->option->path == BST_PATH_OUTPUT_INTO && S_ISDIR(info.st_mode)
                    ? BST_OK
                    : fail_read(ctx, o, input, "");
@@ -234,7 +234,7 @@ static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const outp
 
 /* ------------------------------------------------------------------ all outputs */
 
-/* Whether two outputs are the same file, there or not. */
+/* Checks whether two outputs are the same file, existing or not. */
 static bool clash(const output *a, const output *b) {
     if (a->exists && b->exists) {
         return same(&a->there, &b->there) && !S_ISCHR(a->there.st_mode);
@@ -256,7 +256,7 @@ bst_status bst_outputs_check(bst_ctx *ctx, const bst_option *table, const bool *
                              char *const *word) {
     for (int i = 0; table[i].name; i++) {
         output o = {.option = &table[i], .path = value_of(&table[i])};
-        /* "-" is the standard output where a command has that */
+        /* "-" is standard output for commands that support it */
         if (!given[i] || !is_output(&table[i]) || strcmp(o.path, "-") == 0) {
             continue;
         }

@@ -120,7 +120,7 @@ void bst_plugins_free(bst_scenario_registry *registry) {
 static bst_status read_with(bst_ctx *ctx, const bst_json *json, bst_scenario_plugin_policy policy,
                             bst_scenario *out) {
     bst_scenario_registry registry;
-    *out = (bst_scenario){.format = 0}; /* may be freed after a failure */
+    *out = (bst_scenario){.format = 0}; /* the caller may free it after an error */
     BST_TRY(bst_plugins_registry(ctx, &registry));
     registry.policy = policy;
     bst_status status = bst_scenario_read(ctx, json, &registry, out);

@@ -15,7 +15,7 @@ void bst_progress_start(bst_progress *progress, const char *what, const char *un
     progress->newest = progress->started;
 }
 
-/* Seconds between lines in a file, which cannot be overwritten as those of a terminal are. */
+/* seconds between lines in a file, which cannot be overwritten as on a terminal */
 #define PLAIN_PERIOD_S 10.0
 
 void bst_progress_update(bst_progress *progress, int64_t done) {

@@ -21,7 +21,7 @@ static void *run(void *user) {
     return NULL;
 }
 
-/* The size that threads get whose makers state none; glibc takes the process's limit. */
+/* Default stack size of threads; glibc takes it from the process's limit. */
 static void set_default(void) {
     pthread_attr_t attributes;
     if (pthread_attr_init(&attributes) == 0) {

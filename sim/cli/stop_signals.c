@@ -8,7 +8,7 @@ static volatile sig_atomic_t stop_requested;
 static const int stop_signals[] = {SIGINT, SIGTERM, SIGHUP};
 enum { STOP_SIGNALS = sizeof stop_signals / sizeof *stop_signals };
 
-/* The first one asks the run to end; the second one, of whatever kind, ends the process. */
+/* The first signal requests a stop; the second one of any kind ends the process. */
 static void on_signal(int number) {
     (void)number;
     stop_requested = 1;
@@ -21,14 +21,13 @@ void bst_stop_catch_signals(void) {
     stop_requested = 0;
     for (int i = 0; i < STOP_SIGNALS; i++) {
         struct sigaction action = {.sa_handler = on_signal}, before;
-        /* nohup has the program ignore the end of the terminal */
+        /* nohup ignores SIGHUP: keep that */
         if (stop_signals[i] != SIGHUP ||
             (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)) {
             sigaction(stop_signals[i], &action, NULL);
         }
     }
-    /* a limit on the size of files and a reader that went away are errors of a write, not the end
-     * of the process */
+    /* file size limits and closed pipes shall cause write errors, not end the process */
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
 }

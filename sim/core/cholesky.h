@@ -1,13 +1,13 @@
-/* Symmetric positive definite equations of a few unknowns: a matrix a has `stride` numbers a row,
- * of which the lower triangle of order n is used. */
+/* Solves small symmetric positive definite systems. A matrix a has `stride` numbers per row; the
+ * lower triangle of order n is used. */
 #ifndef BST_CORE_CHOLESKY_H
 #define BST_CORE_CHOLESKY_H
 
 #include <math.h>
 #include <stdbool.h>
 
-/* Replaces the triangle by its Cholesky factor; false when a pivot is not above `least_share` (>=
- * 0) of its diagonal element, or is too large for a number. */
+/* Replaces the lower triangle by its Cholesky factor. False: a pivot is not above `least_share` (>=
+ * 0) of its diagonal element, or overflows. */
 static inline bool bst_cholesky_factor(double *a, int stride, int n, double least_share) {
     for (int j = 0; j < n; j++) {
         double *row = a + j * stride, whole = row[j], d = whole;
@@ -29,7 +29,7 @@ static inline bool bst_cholesky_factor(double *a, int stride, int n, double leas
     return true;
 }
 
-/* Replaces b [n] by the solution for the matrix that was factored. */
+/* Solves the factored system; replaces b [n] by the solution. */
 static inline void bst_cholesky_solve(const double *l, int stride, int n, double *b) {
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < i; k++) {

@@ -1,22 +1,22 @@
-/* Orders of numbers, for qsort and bsearch, and the ends of three. */
+/* Comparison functions for qsort and bsearch, minimum and maximum of three numbers. */
 #ifndef BST_CORE_COMPARE_H
 #define BST_CORE_COMPARE_H
 
 #include <math.h>
 
-/* Ascending, of two doubles; NAN is equal to everything. */
+/* Compares two doubles, ascending; NAN equals everything. */
 static inline int bst_compare_doubles(const void *a, const void *b) {
     double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
-/* Ascending, of two ints. */
+/* Compares two ints, ascending. */
 static inline int bst_compare_ints(const void *a, const void *b) {
     int x = *(const int *)a, y = *(const int *)b;
     return (x > y) - (x < y);
 }
 
-/* The least and the greatest of three numbers; one that is NAN does not count. */
+/* Minimum (or maximum) of three numbers, ignoring NAN. */
 static inline double bst_least_of_3(const double v[3]) {
     return fmin(v[0], fmin(v[1], v[2]));
 }

@@ -12,7 +12,7 @@
 #include "boresight/stage.h"
 #include "sim/core/text.h"
 
-/* 2^53, which the text 2^53 + 1 also reads as */
+/* 2^53; the text 2^53 + 1 is read as the same number */
 static const double END_OF_EXACT_INTEGERS = 9007199254740992.0;
 
 typedef struct reader {
@@ -111,7 +111,7 @@ static bst_status read_list(const reader *r, const cJSON *value, const char *pat
     if (!items) {
         return bst_fail(r->ctx, BST_ERR_MEMORY, "%s: %s: out of memory", r->file, path);
     }
-    /* stored at once, so that bst_config_free finds what was read before an error */
+    /* stored at once, so that bst_config_free frees it after an error */
     *out = (bst_config_list){items, 0};
     for (const cJSON *item = value->child; item; item = item->next) {
         char item_path[512];
@@ -270,7 +270,7 @@ static bool is_optional(const bst_config_desc *d) {
     return d->type == BST_CONFIG_RAW || d->type == BST_CONFIG_STAGE;
 }
 
-/* The entry whose plug-in an object may name; NULL: none. */
+/* Finds the table entry for a plug-in; NULL: none. */
 static const bst_config_desc *stage_of(const bst_config_desc *table) {
     for (const bst_config_desc *d = table; d->key; d++) {
         if (d->type == BST_CONFIG_STAGE) {
@@ -280,7 +280,7 @@ static const bst_config_desc *stage_of(const bst_config_desc *table) {
     return NULL;
 }
 
-/* An object that names a plug-in: its other keys are the plug-in's. */
+/* Reads an object that names a plug-in: its other keys belong to the plug-in. */
 static bst_status read_stage(const reader *r, const cJSON *node, const char *path,
                              const bst_config_desc *d, bst_stage_use *use) {
     char where[512];
@@ -328,7 +328,7 @@ static bst_status read_object(const reader *r, const cJSON *node, const char *pa
     if (stage && node && cJSON_GetObjectItemCaseSensitive(node, stage->key)) {
         BST_TRY(read_stage(r, node, path, stage,
                            (bst_stage_use *)(void *)((char *)object + stage->offset)));
-        node = NULL; /* the others keep their defaults */
+        node = NULL; /* the other members keep their defaults */
     }
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
         if (!find(table, item->string) && strcmp(item->string, "$schema") != 0 &&

@@ -1,4 +1,4 @@
-/* Messages about a value of a configuration. */
+/* Error messages about configuration values. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,7 @@
 #include "sim/core/json_internal.h"
 #include "sim/core/text.h"
 
-/* The offending value as text, shortened. */
+/* Formats the wrong value for a message, shortened. */
 static void value_text(const cJSON *value, char *buffer, size_t bytes) {
     if (cJSON_IsNumber(value)) {
         bst_text_of_number(value->valuedouble, buffer, bytes);
@@ -19,7 +19,7 @@ static void value_text(const cJSON *value, char *buffer, size_t bytes) {
     if (text && strlen(text) >= bytes && bytes > 4) {
         size_t end = bytes - 4;
         while (end > 0 && ((unsigned char)buffer[end] & 0xC0) == 0x80) {
-            end--; /* not in the middle of a UTF-8 character */
+            end--; /* do not cut a UTF-8 character */
         }
         memcpy(buffer + end, "...", 4);
     }

@@ -4,10 +4,10 @@
 
 #include "boresight/stage.h"
 
-/* The largest magnitude that is shown as a bound; wider ranges mean "any finite number". */
+/* largest magnitude shown as a limit; wider ranges mean "any finite number" */
 static const double OPEN_BOUND = 1e300;
 
-/* Text or a number: the pattern is of text, the bounds of numbers. */
+/* Adds the schema of a seed: a text with a pattern, or a number with limits. */
 static void add_seed(cJSON *node) {
     cJSON *types = cJSON_AddArrayToObject(node, "type");
     cJSON_AddItemToArray(types, cJSON_CreateString("string"));
@@ -26,7 +26,7 @@ static void add_range(cJSON *node, const bst_config_desc *d) {
     }
 }
 
-/* The words of a choice as an "enum" of the node. */
+/* Adds the choices as an "enum". */
 static void add_choices(cJSON *node, const bst_config_desc *d) {
     cJSON *choices = cJSON_AddArrayToObject(node, "enum");
     for (int i = 0; d->choices[i]; i++) {
@@ -34,7 +34,7 @@ static void add_choices(cJSON *node, const bst_config_desc *d) {
     }
 }
 
-/* The documentation with the unit in brackets. */
+/* Adds the documentation with the unit in brackets. */
 static void add_description(cJSON *node, const bst_config_desc *d) {
     char text[600];
     const char *unit = d->unit && *d->unit ? d->unit : NULL;
@@ -118,7 +118,7 @@ static cJSON *value_schema(const bst_config_desc *d) {
     return node;
 }
 
-/* An object whose keys are those of `own`, or a plug-in's where it names one. */
+/* Schema of an object with its own keys, or with those of a plug-in if it names one. */
 static cJSON *either(cJSON *own, const bst_config_desc *stage) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "type", "object");

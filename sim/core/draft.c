@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Names are tried this often; a second try is needed once in 1e18 / files beside it. */
+/* number of attempts; a second one is needed once in 1e18 / number of files */
 enum { MOST_TRIES = 16 };
 
 static int make(const char *name) {
@@ -21,7 +21,7 @@ bst_status bst_draft_make(bst_ctx *ctx, const char *path, char *name, size_t byt
     struct stat info;
     *fd = -1;
     if (stat(path, &info) == 0 && !S_ISREG(info.st_mode)) {
-        /* a rename would put a file in the place of a device or a pipe */
+        /* a rename would replace a device or pipe by a file */
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: is not a regular file; give another path",
                         path);
     }

@@ -20,7 +20,7 @@ bst_status bst_file_open(bst_ctx *ctx, const char *path, uint64_t max_bytes, con
                          int *fd, uint64_t *bytes) {
     *fd = -1;
     *bytes = 0;
-    /* O_NONBLOCK: to open a pipe that nobody writes to would wait for ever */
+    /* O_NONBLOCK: opening a pipe without writer would block */
     int opened = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (opened < 0) {
         return bst_fail(ctx, errno == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,

@@ -1,5 +1,5 @@
-/* 64-bit FNV-1a: a quick hash for names, checksums and digests that need not withstand anyone's
- * intent (Fowler, Noll and Vo; RFC 9923). */
+/* 64-bit FNV-1a hash for names, checksums and digests; not cryptographic (Fowler, Noll and Vo; RFC
+ * 9923). */
 #ifndef BST_CORE_FNV_H
 #define BST_CORE_FNV_H
 
@@ -8,7 +8,7 @@
 
 #define BST_FNV_START UINT64_C(0xcbf29ce484222325)
 
-/* Goes on with `bytes` more bytes; the first time from BST_FNV_START. */
+/* Continues a hash with `bytes` bytes; start with BST_FNV_START. */
 static inline uint64_t bst_fnv(uint64_t hash, const void *data, size_t bytes) {
     const unsigned char *p = (const unsigned char *)data;
     for (size_t i = 0; i < bytes; i++) {

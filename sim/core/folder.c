@@ -14,14 +14,14 @@ static bst_status make_one(bst_ctx *ctx, const char *path) {
     if (mkdir(path, 0777) == 0) {
         return BST_OK;
     }
-    /* a folder that is there may answer EROFS or EACCES before EEXIST */
+    /* an existing folder may cause EROFS or EACCES instead of EEXIST */
     int reason = errno;
     struct stat info;
     bool there = stat(path, &info) == 0;
     if (there && S_ISDIR(info.st_mode)) {
         return BST_OK;
     }
-    if (reason == EEXIST) { /* a file is in the way, or a link that leads nowhere */
+    if (reason == EEXIST) { /* a file or a dangling link has this name */
         reason = there ? ENOTDIR : errno;
     }
     return bst_fail(ctx, BST_ERR_IO, "%s: cannot make the folder: %s", path, strerror(reason));
@@ -49,9 +49,9 @@ bst_status bst_folder_make(bst_ctx *ctx, const char *path) {
     return make_one(ctx, path);
 }
 
-enum { OVERFLOW_USER = 65534 }; /* the user that Linux shows where a container does not map one */
+enum { OVERFLOW_USER = 65534 }; /* user that Linux shows if a container does not map one */
 
-/* What is wrong with the owner and mode of a folder; NULL: nothing. */
+/* Describes wrong owner or mode of a folder; NULL: none. */
 static const char *fault_of(const struct stat *info, bool above) {
     bool unknown = above && info->st_uid == OVERFLOW_USER;
     if (info->st_uid != geteuid() && info->st_uid != 0 && !unknown) {

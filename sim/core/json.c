@@ -10,7 +10,7 @@
 
 static const uint64_t MAX_BYTES = 64 << 20;
 
-/* Line and column (from 1) of a byte offset. */
+/* Line and column (from 1) of a byte offset in the text. */
 static void locate(const char *text, size_t offset, int *line, int *column) {
     *line = 1;
     *column = 1;
@@ -28,7 +28,7 @@ static int compare_keys(const void *a, const void *b) {
     return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* Finds a key that an object has twice; sorting keeps hostile objects of a million keys cheap. */
+/* Finds duplicate keys of an object; sorting keeps malicious objects with a million keys fast. */
 static bst_status find_duplicate(bst_ctx *ctx, const cJSON *object, const char **key) {
     *key = NULL;
     int count = cJSON_GetArraySize(object);
@@ -62,7 +62,7 @@ static bool has_control_character(const char *text) {
     return false;
 }
 
-/* Duplicate keys, and keys that would break a message, anywhere in the tree. */
+/* Checks the whole tree for duplicate keys and keys with control characters. */
 static bst_status check_tree(bst_ctx *ctx, const char *name, const cJSON *node, const char *path) {
     if (cJSON_IsObject(node)) {
         const char *twice;
@@ -158,7 +158,7 @@ const char *bst_json_name(const bst_json *json) {
     return json->name;
 }
 
-/* The child that one segment of a JSON pointer names; NULL when there is none. */
+/* Child for one segment of a JSON pointer; NULL: none. */
 static cJSON *child_of(cJSON *node, const char *segment) {
     if (cJSON_IsArray(node)) {
         size_t digits = strspn(segment, "0123456789");
@@ -169,7 +169,7 @@ static cJSON *child_of(cJSON *node, const char *segment) {
     return cJSON_GetObjectItemCaseSensitive(node, segment);
 }
 
-/* An element that a pointer names and that is not there. */
+/* Error: an array element of a pointer does not exist. */
 static bst_status no_child(bst_ctx *ctx, const cJSON *node, const char *segment) {
     int count = cJSON_GetArraySize(node);
     if (cJSON_IsArray(node) && count > 0) {
@@ -248,7 +248,7 @@ bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJ
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     BST_TRY(bst_json_check_assignment(ctx, assignment));
     const char *equals = strchr(assignment, '=');
-    /* a value that is no JSON is a bare word, taken as a string */
+    /* a value that is no JSON is a bare word: a string */
     cJSON *value = NULL;
     bst_json *parsed = NULL;
     bst_ctx scratch = {0};

@@ -1,4 +1,4 @@
-/* JSON files that are another one with some values changed. */
+/* JSON files that extend another file and change some of its values. */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,9 +10,9 @@
 
 enum { MAX_FILES = 16 };
 
-/* The files on the way, each extended by the one before. */
+/* Files in the chain of "extends", each extended by the previous one. */
 typedef struct file_chain {
-    char *files[MAX_FILES]; /* full paths */
+    char *files[MAX_FILES]; /* absolute paths */
     int count;
 } file_chain;
 
@@ -37,8 +37,8 @@ bst_status bst_json_copy(bst_ctx *ctx, const bst_json *json, bst_json **out) {
     return BST_OK;
 }
 
-/* Moves the values of `node`, by top-level key or by pointer, into `json`, whose name is that of
- * the file they come from. */
+/* Moves the values of `node`, by top-level key or by pointer, into `json`; `json` gets the name of
+ * their file. */
 static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_json *json) {
     const char *file = json->name;
     while (node->child) {
@@ -63,19 +63,20 @@ static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_js
     return BST_OK;
 }
 
-/* A value that a file gives twice: by its key, and by a pointer of "set". */
+/* Rejects a value that a file sets both by its key and in "set". */
 static bst_status check_once(bst_ctx *ctx, const bst_json *own, const cJSON *set) {
     for (const cJSON *item = set->child; item; item = item->next) {
         if (item->string[0] == '/' &&
             cJSON_GetObjectItemCaseSensitive(own->root, item->string + 1)) {
-            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %.200s: is given beside \"set\" and in it",
-                            own->name, item->string);
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: %.200s: is given relative_path \"set\" and in it", own->name,
+                            item->string);
         }
     }
     return BST_OK;
 }
 
-/* Changes `base` as `own` says. */
+/* Applies the changes of `own` to `base`. */
 static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
     const cJSON *given = cJSON_GetObjectItemCaseSensitive(own->root, "set");
     if (cJSON_IsObject(given)) {
@@ -86,7 +87,7 @@ static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
     }
     char *name = base->name;
     base->name = own->name;
-    own->name = name; /* each is freed with its document */
+    own->name = name; /* each name is freed with its document */
     cJSON_DeleteItemFromObjectCaseSensitive(own->root, "extends");
     cJSON *set = cJSON_DetachItemFromObjectCaseSensitive(own->root, "set");
     bst_status status = BST_OK;
@@ -107,7 +108,7 @@ static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
 static bst_status add_link(bst_ctx *ctx, const char *path, file_chain *chain) {
     char *full = realpath(path, NULL);
     if (!full) {
-        return BST_OK; /* who reads the file says why */
+        return BST_OK; /* the reader of the file reports the error */
     }
     for (int i = 0; i < chain->count; i++) {
         if (strcmp(chain->files[i], full) == 0) {
@@ -124,8 +125,8 @@ static bst_status add_link(bst_ctx *ctx, const char *path, file_chain *chain) {
     return BST_OK;
 }
 
-/* NULL when there is no memory. */
-static char *beside(const char *file, const char *given) {
+/* Path relative to the folder of another file; NULL: out of memory. */
+static char *relative_path(const char *file, const char *given) {
     const char *slash = strrchr(file, '/');
     size_t folder = given[0] == '/' || !slash ? 0 : (size_t)(slash + 1 - file);
     size_t bytes = folder + strlen(given) + 1;
@@ -151,7 +152,7 @@ static bst_status load(bst_ctx *ctx, const char *path, file_chain *chain, bst_js
         status = bst_config_fail(ctx, path, "/extends", extends, "wrong type",
                                  "a string, the file that this one changes");
     } else {
-        char *file = beside(path, extends->valuestring);
+        char *file = relative_path(path, extends->valuestring);
         status =
             file ? load(ctx, file, chain, &base) : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
         free(file);

@@ -1,4 +1,4 @@
-/* The grammar of JSON, RFC 8259, with a message for each way of leaving it. */
+/* Checks the JSON grammar, RFC 8259, with a message for each kind of error. */
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
@@ -12,13 +12,13 @@ enum { LONGEST_NUMBER = 63 }; /* of cJSON */
 typedef struct scanner {
     const char *text;
     size_t bytes, at;
-    char open[BST_JSON_MAX_DEPTH]; /* '{' or '[' of each level that is open */
+    char open[BST_JSON_MAX_DEPTH]; /* '{' or '[' of each open level */
     int depth;
     long values;
     bst_json_fault *fault;
 } scanner;
 
-/* Offset of the first byte that is not UTF-8 (RFC 3629) or is zero, or `bytes` when all is well. */
+/* Offset of the first byte that is zero or not UTF-8 (RFC 3629); `bytes` if there is none. */
 static size_t utf8_error(const char *text, size_t bytes) {
     const unsigned char *p = (const unsigned char *)text;
     size_t i = 0;
@@ -47,7 +47,7 @@ static size_t utf8_error(const char *text, size_t bytes) {
     return bytes;
 }
 
-/* Bytes of the JSON number at text (RFC 8259, section 6), or 0 when it is none. */
+/* Length of the JSON number at text (RFC 8259, section 6); 0: none. */
 static size_t number_length(const char *text, size_t bytes) {
     size_t i = bytes && text[0] == '-' ? 1 : 0;
     size_t start = i;
@@ -80,8 +80,8 @@ static size_t number_length(const char *text, size_t bytes) {
     return i;
 }
 
-/* Bytes of what a person would call the thing at an offset: a word, or one character. */
-static size_t thing_length(const char *text, size_t bytes) {
+/* Length of the token at an offset for messages: a word, or one character. */
+static size_t token_length(const char *text, size_t bytes) {
     size_t n = 0;
     while (n < bytes && n < 24 &&
            (isalnum((unsigned char)text[n]) || (text[n] && strchr("+-._", text[n])))) {
@@ -100,7 +100,7 @@ static bool fail(scanner *s, size_t offset, const char *what) {
     return false;
 }
 
-/* "WHAT (found THING; allowed: ALLOWED)", where THING is what stands at the offset. */
+/* Reports "WHAT (found TOKEN; allowed: ALLOWED)" with the token at the offset. */
 static bool fail_found(scanner *s, size_t offset, const char *what, const char *allowed) {
     const char *at = s->text + offset;
     char found[40] = "the end of the text";
@@ -109,7 +109,7 @@ static bool fail_found(scanner *s, size_t offset, const char *what, const char *
     } else if (offset < s->bytes && *at == '"') {
         snprintf(found, sizeof found, "a string");
     } else if (offset < s->bytes) {
-        snprintf(found, sizeof found, "\"%.*s\"", (int)thing_length(at, s->bytes - offset), at);
+        snprintf(found, sizeof found, "\"%.*s\"", (int)token_length(at, s->bytes - offset), at);
     }
     s->fault->offset = offset;
     snprintf(s->fault->what, sizeof s->fault->what, "%s (found %s; allowed: %s)", what, found,
@@ -117,7 +117,7 @@ static bool fail_found(scanner *s, size_t offset, const char *what, const char *
     return false;
 }
 
-/* The four hexadecimal digits at an offset, or -1. */
+/* Value of four hexadecimal digits at an offset; -1: invalid. */
 static long hex4(const scanner *s, size_t at) {
     long value = 0;
     for (size_t i = at; i < at + 4; i++) {
@@ -130,7 +130,7 @@ static long hex4(const scanner *s, size_t at) {
     return value;
 }
 
-/* An escape; s->at is at its backslash and ends at the last byte of it. */
+/* Scans an escape, from its backslash to its last byte. */
 static bool scan_escape(scanner *s) {
     size_t start = s->at;
     char c = start + 1 < s->bytes ? s->text[start + 1] : '\0';
@@ -160,7 +160,7 @@ static bool scan_escape(scanner *s) {
     return true;
 }
 
-/* A string; s->at is at its first quote and ends after the last. */
+/* Scans a string, from its first quote to after its last. */
 static bool scan_string(scanner *s) {
     size_t start = s->at++;
     for (; s->at < s->bytes; s->at++) {
@@ -183,7 +183,7 @@ static bool scan_string(scanner *s) {
     return fail(s, start, "the string that begins here has no closing \" in its line");
 }
 
-/* A number of so many bytes, which cJSON must be able to take and a double to hold. */
+/* Scans a number of that length; cJSON and a double must be able to hold it. */
 static bool scan_number(scanner *s, size_t length) {
     char number[LONGEST_NUMBER + 1];
     if (length > LONGEST_NUMBER) {
@@ -198,7 +198,7 @@ static bool scan_number(scanner *s, size_t length) {
     return true;
 }
 
-/* A string, number or word; after an opening bracket s->at is behind it. */
+/* Scans a string, number or word, or an opening bracket. */
 static bool scan_value(scanner *s, const char *allowed) {
     char c = s->at < s->bytes ? s->text[s->at] : '\0';
     if (++s->values > BST_JSON_MAX_VALUES) {
@@ -242,7 +242,7 @@ static void skip_blanks(scanner *s) {
 
 #define A_VALUE "a value: {...}, [...], \"...\", a finite number, true, false, null"
 
-/* Everything up to the end of the outermost value. */
+/* Scans the document up to the end of the outermost value. */
 static bool scan_document(scanner *s) {
     enum { VALUE, FIRST_VALUE, KEY, FIRST_KEY, AFTER_VALUE } state = VALUE;
     do {

@@ -1,4 +1,4 @@
-/* What the parts of the JSON reader share. */
+/* Internal functions of the JSON reader: grammar, origins of values. */
 #ifndef BST_CORE_JSON_INTERNAL_H
 #define BST_CORE_JSON_INTERNAL_H
 
@@ -9,11 +9,11 @@
 
 enum {
     BST_JSON_MAX_DEPTH = 64,
-    /* cJSON takes about 80 bytes for each, so that any text stays below 1 GiB */
+    /* cJSON needs about 80 bytes per value: any text needs less than 1 GiB */
     BST_JSON_MAX_VALUES = 8000000,
 };
 
-/* Which file gave the value at a JSON pointer. */
+/* The file that set the value at a JSON pointer. */
 typedef struct bst_json_origin {
     char *pointer, *file;
 } bst_json_origin;
@@ -21,27 +21,27 @@ typedef struct bst_json_origin {
 struct bst_json {
     char *name;
     struct cJSON *root;
-    bst_json_origin *origins; /* of a file that extends another: later ones win; else NULL */
+    bst_json_origin *origins; /* for a file that extends another, later entries win; else NULL */
     int origin_count;
 };
 
-/* Notes that what is at `pointer` comes from `file`. */
+/* Records that the value at `pointer` comes from `file`. */
 bst_status bst_json_note_origin(bst_ctx *ctx, bst_json *json, const char *pointer,
                                 const char *file) BST_MUST_CHECK;
 
-/* Whether the first `length` bytes are a JSON pointer to something below the root, without empty
- * keys: "/", then keys and numbers of elements with one "/" between them. */
+/* True if the first `length` bytes are a JSON pointer below the root without empty keys: "/" before
+ * each key or array index. */
 bool bst_json_is_pointer(const char *text, size_t length);
 
-/* Why and where a text is not the JSON that is read here. */
+/* Reason and position of a JSON error. */
 typedef struct bst_json_fault {
     size_t offset;  /* byte in the text */
     char what[240]; /* "... (found ...; allowed: ...)" */
 } bst_json_fault;
 
-/* Whether a text is one JSON value in UTF-8 (RFC 8259 and 3629), without \u0000, lone surrogates,
- * zero bytes, nesting beyond BST_JSON_MAX_DEPTH and more than BST_JSON_MAX_VALUES values. Takes
- * time in proportion to bytes, and no memory. */
+/* Checks that a text is one JSON value in UTF-8 (RFC 8259 and 3629), without \u0000, lone
+ * surrogates, zero bytes, nesting beyond BST_JSON_MAX_DEPTH and more than BST_JSON_MAX_VALUES
+ * values. Linear time, no allocation. */
 bool bst_json_check(const char *text, size_t bytes, bst_json_fault *fault);
 
 #endif

@@ -1,4 +1,4 @@
-/* Numbers of a report: what is not finite becomes null, as JSON has no other word for it. */
+/* Writes JSON numbers; non-finite ones become null. */
 #ifndef BST_CORE_JSON_NUMBER_H
 #define BST_CORE_JSON_NUMBER_H
 

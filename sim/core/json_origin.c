@@ -1,11 +1,11 @@
-/* Which file each value of a document comes from. */
+/* Origins of a JSON document's values: the file of each. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sim/core/json_internal.h"
 
-/* Whether one of two pointers leads to the other's value or into it. */
+/* Checks whether one of two JSON pointers is equal to the other or its prefix. */
 static bool one_way(const char *a, const char *b) {
     for (; *a && *b; a++, b++) {
         if (*a != *b) {

@@ -1,4 +1,4 @@
-/* Memory that grows. */
+/* Growing memory blocks. */
 #ifndef BST_CORE_MEMORY_H
 #define BST_CORE_MEMORY_H
 
@@ -7,8 +7,8 @@
 
 #include "boresight/status.h"
 
-/* Makes *memory hold at least `bytes`; *room is what it holds. BST_ERR_MEMORY, "PROBLEM for N
- * bytes", leaves both as they are. */
+/* Extends *memory to at least `bytes`; *room: its size. BST_ERR_MEMORY, "PROBLEM for N bytes": both
+ * are unchanged. */
 static inline bst_status bst_memory_grow(bst_ctx *ctx, const char *problem, void **memory,
                                          size_t *room, size_t bytes) {
     if (*room < bytes) {

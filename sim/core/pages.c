@@ -16,7 +16,7 @@ void *bst_pages_alloc(size_t bytes) {
     }
 #ifdef MADV_HUGEPAGE
     if (align == LARGE_PAGE) {
-        /* whole pages only: what follows belongs to others */
+        /* whole pages only: the remainder is shared with other allocations */
         (void)madvise(memory, bytes / LARGE_PAGE * LARGE_PAGE, MADV_HUGEPAGE);
     }
 #endif

@@ -1,11 +1,11 @@
-/* Large arrays on large pages, so that walking through them does not wait for page tables. */
+/* Allocates large arrays on large pages, which need fewer TLB entries. */
 #ifndef BST_CORE_PAGES_H
 #define BST_CORE_PAGES_H
 
 #include <stddef.h>
 
-/* Memory aligned for vectors (64 bytes), its content undefined; NULL when there is none. From 4 MiB
- * on the system is asked for pages of 2 MiB, which it may decline. Freed by free(). */
+/* Allocates memory aligned to 64 bytes, uninitialised; NULL: out of memory. From 4 MiB on it
+ * requests pages of 2 MiB, which the system may decline. Free with free(). */
 void *bst_pages_alloc(size_t bytes);
 
 #endif

@@ -14,14 +14,14 @@ struct bst_parallel {
     pthread_t workers[MOST_THREADS];
     int worker_count;
     bool stop;
-    /* the loop */
+    /* the current loop */
     bst_parallel_fn fn;
     void *user;
     int count, grain, next;
-    int busy; /* parts being worked on */
+    int busy; /* parts in progress */
 };
 
-/* Takes parts until there are none; called and left with the lock held. */
+/* Executes parts of the loop until none is left; called and left with the lock held. */
 static void take_parts(bst_parallel *pool) {
     while (pool->next < pool->count) {
         int begin = pool->next;

@@ -1,4 +1,4 @@
-/* A few threads that share loops. */
+/* Thread pool for parallel loops. */
 #ifndef BST_CORE_PARALLEL_H
 #define BST_CORE_PARALLEL_H
 
@@ -7,28 +7,29 @@
 
 typedef struct bst_parallel bst_parallel;
 
-/* Starts threads - 1 threads (the caller of a loop is the other one); 0: one per processor that
- * this process may run on, 32 at most. They sleep between loops. When fewer can be started the
- * loops run on those there are. */
+/* Creates a pool of `threads` threads, including the caller of a loop; 0: one per available
+ * processor, at most 32. They sleep between loops. If fewer can be started, loops use those. */
 bst_status bst_parallel_create(bst_ctx *ctx, int threads, bst_parallel **out) BST_MUST_CHECK;
-/* NULL allowed; no loop may be running. */
+/* Frees a pool; no loop may be running. NULL is allowed. */
 void bst_parallel_free(bst_parallel *pool);
-/* Threads that a loop runs on, the caller's included. */
+/* Number of threads of a loop, including the caller's. */
 int bst_parallel_threads(const bst_parallel *pool);
 
-/* Part of a loop: indices begin <= i < end. Called from several threads at a time. */
+/* Body of a loop: indices begin <= i < end. Called concurrently. */
 typedef void (*bst_parallel_fn)(void *user, int begin, int end);
 
-/* Calls fn for parts of at most `grain` >= 1 indices that together are 0 <= i < count, each once,
- * and returns when all are done. pool NULL: on the caller's thread alone. A pool runs one loop at a
- * time: callers on several threads take turns by a lock of their own. */
+/* Calls fn for parts of at most `grain` >= 1 indices that cover 0 <= i < count once; returns when
+ * all are complete. pool NULL: on the caller's thread. One loop at a time per pool: callers on
+ * several threads need a lock. */
 void bst_parallel_for(bst_parallel *pool, int count, int grain, bst_parallel_fn fn, void *user);
 
-/* Stack of every thread that is started: frames take up to 192 KiB, an OpenCL compiler more. */
+/* stack size of every thread: frames take up to 192 KiB, an OpenCL compiler more */
 #define BST_THREAD_STACK_BYTES (8 << 20)
 
-/* pthread_create with a stack of BST_THREAD_STACK_BYTES, whatever the limit of the process is.
- * Returned: 0, or the error's number. */
+/* Starts a thread by pthread_create with a stack of BST_THREAD_STACK_BYTES, independent of the
+ * process's limit.
+ *
+ * Returned:  0, or an error number */
 int bst_core_thread_start(pthread_t *thread, void *(*body)(void *user), void *user);
 
 #endif

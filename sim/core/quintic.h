@@ -1,15 +1,15 @@
-/* The quintic through six vectors at even steps, for values between the third and the fourth. */
+/* Quintic interpolation through six vectors at equal steps, between the third and fourth. */
 #ifndef BST_CORE_QUINTIC_H
 #define BST_CORE_QUINTIC_H
 
 #include "boresight/vec.h"
 
 #define BST_QUINTIC_POINTS 6
-#define BST_QUINTIC_BEFORE 2 /* of them before the one that u is counted from */
+#define BST_QUINTIC_BEFORE 2 /* number of points before the origin of u */
 
-/* Turns the vectors, in place, into Newton's divided differences. Returns the length of their fifth
- * difference: within the middle step the quintic misses smooth motion by less than 1/200 of what
- * that changes by from step to step. */
+/* Replaces the vectors by Newton's divided differences. Returns the length of the fifth difference:
+ * within the middle step the interpolation error of smooth motion is below 1/200 of its change per
+ * step. */
 static inline double bst_quintic_make(bst_vec3 d[BST_QUINTIC_POINTS]) {
     double last = 1.0; /* factorial of the order */
     for (int order = 1; order < BST_QUINTIC_POINTS; order++) {
@@ -21,7 +21,7 @@ static inline double bst_quintic_make(bst_vec3 d[BST_QUINTIC_POINTS]) {
     return last * bst_vec3_norm(d[BST_QUINTIC_POINTS - 1]);
 }
 
-/* The value u steps after the third point; u in [0, 1] lies in the middle. */
+/* Value of the quintic u steps after the third point; 0 <= u <= 1. */
 static inline bst_vec3 bst_quintic_at(const bst_vec3 d[BST_QUINTIC_POINTS], double u) {
     bst_vec3 sum = d[BST_QUINTIC_POINTS - 1];
     for (int i = BST_QUINTIC_POINTS - 2; i >= 0; i--) {

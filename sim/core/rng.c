@@ -7,7 +7,7 @@
 #include "boresight/vec.h"
 #include "sim/core/fnv.h"
 
-/* Byte order independent, so that a seed means the same on every machine. */
+/* independent of byte order: a seed is the same on every machine */
 static uint64_t fnv1a_u64(uint64_t hash, uint64_t value) {
     unsigned char bytes[8];
     for (int i = 0; i < 8; i++) {
@@ -38,7 +38,7 @@ bst_rng_key bst_rng_make_key(uint64_t seed, uint64_t run, const char *instance,
     return (bst_rng_key){{(uint32_t)h, (uint32_t)(h >> 32)}};
 }
 
-/* 53 bits of two words as a double in (0, 1). */
+/* Converts 53 bits of two words to a double in (0, 1). */
 static double open_unit(uint32_t high, uint32_t low) {
     uint64_t bits = (((uint64_t)high << 32) | low) >> 11;
     return ((double)bits + 0.5) * 0x1p-53;

@@ -1,4 +1,4 @@
-/* Normal deviates sixteen at a time, in operations that vectors have. */
+/* Normal random deviates in blocks of sixteen, by vector operations. */
 #include <math.h>
 #include <string.h>
 
@@ -8,15 +8,15 @@
 
 enum { COUNT = BST_RNG_BLOCK };
 
-/* Uniform in (0, 1): 53 bits of two words and half a bit. */
+/* Uniform deviate in (0, 1): 53 bits of two words plus half a bit. */
 static inline double unit_of(uint32_t high, uint32_t low) {
     double upper = (double)(int32_t)(high >> 5);
     double lower = (double)(int32_t)((high & 31u) << 21 | low >> 11);
     return (upper * 0x1p26 + lower + 0.5) * 0x1p-53;
 }
 
-/* ln x for 0 < x < 1, to rounding: x = 2^n m, 0.7 < m < 1.42, ln m = 2 artanh((m - 1) / (m + 1)).
- */
+/* ln x for 0 < x < 1, accurate to rounding: x = 2^n m, 0.7 < m < 1.42, ln m = 2 artanh((m - 1) / (m
+ * + 1)). */
 static inline double log_of(double x) {
     int64_t bits;
     memcpy(&bits, &x, sizeof bits);
@@ -32,7 +32,8 @@ static inline double log_of(double x) {
     return n * 0.69314718055994531 + 2.0 * (t + t * q * series);
 }
 
-/* Cosine and sine of 2 pi u, 0 < u < 1, to rounding: of what is left of quarter turns by series. */
+/* Cosine and sine of 2 pi u, 0 < u < 1, accurate to rounding: series after reduction to a quarter
+ * turn. */
 static inline void turn_of(double u, double *cosine, double *sine) {
     int32_t quarters = (int32_t)(4.0 * u + 0.5);
     double x = (4.0 * u - quarters) * (0.5 * BST_PI), q = x * x, s = 1.0, c = 1.0;

@@ -23,7 +23,7 @@ static const uint32_t constants[ROUNDS] = {
     0x748f82ee, 0x78a5636f, 0x84c87814, 0x8cc70208, 0x90befffa, 0xa4506ceb, 0xbef9a3f7, 0xc67178f2,
 };
 
-/* The same of the square roots of the first 8. */
+/* First 32 bits of the fractional parts of the square roots of the first 8 primes. */
 static const uint32_t initial[WORDS] = {
     0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a, 0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19,
 };
@@ -32,7 +32,7 @@ static uint32_t rotate(uint32_t x, int bits) {
     return x >> bits | x << (32 - bits);
 }
 
-/* One block; the steps are those of section 6.2.2. */
+/* Processes one block; the steps are those of section 6.2.2. */
 static void take(uint32_t hash[WORDS], const unsigned char block[BLOCK]) {
     uint32_t w[ROUNDS], v[WORDS];
     for (int i = 0; i < 16; i++) {

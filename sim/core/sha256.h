@@ -1,4 +1,4 @@
-/* SHA-256 of bytes and files, to say which file it was. */
+/* SHA-256 of bytes and files, to identify input files. */
 #ifndef BST_CORE_SHA256_H
 #define BST_CORE_SHA256_H
 
@@ -8,10 +8,10 @@
 
 enum { BST_SHA256_TEXT = 65 }; /* 64 digits and a zero byte */
 
-/* The digest in lower-case hex, as sha256sum prints it (FIPS 180-4, section 6.2). */
+/* SHA-256 digest in lower-case hex, like sha256sum (FIPS 180-4, section 6.2). */
 void bst_sha256_text(const void *bytes, size_t count, char out[BST_SHA256_TEXT]);
 
-/* The same of a file of at most 1 GiB; errors of bst_file_open. */
+/* SHA-256 digest of a file of at most 1 GiB; errors of bst_file_open. */
 bst_status bst_sha256_file(bst_ctx *ctx, const char *path,
                            char out[BST_SHA256_TEXT]) BST_MUST_CHECK;
 

@@ -1,5 +1,5 @@
-/* Vectors of floats as wide as the processor has them: made by the compiler of plain loops in
- * functions marked BST_CLONES, or written.
+/* SIMD vectors of floats, as wide as the processor supports: by the compiler from loops in
+ * functions marked BST_CLONES, or explicit.
  *
  * A file of kernels is compiled once for each width:
  *
@@ -23,12 +23,12 @@
 #define BST_SIMD_X86
 #endif
 
-/* Marks a function of plain loops, compiled for several instruction sets of which the loader picks
- * one; not with sanitizers, which are not ready when it does. */
+/* Marks a function of plain loops that is compiled for several instruction sets; the loader selects
+ * one. Not with sanitizers, which are not initialised at that time. */
 #if defined(BST_SIMD_X86) && defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
 #define BST_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
-/* for comparisons that are kept as numbers, which 512-bit registers are slow at */
+/* for comparisons stored as numbers, which are slow with 512-bit registers */
 #define BST_CLONES_256 __attribute__((target_clones("default", "avx2")))
 /* for 16-bit numbers */
 #define BST_CLONES_16 __attribute__((target_clones("default", "avx2", "arch=skylake-avx512")))
@@ -41,7 +41,7 @@
 #define BST_SIMD_TYPES(width)                                                   \
     typedef float bst_floats_##width __attribute__((vector_size(4 * (width)))); \
     typedef int32_t bst_ints_##width __attribute__((vector_size(4 * (width)))); \
-    /* the same wherever floats lie */                                          \
+    /* independent of alignment */                                              \
     typedef float bst_floats_at_##width                                         \
         __attribute__((vector_size(4 * (width)), aligned(sizeof(float)), may_alias));
 BST_SIMD_TYPES(4)
@@ -51,13 +51,12 @@ BST_SIMD_TYPES(16)
 
 #define BST_LOAD(p) (*(const bst_floats_at *)(p))
 #define BST_STORE(p, v) (*(bst_floats_at *)(p) = (v))
-/* the greater of v and 0 */
+/* max(v, 0) */
 #define BST_ABOVE_0(v) ((bst_floats)((bst_ints)(v) & ((v) > 0.0f)))
 #define BST_SIMD_INLINE static inline __attribute__((always_inline))
 
-/* A vector of kernels to memory that lies on 16 bytes, past the caches: what is written is not read
- * first, as it is when a part of a line is written. bst_simd_stream_end() before other threads
- * read. */
+/* Stores a vector to memory aligned to 16 bytes, bypassing the caches, so that the cache line is
+ * not read first. Call bst_simd_stream_end() before other threads read it. */
 #ifdef BST_SIMD_X86
 #define BST_STREAM(to, v) bst_simd_stream(to, (const char *)&(v), BST_WIDTH)
 BST_SIMD_INLINE void bst_simd_stream(float *to, const char *from, int floats) {
@@ -71,16 +70,16 @@ BST_SIMD_INLINE void bst_simd_stream(float *to, const char *from, int floats) {
 #define BST_STREAM(to, v) BST_STORE(to, v)
 #endif
 
-/* Makes what was streamed visible to other threads. */
+/* Makes streamed stores visible to other threads. */
 static inline void bst_simd_stream_end(void) {
 #ifdef BST_SIMD_X86
     __builtin_ia32_sfence();
 #endif
 }
 
-/* Floats of the widest vectors that the processor has and bst_simd_limit lets be: 4, 8 or 16. */
+/* Width of the vectors in use, in floats: 4, 8 or 16, limited by processor and bst_simd_limit. */
 int bst_simd_floats(void);
-/* For tests that compare the widths: none wider than this from now on. */
+/* For tests that compare widths: limits the vector width from now on. */
 void bst_simd_limit(int floats);
 
 #ifdef BST_SIMD_X86

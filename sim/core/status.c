@@ -11,8 +11,8 @@ void bst_ctx_init(bst_ctx *ctx, bst_log_fn log, void *log_user, bst_log_level le
     ctx->log_level = level;
 }
 
-/* Messages quote what was found: no control character of it may reach a terminal, and no message
- * gets a second line by it. Lines are those of a `format` that has some itself. */
+/* Replaces control characters in messages, which may quote untrusted input: none reaches a terminal
+ * or starts a new line. Newlines of `format` itself are kept. */
 static void hide_controls(char *text, const char *format) {
     bool lines = strchr(format, '\n') != NULL;
     for (; *text; text++) {
@@ -24,7 +24,7 @@ static void hide_controls(char *text, const char *format) {
 
 bst_status bst_fail(bst_ctx *ctx, bst_status status, const char *format, ...) {
     if (ctx) {
-        /* Through a copy, so that a caller may quote the previous message in the new one. */
+        /* formatted into a copy: arguments may quote the previous message */
         char text[BST_MESSAGE_BYTES];
         va_list args;
         va_start(args, format);

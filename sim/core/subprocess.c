@@ -8,7 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* Runs in the child: only calls that are safe between fork and exec. Never returns. */
+/* Executed in the child after fork: only async-signal-safe calls until exec. Never returns. */
 static void run_child(const char *const argv[], const char *directory, int input_fd, int output_fd,
                       const char *error_path, int report_fd) {
     int null_fd = open("/dev/null", O_RDWR);
@@ -32,7 +32,7 @@ static void close_if_open(int fd) {
     }
 }
 
-/* A pipe whose ends close on exec. */
+/* Creates a pipe that closes on exec. */
 static bool make_pipe(int ends[2]) {
     return pipe(ends) == 0 && fcntl(ends[0], F_SETFD, FD_CLOEXEC) == 0 &&
            fcntl(ends[1], F_SETFD, FD_CLOEXEC) == 0;
@@ -43,7 +43,7 @@ static bst_status start(bst_ctx *ctx, const char *const argv[], const char *dire
                         bst_subprocess *out) {
     int input[2] = {-1, -1};
     int output[2] = {-1, -1};
-    int report[2] = {-1, -1}; /* carries errno when exec fails, closes when it succeeds */
+    int report[2] = {-1, -1}; /* carries errno if exec fails; closes if it succeeds */
     *out = (bst_subprocess){.pid = -1};
     if ((want_input && !make_pipe(input)) || (want_output && !make_pipe(output)) ||
         !make_pipe(report)) {

@@ -1,4 +1,4 @@
-/* Child processes with an argument vector: no shell, no quoting. */
+/* Child processes with an argument vector, without shell and quoting. */
 #ifndef BST_CORE_SUBPROCESS_H
 #define BST_CORE_SUBPROCESS_H
 
@@ -10,27 +10,27 @@
 
 typedef struct bst_subprocess {
     pid_t pid;
-    FILE *output; /* the child's standard output when asked for, else NULL */
-    FILE *input;  /* the child's standard input when asked for, else NULL */
+    FILE *output; /* standard output of the child if requested, else NULL */
+    FILE *input;  /* standard input of the child if requested, else NULL */
 } bst_subprocess;
 
-/* Starts argv[0] (searched in PATH) in `directory` (NULL: the current one) with the C locale. With
- * want_output, child->output reads its standard output; otherwise that goes to /dev/null. Standard
- * error goes to the file `error_path`, or nowhere when NULL. Close with bst_subprocess_wait.
- * BST_ERR_NOT_FOUND when the program does not exist. */
+/* Starts argv[0] (found by PATH) in `directory` (NULL: current) with the C locale. want_output:
+ * child->output reads its standard output; else it goes to /dev/null. Standard error goes to the
+ * file `error_path`; NULL: discarded. Close with bst_subprocess_wait. BST_ERR_NOT_FOUND: no such
+ * program. */
 bst_status bst_subprocess_start(bst_ctx *ctx, const char *const argv[], const char *directory,
                                 bool want_output, const char *error_path,
                                 bst_subprocess *out) BST_MUST_CHECK;
 
-/* The same in the current directory with child->input, which writes to the child's standard input;
- * its standard output goes nowhere. Ignore SIGPIPE: the child may end early. */
+/* Starts a child in the current directory with child->input connected to its standard input; its
+ * standard output is discarded. Ignore SIGPIPE: the child may end early. */
 bst_status bst_subprocess_start_fed(bst_ctx *ctx, const char *const argv[], const char *error_path,
                                     bst_subprocess *out) BST_MUST_CHECK;
 
-/* True when the child has ended; *exit_code is then its exit status, or 128 + signal. */
+/* True if the child has ended; *exit_code: its exit status, or 128 + signal. */
 bool bst_subprocess_poll(bst_subprocess *child, int *exit_code);
 
-/* Closes input and output and waits for the end; returns the exit status, or 128 + signal. */
+/* Closes input and output and waits for the child; returns its exit status, or 128 + signal. */
 int bst_subprocess_wait(bst_subprocess *child);
 
 #endif

@@ -34,7 +34,7 @@ bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
     bool lacks_unit =
         length > 1 && strncmp(word, candidate, length) == 0 && candidate[length] == '_';
     size_t distance = lacks_unit ? 1 : bst_text_distance(word, candidate);
-    /* a word that shares no letter with the candidate is no misspelling of it */
+    /* a word without a common letter is no misspelling */
     if (distance > FARTHEST_SUGGESTION || distance >= strlen(candidate) || distance >= *best) {
         return false;
     }

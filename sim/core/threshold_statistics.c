@@ -12,8 +12,7 @@ static double upper_tail(double u) {
     return 0.5 * erfc(u / sqrt(2.0));
 }
 
-/* The integral over the density of X beyond u by the midpoint rule in the exponential variable that
- * the tail suggests. */
+/* Integral over the density of X beyond u, by the midpoint rule in an exponential variable. */
 double bst_threshold_exceeds_too(double u, double v, double rho) {
     if (rho >= 1.0 - 1e-12) {
         return upper_tail(fmax(u, v)) / upper_tail(u);
@@ -29,7 +28,7 @@ double bst_threshold_exceeds_too(double u, double v, double rho) {
     return sum / total;
 }
 
-/* Cumulant generating function with its first two derivatives; its variance is 1. */
+/* Cumulant generating function with two derivatives; variance 1. */
 static void generate(const double *cumulant, double t, double out[3]) {
     double term = t; /* t^(n-1) / (n-1)! */
     out[0] = 0.5 * t * t;
@@ -54,7 +53,7 @@ double bst_threshold_quantile(double u, const bst_threshold_weights *weights,
         scale /= noise->noise_e;
         cumulant[i] = scale * weights->power[i];
     }
-    /* of an even distribution as wide as a step: -B_n / n step^n with Bernoulli's numbers */
+    /* cumulants of uniform quantisation: -B_n / n step^n with Bernoulli numbers */
     double square = step * step;
     cumulant[1] -= square * square / 120.0 * weights->power[1];
     cumulant[3] += square * square * square / 252.0 * weights->power[3];

@@ -47,7 +47,7 @@ bst_vec3 bst_quat_to_rotvec(bst_quat q) {
     double w = sign * q.w;
     double scale;
     if (n2 < 1e-4 * w * w) {
-        /* the arc tangent's series, exact to rounding: most turns are small */
+        /* series of the arc tangent, accurate to rounding for the usual small rotations */
         double inverse = 1.0 / w, t2 = n2 * inverse * inverse;
         scale = 2.0 * inverse *
                 (1.0 - t2 * (1.0 / 3.0 - t2 * (0.2 - t2 * (1.0 / 7.0 - t2 * (1.0 / 9.0)))));

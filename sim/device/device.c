@@ -14,7 +14,7 @@ enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
 
 enum { MAX_BUILT = 64, MAX_PROGRAMS = 64, PROGRAM_SOURCES = 32 };
 
-/* A program that was built. */
+/* A cached OpenCL program. */
 typedef struct kept_program {
     cl_program program;
     const bst_device_kernel_source *sources[PROGRAM_SOURCES];
@@ -23,14 +23,16 @@ typedef struct kept_program {
 } kept_program;
 
 struct bst_device {
-    cl_device_id parent, id; /* equal unless a sub-device was made */
+    cl_device_id parent, id; /* equal unless it is a sub-device */
     cl_context context;
     cl_command_queue queue;
     char description[4 * NAME_BYTES];
     time_t opened;
     bool pocl;
-    pthread_mutex_t lock; /* over what follows: cameras that change build programs in any thread */
-    const bst_device_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
+    pthread_mutex_t
+        lock; /* protects all members below: cameras that change build programs on any thread */
+    const bst_device_kernel_source
+        *built[MAX_BUILT]; /* sources of all programs, without duplicates */
     int built_count;
     kept_program programs[MAX_PROGRAMS];
     int program_count;
@@ -260,10 +262,10 @@ exit:
     return status;
 }
 
-/* PoCL 3.1 reports a command complete before its worker thread has let go of the command's event,
- * and crashes when queue and context are gone by then. An event holds a reference of its queue, so
- * waiting for the references to go is waiting for the workers. Others may hold references for good
- * reasons: the wait is bounded. */
+/* Waits until PoCL's worker threads have released the queue. PoCL 3.1 reports a command complete
+ * before its worker releases the event, and crashes if queue and context are freed by then. An
+ * event holds a reference of its queue: wait until the references are gone. Other references are
+ * possible: the wait is limited. */
 static void wait_for_workers(cl_command_queue queue) {
     const struct timespec pause = {0, 200000};
     cl_uint references = 2;
@@ -272,7 +274,7 @@ static void wait_for_workers(cl_command_queue queue) {
                                   NULL) != CL_SUCCESS) {
             return;
         }
-        nanosleep(&pause, NULL); /* also after the last: the worker is on its way out */
+        nanosleep(&pause, NULL); /* also after the last reference: the worker is just ending */
     }
 }
 
@@ -315,7 +317,7 @@ const char *bst_device_description(const bst_device *device) {
     return device->description;
 }
 
-/* The log's first lines, as much as a message holds. */
+/* Error with the first lines of the build log. */
 static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_program program,
                                 const char *first_name) {
     char cache[NAME_BYTES + 512];
@@ -369,7 +371,7 @@ static cl_program find_program(const bst_device *device,
     return NULL;
 }
 
-/* Keeps a reference of its own, where there is room. */
+/* Caches a program with a reference of its own, if there is room. */
 static void keep_program(bst_device *device, const bst_device_kernel_source *const *sources,
                          int count, const char *options, cl_program program) {
     kept_program *kept = &device->programs[device->program_count];
@@ -384,8 +386,8 @@ static void keep_program(bst_device *device, const bst_device_kernel_source *con
     device->program_count++;
 }
 
-/* Clang tells, on the standard error and several hundred times, of each vector of 512 bits that a
- * processor without registers for it passes to a function; all of a program are compiled alike. */
+/* Clang warns several hundred times about each 512-bit vector argument on processors without such
+ * registers; all functions of a program are compiled alike. */
 static const char no_abi_warnings[] =
     "#ifdef __clang__\n"
     "#pragma clang diagnostic ignored \"-Wpsabi\"\n"
@@ -402,7 +404,7 @@ static bst_status build(bst_ctx *ctx, bst_device *device,
         }
         return BST_OK;
     }
-    /* a #line before each text, so that the log names the file */
+    /* a #line before each source: the build log then names the file */
     const char **texts = calloc((size_t)count * 2 + 1, sizeof *texts);
     char(*lines)[NAME_BYTES] = calloc((size_t)count, sizeof *lines);
     cl_program program = NULL;

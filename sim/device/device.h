@@ -1,4 +1,4 @@
-/* OpenCL: choice of the device, programs from embedded sources, buffers. */
+/* OpenCL device: selection, programs from embedded kernel sources, buffers. */
 #ifndef BST_DEVICE_DEVICE_H
 #define BST_DEVICE_DEVICE_H
 
@@ -9,10 +9,10 @@
 
 typedef struct bst_device bst_device;
 
-/* Opens a device. `selector`: "" for the default (PoCL's CPU device if there is one, else the first
- * device), or a part of a platform's or device's name, case ignored, or "P:D" by index. threads > 0
- * limits a CPU device to that many compute units (sub-device). An unknown selector lists what there
- * is in the message. */
+/* Opens an OpenCL device. `selector`: "": default (PoCL's CPU device, else the first device); part
+ * of a platform's or device's name, ignoring case; or "P:D" by index. threads > 0 limits a CPU
+ * device to that many compute units (sub-device). The error for an unknown selector lists the
+ * devices. */
 bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads,
                            bst_device **out) BST_MUST_CHECK;
 /* Waits for the queue and frees a device with its programs; NULL is allowed. */
@@ -24,33 +24,32 @@ cl_context bst_device_context(const bst_device *device);
 cl_command_queue bst_device_queue(const bst_device *device);
 /* OpenCL identity of a device; it belongs to the device. */
 cl_device_id bst_device_id(const bst_device *device);
-/* "PoCL 3.1: cpu-..., 2 compute units" for the manifest. */
+/* Description of a device for the manifest: "PoCL 3.1: cpu-..., 2 compute units". */
 const char *bst_device_description(const bst_device *device);
 
-/* A buffer for device and host, which share it without a copy, on large pages (sim/core/pages.h),
- * where the device is a CPU. data: its content at first; NULL: none. `what` begins the message of
- * an error. Released with clReleaseMemObject. */
+/* Creates a buffer shared by device and host, without copies and on large pages (sim/core/pages.h)
+ * for a CPU device. data: initial content; NULL: none. `what`: prefix of error messages. Release
+ * with clReleaseMemObject. */
 bst_status bst_device_buffer(bst_ctx *ctx, cl_context context, size_t bytes, const void *data,
                              const char *what, cl_mem *out) BST_MUST_CHECK;
 
-/* A kernel source that was embedded at build time (see cmake/embed.cmake). */
+/* A kernel source embedded at build time (see cmake/embed.cmake). */
 typedef struct bst_device_kernel_source {
     const char *name; /* file name, for messages */
     const char *text;
     unsigned hash_high, hash_low; /* FNV-1a 64 of the text, for the manifest */
 } bst_device_kernel_source;
 
-/* Builds the concatenation of `count` sources with the given options, or takes what was built of
- * them on this device before: programs are kept until it is closed. A build error's message holds
- * the log's first lines with file names. */
+/* Builds the concatenation of `count` kernel sources with options, or returns the cached program;
+ * programs are cached until the device is closed. A build error has the first lines of the log with
+ * file names. */
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_device_kernel_source *const *sources, int count,
                             const char *options, cl_program *out) BST_MUST_CHECK;
 
-/* The kernel sources that were built on this device, in the order of first use; NULL after the
- * last. */
+/* Kernel sources that were built on this device, in order of first use; NULL after the last. */
 const bst_device_kernel_source *bst_device_built(const bst_device *device, int index);
-/* Begins that list anew, for a user of a device that others have used. */
+/* Clears the list of built sources, for a new user of the device. */
 void bst_device_begin_list(bst_device *device);
 
 /* BST_OK for CL_SUCCESS, else BST_ERR_DEVICE with "what: CL_NAME". */

@@ -12,7 +12,7 @@
 #include "sim/core/folder.h"
 #include "sim/device/kernel_cache_check.h"
 
-/* Why a folder cannot be written, or made where it is not there yet; 0 when it can. */
+/* Reason why a folder cannot be written or created (errno); 0: it can. */
 static int folder_error(char *path) {
     struct stat info;
     while (stat(path, &info) != 0) {
@@ -20,7 +20,7 @@ static int folder_error(char *path) {
         if (errno != ENOENT || !slash) {
             return errno;
         }
-        /* the folder above decides */
+        /* the parent folder decides */
         slash[slash == path] = '\0';
     }
     struct statvfs disk;
@@ -33,7 +33,7 @@ static int folder_error(char *path) {
     return statvfs(path, &disk) == 0 && disk.f_bavail == 0 ? ENOSPC : 0;
 }
 
-/* The folder that PoCL chooses. */
+/* Path of PoCL's cache folder, by PoCL's rules. */
 static void cache_path(char path[4096]) {
     const char *given = getenv("POCL_CACHE_DIR"), *cache = getenv("XDG_CACHE_HOME"),
                *home = getenv("HOME");
@@ -48,7 +48,7 @@ static void cache_path(char path[4096]) {
     }
 }
 
-/* Chooses the folder; see bst_kernel_cache_prepare. */
+/* Selects the cache folder; see bst_kernel_cache_prepare. */
 static bst_status choose(bst_ctx *ctx, char path[4096]) {
     bst_ctx quiet = {0};
     bool given = getenv("POCL_CACHE_DIR") != NULL;
@@ -59,7 +59,7 @@ static bst_status choose(bst_ctx *ctx, char path[4096]) {
     }
     struct stat info;
     if (given && stat(path, &info) != 0) {
-        return BST_OK; /* who cannot write it says so: bst_kernel_cache_is_unusable */
+        return BST_OK; /* bst_kernel_cache_is_unusable reports a folder that cannot be written */
     }
     if (given && !S_ISDIR(info.st_mode)) {
         return BST_OK;

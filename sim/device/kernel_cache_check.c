@@ -17,7 +17,7 @@
 enum { PATH_BYTES = 4096, DEEPEST = 8 };
 static const char sums_name[] = "boresight.sums";
 
-/* Called for each file of a program; false ends the walk. */
+/* Callback for each file of a program; false ends the iteration. */
 typedef bool (*visit_file)(void *user, const char *path, const char *below);
 
 static bool is_code(const char *name) {
@@ -25,8 +25,8 @@ static bool is_code(const char *name) {
     return end && (strcmp(end, ".so") == 0 || strcmp(end, ".bc") == 0);
 }
 
-/* Walks the files *.so and *.bc below a folder; `skip`: bytes of a path that come before what is
- * below the program's folder. False when a visit was. */
+/* Visits the files *.so and *.bc below a folder; `skip`: length of the path of the program's
+ * folder. False: a visit returned false. */
 static bool walk(const char *folder, size_t skip, int depth, visit_file visit, void *user) {
     DIR *dir = depth < DEEPEST ? opendir(folder) : NULL;
     bool go_on = true;
@@ -66,7 +66,7 @@ static bool sum_of(const char *path, uint64_t *sum) {
     return got == 0;
 }
 
-/* The headers of an ELF file and all that they point at lie within the file. */
+/* Checks that the headers of an ELF file and everything they refer to are inside the file. */
 static bool is_whole_elf(int fd, const Elf64_Ehdr *head, uint64_t bytes) {
     if (head->e_phentsize != sizeof(Elf64_Phdr) || head->e_phnum == 0 || head->e_phoff > bytes ||
         head->e_phnum * sizeof(Elf64_Phdr) > bytes - head->e_phoff || head->e_shoff > bytes ||
@@ -84,7 +84,7 @@ static bool is_whole_elf(int fd, const Elf64_Ehdr *head, uint64_t bytes) {
     return true;
 }
 
-/* By its structure alone: ELF, or LLVM bitcode (in words of 32 bits, with or without a wrapper). */
+/* Checks the structure of an ELF or LLVM bitcode file (32-bit words, with or without wrapper). */
 static bool is_whole(const char *path, uint64_t bytes) {
     Elf64_Ehdr head = {.e_type = 0};
     int fd = open(path, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
@@ -94,7 +94,7 @@ static bool is_whole(const char *path, uint64_t bytes) {
         good = bytes % 4 == 0 &&
                (memcmp(&head, "BC\xC0\xDE", 4) == 0 || memcmp(&head, "\xDE\xC0\x17\x0B", 4) == 0);
     } else if (got == (ssize_t)sizeof head && memcmp(head.e_ident, ELFMAG, SELFMAG) == 0) {
-        /* objects of 32 bits are not looked into */
+        /* 32-bit objects are not checked */
         good = head.e_ident[EI_CLASS] != ELFCLASS64 || is_whole_elf(fd, &head, bytes);
     }
     if (fd >= 0) {
@@ -105,13 +105,13 @@ static bool is_whole(const char *path, uint64_t bytes) {
 
 /* ------------------------------------------------------------------ one program */
 
-/* The sums of a program, as text; NULL: none. */
+/* Recorded checksums of a program, as text; NULL: none. */
 typedef struct judged {
     const char *sums;
     bool damaged;
 } judged;
 
-/* The line of a file: "SIZE SECONDS NANOSECONDS SUM PATH". */
+/* Line of a file in the checksums: "SIZE SECONDS NANOSECONDS SUM PATH". */
 static const char *line_of(const char *sums, const char *below) {
     size_t length = strlen(below);
     for (const char *line = sums; line && *line; line = strchr(line, '\n')) {
@@ -201,7 +201,7 @@ static void write_sums(const char *program) {
     int fd;
     snprintf(path, sizeof path, "%.3900s/%s", program, sums_name);
     if (bst_draft_make(&quiet, path, draft, sizeof draft, &fd) != BST_OK) {
-        return; /* a cache that cannot be written is checked by structure alone */
+        return; /* if the cache is read-only, only the structure is checked */
     }
     FILE *file = fdopen(fd, "w");
     if (file) {
@@ -217,7 +217,7 @@ static void write_sums(const char *program) {
 /* ------------------------------------------------------------------ all programs */
 
 typedef struct sweep {
-    time_t since; /* noting; 0: repairing */
+    time_t since; /* recording; 0: repairing */
     int removed;
 } sweep;
 
@@ -237,7 +237,7 @@ static void look_at(sweep *s, const char *program) {
     }
 }
 
-/* ROOT/XX/PROGRAM, XX being two letters. */
+/* Visits ROOT/XX/PROGRAM; XX: two letters. */
 static void each_program(const char *folder, int depth, sweep *s) {
     DIR *dir = opendir(folder);
     for (struct dirent *entry; dir && (entry = readdir(dir)) != NULL;) {

@@ -81,8 +81,8 @@ static bst_status add_filters(bst_ctx *ctx, bst_compensator *c,
     return BST_OK;
 }
 
-/* The last stage of pi and pid. Returns the time constant of its anti-windup: 0 at once, INFINITY
- * when it holds nothing that winds up. */
+/* Adds the last stage of types pi and pid. Returns the time constant of its anti-windup: 0:
+ * immediate, INFINITY: no integrator. */
 static double add_pid(bst_compensator *c, const bst_compensator_config *config) {
     double g = config->gain_scale, kp = g * config->proportional, ki = g * config->integral_per_s;
     double kd = config->type == BST_COMPENSATOR_PID ? g * config->derivative_s : 0.0;
@@ -105,14 +105,14 @@ static double add_pid(bst_compensator *c, const bst_compensator_config *config) 
     return kd > 0.0 ? sqrt(kd / ki) : kp / ki;
 }
 
-/* p (root + s), p of the first degree. */
+/* Multiplies a polynomial p of first degree: p (root + s). */
 static void multiply(double p[3], double root) {
     p[2] = p[1];
     p[1] = p[0] + p[1] * root;
     p[0] *= root;
 }
 
-/* The same of lead_lag. */
+/* Adds the last stage of type lead_lag; returns as add_pid. */
 static double add_lead_lag(bst_compensator *c, const bst_compensator_config *config) {
     double num[3] = {config->gain_scale * config->gain, 0.0, 0.0}, den[3] = {1.0, 0.0, 0.0};
     if (config->lead_zero_hz > 0.0) {
@@ -265,7 +265,7 @@ double bst_compensator_step(bst_compensator *c, double error, double feed_forwar
     return delayed(c, given);
 }
 
-/* States in which a constant input x gives y, after y - ramp and before y + ramp. */
+/* States for a constant input x and output y, between y - ramp and y + ramp. */
 static void rest(const bst_dynamics_biquad *q, double state[2], double x, double y, double ramp) {
     state[0] = y - q->b0 * x;
     state[1] = q->b2 * x - q->a2 * (y - ramp);
@@ -288,7 +288,7 @@ void bst_compensator_set(bst_compensator *c, double error, double feed_forward, 
         rest(q, c->state[i], x, y, 0.0);
         x = y;
     }
-    /* with poles at 1 and p = a2 */
+    /* poles at 1 and p = a2 */
     const bst_dynamics_biquad *q = &c->stage[last];
     double ramp = c->integrates ? (q->b0 + q->b1 + q->b2) * x / (1.0 - q->a2) : 0.0;
     rest(q, c->state[last], x, given - c->feed_forward * feed_forward, ramp);

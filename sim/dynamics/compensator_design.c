@@ -1,4 +1,4 @@
-/* Gains of a compensator from a specification of the loop. */
+/* Designs the gains of a compensator from a specification of the control loop. */
 #include <math.h>
 
 #include "boresight/compensator.h"
@@ -7,26 +7,27 @@
 
 static const double two_pi = 2.0 * BST_PI;
 
-#define LEAD_RATIO_MAX 100.0    /* of a lead's pole over its zero: 78.6 deg */
-#define DERIVATIVE_ZERO_MIN 0.1 /* of the crossover: the most that a derivative is asked for */
+#define LEAD_RATIO_MAX 100.0    /* maximum ratio of a lead's pole and zero: 78.6 deg */
+#define DERIVATIVE_ZERO_MIN 0.1 /* minimum zero of a derivative, relative to the crossover */
 #define DERIVATIVE_FILTER_RATIO 10.0
 #define DERIVATIVE_FILTER_RATE 0.2
-#define LOWEST_SHARE 1e-4 /* of the wanted frequency: how far down the best is sought */
-#define PHASE_POINTS 1500 /* about 1 % apart up to half the rate, finer than the lag of a delay */
+#define LOWEST_SHARE 1e-4 /* lowest searched frequency relative to the requested one */
+/* about 1 % apart up to half the rate, finer than the phase of a delay */
+#define PHASE_POINTS 1500
 
 typedef struct design {
     const bst_compensator_config *config;
     double dt_s;
     bst_dynamics_response_fn plant;
     const void *user;
-    bst_compensator filters; /* notches and low-pass with a gain of one */
-    /* phase of the rest of the loop, followed from the lowest frequency up: there it is within
-     * (-270 deg, 90 deg], and a delay takes it past -180 deg without end */
+    bst_compensator filters; /* notches and low-pass with unit gain */
+    /* unwrapped phase of the remaining loop, from the lowest frequency, where it is within (-270
+     * deg, 90 deg]; a delay decreases it without limit */
     double lowest_hz, log_step, phase_rad[PHASE_POINTS];
 } design;
 
-/* What is wanted of the main section at a crossover: phase, magnitude, and the continuous frequency
- * that Tustin's rule, prewarped as configured, makes of it. */
+/* Required phase and magnitude of the main section at a crossover, and the continuous frequency by
+ * Tustin's rule with the configured prewarping. */
 typedef struct need {
     double phase_rad, gain, omega_radps, prewarp_hz;
 } need;
@@ -72,7 +73,7 @@ static double derivative_filter_hz(const design *d, double crossover_hz) {
                : fmin(DERIVATIVE_FILTER_RATIO * crossover_hz, DERIVATIVE_FILTER_RATE / d->dt_s);
 }
 
-/* The greatest phase that the type can give at a crossover. */
+/* Largest phase that the compensator type can have at a crossover. */
 static double greatest_phase(const design *d, double crossover_hz, double omega_radps) {
     double integral = atan(d->config->integral_ratio);
     switch (d->config->type) {
@@ -86,7 +87,7 @@ static double greatest_phase(const design *d, double crossover_hz, double omega_
     }
 }
 
-/* kp + ki / s with this phase (at most 0) and gain. */
+/* Solves kp + ki / s for a phase (at most 0) and gain. */
 static void solve_pi(const need *n, bst_compensator_config *out) {
     double phase = fmax(n->phase_rad, -0.5 * BST_PI);
     out->proportional = fmax(n->gain * cos(phase), 0.0);
@@ -98,7 +99,7 @@ static void solve_pid(const design *d, double crossover_hz, const need *n,
     double w = n->omega_radps, wi = d->config->integral_ratio * w;
     double filter_hz = derivative_filter_hz(d, crossover_hz), wd = two_pi * filter_hz;
     double lead = n->phase_rad + atan(d->config->integral_ratio) + atan(w / wd);
-    if (lead <= atan(w / wd)) { /* more phase than needed: no derivative */
+    if (lead <= atan(w / wd)) { /* phase to spare: no derivative */
         solve_pi(n, out);
         return;
     }
@@ -121,7 +122,7 @@ static void solve_lead_lag(const design *d, const need *n, bst_compensator_confi
     out->gain = n->gain / root / hypot(1.0, r);
 }
 
-/* Whether the type can have this phase margin at this crossover; fills the gains when it can. */
+/* Computes the gains for a phase margin at a crossover; false: the type cannot have it. */
 static bool solve(const design *d, double crossover_hz, double phase_margin_rad,
                   bst_compensator_config *out) {
     *out = *d->config;
@@ -149,7 +150,7 @@ static bool solve(const design *d, double crossover_hz, double phase_margin_rad,
     return true;
 }
 
-/* Where the closed loop falls to -3 dB, Hz; half the rate when it does not. */
+/* Frequency at which the closed loop falls to -3 dB, Hz; half the rate if it does not. */
 static bst_status closed_loop_bandwidth(bst_ctx *ctx, const design *d,
                                         const bst_compensator_config *gains, double *out) {
     bst_compensator c;
@@ -157,7 +158,7 @@ static bst_status closed_loop_bandwidth(bst_ctx *ctx, const design *d,
     plain.bandwidth_hz = plain.crossover_hz = 0.0;
     BST_TRY(bst_compensator_from_gains(ctx, &c, &plain, d->dt_s));
     double nyquist = 0.5 / d->dt_s, hz = gains->crossover_hz, inside = hz;
-    /* from the crossover upwards; with more than 90 deg of phase margin it lies below */
+    /* search upwards from the crossover; with more than 90 deg of phase margin it is below */
     for (int up = 0;; up++) {
         double complex l =
             bst_compensator_response(&c, two_pi * hz) * d->plant(d->user, two_pi * hz);
@@ -192,7 +193,7 @@ static bst_status closed_loop_bandwidth(bst_ctx *ctx, const design *d,
     return BST_OK;
 }
 
-/* The highest crossover up to `hz` that has this phase margin; 0: none. */
+/* Highest crossover up to `hz` with this phase margin; 0: none. */
 static double highest_crossover(const design *d, double hz, double margin_rad) {
     bst_compensator_config unused;
     double low = hz, high = hz;
@@ -234,7 +235,7 @@ static bst_status cannot(bst_ctx *ctx, const design *d, double crossover_hz, dou
                     config->phase_margin_deg, type, best_hz, crossover_hz, best_margin);
 }
 
-/* The crossover whose closed loop has the wanted bandwidth. */
+/* Finds the crossover whose closed loop has the requested bandwidth. */
 static bst_status for_bandwidth(bst_ctx *ctx, const design *d, double margin_rad,
                                 bst_compensator_config *out) {
     double wanted = d->config->bandwidth_hz, nyquist = 0.5 / d->dt_s, reached = 0.0;
@@ -287,7 +288,7 @@ bst_status bst_compensator_design(bst_ctx *ctx, const bst_compensator_config *co
                                       .low_pass_hz = config->low_pass_hz,
                                       .gain_scale = 1.0};
     BST_TRY(bst_compensator_from_gains(ctx, &d.filters, &filters, dt_s));
-    bst_compensator_config as_asked = *config; /* margins are found on top of the design */
+    bst_compensator_config as_asked = *config; /* gain_scale and delay are not part of the design */
     as_asked.gain_scale = 1.0;
     as_asked.delay_s = 0.0;
     d.config = &as_asked;

@@ -1,17 +1,17 @@
-/* What the cascade (compensator.c) and its design (compensator_design.c) share. */
+/* Internal functions of compensators: cascade (compensator.c) and design (compensator_design.c). */
 #ifndef BST_DYNAMICS_COMPENSATOR_INTERNAL_H
 #define BST_DYNAMICS_COMPENSATOR_INTERNAL_H
 
 #include "boresight/compensator.h"
 
-/* Whether a configuration gives gains. */
+/* True if a configuration has gains instead of a specification. */
 bool bst_compensator_has_gains(const bst_compensator_config *config);
 
-/* Whether type, frequencies and delay can be had at this step; BST_ERR_CONFIG. */
+/* Checks type, frequencies and delay for this time step; BST_ERR_CONFIG. */
 bst_status bst_compensator_check(bst_ctx *ctx, const bst_compensator_config *config,
                                  double dt_s) BST_MUST_CHECK;
 
-/* bst_compensator_init of a configuration whose gains are given, or of a plug-in. */
+/* Initialises a compensator with given gains, or of a plug-in. */
 bst_status bst_compensator_from_gains(bst_ctx *ctx, bst_compensator *compensator,
                                       const bst_compensator_config *config,
                                       double dt_s) BST_MUST_CHECK;

@@ -25,7 +25,7 @@ void bst_dynamics_rk4_step(bst_dynamics_rate_fn rate, const void *user, int coun
     }
 }
 
-/* Sine and cosine; the series of small angles are exact to rounding and three times as fast. */
+/* Sine and cosine; for small angles by series, accurate to rounding and three times as fast. */
 static inline void sine_cosine(double h, double *s, double *c) {
     double h2 = h * h;
     if (h2 < 4e-4) {
@@ -37,8 +37,8 @@ static inline void sine_cosine(double h, double *s, double *c) {
     }
 }
 
-/* The motion under one axis's part of the energy: the body turns about axis i, at a constant rate.
- * q holds {x, y, z, w}. */
+/* Motion under one axis's part of the kinetic energy: the body rotates about axis i at a constant
+ * rate. q: {x, y, z, w}. */
 static inline void turn_about(const bst_dynamics_free_body *body, int i, double dt_s, double q[4],
                               double pi[3]) {
     int j = i == 2 ? 0 : i + 1, k = 3 - i - j;
@@ -93,7 +93,7 @@ void bst_dynamics_matrix_exp(int n, const double *a, double *out) {
     assert(n <= BST_LINEAR_MOST);
     double scaled[BST_LINEAR_MOST * BST_LINEAR_MOST], term[BST_LINEAR_MOST * BST_LINEAR_MOST],
         next[BST_LINEAR_MOST * BST_LINEAR_MOST];
-    double norm = 0.0; /* largest sum of a row */
+    double norm = 0.0; /* largest row sum */
     for (int i = 0; i < n; i++) {
         double sum = 0.0;
         for (int j = 0; j < n; j++) {
@@ -128,7 +128,7 @@ void bst_dynamics_matrix_exp(int n, const double *a, double *out) {
     }
 }
 
-/* One Jacobi rotation that clears a[p][q]. */
+/* Jacobi rotation that zeroes a[p][q]. */
 static void rotate(int n, double *a, double *v, int p, int q) {
     double apq = a[p * n + q];
     double theta = 0.5 * (a[q * n + q] - a[p * n + p]) / apq;
@@ -177,7 +177,8 @@ void bst_dynamics_symmetric_eigen(int n, const double *a, double *values, double
             break;
         }
     }
-    for (int k = 0; k < n; k++) { /* the smallest of those that are left comes to place k */
+    for (int k = 0; k < n;
+         k++) { /* selection sort: the smallest remaining value goes to position k */
         int least = k;
         for (int i = k + 1; i < n; i++) {
             least = m[i * n + i] < m[least * n + least] ? i : least;

@@ -17,17 +17,18 @@
 struct bst_simulation {
     bst_world *world;
     bst_device *device;
-    bool lent;                 /* the device is the caller's */
+    bool lent;                 /* the caller owns the device */
     bst_knowledge **knowledge; /* [sensors of all observers] */
     bst_fleet_member *members; /* [knowledge_count] */
     char (*scopes)[160];       /* [knowledge_count] of the members */
     int knowledge_count;
     bst_engine *engine;
     bst_link *link;
-    bst_module_desc only; /* options->only without what holds its inputs back */
+    bst_module_desc only; /* options->only without input delays */
     bst_port only_ports[BST_MAX_DELAYS];
 };
 
+/* Creates the onboard knowledge of each sensor: camera, catalogue, cue. */
 static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
     const bst_observer_config *observers = scenario->observers.items;
     int total = 0;
@@ -51,8 +52,8 @@ static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst
     return BST_OK;
 }
 
-/* The longest exposure of a sensor that the scenario sets: its own, or exposure_s of a module that
- * commands it. */
+/* The longest exposure time that the scenario sets for a sensor: of its exposure block, or
+ * exposure_s of a module that commands it. */
 static double longest_exposure_s(const bst_scenario *scenario, int observer, int sensor) {
     const bst_observer_config *observers = scenario->observers.items;
     const bst_sensor_config *sensors = observers[observer].sensors.items;
@@ -79,7 +80,7 @@ static double longest_exposure_s(const bst_scenario *scenario, int observer, int
                                                (int)sensors[sensor].camera.height_px);
 }
 
-/* When the sensor's line of sight is written. */
+/* Sets the step ticks of the sensor's gimbal, which writes the line of sight. */
 static void los_ticks(const bst_scenario *scenario, bst_instance_spec *spec) {
     for (int m = 0; m < scenario->module_count; m++) {
         const bst_scenario_module_config *module = &scenario->modules[m];
@@ -95,7 +96,7 @@ static void los_ticks(const bst_scenario *scenario, bst_instance_spec *spec) {
     }
 }
 
-/* The part of a spec that does not depend on the module. */
+/* Instance spec of a sensor's modules, without the module itself. */
 static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_simulation *sim,
                                      int observer, int sensor, const char *scope) {
     const bst_observer_config *observers = scenario->observers.items;
@@ -122,7 +123,7 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .run = (uint64_t)scenario->run};
 }
 
-/* The module that options->only names, if this is it, and who writes its inputs. */
+/* Adds the module that options->only names, and the source of its inputs. */
 static bst_status add_only(bst_ctx *ctx, const bst_simulation_options *options, const char *scope,
                            const bst_scenario_module_config *module, bst_instance_spec *spec,
                            bst_simulation *sim) {
@@ -153,8 +154,9 @@ static bst_status add_only(bst_ctx *ctx, const bst_simulation_options *options, 
     return bst_engine_add(ctx, sim->engine, &writer);
 }
 
-/* Adds the modules that link sensors. */
-static bst_status add_links(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
+/* Adds the multi-sensor modules. */
+static bst_status add_multi_sensor(bst_ctx *ctx, const bst_scenario *scenario,
+                                   bst_simulation *sim) {
     for (int m = 0; m < scenario->module_count; m++) {
         const bst_scenario_module_config *module = &scenario->modules[m];
         if (module->observer >= 0) {
@@ -231,10 +233,10 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
             }
         }
     }
-    return options->only ? BST_OK : add_links(ctx, scenario, sim);
+    return options->only ? BST_OK : add_multi_sensor(ctx, scenario, sim);
 }
 
-/* The PSFs that come from files. */
+/* Reads the PSFs of sensors from their files. */
 static bst_status read_psfs(bst_ctx *ctx, const bst_scenario *scenario, bst_world *world) {
     const bst_observer_config *observers = scenario->observers.items;
     for (int o = 0; o < scenario->observers.count; o++) {
@@ -260,7 +262,7 @@ static bst_status read_psfs(bst_ctx *ctx, const bst_scenario *scenario, bst_worl
     return BST_OK;
 }
 
-/* Says which frames will have a WCS that is wrong by more than a star's place is measured to. */
+/* Warns of frames whose fitted WCS has a larger error than a star's centroid. */
 static void warn_of_misfits(bst_ctx *ctx, const bst_scenario *scenario) {
     const double allowed_px = 1e-3;
     const bst_observer_config *observers = scenario->observers.items;
@@ -280,7 +282,7 @@ static void warn_of_misfits(bst_ctx *ctx, const bst_scenario *scenario) {
     }
 }
 
-/* The link, where a module needs it. */
+/* Creates the link to other programs if a module needs it. */
 static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
                             const bst_simulation_options *options, bst_simulation *sim) {
     bool needed = false;
@@ -396,7 +398,8 @@ void bst_simulation_free(bst_simulation *sim) {
     if (!sim) {
         return;
     }
-    bst_link_close(sim->link, 2, "the simulation has ended"); /* frames that it holds come back */
+    bst_link_close(sim->link, 2,
+                   "the simulation has ended"); /* frames held by the peer come back */
     bst_engine_free(sim->engine);
     for (int i = 0; i < sim->knowledge_count; i++) {
         bst_knowledge_free(sim->knowledge[i]);

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-/* P(a, x) by its series, for x < a + 1. */
+/* Incomplete gamma function P(a, x) by its series, for x < a + 1. */
 static double gamma_series(double a, double x) {
     double term = 1.0 / a, sum = term;
     for (double n = a + 1.0; fabs(term) > 1e-17 * sum; n += 1.0) {
@@ -13,7 +13,7 @@ static double gamma_series(double a, double x) {
     return sum * exp(-x + a * log(x) - lgamma(a));
 }
 
-/* 1 - P(a, x) by its continued fraction (Lentz), for x >= a + 1. */
+/* Q(a, x) = 1 - P(a, x) by its continued fraction (Lentz), for x >= a + 1. */
 static double gamma_fraction(double a, double x) {
     double b = x + 1.0 - a, c = 1e300, d = 1.0 / b, h = d;
     for (int i = 1; i < 100000; i++) {

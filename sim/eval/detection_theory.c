@@ -5,18 +5,20 @@
 
 #include "boresight/vec.h"
 
+/* Density of the standard normal distribution. */
 static double density(double x) {
     return exp(-0.5 * x * x) / sqrt(2.0 * BST_PI);
 }
 
 double bst_eval_normal_tail(double x) {
-    /* what rounding x / sqrt 2 loses grows with x in erfc, so it is put back to first order */
+    /* the rounding error of x / sqrt 2 is amplified by x in erfc; a first-order term corrects it */
     const double root_half = 0.70710678118654752440;
     double t = x * root_half;
     if (fabs(t) < 1e-3 || fabs(t) > 30.0) {
         return 0.5 * erfc(t);
     }
-    double square = 0.5 * x * x, lost = fma(0.5 * x, x, -square); /* x^2 / 2 = square + lost */
+    double square = 0.5 * x * x,
+           lost = fma(0.5 * x, x, -square); /* x^2 / 2 = square + lost (rounding error) */
     double own = t * t, own_lost = fma(t, t, -own);
     double off = ((square - own) + (lost - own_lost)) / (2.0 * t);
     return 0.5 * erfc(t) - exp(-own) / sqrt(BST_PI) * off;
@@ -64,7 +66,7 @@ double bst_eval_normal_tail_inverse(double tail) {
     if (tail >= 0.75) {
         return -far_inverse(1.0 - tail);
     }
-    /* erf keeps its relative accuracy about 0, where Q is nearly a half */
+    /* erf keeps its relative accuracy near 0, where Q is nearly 1/2 */
     double want = 0.5 - tail, x = want * sqrt(2.0 * BST_PI);
     for (int i = 0; i < 4; i++) {
         double miss = (want - 0.5 * erf(x * 0.70710678118654752440)) / density(x);
@@ -87,7 +89,7 @@ double bst_eval_matched_filter_pd(double pfa, double snr, double own_light) {
 }
 
 double bst_eval_matched_filter_snr(double pfa, double pd, double own_light) {
-    /* (snr - t)^2 = z^2 (1 + own_light snr), the root on the side of z */
+    /* root of (snr - t)^2 = z^2 (1 + own_light snr) with the sign of z */
     double t = bst_eval_normal_tail_inverse(pfa), z = -bst_eval_normal_tail_inverse(pd);
     double half = 0.5 * own_light * z;
     return t + z * (half + sqrt(half * half + 1.0 + own_light * t));
@@ -104,9 +106,9 @@ bst_eval_interval bst_eval_wilson_interval(int64_t hits, int64_t trials, double 
                                hits >= trials ? 1.0 : middle + half};
 }
 
-/* Regularised incomplete gamma functions P(a, x) and Q(a, x) = 1 - P, each to full relative
- * accuracy where it is the smaller: series and continued fraction (Abramowitz and Stegun 6.5.29,
- * 6.5.31, the latter by Lentz's method). */
+/* Regularised incomplete gamma functions P(a, x) and Q(a, x) = 1 - P. The smaller one has full
+ * relative accuracy: series and continued fraction (Abramowitz and Stegun 6.5.29, 6.5.31, the
+ * latter by Lentz's method). */
 static void gamma_parts(double a, double x, double *lower, double *upper) {
     double front = exp(a * log(x) - x - lgamma(a));
     enum { ROUNDS = 100000 };
@@ -135,8 +137,8 @@ static void gamma_parts(double a, double x, double *lower, double *upper) {
     *lower = 1.0 - *upper;
 }
 
-/* x at which the lower (or upper) part of gamma(a) is p < 1/2: Newton, halving where that would
- * leave the bracket. */
+/* Quantile x of the gamma distribution, lower or upper tail p < 1/2: Newton's method, bisection
+ * outside the bracket. */
 static double gamma_quantile(double a, double p, bool upper_tail) {
     double z = bst_eval_normal_tail_inverse(p) * (upper_tail ? 1.0 : -1.0);
     double wilson_hilferty = 1.0 - 1.0 / (9.0 * a) + z / (3.0 * sqrt(a));

@@ -1,5 +1,5 @@
-/* Statistics of two-component errors in fixed memory: exact RMS, mean and largest, percentiles from
- * a histogram. */
+/* Statistics of two-component pixel errors in constant memory: RMS, mean, maximum, and percentiles
+ * from a histogram. */
 #ifndef BST_EVAL_ERROR_STATISTICS_H
 #define BST_EVAL_ERROR_STATISTICS_H
 
@@ -14,16 +14,16 @@ typedef struct bst_error_statistics {
     double sum_x, sum_y, sum2, largest; /* px, px, px^2, px */
 } bst_error_statistics;
 
-/* Adds an error of components (x, y) px; its size is hypot(x, y). Zero the struct to begin. */
+/* Adds an error with components (x, y) px. Zero the struct first. */
 void bst_error_statistics_add(bst_error_statistics *statistics, double x_px, double y_px);
-/* Root of the mean square of the sizes, px; NAN without errors. */
+/* RMS of the error magnitudes, px; NAN without errors. */
 double bst_error_statistics_rms(const bst_error_statistics *statistics);
 /* Length of the mean vector, px; NAN without errors. */
 double bst_error_statistics_bias(const bst_error_statistics *statistics);
-/* Percentile of the sizes by nearest rank (the smallest size that at least a share q of all does
- * not exceed), px, right to 0.05 %; NAN without errors. Sizes below 1e-5 px are one bin. */
+/* Percentile of the error magnitudes by nearest rank, px, accurate to 0.05 %; NAN without errors.
+ * Magnitudes below 1e-5 px are one bin. */
 double bst_error_statistics_quantile(const bst_error_statistics *statistics, double q);
-/* Largest size, px; NAN without errors. */
+/* Largest error magnitude, px; NAN without errors. */
 double bst_error_statistics_largest(const bst_error_statistics *statistics);
 
 #endif

@@ -20,8 +20,8 @@ static double cost(const solver *s, int row, int column) {
     return pow(d < s->cutoff ? d : s->cutoff, s->order);
 }
 
-/* Shortest augmenting path from one row to a free column (Kuhn 1955, Munkres 1957, in the form with
- * dual variables). Row and column 0 of the arrays stand for none. */
+/* Finds the shortest augmenting path from one row to a free column of the assignment (Kuhn 1955,
+ * Munkres 1957, with dual variables). Row and column 0 mean none. */
 static void augment(solver *s, int row) {
     int column = 0;
     s->row_of[0] = row;

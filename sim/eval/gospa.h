@@ -1,6 +1,6 @@
-/* Generalised optimal sub-pattern assignment metric between a set of true objects and a set of
- * tracks (Rahmathullah, Garcia-Fernandez and Svensson, 20th Int. Conf. on Information Fusion,
- * 2017), alpha = 2: the form that splits into localisation, missed and false. */
+/* GOSPA metric (generalised optimal sub-pattern assignment) between true objects and tracks, alpha
+ * = 2: the form that splits into localisation, missed and false (Rahmathullah, Garcia-Fernandez and
+ * Svensson, 20th Int. Conf. on Information Fusion, 2017). */
 #ifndef BST_EVAL_GOSPA_H
 #define BST_EVAL_GOSPA_H
 
@@ -14,10 +14,10 @@ typedef struct bst_gospa_result {
     int pairs, missed_count, false_count;
 } bst_gospa_result;
 
-/* distance[i * tracks + j] >= 0 is that of object i and track j, in the unit of cutoff > 0; order p
- * is at least 1. A pair is made only when it is nearer than the cutoff. pair_of_truth (`truths`
- * places; may be NULL) receives each object's track or -1. Exact, O(n^2 m) of the smaller and the
- * larger set. Errors: BST_ERR_ARGUMENT, BST_ERR_MEMORY. */
+/* Computes GOSPA of order p >= 1. distance[i * tracks + j] >= 0: between object i and track j, in
+ * the unit of cutoff > 0. Only pairs nearer than the cutoff are assigned. pair_of_truth (`truths`
+ * items; may be NULL): track of each object or -1. Exact, O(n^2 m) of the smaller and the larger
+ * set. Errors: BST_ERR_ARGUMENT, BST_ERR_MEMORY. */
 bst_status bst_gospa(bst_ctx *ctx, const double *distance, int truths, int tracks, double cutoff,
                      double order, int *pair_of_truth, bst_gospa_result *out) BST_MUST_CHECK;
 

@@ -47,17 +47,17 @@ void bst_location_bound_along(const bst_location_bound *bound, double dx, double
     out[1] = s * s * xx - 2.0 * c * s * xy + c * c * yy;
 }
 
-/* A Gaussian's image on a rectangle of pixels. */
+/* Gaussian image and its derivatives on a rectangle of pixels. */
 typedef struct image {
     int x0, y0, width, height, pixels;
     double *share, *by_x, *by_y;         /* [height][width] */
-    double *row_share, *row_slope;       /* [width], of one node */
+    double *row_share, *row_slope;       /* [width], of one quadrature node */
     double *column_share, *column_slope; /* [height] */
     double *memory;
 } image;
 
-/* Shares of a 1-D Gaussian about `centre` in pixels 0 .. count-1 and their derivatives by the
- * centre, in the pixels within 8.3 sigma: what is beyond is below 1e-16. */
+/* Fractions of a 1-D Gaussian at `centre` in pixels 0 .. count-1, and their derivatives with
+ * respect to the centre. Pixels beyond 8.3 sigma are omitted: below 1e-16. */
 static void profile(double centre, double sigma, int count, double *share, double *slope,
                     int *first, int *last) {
     double reach = 8.3 * sigma;
@@ -76,6 +76,7 @@ static void profile(double centre, double sigma, int count, double *share, doubl
     }
 }
 
+/* Adds a Gaussian at one node of the streak to the image. */
 static void add_node(image *m, double x, double y, double sigma, double weight) {
     int x1, x2, y1, y2;
     profile(x - m->x0, sigma, m->width, m->row_share, m->row_slope, &x1, &x2);
@@ -91,13 +92,14 @@ static void add_node(image *m, double x, double y, double sigma, double weight) 
     }
 }
 
-/* Gauss-Legendre rule of six nodes on [-1/2, 1/2] (Abramowitz and Stegun, table 25.4). */
+/* Six-point Gauss-Legendre rule on [-1/2, 1/2] (Abramowitz and Stegun, table 25.4). */
 static const double gauss_node[3] = {0.5 * 0.238619186083197, 0.5 * 0.661209386466265,
                                      0.5 * 0.932469514203152};
 static const double gauss_weight[3] = {0.5 * 0.467913934572691, 0.5 * 0.360761573048139,
                                        0.5 * 0.171324492379170};
 
-static void draw(image *m, const bst_eval_bound_source *s) {
+/* Integrates the Gaussian along the streak by Gauss-Legendre quadrature. */
+static void integrate_streak(image *m, const bst_eval_bound_source *s) {
     double length = hypot(s->dx_px, s->dy_px) / s->sigma_px;
     if (length == 0.0) {
         add_node(m, s->x_px, s->y_px, s->sigma_px, 1.0);
@@ -107,7 +109,7 @@ static void draw(image *m, const bst_eval_bound_source *s) {
     for (int p = 0; p < parts; p++) {
         for (int k = 0; k < 6; k++) {
             double u = k < 3 ? -gauss_node[2 - k] : gauss_node[k - 3];
-            double at = (p + 0.5 + u) / parts - 0.5; /* of the path, -1/2 to 1/2 */
+            double at = (p + 0.5 + u) / parts - 0.5; /* position on the path, -1/2 to 1/2 */
             add_node(m, s->x_px + at * s->dx_px, s->y_px + at * s->dy_px, s->sigma_px,
                      gauss_weight[k < 3 ? 2 - k : k - 3] / parts);
         }
@@ -149,7 +151,7 @@ bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_eval_bound_source
                                        bst_location_bound *out) {
     image m = {.pixels = 0};
     BST_TRY(open_image(ctx, source, margin_px, &m));
-    draw(&m, source);
+    integrate_streak(&m, source);
     const bst_location_image shares = {m.share, m.by_x, m.by_y, m.pixels};
     bst_status status = bst_location_bound_of(ctx, &shares, source->flux_e, noise, out);
     free(m.memory);
@@ -160,7 +162,7 @@ bst_status bst_eval_gaussian_powers(bst_ctx *ctx, const bst_eval_bound_source *s
                                     double out[2]) {
     image m = {.pixels = 0};
     BST_TRY(open_image(ctx, source, 8.3 * source->sigma_px + 1.0, &m));
-    draw(&m, source);
+    integrate_streak(&m, source);
     out[0] = out[1] = 0.0;
     for (int p = 0; p < m.pixels; p++) {
         double square = m.share[p] * m.share[p];

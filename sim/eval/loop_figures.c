@@ -15,7 +15,7 @@ double bst_eval_pointing_error_px(const bst_camera *camera, double pixel_scale_a
         cs = camera->geometry.cos_rotation;
         sn = camera->geometry.sin_rotation;
     }
-    /* exactly behind there is no position angle: any will do */
+    /* at 180 degrees the position angle is undefined: use any */
     double a = across > 0.0 ? v.x / across : 1.0, b = across > 0.0 ? v.y / across : 0.0;
     *x_px = error_px * (cs * a + sn * b);
     *y_px = error_px * (cs * b - sn * a);

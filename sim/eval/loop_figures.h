@@ -1,32 +1,32 @@
-/* The figures of a sensor's loop: what each means, on one frame and over a run. The summary of a
- * run, its report and studies all take them from here; docs/reference/summary.md
- * says the same in words. */
+/* Figures of merit of a sensor's tracking loop, per frame and per run. Summary, report and studies
+ * use these definitions; docs/reference/summary.md describes them. */
 #ifndef BST_EVAL_LOOP_FIGURES_H
 #define BST_EVAL_LOOP_FIGURES_H
 
 #include "boresight/camera.h"
 #include "sim/eval/error_statistics.h"
 
-/* A track or a detection within this many pixels of the true place is the object's: 2.5 FWHM of the
- * shipped cameras. */
+/* A track or detection within this distance of the true position belongs to the object: 2.5 FWHM of
+ * the shipped cameras, px. */
 #define BST_RIGHT_TARGET_PX 5.0
-/* The loop has settled when the target lies this close to the boresight, in mode track. */
+/* The loop has settled when the target is within this distance of the boresight in mode track,
+ * px. */
 #define BST_SETTLED_PX 3.0
 
-/* One frame. */
+/* Loop figures of one frame. */
 typedef struct bst_loop_frame {
     int64_t exposure_id;
     double time_s; /* middle of the exposure */
-    /* angle from the boresight to the target's true apparent direction, in pixels of the boresight,
-     * and its components along columns and rows; NAN: no target */
+    /* angle from boresight to the target's true apparent direction, px at the boresight, and its
+     * components; NAN: no target */
     double error_px, error_x_px, error_y_px;
-    double target_x_px, target_y_px; /* on the focal plane; NAN: it has no image */
-    double target_snr;               /* true SNR, target in the field; else 0 */
-    bool visible;  /* target not behind the Earth, and some of its light reaches the camera */
-    bool in_track; /* the track of interest is the target's */
-    bool acquired; /* the middle lies at or after the acquisition */
-    bool settled;  /* the exposure began at or after the settling */
-    int mode;      /* bst_mode at the end of the exposure */
+    double target_x_px, target_y_px; /* on the focal plane; NAN: no image */
+    double target_snr;               /* true SNR if the target is in the field; else 0 */
+    bool visible;                    /* target not occulted and illuminated */
+    bool in_track;                   /* the track of interest is of the target */
+    bool acquired;                   /* mid-exposure at or after acquisition */
+    bool settled;                    /* the exposure began at or after settling */
+    int mode;                        /* bst_mode at the end of the exposure */
 } bst_loop_frame;
 
 typedef struct bst_loop_figures {
@@ -34,23 +34,23 @@ typedef struct bst_loop_figures {
     int final_mode;
     double time_to_confirm_s;    /* first confirmed track of the target; NAN: never */
     double time_to_acquire_s;    /* the target's track became the track of interest; NAN: never */
-    double time_to_settle_s;     /* NAN: never */
+    double time_to_settle_s;     /* first settled frame; NAN: never */
     int64_t visible_frames;      /* frames with a visible target */
     int64_t in_track_frames;     /* visible_frames that are in track */
-    int64_t breaks;              /* times that a visible frame out of track follows one in track */
-    bool in_track_at_end;        /* the last frame, visible or not */
+    int64_t breaks;              /* number of visible frames without track after one in track */
+    bool in_track_at_end;        /* in the last frame, visible or not */
     double custody;              /* in_track_frames over visible_frames; NAN: never visible */
-    double track_fraction;       /* the same from the acquisition on; 0: never acquired */
-    int64_t wrong_target_frames; /* the track of interest was another object's: beyond
+    double track_fraction;       /* custody from acquisition on; 0: never acquired */
+    int64_t wrong_target_frames; /* the track of interest was of another object: beyond
                                     BST_RIGHT_TARGET_PX and, where the tracker expects its object to
                                     be hidden, also beyond 99.99 % of its covariance */
-    /* pointing error of the frames of bst_loop_frame_is_pointing; NAN without any */
+    /* pointing error, over frames for which bst_loop_frame_is_pointing is true; NAN without any */
     int64_t pointing_frames;
     double pointing_rms_px, pointing_median_px, pointing_p95_px, pointing_p99_px, pointing_max_px;
     double pointing_bias_px; /* length of the mean error vector */
 } bst_loop_figures;
 
-/* What the figures of a run need of its frames. Zero it to begin. */
+/* Accumulated values of the frames of a run. Zero it first. */
 typedef struct bst_loop_tally {
     int64_t frames, visible, in_track, breaks;
     int64_t visible_acquired, in_track_acquired;
@@ -58,10 +58,10 @@ typedef struct bst_loop_tally {
     bst_error_statistics pointing;
 } bst_loop_tally;
 
-/* Error of pointing on the sphere: the angle between the boresight and a direction, over the pixel
- * scale at the boresight. Its components are the angle times the direction's position angle along
+/* Pointing error on the sphere: angle between the boresight and a direction, in pixels at the
+ * boresight. Its components are the angle times the direction's position angle along
  * columns and rows: an azimuthal equidistant projection, finite over the whole sphere. Near the
- * boresight it equals the difference of places on the focal plane.
+ * boresight it equals the position difference on the focal plane.
  * Given: the camera (rotation); pixel_scale_arcsec of the exposure, <= 0: the camera's; the true
  * attitude; the apparent direction (GCRF axes, any length).
  * Returned: the size, px; its components in *x_px, *y_px. */
@@ -69,23 +69,24 @@ double bst_eval_pointing_error_px(const bst_camera *camera, double pixel_scale_a
                                   bst_quat q_cam_from_gcrf, bst_vec3 apparent, double *x_px,
                                   double *y_px);
 
-/* Whether a track is of the object in the true direction `truth`: its direction, carried on by its
- * rate (rad/s) for `seconds`, lies within BST_RIGHT_TARGET_PX pixels of scale_rad. */
+/* True if a track belongs to the object in the true direction `truth`: the track's direction,
+ * propagated by its rate (rad/s) for `seconds`, is within BST_RIGHT_TARGET_PX pixels of
+ * scale_rad. */
 bool bst_eval_track_is_on_target(bst_vec3 direction, bst_vec3 rate_radps, double seconds,
                                  bst_vec3 truth, double scale_rad);
 
-/* Whether the loop is settled by this frame: it was acquired before, is in mode track, and points
- * to within BST_SETTLED_PX. */
+/* True if the loop has settled in this frame: acquired before, in mode track, and pointing error
+ * within BST_SETTLED_PX. */
 bool bst_loop_settles(bool acquired, int mode, double error_px);
 
-/* Whether a frame counts for the pointing figures: settled, in mode track, the target visible.
- * Tracks play no part: an error of the tracker shows. */
+/* True if a frame counts for the pointing figures: settled, in mode track, target visible. Tracks
+ * do not matter: an error of the tracker counts as pointing error. */
 bool bst_loop_frame_is_pointing(const bst_loop_frame *frame);
 
-/* Adds a frame to the counts. */
+/* Adds a frame to the accumulated loop figures. */
 void bst_loop_tally_add(bst_loop_tally *tally, const bst_loop_frame *frame);
-/* Sets the figures that follow from the frames; the times, final_mode and wrong_target_frames stay
- * as they are. */
+/* Computes the figures that follow from the accumulated frames; the times, final_mode and
+ * wrong_target_frames are not changed. */
 void bst_loop_tally_figures(const bst_loop_tally *tally, bst_loop_figures *figures);
 
 #endif

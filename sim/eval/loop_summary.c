@@ -8,15 +8,15 @@
 /* 99.99 % quantile of chi-square, 2 degrees of freedom. */
 #define FORESEEN_CHI2 18.42
 
-/* Frames that may wait for their tracks: 1 s of latency at 60 Hz. */
+/* frames that wait for their tracks: 1 s of latency at 60 Hz */
 enum { WAITING = 64 };
 
 typedef struct waiting_frame {
     bst_loop_frame frame;
     bst_vec3 direction; /* true, geometric */
     int64_t mid_tick;
-    bool known;  /* the target has a place: not decayed */
-    bool judged; /* tracks of this very exposure have come */
+    bool known;  /* the target's position is known: not decayed */
+    bool judged; /* tracks of this exposure have arrived */
 } waiting_frame;
 
 struct bst_loop_summary {
@@ -27,9 +27,9 @@ struct bst_loop_summary {
     int target;
     bst_loop_frame_fn fn;
     void *user;
-    waiting_frame waiting[WAITING]; /* frames first..next-1 by position % WAITING */
+    waiting_frame waiting[WAITING]; /* frames first..next-1, at index % WAITING */
     int64_t first, next;
-    /* latest track of interest, for frames that never get tracks of their own */
+    /* latest track of interest, for frames without tracks */
     bst_track toi;
     bool has_toi;
     int64_t toi_tick;
@@ -37,7 +37,7 @@ struct bst_loop_summary {
     bool last_in_track;
     bst_loop_frame newest;
     bst_loop_figures figures;
-    int64_t acquire_tick, settle_tick; /* -1: not yet */
+    int64_t acquire_tick, settle_tick; /* -1: never */
     bst_loop_tally tally;
 };
 
@@ -83,7 +83,7 @@ static bst_vec3 track_direction_at(const bst_track *track, double seconds) {
     return bst_vec3_unit(bst_vec3_axpy(track->direction_gcrf, seconds, track->rate_gcrf_radps));
 }
 
-/* Whether the track, carried to the frame's middle, is on the true target. */
+/* Checks whether a track, propagated to mid-exposure, is on the true target. */
 static bool on_target(const bst_loop_summary *s, const waiting_frame *w, const bst_track *track,
                       int64_t tick) {
     return w->known && bst_eval_track_is_on_target(track->direction_gcrf, track->rate_gcrf_radps,
@@ -91,8 +91,8 @@ static bool on_target(const bst_loop_summary *s, const waiting_frame *w, const b
                                                    w->direction, bst_camera_scale_rad(&s->camera));
 }
 
-/* Whether a track whose target cannot be seen foretells a place that the true one does not
- * contradict: a prediction over hours is no claim to have the target within pixels. */
+/* Checks whether the true direction is within the covariance of a track that predicts an invisible
+ * target. Such a prediction over hours need not be accurate to pixels. */
 static bool is_foreseen(const bst_loop_summary *s, const waiting_frame *w, const bst_track *track,
                         int64_t tick) {
     if (track->hidden == BST_HIDDEN_NOT || !w->known) {
@@ -115,6 +115,7 @@ static bool is_foreseen(const bst_loop_summary *s, const waiting_frame *w, const
            p[1][1] * x * x - 2.0 * p[0][1] * x * y + p[0][0] * y * y <= FORESEEN_CHI2 * det;
 }
 
+/* Decides whether a frame is in track, and updates acquisition and settling. */
 static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track, int64_t track_tick,
                   int64_t now) {
     w->frame.in_track = false;
@@ -134,7 +135,7 @@ static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track,
     }
 }
 
-/* The verdict on the oldest waiting frame is final. */
+/* Completes the oldest waiting frame: its result is final. */
 static void retire(bst_loop_summary *s) {
     waiting_frame *w = &s->waiting[s->first % WAITING];
     bst_loop_frame *f = &w->frame;
@@ -150,7 +151,7 @@ static void retire(bst_loop_summary *s) {
     }
 }
 
-/* The true target at mid-exposure, in or out of the field. */
+/* Computes the true target at mid-exposure, in or out of the field. */
 static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_truth *truth,
                                  waiting_frame *w) {
     bst_loop_frame *f = &w->frame;
@@ -158,7 +159,7 @@ static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_tr
     bst_status status =
         bst_world_view_sight(ctx, s->view, s->observer, s->target, f->time_s, &sight);
     if (status == BST_ERR_NUMERIC) {
-        return BST_OK; /* decayed: nothing to see */
+        return BST_OK; /* decayed: not visible */
     }
     BST_TRY(status);
     w->known = true;
@@ -175,7 +176,7 @@ static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_tr
         BST_TRY(bst_world_camera_at_scale(ctx, camera, truth->pixel_scale_arcsec, &scaled));
         camera = &scaled;
     }
-    /* without an image the place stays unknown */
+    /* the position stays unknown if there is no image */
     (void)bst_camera_project(camera, bst_quat_rotate(truth->q_cam_from_gcrf_mid, sight.apparent),
                              &f->target_x_px, &f->target_y_px);
     for (int i = 0; i < truth->count; i++) {
@@ -218,7 +219,7 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_t
     return BST_OK;
 }
 
-/* The first confirmed track of the target, of interest or not, ends the wait for a confirmation. */
+/* Records the time of the first confirmed track of the target. */
 static void note_confirmation(bst_loop_summary *s, const waiting_frame *w, const bst_tracks *tracks,
                               int64_t now) {
     for (int i = 0; i < tracks->count && isnan(s->figures.time_to_confirm_s); i++) {
@@ -230,8 +231,8 @@ static void note_confirmation(bst_loop_summary *s, const waiting_frame *w, const
 }
 
 void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int64_t tick) {
-    /* tracks come in the order of their exposures: earlier frames will have none, and are judged by
-     * what was known before these */
+    /* tracks arrive in the order of exposures: earlier frames get none and use the previous
+     * track */
     while (s->first < s->next &&
            s->waiting[s->first % WAITING].frame.exposure_id < tracks->exposure_id) {
         retire(s);
@@ -276,7 +277,7 @@ void bst_loop_summary_finish(bst_loop_summary *s) {
 void bst_loop_summary_figures(const bst_loop_summary *s, bst_loop_figures *out) {
     *out = s->figures;
     bst_loop_tally_figures(&s->tally, out);
-    out->frames = s->figures.frames; /* those that wait for their tracks, too */
+    out->frames = s->figures.frames; /* includes frames that wait for their tracks */
 }
 
 void bst_loop_summary_newest(const bst_loop_summary *s, bst_loop_frame *out) {

@@ -1,4 +1,4 @@
-/* How well one sensor's loop did, judged against the truth as the run goes. */
+/* Evaluates the tracking loop of one sensor against the truth while a run proceeds. */
 #ifndef BST_EVAL_LOOP_SUMMARY_H
 #define BST_EVAL_LOOP_SUMMARY_H
 
@@ -8,16 +8,16 @@
 
 typedef struct bst_loop_summary bst_loop_summary;
 
-/* target_object: index of the right target in the world, -1 when there is none. The world must
- * outlive the summary. */
+/* Creates the evaluation of a sensor's loop. target_object: index of the true target in the world,
+ * -1: none. The world must outlive it. */
 bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                                    int64_t tick_rate_hz, int target_object,
                                    bst_loop_summary **out) BST_MUST_CHECK;
 /* Frees a summary; NULL is allowed. */
 void bst_loop_summary_free(bst_loop_summary *summary);
 
-/* Called once for every frame when its verdict is final (a few frames late, the last ones at the
- * end). */
+/* Callback for each completed frame; it is called a few frames late, for the last frames at the
+ * end. */
 typedef void (*bst_loop_frame_fn)(void *user, const bst_loop_frame *frame);
 /* Sets the function that gets each frame once it is evaluated; NULL: none. */
 void bst_loop_summary_on_frame(bst_loop_summary *summary, bst_loop_frame_fn fn, void *user);
@@ -35,16 +35,16 @@ void bst_loop_summary_tracks(bst_loop_summary *summary, const bst_tracks *tracks
 /* Stores the mode of control. */
 void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status);
 
-/* The target is another one from now on, -1: none: acquisition and settling begin anew; the times
- * stay those of the first. */
+/* Changes the true target, -1: none. Acquisition and settling start again; the recorded times
+ * remain those of the first target. */
 void bst_loop_summary_retarget(bst_loop_summary *summary, int target_object);
 
-/* Settles the frames that still wait for their tracks. */
+/* Completes the frames that still wait for their tracks. */
 void bst_loop_summary_finish(bst_loop_summary *summary);
-/* Figures so far; frames that wait for their tracks are counted too. */
+/* Loop figures so far, including frames that wait for their tracks. */
 void bst_loop_summary_figures(const bst_loop_summary *summary, bst_loop_figures *out);
-/* The newest frame's state, for a progress line; before its tracks have come in_track is that of
- * the frame before. */
+/* State of the newest frame, for a progress display. Before its tracks arrive, in_track is that of
+ * the previous frame. */
 void bst_loop_summary_newest(const bst_loop_summary *summary, bst_loop_frame *out);
 
 #endif

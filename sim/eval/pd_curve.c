@@ -8,13 +8,13 @@
 
 enum { TERMS = 3 };
 
-static const double LEAST = 0.02, MOST = 0.98; /* what is counted beyond tells of tails only */
+static const double LEAST = 0.02, MOST = 0.98; /* range of counted fractions that the fit uses */
 
 double bst_pd_without_chance(double raw, double chance) {
     return chance < 1.0 ? fmin(fmax((raw - chance) / (1.0 - chance), 0.0), 1.0) : 0.0;
 }
 
-/* Probit regression in u = snr - centre. */
+/* Probit regression of detection counts in u = snr - centre. */
 typedef struct fit {
     const bst_pd_point *points;
     int count, terms, used;
@@ -26,7 +26,7 @@ static double share(const bst_pd_point *p, double chance) {
     return bst_pd_without_chance((double)p->detected / (double)p->trials, chance);
 }
 
-static bool tells(const fit *f, const bst_pd_point *p) {
+static bool is_informative(const fit *f, const bst_pd_point *p) {
     if (p->trials <= 0) {
         return false;
     }
@@ -49,7 +49,7 @@ static double value(const fit *f, const double theta[TERMS], double snr) {
     return sum;
 }
 
-/* Solves a x = b for the fit's terms, and inverts a; false if it is singular. */
+/* Solves a x = b for the terms of the fit and inverts a. False: singular. */
 static bool solve(int n, double a[TERMS][TERMS], const double b[TERMS], double x[TERMS],
                   double inverse[TERMS][TERMS]) {
     double work[TERMS][2 * TERMS] = {{0.0}};
@@ -93,7 +93,7 @@ static double log_likelihood(const fit *f, const double theta[TERMS]) {
     double sum = 0.0;
     for (int i = 0; i < f->count; i++) {
         const bst_pd_point *p = &f->points[i];
-        if (tells(f, p)) {
+        if (is_informative(f, p)) {
             double eta = value(f, theta, p->snr);
             double hit = f->chance + (1.0 - f->chance) * bst_eval_normal_tail(-eta);
             double miss = (1.0 - f->chance) * bst_eval_normal_tail(eta);
@@ -104,8 +104,8 @@ static double log_likelihood(const fit *f, const double theta[TERMS]) {
     return sum;
 }
 
-/* Fisher scoring from the point estimates; steps that lose likelihood are halved. */
-static bool run(fit *f) {
+/* Fisher scoring from initial estimates; a step that decreases the likelihood is halved. */
+static bool fit_curve(fit *f) {
     double score[TERMS], fisher[TERMS][TERMS], step[TERMS];
     for (int round = 0; round < 40; round++) {
         for (int k = 0; k < TERMS; k++) {
@@ -116,11 +116,11 @@ static bool run(fit *f) {
         }
         for (int i = 0; i < f->count; i++) {
             const bst_pd_point *p = &f->points[i];
-            if (!tells(f, p)) {
+            if (!is_informative(f, p)) {
                 continue;
             }
             double b[TERMS], eta = value(f, f->theta, p->snr), n = (double)p->trials;
-            if (round == 0) { /* a regression of the counted shares to begin with */
+            if (round == 0) { /* initial values: linear regression of the counted fractions */
                 eta = -bst_eval_normal_tail_inverse(share(p, f->chance));
             }
             double hit = f->chance + (1.0 - f->chance) * bst_eval_normal_tail(-eta);
@@ -159,7 +159,7 @@ static bool run(fit *f) {
     return true;
 }
 
-/* The place in [low, high] where the fit, rising there, is `want`; NAN: there is none. */
+/* SNR in [low, high] at which the increasing fit equals `want`; NAN: none. */
 static double crossing(const fit *f, double want, double low, double high) {
     double below = value(f, f->theta, low) - want, above = value(f, f->theta, high) - want;
     if (!(below <= 0.0 && above >= 0.0)) {
@@ -177,7 +177,7 @@ bst_pd_needed bst_pd_snr_at(const bst_pd_point *points, int count, double chance
     fit f = {.points = points, .count = count, .chance = chance};
     double low = INFINITY, high = -INFINITY, least = INFINITY, most = -INFINITY;
     for (int i = 0; i < count; i++) {
-        if (tells(&f, &points[i])) {
+        if (is_informative(&f, &points[i])) {
             f.used++;
             f.centre += points[i].snr;
             low = fmin(low, points[i].snr);
@@ -193,10 +193,10 @@ bst_pd_needed bst_pd_snr_at(const bst_pd_point *points, int count, double chance
     }
     f.centre /= f.used;
     f.terms = f.used < 4 ? 2 : 3;
-    if (!run(&f)) {
+    if (!fit_curve(&f)) {
         return none;
     }
-    /* half a step beyond the points that tell, for where they end just short of pd */
+    /* allow half a step beyond the informative points */
     double reach = 0.5 * (high - low) / (f.used - 1);
     double want = -bst_eval_normal_tail_inverse(pd),
            at = crossing(&f, want, low - reach, high + reach);

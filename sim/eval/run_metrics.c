@@ -3,14 +3,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Frames whose truth is kept for messages that come late: 1 s of latency at 60 Hz. */
+/* frames whose truth is kept for late messages: 1 s of latency at 60 Hz */
 enum { WAITING = 64 };
 
 typedef struct known_object {
     uint32_t id;
-    bst_vec3 direction; /* geometric with light time, middle of the exposure */
+    bst_vec3 direction; /* geometric with light time, mid-exposure */
     double x_px, y_px;  /* mean over the exposure */
-    bool lit;           /* not occulted, and some of its light is there */
+    bool lit;           /* not occulted and illuminated */
 } known_object;
 
 typedef struct known_frame {
@@ -30,7 +30,7 @@ struct bst_run_metrics {
     int newest;
     seen_track *tracks;
     int64_t track_count, track_room;
-    uint8_t *objects; /* [objects of the world]: bit 0 seen, bit 1 tracked */
+    uint8_t *objects; /* [objects of the world] bit 0: seen, bit 1: tracked */
     int object_count;
     bst_error_statistics track_error;
     bst_run_metric_figures figures;
@@ -143,7 +143,8 @@ void bst_run_metrics_detections(bst_run_metrics *m, const bst_detections *detect
 }
 
 static bst_status find_track(bst_ctx *ctx, bst_run_metrics *m, int64_t id, seen_track **out) {
-    for (int64_t i = m->track_count - 1; i >= 0; i--) { /* identities grow: new ones are last */
+    for (int64_t i = m->track_count - 1; i >= 0;
+         i--) { /* track identities increase: search from the newest */
         if (m->tracks[i].id == id) {
             *out = &m->tracks[i];
             return BST_OK;
@@ -163,7 +164,7 @@ static bst_status find_track(bst_ctx *ctx, bst_run_metrics *m, int64_t id, seen_
     return BST_OK;
 }
 
-/* The error's components along east and north. */
+/* Adds the east and north components of a track's direction error. */
 static void add_track_error(bst_run_metrics *m, bst_vec3 direction, bst_vec3 truth,
                             double scale_rad) {
     bst_vec3 pole =
@@ -201,7 +202,8 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tr
             }
         }
         bool near = least_px <= BST_RIGHT_TARGET_PX;
-        /* what coasts out of the field is near nothing that is seen, and no evidence */
+        /* a coasting track outside the field is near no visible object; it does not count as
+         * false */
         if (near || t->status == BST_TRACK_CONFIRMED) {
             seen_track *seen = NULL;
             BST_TRY(find_track(ctx, m, t->id, &seen));

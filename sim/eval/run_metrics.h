@@ -1,5 +1,5 @@
-/* Figures of one sensor beside those of its loop (sim/eval/loop_figures.h): detections, accuracy of
- * the target's track, false tracks. */
+/* Figures of merit of one sensor besides its loop (sim/eval/loop_figures.h): detections, accuracy
+ * of the target's track, false tracks. */
 #ifndef BST_EVAL_RUN_METRICS_H
 #define BST_EVAL_RUN_METRICS_H
 
@@ -9,37 +9,37 @@
 
 typedef struct bst_run_metrics bst_run_metrics;
 
-/* What of a sensor was lost, and in how many frames. */
+/* Items that a sensor lost for lack of capacity, with numbers of frames. */
 typedef struct bst_run_losses {
     int64_t frames;                       /* of the sensor */
-    int64_t detections, detection_frames; /* detections that found no room */
-    int64_t tracks, track_frames;         /* tracks that found no room */
-    int64_t truth, truth_frames;          /* sources that found no room */
+    int64_t detections, detection_frames; /* detections beyond the capacity of their message */
+    int64_t tracks, track_frames;         /* tracks beyond the capacity */
+    int64_t truth, truth_frames;          /* sources beyond the capacity */
     int64_t dropped_frames;               /* lost between camera and image processing */
-    int64_t no_stars_frames;              /* processed, and no star was identified */
-    int64_t no_attitude_frames;           /* seen by the tracker without an attitude from stars */
-    int64_t earth_frames, moon_frames, sun_frames; /* covered in part by that body's disc */
+    int64_t no_stars_frames;              /* processed frames without an identified star */
+    int64_t no_attitude_frames; /* frames that the tracker processed without a stellar attitude */
+    int64_t earth_frames, moon_frames, sun_frames; /* partly covered by the disc of that body */
 } bst_run_losses;
 
 typedef struct bst_run_metric_figures {
     int64_t in_field_frames;  /* visible frames with the target in the field */
-    int64_t detected_frames;  /* of them: with a detection within BST_RIGHT_TARGET_PX of it */
+    int64_t detected_frames;  /* with a detection within BST_RIGHT_TARGET_PX of the target */
     double detected_fraction; /* detected_frames over in_field_frames; NAN: never in the field */
-    int64_t detections;       /* all, of any source */
-    /* angle from the target's true direction to the track of interest, confirmed or coasting, in
-     * pixels: frames with tracks of their own and the target in the field and in track; NAN without
-     * any */
+    int64_t detections;       /* detections of any source */
+    /* error of the track of interest (confirmed or coasting) to the target's true direction, px:
+     * frames with tracks, and the target in the field and in track; NAN without any */
     int64_t track_frames;
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
-    /* confirmed tracks, by identity; false: near no object in most of its frames */
+    /* confirmed tracks by identity; false: no object nearby in most of its frames */
     int64_t tracks, false_tracks;
-    int64_t bad_pixels;      /* that image processing had learned by the latest frame */
+    int64_t bad_pixels;      /* learned by image processing up to the latest frame */
     int64_t objects_seen;    /* objects that were in the field */
-    int64_t objects_tracked; /* of them: ever near a confirmed track */
+    int64_t objects_tracked; /* ever near a confirmed track */
     bst_run_losses losses;
 } bst_run_metric_figures;
 
-/* target_object: as of bst_loop_summary_create. The world must outlive the metrics. */
+/* Creates the metrics of a sensor. target_object: as of bst_loop_summary_create. The world must
+ * outlive them. */
 bst_status bst_run_metrics_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                                   int target_object, bst_run_metrics **out) BST_MUST_CHECK;
 /* Frees the metrics of a run; NULL is allowed. */
@@ -58,12 +58,12 @@ void bst_run_metrics_detections(bst_run_metrics *metrics, const bst_detections *
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *metrics,
                                   const bst_tracks *tracks) BST_MUST_CHECK;
-/* Counts a frame, as evaluated by the loop summary, that has the target in the field. */
+/* Counts a frame, evaluated by the loop summary, with the target in the field. */
 void bst_run_metrics_frame(bst_run_metrics *metrics, const bst_loop_frame *frame);
-/* The target is another one from now on, -1: none. */
+/* Changes the true target of the metrics; -1: none. */
 void bst_run_metrics_retarget(bst_run_metrics *metrics, int target_object);
 
-/* Computes the figures of the run so far; NAN where there are no data. */
+/* Computes the metrics of the run so far; NAN where there are no data. */
 void bst_run_metrics_figures(const bst_run_metrics *metrics, bst_run_metric_figures *out);
 
 #endif

@@ -5,9 +5,9 @@
 
 #include "sim/eval/target_match.h"
 
-/* Frames of a sensor that may wait for their detections and tracks, and objects in one. */
+/* frames per sensor that may wait for detections and tracks; objects per frame */
 enum { WAITING = 16, IN_FRAME = 256 };
-/* A track within this many pixels of an object is its: as in loop_summary.c. */
+/* a track within this distance of an object belongs to it, as in loop_summary.c */
 #define TRACK_PX 5.0
 
 double bst_sighting_rms(const bst_sighting_error *e) {
@@ -26,11 +26,11 @@ static void add_errors(bst_sighting_error *to, const bst_sighting_error *from) {
     to->greatest = fmax(to->greatest, from->greatest);
 }
 
-/* An object in a frame. */
+/* An object in the field of a frame. */
 typedef struct seen_object {
-    int record;         /* of its sensor and object */
-    bst_vec3 direction; /* true, geometric, mid */
-    double x_px, y_px;  /* of its detection, where there is one */
+    int record;         /* index of the record of its sensor and object */
+    bst_vec3 direction; /* true, geometric, mid-exposure */
+    double x_px, y_px;  /* position of its detection, if any */
     bool detected;
 } seen_object;
 
@@ -44,11 +44,11 @@ typedef struct frame {
     bst_eval_match_target targets[IN_FRAME];
 } frame;
 
-/* What is known of an object: of one sensor, with the pass under way, or of all. */
+/* Record of an object for one sensor, with the current pass, or for all sensors. */
 typedef struct record {
     bst_sighting sum;
-    bst_eval_pass pass; /* frames 0: none */
-    int next;           /* record of the object's next sensor, -1: none */
+    bst_eval_pass pass; /* frames 0: no current pass */
+    int next;           /* record of the same object for the next sensor; -1: none */
 } record;
 
 typedef struct sensor {
@@ -57,7 +57,7 @@ typedef struct sensor {
     int *record; /* [objects] -1: never in the field */
     frame frames[WAITING];
     int next;
-    int *open; /* records with a pass under way */
+    int *open; /* indices of records with a current pass */
     int open_count, open_room;
 } sensor;
 
@@ -68,7 +68,7 @@ struct bst_sightings {
     void *user;
     int sensor_count, object_count;
     sensor *sensors;
-    int *whole; /* [objects] record of all sensors, -1: never in a field */
+    int *whole; /* [objects] record for all sensors; -1: never in a field */
     record *records;
     int record_count, record_room;
     int of_target[IN_FRAME], *of_detection;
@@ -154,7 +154,7 @@ static bst_status new_record(bst_ctx *ctx, bst_sightings *s, int sensor_index, i
     return BST_OK;
 }
 
-/* The record of an object and a sensor. */
+/* Finds or adds the record of an object and a sensor. */
 static bst_status record_of(bst_ctx *ctx, bst_sightings *s, int sensor_index, int object,
                             int *out) {
     int *own = &s->sensors[sensor_index].record[object];
@@ -173,11 +173,11 @@ static bst_status record_of(bst_ctx *ctx, bst_sightings *s, int sensor_index, in
     return BST_OK;
 }
 
-/* A detection in the order of time: gaps and custody up to it. */
+/* Updates gaps and custody of an object with a detection, in order of time. */
 static void note_detection(const bst_sightings *s, bst_sighting *sum, double seconds) {
     double since = isnan(sum->first_s) ? seconds : seconds - sum->last_s;
     if (!(since >= 0.0)) {
-        return; /* of a frame that came later than another sensor's */
+        return; /* of a frame that arrives after a later frame of another sensor */
     }
     sum->longest_gap_s = fmax(sum->longest_gap_s, since);
     if (isnan(sum->first_s)) {
@@ -213,7 +213,7 @@ static bst_status end_pass(bst_ctx *ctx, bst_sightings *s, record *r) {
     return status;
 }
 
-/* Ends the sensor's passes that have had no frame since `before_s`. */
+/* Ends the passes of a sensor that have had no frame since `before_s`. */
 static bst_status end_passes(bst_ctx *ctx, bst_sightings *s, sensor *e, double before_s) {
     int kept = 0;
     for (int i = 0; i < e->open_count; i++) {
@@ -307,7 +307,8 @@ static frame *frame_of(sensor *e, int64_t exposure_id) {
     return NULL;
 }
 
-/* What the onboard side holds for a star, or for no light of the sky, is no sighting. */
+/* Checks whether the onboard side classifies a detection as a star or an artefact: then it is no
+ * sighting. */
 static bool is_taken_for_else(const bst_detection *d) {
     return (d->label == BST_LABEL_STAR && d->star_id != 0) || d->label == BST_LABEL_HIT ||
            d->label == BST_LABEL_HOT_PIXEL;
@@ -347,7 +348,7 @@ void bst_sightings_detections(bst_sightings *s, int sensor_index, const bst_dete
     }
 }
 
-/* The confirmed track that is an object's, seen in this frame; NULL: none. */
+/* The confirmed track of an object that was measured in this frame; NULL: none. */
 static const bst_track *track_of(const bst_tracks *tracks, bst_vec3 direction, double reach_rad) {
     const bst_track *nearest = NULL;
     for (int i = 0; i < tracks->count; i++) {

@@ -69,8 +69,8 @@ bool bst_track_bound_covariance(const bst_track_bound *bound, double covariance[
     return bst_symmetric_invert(4, bound->information[0], covariance[0]);
 }
 
-/* Half width, in sigma, of the square about the true place in which false alarms are drawn: those
- * beyond say less than exp(-18) about the place. */
+/* Half width, in sigma, of the square around the true position in which false alarms are drawn;
+ * those beyond contribute less than exp(-18). */
 #define REACH 6.0
 #define DRAWS 200000
 

@@ -7,7 +7,7 @@
 #include "sim/eval/gospa.h"
 
 typedef struct object_record {
-    int64_t visible, tracked, last_track; /* frames, frames, identity (0: none yet) */
+    int64_t visible, tracked, last_track; /* frame counts, and track identity (0: none yet) */
     double first_seen_s, first_tracked_s;
     int breaks;
 } object_record;
@@ -24,7 +24,8 @@ struct bst_track_metrics {
     int tracks;
     object_record *object;
     track_record *track;
-    int64_t *paired; /* frames of track t with object o: [t * objects + o] */
+    int64_t
+        *paired; /* number of frames in which track t was paired with object o: [t * objects + o] */
     double *distance;
     int *row, *pair, *identity;
 };
@@ -75,7 +76,7 @@ void bst_track_metrics_free(bst_track_metrics *m) {
 }
 
 static int identify(bst_track_metrics *m, int64_t id) {
-    /* identities grow: the newest are asked for most */
+    /* identities increase: search from the newest */
     for (int t = m->tracks - 1; t >= 0; t--) {
         if (m->track[t].id == id) {
             return t;
@@ -88,7 +89,7 @@ static int identify(bst_track_metrics *m, int64_t id) {
     return m->tracks++;
 }
 
-static void note(object_record *object, double seconds, int64_t id) {
+static void record_track(object_record *object, double seconds, int64_t id) {
     if (object->tracked++ == 0) {
         object->first_tracked_s = seconds;
     } else if (object->last_track != id) {
@@ -133,7 +134,7 @@ bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *m, double se
         if (m->pair[r] >= 0) {
             int t = m->identity[m->pair[r]], o = m->row[r];
             m->paired[t * m->objects + o]++;
-            note(&m->object[o], seconds, m->track[t].id);
+            record_track(&m->object[o], seconds, m->track[t].id);
         }
     }
     for (int t = 0; t < tracks; t++) {

@@ -1,6 +1,6 @@
-/* Frames as PNG with bounding boxes of the true sources, for training detectors: COCO's
- * annotations.json (cocodataset.org, "Data format", object detection), and YOLO's text file an
- * image (docs.ultralytics.com, "Object Detection Datasets"). */
+/* Exports frames as PNG with bounding boxes of true sources, for training object detectors: COCO
+ * annotations.json (cocodataset.org, "Data format", object detection), and YOLO text files
+ * (docs.ultralytics.com, "Object Detection Datasets"). */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -24,12 +24,12 @@ typedef enum class_kind { SATELLITE, STAR, CLASSES } class_kind;
 
 static const char *const class_names[CLASSES] = {"satellite", "star"};
 
-/* Boxes are clipped to the image; what is left of them has this width and height at least. */
+/* minimum width and height of a box after clipping to the image */
 #define LEAST_PX 1.0
-/* Sources in a frame; truth has room for fewer. */
+/* sources in a frame; the truth has room for fewer */
 enum { MOST_ITEMS = 1 << 24 };
 
-/* Where the pixels of a source lie in the mask: x1 and y1 beyond them; pixels 0: nowhere. */
+/* Bounding box of a source's pixels in the mask; x1 and y1 exclusive; pixels 0: none. */
 typedef struct extent {
     int x0, y0, x1, y1;
     int64_t pixels;
@@ -39,19 +39,19 @@ typedef struct job {
     const bst_export *e;
     const bst_run_sensor *sensor;
     bst_fits_reader *fits;
-    bst_io_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
+    bst_io_rows *truth; /* truth rows of the sensor, by exposure; at the next unprocessed row */
     bool truth_more;
     char set[256];
     bst_fits_reader *masks;  /* NULL: the run has none */
-    bst_fits_read_mask mask; /* of the frame; items NULL: none */
-    extent *extents;         /* of the sources in the mask, by their numbers */
+    bst_fits_read_mask mask; /* of the current frame; items NULL: none */
+    extent *extents;         /* of the sources in the mask, by item number */
     int extent_count, extent_room;
     cJSON *images, *annotations; /* COCO */
     int64_t written, boxes;
-    int sensors, masked; /* exported, and of them those with masks */
+    int sensors, masked; /* number of exported sensors, and of those with masks */
 } job;
 
-/* The delivered frame that a box is in, and its own PNG. */
+/* The exported frame that contains a box, and its PNG. */
 typedef struct frame_row {
     int64_t id, fits_index;
     double x0_px, y0_px, binning;
@@ -59,7 +59,7 @@ typedef struct frame_row {
     char utc[48], name[300];
 } frame_row;
 
-/* In pixels from the image's upper left corner: that of the centre of the first pixel is 0.5. */
+/* In pixels from the upper left corner of the image; the centre of the first pixel is 0.5. */
 typedef struct box {
     class_kind class;
     double x, y, width, height; /* clipped to the image */
@@ -77,8 +77,8 @@ static const char truth_sql[] =
     " LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
     " WHERE t.sensor = ?1 ORDER BY t.exposure_id, t.rowid";
 
-/* Extent of the light's way along one axis, grown by `margin`, clipped to 0 ... size. False: less
- * than LEAST_PX of it is in the image. */
+/* Extent of a streak along one axis with `margin`, clipped to 0 ... size. False: less than LEAST_PX
+ * remains. */
 static bool clip(const double v[3], double margin, double size, double *from, double *length) {
     double low = fmin(v[0], fmin(v[1], v[2])) - margin,
            high = fmax(v[0], fmax(v[1], v[2])) + margin;
@@ -89,11 +89,11 @@ static bool clip(const double v[3], double margin, double size, double *from, do
     return *length >= LEAST_PX;
 }
 
-/* The box of the current row of the truth; false when there is none in the image. */
+/* Bounding box of the current truth row; false: outside the image. */
 static bool box_of(const job *j, const frame_row *f, box *out) {
     const bst_io_rows *r = j->truth;
     double x[3], y[3], margin = fmax(0.5 * j->e->box_px, 0.5 * LEAST_PX);
-    /* boxes hold the light, which the optics put beside the chief ray */
+    /* boxes enclose the light, which the optics shift from the chief ray */
     double beside_x = bst_io_rows_real(r, 13) - bst_io_rows_real(r, 11);
     double beside_y = bst_io_rows_real(r, 14) - bst_io_rows_real(r, 12);
     bool finite = true;
@@ -113,7 +113,7 @@ static bool box_of(const job *j, const frame_row *f, box *out) {
 
 /* ------------------------------------------------------------------ masks */
 
-/* Opens the masks that were recorded beside the sensor's frames, if they were. */
+/* Opens the segmentation masks of the sensor if they were recorded. */
 static bst_status open_masks(bst_ctx *ctx, job *j) {
     char name[320], path[4096];
     /* frames.fits -> segmentation.fits, frames_OBSERVER_SENSOR.fits -> ... */
@@ -165,7 +165,7 @@ static bst_status take_extents(bst_ctx *ctx, job *j) {
     return BST_OK;
 }
 
-/* The mask of a frame and where its sources lie in it. */
+/* Reads the mask of a frame and the extents of its sources. */
 static bst_status read_mask(bst_ctx *ctx, job *j, const frame_row *f, int64_t index) {
     j->mask.items = NULL;
     if (!j->masks) {
@@ -181,8 +181,8 @@ static bst_status read_mask(bst_ctx *ctx, job *j, const frame_row *f, int64_t in
     return take_extents(ctx, j);
 }
 
-/* "segmentation" and "area" of the current row of the truth: of its pixels in the mask; without
- * any no polygons and the area of the box. */
+/* Adds "segmentation" and "area" of the current truth row from its mask pixels; without mask: no
+ * polygons and the area of the box. */
 static bst_status add_segmentation(bst_ctx *ctx, const job *j, const box *b, cJSON *node) {
     int64_t item = bst_io_rows_int(j->truth, 17);
     bool shown = j->mask.items && item > 0 && item < j->extent_count && j->extents[item].pixels > 0;
@@ -244,7 +244,7 @@ static void add_coco_image(job *j, const frame_row *f) {
     cJSON_AddItemToArray(j->images, node);
 }
 
-/* Boxes of a frame: the rows of its exposure, of which earlier ones are left behind. `yolo` NULL:
+/* Writes the boxes of a frame from the truth rows of its exposure; skips earlier rows. `yolo` NULL:
  * none. */
 static bst_status write_boxes(bst_ctx *ctx, job *j, const frame_row *f, FILE *yolo) {
     for (; j->truth_more && bst_io_rows_int(j->truth, 0) <= f->id;) {
@@ -265,7 +265,7 @@ static bst_status write_boxes(bst_ctx *ctx, job *j, const frame_row *f, FILE *yo
     return BST_OK;
 }
 
-/* The picture below `folder`: the counts, or with 8 bits their grey levels. */
+/* Writes the picture of a frame below `folder`: DN, or 8-bit grey levels. */
 static bst_status write_image(bst_ctx *ctx, const job *j, const char *folder, const frame_row *f,
                               const bst_fits_read_frame *image) {
     char path[4600];
@@ -403,7 +403,7 @@ static bst_status write_coco(bst_ctx *ctx, const job *j, cJSON *root) {
     return status;
 }
 
-/* Folders below that of the set; the labels' one only for YOLO. */
+/* Creates the folders of a set; that of labels only for YOLO. */
 static bst_status make_folders(bst_ctx *ctx, const char *folder, bool labels) {
     char path[4200];
     snprintf(path, sizeof path, "%.4000s/images", folder);

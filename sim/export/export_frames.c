@@ -15,24 +15,24 @@
 
 enum { STRETCH_FRAMES = 9 };
 
-/* The frames of one sensor on their way. */
+/* State of exporting the frames of one sensor. */
 typedef struct job {
     const bst_export *e;
     const bst_run_sensor *sensor;
     bst_fits_reader *fits;
     bst_frame_marks *marks;
-    int64_t *chosen; /* indices into the file */
-    int64_t *ids;    /* numbers of their exposures */
+    int64_t *chosen; /* indices in the FITS file */
+    int64_t *ids;    /* exposure numbers */
     int64_t count;
     int width, height; /* of a picture */
     bst_io_stretch stretch;
     bst_video *video;
-    bool refused; /* ffmpeg took no more */
+    bool refused; /* ffmpeg closed its input */
     uint8_t *bgr;
     char stem[256], path[4096];
 } job;
 
-/* Chooses the frames by the number of their exposure. */
+/* Selects frames by exposure number. */
 static bst_status choose(bst_ctx *ctx, job *j) {
     int64_t frames = bst_fits_reader_info(j->fits)->frames;
     j->chosen = calloc((size_t)frames + 1, sizeof *j->chosen);
@@ -44,7 +44,7 @@ static bst_status choose(bst_ctx *ctx, job *j) {
     for (int64_t i = 0; i < frames; i++) {
         int64_t id;
         BST_TRY(bst_fits_reader_id(ctx, j->fits, i, &id));
-        if (id < 0) { /* a cube that lost its table */
+        if (id < 0) { /* a cube without its table */
             BST_TRY(bst_frame_marks_exposure(ctx, j->marks, cube ? i : i + 1, &id));
         }
         id = id < 0 ? i : id;
@@ -56,7 +56,7 @@ static bst_status choose(bst_ctx *ctx, job *j) {
     return BST_OK;
 }
 
-/* One stretch for all frames: the median of those of a few, evenly spread. */
+/* Computes one stretch for all frames: the median over a few, evenly spaced. */
 static bst_status find_stretch(bst_ctx *ctx, job *j) {
     double values[3][STRETCH_FRAMES];
     int n = j->count < STRETCH_FRAMES ? (int)j->count : STRETCH_FRAMES;
@@ -88,7 +88,7 @@ static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
     bst_io_stretch stretch = j->e->each_stretch
                                  ? bst_io_stretch_of(frame.pixels, frame.width, frame.height)
                                  : j->stretch;
-    /* a PNG has its frame's own size, a film one for all */
+    /* a PNG has the size of its frame, all frames of a video the same size */
     int width = j->width, height = j->height;
     if (!j->e->film) {
         double scale = fmin(1.0, (double)(j->width > j->height ? j->width : j->height) /
@@ -145,7 +145,7 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
         return status;
     }
     if (status == BST_OK || j->refused) {
-        /* ffmpeg's own words, where it ended early */
+        /* the error message of ffmpeg, if it ended early */
         status = bst_video_end(ctx, j->video);
     } else {
         bst_video_abandon(j->video);

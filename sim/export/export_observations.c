@@ -1,4 +1,4 @@
-/* The directions that a run's sensors measured, for others. */
+/* Exports the directions that a run's sensors measured, as TDM, JSON or CSV. */
 #include <inttypes.h>
 #include <stdio.h>
 

@@ -1,5 +1,5 @@
-/* Orbits of a run, made again from the run's own scenario.json: true ones, and those that observers
- * believe to be on. */
+/* Exports orbits of a run as OEM or CZML, recomputed from its scenario.json: true orbits, and
+ * observers' orbits by onboard navigation. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -21,7 +21,7 @@
 #include "sim/run/run_observations.h"
 #include "sim/world/world.h"
 
-/* Simulated seconds that the run holds. */
+/* Simulated seconds in the run. */
 static double recorded_s(const bst_run_reader *run, const bst_scenario *scenario) {
     if (bst_run_reader_state(run) == BST_RUN_COMPLETE) {
         return scenario->duration_s;
@@ -35,19 +35,19 @@ static double recorded_s(const bst_run_reader *run, const bst_scenario *scenario
 
 enum { MOST_BREAKS = 4096, MOST_KEPT_ROWS = 65536 };
 
-/* One orbit, a stretch of it without a burn inside, on a grid of times. */
+/* An orbit between two burns, sampled at a grid of times. */
 typedef struct track {
     bst_world_view *view;
     const bst_world *world;
-    int observer, object; /* one is -1 */
-    int sensor;           /* whose knowledge of the observer is meant; -1: the truth */
+    int observer, object; /* the other one is -1 */
+    int sensor;           /* sensor whose onboard navigation is exported; -1: the truth */
     double step_s, span_s;
-    double breaks[MOST_BREAKS + 2]; /* 0, where burns begin and end, the end */
+    double breaks[MOST_BREAKS + 2]; /* 0, starts and ends of burns, end of the run */
     int break_count;
-    double from_s, to_s;   /* of the stretch */
-    int64_t inner;         /* first row of the grid after from_s */
-    int64_t first;         /* row of the stretch that a series begins with */
-    bst_world_state *kept; /* the first rows of the stretch, up to MOST_KEPT_ROWS; NULL: none */
+    double from_s, to_s;   /* of the piece */
+    int64_t inner;         /* first grid row after from_s */
+    int64_t first;         /* first row of a series within the piece */
+    bst_world_state *kept; /* cached first rows of the piece, up to MOST_KEPT_ROWS; NULL: none */
 } track;
 
 static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_world_state *out) {
@@ -59,7 +59,7 @@ static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_wor
                             : bst_world_view_object_state(ctx, t->view, t->object, seconds, out);
 }
 
-/* Rows of a stretch: its ends, and step, 2 step ... between them. */
+/* Number of rows of a piece: its ends, and step, 2 step ... between them. */
 static int64_t rows_of(track *t) {
     t->inner = (int64_t)floor(t->from_s / t->step_s + 1e-9) + 1;
     int64_t last = (int64_t)ceil(t->to_s / t->step_s - 1e-9) - 1;
@@ -70,7 +70,7 @@ static double seconds_of(const track *t, int64_t row) {
     return row == 0 ? t->from_s : fmin((double)(t->inner + row - 1) * t->step_s, t->to_s);
 }
 
-/* State of a row; at a stretch's end that of before a burn there. */
+/* State of a row; at the end of a piece, the state before a burn. */
 static bst_status row_state(const track *t, bst_ctx *ctx, double seconds, bst_world_state *out) {
     if (seconds < t->to_s || t->to_s >= t->span_s) {
         return state_of(t, ctx, seconds, out);
@@ -104,7 +104,7 @@ static void add_break(track *t, double seconds) {
     }
 }
 
-/* The object of the scenario's list with this name; NULL when there is none. */
+/* Finds an object of the scenario by name; NULL: none. */
 static const bst_object_config *find_object(const bst_scenario *scenario, const char *name) {
     const bst_object_config *objects = scenario->world.objects.items;
     for (int i = 0; i < scenario->world.objects.count; i++) {
@@ -115,8 +115,8 @@ static const bst_object_config *find_object(const bst_scenario *scenario, const 
     return NULL;
 }
 
-/* Where the motion of the track's orbit breaks: its own burns, and those of what it is relative to.
- */
+/* Collects the times at which an orbit is not smooth: its own burns and those of its reference
+ * orbits. */
 static void find_breaks(const bst_scenario *scenario, bool czml, track *t) {
     const bst_observer_config *observers = scenario->observers.items;
     const bst_object_config *object =
@@ -129,7 +129,7 @@ static void find_breaks(const bst_scenario *scenario, bool czml, track *t) {
                                                     : NULL;
     t->break_count = 0;
     t->breaks[t->break_count++] = 0.0;
-    /* positions, all that CZML holds, go on over a burn */
+    /* CZML has only positions, which are continuous at a burn */
     for (int depth = 0; orbit && !czml && depth <= scenario->world.objects.count; depth++) {
         const bst_burn_config *list = burns->items;
         for (int k = 0; k < burns->count; k++) {
@@ -145,7 +145,7 @@ static void find_breaks(const bst_scenario *scenario, bool czml, track *t) {
     t->breaks[t->break_count++] = t->span_s;
 }
 
-/* Writes `rows` rows from t->first on, the `piece`th stretch in which there is an orbit. */
+/* Writes `rows` rows from t->first on: the `piece`th interval in which the orbit exists. */
 static bst_status write_piece(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t,
                               int64_t rows, int piece) {
     const bst_world_object_info *info =
@@ -182,8 +182,7 @@ static bst_status write_piece(bst_ctx *ctx, const bst_export *e, FILE *stream, t
     return bst_oem_write_segment(ctx, stream, &segment);
 }
 
-/* Writes one orbit, in pieces: at burns, and where it is not there all the time (a decay, a file
- * that ends). */
+/* Writes one orbit in pieces: at burns, and where it does not exist (decay, end of a file). */
 static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
                             FILE *stream, track *t, int *written) {
     int pieces = 0;
@@ -193,7 +192,7 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenari
         t->from_s = t->breaks[k];
         t->to_s = t->breaks[k + 1];
         if (!(t->to_s > t->from_s)) {
-            continue; /* two burns at one time */
+            continue; /* two burns at the same time */
         }
         const int64_t rows = rows_of(t);
         for (int64_t row = 0; row < rows;) {
@@ -225,7 +224,7 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenari
     return BST_OK;
 }
 
-/* All observers, and the objects that are chosen. */
+/* Writes all observers and the selected objects. */
 static bst_status write_tracks(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
                                FILE *stream, track *t, const bst_orbit_selection *s, int *written) {
     int observers = bst_world_observer_count(t->world), objects = bst_world_object_count(t->world);
@@ -248,7 +247,7 @@ static bst_status write_tracks(bst_ctx *ctx, const bst_export *e, const bst_scen
     return status;
 }
 
-/* Whose orbits are written. */
+/* Objects and observers whose orbits are written. */
 typedef struct scene {
     const bst_scenario *scenario;
     const bst_world *world;
@@ -275,7 +274,7 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const scene *i
         BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
                                    "true states of a simulated run"));
     }
-    t.kept = malloc(MOST_KEPT_ROWS * sizeof *t.kept); /* without it states are computed twice */
+    t.kept = malloc(MOST_KEPT_ROWS * sizeof *t.kept); /* without memory states are computed twice */
     bst_status status = write_tracks(ctx, e, scenario, stream, &t, in->selection, written);
     free(t.kept);
     if (status == BST_OK && e->czml) {
@@ -287,7 +286,7 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const scene *i
     return status;
 }
 
-/* The observers' orbits as they believe them; of several sensors the first that is asked for. */
+/* Writes the observers' orbits by onboard navigation, of the first selected sensor. */
 static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const scene *in, FILE *stream,
                                  int *written) {
     const bst_scenario *scenario = in->scenario;
@@ -328,7 +327,7 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     bst_world_view *view = NULL;
     bst_orbit_selection selection = {0};
     int written = 0;
-    /* orbits need no stars */
+    /* orbits do not need stars */
     bst_world_config config = scenario->world;
     config.faint_stars = BST_FAINT_NONE;
     snprintf(config.star_catalogue, sizeof config.star_catalogue, "embedded");

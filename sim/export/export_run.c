@@ -1,4 +1,4 @@
-/* Everything that is exported of a run, in turn. */
+/* Executes all requested exports of a run, one after the other. */
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -11,7 +11,7 @@ bool bst_export_into_folder(const bst_export_parts *r) {
            r->orbits != BST_EXPORT_NOT || r->observations != BST_EXPORT_NOT;
 }
 
-/* The folder for what is made: RUN.export beside the run when none is given. */
+/* Creates the output folder: RUN.export beside the run by default. */
 static bst_status make_folder(bst_ctx *ctx, const char *given, const bst_run_reader *run, char *out,
                               size_t bytes) {
     const char *folder = bst_run_reader_folder(run);
@@ -29,8 +29,7 @@ static bst_status make_folder(bst_ctx *ctx, const char *given, const bst_run_rea
     return BST_OK;
 }
 
-/* The folder of --satnet, --coco or --yolo: a relative one lies in that of --out, where there is
- * one. */
+/* Folder of --satnet, --coco or --yolo; a relative path is inside --out. */
 static bst_status make_set_folder(bst_ctx *ctx, const char *given, const char *base,
                                   const bst_run_reader *run, char *out, size_t bytes) {
     char path[4096];
@@ -44,7 +43,7 @@ static bst_status make_set_folder(bst_ctx *ctx, const char *given, const char *b
     return make_folder(ctx, path, run, out, bytes);
 }
 
-/* Whether the run has frames among those asked for; a run that lost its tables is not asked. */
+/* Checks that the run has the requested frames; a run without tables is not checked. */
 static bst_status check_frames(bst_ctx *ctx, const bst_export *e, bool asked) {
     char sql[200];
     snprintf(sql, sizeof sql,
@@ -64,7 +63,7 @@ static bst_status check_frames(bst_ctx *ctx, const bst_export *e, bool asked) {
                                e->run, "SELECT max(exposure_id) FROM exposures", 0, 0));
 }
 
-/* The folders of --satnet, --coco and --yolo, in place of their names. */
+/* Resolves the folders of --satnet, --coco and --yolo. */
 static bst_status make_set_folders(bst_ctx *ctx, bst_export_parts *r, char sets[3][4096]) {
     const char **const of_sets[] = {&r->e.satnet, &r->e.coco, &r->e.yolo};
     for (int k = 0; k < 3; k++) {
@@ -79,7 +78,7 @@ static bst_status make_set_folders(bst_ctx *ctx, bst_export_parts *r, char sets[
     return BST_OK;
 }
 
-/* Everything that is asked for of an open run. */
+/* Executes all requested exports of an open run. */
 bst_status bst_export_run(bst_ctx *ctx, bst_export_parts *r) {
     bst_export *e = &r->e;
     char folder[4096], sets[3][4096];

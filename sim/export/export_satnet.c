@@ -1,8 +1,6 @@
-/* Frames with annotations as SatNet has them: ImageFiles/SET.NNNN.fits and
- * Annotations/SET.NNNN.json. Keys and meanings as in satsim/io/satnet.py of
- * github.com/ssc-ai/satsim (commit 03e5ff3): coordinates are fractions of the image between pixel
- * edges, (pixel + 0.5) / size.
- */
+/* Exports frames with SatNet annotations: ImageFiles/SET.NNNN.fits and Annotations/SET.NNNN.json.
+ * Keys and meanings as in satsim/io/satnet.py of github.com/ssc-ai/satsim (commit 03e5ff3):
+ * coordinates are fractions of the image between pixel edges, (pixel + 0.5) / size. */
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -43,14 +41,14 @@ bst_status bst_export_split(bst_ctx *ctx, const char *text, double shares[PARTS]
     return BST_OK;
 }
 
-/* The frames of one sensor on their way. */
+/* State of exporting the frames of one sensor. */
 typedef struct job {
     const bst_export *e;
     const bst_run_sensor *sensor;
     const bst_scenario *scenario;
     const bst_camera *camera;
     bst_fits_reader *fits;
-    bst_io_rows *truth; /* rows of the sensor, by exposure; on the first that was not taken */
+    bst_io_rows *truth; /* truth rows of the sensor, by exposure; at the next unprocessed row */
     bool truth_more;
     bool mask; /* the run has a segmentation mask */
     int64_t written;
@@ -61,7 +59,7 @@ typedef struct job {
 
 /* ------------------------------------------------------------------ one frame */
 
-/* What the tables say of a frame. */
+/* Values of a frame from the tables of the run. */
 typedef struct frame_row {
     int64_t id, fits_index;
     bst_fits_frame frame;
@@ -109,7 +107,7 @@ static bst_status read_frame_row(bst_ctx *ctx, const job *j, const bst_io_rows *
     return BST_OK;
 }
 
-/* Along one axis: start, middle and end as fractions of the image. */
+/* Adds start, middle and end along one axis, as fractions of the image. */
 static void put_axis(cJSON *node, char axis, const double v[3], double box) {
     const char *const names[] = {"min", "max", "center", "start", "mid", "end"};
     const double values[] = {bst_least_of_3(v),
@@ -134,14 +132,14 @@ static const char truth_sql[] =
     "LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
     " WHERE t.sensor = ?1 ORDER BY t.rowid";
 
-/* The label of the current row of the truth; NULL when it is none of the frame's. */
+/* Label of the current truth row; NULL: not in the frame. */
 static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height) {
     const bst_io_rows *r = j->truth;
     bool star = strcmp(bst_io_rows_text(r, 1), "star") == 0;
     double x[3], y[3], v_mag = bst_io_rows_real(r, 10), electrons = bst_io_rows_real(r, 11);
     double binning = f->binning > 1 ? f->binning : 1;
     double chief_x = bst_io_rows_real(r, 17), chief_y = bst_io_rows_real(r, 18);
-    /* boxes hold the light, which the optics put beside the chief ray */
+    /* boxes enclose the light, which the optics shift from the chief ray */
     double beside_x = bst_io_rows_real(r, 19) - chief_x,
            beside_y = bst_io_rows_real(r, 20) - chief_y;
     for (int k = 0; k < 3; k++) {
@@ -184,7 +182,7 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
     return node;
 }
 
-/* Labels of a frame: the rows of its exposure, of which earlier ones are left behind. */
+/* Adds the labels of a frame from the truth rows of its exposure; skips earlier rows. */
 static bst_status add_labels(bst_ctx *ctx, job *j, const frame_row *row, int width, int height,
                              cJSON *list, int *satellites) {
     *satellites = 0;
@@ -256,7 +254,8 @@ static bst_status write_annotation(bst_ctx *ctx, job *j, const frame_row *row, c
     return status;
 }
 
-/* The part that a frame belongs to follows from its name alone (FNV-1a, mixed as in SplitMix64). */
+/* Selects training, validation or test from the frame's name only (FNV-1a, mixed as in
+ * SplitMix64). */
 static int part_of(const job *j, const char *name) {
     uint64_t h = bst_fnv(BST_FNV_START, name, strlen(name));
     h = (h ^ (h >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);

@@ -16,11 +16,11 @@
 
 typedef struct states {
     const bst_export_states_request *request;
-    bst_sky_clock *clock; /* NULL in TEME */
+    bst_sky_clock *clock; /* NULL for TEME */
     FILE *stream;
 } states;
 
-/* One satellite, as the writers ask for its states. */
+/* A satellite, for the state series of a writer. */
 typedef struct satellite {
     const states *states;
     const bst_elements *elements;
@@ -31,14 +31,14 @@ static bst_time time_of(const bst_export_states_request *q, int64_t row) {
     return bst_time_at_tick(q->start, row * q->step_ticks, BST_EXPORT_STATES_TICKS_PER_SECOND);
 }
 
-/* Minutes from the element set's epoch, days of UTC counted as uniform, as the theory does. */
+/* Minutes after the element epoch; SGP4 counts uniform days of UTC. */
 static double minutes_of(const bst_elements *e, bst_time t) {
     double jd1, jd2;
     bst_time_utc(t, &jd1, &jd2);
     return (jd1 - e->epoch_utc_jd1) * 1440.0 + (jd2 - e->epoch_utc_jd2) * 1440.0;
 }
 
-/* Number of rows before SGP4 ends, and why it does. */
+/* Number of rows until SGP4 fails, and the reason. */
 static int64_t valid_rows(const bst_export_states_request *q, const bst_elements *e,
                           const bst_sgp4 *sgp4, bst_sgp4_error *error) {
     double r[3], v[3];
@@ -51,7 +51,7 @@ static int64_t valid_rows(const bst_export_states_request *q, const bst_elements
     return q->rows;
 }
 
-/* The designator of the launch as OEM writes it: "13009D" becomes "2013-009D". */
+/* International designator in OEM format: "13009D" becomes "2013-009D". */
 static void object_id(const bst_elements *e, char *buffer, size_t bytes) {
     const char *d = e->designator;
     if (strlen(d) < 6 || strspn(d, "0123456789") < 5) {
@@ -89,7 +89,7 @@ static bst_status write_file_head(bst_ctx *ctx, const bst_export_states_request 
     return bst_oem_write_head(ctx, stream, created, "BORESIGHT", NULL);
 }
 
-/* State at a row, km and km/s. */
+/* State of a satellite at a row, km and km/s. */
 static bst_status state_km(bst_ctx *ctx, const satellite *s, int64_t row, bst_time *t, bst_vec3 *r,
                            bst_vec3 *v) {
     double p[3] = {0}, w[3] = {0};
@@ -151,8 +151,8 @@ static bst_status write_rows(bst_ctx *ctx, satellite *s, int64_t rows) {
     return BST_OK;
 }
 
-/* Writes one satellite. *complete is false when SGP4 could not go to the end, which is told on the
- * standard error at once and does not stop the other satellites. */
+/* Writes one satellite. *complete false: SGP4 did not reach the end; a message goes to standard
+ * error and the other satellites continue. */
 static bst_status write_object(bst_ctx *ctx, const states *s, const bst_elements *e,
                                bool *complete) {
     const bst_export_states_request *q = s->request;
@@ -188,7 +188,7 @@ typedef struct candidate {
     double age_minutes;
 } candidate;
 
-/* By satellite, then nearest to the start (of equals, the first in the file). */
+/* Orders element sets by satellite, then by nearest epoch (then file order). */
 static int compare_candidates(const void *x, const void *y) {
     const candidate *a = x, *b = y;
     if (a->norad != b->norad) {
@@ -200,7 +200,7 @@ static int compare_candidates(const void *x, const void *y) {
     return a->index - b->index;
 }
 
-/* Marks the one set of each satellite that is taken. */
+/* Selects one element set per satellite. */
 static bst_status choose(bst_ctx *ctx, const bst_export_states_request *q, const bst_elements *sets,
                          int count, bool *taken) {
     candidate *list = malloc((size_t)count * sizeof *list);
@@ -242,7 +242,7 @@ static bst_status write_all(bst_ctx *ctx, const states *s, const bst_elements *s
     return status;
 }
 
-/* Opens what the request needs, writes, and closes everything. */
+/* Opens files and Earth orientation, writes all satellites, closes everything. */
 bst_status bst_export_states(bst_ctx *ctx, const bst_export_states_request *q, bool *complete) {
     bst_elements *sets = NULL;
     int count = 0;
@@ -259,7 +259,7 @@ bst_status bst_export_states(bst_ctx *ctx, const bst_export_states_request *q, b
             status = bst_sky_clock_create(ctx, eop, &s.clock);
         }
         bst_sky_rotation sky;
-        /* both ends first, so that nothing is written for dates that the table does not cover */
+        /* check both ends first: write nothing for dates outside the table */
         for (int end = 0; end < 2 && status == BST_OK; end++) {
             status = bst_sky_clock_at(ctx, s.clock, time_of(q, end ? q->rows - 1 : 0), &sky);
             if (status == BST_ERR_RANGE) {

@@ -1,4 +1,4 @@
-/* Positions and velocities from element sets, by SGP4. */
+/* Exports positions and velocities from element sets by SGP4. */
 #ifndef BST_EXPORT_EXPORT_STATES_H
 #define BST_EXPORT_EXPORT_STATES_H
 
@@ -9,24 +9,24 @@
 enum { BST_EXPORT_STATES_TEME, BST_EXPORT_STATES_GCRF };
 enum { BST_EXPORT_STATES_CSV, BST_EXPORT_STATES_OEM, BST_EXPORT_STATES_CZML };
 
-/* Steps are whole microseconds, so that times are ticks and nothing accumulates. */
+/* Steps are whole microseconds: times are ticks, and rounding does not accumulate. */
 enum { BST_EXPORT_STATES_TICKS_PER_SECOND = 1000000 };
 
 typedef struct bst_export_states_request {
     const char *elements; /* file of element sets */
     const char *output;   /* NULL: the standard output */
-    const char *eop_path; /* Earth orientation; NULL: the program's own */
+    const char *eop_path; /* Earth orientation; NULL: built-in */
     int norad;            /* 0: all */
     int frame, format;    /* BST_EXPORT_STATES_... */
     int gravity, mode;    /* bst_sgp4_gravity, bst_sgp4_mode */
     bst_time start;
     int64_t step_ticks, rows;
-    int time_digits; /* of seconds */
+    int time_digits; /* decimals of the seconds */
 } bst_export_states_request;
 
-/* Writes the states of all satellites, of several sets of one satellite those of the set whose
- * epoch is nearest to the start. *complete: whether SGP4 reached the last row of each. Errors: what
- * reading and writing fail with, and times that the Earth orientation does not cover. */
+/* Writes the states of all satellites, each from its element set with the epoch nearest to the
+ * start. *complete: SGP4 reached the last row of all. Errors of reading and writing, and times
+ * outside the Earth orientation data. */
 bst_status bst_export_states(bst_ctx *ctx, const bst_export_states_request *request,
                              bool *complete) BST_MUST_CHECK;
 

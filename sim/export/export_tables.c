@@ -6,7 +6,7 @@
 #include "sim/export/export.h"
 #include "sim/io/csv.h"
 
-/* Whether `name` is a word of the list "a,b". */
+/* Checks whether `name` is in the list "a,b". */
 static bool is_listed(const char *list, const char *name) {
     size_t length = strlen(name);
     for (const char *word = list; word; word = strchr(word, ',')) {
@@ -43,7 +43,7 @@ static bst_status check_names(bst_ctx *ctx, const bst_export *e, const char *tab
     return BST_OK;
 }
 
-/* The column that says when a row holds: the first of these. */
+/* Column with the time of a row: the first of these. */
 static const char time_column[] =
     "SELECT \"column\" FROM columns WHERE \"table\" = (SELECT \"table\" FROM tables"
     " WHERE rowid = ?1) AND \"column\" IN ('mid_s', 'time_s', 'start_s')"
@@ -60,7 +60,7 @@ static bst_status make_sql(bst_ctx *ctx, const bst_export *e, int64_t number, co
         snprintf(utc, sizeof utc, "utc(%.60s) AS utc, ", bst_io_rows_text(rows, 0));
     }
     bst_io_rows_close(rows);
-    /* stars and objects are numbered apart; together they need a name of their own */
+    /* stars and objects are numbered separately; the CSV needs a column for both */
     bool truth = strcmp(name, "truth") == 0;
     snprintf(sql, bytes, "SELECT %s%s* FROM \"%s\"", utc,
              truth ? "kind || '-' || id AS source, " : "", name);
@@ -103,7 +103,7 @@ bst_status bst_export_tables(bst_ctx *ctx, const bst_export *e, const char *tabl
     while ((status = bst_io_rows_next(ctx, list, &more)) == BST_OK && more) {
         char name[64];
         snprintf(name, sizeof name, "%s", bst_io_rows_text(list, 1));
-        /* names that the recorder does not give are no tables of a run */
+        /* the recorder does not create tables with such names */
         if (strpbrk(name, "\"'/.") || (tables && !is_listed(tables, name))) {
             continue;
         }

@@ -1,5 +1,5 @@
-/* Fields of view in CZML: a frustum of lines from each observer along the corners of its sensor, in
- * the true attitudes that the run recorded. */
+/* Exports fields of view to CZML: a frustum from each observer along the corners of its sensor, at
+ * the recorded true attitudes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,10 +10,10 @@
 
 enum { CORNERS = 4, MOST_ROWS = 4096 };
 
-/* How far the corners are drawn where no object was in the field. */
+/* length of the frustum if no object was in the field */
 #define LENGTH_M 1e6
 
-/* Where the camera looked at the middle of an exposure. */
+/* Camera attitude at mid-exposure. */
 typedef struct pose {
     double seconds, pixel_scale_arcsec;
     bst_quat q_cam_from_gcrf;
@@ -23,13 +23,13 @@ typedef struct frustum {
     bst_world_view *view;
     const bst_world *world;
     const bst_camera *camera;
-    int observer, corner; /* corner < 0: the eye itself */
+    int observer, corner; /* corner < 0: the observer itself */
     double length_m;
     pose *poses;
     int64_t count;
 } frustum;
 
-/* Place of a corner (or of the eye) at a pose. */
+/* Position of a corner (or of the observer) at a pose. */
 static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
                          bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const frustum *f = user;
@@ -52,7 +52,7 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
     return BST_OK;
 }
 
-/* Reads the poses of a sensor, thinned out where there are very many. */
+/* Reads the camera attitudes of a sensor, thinned if there are many. */
 static bst_status read_poses(bst_ctx *ctx, const bst_export *e, int64_t sensor, frustum *f) {
     bst_io_rows *rows;
     bool more;
@@ -102,7 +102,7 @@ static double length_of(bst_ctx *ctx, const bst_export *e, int64_t sensor) {
 
 static bst_status write_frustum(bst_ctx *ctx, FILE *stream, const char *name, frustum *f) {
     static const unsigned char colour[4] = {120, 255, 255, 120};
-    /* eye, corner, next corner, eye, ... */
+    /* observer, corner, next corner, observer, ... */
     static const int way[] = {0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 1};
     char ids[CORNERS + 1][200];
     const char *line[sizeof way / sizeof *way];
@@ -133,7 +133,7 @@ static bst_status write_frustum(bst_ctx *ctx, FILE *stream, const char *name, fr
 
 bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
                             const bst_world *world, bst_world_view *view, FILE *stream) {
-    /* a run that did not record the truth has no attitudes */
+    /* a run without recorded truth has no attitudes */
     if (!bst_run_reader_has_tables(e->run) ||
         bst_run_reader_int(e->run, "SELECT count(*) FROM exposures", 0, 0) < 1) {
         return BST_OK;

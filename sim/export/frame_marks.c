@@ -10,16 +10,15 @@
 
 #include "sim/eval/loop_figures.h"
 
-/* Rows of a table in the order of their first column. */
+/* Rows of a table, ordered by their first column. */
 typedef struct cursor {
-    bst_io_rows *rows; /* NULL: no such table, or all are read */
-    bool held;         /* the current row waits for its turn */
+    bst_io_rows *rows; /* NULL: no such table, or all rows read */
+    bool held;         /* the current row has not been used yet */
 } cursor;
 
 enum { FRAMES, EXPOSURES, OBJECTS, DETECTIONS, TRACKS, MODES, CURSORS };
 
-/* The first column is the key that the cursor advances by; ?1 is the sensor. Rows were written in
- * the order of exposures. */
+/* The first column is the key of the cursor; ?1: the sensor. Rows are in the order of exposures. */
 static const char *const queries[CURSORS] = {
     [FRAMES] =
         "SELECT exposure_id, x0_px, y0_px, binning, utc(start_s + exposure_s / 2),"
@@ -45,7 +44,7 @@ struct bst_frame_marks {
     cursor cursors[CURSORS], planes;
     bst_io_overlay_mark *marks;
     int count, room;
-    bool has_target; /* its true place on the frame */
+    bool has_target; /* its true position on the frame */
     double target_x_px, target_y_px;
     char mode[32], caption[200];
     double x0, y0, binning; /* of the frame */
@@ -87,7 +86,7 @@ void bst_frame_marks_free(bst_frame_marks *m) {
     }
 }
 
-/* Goes to the next row whose key is `low` to `high`; *found is false when there is none (yet). */
+/* Advances to the next row whose key is `low` to `high`; *found false: none (yet). */
 static bst_status advance(bst_ctx *ctx, cursor *c, int64_t low, int64_t high, bool *found) {
     *found = false;
     while (c->rows) {
@@ -118,7 +117,7 @@ bst_status bst_frame_marks_exposure(bst_ctx *ctx, bst_frame_marks *m, int64_t fi
     return BST_OK;
 }
 
-/* A new mark at a place of the sensor. */
+/* Adds a mark at a sensor position. */
 static bst_status add(bst_ctx *ctx, bst_frame_marks *m, bst_io_overlay_kind kind, double importance,
                       double x_px, double y_px) {
     if (m->count == m->room) {
@@ -130,7 +129,10 @@ static bst_status add(bst_ctx *ctx, bst_frame_marks *m, bst_io_overlay_kind kind
         m->marks = more;
         m->room = room;
     }
-    double middle = 0.5 * (m->binning - 1.0); /* of a binned pixel, from its first pixel's centre */
+    double middle =
+        0.5 *
+        (m->binning -
+         1.0); /* centre of a binned pixel, relative to the centre of its first sensor pixel */
     m->marks[m->count++] = (bst_io_overlay_mark){.kind = kind,
                                                  .x_px = (x_px - m->x0 - middle) / m->binning,
                                                  .y_px = (y_px - m->y0 - middle) / m->binning,

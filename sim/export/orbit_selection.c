@@ -9,8 +9,8 @@ static void choose(bst_orbit_selection *s, int object) {
     s->chosen[object] = true;
 }
 
-/* Chooses the objects whose indices, or names, a query returns. A table that the run did not record
- * has none. */
+/* Selects the objects whose indices or names a query returns. A table that was not recorded selects
+ * none. */
 static bst_status choose_rows(bst_ctx *ctx, const bst_run_reader *run, const bst_world *world,
                               const char *sql, bst_orbit_selection *s) {
     bst_io_rows *rows;
@@ -41,7 +41,7 @@ static bst_status choose_seen(bst_ctx *ctx, const bst_run_reader *run, const bst
     return choose_rows(ctx, run, world, "SELECT target FROM sensors", s);
 }
 
-/* Chooses the objects with this name, or this number in the catalogue; false: there is none. */
+/* Selects the objects with this name or catalogue number; false: none. */
 static bool choose_entry(const bst_world *world, const char *entry, size_t length,
                          bst_orbit_selection *s) {
     bool found = false, number = length > 0 && strspn(entry, "0123456789") >= length;
@@ -58,7 +58,7 @@ static bool choose_entry(const bst_world *world, const char *entry, size_t lengt
     return found;
 }
 
-/* Each entry is the longest piece up to a comma that is an object. */
+/* Parses a list of objects: each entry is the longest text up to a comma that names an object. */
 static bst_status choose_list(bst_ctx *ctx, const bst_world *world, const char *text,
                               bst_orbit_selection *s) {
     for (const char *entry = text;;) {

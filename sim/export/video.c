@@ -11,20 +11,20 @@
 #include "sim/core/draft.h"
 #include "sim/core/subprocess.h"
 
-/* A film takes at most 1 MB for each second that it lasts, if it lasts a second and a frame: the
- * buffer model of H.264 (ITU-T H.264, annex C) bounds any stretch of T seconds by rate T + buffer.
- */
+/* Limits a video to 1 MB per second of duration, for more than a second plus a frame: by the buffer
+ * model of H.264 (ITU-T H.264, annex C) any interval of T seconds has at most rate T + buffer
+ * bits. */
 #define MOST_BITS_PER_S 6e6
 #define BUFFER_BITS 2e6
 
 struct bst_video {
     char path[4096], draft[4160], words[4160];
-    size_t bytes; /* of a frame */
-    bool refused; /* a frame was not taken: whatever is there is not whole */
+    size_t bytes; /* per frame */
+    bool refused; /* ffmpeg rejected a frame: the file is incomplete */
     bst_subprocess child;
 };
 
-/* Whether this ffmpeg can encode H.264. */
+/* Checks whether ffmpeg can encode H.264. */
 static bst_status has_x264(bst_ctx *ctx, bool *out) {
     const char *const argv[] = {"ffmpeg", "-hide_banner", "-encoders", NULL};
     bst_subprocess child;
@@ -43,7 +43,7 @@ static bst_status has_x264(bst_ctx *ctx, bool *out) {
     return BST_OK;
 }
 
-/* The film, which ffmpeg writes into the file that is there (-y), and what it says. */
+/* Creates the drafts of the video, which ffmpeg overwrites (-y), and of its messages. */
 static bst_status make_drafts(bst_ctx *ctx, bst_video *v) {
     int fd;
     BST_TRY(bst_draft_make(ctx, v->path, v->draft, sizeof v->draft, &fd));
@@ -70,7 +70,7 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
         free(v);
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
     }
-    /* a path is never taken for an option or a protocol */
+    /* a path must not look like an option or a protocol */
     const char *here = path[0] == '/' ? "" : "./";
     snprintf(v->path, sizeof v->path, "%s%s", here, path);
     bst_status status = make_drafts(ctx, v);
@@ -90,7 +90,7 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
         "-pixel_format", "bgr24", "-video_size", size, "-framerate", rate, "-i", "pipe:0", "-an",
         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-c:v",
         x264 ? "libx264" : "mpeg4", x264 ? "-crf" : "-b:v", x264 ? "20" : most,
-        /* the marks' colours stay, which the grey noise does not need */
+        /* keeps the colours of the marks, at the expense of the grey noise */
         x264 ? "-x264-params" : "-qmin", x264 ? "chroma-qp-offset=-12" : "2", "-maxrate", most,
         "-bufsize", buffer, "-movflags", "+faststart", "-f", "mp4", output, NULL};
     status = bst_subprocess_start_fed(ctx, argv, v->words, &v->child);
@@ -113,7 +113,7 @@ bst_status bst_video_add(bst_ctx *ctx, bst_video *video, const uint8_t *bgr) {
     return BST_OK;
 }
 
-/* The first line of what ffmpeg said. */
+/* Reads the first line of ffmpeg's messages. */
 static void read_words(const bst_video *video, char *text, size_t bytes) {
     FILE *file = fopen(video->words, "re");
     snprintf(text, bytes, "no reason given");

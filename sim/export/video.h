@@ -1,4 +1,4 @@
-/* A film, made by the program ffmpeg as a child process. */
+/* Writes a video with ffmpeg as a child process. */
 #ifndef BST_EXPORT_VIDEO_H
 #define BST_EXPORT_VIDEO_H
 
@@ -8,17 +8,16 @@
 
 typedef struct bst_video bst_video;
 
-/* Begins an MP4 file of width x height pixels (H.264, or MPEG-4 where ffmpeg lacks libx264; 4:2:0,
- * sides made even; at most 1 MB per second of film, at a quality that this allows) at `path`, which
- * appears when bst_video_end succeeds. BST_ERR_NOT_FOUND when there is no ffmpeg: the message says
- * what to install. Ignore SIGPIPE. */
+/* Begins an MP4 video of width x height pixels (rounded to even) at `path`, which appears with
+ * bst_video_end. H.264, or MPEG-4 if ffmpeg has no libx264; 4:2:0; best quality within 1 MB per
+ * second. BST_ERR_NOT_FOUND: no ffmpeg; the message names the package. Ignore SIGPIPE. */
 bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height, double frame_rate,
                            bst_video **out) BST_MUST_CHECK;
-/* Adds a frame of 3 * width * height bytes, blue first. BST_ERR_IO when ffmpeg ended. */
+/* Adds a frame of 3 * width * height bytes, blue first. BST_ERR_IO: ffmpeg has ended. */
 bst_status bst_video_add(bst_ctx *ctx, bst_video *video, const uint8_t *bgr) BST_MUST_CHECK;
-/* Completes the file; frees `video` in every case. BST_ERR_IO with ffmpeg's own words. */
+/* Completes the video and frees it, also after an error. BST_ERR_IO with ffmpeg's message. */
 bst_status bst_video_end(bst_ctx *ctx, bst_video *video) BST_MUST_CHECK;
-/* Gives it up: no file is left. NULL is allowed. */
+/* Abandons a video and removes its file. NULL is allowed. */
 void bst_video_abandon(bst_video *video);
 
 #endif

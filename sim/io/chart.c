@@ -6,20 +6,20 @@
 #include "boresight/messages.h"
 #include "sim/io/html.h"
 
-/* Margins round the plotting area; the left one is the chart's own. */
+/* margins around the plotting area; the left margin belongs to the chart */
 #define MARGIN_TOP 10.0
 #define MARGIN_RIGHT 16.0
 #define MARGIN_BOTTOM 40.0
 #define MARGIN_BARE 12.0
-/* Steps of a path per unit of the chart. */
+/* path coordinates per unit of the chart */
 #define FINE 10.0
-/* What lies off the axes is drawn at most so many heights away. */
+/* values off the axes are drawn at most this many heights away */
 #define OFF_SCALE 2.0
 
 enum { MOST_TICKS = 40, MOST_COLUMNS = 512 };
 
 void bst_chart_style(FILE *out) {
-    /* after Okabe and Ito, somewhat darker on light ground; then the grounds of the modes */
+    /* after Okabe and Ito, darker for a light background; then the backgrounds of the modes */
     static const char *const light[] = {"#0b62a8", "#c25b00", "#00795a", "#b3261e",
                                         "#8b3f86", "#7a5a00", "#1a8fb8", "#6b7480"};
     static const char *const dark[] = {"#6db3f2", "#f0a04b", "#4cc9a0", "#ff8a80",
@@ -92,7 +92,7 @@ void bst_chart_fit(bst_chart_axis *axis, double low, double high, double margin)
         return;
     }
     double length = high - low;
-    if (!(length > 1e-9 * fmax(fabs(low), fabs(high)))) { /* no number would tell it */
+    if (!(length > 1e-9 * fmax(fabs(low), fabs(high)))) { /* below numerical resolution */
         length = fmax(fabs(low), 1.0) * 0.1;
         margin = 1.0;
     }
@@ -103,7 +103,7 @@ void bst_chart_fit(bst_chart_axis *axis, double low, double high, double margin)
 static int decades(double low, double high, int wanted, double *ticks, int room) {
     int first = (int)ceil(log10(low) - 1e-9), last = (int)floor(log10(high) + 1e-9), count = 0;
     int every = (last - first) / (wanted > 1 ? wanted : 1) + 1;
-    bool between = last - first < 2; /* few whole decades: 2 and 5 as well */
+    bool between = last - first < 2; /* few decades: ticks at 2 and 5 too */
     for (int k = first - 1; k <= last; k++) {
         static const double steps[] = {1.0, 2.0, 5.0};
         for (int i = 0; i < 3; i++) {
@@ -144,7 +144,7 @@ int bst_chart_ticks(double low, double high, bool logarithmic, int wanted, doubl
     return count;
 }
 
-/* x = high belongs to the last one. */
+/* Column of x when a line is thinned; x = high belongs to the last column. */
 static double column_of(double x, double low, double scale, int columns) {
     return fmin(floor((x - low) * scale), columns - 1.0);
 }
@@ -201,12 +201,12 @@ static double along(const bst_chart_axis *axis, double value) {
     return (value - axis->low) / (axis->high - axis->low);
 }
 
-/* What is not a number becomes `low`. */
+/* Limits v to low..high; NAN becomes `low`. */
 static double clamp(double v, double low, double high) {
     return v > high ? high : v > low ? v : low;
 }
 
-/* Place in the plotting area, not beyond it. */
+/* x coordinate in the SVG, limited to the plotting area. */
 static double inside_x(const bst_chart *c, double x) {
     return c->left + c->inner_width * clamp(along(&c->x, x), 0.0, 1.0);
 }
@@ -228,14 +228,14 @@ static void put_number(FILE *out, double value, int decimals) {
     fputs(text, out);
 }
 
-/* Ticks of the vertical axis. */
+/* Computes the ticks of the vertical axis. */
 static int y_ticks(const bst_chart *c, double ticks[MOST_TICKS], int *decimals) {
     return c->y.bare ? 0
                      : bst_chart_ticks(c->y.low, c->y.high, c->y.logarithmic,
                                        (int)(c->inner_height / 32.0), ticks, MOST_TICKS, decimals);
 }
 
-/* Room for the longest number of the vertical axis, and for its label. */
+/* Left margin for the longest number of the vertical axis and its label. */
 static double needed_left(const bst_chart *c) {
     double ticks[MOST_TICKS];
     int decimals, longest = 0, n = y_ticks(c, ticks, &decimals);
@@ -348,7 +348,8 @@ void bst_chart_bar(const bst_chart *c, double x0, double x1, double y0, double y
     }
 }
 
-/* A path inside the plotting area: coordinates are whole steps from its upper left corner. */
+/* Writes an SVG path inside the plotting area; coordinates are integers from the upper left
+ * corner. */
 typedef struct pen {
     FILE *out;
     const bst_chart *chart;
@@ -376,7 +377,7 @@ static void pen_to(pen *p, double x, double y) {
     long px = step_x(p->chart, x), py = step_y(p->chart, y);
     if (!p->down) {
         fprintf(p->out, "M%ld %ldl", px, py);
-        fputs("0 0", p->out); /* a lone point is a dot of the line's width */
+        fputs("0 0", p->out); /* a single point is a dot of the line's width */
     } else if (px != p->x || py != p->y) {
         fprintf(p->out, " %ld %ld", px - p->x, py - p->y);
     }
@@ -385,7 +386,7 @@ static void pen_to(pen *p, double x, double y) {
     p->down = true;
 }
 
-/* Columns that lines are thinned out to: two units wide. */
+/* Number of columns for thinning lines: each two units wide. */
 static int columns_of(const bst_chart *c) {
     return (int)clamp(0.5 * c->inner_width, 16.0, MOST_COLUMNS);
 }
@@ -428,11 +429,11 @@ void bst_chart_area(const bst_chart *c, const double *x, const double *low, cons
 }
 
 void bst_chart_dots(const bst_chart *c, const double *x, const double *y, size_t n, int colour) {
-    /* a place, in whole units, is drawn once; all of them where there is no memory to know by */
+    /* each integer position is drawn once; without memory all points are drawn */
     size_t wide = (size_t)c->inner_width + 2, high = (size_t)c->inner_height + 2;
     bool *taken = calloc(wide * high, sizeof *taken);
     open_clip(c);
-    /* round caps on strokes without length: one path for all dots */
+    /* round caps on strokes of zero length: one path for all dots */
     fprintf(c->out,
             "<path class=\"l c%d\" style=\"stroke-width:3.4\" stroke-linecap=\"round\" d=\"",
             colour);

@@ -1,10 +1,8 @@
-/* Charts as SVG for a page of HTML: axes, lines, dots, bars, bands and lanes. They take their
- * colours from the page (bst_chart_style), so that they can be read on light and dark ground and in
- * print, need no other program, and are the same bytes for the same data. sim/io/plot.h draws
- * pictures that stand alone, through gnuplot.
- *
- * Order of calls: bst_chart_begin, then what is behind before what is in front, bst_chart_end.
- * Errors are those of the stream. */
+/* SVG charts for HTML reports: axes, lines, dots, bars, bands. Colours come from the page's style
+ * sheet (bst_chart_style), so that charts suit light and dark pages and print. The output depends
+ * on the data only. sim/io/plot.h makes separate pictures with gnuplot.
+ * Order of calls: bst_chart_begin, then background before foreground, bst_chart_end. Errors are
+ * those of the stream. */
 #ifndef BST_IO_CHART_H
 #define BST_IO_CHART_H
 
@@ -13,7 +11,7 @@
 #include <stdio.h>
 
 typedef struct bst_chart_axis {
-    const char *label; /* "" for none */
+    const char *label; /* "": none */
     double low, high;
     bool logarithmic;
     bool bare; /* no ticks and no numbers */
@@ -21,15 +19,15 @@ typedef struct bst_chart_axis {
 
 typedef struct bst_chart {
     FILE *out;
-    const char *name;     /* what it shows, for those who cannot see it */
-    double width, height; /* of the whole, units of the SVG; about pixels */
+    const char *name;     /* description for screen readers */
+    double width, height; /* of the SVG, in its units; about pixels */
     bst_chart_axis x, y;
-    double margin_left; /* of the plotting area at least; more where the numbers need it */
-    /* set by bst_chart_begin: the plotting area */
+    double margin_left; /* minimum left margin; increased if the numbers need it */
+    /* plotting area, set by bst_chart_begin */
     double left, top, inner_width, inner_height;
 } bst_chart;
 
-/* Colours. The first eight can be told apart by people who do not see all colours. */
+/* Colours. The first eight are distinguishable with colour vision deficiency. */
 typedef enum bst_chart_colour {
     BST_CHART_BLUE,
     BST_CHART_ORANGE,
@@ -39,34 +37,33 @@ typedef enum bst_chart_colour {
     BST_CHART_BROWN,
     BST_CHART_CYAN,
     BST_CHART_GREY,
-    BST_CHART_MODE /* + a bst_mode: grounds of the modes */
+    BST_CHART_MODE /* + a bst_mode: backgrounds of the modes */
 } bst_chart_colour;
 
 /* Writes the style sheet that charts need, without the <style> tags. */
 void bst_chart_style(FILE *out);
 
-/* Widens low..high by the finite values among n (only those above 0 where `logarithmic`); begin
- * with low = INFINITY, high = -INFINITY. */
+/* Extends low..high to the finite values among n (only positive ones if `logarithmic`). Begin with
+ * low = INFINITY, high = -INFINITY. */
 void bst_chart_widen(const double *values, size_t n, bool logarithmic, double *low, double *high);
-/* Makes an axis of a range that may be empty or a point: a margin of `margin` of its length (0.05)
- * on either side, whole decades on a logarithmic one. */
+/* Sets an axis to a range, which may be empty or a point: adds `margin` (0.05) of its length on
+ * either side, or whole decades on a logarithmic axis. */
 void bst_chart_fit(bst_chart_axis *axis, double low, double high, double margin);
 
-/* Places of about `wanted` ticks from low to high, at most `room`; *decimals gets the digits after
- * the point that tell them apart, -1 where %g is better. Returns their number. */
+/* Positions of about `wanted` ticks from low to high, at most `room`. *decimals: digits after the
+ * point, -1: use %g. Returns their number. */
 int bst_chart_ticks(double low, double high, bool logarithmic, int wanted, double *ticks, int room,
                     int *decimals);
 
 /* A point of a thinned line. */
 typedef struct bst_chart_point {
-    double x, y; /* y NAN: the line is broken here */
+    double x, y; /* y NAN: gap in the line */
 } bst_chart_point;
 
-/* Thins a line out: of the points of each of `columns` equal parts of low..high the first, the
- * lowest, the highest and the last remain, in their order; what a drawing of so many columns shows
- * stays the same. Up to 4 * columns points are kept as they are. x ascends. A part in which no y is
- * finite breaks the line. Returns the number of points, at most 5 * columns + 1: the room in `out`.
- */
+/* Thins a line for drawing: of the points in each of `columns` equal parts of low..high it keeps
+ * the first, lowest, highest and last. Up to 4 * columns points are unchanged. x ascends. A part
+ * without finite y is a gap. Returns the number of points, at most 5 * columns + 1, the capacity of
+ * `out`. */
 size_t bst_chart_thin(const double *x, const double *y, size_t n, double low, double high,
                       int columns, bst_chart_point *out);
 
@@ -77,33 +74,33 @@ void bst_chart_begin(bst_chart *chart);
 /* Ends a chart: draws its frame and closes the SVG element. */
 void bst_chart_end(bst_chart *chart);
 
-/* Grounds from from[i] to to[i], the whole height. `title` is shown under the pointer; NULL for
+/* Draws background bands from from[i] to to[i] over the full height. `title`: tooltip; NULL:
  * none. */
 void bst_chart_bands(const bst_chart *chart, const double *from, const double *to, size_t n,
                      int colour, const char *title);
-/* A line through points; one whose y is not finite breaks it. Thinned out where there are many. */
+/* Draws a line through points, thinned if there are many; a non-finite y is a gap. */
 void bst_chart_line(const bst_chart *chart, const double *x, const double *y, size_t n, int colour,
                     bool dashed);
-/* Points; of many in one place one is drawn. */
+/* Draws dots; of several dots at one pixel only one. */
 void bst_chart_dots(const bst_chart *chart, const double *x, const double *y, size_t n, int colour);
-/* An area between low and high, for intervals along a curve. */
+/* Fills the area between low and high, for confidence bands. */
 void bst_chart_area(const bst_chart *chart, const double *x, const double *low, const double *high,
                     size_t n, int colour);
-/* A vertical interval at each x. */
+/* Draws a vertical interval (error bar) at each x. */
 void bst_chart_whiskers(const bst_chart *chart, const double *x, const double *low,
                         const double *high, size_t n, int colour);
-/* A bar from x0 to x1 and y0 to y1. */
+/* Draws a bar from (x0, y0) to (x1, y1). */
 void bst_chart_bar(const bst_chart *chart, double x0, double x1, double y0, double y1, int colour,
                    const char *title);
-/* A horizontal line at y. */
+/* Draws a horizontal line at y. */
 void bst_chart_rule(const bst_chart *chart, double y, int colour);
-/* A vertical line at x; nothing if x is outside the axis. */
+/* Draws a vertical line at x, if x is on the axis. */
 void bst_chart_mark(const bst_chart *chart, double x, int colour);
-/* A word at a place of the axes, dx and dy beside it; anchor "start", "middle" or "end". */
+/* Writes text at a position of the axes plus (dx, dy); anchor "start", "middle" or "end". */
 void bst_chart_word(const bst_chart *chart, double x, double y, double dx, double dy,
                     const char *anchor, const char *text);
 
-/* Units for a span of time: its name ("s", "min", "h", "d") and how many seconds it has. */
+/* Unit for a time span: name ("s", "min", "h", "d") and its length in seconds. */
 double bst_chart_time_unit(double span_s, const char **name);
 
 /* One entry of the legend below a chart, as HTML. */

@@ -15,7 +15,7 @@ void bst_csv_put_text(FILE *file, const char *text) {
         fputs(text, file);
         return;
     }
-    /* an empty text is quoted, so that it is not taken for NULL */
+    /* empty text is quoted: an empty field means NULL */
     fputs(formula ? "\"'" : "\"", file);
     for (const char *c = text; *c; c++) {
         if (*c == '"') {

@@ -6,19 +6,19 @@
 
 #include "sim/io/run_reader.h"
 
-/* Told from time to time how many rows are written; `user` is the caller's. */
+/* Progress callback: number of rows written so far. */
 typedef void (*bst_csv_progress)(void *user, int64_t rows);
 
-/* Writes a cell of text: quoted where it must be, and where it is empty. Spreadsheets run a cell
- * that begins with = + - @, a tab or a carriage return as a formula, unless it is a number; an
- * apostrophe before it makes it text (OWASP, CSV Injection). */
+/* Writes a text cell; quotes it if required or empty. Spreadsheets execute cells that begin with =
+ * + - @, tab or carriage return as formulas, unless they are numbers; an apostrophe prevents this
+ * (OWASP, CSV Injection). */
 void bst_csv_put_text(FILE *file, const char *text);
 
-/* Writes what `sql` selects to `path`: a header row with the columns' names, then a row each; lines
- * end with CR LF as RFC 4180 has it. Reals have 17 significant digits, so that they read back as
- * the same double; NULL is an empty field; text as bst_csv_put_text writes it. The file appears
- * whole or not at all. Memory does not grow with the rows. `rows` (may be NULL) gets their number.
- * BST_ERR_IO with path and reason; BST_ERR_FORMAT when the database is damaged. */
+/* Writes the result of a query `sql` to the CSV file `path`: a header row with column names, then
+ * the rows; line ends CR LF (RFC 4180). Reals have 17 significant digits and are recovered exactly;
+ * NULL is an empty field; text as by bst_csv_put_text. The file appears complete or not at all.
+ * Memory is constant. `rows` (may be NULL): number of rows. BST_ERR_IO with path and reason;
+ * BST_ERR_FORMAT: damaged database. */
 bst_status bst_csv_write(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
                          const char *path, bst_csv_progress progress, void *user,
                          int64_t *rows) BST_MUST_CHECK;

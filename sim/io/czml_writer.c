@@ -7,7 +7,7 @@
 
 enum { LAGRANGE_DEGREE = 5 };
 
-/* Bytes of the UTF-8 character at text, 0 when it is none (RFC 3629). */
+/* Length of the UTF-8 character at c; 0: invalid (RFC 3629). */
 static size_t utf8_length(const unsigned char *c) {
     size_t length = c[0] < 0x80                   ? 1
                     : c[0] >= 0xC2 && c[0] < 0xE0 ? 2
@@ -24,7 +24,7 @@ static size_t utf8_length(const unsigned char *c) {
     return length > 1 && overlong_or_surrogate ? 0 : length;
 }
 
-/* A JSON string with its quotes. */
+/* Writes a JSON string with quotes. */
 static void write_string(FILE *stream, const char *text) {
     fputc('"', stream);
     const unsigned char *c = (const unsigned char *)text;

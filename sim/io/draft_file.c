@@ -62,7 +62,7 @@ void bst_draft_sweep(const char *folder) {
     DIR *dir = opendir(folder);
     for (struct dirent *entry; dir && (entry = readdir(dir)) != NULL;) {
         if (bst_draft_is_name(entry->d_name)) {
-            (void)unlinkat(dirfd(dir), entry->d_name, 0); /* not a folder */
+            (void)unlinkat(dirfd(dir), entry->d_name, 0); /* fails on folders, which stay */
         }
     }
     if (dir) {

@@ -1,4 +1,4 @@
-/* Files that are written row by row and appear whole or not at all. */
+/* Draft files: written row by row under a temporary name, renamed when complete. */
 #ifndef BST_IO_DRAFT_FILE_H
 #define BST_IO_DRAFT_FILE_H
 
@@ -8,21 +8,21 @@
 
 typedef struct bst_draft {
     FILE *stream;
-    char path[4096], name[4160]; /* final name; while it is written, "" of a device */
+    char path[4096], name[4160]; /* final name; name of the draft, "" for a device */
 } bst_draft;
 
-/* Opens a temporary file (bst_draft_make) beside `path` for writing. BST_ERR_IO with path and
- * reason; BST_ERR_ARGUMENT where a folder or pipe is there. A character device, such as /dev/null,
- * is written to as it is. */
+/* Opens a draft (bst_draft_make) beside `path` for writing. BST_ERR_IO with path and reason;
+ * BST_ERR_ARGUMENT: `path` is a folder or pipe. A character device such as /dev/null is written
+ * directly. */
 bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) BST_MUST_CHECK;
 
-/* With BST_OK: flushes it to disk and gives it its name, replacing what was there. With another
- * status, or when that fails: removes it. Closes in every case; returns `status`, or BST_ERR_IO
- * with path and reason. */
+/* Closes a draft. With status BST_OK it flushes the file to disk and renames it, replacing an older
+ * file. Otherwise, or on failure, it removes the draft. Returns `status`, or BST_ERR_IO with path
+ * and reason. */
 bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) BST_MUST_CHECK;
 
-/* Removes drafts, files with a name of bst_draft_make, that killed programs left
- * in a folder. Nobody else may be writing there. */
+/* Removes drafts (names of bst_draft_make) of killed programs from a folder. No other program may
+ * be writing there. */
 void bst_draft_sweep(const char *folder);
 
 #endif

@@ -1,7 +1,6 @@
-/* HDUs are made by cfitsio in memory and appended to the file in an order that leaves no torn HDU
- * behind, whenever the process dies. A header without its END card is no header: the card's three
- * letters are written last. Until then the file's length is no multiple of a block, which tells
- * readers (astropy, cfitsio) that what follows the last HDU is not one. */
+/* Appends HDUs to a FITS file so that a killed process leaves no damaged HDU. cfitsio makes the HDU
+ * in memory. The three letters of its END card are written last. Until then the file length is no
+ * multiple of a block; readers (astropy, cfitsio) therefore ignore the data after the last HDU. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stddef.h>
@@ -30,7 +29,7 @@ bool bst_fits_write_at(int fd, const void *data, size_t bytes, long long offset)
     return true;
 }
 
-/* Signed big-endian, as BZERO 32768 wants it: v - 32768 flips the top bit. */
+/* Big-endian signed integers for BZERO 32768: v - 32768 inverts the top bit. */
 static void to_fits(uint16_t *restrict out, const uint16_t *restrict in, size_t count) {
     for (size_t i = 0; i < count; i++) {
         uint16_t v = (uint16_t)(in[i] ^ 0x8000u);
@@ -53,8 +52,8 @@ bool bst_fits_write_pixels(bst_fits *fits, const uint16_t *pixels, size_t count,
     return ok && bst_fits_write_at(fits->file, zeros, (size_t)fill, offset + (long long)count * 2);
 }
 
-/* cfitsio takes the size of its memory for the length of a file, so that memory which is kept has
- * to carry its size before itself. */
+/* cfitsio takes the size of its memory as the length of the file; memory that is reused stores its
+ * size in front. */
 typedef union memory_head {
     size_t capacity;
     max_align_t align;
@@ -88,7 +87,7 @@ void bst_fits_memory_open(bst_fits_memory *memory, bool primary, int *code) {
         }
     }
     memory->size = 0;
-    /* it grows by a block: cfitsio 4.2 loses the end of a file that grows by more at a time */
+    /* grows by one block at a time: cfitsio 4.2 loses the end of a file that grows by more */
     fits_create_memfile(&memory->file, &memory->bytes, &memory->size, BST_FITS_BLOCK, grow_kept,
                         code);
     if (primary) {
@@ -142,7 +141,7 @@ static long long find_end_card(const char *hdu, long long bytes) {
     return -1;
 }
 
-/* Appends `bytes` of an HDU and, after them, pixels (NULL: none). */
+/* Appends `bytes` of an HDU, then pixels (NULL: none). */
 static bst_status append(bst_ctx *ctx, bst_fits *fits, const char *hdu, long long bytes,
                          const uint16_t *pixels, size_t count) {
     long long end_card = find_end_card(hdu, bytes);
@@ -152,8 +151,8 @@ static bst_status append(bst_ctx *ctx, bst_fits *fits, const char *hdu, long lon
     long long data = (long long)count * 2,
               fill = (BST_FITS_BLOCK - data % BST_FITS_BLOCK) % BST_FITS_BLOCK;
     long long whole = bytes + data + fill, after = end_card + 3;
-    /* cards begin at multiples of 16 bytes, so that three letters never cross a memory page: the
-     * last write is done or not done */
+    /* cards start at multiples of 16 bytes: the three letters are in one memory page, and the last
+     * write is atomic */
     bool ok =
         bst_fits_open_tail(fits, whole) &&
         bst_fits_write_at(fits->file, hdu, (size_t)end_card, fits->end) &&

@@ -1,4 +1,4 @@
-/* The cards of a FITS header that sizes hang on, and any other by its key. */
+/* Reads FITS header cards that determine sizes, and other cards by key. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 
 enum { CARD = BST_FITS_CARD, MAX_FIELDS = 999 };
 
-/* A header on its way. */
+/* State of parsing a header. */
 typedef struct scan {
     bst_ctx *ctx;
     const char *name;
@@ -17,7 +17,7 @@ typedef struct scan {
 
 static const int64_t UNSET = BST_FITS_UNSET;
 
-/* The value field of a card, without quotes, comment and blanks around it. */
+/* Extracts the value of a card without quotes, comment and surrounding blanks. */
 static void card_value(const char *card, char out[CARD]) {
     const char *value = card + 10, *end = card + CARD;
     while (value < end && *value == ' ') {
@@ -45,7 +45,8 @@ static bst_status wrong(const scan *c, const char *card, const char *allowed) {
                     allowed);
 }
 
-/* Whether a card's key is `stem` followed by a number from 1 to `count`; *index is that less 1. */
+/* Checks whether a card's key is `stem` with a number from 1 to `count`; *index: the number minus
+ * 1. */
 static bool is_indexed(const char *card, const char *stem, int count, int *index) {
     size_t length = strlen(stem);
     char digit = card[length];
@@ -85,7 +86,7 @@ static bst_status set_bitpix(const scan *c, const char *card, int64_t *out) {
     return known ? BST_OK : wrong(c, card, allowed);
 }
 
-/* Takes what matters of one card. */
+/* Stores the value of one card if it determines sizes. */
 static bst_status read_card(scan *c, const char *card) {
     const char *size = "an integer from 0 to 1000000000000";
     const int64_t most = 1000000000000;
@@ -114,8 +115,7 @@ static bst_status read_card(scan *c, const char *card) {
         card_value(card, value);
         h->is_table = strcmp(value, "IMAGE") != 0;
     }
-    /* cfitsio reads more spellings of the key than the standard has, and the value's first letter
-     */
+    /* cfitsio accepts more spellings of the key, and uses the first letter of the value */
     if (strstr(card, "ZIMAGE")) {
         char value[CARD];
         card_value(card, value);
@@ -125,7 +125,7 @@ static bst_status read_card(scan *c, const char *card) {
     return BST_OK;
 }
 
-/* Bytes of the data by the keys, or more than any file has. */
+/* Computes the size of the data from the keys; on overflow a value larger than any file. */
 static bst_status set_data_bytes(const scan *c) {
     bst_fits_cards *h = c->cards;
     uint64_t count = h->naxis > 0;
@@ -140,7 +140,7 @@ static bst_status set_data_bytes(const scan *c) {
                         "%.400s: HDU %d: BITPIX, NAXIS or one of NAXISn is missing", c->name,
                         c->hdu);
     }
-    /* without them cfitsio 4.2 takes what its memory holds */
+    /* if these keys are missing, cfitsio 4.2 uses uninitialised memory */
     if (h->is_table && (h->pcount == UNSET || h->gcount == UNSET || h->tfields == UNSET)) {
         return bst_fail(c->ctx, BST_ERR_FORMAT,
                         "%.400s: HDU %d: PCOUNT, GCOUNT or TFIELDS is missing", c->name, c->hdu);

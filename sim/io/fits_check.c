@@ -1,5 +1,5 @@
-/* The structure of a FITS file before cfitsio sees it: cfitsio believes what headers say of sizes.
- */
+/* Checks the structure of a FITS file before cfitsio reads it: cfitsio trusts the sizes in
+ * headers. */
 #include <inttypes.h>
 #include <stddef.h>
 

@@ -1,5 +1,4 @@
-/* The structure of a FITS file, checked before cfitsio, which believes what headers say of sizes.
- */
+/* Structure check of untrusted FITS files, because cfitsio trusts the sizes in headers. */
 #ifndef BST_IO_FITS_CHECK_H
 #define BST_IO_FITS_CHECK_H
 
@@ -7,12 +6,11 @@
 
 #include "boresight/status.h"
 
-/* Checks that a file of `bytes` bytes at `data` is a sequence of HDUs whose sizes, by BITPIX,
- * NAXIS, NAXISn and PCOUNT, are plain integers that fit into the file, each given once; that
- * nothing follows the last; and that there is no compressed image: cfitsio 4.2 reads beyond its
- * memory on damaged ones, whatever their headers say. `name` stands for the file in messages.
- * BST_ERR_FORMAT: "NAME: HDU 2: NAXIS1 is wrong (found -1; allowed: ...)". Source: FITS
- * Standard 4.0, sections 3, 4.4.1 and 10. */
+/* Checks that the file at `data` is a sequence of HDUs whose sizes (BITPIX, NAXIS, NAXISn, PCOUNT)
+ * are integers, given once, and fit into the file, without trailing data. Compressed images are
+ * rejected: cfitsio 4.2 reads beyond its memory on damaged ones. `name`: file name for messages.
+ * BST_ERR_FORMAT: "NAME: HDU 2: NAXIS1 is wrong (found -1; allowed: ...)". Source: FITS Standard
+ * 4.0, sections 3, 4.4.1 and 10. */
 bst_status bst_fits_check_structure(bst_ctx *ctx, const char *name, const void *data,
                                     uint64_t bytes) BST_MUST_CHECK;
 

@@ -1,6 +1,6 @@
-/* The datacube. cfitsio makes the header and, at the end, the table in memory; the planes go to the
- * file directly, and NAXIS3 is raised only after a plane is whole, so that a killed run leaves a
- * valid cube of the planes it completed. */
+/* Writes frames as a FITS datacube. Planes are written to the file directly. NAXIS3 is increased
+ * only after a plane is complete, so that a killed run leaves a valid cube. cfitsio makes the
+ * header and, at the end, the table in memory. */
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -11,7 +11,8 @@
 
 #include "sim/io/fits_internal.h"
 
-/* SIMPLE, BITPIX, NAXIS, NAXIS1, NAXIS2, NAXIS3 in this order: FITS 4.0, section 4.4.1.1 */
+/* offset of NAXIS3: SIMPLE, BITPIX, NAXIS, NAXIS1, NAXIS2, NAXIS3 have this order (FITS 4.0,
+ * section 4.4.1.1) */
 #define NAXIS3_OFFSET (5 * 80)
 #define SUM_CARDS (2 * BST_FITS_CARD)
 #define ONE_PAGE 4096
@@ -28,8 +29,8 @@ bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) {
     return BST_OK;
 }
 
-/* The cards of the sums stay blank until the end, since every plane changes them. They come first,
- * so that each lies within one memory page and is written whole or not at all. */
+/* Leaves the checksum cards blank until the end: every plane changes the sums. They come first, so
+ * that each is in one memory page and is written atomically. */
 static bool blank_sums(bst_fits_cube *cube, char *hdu) {
     for (cube->sums_at = 0; cube->sums_at + SUM_CARDS <= ONE_PAGE; cube->sums_at += BST_FITS_CARD) {
         char *cards = hdu + cube->sums_at;
@@ -42,8 +43,8 @@ static bool blank_sums(bst_fits_cube *cube, char *hdu) {
     return false;
 }
 
-/* Sets the sums of the cube, whose header and planes do not change any more. */
-static bst_status sign(bst_ctx *ctx, bst_fits *fits) {
+/* Writes the checksums of the completed cube. */
+static bst_status write_sums(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_cube *cube = &fits->cube;
     size_t bytes = (size_t)cube->data_start;
     char *header = malloc(bytes);
@@ -57,7 +58,7 @@ static bst_status sign(bst_ctx *ctx, bst_fits *fits) {
         char *cards = header + cube->sums_at;
         memcpy(cards, cube->sum_cards, SUM_CARDS);
         bool ok = bst_fits_sign(header, bytes, cube->sum);
-        /* a DATASUM alone is right too; a CHECKSUM is not */
+        /* a DATASUM alone is valid; a CHECKSUM alone is not */
         ok = ok && bst_fits_write_at(fits->file, cards + BST_FITS_CARD, BST_FITS_CARD,
                                      cube->sums_at + BST_FITS_CARD);
         ok = ok && bst_fits_write_at(fits->file, cards, BST_FITS_CARD, cube->sums_at);
@@ -67,7 +68,7 @@ static bst_status sign(bst_ctx *ctx, bst_fits *fits) {
     return status;
 }
 
-/* The header of a cube without planes. */
+/* Writes the header of an empty cube. */
 static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     bst_fits_cube *cube = &fits->cube;
     long size[3] = {width, height, 0};
@@ -127,7 +128,7 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
               bst_fits_write_pixels(fits, pixels, count, offset, fill);
     char value[24];
     snprintf(value, sizeof value, "%20lld", (long long)(cube->planes + 1));
-    /* the card lies within one memory page: this write is done or not done */
+    /* the card is in one memory page: the write is atomic */
     ok = ok && bst_fits_write_at(fits->file, value, 20, NAXIS3_OFFSET + 10);
     bst_status status = ok ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be written");
     if (ok) {
@@ -222,7 +223,7 @@ static void put_row(fitsfile *file, LONGLONG row, const bst_fits_frame *f, int *
 bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_cube *cube = &fits->cube;
     if (fits->file < 0) {
-        return BST_OK; /* no frame came, or the file could not be made; that was reported */
+        return BST_OK; /* no frame was written, or an earlier error was reported */
     }
     char *hdu = NULL;
     long long bytes = 0;
@@ -256,7 +257,7 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
     }
     if (status == BST_OK && fits->checksums) {
         status = bst_fits_sign(hdu, (size_t)bytes, (bst_fits_sum){0})
-                     ? sign(ctx, fits)
+                     ? write_sums(ctx, fits)
                      : bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
     }
     if (status == BST_OK) {

@@ -1,4 +1,4 @@
-/* Image extensions: a frame's counts, or a plane of other numbers. */
+/* Writes frames and planes as FITS image extensions. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -19,7 +19,8 @@ bst_status bst_fits_sign_hdu(bst_ctx *ctx, const bst_fits *fits, char *hdu, long
                : bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
 }
 
-/* Gives the header of an image without pixels its size; false when the cards are elsewhere. */
+/* Sets the image size in a header that was made without pixels; false: unexpected order of
+ * cards. */
 static bool set_size(char *header, int width, int height) {
     const int size[2] = {width, height};
     for (int k = 0; k < 2; k++) {

@@ -1,4 +1,4 @@
-/* Errors of frame files. */
+/* Error messages of FITS frame files. */
 #include <errno.h>
 #include <string.h>
 

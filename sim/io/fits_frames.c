@@ -23,7 +23,7 @@ static void copy_names(bst_fits *fits, const bst_fits_info *info) {
     fits->names.camera = *info->camera;
 }
 
-/* The primary HDU of a file of extensions, or of a cube without planes. */
+/* Writes the primary HDU of a file of extensions, or of an empty cube. */
 static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
     char *hdu = NULL;
     long long bytes = 0;

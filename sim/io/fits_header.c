@@ -3,8 +3,9 @@
 
 #include "sim/io/fits_internal.h"
 
-#define DIGITS (-15)     /* significant digits of a real key */
-#define MJD_DIGITS (-16) /* of a modified Julian date: 1e-11 d, about what a double holds */
+#define DIGITS (-15) /* significant digits of real values */
+/* digits of a modified Julian date: 1e-11 d, the resolution of a double */
+#define MJD_DIGITS (-16)
 
 static void put_real(fitsfile *file, const char *key, double value, const char *comment,
                      int *code) {
@@ -32,7 +33,8 @@ double bst_fits_saturation_dn(const bst_camera *camera, int bits) {
     return fmin(full, (double)((1 << bits) - 1));
 }
 
-/* V magnitude of a source that gives one detected electron per second, in the camera's own band. */
+/* Photometric zero point: V magnitude of a source with one detected electron per second, in the
+ * camera's band. */
 static double zero_point_mag(const bst_camera *c) {
     return 2.5 * log10(bst_camera_electrons_per_s(c, 0.0));
 }

@@ -22,7 +22,7 @@ static bst_status fail_cfitsio(bst_ctx *ctx, const char *path, int code) {
     return bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read: %s", path, reason);
 }
 
-/* Goes to the first image of two axes, or of `most_axes`; size[2] is 1 where there are two. */
+/* Finds the first image with two axes, or up to `most_axes`; size[2] is 1 for two axes. */
 static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, int most_axes,
                              long size[3]) {
     int code = 0, count = 0;
@@ -33,7 +33,7 @@ static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, int
         if (code == 0 && type == IMAGE_HDU) {
             fits_get_img_dim(file, &axes, &code);
         }
-        /* cfitsio knows the key in more spellings than the standard does */
+        /* cfitsio accepts more spellings of the key than the standard */
         if (code == 0 && fits_is_compressed_image(file, &code)) {
             return bst_fail(ctx, BST_ERR_FORMAT,
                             "%.400s: HDU %d: is a compressed image (allowed: images that are not "
@@ -81,7 +81,7 @@ static bst_status read_pixels(bst_ctx *ctx, const char *path, fitsfile *file, co
     return BST_OK;
 }
 
-/* planes NULL: of two axes only. Closes the file. */
+/* Reads the image and closes the file. planes NULL: two axes only. */
 static bst_status read_image(bst_ctx *ctx, const char *path, fitsfile *file, int *width,
                              int *height, int *planes, float **pixels) {
     long size[3] = {0, 0, 1};
@@ -102,8 +102,7 @@ static bst_status read_image(bst_ctx *ctx, const char *path, fitsfile *file, int
     return status;
 }
 
-/* cfitsio also takes files that are compressed as a whole, which may unpack to any size, and other
- * formats, and believes sizes. */
+/* Rejects files that cfitsio would accept: compressed as a whole, other formats, wrong sizes. */
 static bst_status check(bst_ctx *ctx, const char *path, const void *data, uint64_t bytes) {
     static const char expected[] = "SIMPLE  = ";
     if (bytes < sizeof expected - 1 || memcmp(data, expected, sizeof expected - 1) != 0) {
@@ -138,7 +137,7 @@ static bst_status read_file(bst_ctx *ctx, const char *path, int *width, int *hei
     BST_TRY(check_file(ctx, path));
     fitsfile *file = NULL;
     int code = 0;
-    /* "disk file": a path with brackets is a path, not cfitsio's extended syntax */
+    /* "disk file": brackets in a path are no extended syntax of cfitsio */
     if (fits_open_diskfile(&file, path, READONLY, &code) != 0) {
         return fail_cfitsio(ctx, path, code);
     }
@@ -161,7 +160,7 @@ bst_status bst_fits_read_image_buffer(bst_ctx *ctx, const char *name, const void
     *pixels = NULL;
     *width = *height = 0;
     BST_TRY(check(ctx, name, data, bytes));
-    /* cfitsio wants to own what it may change, and reads whole blocks, also beyond the end */
+    /* cfitsio changes its memory and reads whole blocks, also beyond the end: make a copy */
     size_t copy_bytes = (bytes + BLOCK - 1) / BLOCK * BLOCK;
     void *copy = calloc(1, copy_bytes);
     if (!copy) {

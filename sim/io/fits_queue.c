@@ -1,4 +1,4 @@
-/* Extensions that a second thread compresses and writes, in the order in which they came. */
+/* Queue of frames that a thread compresses and writes as FITS extensions, in order. */
 #include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 #include "sim/core/parallel.h"
 #include "sim/io/fits_internal.h"
 
-/* Frames that may wait: enough to even out the work, few enough to lose little with the process. */
+/* maximum number of queued frames: enough to balance the load, few to lose if the process dies */
 #define DEPTH 4
 
 typedef struct slot {
@@ -23,10 +23,10 @@ typedef struct bst_fits_queue {
     pthread_mutex_t lock;
     pthread_cond_t changed;
     slot slots[DEPTH];
-    int first, count; /* the first one is being written */
+    int first, count; /* the first frame is being written */
     bool stop;
-    bst_status status; /* of the writer; its first failure stays */
-    bst_ctx ctx;       /* the writer's own */
+    bst_status status; /* of the writing thread; it keeps the first error */
+    bst_ctx ctx;       /* of the writing thread */
 } bst_fits_queue;
 
 static void *work(void *argument) {
@@ -59,7 +59,7 @@ static void *work(void *argument) {
 
 bst_status bst_fits_queue_create(bst_ctx *ctx, bst_fits *fits) {
     if (!fits_is_reentrant()) {
-        return BST_OK; /* a cfitsio for one thread: compress in the caller's */
+        return BST_OK; /* cfitsio without thread support: compress in the caller's thread */
     }
     bst_fits_queue *q = calloc(1, sizeof *q);
     if (!q) {
@@ -69,7 +69,7 @@ bst_status bst_fits_queue_create(bst_ctx *ctx, bst_fits *fits) {
     pthread_mutex_init(&q->lock, NULL);
     pthread_cond_init(&q->changed, NULL);
     fits->queue = q;
-    /* signals are the main thread's */
+    /* signals go to the main thread */
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -86,7 +86,7 @@ bst_status bst_fits_queue_create(bst_ctx *ctx, bst_fits *fits) {
     return BST_OK;
 }
 
-/* The writer's failure, for the caller; the lock is held. */
+/* Returns the error of the writing thread; the lock is held. */
 static bst_status report(bst_ctx *ctx, const bst_fits_queue *q) {
     return q->status == BST_OK ? BST_OK : bst_fail(ctx, q->status, "%s", q->ctx.message);
 }
@@ -105,7 +105,7 @@ bst_status bst_fits_queue_put(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame
     }
     slot *s = &q->slots[(q->first + q->count) % DEPTH];
     pthread_mutex_unlock(&q->lock);
-    /* only this thread fills slots, so a free one stays free */
+    /* only this thread fills slots: a free slot stays free */
     size_t bytes = (size_t)width * (size_t)height * sizeof *pixels;
     if (bytes > s->capacity) {
         free(s->pixels);

@@ -13,14 +13,14 @@
 
 enum {
     LONGEST_SIDE = 32768,
-    READ_BLOCKS = 4,      /* of a header at a time; ours have 3 or 4 */
-    MOST_BLOCKS = 1000,   /* of a header */
-    MOST_RICE_BLOCK = 64, /* pixels */
-    /* no 16-bit row takes more: its pixels verbatim, a code for each block, the first pixel */
+    READ_BLOCKS = 4,      /* blocks of a header per read; our headers have 3 or 4 */
+    MOST_BLOCKS = 1000,   /* maximum blocks of a header */
+    MOST_RICE_BLOCK = 64, /* maximum pixels of a Rice block */
+    /* upper limit of a compressed 16-bit row: verbatim pixels, a code per block, the first pixel */
     MOST_ROW_BYTES = LONGEST_SIDE * 2 + LONGEST_SIDE / 2 + 16
 };
 
-/* How a tile-compressed image lies in its table. */
+/* Layout of a tile-compressed image in its table. */
 typedef struct packed {
     bool wide; /* descriptors of 64-bit numbers */
     int block;
@@ -28,16 +28,16 @@ typedef struct packed {
     uint64_t heap_at, heap_bytes;
 } packed;
 
-/* An HDU as its header tells. */
+/* An HDU, from its header. */
 typedef struct hdu {
     int number; /* from 1 */
     uint64_t at, data_at, end;
-    int64_t axes, size[3]; /* of the image, compressed or not; axes is 0 without one */
+    int64_t axes, size[3]; /* of the image, also if compressed; axes 0: no image */
     bool compressed;
     packed p;
 } hdu;
 
-/* Where a frame's HDU is. */
+/* Position of a frame's HDU. */
 typedef struct frame_place {
     uint64_t at;
     int number;
@@ -45,26 +45,26 @@ typedef struct frame_place {
 
 struct bst_fits_reader {
     char path[4096];
-    int fd; /* -1: the file is in memory */
+    int fd; /* -1: file in memory */
     const char *data;
     uint64_t bytes; /* of the file */
     bst_fits_file_info info;
-    bool items;          /* pixels are numbers of sources, 32 bits */
-    frame_place *frames; /* of a file with an extension each */
+    bool items;          /* pixels are 32-bit item numbers of sources */
+    frame_place *frames; /* of a file with one extension per frame */
     size_t frame_room;
     hdu cube;
-    uint64_t ids_at; /* where the cube's table begins; 0 without one */
+    uint64_t ids_at; /* offset of the cube's table; 0: none */
     int64_t id_step, id_count;
     char *header;
     size_t header_bytes, header_room;
-    uint8_t *row; /* MOST_ROW_BYTES of a compressed one */
+    uint8_t *row; /* buffer of MOST_ROW_BYTES for a compressed row */
     uint16_t *pixels;
     size_t capacity;
-    int32_t *mask; /* of a file of masks */
+    int32_t *mask; /* pixels of a file of masks */
     size_t mask_capacity;
 };
 
-/* Reads `bytes` at `at`, all of which lie within the file as it was when it was opened. */
+/* Reads `bytes` at offset `at`, within the size that the file had when opened. */
 static bst_status read_at(bst_ctx *ctx, const bst_fits_reader *reader, void *out, uint64_t bytes,
                           uint64_t at) {
     if (at > reader->bytes || bytes > reader->bytes - at) {
@@ -98,7 +98,7 @@ static bool has_end(const char *cards, size_t bytes) {
     return false;
 }
 
-/* Reads a header into memory, up to the block with END. */
+/* Loads a header up to the block with END. */
 static bst_status load_header(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h,
                               bst_fits_cards *cards) {
     reader->header_bytes = 0;
@@ -122,7 +122,7 @@ static bst_status load_header(bst_ctx *ctx, bst_fits_reader *reader, const hdu *
         char *start = reader->header + reader->header_bytes;
         BST_TRY(read_at(ctx, reader, start, more, h->at + reader->header_bytes));
         reader->header_bytes = bytes;
-        /* what begins otherwise has no END worth looking for */
+        /* without SIMPLE or XTENSION it is no header: do not search for END */
         ended = has_end(start, (size_t)more) || (memcmp(reader->header, "SIMPLE", 6) != 0 &&
                                                  memcmp(reader->header, "XTENSION", 8) != 0);
     }
@@ -141,8 +141,8 @@ static bool is_text(const bst_fits_reader *reader, const char *key, const char *
            strncmp(value, expected, strlen(expected)) == 0;
 }
 
-/* Whether pixels are 16-bit unsigned, in a file of masks 32-bit signed; "32768" and "32768." are
- * both written. */
+/* Checks for 16-bit unsigned pixels, or 32-bit signed ones in a file of masks; "32768" and "32768."
+ * both occur. */
 static bool are_known_pixels(const bst_fits_reader *reader, int64_t bitpix) {
     char value[BST_FITS_CARD] = "", *end;
     double zero = 0.0, scale = 1.0;
@@ -165,9 +165,9 @@ static bst_status not_a_frame(bst_ctx *ctx, const bst_fits_reader *reader, const
                                     "a row to a tile");
 }
 
-/* Takes what the header says of a compressed image. */
-static bst_status look_packed(bst_ctx *ctx, const bst_fits_reader *reader,
-                              const bst_fits_cards *cards, hdu *h) {
+/* Reads the layout of a compressed image from its header. */
+static bst_status read_packed_layout(bst_ctx *ctx, const bst_fits_reader *reader,
+                                     const bst_fits_cards *cards, hdu *h) {
     static const char *const sizes[] = {"ZNAXIS1", "ZNAXIS2", "ZNAXIS3"};
     static const char *const tiles[] = {"ZTILE1", "ZTILE2", "ZTILE3"};
     h->compressed = true;
@@ -213,7 +213,7 @@ static bst_status look_packed(bst_ctx *ctx, const bst_fits_reader *reader,
     return BST_OK;
 }
 
-/* Takes what the header in memory says. *whole is false when its data end behind the file's end. */
+/* Interprets the header in memory. *whole false: the data extend beyond the end of the file. */
 static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
                             const bst_fits_cards *cards, hdu *h, bool *whole) {
     uint64_t blocks = (cards->data_bytes + BST_FITS_BLOCK - 1) / BST_FITS_BLOCK;
@@ -224,7 +224,7 @@ static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
     h->compressed = false;
     h->size[0] = h->size[1] = h->size[2] = 1;
     if (cards->is_compressed) {
-        BST_TRY(look_packed(ctx, reader, cards, h));
+        BST_TRY(read_packed_layout(ctx, reader, cards, h));
     } else if ((h->number == 1 || is_text(reader, "XTENSION", "IMAGE")) &&
                (cards->naxis == 2 || cards->naxis == 3)) {
         h->axes = cards->naxis;
@@ -272,7 +272,7 @@ static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h)
     return BST_OK;
 }
 
-/* Counts the frames of a file with an extension each, from the HDU behind `h` on. */
+/* Counts the frames of a file with one extension per frame, starting after HDU `h`. */
 static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, hdu h) {
     bool whole = true;
     bst_ctx unheard = {0};
@@ -284,7 +284,7 @@ static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, hdu h)
         }
         bst_fits_cards cards;
         bst_status status = load_header(&unheard, reader, &h, &cards);
-        if (status == BST_ERR_FORMAT) { /* no header, or not yet */
+        if (status == BST_ERR_FORMAT) { /* no header, or an incomplete one */
             reader->info.cut_off = true;
             return BST_OK;
         }
@@ -302,7 +302,7 @@ static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, hdu h)
     }
 }
 
-/* The table behind a cube: FRAMEID is its first column. */
+/* Finds the table after a cube; FRAMEID is its first column. */
 static void find_ids(bst_fits_reader *reader, const hdu *cube) {
     bst_ctx unheard = {0};
     bst_fits_cards cards;
@@ -347,7 +347,7 @@ static bst_status count_frames(bst_ctx *ctx, bst_fits_reader *reader) {
     if (h.axes == 3) {
         return take_cube(ctx, reader, &h, whole);
     }
-    /* a compressed cube is in the first extension, below an empty primary array */
+    /* a compressed cube is in the first extension, after an empty primary array */
     hdu second = {.number = 2, .at = h.end};
     bst_ctx unheard = {0};
     if (whole && second.at < reader->bytes && look(&unheard, reader, &second, &whole) == BST_OK &&
@@ -362,7 +362,7 @@ static bst_status count_frames(bst_ctx *ctx, bst_fits_reader *reader) {
 }
 
 static bst_status open_file(bst_ctx *ctx, bst_fits_reader *reader) {
-    /* a pipe in the place of the file would wait for ever */
+    /* do not block on a pipe */
     reader->fd = open(reader->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     struct stat file;
     if (reader->fd < 0 || fstat(reader->fd, &file) != 0) {
@@ -451,7 +451,7 @@ static uint64_t big_endian(const uint8_t *bytes, int count) {
     return value;
 }
 
-/* The HDU of a frame, with its header in memory unless it is the cube. */
+/* Finds the HDU of a frame; loads its header unless it is the cube. */
 static bst_status find_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index, hdu *h) {
     if (index < 0 || index >= reader->info.frames) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%.400s: has no frame %lld; it has %lld",
@@ -501,7 +501,7 @@ static bst_status make_room(bst_ctx *ctx, bst_fits_reader *reader, size_t count)
     return reader->pixels ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
 }
 
-/* BZERO 32768: the pixels lie there less 2^15, which flips the top bit. */
+/* Converts from BZERO 32768: stored minus 2^15, which inverts the top bit. */
 static void from_fits(uint16_t *pixels, size_t count) {
     for (size_t i = 0; i < count; i++) {
         uint8_t *b = (uint8_t *)&pixels[i];
@@ -509,7 +509,7 @@ static void from_fits(uint16_t *pixels, size_t count) {
     }
 }
 
-/* Decodes a row, which is row `row` of the table. */
+/* Decodes one compressed row of a frame; `row`: row of the table. */
 static bst_status read_row(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, int64_t row,
                            uint16_t *out) {
     uint8_t place[16];

@@ -1,6 +1,6 @@
-/* Frames back from a FITS file of a run: image extensions or a datacube, raw or tile-compressed,
- * finished or left over from a killed run. All of it is checked: a damaged file gives an error,
- * never a read beyond memory. cfitsio is not asked, since it believes what headers say of sizes. */
+/* Reads frames from a run's FITS file: image extensions or a datacube, raw or tile-compressed, also
+ * of a killed run. All sizes are checked: a damaged file causes an error, never an invalid memory
+ * access. cfitsio is not used, because it trusts the sizes in headers. */
 #ifndef BST_IO_FITS_READER_H
 #define BST_IO_FITS_READER_H
 
@@ -12,22 +12,22 @@
 typedef struct bst_fits_reader bst_fits_reader;
 
 typedef struct bst_fits_file_info {
-    int64_t frames;    /* whole frames */
-    bool cube;         /* one cube, else an image extension per frame */
+    int64_t frames;    /* complete frames */
+    bool cube;         /* a datacube, else one image extension per frame */
     bool compressed;   /* tile-compressed (Rice) */
-    bool cut_off;      /* the file ends inside what follows the last whole frame */
+    bool cut_off;      /* the file ends within data after the last complete frame */
     int width, height; /* largest of all frames; 0 without frames */
 } bst_fits_file_info;
 
-/* Opens a file for reading only and counts its whole frames. Frames are images of 16-bit unsigned
- * numbers (BITPIX 16, BZERO 32768), each in an extension, or planes of a cube in the first or
- * second HDU; or the same tile-compressed by RICE_1, a row to a tile, as boresight and fpack do.
- * Memory: 16 bytes a frame. BST_ERR_NOT_FOUND, BST_ERR_IO: it cannot be opened or read, with the
- * system's reason; BST_ERR_FORMAT: it is no FITS file, or its images are not frames. What follows
- * the last HDU that is whole is no error but cut_off. */
+/* Opens a FITS file of frames for reading and counts its complete frames. Frames are 16-bit
+ * unsigned images (BITPIX 16, BZERO 32768): extensions, or planes of a cube in the first or second
+ * HDU; raw or RICE_1 tile-compressed with one tile per row, as boresight and fpack write. Memory:
+ * 16 bytes per frame. BST_ERR_NOT_FOUND, BST_ERR_IO: cannot be opened or read; BST_ERR_FORMAT: no
+ * FITS file, or its images are no frames. Data after the last complete HDU only set cut_off. */
 bst_status bst_fits_reader_open(bst_ctx *ctx, const char *path,
                                 bst_fits_reader **out) BST_MUST_CHECK;
-/* The same of a file in memory, which is borrowed; `name` stands for the path in messages. */
+/* As bst_fits_reader_open, for a file in memory, which is borrowed; `name`: file name for
+ * messages. */
 bst_status bst_fits_reader_open_buffer(bst_ctx *ctx, const char *name, const void *data,
                                        uint64_t bytes, bst_fits_reader **out) BST_MUST_CHECK;
 /* NULL is allowed. */
@@ -35,36 +35,37 @@ void bst_fits_reader_close(bst_fits_reader *reader);
 /* Description of the open file; it belongs to the reader. */
 const bst_fits_file_info *bst_fits_reader_info(const bst_fits_reader *reader);
 
-/* A frame as read. */
+/* A frame read from a file. */
 typedef struct bst_fits_read_frame {
-    const uint16_t *pixels; /* row-major [height][width]; the reader's, until its next call */
+    const uint16_t
+        *pixels; /* row-major [height][width]; owned by the reader, valid until its next call */
     int width, height;
-    int64_t exposure_id; /* -1: the file does not say (the cube of a killed run) */
+    int64_t exposure_id; /* -1: unknown (cube of a killed run) */
 } bst_fits_read_frame;
 
-/* Number of the exposure of frame `index`, -1 when the file does not say, without reading pixels.
- */
+/* Exposure number of frame `index` without reading pixels; -1: unknown. */
 bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                               int64_t *exposure_id) BST_MUST_CHECK;
 
-/* Reads frame `index`, counted from 0 in the file's order. Memory is that of one frame.
- * BST_ERR_FORMAT when its compressed pixels are damaged. */
+/* Reads frame `index`, from 0 in file order. Memory: one frame. BST_ERR_FORMAT: damaged compressed
+ * pixels. */
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) BST_MUST_CHECK;
 
-/* Opens a file of masks (segmentation.fits): 32-bit signed images, an extension each, not
- * compressed. Errors as bst_fits_reader_open. */
+/* Opens a FITS file of segmentation masks (segmentation.fits): uncompressed 32-bit signed image
+ * extensions. Errors as bst_fits_reader_open. */
 bst_status bst_fits_reader_open_masks(bst_ctx *ctx, const char *path,
                                       bst_fits_reader **out) BST_MUST_CHECK;
 
-/* A mask as read. */
+/* A segmentation mask read from a file. */
 typedef struct bst_fits_read_mask {
-    const int32_t *items; /* row-major [height][width]; the reader's, until its next call */
+    const int32_t
+        *items; /* row-major [height][width]; owned by the reader, valid until its next call */
     int width, height;
-    int64_t exposure_id; /* -1: the file does not say */
+    int64_t exposure_id; /* -1: unknown */
 } bst_fits_read_mask;
 
-/* Reads mask `index`, counted from 0, of a file that was opened as one of masks. */
+/* Reads mask `index`, from 0, of a file opened by bst_fits_reader_open_masks. */
 bst_status bst_fits_reader_mask(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                 bst_fits_read_mask *out) BST_MUST_CHECK;
 

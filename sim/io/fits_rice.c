@@ -1,13 +1,14 @@
 #include "sim/io/fits_rice.h"
 
-/* Of 16-bit pixels: bits of a block's code, and the code of a block that holds differences as they
- * are. */
+/* Rice coding of 16-bit pixels: bits of a block's code, and the code of a block with verbatim
+ * differences. */
 enum { CODE_BITS = 4, VERBATIM = 15, PIXEL_BITS = 16 };
 
-/* Bits, most significant first. Behind the end come zeros, and `missing` counts them. */
+/* Reads bits, most significant first. Beyond the end it returns zeros and counts them in
+ * `missing`. */
 typedef struct bit_reader {
     const uint8_t *next, *end;
-    uint64_t bits; /* the next ones, at the top */
+    uint64_t bits; /* next bits, left-aligned */
     int count;
     size_t missing;
 } bit_reader;
@@ -34,12 +35,12 @@ static uint32_t take(bit_reader *r, int n) {
     return value;
 }
 
-/* Whether bits behind the end have been taken. */
+/* Checks whether bits beyond the end were read. */
 static bool is_exhausted(const bit_reader *r) {
     return r->missing > (size_t)r->count;
 }
 
-/* Zeros before the next one, which is taken too; false for more zeros than any code has. */
+/* Reads a unary number: zeros before the next one. False: more zeros than any code has. */
 static bool take_unary(bit_reader *r, uint32_t most, uint32_t *zeros) {
     for (*zeros = 0; *zeros <= most;) {
         if (r->bits != 0) {
@@ -74,7 +75,7 @@ bool bst_fits_rice_decode(const uint8_t *data, size_t bytes, int block, uint16_t
                 }
                 mapped = high << low_bits | take(&r, low_bits);
             }
-            /* 0, 1, 2, 3, ... stand for 0, -1, 1, -2, ... */
+            /* 0, 1, 2, 3, ... encode 0, -1, 1, -2, ... */
             last += mapped & 1 ? ~(mapped >> 1) : mapped >> 1;
             out[i] = (uint16_t)last;
         }

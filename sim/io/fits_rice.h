@@ -1,4 +1,4 @@
-/* Rice decoding of 16-bit pixels. cfitsio 4.2 reads beyond its memory on damaged data. */
+/* Rice decoder for 16-bit FITS pixels. cfitsio 4.2 reads beyond its memory on damaged data. */
 #ifndef BST_IO_FITS_RICE_H
 #define BST_IO_FITS_RICE_H
 
@@ -6,11 +6,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Decodes one tile of `count` pixels from `bytes` bytes at `data`, `block` pixels to a block
- * (1 or more). The values are those that were coded, modulo 2^16. False when the data end before
- * the last pixel or hold what the code does not allow; then `out` is of no use. Source: FITS
- * Standard 4.0, section 10.4.1; R. L. White et al., "Tiled Image Convention for Storing Compressed
- * Images", 2009. */
+/* Decodes one tile of `count` pixels from `bytes` bytes at `data`, `block` pixels to a block (1 or
+ * more). The values are those that were coded, modulo 2^16. False: the data are too short or
+ * contain an invalid code; `out` is then undefined. Source: FITS Standard 4.0, section 10.4.1; R.
+ * L. White et al., "Tiled Image Convention for Storing Compressed Images", 2009. */
 bool bst_fits_rice_decode(const uint8_t *data, size_t bytes, int block, uint16_t *out,
                           size_t count);
 

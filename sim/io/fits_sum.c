@@ -1,5 +1,5 @@
-/* DATASUM and CHECKSUM: the ones' complement sums of an HDU's 32-bit words, by which readers find
- * damage. Source: FITS Standard 4.0, section 4.4.2.7 and appendix J. */
+/* FITS checksums DATASUM and CHECKSUM: ones' complement sums of an HDU's 32-bit words. Source: FITS
+ * Standard 4.0, section 4.4.2.7 and appendix J. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 
 enum { CARD = BST_FITS_CARD, CHUNK = 65536 };
 
-/* Folds the carries of a sum of 16-bit words back in, as ones' complement wants. */
+/* Adds the carries of a sum of 16-bit words (ones' complement). */
 static void fold(bst_fits_sum *sum) {
     for (uint64_t high = sum->high >> 16, low = sum->low >> 16; high | low;
          high = sum->high >> 16, low = sum->low >> 16) {
@@ -32,7 +32,7 @@ void bst_fits_sum_pixels(bst_fits_sum *sum, const uint16_t *pixels, size_t count
     fold(sum);
 }
 
-/* Adds bytes, a multiple of 4 of them, at a boundary of words. */
+/* Adds bytes to a checksum: a multiple of 4, aligned to words. */
 static void sum_bytes(bst_fits_sum *sum, const char *bytes, size_t count) {
     for (size_t i = 0; i + 3 < count; i += 4) {
         const unsigned char *b = (const unsigned char *)bytes + i;
@@ -42,7 +42,7 @@ static void sum_bytes(bst_fits_sum *sum, const char *bytes, size_t count) {
     fold(sum);
 }
 
-/* Place of a card by its first ten characters; NULL without. */
+/* Finds a header card by its first ten characters; NULL: none. */
 static char *find_card(char *header, size_t bytes, const char *start) {
     for (size_t at = 0; at + CARD <= bytes; at += CARD) {
         if (memcmp(header + at, start, strlen(start)) == 0) {
@@ -74,7 +74,7 @@ bool bst_fits_sign(char *hdu, size_t bytes, bst_fits_sum data) {
     memcpy(total + 11, text, 10);
     memset(check + 11, '0', 16);
     sum_bytes(&data, hdu, header);
-    /* what is written makes the whole come to minus zero */
+    /* the encoded value makes the sum of the HDU minus zero */
     fits_encode_chksum((unsigned long)(data.high << 16 | data.low), 1, text);
     memcpy(check + 11, text, 16);
     return true;

@@ -29,7 +29,7 @@ void bst_mark_diamond(bst_picture *p, double x, double y, double r) {
     }
 }
 
-/* A mark at (x, y) of the picture; returns how far it reaches to the right. */
+/* Draws a mark at (x, y) of the picture; returns its extent to the right. */
 static double draw_mark(bst_picture *p, bst_io_overlay_kind kind, double x, double y, double r) {
     switch (kind) {
         case BST_OVERLAY_TARGET:
@@ -54,7 +54,7 @@ static double draw_mark(bst_picture *p, bst_io_overlay_kind kind, double x, doub
     return 0.0;
 }
 
-/* A line of text with a dark ground, so that it can be read over stars. */
+/* Draws a line of text on a dark background, legible over stars. */
 static double put_line(bst_picture *p, double x, double y, double height, bst_io_colour colour,
                        const char *text) {
     double width = bst_picture_text_width(height, false, text);
@@ -85,7 +85,7 @@ static void draw_legend(bst_picture *p, int width, int height, double h) {
 
 static void draw_overlay(bst_picture *p, const bst_io_overlay *overlay, int width, int height,
                          bst_io_box box, double scale) {
-    double h = fmin(fmax(width / 100.0, 7.0), 14.0); /* of capital letters */
+    double h = fmin(fmax(width / 100.0, 7.0), 14.0); /* height of capital letters */
     bst_picture_clip(p, box);
     for (int i = overlay->count - 1; i >= 0; i--) {
         const bst_io_overlay_mark *m = &overlay->marks[i];
@@ -95,7 +95,7 @@ static void draw_overlay(bst_picture *p, const bst_io_overlay *overlay, int widt
         double x = box.x + (m->x_px + 0.5) * scale - 0.5, y = box.y + (m->y_px + 0.5) * scale - 0.5;
         double r = draw_mark(p, m->kind, x, y, m->radius_px * scale);
         if (m->label[0]) {
-            /* a track's above, an object's below: they are often at one place */
+            /* a track's label is above, an object's below: their positions often coincide */
             double base = m->kind == BST_OVERLAY_TRACK ? y - 0.5 * r : y + 0.5 * r + 0.8 * h;
             bst_picture_text(p, x + fmax(r, 18.0) + 6.0, base, 0.8 * h, colours[m->kind], false,
                              m->label);

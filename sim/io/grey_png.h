@@ -1,4 +1,4 @@
-/* Grey pixels as PNG, one pixel for each. */
+/* Writes grey-level PNG files, one pixel per frame pixel. */
 #ifndef BST_IO_GREY_PNG_H
 #define BST_IO_GREY_PNG_H
 
@@ -6,9 +6,9 @@
 
 #include "boresight/status.h"
 
-/* Writes width x height pixels, row 0 at the top, whole or not at all: of 16 bits, values as they
- * are (their scale is linear, and the file says so), or of 8 bits. Errors: BST_ERR_MEMORY,
- * BST_ERR_IO. Format: ISO/IEC 15948. */
+/* Writes a 16-bit grey PNG of width x height pixels, row 0 at the top, complete or not at all.
+ * Values are unchanged; the file declares a linear scale. Errors: BST_ERR_MEMORY, BST_ERR_IO.
+ * Format: ISO/IEC 15948. */
 bst_status bst_grey_png_write16(bst_ctx *ctx, const char *path, const uint16_t *pixels, int width,
                                 int height) BST_MUST_CHECK;
 

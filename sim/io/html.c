@@ -6,15 +6,15 @@
 
 #define REPLACEMENT "\xEF\xBF\xBD"
 
-/* Bytes of the UTF-8 character at `s`, 0 when there is none: overlong forms, surrogates and what
- * lies beyond U+10FFFF are no characters. */
+/* Length of the UTF-8 character at `s`; 0: invalid (overlong form, surrogate, or beyond
+ * U+10FFFF). */
 static int character_bytes(const unsigned char *s) {
     static const uint32_t least[5] = {0, 0, 0x80, 0x800, 0x10000};
     int n = s[0] < 0x80 ? 1 : s[0] >> 5 == 6 ? 2 : s[0] >> 4 == 14 ? 3 : s[0] >> 3 == 30 ? 4 : 0;
     uint32_t code = n == 1 ? s[0] : s[0] & (0xFFu >> (n + 1));
     for (int i = 1; i < n; i++) {
         if (s[i] >> 6 != 2) {
-            return 0; /* the end of the text is met here too */
+            return 0; /* includes the end of the text */
         }
         code = code << 6 | (s[i] & 0x3Fu);
     }

@@ -40,7 +40,7 @@ bst_status bst_io_run_write_json(bst_ctx *ctx, const bst_run *run, const char *n
     if (!text) {
         return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
     }
-    /* the terminating zero makes room for the newline */
+    /* the newline replaces the terminating zero */
     size_t bytes = strlen(text);
     text[bytes] = '\n';
     bst_status status = bst_io_write_file_atomic(ctx, path, text, bytes + 1);

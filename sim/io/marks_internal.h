@@ -1,4 +1,4 @@
-/* Colours and marks that the pictures of frames share. */
+/* Colours and marks shared by the pictures of frames. */
 #ifndef BST_IO_MARKS_INTERNAL_H
 #define BST_IO_MARKS_INTERNAL_H
 
@@ -21,9 +21,9 @@
 #define BST_CROSS_COLOUR \
     { 236, 128, 255 }
 
-/* The boresight: four arms from `gap` to `arm` picture pixels off the centre. */
+/* Draws the boresight mark: four arms from `gap` to `arm` picture pixels from the centre. */
 void bst_mark_cross(bst_picture *picture, double x, double y, double gap, double arm);
-/* A track: a square on its corner, `r` picture pixels from centre to corner. */
+/* Draws the mark of a track: a diamond, `r` picture pixels from centre to corner. */
 void bst_mark_diamond(bst_picture *picture, double x, double y, double r);
 
 #endif

@@ -7,18 +7,19 @@ typedef struct corner {
     int x, y;
 } corner;
 
-/* A closed line along edges of pixels, the source's pixels on its right. */
+/* A closed line along pixel edges, with the source's pixels on its right. */
 typedef struct loop {
-    int x, y;                          /* a pixel of the source below one of its edges */
-    size_t first, count;               /* of the corners */
-    double area;                       /* above 0: an outline; below: of a hole */
-    int outline;                       /* of a hole: index of the outline that it belongs to */
-    size_t outline_corner, own_corner; /* of a hole: ends of its seam, from the loops' first */
+    int x, y;            /* a pixel of the source below one of the loop's edges */
+    size_t first, count; /* index and number of its corners */
+    double area;         /* positive: an outline; negative: a hole */
+    int outline;         /* of a hole: index of the enclosing outline */
+    size_t outline_corner,
+        own_corner; /* of a hole: corners that the seam connects, as indices in the loops */
 } loop;
 
 typedef struct tracer {
     const bst_mask_item *item;
-    uint8_t *begun; /* upper edges of pixels of the box that a loop has gone along */
+    uint8_t *begun; /* pixels of the box whose upper edge is already part of a loop */
     corner *corners;
     size_t corner_count, corner_room;
     loop *loops;
@@ -31,7 +32,7 @@ static bool has(const tracer *t, int x, int y) {
            m->mask[(size_t)y * (size_t)m->width + (size_t)x] == m->item;
 }
 
-/* Room for one more of `count` items. */
+/* Makes room for one more item of a list with `count` items. */
 static bst_status make_room(bst_ctx *ctx, void **list, size_t count, size_t *room, size_t bytes) {
     if (count < *room) {
         return BST_OK;
@@ -53,15 +54,15 @@ static bst_status add_corner(bst_ctx *ctx, tracer *t, int x, int y) {
     return BST_OK;
 }
 
-/* The pixel that lies ahead of a corner on the right or left of a direction: 0 right, 1 down, 2
- * left, 3 up. */
+/* Checks the pixel ahead of a corner, right or left of a direction: 0 right, 1 down, 2 left, 3
+ * up. */
 static bool has_ahead(const tracer *t, int x, int y, int direction, bool right) {
     int side = right ? direction : (direction + 3) % 4;
     return has(t, side == 1 || side == 2 ? x - 1 : x, side == 2 || side == 3 ? y - 1 : y);
 }
 
-/* Follows the loop that goes right along the upper edge of pixel (x, y). Where pixels meet at a
- * corner alone it turns right, so that outlines hold pixels that share edges. */
+/* Traces the loop that starts right along the upper edge of pixel (x, y). Where pixels share only a
+ * corner it turns right: an outline contains pixels that share edges. */
 static bst_status trace(bst_ctx *ctx, tracer *t, int x, int y) {
     static const int step_x[] = {1, 0, -1, 0}, step_y[] = {0, 1, 0, -1};
     const bst_mask_item *m = t->item;
@@ -76,7 +77,7 @@ static bst_status trace(bst_ctx *ctx, tracer *t, int x, int y) {
         }
         x += step_x[direction];
         y += step_y[direction];
-        /* shoelace: twice the area, y down */
+        /* shoelace formula: twice the area, y down */
         l->area += (double)(x - step_x[direction]) * y - (double)x * (y - step_y[direction]);
         int turn = !has_ahead(t, x, y, direction, true)   ? 1
                    : has_ahead(t, x, y, direction, false) ? 3
@@ -90,7 +91,7 @@ static bst_status trace(bst_ctx *ctx, tracer *t, int x, int y) {
     return BST_OK;
 }
 
-/* Whether the middle of the pixel at (x, y) is inside a loop: even-odd rule along a line to the
+/* Checks whether the centre of pixel (x, y) is inside a loop: even-odd rule along a line to the
  * left. */
 static bool encloses(const tracer *t, const loop *l, int x, int y) {
     const corner *c = t->corners + l->first;
@@ -102,8 +103,7 @@ static bool encloses(const tracer *t, const loop *l, int x, int y) {
     return inside;
 }
 
-/* The outline round a hole is the smallest that encloses it; the seam goes between the corners that
- * are nearest to each other. */
+/* Assigns a hole to the smallest enclosing outline; the seam connects their nearest corners. */
 static void join(tracer *t, loop *hole) {
     const corner *own = t->corners + hole->first;
     double least = -1.0;
@@ -132,7 +132,7 @@ static void write_corner(FILE *stream, const corner *c, bool first) {
     fprintf(stream, "%s%d,%d", first ? "" : ",", c->x, c->y);
 }
 
-/* An outline with its holes. */
+/* Writes an outline with its holes as one polygon. */
 static void write_polygon(const tracer *t, size_t index, FILE *stream) {
     const loop *l = &t->loops[index];
     for (size_t i = 0; i < l->count; i++) {

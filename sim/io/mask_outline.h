@@ -1,4 +1,4 @@
-/* Outlines of the sources of a mask as polygons, as COCO's "segmentation" holds them. */
+/* Outlines of sources in a segmentation mask as polygons, for COCO's "segmentation". */
 #ifndef BST_IO_MASK_OUTLINE_H
 #define BST_IO_MASK_OUTLINE_H
 
@@ -7,12 +7,12 @@
 
 #include "boresight/status.h"
 
-/* A mask and where the source `item` lies in it. */
+/* A mask and the position of the source `item` in it. */
 typedef struct bst_mask_item {
     const int32_t *mask; /* row-major [..][width] */
     int width;
     int32_t item;
-    int x0, y0, x1, y1; /* box that holds all its pixels, x1 and y1 beyond it */
+    int x0, y0, x1, y1; /* bounding box of its pixels; x1 and y1 exclusive */
 } bst_mask_item;
 
 /* Writes the outline of a source as JSON: a list of polygons, each a list x, y, x, y, ...

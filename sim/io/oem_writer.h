@@ -18,25 +18,25 @@ typedef struct bst_oem_covariance {
 
 typedef struct bst_oem_segment {
     const char *object_name, *object_id; /* "INMARSAT GX5", "2019-081A"; not empty */
-    const char *ref_frame;               /* of the series, as OEM names it: "GCRF", "TEME" ... */
+    const char *ref_frame;               /* of the series, by its OEM name: "GCRF", "TEME" ... */
     const char *comment;                 /* one or more lines; NULL: none */
-    /* What readers shall interpolate with: HERMITE of this degree, or with 0 LAGRANGE of degree 9
-     * (less for fewer rows). Positions and velocities of SGP4 differ from one motion by several
-     * cm/s, which Hermite polynomials turn into 0.6 m between rows of a LEO 60 s apart. */
+    /* Interpolation that readers shall use: HERMITE of this degree; 0: LAGRANGE of degree 9 (less
+     * for fewer rows). SGP4's velocity is not the derivative of its position (several cm/s):
+     * Hermite interpolation would cause 0.6 m between rows of a LEO 60 s apart. */
     int hermite_degree;
-    const bst_oem_covariance *covariance; /* after the rows; NULL: none */
+    const bst_oem_covariance *covariance; /* after the states; NULL: none */
     bst_state_series series;              /* at least one row */
 } bst_oem_segment;
 
-/* Starts the message. `creation_utc` is "YYYY-MM-DDThh:mm:ss"; `comment` may be NULL. The stream is
- * the caller's. What is not printable ASCII in a text is written as '_'. Every function:
- * BST_ERR_ARGUMENT for an empty name or no rows; BST_ERR_IO when the stream has an error. */
+/* Writes the head of an OEM. `creation_utc`: "YYYY-MM-DDThh:mm:ss"; `comment` may be NULL. The
+ * caller owns the stream. Non-printable or non-ASCII characters become '_'. Errors of all
+ * functions: BST_ERR_ARGUMENT for an empty name or no rows; BST_ERR_IO. */
 bst_status bst_oem_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,
                               const char *originator, const char *comment) BST_MUST_CHECK;
 
-/* One object: metadata with the series' span, TIME_SYSTEM UTC and the interpolation, then a row per
- * state: UTC to 1 ns, km to 1e-9, km/s to 1e-12; then the covariance, km and km/s to 13 digits.
- * Rows must rise in time (BST_ERR_ARGUMENT). */
+/* Writes one object: metadata with time span, TIME_SYSTEM UTC and interpolation; a row per state
+ * (UTC to 1 ns, km to 1e-9, km/s to 1e-12); the covariance (km and km/s, 13 digits). Times must
+ * increase (BST_ERR_ARGUMENT). */
 bst_status bst_oem_write_segment(bst_ctx *ctx, FILE *stream,
                                  const bst_oem_segment *segment) BST_MUST_CHECK;
 

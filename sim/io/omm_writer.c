@@ -46,7 +46,7 @@ bst_status bst_omm_write(bst_ctx *ctx, FILE *stream, const bst_elements *e,
     write_text(stream, "TIME_SYSTEM", "UTC");
     write_text(stream, "MEAN_ELEMENT_THEORY", "SGP4");
     bst_time_to_utc(epoch, 6, text, sizeof text);
-    text[26] = '\0'; /* without the Z */
+    text[26] = '\0'; /* removes the Z */
     write_text(stream, "EPOCH", text);
     fprintf(stream,
             "    \"MEAN_MOTION\": %.12f,\n"

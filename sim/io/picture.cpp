@@ -13,7 +13,7 @@
 
 #include "sim/io/manifest.h"
 
-/* Everything is drawn at twice the size and reduced when saved: smoother strokes and letters. */
+/* drawn at twice the size and reduced when saved: smoother lines and letters */
 static constexpr int kOver = 2;
 static constexpr int kShift = 4; /* fractional bits of OpenCV's coordinates */
 
@@ -42,8 +42,8 @@ cv::Rect enlarged(bst_io_box box) {
     return cv::Rect(box.x * kOver, box.y * kOver, box.width * kOver, box.height * kOver);
 }
 
-/* Runs body(view, origin) on the clipped part of the image. Drawing cannot fail in a way that a
- * caller could mend; an exception leaves the shape out. */
+/* Calls body(view, origin) on the clipped part of the image. An exception in drawing is ignored:
+ * the shape is omitted. */
 template <typename Body>
 void draw(bst_picture *picture, Body body) noexcept {
     try {

@@ -1,4 +1,4 @@
-/* Drawing on 8-bit RGB pictures, and PNG: a shim over OpenCV's core and imgproc, and libpng. */
+/* Draws on 8-bit RGB pictures and writes PNG: a shim over OpenCV (core, imgproc) and libpng. */
 #ifndef BST_IO_PICTURE_H
 #define BST_IO_PICTURE_H
 
@@ -21,10 +21,11 @@ typedef struct bst_io_colour {
     uint8_t r, g, b;
 } bst_io_colour;
 
-/* Grey levels of a frame: what is shown as black and as white, and how hard the asinh bends. */
+/* Mapping of frame values to grey levels: black and white level, and softening of the asinh
+ * stretch. */
 typedef struct bst_io_stretch {
     double black, white; /* DN */
-    double softening; /* > 0: DN above black at which the scale turns from linear to logarithmic */
+    double softening; /* > 0: DN above black where the scale changes from linear to logarithmic */
 } bst_io_stretch;
 
 /* A rectangle in picture pixels. */
@@ -43,21 +44,20 @@ bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_io_colour
 /* Frees a picture; NULL is allowed. */
 void bst_picture_free(bst_picture *picture) BST_NOEXCEPT;
 
-/* A stretch from the frame's own histogram: black a little below the median, white far above the
- * noise (robust sigma from the lower quartile). A flat frame gives a valid stretch. */
+/* Computes a stretch from the frame's histogram: black just below the median, white far above the
+ * noise (robust sigma from the lower quartile). A uniform frame gives a valid stretch. */
 bst_io_stretch bst_io_stretch_of(const uint16_t *pixels, int width, int height) BST_NOEXCEPT;
 
-/* Fills `to` with the part of a frame that begins at (x0, y0), `columns` x `rows` pixels large,
- * row 0 at the top. Reduced by area averaging, enlarged by whole pixels as they are. The part is
- * clipped to the frame; what lies outside is painted black. */
+/* Draws `columns` x `rows` pixels of a frame, starting at (x0, y0), into the box `to`, row 0 at the
+ * top. Reduction averages areas; enlargement repeats pixels. The parts outside the frame are
+ * black. */
 bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_io_box to,
                              const uint16_t *pixels, int width, int height, int x0, int y0,
                              int columns, int rows,
                              bst_io_stretch stretch) BST_NOEXCEPT BST_MUST_CHECK;
 
-/* Anti-aliased shapes; coordinates in picture pixels (centre of the first: 0, 0), thickness in
- * pixels. What lies outside the picture, or outside the box last given to bst_picture_clip, is cut.
- */
+/* Limits drawing to a box. Shapes are anti-aliased; coordinates and thickness in picture pixels
+ * (centre of the first: 0, 0). */
 void bst_picture_clip(bst_picture *picture, bst_io_box box) BST_NOEXCEPT;
 /* Ends the clipping of bst_picture_clip: shapes may cover the whole picture. */
 void bst_picture_unclip(bst_picture *picture) BST_NOEXCEPT;
@@ -72,23 +72,24 @@ void bst_picture_rectangle(bst_picture *picture, double x, double y, double widt
                            bst_io_colour colour, double thickness) BST_NOEXCEPT;
 /* Fills a box with a colour. */
 void bst_picture_fill(bst_picture *picture, bst_io_box box, bst_io_colour colour) BST_NOEXCEPT;
-/* Text (ASCII; other bytes are shown as '?') with its base line's left end at (x, y); `height` is
- * that of a capital letter, px. Returns the width, px. */
+/* Draws text (ASCII; other bytes become '?') with the left end of its base line at (x, y);
+ * `height`: of a capital letter, px. Returns the width, px. */
 double bst_picture_text(bst_picture *picture, double x, double y, double height,
                         bst_io_colour colour, bool bold, const char *text) BST_NOEXCEPT;
 /* Width that bst_picture_text would return, px, without drawing. */
 double bst_picture_text_width(double height, bool bold, const char *text) BST_NOEXCEPT;
 
-/* Copies the picture to `bgr`: height x width pixels of three bytes, blue first, no padding. */
+/* Copies the picture to `bgr`: height x width pixels of three bytes, blue first, without
+ * padding. */
 bst_status bst_picture_copy(bst_ctx *ctx, const bst_picture *picture,
                             uint8_t *bgr) BST_NOEXCEPT BST_MUST_CHECK;
 
-/* Encodes the picture as a grey PNG of `levels` grey levels, 2 to 256, evenly spread: few levels
- * make noise small. The caller frees *png. */
+/* Encodes the picture as a grey PNG with 2 to 256 evenly spaced levels; few levels compress noise
+ * well. The caller frees *png. */
 bst_status bst_picture_grey_png(bst_ctx *ctx, const bst_picture *picture, int levels, uint8_t **png,
                                 size_t *bytes) BST_NOEXCEPT BST_MUST_CHECK;
 
-/* Writes a PNG, whole or not at all. */
+/* Writes the picture as a PNG file, complete or not at all. */
 bst_status bst_picture_save(bst_ctx *ctx, const bst_picture *picture,
                             const char *path) BST_NOEXCEPT BST_MUST_CHECK;
 

@@ -14,7 +14,7 @@
 
 extern char **environ;
 
-/* A path inside gnuplot's single quotes: a quote is doubled. */
+/* Writes a path in gnuplot's single quotes; quotes are doubled. */
 static void put_quoted(FILE *script, const char *text) {
     fputc('\'', script);
     for (const char *c = text; *c; c++) {
@@ -45,8 +45,8 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
     if (n < 0 || (size_t)n >= sizeof plot->path || strchr(path, '\n')) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: not a path for a plot", path);
     }
-    /* The script's file loses its name at once: nothing of it is left when the process dies.
-     * gnuplot draws into the draft, so that a plot appears whole or not at all. */
+    /* The script is unlinked at once: nothing remains if the process dies. gnuplot writes to a
+     * draft, so that a plot appears complete or not at all. */
     int fd;
     BST_TRY(bst_draft_make(ctx, path, plot->draft, sizeof plot->draft, &fd));
     unlink(plot->draft);
@@ -61,7 +61,7 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
         plot->script = NULL;
         return status;
     }
-    close(fd); /* gnuplot writes into the file that is there */
+    close(fd); /* gnuplot overwrites the existing file */
     if (ends_in(path, ".svg")) {
         fprintf(plot->script,
                 "set terminal svg size %d,%d font 'DejaVu Sans,11' background '#ffffff'\n", width,
@@ -82,7 +82,7 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
     return BST_OK;
 }
 
-/* Runs gnuplot with the script as its standard input; false when it is missing or fails. */
+/* Runs gnuplot with the script as standard input; false: missing or failed. */
 static bool run_gnuplot(int script) {
     posix_spawn_file_actions_t actions;
     if (posix_spawn_file_actions_init(&actions) != 0) {

@@ -6,17 +6,17 @@
 
 #define FLOOR_PX 0.01
 
-/* Ground colours of the modes, in the order of bst_mode. */
+/* Background colours of the modes, in the order of bst_mode. */
 static const char *const mode_colours[BST_MODE_COUNT] = {
     "#e3e3e3", "#d6e4f5", "#fbe3c0", "#f7d3d8", "#d9efd9", "#eedcf3",
     "#e6efe9", "#dfeef5", "#d5d3e6", "#f0ead2", "#e2f0ee",
 };
 
-/* Extent of what is drawn. */
+/* Ranges of the plotted values. */
 typedef struct extent {
     int counted;   /* points that are counted */
     double top;    /* largest radial error */
-    double spread; /* largest component of points that are counted */
+    double spread; /* largest component of counted points */
 } extent;
 
 static double radial(const bst_io_pointing_point *p) {
@@ -40,7 +40,7 @@ static extent measure(const bst_io_pointing_point *points, int count) {
     return e;
 }
 
-/* Text for gnuplot's double quotes in "noenhanced" places: quotes, backslashes and controls go. */
+/* Writes text in gnuplot's double quotes; removes quotes, backslashes and control characters. */
 static void put_text(FILE *script, const char *text) {
     for (const char *c = text ? text : ""; *c; c++) {
         fputc(strchr("\"\\`", *c) || (unsigned char)*c < ' ' ? ' ' : *c, script);
@@ -61,7 +61,7 @@ static void put_data(FILE *s, const bst_io_pointing_point *points, int count) {
     fputs("BST_END\n", s);
 }
 
-/* The modes as coloured ground; returns a bit per mode that occurs. */
+/* Draws the modes as background; returns a bit per mode that occurs. */
 static unsigned put_modes(FILE *s, const bst_io_pointing_point *points, int count, double end_s) {
     unsigned seen = 0;
     for (int i = 0; i < count;) {

@@ -8,7 +8,7 @@
 #include "boresight/vec.h"
 #include "sim/io/fits_image.h"
 
-/* OVERSAMP of the first image of two to `most_axes` axes; 0: there is none. */
+/* Reads OVERSAMP of the first image with two to `most_axes` axes; 0: missing. */
 static bst_status read_keyword(bst_ctx *ctx, const char *path, int most_axes, double *out) {
     fitsfile *file = NULL;
     int code = 0, count = 0, axes = 0;

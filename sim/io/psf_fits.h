@@ -1,5 +1,5 @@
-/* Point spread functions from FITS images: as what the onboard side knows of one, a width, and as
- * samples for rendering. */
+/* Reads point spread functions from FITS images: a width for onboard knowledge, samples for
+ * rendering. */
 #ifndef BST_IO_PSF_FITS_H
 #define BST_IO_PSF_FITS_H
 
@@ -30,10 +30,10 @@ typedef struct bst_psf_summary {
 bst_status bst_psf_fits_read(bst_ctx *ctx, const char *path, double oversampling,
                              bst_psf_summary *out) BST_MUST_CHECK;
 
-/* Reads the file's first image of two axes, or cube of three (one plane for each node of the field
- * grid), as samples of the PSF before integration over the pixel, on any scale. Samples per pixel
- * as above. out->samples is the caller's to free. BST_ERR_FORMAT for no or a wrong OVERSAMP, and
- * all that bst_fits_read_image refuses. */
+/* Reads PSF samples before integration over the pixel, on any scale: the first image with two axes,
+ * or a cube with one plane per node of the field grid. Samples per pixel as in bst_psf_fits_read.
+ * The caller frees out->samples. BST_ERR_FORMAT: OVERSAMP missing or wrong; errors of
+ * bst_fits_read_image. */
 bst_status bst_psf_fits_samples(bst_ctx *ctx, const char *path, double oversampling,
                                 bst_psf_samples *out) BST_MUST_CHECK;
 

@@ -6,21 +6,21 @@
 
 #include "sim/io/marks_internal.h"
 
-#define PANEL 640 /* width and greatest height of a panel */
+#define PANEL 640 /* width and maximum height of a panel */
 #define MARGIN 20
 #define HEAD 58    /* title */
 #define CAPTION 58 /* above each panel */
 #define LEGEND 44  /* below */
 #define LEGEND_ROW 24
 #define INSET 208   /* side of the inset */
-#define INSET_PX 48 /* pixels of the frame in it */
+#define INSET_PX 48 /* frame pixels per side of the inset */
 
 static const bst_io_colour ground = {16, 20, 28}, white = BST_WHITE, soft = BST_SOFT,
                            target_colour = BST_TARGET_COLOUR, track_colour = BST_TRACK_COLOUR,
                            object_colour = BST_OBJECT_COLOUR, star_colour = BST_STAR_COLOUR,
                            rest_colour = BST_REST_COLOUR;
 
-/* How frame pixels come to picture pixels in one view. */
+/* Mapping from frame pixels to picture pixels in one view. */
 typedef struct view {
     bst_io_box box;
     double x0, y0; /* frame pixel coordinates of the box's outer corner */
@@ -47,7 +47,7 @@ static int drawn_of(const bst_quicklook_frame *f) {
     return f->detection_count < BST_QUICKLOOK_MARKS ? f->detection_count : BST_QUICKLOOK_MARKS;
 }
 
-/* `size` scales the marks: they are larger in the inset. */
+/* Draws the marks of detections, truth and track; `size` scales them (larger in the inset). */
 static void draw_marks(bst_picture *p, const bst_quicklook_frame *f, const view *v, double size) {
     bst_picture_clip(p, v->box);
     for (int i = drawn_of(f) - 1; i >= 0; i--) {
@@ -72,7 +72,7 @@ static void draw_marks(bst_picture *p, const bst_quicklook_frame *f, const view 
     bst_picture_unclip(p);
 }
 
-/* A length that is 1, 2 or 5 times a power of ten. */
+/* Rounds a length down to 1, 2 or 5 times a power of ten. */
 static double round_length(double v) {
     double ten = pow(10.0, floor(log10(v)));
     double m = v / ten;
@@ -104,7 +104,7 @@ static bool target_is_inside(const bst_quicklook_frame *f) {
            f->target_x_px < f->width - 0.5 && f->target_y_px < f->height - 0.5;
 }
 
-/* An arrow at the boresight, towards a target that is not on the frame. */
+/* Draws an arrow at the boresight towards a target outside the frame. */
 static void draw_pointer(bst_picture *p, const bst_quicklook_frame *f, const view *v) {
     double dx = f->target_x_px - f->boresight_x_px, dy = f->target_y_px - f->boresight_y_px;
     double r = hypot(dx, dy);
@@ -123,14 +123,14 @@ static void draw_pointer(bst_picture *p, const bst_quicklook_frame *f, const vie
     char text[64];
     snprintf(text, sizeof text, "target: %.0f px away", r);
     double width = bst_picture_text_width(9.5, false, text);
-    /* beyond the point, or beside it when the arrow runs up or down */
+    /* beyond the tip, or beside it for a vertical arrow */
     double x = fabs(dx) < 0.5 ? x1 + 10 : dx > 0.0 ? x1 + 8 : x1 - 8 - width;
     bst_picture_text(p, x, y1 + 5, 9.5, target_colour, false, text);
     bst_picture_unclip(p);
 }
 
-/* The surroundings of the target, enlarged, in the panel's upper right corner, or in the upper left
- * when that would hide what it shows. */
+/* Draws the enlarged surroundings of the target in the upper right corner of the panel, or in the
+ * upper left if it would hide them. */
 static bst_status draw_inset(bst_ctx *ctx, bst_picture *p, const bst_quicklook_frame *f,
                              const view *panel, bst_io_stretch stretch) {
     bool inside = target_is_inside(f);
@@ -153,7 +153,7 @@ static bst_status draw_inset(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
                               INSET_PX, stretch));
     draw_marks(p, f, &v, 2.6);
     bst_picture_rectangle(p, v.box.x, v.box.y, v.box.width - 1, v.box.height - 1, soft, 1.2);
-    /* the part that it shows, on the panel */
+    /* the enlarged part, on the panel */
     bst_picture_rectangle(p, view_x(panel, v.x0), view_y(panel, v.y0), INSET_PX * panel->scale,
                           INSET_PX * panel->scale, soft, 1.0);
     char text[64];
@@ -202,7 +202,7 @@ static bst_status draw_panel(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
     return BST_OK;
 }
 
-/* `single`: there is one panel, under which the legend takes two rows. */
+/* Draws the legend. `single`: one panel only; the legend then has two rows. */
 static void draw_legend(bst_picture *p, double left, double y, bool single) {
     const double h = 9.5, gap = 30;
     double x = left;

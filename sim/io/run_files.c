@@ -7,9 +7,8 @@
 
 #include "sim/core/draft.h"
 
-/* Frames and planes of a sensor of several are WHAT_OBSERVER_SENSOR.fits
- * (sim/engine/recorder/recorder.c).
- */
+/* With several sensors, FITS files are named WHAT_OBSERVER_SENSOR.fits
+ * (sim/engine/recorder/recorder.c). */
 static const char *const run_names[] = {"run.sqlite",
                                         "run.sqlite-wal",
                                         "run.sqlite-shm",
@@ -42,7 +41,7 @@ static const char *const study_names[] = {
     "test.txt",     "*.csv",          "shards",      "runs",
     "slurm",        "ImageFiles",     "Annotations", NULL};
 
-/* A draft has the name of what it becomes, and an ending. */
+/* Matches a file name against patterns; drafts of these files match too. */
 static bool matches(const char *const *patterns, const char *name) {
     char base[256];
     int n = snprintf(base, sizeof base, "%s", name);

@@ -8,14 +8,15 @@
 extern "C" {
 #endif
 
-/* The page that "boresight report" puts into the folder of a run or a study. */
+/* page that "boresight report" writes into the folder of a run or study */
 #define BST_RUN_PAGE "report.html"
 
-/* Whether `name` (without a folder) is that of a file that a run writes into its folder: tables,
- * manifest, scenario, frames and planes, pictures, recorded packets, lock, and drafts of these. */
+/* True if a run writes files of this name (without folder): tables, manifest, scenario, frames,
+ * planes, pictures, recorded packets, lock, and their drafts. */
 bool bst_run_owns(const char *name);
 
-/* The same of a study's folder: tables, CSV files, description, lock, shards and kept runs. */
+/* True if a study writes files of this name: tables, CSV files, description, lock, shards and kept
+ * runs. */
 bool bst_io_study_owns(const char *name);
 
 /* True if a folder holds a run, complete or not. */

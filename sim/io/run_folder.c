@@ -1,4 +1,4 @@
-/* The folder that a run is written into, by its name. */
+/* The folder of a run that is being written: paths and checks. */
 #include <stdio.h>
 #include <sys/stat.h>
 

@@ -1,4 +1,5 @@
-/* What run_store.c and run_folder.c (the folder) and run_tables.c (the database) share. */
+/* Internal state of the run store, shared by run_store.c, run_folder.c (folder) and run_tables.c
+ * (database). */
 #ifndef BST_IO_RUN_INTERNAL_H
 #define BST_IO_RUN_INTERNAL_H
 
@@ -24,7 +25,7 @@ struct bst_run {
     char out[BST_RUN_PATH_BYTES];    /* final name */
     char folder[BST_RUN_PATH_BYTES]; /* out + ".partial" */
     bool overwrite;
-    int lock; /* descriptor that holds the lock on folder/lock */
+    int lock; /* file descriptor with the lock on folder/lock */
     sqlite3 *db;
     bst_io_table *tables;
     sqlite3_stmt *note_table, *note_column;
@@ -35,18 +36,19 @@ struct bst_run {
     void *before_commit_user;
 };
 
-/* FOLDER/NAME; BST_ERR_ARGUMENT when it is too long. */
+/* Joins folder and file name; BST_ERR_ARGUMENT: too long. */
 bst_status bst_run_path_join(bst_ctx *ctx, char *buffer, size_t bytes, const char *folder,
                              const char *name) BST_MUST_CHECK;
 
-/* Fails when the folder was removed, moved or replaced while the run writes it. */
+/* Checks that the run's folder was not removed, moved or replaced. */
 bst_status bst_run_check_folder(bst_ctx *ctx, const bst_run *run) BST_MUST_CHECK;
 
 /* Creates the run's SQLite database with the tables that describe all others.
  *
  * Errors:    BST_ERR_IO */
 bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
-/* Commits, folds the journal in and closes. Closes in every case; nothing is done when closed. */
+/* Commits, merges the journal and closes the run's database, also after an error. Nothing happens
+ * if it is closed. */
 bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 
 #endif

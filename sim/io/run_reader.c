@@ -21,7 +21,7 @@ struct bst_run_reader {
     char folder[BST_RUN_PATH_BYTES];
     bst_run_state state;
     bst_json *manifest, *scenario;
-    const char *database; /* its name in the folder; a literal */
+    const char *database; /* file name in the folder; a literal */
     sqlite3 *db;
     bool has_epoch;
     bst_time epoch;
@@ -59,7 +59,7 @@ static bool has_file(const bst_run_reader *reader, const char *name) {
            stat(path, &info) == 0 && S_ISREG(info.st_mode);
 }
 
-/* Whether a living process holds the folder's lock. */
+/* Checks whether a running process holds the lock of the folder. */
 static bool is_locked(const bst_run_reader *reader) {
     char path[BST_RUN_PATH_BYTES];
     if (bst_run_reader_file(NULL, reader, "lock", path, sizeof path) != BST_OK) {
@@ -93,7 +93,7 @@ static bst_json *load_json(bst_run_reader *reader, const char *name, const char 
     return json;
 }
 
-/* SQL function utc(seconds): the instant so long after the run's epoch, ISO 8601, to 1e-6 s. */
+/* SQL function utc(seconds): time after the run's epoch as ISO 8601, to 1e-6 s. */
 static void sql_utc(sqlite3_context *context, int count, sqlite3_value **values) {
     const bst_run_reader *reader = sqlite3_user_data(context);
     char text[40];
@@ -104,7 +104,7 @@ static void sql_utc(sqlite3_context *context, int count, sqlite3_value **values)
     }
 }
 
-/* The epoch, from the table run, else from scenario.json. */
+/* Reads the epoch from the table run, else from scenario.json. */
 static void find_epoch(bst_run_reader *reader) {
     bst_ctx unheard = {0};
     bst_io_rows *rows = NULL;
@@ -128,8 +128,8 @@ bool bst_run_reader_epoch(const bst_run_reader *reader, bst_time *epoch) {
     return reader->has_epoch;
 }
 
-/* Whether the file's header says that it has a journal of the kind WAL. */
-static bool wants_journal(const char *path) {
+/* Checks whether the database header declares a WAL journal. */
+static bool has_wal_header(const char *path) {
     unsigned char head[20] = {0};
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     ssize_t n = fd >= 0 ? read(fd, head, sizeof head) : -1;
@@ -139,7 +139,7 @@ static bool wants_journal(const char *path) {
     return n == (ssize_t)sizeof head && head[18] == 2;
 }
 
-/* "file:" URI of a path with every byte but the plainest escaped. */
+/* Makes a "file:" URI of a path with all special bytes escaped. */
 static void make_uri(char *uri, size_t bytes, const char *path, const char *parameters) {
     size_t n = (size_t)snprintf(uri, bytes, "file:");
     for (const unsigned char *c = (const unsigned char *)path; *c && n + 64 < bytes; c++) {
@@ -160,20 +160,20 @@ static void open_database(bst_run_reader *reader, const char *name) {
     if (bst_run_reader_file(NULL, reader, name, path, sizeof path) != BST_OK) {
         return;
     }
-    /* A living run is read as SQLite means it to be, through the locks and the shared index that
-     * its writer keeps. Nobody writes the others: without locks, and with the journal's index in
-     * memory, SQLite has nothing to write. "immutable" is for a database that lost its journal. */
+    /* The database of a running process is read with SQLite's locks and shared index. Other
+     * databases have no writer: they are read without locks and with the journal's index in memory,
+     * so that SQLite writes nothing. "immutable" is for a database without its journal. */
     bool journal = has_file(reader, BST_RUN_DATABASE "-wal");
     bool living = reader->state == BST_RUN_RUNNING;
     make_uri(uri, sizeof uri, path,
-             living                            ? "mode=ro"
-             : journal || !wants_journal(path) ? "mode=ro&vfs=unix-none"
-                                               : "mode=ro&immutable=1");
+             living                             ? "mode=ro"
+             : journal || !has_wal_header(path) ? "mode=ro&vfs=unix-none"
+                                                : "mode=ro&immutable=1");
     int flags = SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX;
     int code = sqlite3_open_v2(uri, &reader->db, flags, NULL);
     if (code == SQLITE_OK) {
         sqlite3_db_config(reader->db, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, (int *)NULL);
-        /* a run has tables alone; a view in the place of one could be a query without end */
+        /* a run has only tables; a view could be a query that does not end */
         sqlite3_db_config(reader->db, SQLITE_DBCONFIG_ENABLE_VIEW, 0, (int *)NULL);
         sqlite3_db_config(reader->db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, (int *)NULL);
         sqlite3_busy_timeout(reader->db, 2000);
@@ -203,7 +203,7 @@ static bst_run_state find_state(const bst_run_reader *reader) {
     if (!cJSON_IsTrue(complete)) {
         return BST_RUN_INTERRUPTED;
     }
-    /* what is whole has lost its lock and got its name; a run killed while it closed has not */
+    /* a complete run has no lock and its final name; a run killed while closing does not */
     const char *tail = ".partial";
     size_t length = strlen(reader->folder), n = strlen(tail);
     bool unnamed = length > n && strcmp(reader->folder + length - n, tail) == 0;
@@ -230,7 +230,7 @@ static bst_status check_folder(bst_ctx *ctx, const char *path) {
     return BST_OK;
 }
 
-/* A manifest.json that another program wrote does not make a folder a run's. */
+/* Checks that manifest.json was written by boresight: other programs use the same file name. */
 static bool is_ours(const bst_json *manifest) {
     const cJSON *program = cJSON_GetObjectItemCaseSensitive(bst_json_root(manifest), "program");
     return cJSON_IsString(program) && strcmp(program->valuestring, "boresight") == 0;
@@ -303,7 +303,7 @@ bst_status bst_run_reader_open_study(bst_ctx *ctx, const char *path, bst_run_rea
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
     memcpy(reader->folder, path, length);
-    reader->state = BST_RUN_COMPLETE; /* its tables appear when it is */
+    reader->state = BST_RUN_COMPLETE; /* its tables appear at completion */
     open_database(reader, BST_STUDY_DATABASE);
     if (!reader->db) {
         bst_status status = has_file(reader, BST_STUDY_DATABASE)

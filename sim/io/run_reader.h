@@ -1,5 +1,5 @@
-/* Reading a run's folder, whatever became of the run. Nothing in the folder is ever changed, and
- * nothing is made there. */
+/* Reads the folder of a run in any state (complete, running, killed). It never changes the
+ * folder. */
 #ifndef BST_IO_RUN_READER_H
 #define BST_IO_RUN_READER_H
 
@@ -12,23 +12,22 @@ struct cJSON;
 
 typedef enum bst_run_state {
     BST_RUN_COMPLETE,
-    BST_RUN_INTERRUPTED, /* closed properly before its end */
-    BST_RUN_RUNNING,     /* a living process writes it */
-    BST_RUN_KILLED       /* its process is gone and did not close it */
+    BST_RUN_INTERRUPTED, /* stopped and closed before its end */
+    BST_RUN_RUNNING,     /* a running process writes it */
+    BST_RUN_KILLED       /* its process ended without closing it */
 } bst_run_state;
 
 typedef struct bst_run_reader bst_run_reader;
 
-/* Opens a run's folder. What is missing or damaged inside is no error but a problem (below); the
- * parts that are whole can be read. A table that the run's process had not folded into its database
- * yet is read from the journal. Errors: BST_ERR_NOT_FOUND when there is nothing at `path`;
- * BST_ERR_FORMAT when it is no folder, or one that holds no run; BST_ERR_IO when it cannot be
- * looked into. The caller closes. */
+/* Opens a run's folder. Missing or damaged parts are reported as problems (below), not as errors;
+ * other parts are readable. Uncommitted journal entries are read too. Errors: BST_ERR_NOT_FOUND: no
+ * such path; BST_ERR_FORMAT: no folder or no run in it; BST_ERR_IO: not readable. The caller closes
+ * it. */
 bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **out) BST_MUST_CHECK;
-/* Name of the tables of a study in its folder. */
+/* file name of a study's tables */
 #define BST_STUDY_DATABASE "study.sqlite"
-/* Opens the tables of a study's folder, and nothing else of it: there is no manifest, scenario or
- * epoch. BST_ERR_NOT_FOUND when they are missing, BST_ERR_FORMAT when they cannot be read. */
+/* Opens the tables in a study's folder; a study has no manifest, scenario or epoch.
+ * BST_ERR_NOT_FOUND: missing; BST_ERR_FORMAT: not readable. */
 bst_status bst_run_reader_open_study(bst_ctx *ctx, const char *path,
                                      bst_run_reader **out) BST_MUST_CHECK;
 /* NULL is allowed. */
@@ -36,41 +35,41 @@ void bst_run_reader_close(bst_run_reader *reader);
 
 /* Folder of a run; it belongs to the reader. */
 const char *bst_run_reader_folder(const bst_run_reader *reader);
-/* State of a run: complete or not. */
+/* State of a run: complete, interrupted, running or killed. */
 bst_run_state bst_run_reader_state(const bst_run_reader *reader);
-/* "complete", "interrupted", "still running", "left over from a killed run". */
+/* Name of a run's state: "complete", "interrupted", "still running", "left over from a killed
+ * run". */
 const char *bst_run_state_name(bst_run_state state);
 
-/* What is wrong with the folder, in words; NULL after the last. */
+/* Description of a problem in the run's folder; NULL after the last. */
 const char *bst_run_reader_problem(const bst_run_reader *reader, int index);
-/* Adds a problem that a reader of the parts found. The list holds 16; more are dropped. */
+/* Adds a problem that was found while reading parts of the run; at most 16 are kept. */
 void bst_run_reader_note_problem(bst_run_reader *reader, const char *format, ...) BST_PRINTF(2, 3);
 
 /* manifest.json of a run; NULL if missing or damaged. It belongs to the reader. */
 const struct cJSON *bst_run_reader_manifest(const bst_run_reader *reader);
 /* scenario.json of a run; NULL if missing or damaged. It belongs to the reader. */
 const struct cJSON *bst_run_reader_scenario(const bst_run_reader *reader);
-/* Whether there is a database that could be opened. */
+/* True if the run's database is open. */
 bool bst_run_reader_has_tables(const bst_run_reader *reader);
 
-/* The instant of tick 0; false when the run does not say. */
+/* Time of tick 0; false: unknown. */
 bool bst_run_reader_epoch(const bst_run_reader *reader, bst_time *epoch);
 
-/* Path of a file in the folder. BST_ERR_ARGUMENT when it does not fit. */
+/* Path of a file in the run's folder. BST_ERR_ARGUMENT: too long. */
 bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const char *name,
                                char *buffer, size_t bytes) BST_MUST_CHECK;
 
-/* A query on the run's tables, row by row. Memory does not grow with the rows. */
+/* A query on the run's tables, row by row, in constant memory. */
 typedef struct bst_io_rows bst_io_rows;
 
-/* Prepares one SELECT with up to two integer parameters (?1, ?2). utc(seconds) in it is the instant
- * so long after the epoch, ISO 8601 to 1e-6 s. BST_ERR_FORMAT, with SQLite's
- * reason, when the database has no such table or column, or is damaged; BST_ERR_NOT_FOUND when the
- * run has no database. */
+/* Prepares one SELECT with up to two integer parameters (?1, ?2). The SQL function utc(seconds)
+ * gives the time after the epoch as ISO 8601, to 1e-6 s. BST_ERR_FORMAT with SQLite's reason: no
+ * such table or column, or damaged; BST_ERR_NOT_FOUND: the run has no database. */
 bst_status bst_io_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
                             int64_t parameter1, int64_t parameter2,
                             bst_io_rows **out) BST_MUST_CHECK;
-/* Goes to the next row; *more is false after the last. BST_ERR_FORMAT when the file is damaged. */
+/* Fetches the next row; *more false: no further row. BST_ERR_FORMAT: damaged file. */
 bst_status bst_io_rows_next(bst_ctx *ctx, bst_io_rows *rows, bool *more) BST_MUST_CHECK;
 /* Number of columns of the rows; columns count from 0. */
 int bst_io_rows_columns(const bst_io_rows *rows);
@@ -95,7 +94,7 @@ bst_io_cell_kind bst_io_rows_kind(const bst_io_rows *rows, int column);
 /* Ends a query; NULL is allowed. */
 void bst_io_rows_close(bst_io_rows *rows);
 
-/* First integer of a query's only row; `fallback` when it has none or fails. */
+/* First integer of a query's only row; `fallback` if there is none or the query fails. */
 int64_t bst_run_reader_int(const bst_run_reader *reader, const char *sql, int64_t parameter,
                            int64_t fallback);
 

@@ -15,8 +15,8 @@
 #include "sim/io/run_files.h"
 #include "sim/io/run_internal.h"
 
-/* The lock keeps this much of the disk and gives it back when the run is abandoned: reading tables
- * with a journal takes 32 KiB of disk, also of a full one. */
+/* size of the lock file, freed when the run is abandoned: reading tables with a journal needs 32
+ * KiB of disk, also on a full disk */
 #define SPARE_BYTES 65536
 
 static bst_status fail_errno(bst_ctx *ctx, const char *path, const char *what) {
@@ -27,7 +27,8 @@ static bool is_dots(const char *name) {
     return strcmp(name, ".") == 0 || strcmp(name, "..") == 0;
 }
 
-/* Removes what `name` under `parent` is; links are removed, not followed. False with errno. */
+/* Removes the file or folder `name` in `parent`; links are removed, not followed. False with
+ * errno. */
 static bool remove_tree(int parent, const char *name) {
     if (unlinkat(parent, name, 0) == 0) {
         return true;
@@ -53,9 +54,9 @@ static bool remove_tree(int parent, const char *name) {
     return ok && unlinkat(parent, name, AT_REMOVEDIR) == 0;
 }
 
-/* Empties and removes the folder of a run: its own files are deleted, whatever else is in there is
- * moved into the folder `to`. False with errno; what cannot be moved stays in `from`. */
-static bool give_way(const char *from, const char *to) {
+/* Removes the folder of a run: deletes the run's files and moves other files to the folder `to`.
+ * False with errno; files that cannot be moved stay in `from`. */
+static bool remove_run_folder(const char *from, const char *to) {
     int source = open(from, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     int target = open(to, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *dir = source >= 0 && target >= 0 ? fdopendir(dup(source)) : NULL;
@@ -88,8 +89,8 @@ static bool give_way(const char *from, const char *to) {
     return ok && rmdir(from) == 0;
 }
 
-/* Whether a folder may be taken for a run's and removed: it holds a run's tables, or nothing (but
- * the lock of a run that died at once). Files such as manifest.json are other programs', too. */
+/* Checks whether a folder may be removed as a run: it contains a run's tables, or only a lock.
+ * Files such as manifest.json may belong to other programs. */
 static bool looks_like_run(const char *folder) {
     DIR *dir = opendir(folder);
     if (!dir) {
@@ -106,7 +107,7 @@ static bool looks_like_run(const char *folder) {
     return empty || tables;
 }
 
-/* Opens folder/lock and locks it; -1 with errno (EWOULDBLOCK: a living process holds it). */
+/* Opens and locks folder/lock; -1 with errno (EWOULDBLOCK: a running process holds it). */
 static int take_lock(const char *folder, int flags) {
     char path[BST_RUN_PATH_BYTES];
     if (bst_run_path_join(NULL, path, sizeof path, folder, BST_RUN_LOCK) != BST_OK) {
@@ -117,8 +118,8 @@ static int take_lock(const char *folder, int flags) {
     if (fd < 0) {
         return -1;
     }
-    /* The lock counts only if the file still is the one at that path: another run may have replaced
-     * the folder between open and flock. */
+    /* the lock is valid only if the file is still at that path: another run may have replaced the
+     * folder between open and flock */
     struct stat held, named;
     int error = 0;
     if (flock(fd, LOCK_EX | LOCK_NB) != 0 || fstat(fd, &held) != 0 || stat(path, &named) != 0) {
@@ -134,8 +135,8 @@ static int take_lock(const char *folder, int flags) {
     return fd;
 }
 
-/* Moves the .partial folder of a dead run out of the way and removes it; what is no file of a run
- * goes into the folder `to`. */
+/* Moves the .partial folder of a dead run away and removes it; files that do not belong to a run go
+ * to the folder `to`. */
 static bst_status clear_dead_run(bst_ctx *ctx, const char *folder, const char *to) {
     if (!looks_like_run(folder)) {
         return bst_fail(ctx, BST_ERR_IO,
@@ -155,14 +156,15 @@ static bst_status clear_dead_run(bst_ctx *ctx, const char *folder, const char *t
     bst_log(ctx, BST_LOG_WARNING, "%s: replacing what an unfinished run left", folder);
     char dead[BST_RUN_PATH_BYTES];
     int n = snprintf(dead, sizeof dead, "%s.dead.%ld", folder, (long)getpid());
-    bool ok = n > 0 && (size_t)n < sizeof dead && rename(folder, dead) == 0 && give_way(dead, to);
+    bool ok = n > 0 && (size_t)n < sizeof dead && rename(folder, dead) == 0 &&
+              remove_run_folder(dead, to);
     bst_status status = ok ? BST_OK : fail_errno(ctx, folder, "cannot remove the unfinished run");
     close(lock);
     return status;
 }
 
-/* Makes the .partial folder with its lock taken: prepared under a name of its own, then renamed, so
- * that nobody ever sees it unlocked. */
+/* Creates the .partial folder with its lock: it is prepared under a temporary name and renamed, so
+ * that it is never visible unlocked. */
 static bst_status claim_folder(bst_ctx *ctx, bst_run *run) {
     char draft[BST_RUN_PATH_BYTES];
     int made = -1;
@@ -237,7 +239,7 @@ bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bs
         return bst_fail(ctx, BST_ERR_ARGUMENT, "'%s' is not a name for an output folder",
                         out_path ? out_path : "");
     }
-    /* room for the names of the files inside */
+    /* leaves room for the names of files inside */
     if (length > BST_RUN_PATH_BYTES - 256) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "the path of the output folder is too long");
     }
@@ -260,7 +262,7 @@ bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bs
     if (status == BST_OK) {
         status = bst_run_open_database(ctx, run);
         if (status != BST_OK) {
-            remove_tree(AT_FDCWD, run->folder); /* ours, and nothing is in it yet */
+            remove_tree(AT_FDCWD, run->folder); /* created by this run and still empty */
         }
     }
     if (status != BST_OK) {
@@ -297,10 +299,10 @@ int64_t bst_run_free_bytes(const char *path) {
     }
 }
 
-/* fsync of a file or folder. */
+/* Flushes a file or folder to disk (fsync). */
 static bst_status sync_path(bst_ctx *ctx, const char *path) {
     int fd = open(path, O_RDONLY | O_CLOEXEC);
-    /* some file systems do not take fsync of a folder: EINVAL */
+    /* some file systems reject fsync of a folder: EINVAL */
     if (fd < 0 || (fsync(fd) != 0 && errno != EINVAL)) {
         bst_status status = fail_errno(ctx, path, "cannot flush to disk");
         if (fd >= 0) {
@@ -321,7 +323,7 @@ static bst_status sync_folder(bst_ctx *ctx, const char *folder) {
     for (struct dirent *entry; status == BST_OK && (entry = readdir(dir));) {
         char path[BST_RUN_PATH_BYTES];
         struct stat info;
-        /* links, pipes and folders are somebody else's */
+        /* links, pipes and folders do not belong to the run */
         if (fstatat(dirfd(dir), entry->d_name, &info, AT_SYMLINK_NOFOLLOW) == 0 &&
             S_ISREG(info.st_mode)) {
             status = bst_run_path_join(ctx, path, sizeof path, folder, entry->d_name);
@@ -360,7 +362,7 @@ static bst_status publish(bst_ctx *ctx, bst_run *run) {
         }
         return fail_errno(ctx, run->out, "cannot name the finished run");
     }
-    if (old[0] && !give_way(old, run->out)) {
+    if (old[0] && !remove_run_folder(old, run->out)) {
         bst_log(ctx, BST_LOG_WARNING, "%s: cannot be removed: %s", old, strerror(errno));
     }
     char parent[BST_RUN_PATH_BYTES];
@@ -407,9 +409,9 @@ void bst_run_abandon(bst_run *run) {
     bst_ctx unheard;
     bst_ctx_init(&unheard, NULL, NULL, BST_LOG_ERROR);
     bst_status status = bst_run_close_database(&unheard, run);
-    (void)status; /* a run that is given up keeps what could be saved */
+    (void)status; /* an abandoned run keeps what could be saved */
     int given = ftruncate(run->lock, 0);
-    (void)given; /* the space would have been a reader's */
+    (void)given; /* the space was for readers only */
     close(run->lock);
     free(run);
 }

@@ -1,5 +1,5 @@
-/* A run's folder: written as "<out>.partial", renamed to "<out>" when complete, with its SQLite
- * tables (run.sqlite). */
+/* The run store: folder "<out>.partial", renamed to "<out>" when complete, with SQLite tables
+ * (run.sqlite). */
 #ifndef BST_IO_RUN_STORE_H
 #define BST_IO_RUN_STORE_H
 
@@ -16,43 +16,41 @@ extern "C" {
 typedef struct bst_run bst_run;
 typedef struct bst_io_table bst_io_table;
 
-/* Makes "<out>.partial" (and missing parents, as mkdir -p) with an empty database in it. Nothing is
- * written before this call.
- * An existing <out> is refused with BST_ERR_IO unless `overwrite` is set: then its run is replaced
- * when the new one finishes, and only if it is an empty folder or holds a run (run.sqlite). Other
- * files and folders in it stay where they are; only those of a run (bst_run_owns) and its page are
- * removed.
- * A .partial that a dead run left is logged as a warning and replaced; one that a living process
- * still writes (it holds a lock on it) is refused.
- * Errors, which leave nothing behind: BST_ERR_IO with the path and the system's reason;
- * BST_ERR_ARGUMENT for an empty path. */
+/* Creates "<out>.partial" (and its parents) with an empty database. Nothing is written before this
+ * call.
+ *
+ * Errors:    BST_ERR_IO with path and reason; BST_ERR_ARGUMENT: empty path. Nothing
+ *            remains after an error.
+ * Notes:     An existing <out> is refused (BST_ERR_IO) unless `overwrite` is set. Then
+ *            its run is replaced when the new one completes, provided that the folder is empty or
+ *            contains a run (run.sqlite). Only files of a run (bst_run_owns) and its page are
+ *            removed.
+ *            The .partial folder of a dead run is replaced with a warning; that of a running
+ *            process (lock) is refused. */
 bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite,
                           bst_run **out) BST_MUST_CHECK;
 
 /* The folder that is being written ("<out>.partial"); owned by the run. */
 const char *bst_run_folder(const bst_run *run);
 
-/* Path of a file in that folder. BST_ERR_ARGUMENT when it does not fit. */
+/* Path of a file in the run's folder. BST_ERR_ARGUMENT: too long. */
 bst_status bst_run_file(bst_ctx *ctx, const bst_run *run, const char *name, char *buffer,
                         size_t bytes) BST_MUST_CHECK;
 
-/* Closes the tables (one run.sqlite, no journal beside it) and flushes every file to disk; no rows
- * are taken after it. What is left to do is the manifest and bst_run_finish or bst_run_abandon: a
- * manifest that is written after this speaks of data that are safe. BST_ERR_IO with file and
- * reason. */
+/* Closes the tables (run.sqlite without journal) and flushes all files to disk; no more rows are
+ * accepted. Then write the manifest and call bst_run_finish or bst_run_abandon. BST_ERR_IO with
+ * file and reason. */
 bst_status bst_run_seal(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 
-/* Completes the run: seals it where that was not done, and renames the folder to its final name in
- * one step. Frees `run` in every case; on an error the .partial folder stays. BST_ERR_IO when
- * another run took the name meanwhile. */
+/* Completes a run: seals it if necessary and renames its folder. Frees `run`, also after an error,
+ * when the .partial folder stays. BST_ERR_IO: another run has taken the name. */
 bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 
-/* Commits what there is as well as it can, and frees `run`; "<out>.partial" stays, readable. NULL
- * is allowed. */
+/* Abandons a run: commits its rows if possible and frees `run`; "<out>.partial" stays readable.
+ * NULL is allowed. */
 void bst_run_abandon(bst_run *run);
 
-/* Bytes that are free for this user where `path`, or the nearest folder above it that exists, lies;
- * -1 when the system does not tell. */
+/* Free disk space for this user at `path` or its nearest existing parent, bytes; -1: unknown. */
 int64_t bst_run_free_bytes(const char *path);
 
 typedef enum bst_io_column_type {
@@ -61,8 +59,8 @@ typedef enum bst_io_column_type {
     BST_COLUMN_TEXT,
 } bst_io_column_type;
 
-/* A column. `name` carries the unit as the project names fields (x_px, ra_deg); unit and doc go
- * into the table "columns". */
+/* A table column. `name` includes the unit (x_px, ra_deg); unit and doc go to the table
+ * "columns". */
 typedef struct bst_io_column {
     const char *name;
     bst_io_column_type type;
@@ -70,8 +68,7 @@ typedef struct bst_io_column {
     const char *doc;
 } bst_io_column;
 
-/* A cell. What is no finite number (the magnitude of what sends no light, say) and NULL text are
- * stored as SQL NULL. */
+/* A table cell. Non-finite numbers and NULL text are stored as SQL NULL. */
 typedef struct bst_io_value {
     bst_io_column_type type;
     bool is_null;
@@ -127,17 +124,17 @@ bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, con
                                const bst_io_column *columns, int count,
                                bst_io_table **out) BST_MUST_CHECK;
 
-/* Appends one row of as many values as the table has columns, of their types. Rows are committed in
- * batches: after 50,000 rows, or with the first row that comes 2 s after the batch's first, so that
- * a killed run loses no more than that. */
+/* Appends a row with a value per column, of the column's type. Rows are committed in batches: after
+ * 50,000 rows, or at the first row 2 s after the batch began. A killed run loses at most one
+ * batch. */
 bst_status bst_io_table_append(bst_ctx *ctx, bst_io_table *table,
                                const bst_io_value *values) BST_MUST_CHECK;
 
-/* Commits the open batch now. BST_ERR_IO also when the folder is no longer where it was made. */
+/* Commits the current batch. BST_ERR_IO also if the folder was moved. */
 bst_status bst_run_commit(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 
-/* Has `before` called before each commit, so that files that rows speak of hold it first; when it
- * fails the batch is rolled back and the commit fails with it. NULL: none. */
+/* Called before each commit, so that files contain what the rows refer to. If it fails, the batch
+ * is rolled back and the commit fails. */
 typedef bst_status (*bst_run_before_commit)(bst_ctx *ctx, void *user);
 /* Sets the function that runs before each commit of the database; NULL: none. */
 void bst_run_set_before_commit(bst_run *run, bst_run_before_commit before, void *user);

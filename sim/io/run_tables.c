@@ -13,7 +13,7 @@ static bst_status fail_sql(bst_ctx *ctx, const bst_run *run, const char *what) {
     int last = errno, code = run->db ? sqlite3_errcode(run->db) & 0xff : 0;
     int error = run->db ? sqlite3_system_errno(run->db) : 0;
     if (error == 0 && (code == SQLITE_IOERR || code == SQLITE_FULL)) {
-        error = last; /* SQLite does not always keep it; it was cleared before the call */
+        error = last; /* SQLite does not always keep errno; it was cleared before the call */
     }
     return bst_fail(ctx, BST_ERR_IO, "%s/%s: %s: %s%s%s%s", run->folder, BST_RUN_DATABASE, what,
                     run->db ? sqlite3_errmsg(run->db) : "out of memory", error ? " (" : "",
@@ -26,7 +26,7 @@ static bst_status execute(bst_ctx *ctx, bst_run *run, const char *sql, const cha
                                                                      : fail_sql(ctx, run, what);
 }
 
-/* Runs a prepared statement that returns no rows. */
+/* Executes a prepared statement that returns no rows. */
 static bst_status step_once(bst_ctx *ctx, bst_run *run, sqlite3_stmt *statement, const char *what) {
     errno = 0;
     bst_status status = sqlite3_step(statement) == SQLITE_DONE ? BST_OK : fail_sql(ctx, run, what);
@@ -36,7 +36,7 @@ static bst_status step_once(bst_ctx *ctx, bst_run *run, sqlite3_stmt *statement,
 
 bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) {
     char path[BST_RUN_PATH_BYTES + 32];
-    /* SQLite may read a name that begins with "file:" as a URI */
+    /* SQLite may interpret a name that begins with "file:" as a URI */
     snprintf(path, sizeof path, "%s%s/%s", run->folder[0] == '/' ? "" : "./", run->folder,
              BST_RUN_DATABASE);
     int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
@@ -45,7 +45,7 @@ bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) {
         status = fail_sql(ctx, run, "cannot be made");
     }
     if (status == BST_OK) {
-        /* rows are only appended, so a cache of 128 KiB does; the default grows by 2 MB in a long
+        /* rows are only appended: 128 KiB of cache suffice; the default grows by 2 MB in a long
          * run */
         status = execute(ctx, run,
                          "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;"
@@ -85,7 +85,7 @@ bst_status bst_run_commit(bst_ctx *ctx, bst_run *run) {
     }
     run->in_batch = false;
     if (status != BST_OK) {
-        /* after a failed COMMIT the transaction may be open or not */
+        /* a failed COMMIT may leave the transaction open */
         sqlite3_exec(run->db, "ROLLBACK", NULL, NULL, NULL);
     }
     return status;
@@ -141,7 +141,7 @@ static const char *type_name(bst_io_column_type type) {
     return type == BST_COLUMN_INT ? "INTEGER" : type == BST_COLUMN_REAL ? "REAL" : "TEXT";
 }
 
-/* Texts of the SQL that makes the table and of the one that inserts a row. */
+/* Writes the SQL texts that create a table and insert a row. */
 static bst_status write_sql(bst_ctx *ctx, const char *name, const bst_io_column *columns, int count,
                             char create[SQL_BYTES], char insert[SQL_BYTES]) {
     size_t c = (size_t)snprintf(create, SQL_BYTES, "CREATE TABLE \"%s\" (", name);
@@ -184,7 +184,7 @@ bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, con
         return bst_fail(ctx, BST_ERR_ARGUMENT, "table '%s' with %d columns cannot be made", name,
                         count);
     }
-    /* a name of 63 characters and its quotes fit SQL_BYTES 64 times */
+    /* 64 names of 63 characters with quotes fit into SQL_BYTES */
     char create[SQL_BYTES], insert[SQL_BYTES];
     BST_TRY(write_sql(ctx, name, columns, count, create, insert));
     BST_TRY(begin_batch(ctx, run));

@@ -7,16 +7,16 @@
 
 enum { NODES = 16, GRID = 15, ROUNDS = 3, N = BST_SIP_ORDER + 1 };
 
-static const double LEFT_OUT_PX = 1e-5; /* by the order that is chosen */
-static const double INVERSE_PX = 1e-4;  /* aim of the inverse */
+static const double LEFT_OUT_PX = 1e-5; /* truncation limit that selects the polynomial order */
+static const double INVERSE_PX = 1e-4;  /* required accuracy of the inverse */
 
-/* The map from pixels to catalogue places. */
+/* Mapping from pixels to catalogue directions. */
 typedef struct mapping {
     const bst_camera *camera;
     bst_quat q_gcrf_from_cam;
     const bst_light *light;
     double x0, y0;         /* boresight */
-    double cx, cy, hx, hy; /* middle and half sides of the sensor, px */
+    double cx, cy, hx, hy; /* centre and half size of the sensor, px */
 } mapping;
 
 static bst_vec3 place(const mapping *m, double x, double y) {
@@ -35,7 +35,7 @@ static double evaluate(const double *c, int order, double u, double v) {
     return sum;
 }
 
-/* rows[i] are the coefficients of T_i(s + shift) by powers of s. */
+/* rows[i]: coefficients of T_i(s + shift) in powers of s. */
 static void chebyshev_rows(double shift, double rows[N][N]) {
     memset(rows, 0, N * N * sizeof(double));
     rows[0][0] = 1.0;
@@ -49,8 +49,8 @@ static void chebyshev_rows(double shift, double rows[N][N]) {
     }
 }
 
-/* Powers of pixels from the origin, instead of products of Chebyshev polynomials of
- * t = (pixel - middle) / half. c: by bst_sip_term; in place. */
+/* Converts products of Chebyshev polynomials of t = (pixel - centre) / half to powers of pixels
+ * from the origin, in place. c: ordered by bst_sip_term. */
 static void to_powers(double *c, int order, double shift_x, double shift_y, double half_x,
                       double half_y) {
     double tx[N][N], ty[N][N], out[BST_SIP_TERMS] = {0};
@@ -76,7 +76,7 @@ static void to_powers(double *c, int order, double shift_x, double shift_y, doub
     memcpy(c, out, sizeof out);
 }
 
-/* Chebyshev coefficients of values at the roots of T_NODES in both axes. */
+/* Chebyshev coefficients from values at the roots of T_NODES in both axes. */
 static void transform(const double value[NODES][NODES], double coefficient[NODES][NODES]) {
     double half[NODES][NODES];
     for (int i = 0; i < NODES; i++) {
@@ -119,7 +119,7 @@ static bool transform_plane(const bst_io_sky_plane *t, samples *s) {
     return true;
 }
 
-/* Lowest order whose left-out coefficients sum to less than LEFT_OUT_PX. */
+/* Lowest polynomial order whose omitted coefficients sum to less than the truncation limit. */
 static int choose_order(const samples *s, double scale) {
     double out = 0.0;
     int order = 2 * NODES - 2;
@@ -156,7 +156,8 @@ static void apply_inverse(const double cd[2][2], double xi, double eta, double *
     *v = (cd[0][0] * eta - cd[1][0] * xi) / det;
 }
 
-/* Solves a x = b[0], b[1] for symmetric positive definite a[n][n] by Cholesky; in place. */
+/* Solves a x = b[0], b[1] for symmetric positive definite a[n][n] by Cholesky decomposition, in
+ * place. */
 static bool solve(double a[BST_SIP_TERMS][BST_SIP_TERMS], double b[2][BST_SIP_TERMS], int n) {
     for (int i = 0; i < n; i++) {
         for (int j = 0; j <= i; j++) {
@@ -187,12 +188,13 @@ static bool solve(double a[BST_SIP_TERMS][BST_SIP_TERMS], double b[2][BST_SIP_TE
     return true;
 }
 
-/* One pixel and where it lies on the undistorted plane. */
+/* A pixel and its position on the undistorted plane. */
 typedef struct pair {
     double u, v, big_u, big_v;
 } pair;
 
-/* Least squares of u - U and v - V by Chebyshev products of U and V over their range. */
+/* Fits the inverse SIP polynomials: least squares of u - U and v - V by Chebyshev products of U and
+ * V. */
 static bool fit_inverse(const pair *pairs, int count, int order, bst_sip *out) {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int i = 0; i < count; i++) {
@@ -244,7 +246,7 @@ static bool fit_inverse(const pair *pairs, int count, int order, bst_sip *out) {
     return true;
 }
 
-/* Largest misfits of both polynomials over pairs. */
+/* Largest errors of both SIP polynomials over pairs. */
 static void misfit(const bst_sip *sip, const pair *pairs, int count, double *forward,
                    double *inverse) {
     *forward = *inverse = 0.0;
@@ -259,7 +261,7 @@ static void misfit(const bst_sip *sip, const pair *pairs, int count, double *for
     }
 }
 
-/* Pixels and their places on the undistorted plane: those of the fit, and a grid to judge it by. */
+/* Computes pairs of pixels and undistorted positions: for the fit, and a grid for its error. */
 static bool make_pairs(const mapping *m, const samples *s, const bst_io_sky_plane *plane,
                        const double cd[2][2], pair *pairs, pair *grid) {
     for (int i = 0; i < NODES * NODES + GRID * GRID; i++) {
@@ -281,8 +283,8 @@ static bool make_pairs(const mapping *m, const samples *s, const bst_io_sky_plan
     return true;
 }
 
-/* The inverse of least error, of the order of the polynomial or more; returns the larger misfit of
- * both directions over the grid, px. */
+/* Selects the order of the inverse polynomial with the smallest error, at least the forward order.
+ * Returns the larger error of both directions over the grid, px. */
 static double fit_best_inverse(const pair *pairs, const pair *grid, bst_sip *out) {
     double forward = 0.0, inverse = INFINITY;
     for (int order = out->order; order <= BST_SIP_ORDER && inverse > INVERSE_PX; order++) {
@@ -325,7 +327,7 @@ bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_l
     double powers[2][BST_SIP_TERMS];
     bst_io_sky_plane plane;
     memset(out, 0, sizeof *out);
-    /* the polynomial's own value at the boresight becomes the tangent point */
+    /* the polynomial's value at the boresight becomes the tangent point */
     for (int round = 0; round < ROUNDS; round++) {
         plane = bst_io_sky_plane_at(crval_rad[0], crval_rad[1]);
         if (!transform_plane(&plane, &s)) {
@@ -369,7 +371,7 @@ void bst_sip_distort(const bst_sip *sip, double big_u, double big_v, double *u, 
     }
     *u += evaluate(sip->ap, sip->inverse_order, big_u, big_v);
     *v += evaluate(sip->bp, sip->inverse_order, big_u, big_v);
-    /* the polynomials are near inverses of one another: a few rounds take the rest away */
+    /* the polynomials are approximate inverses: a few Newton iterations converge */
     for (int k = 0; k < 8; k++) {
         double x, y;
         bst_sip_undistort(sip, *u, *v, &x, &y);

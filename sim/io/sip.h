@@ -1,5 +1,5 @@
-/* The distortion of a frame's world coordinate system as simple imaging polynomials (SIP; Shupe et
- * al. 2005, ADASS XIV, ASP Conf. 347, 491). */
+/* SIP distortion polynomials of a frame's WCS (Shupe et al. 2005, ADASS XIV, ASP Conf. 347,
+ * 491). */
 #ifndef BST_IO_SIP_H
 #define BST_IO_SIP_H
 
@@ -8,7 +8,7 @@
 #include "boresight/camera.h"
 #include "sim/astro/bodies.h"
 
-#define BST_SIP_ORDER 9 /* the highest that readers know */
+#define BST_SIP_ORDER 9 /* highest order that readers support */
 #define BST_SIP_TERMS 55
 
 /* u, v: FITS pixels from CRPIX; U, V: the same on an undistorted plane, so that (xi, eta) =
@@ -21,22 +21,22 @@ typedef struct bst_sip {
     double a[BST_SIP_TERMS], b[BST_SIP_TERMS], ap[BST_SIP_TERMS], bp[BST_SIP_TERMS];
 } bst_sip;
 
-/* Place of the term u^p v^q in the arrays: (0,0), (1,0), (0,1), (2,0), (1,1), (0,2) ... */
+/* Index of the term u^p v^q in the coefficient arrays: (0,0), (1,0), (0,1), (2,0), (1,1), (0,2)
+ * ... */
 static inline int bst_sip_term(int p, int q) {
     int n = p + q;
     return n * (n + 1) / 2 + q;
 }
 
-/* Polynomials for pixels and places: fits crval (rad), cd (rad per pixel) and sip to the camera's
- * map from pixels to ICRS catalogue places (see bst_wcs_fit). Chebyshev interpolation over the
- * sensor, of the lowest order that leaves less than 1e-5 px out, at most 9; the inverse by least
- * squares. *residual_px: the largest misfit of either over the sensor. False when the field is too
- * wide for one tangent plane. */
+/* Fits a TAN-SIP solution to the camera's mapping from pixels to ICRS catalogue directions (see
+ * bst_wcs_fit): crval (rad), cd (rad per pixel) and sip. Chebyshev interpolation over the sensor
+ * with the lowest order, at most 9, that omits less than 1e-5 px; the inverse by least squares.
+ * *residual_px: largest error over the sensor. False: the field is too wide for one tangent
+ * plane. */
 bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_light *light,
                  double crval_rad[2], double cd_rad[2][2], bst_sip *out, double *residual_px);
 
-/* (U, V) of (u, v), and back; the inverse is that of the first polynomials, which the second ones
- * only approximate. */
+/* Undistorted offsets (U, V) from pixel offsets (u, v), by the SIP polynomials. */
 void bst_sip_undistort(const bst_sip *sip, double u, double v, double *big_u, double *big_v);
 
 /* Distorted pixel offsets from undistorted ones: inverse polynomial, then refined by iteration.
@@ -45,7 +45,7 @@ void bst_sip_undistort(const bst_sip *sip, double u, double v, double *big_u, do
  * Returned:  u, v  distorted offsets, px */
 void bst_sip_distort(const bst_sip *sip, double big_u, double big_v, double *u, double *v);
 
-/* The same polynomials for pixels that are `binning` times as large. */
+/* Scales the SIP polynomials to pixels that are `binning` times larger. */
 void bst_sip_bin(bst_sip *sip, double binning);
 
 #endif

@@ -1,4 +1,4 @@
-/* A series of states that a writer asks for row by row, so that its length takes no memory. */
+/* A series of orbit states that a writer requests row by row, in constant memory. */
 #ifndef BST_IO_STATE_SERIES_H
 #define BST_IO_STATE_SERIES_H
 
@@ -9,9 +9,9 @@
 extern "C" {
 #endif
 
-/* Rows 0 to rows - 1, in order of time. Writers ask for the last row first, where a head names it,
- * then for all rows in order. Position in m and velocity in m/s, geocentric, in the axes that the
- * writer says. An error ends the writing and is passed on. */
+/* Rows 0 to rows - 1 in order of time. Writers request the last row first if a header needs it,
+ * then all rows. Position in m and velocity in m/s, geocentric, in the writer's frame. An error
+ * ends the output and is returned. */
 typedef struct bst_state_series {
     int64_t rows;
     bst_status (*state)(void *user, bst_ctx *ctx, int64_t row, bst_time *time, bst_vec3 *position_m,

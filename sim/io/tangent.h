@@ -1,4 +1,4 @@
-/* Gnomonic coordinates about a place of the sky. */
+/* Gnomonic (tangent plane) coordinates about a direction on the sky. */
 #ifndef BST_IO_TANGENT_H
 #define BST_IO_TANGENT_H
 
@@ -7,7 +7,7 @@
 
 #include "boresight/vec.h"
 
-/* Tangent plane at a place: unit vectors to it, east and north. */
+/* Tangent plane at a direction: unit vectors along it, east and north. */
 typedef struct bst_io_sky_plane {
     bst_vec3 centre, east, north;
 } bst_io_sky_plane;
@@ -17,7 +17,7 @@ static inline bst_io_sky_plane bst_io_sky_plane_at(double ra_rad, double dec_rad
     return (bst_io_sky_plane){{cd * cr, cd * sr, sd}, {-sr, cr, 0.0}, {-sd * cr, -sd * sr, cd}};
 }
 
-/* Standard coordinates (rad); false beyond the plane's horizon. */
+/* Gnomonic coordinates (rad) of a direction; false: 90 degrees or more from the tangent point. */
 static inline bool bst_io_sky_to_plane(const bst_io_sky_plane *t, bst_vec3 v, double *xi,
                                        double *eta) {
     double z = bst_vec3_dot(t->centre, v);

@@ -85,7 +85,7 @@ static void write_metadata(FILE *stream, const bst_tdm_segment *s) {
     fputs("META_STOP\n\n", stream);
 }
 
-/* Degrees in [0, 360) that stay there when printed. */
+/* Angle in degrees, within [0, 360) also after rounding in print. */
 static double turn_deg(double rad) {
     double degrees = fmod(rad / BST_DEG_RAD, 360.0);
     degrees += degrees < 0.0 ? 360.0 : 0.0;

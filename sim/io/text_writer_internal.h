@@ -1,4 +1,4 @@
-/* What the writers of text formats share. */
+/* Functions shared by the writers of OEM, OMM and TDM. */
 #ifndef BST_IO_TEXT_WRITER_INTERNAL_H
 #define BST_IO_TEXT_WRITER_INTERNAL_H
 
@@ -8,20 +8,19 @@
 
 enum { BST_TIME_TEXT_BYTES = 40 };
 
-/* UTC without the Z, to 1 ns; zeros beyond the third decimal are left out. */
+/* Formats UTC without Z, to 1 ns; trailing zeros beyond the third decimal are omitted. */
 void bst_text_utc(bst_time t, char text[BST_TIME_TEXT_BYTES]);
 
-/* "KEY = value\n", what is not printable ASCII as '_'. */
+/* Writes "KEY = value\n"; non-printable or non-ASCII characters become '_'. */
 void bst_io_kvn_write(FILE *stream, const char *key, const char *value);
 
-/* Each line of a text as "COMMENT line\n"; NULL and "": nothing. */
+/* Writes each line of a text as "COMMENT line\n"; NULL and "": nothing. */
 void bst_io_kvn_comment(FILE *stream, const char *text);
 
-/* BST_ERR_IO when the stream has an error. */
+/* BST_ERR_IO if the output stream has an error. */
 bst_status bst_text_stream_ok(bst_ctx *ctx, FILE *stream) BST_MUST_CHECK;
 
-/* BST_ERR_ARGUMENT unless `after` is later than `before`; `what` and `row` (of `after`) name them.
- */
+/* Checks that the time `after` is later than `before`; BST_ERR_ARGUMENT names `what` and `row`. */
 bst_status bst_text_rising(bst_ctx *ctx, const char *what, int64_t row, bst_time before,
                            bst_time after) BST_MUST_CHECK;
 

@@ -7,14 +7,14 @@
 #define GRID 9
 #define DEG (180.0 / BST_PI)
 
-/* One grid point: offset from the boresight (px) and catalogue place. */
+/* A grid point: offset from the boresight (px) and catalogue direction. */
 typedef struct sample {
     double dx, dy;
     bst_vec3 icrs;
 } sample;
 
-/* Fits (xi, eta) = offset + cd * (dx, dy). The grid is symmetric about the boresight, so that the
- * normal equations are diagonal. */
+/* Fits (xi, eta) = offset + cd * (dx, dy). The grid is symmetric about the boresight: the normal
+ * equations are diagonal. */
 static bool fit_plane(const bst_io_sky_plane *t, const sample *samples, double offset[2],
                       double cd[2][2]) {
     double sum[2] = {0, 0}, sx[2] = {0, 0}, sy[2] = {0, 0}, sxx = 0, syy = 0;
@@ -69,7 +69,7 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
     }
     bst_quat q_gcrf_from_cam = bst_quat_conj(q_cam_from_gcrf);
     double cx = bst_camera_centre_x(camera), cy = bst_camera_centre_y(camera);
-    /* a sensor one pixel wide still needs a grid of some width */
+    /* a sensor one pixel wide still needs a grid of non-zero width */
     double half_x = fmax(fmax(cx, (double)(camera->width_px - 1) - cx), 1.0);
     double half_y = fmax(fmax(cy, (double)(camera->height_px - 1) - cy), 1.0);
     sample samples[GRID * GRID];
@@ -83,7 +83,8 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
     double ra, dec, offset[2], cd[2][2];
     bst_vec3_to_radec(samples[GRID * GRID / 2].icrs, &ra, &dec);
     bool good = true;
-    /* moving the tangent point by the mean offset converges at once: two rounds and a check */
+    /* shifting the tangent point by the mean offset converges at once: two iterations and a
+     * check */
     for (int round = 0; round < 3 && good; round++) {
         bst_io_sky_plane t = bst_io_sky_plane_at(ra, dec);
         good = fit_plane(&t, samples, offset, cd);
@@ -114,7 +115,7 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
 }
 
 double bst_wcs_distortion_misfit_px(const bst_camera *camera) {
-    /* the Sun behind the camera, which looks along z, so that it deflects nothing */
+    /* observer at rest; the Sun behind the camera (which looks along z) does not deflect light */
     const bst_light at_rest = {.sun_m = {0.0, 0.0, -BST_AU_M}};
     const bst_quat q = {0.0, 0.0, 0.0, 1.0};
     double crval[2], cd[2][2], misfit;
@@ -128,7 +129,7 @@ double bst_wcs_distortion_misfit_px(const bst_camera *camera) {
 bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning) {
     bst_wcs w = *wcs;
     double b = binning > 1 ? binning : 1;
-    /* full-sensor FITS pixel p covers (p - 0.5, p + 0.5) */
+    /* FITS pixel p of the full sensor covers (p - 0.5, p + 0.5) */
     w.crpix[0] = (wcs->crpix[0] - 0.5 - window.x0) / b + 0.5;
     w.crpix[1] = (wcs->crpix[1] - 0.5 - window.y0) / b + 0.5;
     w.residual_px /= b;

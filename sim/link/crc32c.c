@@ -2,11 +2,10 @@
 
 #include <string.h>
 
-/* The polynomial, reflected: bit 31 is the coefficient of x^0. */
+/* CRC-32C polynomial, reflected: bit 31 is the coefficient of x^0. */
 #define POLYNOMIAL 0x82F63B78u
 
-/* The register after four bits more, by what falls out of it: the sixteen multiples of the
- * polynomial. */
+/* Register update for four bits: the sixteen multiples of the polynomial. */
 static const uint32_t nibbles[16] = {
     0x00000000u, 0x105EC76Fu, 0x20BD8EDEu, 0x30E349B1u, 0x417B1DBCu, 0x5125DAD3u,
     0x61C69362u, 0x7198540Du, 0x82F63B78u, 0x92A8FC17u, 0xA24BB5A6u, 0xB21572C9u,
@@ -28,7 +27,7 @@ uint32_t bst_crc32c_portable(const void *data, size_t bytes) {
 
 #if defined(__x86_64__) && defined(__GNUC__)
 
-/* The product of two polynomials modulo the checksum's. */
+/* Product of two polynomials modulo the CRC polynomial. */
 static uint32_t multiply(uint32_t a, uint32_t b) {
     uint32_t product = 0;
     for (uint32_t bit = 0x80000000u; bit; bit >>= 1) {
@@ -40,7 +39,7 @@ static uint32_t multiply(uint32_t a, uint32_t b) {
     return product;
 }
 
-/* x^(8 bytes): what so many zero bytes do to the register. */
+/* x^(8 bytes): effect of that many zero bytes on the CRC register. */
 static uint32_t zeros(size_t bytes) {
     uint32_t power = 0x80000000u, square = 0x00800000u; /* 1, x^8 */
     for (; bytes; bytes >>= 1) {
@@ -58,8 +57,8 @@ static inline uint64_t load(const unsigned char *p) {
     return word;
 }
 
-/* The instruction takes three cycles and one can start in each: three thirds side by side, put
- * together at the end. */
+/* CRC-32C by SSE 4.2. The instruction has a latency of three cycles and a throughput of one: three
+ * thirds of the data run in parallel and are combined at the end. */
 __attribute__((target("sse4.2"))) static uint32_t by_instruction(uint32_t crc,
                                                                  const unsigned char *p,
                                                                  size_t bytes) {

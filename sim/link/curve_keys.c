@@ -52,7 +52,7 @@ bst_status bst_curve_keys_make(bst_ctx *ctx, const char *path) {
     return BST_OK;
 }
 
-/* One line, without its end: a comment, nothing, or a key. */
+/* Reads one line of a key file: a comment, an empty line, or a key. */
 static bst_status read_line(bst_ctx *ctx, const char *path, int number, const char *line,
                             bst_curve_keys *out) {
     uint8_t bytes[KEY_BYTES];

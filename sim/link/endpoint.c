@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A decimal number from 0 to `most` that ends at `end`; -1 when it is none. */
+/* Decimal number from 0 to `most` that ends at `end`; -1: not a number. */
 static long number(const char *text, const char *end, long most) {
     long value = 0;
     const char *p = text;
@@ -15,7 +15,7 @@ static long number(const char *text, const char *end, long most) {
     return p == end && p > text && value <= most ? value : -1;
 }
 
-/* 127.a.b.c */
+/* Matches 127.a.b.c. */
 static bool loopback_v4(const char *host, const char *end) {
     const char *p = host;
     for (int i = 0; i < 4; i++) {
@@ -37,7 +37,7 @@ static bool is(const char *word, const char *host, const char *end) {
 bst_status bst_link_endpoint_check(bst_ctx *ctx, const char *endpoint,
                                    char out[BST_LINK_ENDPOINT_BYTES]) {
     size_t bytes = strlen(endpoint);
-    /* a path of a socket has at most 107 bytes */
+    /* socket paths have at most 107 bytes */
     if (strncmp(endpoint, "ipc://", 6) == 0 && bytes > 6 && bytes <= 6 + 107 &&
         endpoint[6] != '@' && endpoint[6] != '*') {
         snprintf(out, BST_LINK_ENDPOINT_BYTES, "%s", endpoint);

@@ -1,4 +1,4 @@
-/* Addresses of the link: this machine only. */
+/* Addresses of the link: loopback and local sockets only. */
 #ifndef BST_LINK_ENDPOINT_H
 #define BST_LINK_ENDPOINT_H
 
@@ -6,9 +6,9 @@
 
 enum { BST_LINK_ENDPOINT_BYTES = 128 };
 
-/* Checks "tcp://127.0.0.1:PORT" (also [::1] and localhost, which becomes 127.0.0.1) or
- * "ipc://PATH" and writes it as ZeroMQ takes it. BST_ERR_ARGUMENT, with the tunnel to use instead,
- * for an address that other machines could reach. */
+/* Checks "tcp://127.0.0.1:PORT" (also [::1] and localhost, which becomes 127.0.0.1) or "ipc://PATH"
+ * and writes the address for ZeroMQ. BST_ERR_ARGUMENT, with a hint to use a tunnel, for addresses
+ * that other machines can reach. */
 bst_status bst_link_endpoint_check(bst_ctx *ctx, const char *endpoint,
                                    char out[BST_LINK_ENDPOINT_BYTES]) BST_MUST_CHECK;
 

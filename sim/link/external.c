@@ -9,13 +9,13 @@
 
 enum {
     MOST_PORTS = 8,
-    MOST_QUEUED = 8, /* messages of one queue in a step; more go with the next exchange */
+    MOST_QUEUED = 8, /* queued messages per step; more are sent in the next exchange */
     MOST_INPUTS = MOST_PORTS + MOST_QUEUED,
     MOST_COUNTED = 100000,
 };
 
 bst_link_type bst_external_type(const char *channel) {
-    return bst_wire_type_of(channel); /* messages are called as their channels are */
+    return bst_wire_type_of(channel); /* messages have the names of their channels */
 }
 
 typedef struct external_config {
@@ -75,11 +75,11 @@ typedef struct external {
     const bst_module_desc *desc;
     bst_link *link;
     int part;
-    int64_t seen[MOST_PORTS];              /* sequence of the message of each input sent last */
-    int64_t samples;                       /* of the telemetry's ring sent so far */
-    bst_link_pointing_telemetry *pointing; /* room for the ring */
+    int64_t seen[MOST_PORTS];              /* sequence of the last message sent, per input */
+    int64_t samples;                       /* number of telemetry samples sent so far */
+    bst_link_pointing_telemetry *pointing; /* buffer for new telemetry samples */
     int pointing_room;
-    bst_link_output outputs[MOST_PORTS]; /* by output, in the order of ports */
+    bst_link_output outputs[MOST_PORTS]; /* by output port */
     int output_ports[MOST_PORTS], output_count;
 } external;
 
@@ -170,7 +170,7 @@ static bst_status create_control(const bst_module_env *env, const void *config, 
     return create(env, &bst_external_control_module, config, self);
 }
 
-/* The samples of the telemetry's ring that are new. */
+/* Copies the telemetry samples that have not been sent yet. */
 static bst_status new_samples(external *m, bst_ctx *ctx, const bst_pointing_telemetry *t) {
     if (m->pointing_room < t->capacity) {
         void *room = realloc(
@@ -200,7 +200,7 @@ static bst_status new_samples(external *m, bst_ctx *ctx, const bst_pointing_tele
 static void hold_frame(void *owner) {
     const uint16_t *pixels;
     bst_frame_retain(owner);
-    (void)!bst_frame_map(owner, NULL, &pixels); /* mapped already: maps nest */
+    (void)!bst_frame_map(owner, NULL, &pixels); /* maps are counted: this one is nested */
 }
 
 static void release_frame(void *owner) {
@@ -245,7 +245,7 @@ void bst_external_tell(bst_link *link, struct bst_step *step) {
     }
 }
 
-/* What a peer has answered goes to the channels. */
+/* Publishes a peer's answer on the channels. */
 static void publish_answer(external *m, struct bst_step *step) {
     for (int i = 0; i < m->output_count; i++) {
         const bst_link_output *output = &m->outputs[i];
@@ -271,7 +271,7 @@ static bst_status publish_more(external *m, struct bst_step *step) {
     }
 }
 
-/* Whether the peer has an ear for this step; what it has answered to earlier ones goes out. */
+/* Publishes answers to earlier steps, and checks whether the peer can take this step. */
 static bst_status ready(external *m, struct bst_step *step, bool *is_ready) {
     bst_status status = bst_link_ready(bst_step_ctx(step), m->link, m->part, bst_step_tick(step),
                                        m->outputs, m->output_count, is_ready);
@@ -280,7 +280,7 @@ static bst_status ready(external *m, struct bst_step *step, bool *is_ready) {
     return publish_more(m, step);
 }
 
-/* One exchange; what came goes to the channels. */
+/* Exchanges one step with the peer and publishes its answer. */
 static bst_status exchange(external *m, struct bst_step *step, const bst_link_input *inputs,
                            int count) {
     bool answered;
@@ -297,7 +297,7 @@ static bool is_queue(const bst_port *port) {
     return bst_channel_type_find(port->channel)->kind == BST_CHANNEL_QUEUE;
 }
 
-/* The newest messages of the inputs that are no queues, where they have not been sent. */
+/* Adds the newest messages of inputs that are not queues, unless they were already sent. */
 static bst_status add_latest(external *m, struct bst_step *step, bst_link_input *inputs,
                              int *count) {
     for (int p = 0; p < m->desc->port_count; p++) {
@@ -322,7 +322,7 @@ static bst_status add_latest(external *m, struct bst_step *step, bst_link_input 
     return BST_OK;
 }
 
-/* An exchange for each frame or set of detections. */
+/* Steps imgproc or tracker externally: one exchange per frame or set of detections. */
 static bst_status step_by_queue(void *self, struct bst_step *step) {
     external *m = self;
     for (bst_sample next = bst_step_next(step, 0); next.payload; next = bst_step_next(step, 0)) {
@@ -331,10 +331,10 @@ static bst_status step_by_queue(void *self, struct bst_step *step) {
         bool is_ready;
         BST_TRY(ready(m, step, &is_ready));
         if (!is_ready) {
-            continue; /* lost for it */
+            continue; /* the frame is lost to the peer */
         }
         BST_TRY(add_latest(m, step, inputs, &count));
-        if (m->desc->ports[0].channel[0] == 'd') { /* detections */
+        if (m->desc->ports[0].channel[0] == 'd') { /* the channel "detections" */
             inputs[count++] = (bst_link_input){
                 .type = BST_LINK_DETECTIONS, .payload = next.payload, .tick = next.written_tick};
             BST_TRY(exchange(m, step, inputs, count));
@@ -360,7 +360,7 @@ static bst_status step_by_queue(void *self, struct bst_step *step) {
     return BST_OK;
 }
 
-/* An exchange for each step, with the tracks that have come since the last one. */
+/* Steps control externally: one exchange per step, with the tracks since the last one. */
 static bst_status step_control(void *self, struct bst_step *step) {
     external *m = self;
     bst_link_input inputs[MOST_INPUTS];
@@ -368,7 +368,7 @@ static bst_status step_control(void *self, struct bst_step *step) {
     bool is_ready;
     BST_TRY(ready(m, step, &is_ready));
     if (!is_ready) {
-        return BST_OK; /* tracks wait for the next step */
+        return BST_OK; /* tracks are sent in the next step */
     }
     BST_TRY(add_latest(m, step, inputs, &count));
     for (int i = 0; i < MOST_QUEUED; i++) {

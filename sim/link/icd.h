@@ -1,4 +1,4 @@
-/* The interface control document of the link, made from the tables that the code uses. */
+/* Generates the interface control document of the link from its message tables. */
 #ifndef BST_LINK_ICD_H
 #define BST_LINK_ICD_H
 
@@ -6,7 +6,7 @@
 
 #include "boresight/status.h"
 
-/* Writes docs/reference/icd.md (Markdown). BST_ERR_IO: the stream took less. */
+/* Writes docs/reference/icd.md (Markdown). BST_ERR_IO: write error. */
 bst_status bst_link_icd(bst_ctx *ctx, FILE *out) BST_MUST_CHECK;
 
 #endif

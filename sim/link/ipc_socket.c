@@ -18,8 +18,8 @@ static int new_socket(void) {
     return socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 }
 
-/* The folder of the socket, locked, so that of two programs that find a dead socket one only makes
- * a new one; -1 with errno. */
+/* Opens and locks the folder of the socket, so that only one program replaces a dead socket. -1
+ * with errno. */
 static int lock_folder(const char *path) {
     char folder[108];
     const char *slash = strrchr(path, '/');
@@ -30,8 +30,8 @@ static int lock_folder(const char *path) {
     return fd;
 }
 
-/* Makes way at the address: nothing is there, or a dead socket of this user, which is removed. */
-static bst_status make_way(bst_ctx *ctx, const struct sockaddr_un *address) {
+/* Frees the address: removes a dead socket of this user. */
+static bst_status remove_dead_socket(bst_ctx *ctx, const struct sockaddr_un *address) {
     struct stat info;
     if (lstat(address->sun_path, &info) != 0) {
         return errno == ENOENT ? BST_OK
@@ -70,7 +70,7 @@ static bst_status make_way(bst_ctx *ctx, const struct sockaddr_un *address) {
 
 static bst_status listen_at(bst_ctx *ctx, const struct sockaddr_un *address, bst_ipc_socket *out) {
     struct stat info;
-    /* the mode that the socket has before it is bound is that of its file */
+    /* the mode before binding becomes the mode of the file */
     if (fchmod(out->fd, 0600) == 0 &&
         bind(out->fd, (const struct sockaddr *)address, sizeof *address) == 0 &&
         lstat(address->sun_path, &info) == 0 && listen(out->fd, BACKLOG) == 0) {
@@ -97,7 +97,7 @@ bst_status bst_ipc_socket_open(bst_ctx *ctx, const char *path, bst_ipc_socket *o
         return bst_fail(ctx, BST_ERR_IO, "link: ipc://%s: its folder cannot be opened: %s", path,
                         strerror(errno));
     }
-    bst_status status = make_way(ctx, &address);
+    bst_status status = remove_dead_socket(ctx, &address);
     if (status == BST_OK && (out->fd = new_socket()) < 0) {
         status = bst_fail(ctx, BST_ERR_IO, "link: no socket: %s", strerror(errno));
     }

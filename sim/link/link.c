@@ -96,7 +96,7 @@ static bst_status bind_address(bst_ctx *ctx, bst_link *link) {
         return bst_fail(ctx, BST_ERR_IO, "link: cannot watch connections: %s", zmq_strerror(errno));
     }
     if (strncmp(link->address, "ipc://", 6) == 0) {
-        /* ZeroMQ itself would remove whatever is at the path */
+        /* ZeroMQ itself would remove any file at the path */
         BST_TRY(bst_ipc_socket_open(ctx, link->address + 6, &link->ipc));
         set(link->router, ZMQ_USE_FD, link->ipc.fd);
     }
@@ -154,15 +154,15 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
             (void)bst_link_send_end(link, p, rooms + (size_t)p * LINK_END_BYTES);
         }
     }
-    /* A socket that closes while a message of several parts is on its way to a peer that breaks off
-     * just then ends the process in libzmq 4.3.4 (an assertion of its session): so the last message
-     * leaves first, unless the peer does not read. */
+    /* libzmq 4.3.4 aborts if a socket closes while a multi-part message is being sent to a peer
+     * that disconnects. Therefore wait until the last message is sent, unless the peer does not
+     * read. */
     for (int ms = 0; ms < LINK_PARTING_MS && __atomic_load_n(&link->parting, __ATOMIC_ACQUIRE) > 0;
          ms++) {
         (void)zmq_poll(NULL, 0, 1);
     }
     if (link->router) {
-        set(link->router, ZMQ_LINGER, 200); /* ms, for `end` to leave */
+        set(link->router, ZMQ_LINGER, 200); /* linger in ms, so that `end` is sent */
         (void)zmq_socket_monitor(link->router, NULL, 0);
         zmq_close(link->router);
     }
@@ -173,7 +173,7 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
         zmq_close(link->asker);
     }
     if (link->context) {
-        zmq_ctx_term(link->context); /* all frames have been released when it returns */
+        zmq_ctx_term(link->context); /* ZeroMQ has released all frames when it returns */
     }
     bst_ipc_socket_remove(&link->ipc);
     if (rooms != none) {
@@ -252,7 +252,7 @@ int64_t bst_link_news(bst_link *link, int index, const char **name) {
 void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...) {
     link->counts[event]++;
     if (link->note_count == LINK_NOTES) {
-        return; /* the log has a few of them; the counters have all */
+        return; /* the log gets the first few; the counters count all */
     }
     char *note = link->notes[(link->note_first + link->note_count++) % LINK_NOTES];
     int n = snprintf(note, LINK_NOTE_BYTES, "%s: ", event_names[event] + strlen("link_"));

@@ -1,10 +1,8 @@
-/* The simulation's end of the link: parts of a scenario that other programs play. It binds an
- * address of this machine (ZeroMQ ROUTER); peers connect to it (DEALER), say which parts they play,
- * and answer each step of such a part. What the bytes are: docs/reference/icd.md; how it is used:
- * docs/how-to/hardware_in_the_loop.md.
- *
- * Whatever a peer does has an answer that is counted: see bst_link_counter. Nothing waits longer
- * than the time-outs say. One thread uses a link. */
+/* The simulation's side of the link: other programs (peers) replace modules of a scenario. It binds
+ * a local address (ZeroMQ ROUTER); peers connect (DEALER), name the modules that they play, and
+ * answer each step. Packets: docs/reference/icd.md; use: docs/how-to/hardware_in_the_loop.md. Every
+ * fault of a peer is counted: see bst_link_counter. Time-outs limit all waits. A link is for one
+ * thread. */
 #ifndef BST_LINK_LINK_H
 #define BST_LINK_LINK_H
 
@@ -17,26 +15,26 @@ typedef struct bst_link bst_link;
 
 typedef enum bst_link_silence { BST_LINK_STOP, BST_LINK_GO_ON } bst_link_silence;
 
-/* A scenario's "link". */
+/* The "link" block of a scenario. */
 typedef struct bst_link_config {
     char address[128];
-    char keys_file[512];      /* "": the link asks for none */
+    char keys_file[512];      /* "": no authentication */
     double timeout_s;         /* for the answer to a step */
-    double connect_timeout_s; /* for a peer that plays a part, at its first step */
+    double connect_timeout_s; /* for a peer's connection, before its first step */
     int32_t on_silence;       /* bst_link_silence */
     bool shared_memory;
 } bst_link_config;
 
 extern const bst_config_desc bst_link_config_table[];
 
-/* How long a step waits for its answer. */
+/* Waiting for the answer to a step. */
 typedef enum bst_link_waiting {
-    BST_LINK_AWAIT, /* until it comes, or the time-outs say that it does not */
-    BST_LINK_HOLD,  /* for hold_s; then the run goes on, and the answer counts when it comes */
-    BST_LINK_RUSH,  /* not at all: the same with hold_s 0 */
+    BST_LINK_AWAIT, /* until it arrives or the time-out expires */
+    BST_LINK_HOLD,  /* for hold_s; then the run continues and uses the answer when it arrives */
+    BST_LINK_RUSH,  /* no waiting: as hold_s 0 */
 } bst_link_waiting;
 
-/* What the run is, for `welcome` and headers. */
+/* Description of the run, for `welcome` and headers. */
 typedef struct bst_link_run {
     const char *scenario;
     bst_time epoch;
@@ -49,30 +47,31 @@ typedef struct bst_link_run {
 /* Checks the address; nothing is bound yet. */
 bst_status bst_link_create(bst_ctx *ctx, const bst_link_config *config, const bst_link_run *run,
                            bst_link **out) BST_MUST_CHECK;
-/* How the run has ended, for bst_link_close. */
+/* Sets the reason of the run's end, for bst_link_close. */
 void bst_link_set_end(bst_link *link, int reason, const char *text);
-/* Tells the peers why (bst_link_end.reason; what bst_link_set_end has said goes before) and lets go
- * of everything; `link` may be NULL. */
+/* Sends `end` with the reason to the peers (bst_link_end.reason; the reason of bst_link_set_end
+ * takes precedence) and frees the link; `link` may be NULL. */
 void bst_link_close(bst_link *link, int reason, const char *text);
 
-/* Adds a part that a peer is to play; *number is what bst_link_exchange takes. Before
+/* Adds a module that a peer plays; *number identifies it in bst_link_exchange. Before
  * bst_link_open. */
 bst_status bst_link_add(bst_ctx *ctx, bst_link *link, const bst_link_part *part,
                         int *number) BST_MUST_CHECK;
-/* Binds the address; once, else by the first exchange. BST_ERR_IO: it is taken. */
+/* Binds the address, once; otherwise the first exchange binds it. BST_ERR_IO: address in use. */
 bst_status bst_link_open(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
-/* Waits until each part has a peer, for connect_timeout_s. Errors as bst_link_exchange. */
+/* Waits up to connect_timeout_s until each part has a peer. Errors as bst_link_exchange. */
 bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
-/* Asked about ten times a second while waiting; true ends the wait with BST_ERR_INTERRUPTED. */
+/* Sets a function that is called about ten times a second while waiting; true ends the wait with
+ * BST_ERR_INTERRUPTED. */
 void bst_link_on_wait(bst_link *link, bool (*stop)(void *user), void *user);
 
-/* A message to the peer. */
+/* A message to a peer. */
 typedef struct bst_link_input {
     bst_link_type type;
-    const void *payload; /* its struct */
-    int64_t tick;        /* at which it was written */
-    /* BST_LINK_FRAME: the pixels, sent without a copy. `hold` is called before they are, `release`
-     * when they have been, perhaps from another thread; both may be NULL. */
+    const void *payload; /* struct of the message type */
+    int64_t tick;        /* tick at which it was written */
+    /* BST_LINK_FRAME: pixels, sent without a copy. `hold` is called before sending, `release` after
+     * it, possibly by another thread; both may be NULL. */
     const uint16_t *pixels;
     size_t pixel_bytes;
     void (*hold)(void *owner);
@@ -80,16 +79,16 @@ typedef struct bst_link_input {
     void *owner;
 } bst_link_input;
 
-/* A message that the peer may answer with, at most one of each. */
+/* A message that a peer may answer with, at most one of each type. */
 typedef struct bst_link_output {
     bst_link_type type;
-    void *payload; /* its struct with room for `capacity` items */
+    void *payload; /* struct of the type with room for `capacity` items */
     int capacity;
-    bool given;  /* set by the exchange */
+    bool given;  /* set by the exchange: it was received */
     int dropped; /* items beyond the capacity */
 } bst_link_output;
 
-/* What a part is sent in a step, and what it may answer with. */
+/* Messages to a peer in one step, and its possible answers. */
 typedef struct bst_link_messages {
     const bst_link_input *inputs; /* [input_count] */
     int input_count;
@@ -97,13 +96,13 @@ typedef struct bst_link_messages {
     int output_count;
 } bst_link_messages;
 
-/* One step of a part: sends the inputs (at most 63), waits for the answer. *answered false: there
- * was none in time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one
- * said that it has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
+/* Executes one step of a part: sends the inputs (at most 63) and waits for the answer. *answered
+ * false: time-out, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer, no answer, or the peer
+ * reports a failure; BST_ERR_INTERRUPTED: bst_link_on_wait. */
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                              const bst_link_messages *messages, bool *answered) BST_MUST_CHECK;
 
-/* Takes another answer of a part, if there is one, with BST_LINK_HOLD or BST_LINK_RUSH.
+/* Takes another received answer of a part, with BST_LINK_HOLD or BST_LINK_RUSH.
  *
  * Given:     part  number of the part
  *            tick  tick of the step
@@ -127,56 +126,55 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                           const bst_link_output *outputs, int output_count,
                           bool *ready) BST_MUST_CHECK;
 
-/* Writes what the parts are answered to a file, before the first exchange; bst_link_record_end says
- * whether it all got there. */
+/* Starts recording the answers of all parts to a file, before the first exchange.
+ * bst_link_record_end reports write errors. */
 bst_status bst_link_record(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
 
 /* Flushes and closes the recording of a link; without one it does nothing.
  *
  * Errors:    BST_ERR_IO if anything could not be written */
 bst_status bst_link_record_end(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
-/* Has the parts answered from such a file: nothing is bound, nobody is waited for. An exchange that
- * is not the recorded one is BST_ERR_FORMAT. */
+/* Replays a recording: answers come from the file, without a socket or peers. BST_ERR_FORMAT: an
+ * exchange differs from the recorded one. */
 bst_status bst_link_replay(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
 /* True if a link replays a recording. */
 bool bst_link_replays(const bst_link *link);
-/* For those who drop frames by the clock: while recording keeps *dropped of a frame of an instance
- * that is no part, while replaying sets it to what it was. */
+/* Records or replays a frame drop of pacing, for an instance that is no external part. Recording:
+ * stores *dropped; replaying: sets it. */
 bst_status bst_link_keep_drop(bst_ctx *ctx, bst_link *link, const char *instance, int64_t tick,
                               bool *dropped) BST_MUST_CHECK;
 
-/* What has been counted, by name ("link_bad_crc"); false after the last. */
+/* Counters of the link by name ("link_bad_crc"); false after the last. */
 bool bst_link_counter(const bst_link *link, int index, const char **name, int64_t *count);
-/* What a counter has grown by since this was last asked, for those who pass counts on; -1 after the
- * last counter. */
+/* Increase of a counter since the last call; -1 after the last counter. */
 int64_t bst_link_news(bst_link *link, int index, const char **name);
-/* The next line of what has happened that is worth a record ("peer x: ..."); NULL: no more. At most
- * a few dozen are kept between two calls. */
+/* Next line of the link's notes ("peer x: ..."); NULL: no more. It keeps a few dozen lines between
+ * calls. */
 const char *bst_link_note(bst_link *link);
 
 /* ---- a peer in C ---- */
 
 typedef struct bst_link_peer bst_link_peer;
 
-/* Connects to a simulation, which need not be there yet, and says hello. `keys_file`: of a link
- * that asks for keys (bst_curve_keys_read), else NULL. */
+/* Connects a peer to a simulation, which may start later, and sends `hello`. `keys_file`: for a
+ * link with authentication (bst_curve_keys_read), else NULL. */
 bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const char *keys_file,
                               const bst_link_hello *hello, bst_link_peer **out) BST_MUST_CHECK;
 /* Closes the peer's side of a link and frees it; NULL is allowed. */
 void bst_link_peer_close(bst_link_peer *peer);
 
-/* A message that came. Pointers are lent until the next bst_link_peer_receive. */
+/* A received message. Pointers are valid until the next bst_link_peer_receive. */
 typedef struct bst_link_received {
     bst_link_header header;
-    const void *payload;    /* the struct of header.type */
+    const void *payload;    /* struct of header.type */
     const uint16_t *pixels; /* of a frame */
 } bst_link_received;
 
-/* The next message; BST_ERR_NOT_FOUND when none came in time. After an `error` that says so, hello
- * is said again. Messages that are wrong are an error: a simulation sends none. */
+/* Receives the next message of the simulation; BST_ERR_NOT_FOUND: time-out. Repeats `hello` after
+ * an `error` that asks for it. Invalid messages are an error. */
 bst_status bst_link_peer_receive(bst_ctx *ctx, bst_link_peer *peer, double timeout_s,
                                  bst_link_received *out) BST_MUST_CHECK;
-/* Sends a payload of a type as part of the answer to `step` (a received header, or NULL: none). */
+/* Sends a payload as part of the answer to `step` (a received header, or NULL: none). */
 bst_status bst_link_peer_send(bst_ctx *ctx, bst_link_peer *peer, bst_link_type type,
                               const void *payload, const bst_link_header *step) BST_MUST_CHECK;
 

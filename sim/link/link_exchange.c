@@ -1,4 +1,4 @@
-/* A step of a part that a peer plays. */
+/* Exchange of one step with the peer that plays a part. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,15 +7,15 @@
 #include "sim/link/crc32c.h"
 #include "sim/link/link_internal.h"
 
-/* The pixels' checksums are worked out once, however often they are sent. */
+/* Inputs of a step; checksums of pixels are computed once. */
 typedef struct sending {
     const bst_link_input *inputs;
     int count, attempt;
-    uint64_t has_crc; /* bit i: of input i, below 64 */
+    uint64_t has_crc; /* bit i: input i, below 64 */
     uint32_t crcs[64];
 } sending;
 
-/* Inputs, then `step`. A peer that takes none of it has gone. */
+/* Sends the inputs of a step, then `step`. A peer that takes none of them is disconnected. */
 static void send_step(bst_link *link, link_exchange *x, sending *s) {
     link_part *part = &link->parts[x->part];
     int peer = part->peer;
@@ -55,11 +55,11 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
     }
     *answered = false;
     for (int i = 0; i < x->answer.output_count; i++) {
-        x->answer.outputs[i].given = false; /* half of an answer is none */
+        x->answer.outputs[i].given = false; /* discard an incomplete answer */
     }
     if (link->config.on_silence == BST_LINK_GO_ON) {
         if (peer >= 0) {
-            bst_link_unassign(link, peer); /* until it says hello again */
+            bst_link_unassign(link, peer); /* until the next `hello` */
         }
         return BST_OK;
     }
@@ -78,7 +78,7 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
                     link->address);
 }
 
-/* The oldest answer that is whole goes to the caller. */
+/* Returns the oldest complete answer of a part to the caller. */
 static bool oldest_answer(bst_link *link, int number, bst_link_output *outputs, int output_count) {
     link_part *part = &link->parts[number];
     link_answer *oldest = NULL;
@@ -123,7 +123,7 @@ bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
     return BST_OK;
 }
 
-/* Room for answers that are not awaited. */
+/* Allocates buffers for answers that are not awaited. */
 static bst_status make_ahead(bst_ctx *ctx, link_part *part, const bst_link_output *outputs,
                              int count) {
     for (int a = 0; a < LINK_AHEAD && !part->ahead[a].outputs; a++) {
@@ -148,8 +148,8 @@ static bst_status make_ahead(bst_ctx *ctx, link_part *part, const bst_link_outpu
     return BST_OK;
 }
 
-/* A place for the answer to another step; NULL: there is none, or frames in shared memory would be
- * written over that may not have been read. */
+/* Buffer for the answer to another step. NULL: none is free, or unread frames in shared memory
+ * would be overwritten. */
 static link_answer *free_place(bst_link *link, link_part *part) {
     int open = 0;
     for (int i = 0; i < link->part_count; i++) {
@@ -164,7 +164,8 @@ static link_answer *free_place(bst_link *link, link_part *part) {
     return place;
 }
 
-/* Takes what comes until `until` (wall seconds) or until `enough`; at least what is there. */
+/* Receives messages until `until` (wall seconds) or until `enough` is true; at least those already
+ * received. */
 static bst_status take_until(bst_link *link, link_exchange *x, double until,
                              bool (*enough)(bst_link *link, link_exchange *x)) {
     for (;;) {
@@ -219,7 +220,7 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     bool place = free_place(link, part) != NULL;
     for (int a = 0; a < LINK_AHEAD; a++) {
         const link_answer *answer = &part->ahead[a];
-        place |= answer->open && answer->finished; /* bst_link_more makes room */
+        place |= answer->open && answer->finished; /* bst_link_more frees a buffer */
         oldest = answer->open && !answer->finished ? fmin(oldest, answer->sent_s) : oldest;
     }
     if (part->peer >= 0 && bst_wall_seconds() - oldest > link->config.timeout_s) {
@@ -234,7 +235,7 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     return BST_OK;
 }
 
-/* A step that is sent and not awaited, or not for long. */
+/* Executes a step without waiting for its answer, or only for hold_s. */
 static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
                               const bst_link_messages *m, bool *answered) {
     link_part *part = &link->parts[number];
@@ -307,7 +308,7 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     sending s = {.inputs = m->inputs, .count = m->input_count};
     double began = bst_wall_seconds();
     bool first = !part->had_peer;
-    /* one that has been lost already is not waited for again where the run does without */
+    /* with on_silence = go on, do not wait again for a lost peer */
     bool waits = part->peer >= 0 || first || link->config.on_silence == BST_LINK_STOP;
     double limit = !waits ? 0.0 : first ? link->config.connect_timeout_s : link->config.timeout_s;
     double end = began + limit, last = began + LINK_EXTENSIONS * link->config.timeout_s;

@@ -1,5 +1,5 @@
-/* What peers over TCP have sent that has not been taken. ZeroMQ bounds each part of a message, not
- * the message, nor how many parts it has; it holds all of them until the last has come. */
+/* Limits the bytes that TCP peers have sent and the link has not read. ZeroMQ limits each message
+ * part, but not the number of parts; it buffers them until the last one arrives. */
 #include <errno.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
@@ -10,7 +10,7 @@
 #include "sim/core/wall_clock.h"
 #include "sim/link/link_internal.h"
 
-/* Between two looks at the connections. */
+/* seconds between checks of the connections */
 static const double LOOK_S = 0.005;
 
 static link_flow *find(bst_link *link, int fd) {
@@ -22,8 +22,7 @@ static link_flow *find(bst_link *link, int fd) {
     return NULL;
 }
 
-/* Ends a connection; ZeroMQ closes the socket. Without lingering the peer sees it at once (RST),
- * and does not wait for a window that never opens. */
+/* Closes a TCP connection without lingering: the peer gets a reset at once and does not wait. */
 static void cut(int fd) {
     const struct linger none = {.l_onoff = 1, .l_linger = 0};
     (void)setsockopt(fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
@@ -35,7 +34,7 @@ bool bst_link_flow_watched(const bst_link *link) {
 }
 
 void bst_link_flow_open(bst_link *link, int fd) {
-    /* by CURVE a peer is known, and what it sends has another length on the wire */
+    /* with CURVE peers are authenticated, and the length on the wire differs */
     if (strncmp(link->address, "tcp://", 6) != 0 || link->asker || fd < 0) {
         return;
     }
@@ -63,8 +62,7 @@ void bst_link_flow_take(bst_link *link, zmq_msg_t *part) {
     }
 }
 
-/* Bytes that the connection has received and the link has not taken; -1: it is none of the link's
- * any more. */
+/* Bytes received on a connection and not yet read by the link; -1: the connection is closed. */
 static int64_t waiting(const bst_link *link, const link_flow *flow) {
     struct tcp_info info = {0};
     struct sockaddr_storage own = {0};

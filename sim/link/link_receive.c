@@ -1,5 +1,4 @@
-/* What the simulation's end receives: nothing in it is taken to be true before it has been checked.
- */
+/* Receives messages on the simulation's side of the link; every value is checked before use. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -7,17 +6,17 @@
 #include "sim/core/wall_clock.h"
 #include "sim/link/link_internal.h"
 
-enum { MOST_PARTS = 4 }; /* identity, header, payload, and one too many */
+enum { MOST_PARTS = 4 }; /* identity, header, payload, and one excess part */
 
 typedef struct message {
     zmq_msg_t parts[MOST_PARTS];
-    int count; /* of those above; more are let go */
+    int count; /* stored parts; further ones are discarded */
     bool more;
     link_id id;
     bst_link_header header;
 } message;
 
-/* What comes besides outputs. */
+/* Payloads of control messages. */
 typedef union control_message {
     bst_link_hello hello;
     bst_link_done done;
@@ -60,9 +59,9 @@ static const char *name_of(const bst_link *link, int peer) {
     return peer >= 0 && *link->peers[peer].name ? link->peers[peer].name : "a peer";
 }
 
-/* Counts what is wrong with a message and tells its sender. */
-static void refuse(bst_link *link, link_exchange *x, const message *m, int peer, int event,
-                   const char *fault, const char *text) {
+/* Counts an invalid message and sends an `error` to its sender. */
+static void reject_message(bst_link *link, link_exchange *x, const message *m, int peer, int event,
+                           const char *fault, const char *text) {
     int64_t sequence = m->header.type == BST_LINK_TYPES ? -1 : m->header.sequence;
     bst_link_event(link, x->ctx, event, "%s: %s", name_of(link, peer), text);
     if (x->replies < LINK_REPLIES) {
@@ -71,7 +70,7 @@ static void refuse(bst_link *link, link_exchange *x, const message *m, int peer,
     }
 }
 
-/* Whether a list as in bst_link_hello.serves names a part. */
+/* Checks whether a list as in bst_link_hello.serves names a part. */
 static bool serves(const char *list, const char *instance) {
     const char *last = strrchr(instance, '/');
     last = last ? last + 1 : instance;
@@ -91,7 +90,7 @@ static int place_for(bst_link *link, const link_id *id) {
     for (int p = 0; known < 0 && p < LINK_PEERS; p++) {
         known = !link->peers[p].used ? p : known;
     }
-    /* those who have left, or play nothing, make room */
+    /* replace peers that have left or play no part */
     for (int blocked = 0; blocked < 2; blocked++) {
         for (int p = 0; known < 0 && p < LINK_PEERS; p++) {
             known = !plays_any(link, p) && link->peers[p].blocked == blocked ? p : known;
@@ -127,7 +126,7 @@ static void take_hello(bst_link *link, link_exchange *x, const message *m,
                        const bst_link_hello *hello) {
     int p = place_for(link, &m->id);
     if (p < 0) {
-        refuse(link, x, m, -1, LINK_REFUSED, "refused", "there are 16 peers already");
+        reject_message(link, x, m, -1, LINK_REFUSED, "refused", "there are 16 peers already");
         return;
     }
     link_peer *peer = &link->peers[p];
@@ -165,7 +164,7 @@ static void take_hello(bst_link *link, link_exchange *x, const message *m,
         snprintf(text, sizeof text, "no part is called \"%.100s\" (there is %.160s%s)",
                  hello->serves, link->parts[0].about.instance,
                  link->part_count > 1 ? " and others" : "");
-        refuse(link, x, m, p, LINK_REFUSED, "refused", text);
+        reject_message(link, x, m, p, LINK_REFUSED, "refused", text);
         return;
     }
     bst_link_event(link, x->ctx, LINK_HELLO_TAKEN, "%s plays %d part%s", name_of(link, p), played,
@@ -173,7 +172,7 @@ static void take_hello(bst_link *link, link_exchange *x, const message *m,
     send_welcome(link, p, x);
 }
 
-/* The sequence of a message: false when it is not to be taken. */
+/* Checks the sequence number of a message. False: discard it. */
 static bool in_order(bst_link *link, link_exchange *x, const message *m, int p) {
     link_peer *peer = &link->peers[p];
     int64_t sequence = m->header.sequence;
@@ -182,8 +181,8 @@ static bool in_order(bst_link *link, link_exchange *x, const message *m, int p) 
         bool last = sequence == peer->expected - 1;
         snprintf(text, sizeof text, "sequence %lld has %s (expected: %lld)", (long long)sequence,
                  last ? "come already" : "been passed", (long long)peer->expected);
-        refuse(link, x, m, p, last ? LINK_DUPLICATE : LINK_OUT_OF_ORDER,
-               last ? "duplicate" : "out_of_order", text);
+        reject_message(link, x, m, p, last ? LINK_DUPLICATE : LINK_OUT_OF_ORDER,
+                       last ? "duplicate" : "out_of_order", text);
         return false;
     }
     if (sequence > peer->expected) {
@@ -203,7 +202,7 @@ static bst_link_output *output_of(const link_answer *answer, bst_link_type type)
     return NULL;
 }
 
-/* The step that a message of peer p answers; NULL when it is none that is under way. */
+/* The unfinished answer to which a message of peer p belongs; NULL: none. */
 static link_answer *answer_of(bst_link *link, link_exchange *x, const bst_link_header *h, int p) {
     for (int i = 0; i < link->part_count; i++) {
         link_part *part = &link->parts[i];
@@ -222,7 +221,7 @@ static link_answer *answer_of(bst_link *link, link_exchange *x, const bst_link_h
     return NULL;
 }
 
-/* Where the payload of a message goes; NULL, after saying why, when it is not to be taken. */
+/* Buffer for the payload of a message. NULL, after an error reply: the message is rejected. */
 static void *room_for(bst_link *link, link_exchange *x, const message *m, int p,
                       control_message *control, int *capacity) {
     const bst_link_header *h = &m->header;
@@ -237,7 +236,7 @@ static void *room_for(bst_link *link, link_exchange *x, const message *m, int p,
         snprintf(text, sizeof text, "%s for step %lld of %.100s; step %lld of %.100s is under way",
                  bst_wire_message_of(h->type)->name, (long long)h->step, h->instance,
                  part ? (long long)part->step - 1 : -1LL, part ? part->about.instance : "no part");
-        refuse(link, x, m, p, LINK_LATE, "late", text);
+        reject_message(link, x, m, p, LINK_LATE, "late", text);
         return NULL;
     }
     if (h->type == BST_LINK_DONE) {
@@ -247,20 +246,21 @@ static void *room_for(bst_link *link, link_exchange *x, const message *m, int p,
     if (!output) {
         snprintf(text, sizeof text, "%s is no output of %.160s", bst_wire_message_of(h->type)->name,
                  h->instance);
-        refuse(link, x, m, p, BST_WIRE_UNEXPECTED, bst_wire_fault_name(BST_WIRE_UNEXPECTED), text);
+        reject_message(link, x, m, p, BST_WIRE_UNEXPECTED, bst_wire_fault_name(BST_WIRE_UNEXPECTED),
+                       text);
         return NULL;
     }
     if (output->given) {
         snprintf(text, sizeof text, "a second %s in step %lld: the first one holds",
                  bst_wire_message_of(h->type)->name, (long long)h->step);
-        refuse(link, x, m, p, LINK_REPEATED, "repeated", text);
+        reject_message(link, x, m, p, LINK_REPEATED, "repeated", text);
         return NULL;
     }
     *capacity = output->capacity;
     return output->payload;
 }
 
-/* A step ends when all that the peer has sent for it has been taken. */
+/* Completes the answer to a step at `done`, if all its messages were received. */
 static void take_done(bst_link *link, link_exchange *x, const message *m, int p,
                       const bst_link_done *done) {
     char text[120];
@@ -271,11 +271,11 @@ static void take_done(bst_link *link, link_exchange *x, const message *m, int p,
                  "done with %d outputs, %d have been taken: send what is missing, "
                  "then done again",
                  done->outputs, answer->taken);
-        refuse(link, x, m, p, LINK_INCOMPLETE, "incomplete", text);
+        reject_message(link, x, m, p, LINK_INCOMPLETE, "incomplete", text);
     }
 }
 
-/* The time-outs of steps that are not awaited start anew. */
+/* Restarts the time-outs of steps that are not awaited. */
 static void prolong_ahead(bst_link *link, int p) {
     for (int i = 0; i < link->part_count; i++) {
         for (int a = 0; link->parts[i].peer == p && a < LINK_AHEAD; a++) {
@@ -324,7 +324,7 @@ static void take_content(bst_link *link, link_exchange *x, const message *m, int
     }
 }
 
-/* Whether a peer is still heard: not one that sends without end. */
+/* Checks the number of messages of a peer: one that floods the link is ignored. */
 static bool is_heard(bst_link *link, const link_exchange *x, int p) {
     link_peer *peer = &link->peers[p];
     if (peer->heard_step != link->exchanges) {
@@ -343,7 +343,7 @@ static bool is_heard(bst_link *link, const link_exchange *x, int p) {
     return !peer->blocked;
 }
 
-/* The header, and whether it is for the simulation. */
+/* Reads the header of a message and checks that it is for the simulation. */
 static bst_wire_fault read_header(bst_ctx *why, message *m) {
     m->header.type = BST_LINK_TYPES;
     if (m->count < 2) {
@@ -379,12 +379,12 @@ static void take_message(bst_link *link, link_exchange *x, message *m) {
     if (p >= 0 && !is_heard(link, x, p)) {
         return;
     }
-    bst_ctx why = {0}; /* what is wrong with a message is not why the run ends */
+    bst_ctx why = {0}; /* a faulty message does not end the run */
     bst_wire_fault fault = read_header(&why, m);
     if (fault == BST_WIRE_GOOD && m->header.type != BST_LINK_HELLO) {
         if (p < 0 || (!plays_any(link, p) && m->header.type != BST_LINK_END)) {
-            refuse(link, x, m, p, LINK_STRANGER, "stranger",
-                   "this peer plays no part now: say hello (again)");
+            reject_message(link, x, m, p, LINK_STRANGER, "stranger",
+                           "this peer plays no part now: say hello (again)");
             return;
         }
         if (!in_order(link, x, m, p)) {
@@ -407,14 +407,14 @@ static void take_message(bst_link *link, link_exchange *x, message *m) {
                             zmq_msg_size(&m->parts[2]), room, capacity, &dropped);
     }
     if (fault != BST_WIRE_GOOD) {
-        refuse(link, x, m, p, (int)fault, bst_wire_fault_name(fault), why.message);
+        reject_message(link, x, m, p, (int)fault, bst_wire_fault_name(fault), why.message);
         return;
     }
     link->counts[BST_WIRE_GOOD]++;
     take_content(link, x, m, p, &control, dropped);
 }
 
-/* One whole message, if there is one. */
+/* Receives one complete message if there is one. */
 static bool receive(bst_link *link, message *m) {
     m->count = 0;
     m->more = false;
@@ -443,7 +443,7 @@ static bool receive(bst_link *link, message *m) {
     return m->count > 0;
 }
 
-/* Connections that came and went. */
+/* Processes new and closed connections. */
 static void watch(bst_link *link) {
     for (int i = 0; i < 1000; i++) {
         uint8_t event[6] = {0};
@@ -469,7 +469,7 @@ bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) {
     zmq_pollitem_t items[3] = {{.socket = link->router, .events = ZMQ_POLLIN},
                                {.socket = link->monitor, .events = ZMQ_POLLIN},
                                {.socket = link->asker, .events = ZMQ_POLLIN}};
-    /* parts of a message that never ends wake nobody up */
+    /* parts of an incomplete message do not wake the poll */
     if (bst_link_flow_watched(link) && wait_ms > LINK_LOOK_MS) {
         wait_ms = LINK_LOOK_MS;
     }

@@ -1,8 +1,8 @@
-/* What peers answered, as a file, and a run that gets its answers from there.
+/* Records the answers of peers to a file, and replays them.
  *
  * Packets as in docs/reference/icd.md, each after the bytes of its header and of its payload (two
- * uint32, little-endian). A call that gave an answer has the outputs and `done`; `step` with
- * attempt 0 tells whether a part was ready, with attempt 1 that there was no answer more. */
+ * uint32, little-endian). A call with an answer is stored as outputs and `done`; `step` with
+ * attempt 0 records whether a part was ready, with attempt 1 that there was no further answer. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +22,7 @@ struct link_tape {
     uint8_t *payload;
     size_t room;
     int64_t packets;
-    int failed; /* errno of the first write that failed */
+    int failed; /* errno of the first failed write */
 };
 
 static bst_status open_tape(bst_ctx *ctx, bst_link *link, const char *path, bool writing) {
@@ -186,7 +186,7 @@ static bst_status misfit(bst_ctx *ctx, const bst_link *link, const char *instanc
         found->instance, (long long)found->tick, instance, (long long)tick);
 }
 
-/* The next packet; its payload is in tape->payload. */
+/* Reads the next packet; tape->payload holds its payload. */
 static bst_status get(bst_ctx *ctx, const bst_link *link, const char *instance, int64_t tick,
                       bst_link_header *header) {
     link_tape *tape = link->tape;
@@ -231,7 +231,7 @@ static bst_status decode(bst_ctx *ctx, const bst_link *link, const bst_link_head
     return bst_fail_prefix(ctx, BST_ERR_FORMAT, "link: %s", link->tape->path);
 }
 
-/* The rest of an answer whose first packet's header has been read. */
+/* Reads the remaining packets of an answer, after the header of the first. */
 static bst_status read_answer(bst_ctx *ctx, const bst_link *link, int part, int64_t tick,
                               bst_link_header *header, bst_link_output *outputs, int count) {
     for (int i = 0; i < count; i++) {

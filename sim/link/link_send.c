@@ -1,12 +1,12 @@
-/* What the simulation's end sends. */
+/* Sends messages from the simulation's side of the link. */
 #include <stdio.h>
 #include <string.h>
 
 #include "sim/link/crc32c.h"
 #include "sim/link/link_internal.h"
 
-/* ZeroMQ has done with a frame's pixels; called by its own thread. */
-static void landed(void *pixels, void *hint) {
+/* Called by ZeroMQ's thread when it no longer needs a frame's pixels. */
+static void pixels_sent(void *pixels, void *hint) {
     link_flying *f = hint;
     (void)pixels;
     if (f->release) {
@@ -15,7 +15,7 @@ static void landed(void *pixels, void *hint) {
     __atomic_store_n(&f->busy, 0, __ATOMIC_RELEASE);
 }
 
-/* A message that holds the pixels: lent, or a copy while others are still on their way. */
+/* Makes a message part with the pixels: borrowed, or a copy if too many are in flight. */
 static bool pixels_message(bst_link *link, const bst_link_input *frame, zmq_msg_t *out) {
     for (int i = 0; i < LINK_FLYING; i++) {
         link_flying *f = &link->flying[i];
@@ -28,11 +28,11 @@ static bool pixels_message(bst_link *link, const bst_link_input *frame, zmq_msg_
         if (frame->hold) {
             frame->hold(frame->owner);
         }
-        if (zmq_msg_init_data(out, (void *)(uintptr_t)frame->pixels, frame->pixel_bytes, landed,
-                              f) == 0) {
+        if (zmq_msg_init_data(out, (void *)(uintptr_t)frame->pixels, frame->pixel_bytes,
+                              pixels_sent, f) == 0) {
             return true;
         }
-        landed(NULL, f);
+        pixels_sent(NULL, f);
         return false;
     }
     if (zmq_msg_init_size(out, frame->pixel_bytes) != 0) {
@@ -42,7 +42,7 @@ static bool pixels_message(bst_link *link, const bst_link_input *frame, zmq_msg_
     return true;
 }
 
-/* The parts of a message to an address; false: nothing of it has been sent. */
+/* Sends the parts of a message to an address. False: nothing was sent. */
 static bool send_parts(bst_link *link, const link_id *id, const char *header, size_t header_bytes,
                        zmq_msg_t *payload, zmq_msg_t *pixels) {
     bool sent = zmq_send(link->router, id->bytes, id->count, ZMQ_SNDMORE | ZMQ_DONTWAIT) >= 0 &&
@@ -58,8 +58,8 @@ static bool send_parts(bst_link *link, const link_id *id, const char *header, si
     return sent;
 }
 
-/* ZeroMQ has done with a peer's `end`; called by its own thread. */
-static void parted(void *text, void *left) {
+/* Called by ZeroMQ's thread when a peer's `end` was sent. */
+static void end_sent(void *text, void *left) {
     (void)text;
     __atomic_sub_fetch((int *)left, 1, __ATOMIC_RELEASE);
 }
@@ -77,8 +77,8 @@ bool bst_link_send_end(bst_link *link, int peer, uint8_t *room) {
     char text[BST_LINK_HEADER_BYTES];
     zmq_msg_t payload;
     __atomic_add_fetch(&link->parting, 1, __ATOMIC_RELAXED);
-    if (zmq_msg_init_data(&payload, room, bytes, parted, &link->parting) != 0) {
-        parted(NULL, &link->parting);
+    if (zmq_msg_init_data(&payload, room, bytes, end_sent, &link->parting) != 0) {
+        end_sent(NULL, &link->parting);
         return false;
     }
     return send_parts(link, &link->peers[peer].id, text, bst_link_header_write(&header, text),

@@ -1,4 +1,4 @@
-/* The tables of all messages. */
+/* Field tables of all link messages. */
 #include <math.h>
 #include <string.h>
 
@@ -89,7 +89,7 @@ static const bst_wire_field step[] = {
 
 static const bst_wire_field done[] = {
     INT(bst_link_done, outputs, 0, MANY, "", "Messages that belonged to it."),
-    BOUNDED(bst_link_done, busy_s, 0, 1e9, "s", "Wall time of the peer's work; 0: not told."), END};
+    BOUNDED(bst_link_done, busy_s, 0, 1e9, "s", "Wall time of the peer's work; 0: unknown."), END};
 
 static const bst_wire_field error[] = {
     FIELD_(bst_link_error, sequence, BST_WIRE_I64, 1, BST_WIRE_RANGE, -1, 9e15, "",
@@ -287,7 +287,8 @@ static const bst_wire_field tracks[] = {
     REAL(bst_tracks, FIX(rms_px), "px", "Of the stars' residuals."),
     BOUNDED(bst_tracks, FIX(shared), 0, 1, "", "Variance that successive frames share, of all."),
     NUMBER(bst_tracks, target_id, 0, "Track of interest, 0 when none."),
-    INT(bst_tracks, at_rest, 0, MANY, "", "Followed and at rest among the stars: not told."),
+    INT(bst_tracks, at_rest, 0, MANY, "",
+        "Number of stationary tracks, which are not among the items."),
     COUNT(bst_tracks, "Items."),
     INT(bst_tracks, lost, 0, MANY, "", "Tracks that found no room."),
     END};

@@ -6,7 +6,7 @@
 
 #include "sim/link/crc32c.h"
 
-/* How a header ends: "crc32c":"xxxxxxxx"} */
+/* end of a header: "crc32c":"xxxxxxxx"} */
 static const char ending[] = "\"crc32c\":\"";
 enum { ENDING_BYTES = sizeof ending - 1 + 8 + 2, DEPTH = 8 };
 
@@ -47,7 +47,7 @@ size_t bst_link_header_write(const bst_link_header *h, char out[BST_LINK_HEADER_
     return n;
 }
 
-/* What is read, from one end to the other. */
+/* State of parsing a header. */
 typedef struct text {
     const char *at, *end;
     bool bad;
@@ -60,7 +60,7 @@ static void skip_space(text *t) {
     }
 }
 
-/* Passes over a character after white space; false when another one is there. */
+/* Skips a character after white space; false: another character. */
 static bool take(text *t, char c) {
     skip_space(t);
     if (t->bad || t->at == t->end || *t->at != c) {
@@ -116,7 +116,7 @@ static uint32_t read_hex(text *t) {
     return value;
 }
 
-/* Any value; what is in strings is not looked at. */
+/* Skips any JSON value; the content of strings is ignored. */
 static void skip_value(text *t) {
     int depth = 0;
     do {
@@ -166,7 +166,7 @@ typedef struct reading {
 } reading;
 
 static bool first_time(text *t, reading *r, unsigned key) {
-    t->bad |= (r->has & key) != 0; /* a member twice */
+    t->bad |= (r->has & key) != 0; /* duplicate member */
     r->has |= key;
     return !t->bad;
 }

@@ -1,4 +1,4 @@
-/* A peer's end of the link. */
+/* The peer's side of the link. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,15 +20,15 @@ struct bst_link_peer {
     int64_t sent;
     bst_shared_frames *shared;
     char shared_name[64];
-    zmq_msg_t parts[PARTS]; /* of the message that was received last */
+    zmq_msg_t parts[PARTS]; /* parts of the last received message */
     int part_count;
-    void *payload; /* its struct */
+    void *payload; /* struct of the message */
     size_t payload_room;
-    uint16_t *pixels; /* a copy, where the message has them at an odd address */
+    uint16_t *pixels; /* aligned copy, if the pixels are misaligned in the message */
     size_t pixel_room;
 };
 
-static void let_go(bst_link_peer *peer) {
+static void release_parts(bst_link_peer *peer) {
     for (int i = 0; i < peer->part_count; i++) {
         zmq_msg_close(&peer->parts[i]);
     }
@@ -39,7 +39,7 @@ void bst_link_peer_close(bst_link_peer *peer) {
     if (!peer) {
         return;
     }
-    let_go(peer);
+    release_parts(peer);
     if (peer->socket) {
         zmq_close(peer->socket);
     }
@@ -133,7 +133,7 @@ bst_status bst_link_peer_send(bst_ctx *ctx, bst_link_peer *peer, bst_link_type t
     return BST_OK;
 }
 
-/* The parts of one message; BST_ERR_NOT_FOUND when none has come in time. */
+/* Receives the parts of one message; BST_ERR_NOT_FOUND: time-out. */
 static bst_status receive_parts(bst_ctx *ctx, bst_link_peer *peer, double timeout_s) {
     zmq_pollitem_t item = {.socket = peer->socket, .events = ZMQ_POLLIN};
     int wait_ms = timeout_s <= 0.0 ? 0 : timeout_s > 1e6 ? 1000000000 : (int)(timeout_s * 1e3) + 1;
@@ -163,7 +163,7 @@ static bst_status receive_parts(bst_ctx *ctx, bst_link_peer *peer, double timeou
     return BST_OK;
 }
 
-/* What is wrong with a message from the simulation. */
+/* Error status of a faulty message from the simulation. */
 static bst_status wrong(bst_ctx *ctx, bst_wire_fault fault) {
     return bst_fail_prefix(ctx, BST_ERR_FORMAT, "link: a message of the simulation is %s",
                            bst_wire_fault_name(fault));
@@ -249,14 +249,14 @@ bst_status bst_link_peer_receive(bst_ctx *ctx, bst_link_peer *peer, double timeo
                                  bst_link_received *out) {
     double end = bst_wall_seconds() + timeout_s;
     for (;;) {
-        let_go(peer);
+        release_parts(peer);
         BST_TRY(receive_parts(ctx, peer, end - bst_wall_seconds()));
         BST_TRY(read_message(ctx, peer, out));
         const bst_link_error *error = out->payload;
         if (out->header.type != BST_LINK_ERROR || strcmp(error->fault, "stranger") != 0) {
             return BST_OK;
         }
-        /* the connection broke, or an answer was too late */
+        /* the connection was lost, or an answer was too late */
         BST_TRY(say_hello(ctx, peer));
     }
 }

@@ -13,16 +13,16 @@
 #include "sim/core/parallel.h"
 
 struct bst_shared_frames {
-    char name[64]; /* with its slash */
+    char name[64]; /* including the slash */
     unsigned char *memory;
     size_t slot_bytes;
     int slots;
     int64_t next;
     bool owner;
-    bst_parallel *threads; /* of the writer: one core does not reach the memory's speed */
+    bst_parallel *threads; /* of the writer: one core does not saturate the memory bandwidth */
 };
 
-/* A copy in pieces small enough to stay in the caches on their way to the reader. */
+/* bytes per copied piece; small enough for the shared cache */
 enum { PIECE = 256 << 10 };
 typedef struct copy {
     unsigned char *to;

@@ -1,6 +1,5 @@
-/* Frames in shared memory: a ring of slots that one process writes and others on the same machine
- * read. Each slot begins with the header of the message that it belongs to; pixels follow at
- * BST_LINK_PIXELS_AT. */
+/* Frames of the link in shared memory: a ring of slots that one process writes and others on the
+ * same machine read. A slot begins with the message header; pixels follow at BST_LINK_PIXELS_AT. */
 #ifndef BST_LINK_SHARED_FRAMES_H
 #define BST_LINK_SHARED_FRAMES_H
 
@@ -12,17 +11,17 @@
 
 enum {
     BST_LINK_SLOTS = 2,
-    BST_LINK_SLOT_HEADER_AT = 16, /* before it: int64 number (-1: being written), int64 bytes */
+    BST_LINK_SLOT_HEADER_AT = 16, /* preceded by: int64 number (-1: being written), int64 bytes */
     BST_LINK_PIXELS_AT = 4096,
 };
 
 typedef struct bst_shared_frames bst_shared_frames;
 
-/* Makes the object, readable and writable by this user alone, for images of up to pixel_bytes;
+/* Creates the shared memory for images of up to pixel_bytes, accessible to this user only.
  * bst_shared_frames_free removes it. */
 bst_status bst_shared_frames_create(bst_ctx *ctx, size_t pixel_bytes,
                                     bst_shared_frames **out) BST_MUST_CHECK;
-/* Opens one that another process made, for reading. */
+/* Opens the shared memory of another process for reading. */
 bst_status bst_shared_frames_open(bst_ctx *ctx, const char *name, int64_t slot_bytes, int slots,
                                   bst_shared_frames **out) BST_MUST_CHECK;
 
@@ -35,8 +34,7 @@ const char *bst_shared_frames_name(const bst_shared_frames *frames);
 /* Size of a slot, bytes. */
 int64_t bst_shared_frames_slot_bytes(const bst_shared_frames *frames);
 
-/* Writer: number of the message that is written next, 0, 1, ...; its slot is this number modulo
- * slots. */
+/* Writer: number of the next message, 0, 1, ...; its slot is number modulo slots. */
 int64_t bst_shared_frames_next(const bst_shared_frames *frames);
 
 /* Writer: writes the next message to its slot.

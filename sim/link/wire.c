@@ -133,7 +133,7 @@ static bst_wire_fault check_text(bst_ctx *ctx, const bst_wire_message *message,
     return BST_WIRE_GOOD;
 }
 
-/* `item`: its number, -1 for the record. */
+/* Checks a field of a message. `item`: index of the item, -1: the record. */
 static bst_wire_fault check_field(bst_ctx *ctx, const bst_wire_message *message,
                                   const bst_wire_field *f, const uint8_t *p, int item) {
     if (f->type == BST_WIRE_TEXT) {

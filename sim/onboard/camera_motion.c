@@ -4,7 +4,7 @@ static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int
     return &t->items[n % t->capacity];
 }
 
-/* Sums of a piecewise linear rotation vector r(t), t from the exposure's middle. */
+/* Moments of a piecewise linear rotation vector r(t), t from mid-exposure. */
 typedef struct moments {
     bst_vec3 zeroth, first, second; /* integrals of r, t r and t^2 r */
 } moments;
@@ -26,12 +26,13 @@ static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double s) {
     return bst_vec3_axpy(a, s, bst_vec3_sub(b, a));
 }
 
-/* Third differences of rotation vectors at equal steps: 20 times the variance of white noise. */
+/* Estimates white noise from third differences of rotation vectors at equal steps: their variance
+ * is 20 times that of the noise. */
 typedef struct roughness {
-    bst_vec3 last[3]; /* the newest first */
+    bst_vec3 last[3]; /* newest first */
     double step;
-    int run, count; /* samples at this step so far; differences */
-    double sum;     /* of squares about x and y */
+    int run, count; /* run: samples at this step; count: differences */
+    double sum;     /* sum of squares about x and y */
 } roughness;
 
 static void add_sample(roughness *s, double step, bst_vec3 r) {
@@ -49,14 +50,14 @@ static void add_sample(roughness *s, double step, bst_vec3 r) {
     s->run++;
 }
 
-/* Fewest third differences that tell the noise. */
+/* minimum number of third differences for a noise estimate */
 enum { FEWEST_DIFFERENCES = 5 };
 
 static void judge_bend(const roughness *s, double samples, bst_camera_motion *motion) {
     if (s->count < FEWEST_DIFFERENCES) {
         return;
     }
-    /* least-squares coefficient of a Legendre polynomial of degree 2 */
+    /* least-squares coefficient of a second-degree Legendre polynomial */
     double variance = s->sum / (2.0 * s->count * 20.0) * 5.0 / samples;
     bst_vec3 b = motion->bend_cam_rad;
     double square = b.x * b.x + b.y * b.y;
@@ -73,7 +74,7 @@ bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, i
     int64_t newest = telemetry->written - 1;
     int64_t oldest =
         telemetry->written > telemetry->capacity ? telemetry->written - telemetry->capacity : 0;
-    /* first: the last sample not after the exposure's start, or the ring's first */
+    /* first: the last sample at or before the start of the exposure, or the oldest one */
     int64_t first = newest;
     while (first > oldest && sample_at(telemetry, first)->tick > start_tick) {
         first--;
@@ -89,7 +90,7 @@ bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, i
     bst_vec3 at_middle = {0, 0, 0};
     roughness noise = {.run = 0};
     bst_vec3 rb = {0, 0, 0};
-    int64_t known = -1; /* sample that rb is of */
+    int64_t known = -1; /* sample to which rb belongs */
     for (int64_t n = first; n < newest; n++) {
         const bst_pointing_sample *a = sample_at(telemetry, n), *b = sample_at(telemetry, n + 1);
         double ta = (double)(a->tick - start_tick) - middle;
@@ -122,9 +123,9 @@ bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, i
     if (half > 0.0) {
         double span = 2.0 * half;
         mean = bst_vec3_scale(m.zeroth, 1.0 / span);
-        /* slope = 12 / T^3 integral of t r; the turn is slope times T */
+        /* slope = 12 / T^3 integral of t r; the rotation is slope times T */
         turn = bst_vec3_scale(m.first, 12.0 / (span * span));
-        /* (5 / T) integral of P2(2 t / T) r, P2 the Legendre polynomial */
+        /* (5 / T) integral of P2(2 t / T) r, P2: Legendre polynomial */
         bend = bst_vec3_axpy(bst_vec3_scale(m.zeroth, -2.5 / span), 30.0 / (span * span * span),
                              m.second);
     }
@@ -158,7 +159,7 @@ void bst_camera_motion_bend(const bst_camera_motion *motion, const bst_camera *c
     *y_px = (k[1][0] * a + k[1][1] * b) / scale;
 }
 
-/* Share of a measured or told bend that may be no bend. */
+/* possible error of a measured or commanded curvature, as a fraction */
 static const double BEND_LEFT = 0.05;
 
 static void widen(double x, double y, bst_detection *d) {
@@ -173,7 +174,7 @@ void bst_camera_motion_widen(double bend_x_px, double bend_y_px, double followed
     widen(BEND_LEFT * followed_x_px, BEND_LEFT * followed_y_px, d);
 }
 
-/* The rotation vector that moves the boresight by (x_px, y_px). */
+/* Rotation vector that moves the boresight by (x_px, y_px). */
 static bst_vec3 rotation_of(const bst_camera *camera, double x_px, double y_px) {
     double scale = bst_camera_scale_rad(camera), k[2][2];
     bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);

@@ -7,13 +7,13 @@
 #include "sim/onboard/knowledge_internal.h"
 #include "sim/optics/psf.h"
 
-/* Fifth difference, rad, up to which the interpolation is used: what it misses is 200 times less.
- */
+/* Fifth difference, rad, up to which directions are interpolated; the error is 200 times
+ * smaller. */
 static const double SMOOTH_RAD = 1e-11;
 
-/* The onboard camera's PSF is one Gaussian: of the width given, or else that with the true one's
- * noise-equivalent area in the middle of the field. *psf: the true one, where it is what is known
- * and no such Gaussian. */
+/* Sets the onboard camera's PSF to a Gaussian: of the given width, else with the noise-equivalent
+ * area of the true PSF at the field centre. *psf: the true PSF if it is known on board and not
+ * Gaussian. */
 static void know_psf(bst_camera *c, double given_fwhm_px, const bst_psf **psf) {
     double sigma_px;
     bool plain = (!c->psf && c->optics.psf == BST_PSF_GAUSSIAN) ||
@@ -156,7 +156,7 @@ bst_status bst_onboard_nav_eye(bst_ctx *ctx, bst_knowledge_view *view, double se
     return BST_OK;
 }
 
-/* Where the target nominally is, as the spacecraft reckons it. */
+/* Direction of the target on its nominal orbit, by onboard navigation. */
 static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                     bst_vec3 *out) {
     const bst_knowledge *k = view->knowledge;
@@ -181,7 +181,8 @@ static const bst_onboard_cue_knot *knot_at(bst_knowledge_view *view, int64_t sec
     bst_onboard_cue_knot *knot =
         &view->knots[((second % BST_CUE_KNOTS) + BST_CUE_KNOTS) % BST_CUE_KNOTS];
     if (!knot->made || knot->second != second) {
-        bst_ctx quiet = {0}; /* beyond the end of an orbit there is none, which is no error here */
+        bst_ctx quiet = {
+            0}; /* after the end of an orbit there is no direction, which is no error here */
         knot->made = true;
         knot->second = second;
         knot->known = nominal_direction(&quiet, view, (double)second, &knot->direction) == BST_OK;
@@ -189,7 +190,7 @@ static const bst_onboard_cue_knot *knot_at(bst_knowledge_view *view, int64_t sec
     return knot;
 }
 
-/* Whether the direction between a second and the next one follows a quintic. */
+/* Checks whether the direction between two consecutive seconds follows a quintic. */
 static bool is_smooth(bst_knowledge_view *view, int64_t second) {
     if (!view->any_checked || view->checked != second) {
         bool known = true;
@@ -205,8 +206,8 @@ static bool is_smooth(bst_knowledge_view *view, int64_t second) {
     return view->smooth;
 }
 
-/* Where the cue has the target: by the polynomial through the six seconds around where that is
- * exact, else directly; a function of time alone. */
+/* Direction of the cue: interpolated from six seconds if accurate, else direct; a function of time
+ * only. */
 static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                bst_vec3 *out) {
     double whole = floor(seconds);

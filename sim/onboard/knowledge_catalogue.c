@@ -1,4 +1,4 @@
-/* The onboard catalogue: the scenario's objects on their catalogued orbits, burns left out. */
+/* Onboard catalogue: the scenario's objects on catalogued orbits, without burns. */
 #include <string.h>
 
 #include "sim/onboard/knowledge_internal.h"

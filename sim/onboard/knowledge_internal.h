@@ -1,4 +1,4 @@
-/* Inside of a view of the onboard knowledge, shared by knowledge*.c only. */
+/* Internal state of an onboard knowledge view, shared by knowledge*.c. */
 #ifndef BST_ONBOARD_KNOWLEDGE_INTERNAL_H
 #define BST_ONBOARD_KNOWLEDGE_INTERNAL_H
 
@@ -7,21 +7,20 @@
 #include "sim/world/world_internal.h"
 
 struct bst_knowledge {
-    const bst_world
-        *world;           /* for the nominal orbits and Earth orientation only; never handed out */
-    bst_stars *own_stars; /* NULL: the world's */
-    bst_stars *altered;   /* those with the catalogue's errors; NULL: it has none */
+    const bst_world *world; /* only for nominal orbits and Earth orientation; never exposed */
+    bst_stars *own_stars;   /* NULL: the world's catalogue */
+    bst_stars *altered;     /* stars with catalogue errors; NULL: no errors */
     bst_camera camera;
-    const struct bst_psf *psf; /* lent by the world; NULL: the camera's Gaussian */
+    const struct bst_psf *psf; /* borrowed from the world; NULL: Gaussian of the camera */
     int observer, sensor;
     double julian_year;
 };
 
-/* The cue's direction is kept at whole seconds and interpolated by six of them. */
+/* the cue's direction is cached at whole seconds and interpolated from six of them */
 enum { BST_CUE_KNOTS = 16 };
 
 typedef struct bst_onboard_cue_knot {
-    bool made, known; /* known: there is a direction */
+    bool made, known; /* known: the direction exists */
     int64_t second;
     bst_vec3 direction;
 } bst_onboard_cue_knot;
@@ -30,17 +29,16 @@ struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
     bst_onboard_cue_knot knots[BST_CUE_KNOTS];
-    bst_quat cue_error; /* turns where the own cue's target nominally is to where the cue has it */
-    /* the second that was looked at last, and the quintic about it, of where the cue has the
-     * target */
+    bst_quat cue_error; /* rotation from the nominal direction of the own cue to the cue */
+    /* last tested second, and the quintic of the cue's direction around it */
     int64_t checked;
     bool any_checked, smooth;
     bst_vec3 cued[BST_QUINTIC_POINTS];
-    bst_task task; /* the last one */
-    bool tasked;   /* its object is the cue, without an error */
+    bst_task task; /* latest task */
+    bool tasked;   /* the task's object is the cue, without cue error */
 };
 
-/* Onboard time, and where the observer believes to be. */
+/* Onboard time, and the estimated observer state. */
 bst_status bst_onboard_nav_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
                                bst_world_state *eye) BST_MUST_CHECK;
 

@@ -4,7 +4,7 @@
 
 void bst_nav_state_after(const bst_nav_telemetry *nav, double dt_s, bst_vec3 *position_m,
                          bst_vec3 *velocity_mps) {
-    bst_ctx quiet = {0}; /* telemetry that is no orbit is no failure of the run */
+    bst_ctx quiet = {0}; /* invalid telemetry is no failure of the run */
     if (bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
                              nav->velocity_gcrf_mps, dt_s, position_m, velocity_mps) != BST_OK) {
         *position_m = bst_vec3_axpy(nav->position_gcrf_m, dt_s, nav->velocity_gcrf_mps);

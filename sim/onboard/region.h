@@ -1,11 +1,11 @@
-/* A region of the sky in which a target is to be found, when no place of it is known. */
+/* A region of the sky that contains a target of unknown position. */
 #ifndef BST_ONBOARD_REGION_H
 #define BST_ONBOARD_REGION_H
 
 enum {
     BST_REGION_NONE,
-    BST_REGION_ARC,           /* along a great circle among the stars */
-    BST_REGION_GEOSTATIONARY, /* over a range of longitudes, at the radius of the belt */
+    BST_REGION_ARC,           /* along a great circle on the sky */
+    BST_REGION_GEOSTATIONARY, /* over a range of longitudes at the geostationary radius */
 };
 
 typedef struct bst_region {

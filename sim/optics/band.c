@@ -16,8 +16,8 @@
 #define V0_IRRADIANCE 3.631e-2
 #define UM 1e-6
 
-/* A panel is no wider than this share of its wavelength: there, eight points give an integral of
- * Planck's law times a line to 1e-14. */
+/* maximum panel width relative to its wavelength: eight points then integrate Planck's law times a
+ * line to 1e-14 */
 #define PANEL_SHARE 0.05
 enum { GAUSS = 8, COLOURS = 117 };
 #define COLOUR_FIRST (-0.4)
@@ -34,7 +34,7 @@ typedef struct table {
     int count;
 } table;
 
-/* Quadrature over wavelength: integral of f is sum of weight * f(place). */
+/* Quadrature over wavelength: the integral of f is the sum of weight * f(point). */
 typedef struct quadrature {
     double *place, *weight;
     int count, capacity;
@@ -43,15 +43,15 @@ typedef struct quadrature {
 struct bst_band {
     bst_optics_response_point *points[2]; /* detector, transmission */
     int count[2];
-    quadrature rule; /* weights hold the response */
+    quadrature rule; /* the weights include the response */
     double sun, mean_m;
     double sun_share[BST_SUNLIGHT_COLOURS]; /* of `sun`, next to each wavelength of
                                                bst_astro_sunlight */
     double log_star[COLOURS];
 };
 
-/* Flat tops with the edges that real bands have; the silicon curve is that of a back-illuminated
- * detector with a coating for the visible, no particular one. */
+/* Flat tops with realistic edges; the silicon curve is a generic back-illuminated detector with a
+ * visible coating. */
 static const bst_optics_response_point silicon[] = {
     {0.30, 0.10}, {0.35, 0.40}, {0.40, 0.65}, {0.45, 0.85}, {0.50, 0.95}, {0.55, 1.00},
     {0.60, 1.00}, {0.65, 0.98}, {0.70, 0.94}, {0.75, 0.88}, {0.80, 0.78}, {0.85, 0.65},
@@ -61,7 +61,7 @@ static const bst_optics_response_point swir[] = {
 static const bst_optics_response_point mwir[] = {{3.30, 0}, {3.50, 1}, {4.90, 1}, {5.10, 0}};
 static const bst_optics_response_point lwir[] = {{7.80, 0}, {8.20, 1}, {11.80, 1}, {12.20, 0}};
 #define COUNT_OF(a) ((int)(sizeof(a) / sizeof *(a)))
-/* For the preset v a table of the optics alone has Bessell's V as its detector. */
+/* with the preset v a table of the optics alone uses Bessell's V as detector */
 static const bst_optics_response_point bessell_v[] = {
     {0.47, 0},     {0.48, 0.03},  {0.49, 0.163}, {0.50, 0.458}, {0.51, 0.78},  {0.52, 0.967},
     {0.53, 1},     {0.54, 0.973}, {0.55, 0.898}, {0.56, 0.792}, {0.57, 0.684}, {0.58, 0.574},
@@ -178,7 +178,7 @@ static int compare_doubles(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Panels between all corners of the tables and of the solar spectrum. */
+/* Makes quadrature panels between all nodes of the tables and the solar spectrum. */
 static bst_status make_rule(bst_ctx *ctx, bst_band *band) {
     int capacity = band->count[0] + band->count[1] + SOLAR_NODES;
     double *corners = malloc((size_t)capacity * sizeof *corners);
@@ -216,8 +216,8 @@ double bst_band_response(const bst_band *band, double wavelength_m) {
     return band->count[1] > 0 ? detector * table_at(band->points[1], band->count[1], um) : detector;
 }
 
-/* Photons per m2 and s that a star of V = 0 and this temperature has, over those of a black body of
- * one steradian. Energy through V fixes it: Bessell's passbands are for integrals of energy. */
+/* Ratio of photons per m2 and s of a V = 0 star of this temperature to those of a black body of one
+ * steradian. Normalised by energy through V: Bessell's passbands apply to energy integrals. */
 static double star_scale(double temperature_k) {
     double through = 0.0, width = 0.0;
     const int pieces = 4;
@@ -234,8 +234,8 @@ static double star_scale(double temperature_k) {
     return V0_IRRADIANCE * width / through;
 }
 
-/* Shares `light` of one wavelength among the two of bst_sunlight_wavelength_m that it lies between.
- */
+/* Distributes `light` of one wavelength to the two adjacent wavelengths of
+ * bst_sunlight_wavelength_m. */
 static void add_sunlight(bst_band *band, double wavelength_m, double light) {
     const double *w = bst_sunlight_wavelength_m;
     int k = 0;
@@ -274,7 +274,7 @@ static bst_status prepare(bst_ctx *ctx, bst_band *band) {
     return BST_OK;
 }
 
-/* One of the two tables, from the list or the file. */
+/* Reads one of the two tables, from the list or the file. */
 static bst_status take_table(bst_ctx *ctx, const bst_config_list *list, const char *file,
                              const char *base_dir, const char *key,
                              bst_optics_response_point **points, int *count) {

@@ -1,4 +1,4 @@
-/* A spectral band: how many detected photons a star, sunlight and a warm surface give in it.
+/* Photometry in a spectral band: detected photons from stars, sunlight and thermal surfaces.
  *
  * All rates are photons weighted with the band's response (detector times transmission, by
  * wavelength), so that electrons = rate * area * throughput * quantum efficiency. */
@@ -12,42 +12,43 @@
 /* Immutable once made; shareable between threads. */
 typedef struct bst_band bst_band;
 
-/* Colour of what has none: the Sun's (Willmer 2018 has 0.653). */
+/* colour of stars without one: the Sun's (Willmer 2018: 0.653) */
 #define BST_SUN_B_MINUS_V 0.65
 /* Apparent V magnitude of the Sun at 1 au (Willmer 2018 gives -26.76 in Vega V; -26.74 is the value
  * in common use). */
 #define BST_SUN_V_MAG (-26.74)
 
-/* Makes a band; `base_dir` is the folder that relative paths start from ("": the current one).
- * *out is NULL for the preset "v" without tables: that has no spectrum. BST_ERR_CONFIG with the key
- * below `band` when the tables do not ascend, are given twice or leave no response; errors of the
- * files as of bst_file_read and BST_ERR_FORMAT with the line. */
+/* Creates a band; `base_dir`: base of relative paths ("": current folder). *out is NULL for the
+ * preset "v" without tables: that has no spectrum. BST_ERR_CONFIG with the key below `band` when
+ * the tables do not ascend, are given twice or leave no response; errors of the files as of
+ * bst_file_read and BST_ERR_FORMAT with the line. */
 bst_status bst_band_create(bst_ctx *ctx, const bst_band_config *config, const char *base_dir,
                            bst_band **out) BST_MUST_CHECK;
 /* Frees a band; NULL is allowed. */
 void bst_band_free(bst_band *band);
 
-/* A star of V = 0 and colour B-V (NAN: that of the Sun), 1/s/m2. Its spectrum is a black body's at
- * the temperature of Ballesteros (EPL 97, 34008, 2012), with the flux of V = 0 through Bessell's V
- * (PASP 102, 1181, 1990): 3.631e-9 erg/s/cm2/A (Bessell, Castelli and Plez 1998). B-V is held
- * between -0.4 and 2.5. */
+/* Photon rate of a star of V = 0 and colour B-V (NAN: solar), 1/s/m2. Its spectrum is a black body
+ * at the temperature of Ballesteros (EPL 97, 34008, 2012), with the flux of V = 0 through Bessell's
+ * V (PASP 102, 1181, 1990): 3.631e-9 erg/s/cm2/A (Bessell, Castelli and Plez 1998). B-V is limited
+ * to -0.4 .. 2.5. */
 double bst_band_star(const bst_band *band, double b_minus_v);
 
-/* Sunlight at 1 au, 1/s/m2, from bst_optics_sun_irradiance. */
+/* Photon rate of sunlight at 1 au, 1/s/m2, from bst_optics_sun_irradiance. */
 double bst_band_sun(const bst_band *band);
 
-/* Sunlight that has passed the Earth's air over unweakened sunlight in the band, `light` being that
- * ratio at bst_sunlight_wavelength_m; between them straight, beyond them constant. */
+/* Ratio of sunlight after passing the Earth's atmosphere to direct sunlight in the band. `light`:
+ * that ratio at bst_sunlight_wavelength_m, interpolated linearly, constant beyond. */
 double bst_band_reddened_sun(const bst_band *band, const double light[BST_SUNLIGHT_COLOURS]);
 
-/* A black body's radiance, 1/s/m2/sr; 0 for a temperature that is not above 0. */
+/* Photon radiance of a black body in the band, 1/s/m2/sr; 0 for a temperature that is not
+ * positive. */
 double bst_band_radiance(const bst_band *band, double temperature_k);
 
-/* Response at a wavelength. */
+/* Response of the band at a wavelength. */
 double bst_band_response(const bst_band *band, double wavelength_m);
 
-/* From here on bodies at some 300 K matter and albedo is taken from the emissivity (Kirchhoff):
- * mean wavelength above 3 um. */
+/* True for a thermal band: mean wavelength above 3 um. Emission of bodies at 300 K matters, and
+ * reflectance follows from emissivity (Kirchhoff). */
 bool bst_band_is_thermal(const bst_band *band);
 
 /* Planck's law in photons: spectral radiance of a black body, 1/s/m2/sr per m of wavelength:
@@ -61,8 +62,8 @@ double bst_optics_sun_irradiance(double wavelength_m);
 
 /* Temperature of a star of colour B-V, K: Ballesteros 2012, equation 14. */
 double bst_optics_star_temperature_k(double b_minus_v);
-/* Temperature of the black body that bst_band_star takes a star of colour B-V (NAN: the Sun's) for,
- * K: 2725 to 21707. */
+/* Black-body temperature that bst_band_star uses for a star of colour B-V (NAN: solar), K: 2725 to
+ * 21707. */
 double bst_optics_star_spectrum_k(double b_minus_v);
 
 #endif

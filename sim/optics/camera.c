@@ -89,7 +89,7 @@ double bst_camera_illumination(const bst_camera *c, double x_px, double y_px) {
     return 1.0;
 }
 
-/* Pupil area times throughput and quantum efficiency. */
+/* Effective area: pupil area times throughput and quantum efficiency. */
 static double effective_m2(const bst_camera *c) {
     double area_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);
     return area_m2 * c->throughput * c->quantum_efficiency;

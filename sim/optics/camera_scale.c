@@ -1,7 +1,7 @@
-/* Pixel scale, focal length and pixel pitch: which of them a camera gives, and the rest. */
+/* Computes pixel scale, focal length and pixel pitch of a camera from those given. */
 #include "boresight/camera.h"
 
-/* How far given values may contradict each other: data sheets round to three digits or more. */
+/* tolerance of redundant values: data sheets have three digits or more */
 static const double AGREES = 1e-3;
 
 static bool agree(double a, double b) {
@@ -17,7 +17,7 @@ static bst_status contradict(bst_ctx *ctx, const char *first, double a, const ch
         first, a, unit, second, b, unit);
 }
 
-/* A focal ratio or pitch that another block gives too. */
+/* Checks a focal ratio or pitch that two blocks give. */
 static bst_status same_as(bst_ctx *ctx, const char *key, double given, const char *other_key,
                           double other, const char *unit) {
     return isnan(given) || !(other > 0.0) || agree(given, other)
@@ -25,7 +25,7 @@ static bst_status same_as(bst_ctx *ctx, const char *key, double given, const cha
                : contradict(ctx, key, given, other_key, other, unit);
 }
 
-/* The focal length from itself or from the focal ratio; NAN: neither is given. */
+/* Focal length, given or from the focal ratio; NAN: neither is given. */
 static bst_status focal_length(bst_ctx *ctx, bst_camera *c) {
     if (isnan(c->f_number)) {
         return BST_OK;

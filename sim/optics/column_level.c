@@ -2,8 +2,8 @@
 
 #include <stddef.h>
 
-/* Offsets of columns of this share of the read noise and more are taken off. They add about twice
- * their variance to a point filter's, three rows of which share one: at 0.2 that triples the false
+/* Column offsets above this fraction of the read noise are subtracted. They add about twice their
+ * variance to a point filter, three rows of which share a column: at 0.2 this triples the false
  * alarms at 5 sigma, exp(25 * 2 * 0.04 / 2). */
 static const double OFFSET_SHARE = 0.2;
 

@@ -121,6 +121,6 @@ double bst_detector_lead_s(const bst_detector_config *d, int rows) {
 }
 
 int64_t bst_detector_lead_ticks(const bst_detector_config *d, int rows, double tick_rate_hz) {
-    /* a sum of times that is whole but for its rounding is not one tick more */
+    /* tolerance: a sum of times may exceed an integer by rounding */
     return (int64_t)ceil(bst_detector_lead_s(d, rows) * tick_rate_hz - 1e-6);
 }

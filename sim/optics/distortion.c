@@ -3,15 +3,15 @@
 #include "boresight/camera.h"
 
 /* The map u -> u L(r^2) + 2 u (q.u) + q r^2 with q = (p2, p1) is the gradient of a potential: its
- * Jacobian is symmetric. Where that is positive definite on a disc, the map is strictly monotone
- * there and so one to one. Radial part: eigenvalues d(r L)/dr along r and L across; the tangential
- * part lowers them by 6 |q| r at most. */
+ * Jacobian is symmetric. Where it is positive definite on a disc, the map is injective. Radial
+ * part: eigenvalues d(r L)/dr along r and L across; the tangential part lowers them by 6 |q| r at
+ * most. */
 
 enum { DEGREE = 6, SAMPLES = 256 };
 
-/* How far beyond the sensor's farthest corner the bounds of the local scale hold. */
+/* margin beyond the farthest corner for the limits of the local scale */
 static const double FIELD_MARGIN = 1.1;
-/* Directions further out than this tangent (89.4 degrees) are not looked at. */
+/* tangent of the largest field angle considered (89.4 degrees) */
 static const double WIDEST = 100.0;
 
 typedef struct plane {
@@ -26,8 +26,8 @@ static double horner(const double *c, int degree, double x) {
     return v;
 }
 
-/* Roots with a change of sign on (0, most], ascending: between neighbouring extrema a polynomial is
- * monotone, and bisection cannot miss. */
+/* Roots with a change of sign on (0, most], ascending: between consecutive extrema a polynomial is
+ * monotonic, so that bisection finds them. */
 static int roots(const double *c, int degree, double most, double *out) {
     if (degree == 0) {
         return 0;
@@ -81,8 +81,8 @@ static void slopes(const bst_camera_distortion *d, plane u, double j[3]) {
     j[2] = l + u.y * u.y * by_s + 6.0 * d->p1 * u.y + 2.0 * d->p2 * u.x;
 }
 
-/* Newton's method for distort(u) = target from *u; false, with *u spoilt, when it leaves the domain
- * or does not settle. */
+/* Newton's method for distort(u) = target from *u. False, *u undefined: it left the domain or did
+ * not converge. */
 static bool newton(const bst_camera *c, plane target, plane *u) {
     const bst_camera_distortion *d = &c->distortion;
     double domain2 = c->geometry.domain * c->geometry.domain;
@@ -90,7 +90,7 @@ static bool newton(const bst_camera *c, plane target, plane *u) {
     for (int k = 0; k < 30; k++) {
         plane f = distort(d, *u);
         double rx = target.x - f.x, ry = target.y - f.y, rest = hypot(rx, ry);
-        /* rounding is reached when the rest no longer shrinks */
+        /* rounding level: the residual no longer decreases */
         if (rest == 0.0 || (rest <= 1e-10 * size && rest >= 0.5 * before)) {
             return true;
         }
@@ -110,12 +110,12 @@ static bool newton(const bst_camera *c, plane target, plane *u) {
     return false;
 }
 
-/* Original of a distorted place: Newton's method along the ray from the boresight, in steps that
- * halve until it converges. The originals of the ray stay inside the domain, where the Jacobian is
- * positive definite, so that steps short enough exist everywhere on it. */
+/* Inverts the distortion: Newton's method along the ray from the boresight, in steps that are
+ * halved until it converges. The ray stays inside the domain with a positive definite Jacobian, so
+ * that small enough steps exist. */
 static plane undistort(const bst_camera *c, plane target) {
     double size = hypot(target.x, target.y);
-    /* at the very border the Jacobian is singular */
+    /* the Jacobian is singular at the border */
     double most = c->geometry.image_radius * (1.0 - 1e-13);
     if (!(size <= most)) {
         double f = isfinite(size) ? most / size : 0.0;
@@ -212,7 +212,7 @@ double bst_camera_reach_rad(const bst_camera *c, bst_vec3 centre, double x0, dou
     double far_x = fmax(x1 - bst_camera_centre_x(c), bst_camera_centre_x(c) - x0);
     double far_y = fmax(y1 - bst_camera_centre_y(c), bst_camera_centre_y(c) - y0);
     bool folds = hypot(far_x, far_y) * bst_camera_scale_rad(c) > c->geometry.image_radius;
-    /* what is beyond the fold may come over it */
+    /* light from beyond the fold may overlap */
     return reach + gap + (folds ? margin_px * bst_camera_scale_rad(c) : 0.0);
 }
 
@@ -254,7 +254,7 @@ double bst_camera_half_diagonal_rad(const bst_camera *c) {
     return angle;
 }
 
-/* Bounds of scale and curvature out to the farthest corner and some. */
+/* Limits of scale and curvature up to the farthest corner, with a margin. */
 static void bound_field(bst_camera *c) {
     bst_camera_geometry *g = &c->geometry;
     const bst_camera_distortion *d = &c->distortion;
@@ -293,7 +293,7 @@ bst_status bst_camera_prepare(bst_ctx *ctx, bst_camera *c) {
     double most = fmax(WIDEST, 10.0 * farthest * scale);
     g->domain = g->image_radius = INFINITY;
     if (distorted) {
-        /* in units of the farthest corner, so that coefficients of any size are of order one */
+        /* scaled to the farthest corner: coefficients are of order one */
         double unit = farthest * scale, u2 = unit * unit, u4 = u2 * u2, u6 = u4 * u2;
         const double along[DEGREE + 1] = {
             1.0, -6.0 * q * unit, 3.0 * d->k1 * u2, 0.0, 5.0 * d->k2 * u4, 0.0, 7.0 * d->k3 * u6};

@@ -5,8 +5,9 @@
 
 enum { LEAST_STARS = 3 };
 static const double LEAST_SNR = 10.0, CLIP_SIGMA = 3.0;
-static const double MAG_PER_SHARE = 1.0857362047581296;    /* 2.5 / ln 10 */
-static const double SIGMA_PER_MEDIAN = 1.4826022185056018; /* of a normal deviate's size */
+static const double MAG_PER_SHARE = 1.0857362047581296; /* 2.5 / ln 10 */
+static const double SIGMA_PER_MEDIAN =
+    1.4826022185056018; /* sigma of a normal distribution over its median deviation */
 
 bst_status bst_optics_photometer_create(bst_ctx *ctx, int capacity, bst_optics_photometer *out) {
     size_t n = (size_t)capacity;
@@ -43,7 +44,7 @@ void bst_optics_photometer_add(bst_optics_photometer *p, const bst_detection *st
     }
 }
 
-/* Of the numbers in work, which are sorted (Shell's method). */
+/* Median of the numbers in p->work, which are sorted (Shell's method). */
 static double median_of_work(bst_optics_photometer *p) {
     double *v = p->work;
     int n = p->count, gap = 1;

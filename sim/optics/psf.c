@@ -6,10 +6,11 @@
 
 #include "sim/optics/psf_internal.h"
 
-/* Gaussian OTF exp(-2 pi^2 sigma^2 f^2) falls below 1e-9 beyond this over sigma. */
+/* frequency, in units of 1 / sigma, above which the Gaussian OTF exp(-2 pi^2 sigma^2 f^2) is below
+ * 1e-9 */
 #define GAUSSIAN_CUTOFF 1.024617
 
-/* A Gaussian falls to 1e-9 of its peak at this times sigma. */
+/* radius in units of sigma at which a Gaussian is 1e-9 of its peak */
 #define GAUSSIAN_REACH 6.437899
 
 #define FWHM_PER_SIGMA 2.3548200450309493 /* 2 sqrt(2 ln 2) */
@@ -27,7 +28,7 @@ void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[
     if (n->grid.step > 0.0) {
         bst_optics_grid_otf_add(&n->grid, fx, fy, out);
     } else if (!n->radial) {
-        out[0] = 1.0; /* nothing but Gaussians */
+        out[0] = 1.0; /* only Gaussians */
     }
     double variance = n->sigma_px * n->sigma_px + psf->diffusion_px * psf->diffusion_px;
     double factor = sinc(psf->fill[0] * fx) * sinc(psf->fill[1] * fy);
@@ -54,7 +55,7 @@ int bst_psf_spectra(const bst_psf *psf) {
     return psf->spectra;
 }
 
-/* Place along one axis of the grid: the lower node and the weight of the upper one. */
+/* Position on one axis of the field grid: lower node, and weight of the upper node. */
 static int grid_place(double at_px, double last_px, int nodes, double *upper) {
     if (nodes < 2 || !(last_px > 0.0)) {
         *upper = 0.0;
@@ -96,7 +97,7 @@ bool bst_psf_gaussian(const bst_psf *psf, double *sigma_px) {
 }
 
 double bst_psf_noise_area_px2(const bst_psf *psf, int node) {
-    enum { STEPS = 128 }; /* of the half-plane's side */
+    enum { STEPS = 128 }; /* samples per side of the half-plane */
     double step = psf->cutoff / STEPS, sum = 0.0;
     for (int j = -STEPS; j < STEPS; j++) {
         for (int i = 0; i < STEPS; i++) {
@@ -108,8 +109,8 @@ double bst_psf_noise_area_px2(const bst_psf *psf, int node) {
     return 1.0 / (2.0 * sum * step * step);
 }
 
-/* Sum of squared pixel shares of a line-integrated Gaussian, mean over its place in the pixel: the
- * overlap of a triangle of base 2 with a Gaussian of variance 2 sigma^2. */
+/* Sum of squared pixel fractions of a line-integrated Gaussian, mean over the pixel phase: overlap
+ * of a triangle of base 2 with a Gaussian of variance 2 sigma^2. */
 static double squared_shares(double sigma) {
     double s = sqrt(2.0) * sigma;
     return erf(1.0 / (s * sqrt(2.0))) + 2.0 * s / sqrt(2.0 * BST_PI) * expm1(-0.5 / (s * s));
@@ -144,8 +145,8 @@ double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px) 
     return bst_psf_coloured_fwhm_px(psf, sun, x_px, y_px);
 }
 
-/* The first moments of the image are the slopes of the OTF's phase at 0. Extrapolated to it: wings
- * of hard apertures bend the phase in proportion to the frequency. */
+/* Centroid of the image: slope of the OTF's phase at 0, extrapolated, because wings of hard
+ * apertures bend the phase in proportion to frequency. */
 static void find_centroid(const bst_psf *psf, int node, double out[2]) {
     static const double f = 2e-3; /* cycles/px */
     for (int a = 0; a < 2; a++) {
@@ -198,8 +199,8 @@ void bst_psf_free(bst_psf *psf) {
 
 static bst_status make_moffat(bst_ctx *ctx, bst_psf_node *node, double fwhm_px, double beta) {
     double alpha = 0.5 * fwhm_px / sqrt(exp2(1.0 / beta) - 1.0);
-    /* the OTF falls at least as fast as (pi alpha f)^(beta - 1.5) exp(-2 pi alpha f) times a
-     * constant, for large beta as a Gaussian: find 1e-9 by doubling and bisection */
+    /* the OTF decreases at least as (pi alpha f)^(beta - 1.5) exp(-2 pi alpha f), for large beta as
+     * a Gaussian: find 1e-9 by doubling and bisection */
     double low = 0.0, high = 0.1 / alpha;
     while (bst_optics_moffat_otf(alpha, beta, high) > 1e-9) {
         low = high;
@@ -218,7 +219,7 @@ static bst_status make_moffat(bst_ctx *ctx, bst_psf_node *node, double fwhm_px, 
     return BST_OK;
 }
 
-/* Gaussian or Moffat profiles at each node. */
+/* Makes the Gaussian or Moffat profiles of all nodes. */
 static bst_status make_profiles(bst_ctx *ctx, const bst_camera *camera, bst_psf *psf) {
     const bst_optics_config *optics = &camera->optics;
     const bst_psf_field_node *field = optics->field.items;
@@ -245,10 +246,10 @@ static bst_status make_profiles(bst_ctx *ctx, const bst_camera *camera, bst_psf 
     return BST_OK;
 }
 
-/* Bounds and widths of a PSF that sigma_px more of diffusion widens. */
+/* Widens a PSF by sigma_px of diffusion: limits and widths. */
 static void widen(bst_psf *psf, double sigma_px) {
     if (psf->diffusion_px > 0.0) {
-        /* both fall from 1: their product is below 1e-9 where either is */
+        /* both decrease from 1: their product is below 1e-9 where one of them is */
         psf->cutoff = fmin(psf->cutoff, GAUSSIAN_CUTOFF / psf->diffusion_px);
     }
     psf->reach_px += GAUSSIAN_REACH * sigma_px;

@@ -4,14 +4,13 @@
 #include "sim/optics/band.h"
 #include "sim/optics/psf_internal.h"
 
-/* A PSF is linear in the normalised spectrum. Black bodies of four temperatures span, by weights
- * that may be negative, those of all others in a band as far as a PSF can tell: with weights that
- * keep the mean, mean square and mean cube of the wavelength, the mix differs from the PSF of the
- * spectrum itself by what the OTF has beyond a cubic of the wavelength, on what the spectrum has
- * beyond the mix. */
+/* A PSF is linear in the normalised spectrum. Mixing the PSFs of four black bodies approximates
+ * that of any other one in the band; weights may be negative. The weights preserve mean, mean
+ * square and mean cube of the wavelength. The error is the part of the OTF beyond a cubic of the
+ * wavelength, on the difference of the spectra. */
 
-/* The Sun's effective temperature (IAU 2015 resolution B3), then the others: of stars, and in
- * thermal bands of what is warm. */
+/* temperatures: the Sun's (IAU 2015 resolution B3), then others: of stars, and in thermal bands of
+ * warm bodies */
 static const double anchor_k[2][BST_PSF_SPECTRA] = {{5772.0, 2800.0, 3900.0, 16000.0},
                                                     {5772.0, 200.0, 300.0, 500.0}};
 /* Bounds of what a source's spectrum can be, K, and of the temperatures that stars have or that
@@ -22,7 +21,7 @@ static const double usual_k[2][2] = {{2700.0, 22000.0}, {200.0, 22000.0}};
 enum { STEPS = 1024, RINGS = 200, C = BST_PSF_COLOURS };
 
 struct bst_psf_colours {
-    double least, per_step;    /* 1 / temperature: of the hottest, and between entries */
+    double least, per_step;    /* 1 / temperature: smallest value, and step between entries */
     float share[STEPS + 1][C]; /* spectra 1, 2, 3 */
     double error;
 };
@@ -31,7 +30,7 @@ double bst_psf_anchor_k(bool thermal, int spectrum) {
     return anchor_k[thermal][spectrum];
 }
 
-/* Photons of a black body through the band, together 1. */
+/* Photons of a black body through the band, normalised to 1. */
 static void photons_of(const bst_psf_rule *rule, double temperature_k, double *out) {
     double sum = 0.0;
     for (int k = 0; k < rule->count; k++) {
@@ -44,7 +43,7 @@ static void photons_of(const bst_psf_rule *rule, double temperature_k, double *o
     }
 }
 
-/* Means of the powers 1, 2, 3 of the wavelength, which goes from -1 to 1. */
+/* Moments 1, 2, 3 of the wavelength, scaled to -1 .. 1. */
 static void moments_of(const bst_psf_rule *rule, const double *photons, double out[C]) {
     double first = rule->wavelength_m[0], last = rule->wavelength_m[rule->count - 1];
     double middle = 0.5 * (first + last), half = 0.5 * (last - first);
@@ -60,14 +59,13 @@ static void moments_of(const bst_psf_rule *rule, const double *photons, double o
     }
 }
 
-/* What the moments of spectra 1, 2, 3 have beyond those of spectrum 0. */
+/* Moments of spectra 1, 2, 3 relative to spectrum 0. */
 typedef struct anchors {
     double sun[C], more[C][C]; /* more[moment][spectrum - 1] */
 } anchors;
 
-/* The smallest shares among those that keep the moments: in a band so narrow, or of so few
- * wavelengths, that the spectra do not differ in some combination of moments, none of it is
- * wanted. Regularised least squares (Tikhonov). */
+/* Smallest fractions that preserve the moments. In a narrow band the spectra do not differ in some
+ * combinations of moments; these get no weight. Regularised least squares (Tikhonov). */
 static void shares_of(const anchors *a, const double moments[C], double out[C]) {
     double m[C][C + 1];
     for (int i = 0; i < C; i++) {
@@ -78,7 +76,7 @@ static void shares_of(const anchors *a, const double moments[C], double out[C]) 
             }
         }
     }
-    for (int i = 0; i < C; i++) { /* symmetric and positive: no pivots */
+    for (int i = 0; i < C; i++) { /* symmetric and positive definite: no pivoting */
         for (int r = 0; r < C; r++) {
             double factor = r == i ? 0.0 : m[r][i] / m[i][i];
             for (int j = i; j <= C; j++) {
@@ -106,8 +104,7 @@ static void make_anchors(const bst_psf_rule *rule, anchors *a) {
     }
 }
 
-/* Rings of the frequency plane, the pixel's own transfer function with them: frequency times OTF.
- */
+/* Frequency times OTF, including the pixel, on rings of the frequency plane. */
 static void fill_rings(const bst_psf_rule *rule, const double *q, double inner, double *h) {
     double least_q = INFINITY;
     for (int k = 0; k < rule->count; k++) {
@@ -121,7 +118,8 @@ static void fill_rings(const bst_psf_rule *rule, const double *q, double inner, 
     }
 }
 
-/* bst_psf_mixing_error. h: [RINGS][wavelengths], frequency times OTF. */
+/* Error of mixing spectra, see bst_psf_mixing_error. h: [RINGS][wavelengths], frequency times
+ * OTF. */
 static double mixing_error(const bst_psf_rule *rule, const anchors *a, const double *h) {
     enum { COLOURS = 48 };
     double photons[BST_PSF_SPECTRA][BST_PSF_WAVELENGTHS], worst = 0.0;

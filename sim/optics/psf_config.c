@@ -5,7 +5,7 @@ static const char *const spectra[] = {"flat", "solar", "sources", NULL};
 static const char *const file_centres[] = {"centroid", "array", NULL};
 static const char *const vignetting_models[] = {"none", "cos4", "polynomial", NULL};
 
-/* Noll's term j of radial degree n and azimuthal order m (negative: sine). */
+/* Zernike term j of Noll with radial degree n and azimuthal order m (negative: sine). */
 #define ZERNIKE(j, n, m)                                                                          \
     {                                                                                             \
         .key = "z" #j, .type = BST_CONFIG_REAL, .unit = "waves", .minimum = -100, .maximum = 100, \

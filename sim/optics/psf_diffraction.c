@@ -5,17 +5,17 @@
 #include "sim/optics/psf_internal.h"
 #include "sim/optics/pupil.h"
 
-/* The OTF of an aperture is its annulus's closed form, averaged over the band, plus what spiders
- * and aberrations change. That difference is made on grids, where it is smooth: the annulus, whose
- * OTF has a cone at 0 and square roots at its edges, is taken away on the same grids. */
+/* Diffraction OTF: closed form of the annular aperture, averaged over the band, plus the change by
+ * spider vanes and aberrations. The change is computed on grids, where it is smooth: the annulus,
+ * whose OTF has a cone at 0 and square roots at its edges, is subtracted on the same grids. */
 
-/* Grid cells across the aperture, counted at the shortest wavelength: at least; with vanes; at
- * most; and per wave of slope across the aperture. */
+/* grid cells across the aperture at the shortest wavelength: minimum; with vanes; maximum; per wave
+ * of slope across the aperture */
 enum { CELLS = 384, CELLS_VANES = 512, CELLS_MOST = 1024, CELLS_PER_WAVE = 16 };
 
 enum { MOST_WAVELENGTHS = BST_PSF_WAVELENGTHS };
 
-/* The band as a sum, for each of the spectra. */
+/* Quadrature over the band, for each spectrum. */
 typedef struct band {
     bst_psf_rule rule;
     int spectra;
@@ -24,7 +24,7 @@ typedef struct band {
     double q_least;
 } band;
 
-/* Gauss-Legendre places and weights on [0, 1] (Abramowitz and Stegun 25.4.29): Newton's method on
+/* Gauss-Legendre nodes and weights on [0, 1] (Abramowitz and Stegun 25.4.29): Newton's method on
  * the Legendre polynomial. */
 static void gauss_legendre(int n, double *place, double *weight) {
     for (int i = 0; i < n; i++) {
@@ -47,8 +47,7 @@ static void gauss_legendre(int n, double *place, double *weight) {
 /* The Sun's effective temperature, K (IAU 2015 resolution B3). */
 #define SUN_K 5772.0
 
-/* Wavelengths, m, between which a camera's band has more than a thousandth of its largest response.
- */
+/* Wavelength range, m, in which the response exceeds a thousandth of its maximum. */
 static void find_range(const bst_band *spectrum, double *from_m, double *to_m) {
     enum { STEPS = 2000 };
     double ratio = pow(40e-6 / 0.1e-6, 1.0 / STEPS), most = 0.0;
@@ -67,7 +66,7 @@ static void find_range(const bst_band *spectrum, double *from_m, double *to_m) {
     }
 }
 
-/* Spectrum `s` of the band's photons, together 1. */
+/* Photons of spectrum `s` in the band, normalised to 1. */
 static bst_status make_spectrum(bst_ctx *ctx, bool solar, band *b, int s) {
     const bst_psf_rule *rule = &b->rule;
     double sum = 0.0;
@@ -151,7 +150,7 @@ static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
     return BST_OK;
 }
 
-/* Aberrations of a node (NULL: those of the whole field alone), as a wavefront in m. */
+/* Wavefront of a node in m (node NULL: only aberrations of the whole field). */
 static bst_status make_wavefront(bst_ctx *ctx, const bst_optics_config *o,
                                  const bst_psf_field_node *node, bst_zernike_polynomial *out) {
     double wave_m = 1e-9 * (o->zernike_nm > 0.0 ? o->zernike_nm : 550.0);
@@ -167,7 +166,7 @@ static bst_status make_wavefront(bst_ctx *ctx, const bst_optics_config *o,
         }
     }
     if (defocus_um != 0.0) {
-        /* dz behind the focus is -dz / (8 F^2) r^2, and term 4 is sqrt(3) (2 r^2 - 1) */
+        /* defocus dz is -dz / (8 F^2) r^2, and term 4 is sqrt(3) (2 r^2 - 1) */
         bst_zernike_add(out, 4,
                         -1e-6 * defocus_um / (16.0 * sqrt(3.0) * o->f_number * o->f_number));
     }
@@ -185,20 +184,20 @@ static bool aberrated(const bst_zernike_polynomial *w) {
     return false;
 }
 
-/* Tables of one node, as many as there are spectra. */
+/* OTF tables of one node, one per spectrum */
 typedef bst_optics_grid_otf *tables[BST_PSF_SPECTRA];
 
-/* The frequencies of tables. */
+/* Frequency grid of the tables. */
 typedef struct grid {
     double step;
     int reach;
 } grid;
 
-/* Adds the band's OTF of an aperture to a node's tables. */
+/* Adds the band-averaged OTF of an aperture to a node's tables. */
 static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
                            const band *b, bool with_waves, tables out) {
     for (int k = 0; k < b->rule.count; k++) {
-        /* cells of one step of the tables' frequency at this wavelength: no resampling */
+        /* cell size of one table step at this wavelength: no resampling */
         double cell = out[0]->step * b->q[k];
         double wavelength_m = with_waves ? b->rule.wavelength_m[k] : 0.0;
         int cells = (int)ceil(1.0 / cell);
@@ -226,8 +225,7 @@ static bst_status create_tables(bst_ctx *ctx, const band *b, grid g, tables out)
     return BST_OK;
 }
 
-/* What a node's aperture adds to the annulus. base: tables of the annulus, made when first needed.
- */
+/* Change of a node's OTF relative to the annulus. base: tables of the annulus, made on demand. */
 static bst_status make_node(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
                             const band *b, grid g, tables base, tables out) {
     int reach = g.reach;
@@ -246,7 +244,7 @@ static bst_status make_node(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil 
                 node[i] -= less[i];
             }
         }
-        /* cells that are half open lose light at no shift alone */
+        /* partly open cells lose light at zero shift only */
         float *centre = bst_optics_grid_otf_node(out[s], 0, 0);
         centre[0] = centre[1] = 0.0F;
         bst_optics_grid_otf_mirror(out[s]);
@@ -260,7 +258,7 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
     const bst_psf_field_node *field = o->field.count > 0 ? o->field.items : NULL;
     double slope_m = 0.0;
     bool any = pupil.vanes > 0;
-    int nodes = psf->columns * psf->rows; /* of each spectrum */
+    int nodes = psf->columns * psf->rows; /* number of nodes per spectrum */
     for (int k = 0; k < nodes; k++) {
         BST_TRY(make_wavefront(ctx, o, field ? &field[k] : NULL, &pupil.wavefront));
         slope_m = fmax(slope_m, bst_pupil_slope_m(&pupil));

@@ -1,17 +1,17 @@
-/* The squared image of a PSF that is no Gaussian as a sum of Gaussians: what widens and smears it
- * acts on each of them in closed form. */
+/* Approximates the squared image of a non-Gaussian PSF by a sum of Gaussians, which can be widened
+ * and smeared in closed form. */
 #include <math.h>
 
 #include "sim/optics/psf_internal.h"
 #include "sim/optics/streak_image.h"
 
 enum { PARTS = BST_PSF_GAUSSIANS, RADII = 128, DIRECTIONS = 12, SWEEPS = 1000 };
-/* Widths, over that of the Gaussian of the same noise-equivalent area: the first, and from one to
- * the next. */
+/* widths relative to the Gaussian of equal noise-equivalent area: the first, and the ratio of
+ * consecutive ones */
 static const double FIRST_WIDTH = 0.5, NEXT_WIDTH = 1.35;
 
-/* Least squares with weights >= 0 (coordinate descent) over the plane of frequencies: by Parseval
- * those of the image's autocorrelation over the plane of shifts. */
+/* Non-negative least squares (coordinate descent) over the frequency plane; by Parseval equivalent
+ * to the image's autocorrelation over shifts. */
 static void solve(double a[PARTS][PARTS], const double b[PARTS], double x[PARTS]) {
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
         for (int i = 0; i < PARTS; i++) {
@@ -32,7 +32,7 @@ void bst_psf_fit_gaussians(const bst_psf *psf, int node, bst_psf_node *out) {
         out->gaussian_weight[i] = 0.0;
     }
     for (int n = 0; n < RADII; n++) {
-        /* beyond the cutoff too, where there is nothing */
+        /* includes frequencies beyond the cutoff, where the OTF is 0 */
         double f = 2.0 * psf->cutoff * (n + 0.5) / RADII, mean = 0.0, basis[PARTS];
         for (int d = 0; d < DIRECTIONS; d++) { /* half the plane: the image is real */
             double angle = BST_PI * (d + 0.5) / DIRECTIONS, h[2];
@@ -57,7 +57,7 @@ void bst_psf_fit_gaussians(const bst_psf *psf, int node, bst_psf_node *out) {
     }
 }
 
-/* Integral of the squared image of one node and spectrum. */
+/* Integral of the squared image for one node and spectrum. */
 static double squared_of(const bst_psf_node *n, double along_px2, double across_px2,
                          double length_px) {
     double sum = 0.0;
@@ -85,8 +85,8 @@ double bst_psf_squared_image(const bst_psf *psf, const float colour[BST_PSF_COLO
                 squared_of(&psf->nodes[s * fields + node[k]], along_px2, across_px2, length_px);
         }
     }
-    /* the image is the sum of the nodes' images; the integral of the product of two is the harmonic
-     * mean of those of their squares, exactly so for round Gaussians */
+    /* the image is the sum of the nodes' images; the integral of a product is approximated by the
+     * harmonic mean of those of the squares, exact for circular Gaussians */
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < count; k++) {
             double both = squared[i] + squared[k];

@@ -34,7 +34,7 @@ void bst_optics_grid_otf_mirror(bst_optics_grid_otf *table) {
     }
 }
 
-/* Weights of the nodes -2 .. 3 at t in [0, 1]. */
+/* Six-point Lagrange weights of the nodes -2 .. 3 at t in [0, 1]. */
 static void lagrange6(double t, double w[6]) {
     double a = t + 2.0, b = t + 1.0, c = t - 1.0, d = t - 2.0, e = t - 3.0;
     w[0] = b * t * c * d * e * (-1.0 / 120.0);

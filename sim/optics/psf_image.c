@@ -8,7 +8,7 @@
 
 enum { LEAST_PERIOD_PX = 64, MOST_FREQUENCIES = 1024 };
 
-/* exp(-2 pi^2 (sigma f)^2) is below 1e-9 beyond this sigma f */
+/* frequency times sigma above which exp(-2 pi^2 (sigma f)^2) is below 1e-9 */
 static const double GAUSSIAN_CUTOFF = 1.03;
 
 static int period_of(int reach_px) {
@@ -17,8 +17,8 @@ static int period_of(int reach_px) {
     return period > LEAST_PERIOD_PX ? period : LEAST_PERIOD_PX;
 }
 
-/* The OTF at multiples of 1 / period on a grid of `side` frequencies each way: those beyond it come
- * to lie where samples cannot tell them apart from others. */
+/* OTF at multiples of 1 / period on a grid of `side` frequencies per axis; higher frequencies are
+ * aliased. */
 static void fill_spectrum(const bst_psf *psf, int node, double blur_px, int period, int side,
                           fftw_complex *out) {
     double cutoff = bst_psf_cutoff(psf), scale = 1.0 / ((double)period * period);

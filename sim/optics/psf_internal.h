@@ -1,4 +1,4 @@
-/* Parts of a point spread function: tables of optical transfer functions. */
+/* Internal types of the PSF: tables of optical transfer functions. */
 #ifndef BST_OPTICS_PSF_INTERNAL_H
 #define BST_OPTICS_PSF_INTERNAL_H
 
@@ -6,8 +6,8 @@
 
 #include "sim/optics/psf.h"
 
-/* A real, circular OTF: values at f = limit (i / (BST_RADIAL_NODES - 1))^2, which follow a power of
- * the frequency at 0, as that of every PSF with wings has it. */
+/* A real, circular OTF: values at f = limit (i / (BST_RADIAL_NODES - 1))^2, dense at 0, where PSF
+ * wings cause a power law. */
 enum { BST_RADIAL_NODES = 16384 };
 typedef struct bst_optics_radial_otf {
     double limit;  /* cycles/px; 0 beyond */
@@ -22,19 +22,19 @@ bst_status bst_optics_radial_create(bst_ctx *ctx, double limit,
                                     bst_optics_radial_otf *out) BST_MUST_CHECK;
 /* Frequency of node i of a table that ends at `limit`. */
 double bst_optics_radial_frequency(double limit, int i);
-/* Value at f >= 0: cubic between nodes. */
+/* Value of a radial OTF at f >= 0: cubic interpolation. */
 double bst_optics_radial_at(const bst_optics_radial_otf *table, double f);
 
-/* A complex OTF (or a part of one) with the symmetry of a real image, on the half-plane of a square
+/* A complex OTF (or part of one) with the symmetry of a real image, on the half-plane of a square
  * grid: rows fy = -reach .. reach, columns fx = 0 .. reach, in steps of `step` cycles/px. */
 typedef struct bst_optics_grid_otf {
-    double step; /* 0: no table, nothing to add */
-    int reach;   /* nodes to either side of 0 */
+    double step; /* 0: no table */
+    int reach;   /* number of nodes on either side of 0 */
     int stride;  /* complex numbers per row */
-    float *node; /* complex pairs; BST_GRID_MARGIN more on each side than reach says */
+    float *node; /* complex pairs, with BST_GRID_MARGIN additional nodes on each side */
 } bst_optics_grid_otf;
 
-/* What the interpolation reaches over. */
+/* margin for interpolation */
 enum { BST_GRID_MARGIN = 3 };
 
 /* Allocates a table of an OTF on a half plane of frequencies.
@@ -47,34 +47,35 @@ bst_status bst_optics_grid_otf_create(bst_ctx *ctx, double step, int reach,
                                       bst_optics_grid_otf *out) BST_MUST_CHECK;
 /* Frees the memory of a table and clears the struct, which belongs to the caller. */
 void bst_optics_grid_otf_free(bst_optics_grid_otf *table);
-/* The node (column kx >= -BST_GRID_MARGIN, row ky) as {real, imaginary}. */
+/* Node (column kx >= -BST_GRID_MARGIN, row ky) of an OTF table as {real, imaginary}. */
 static inline float *bst_optics_grid_otf_node(const bst_optics_grid_otf *t, int kx, int ky) {
     return t->node + 2 * ((size_t)(ky + t->reach + BST_GRID_MARGIN) * (size_t)t->stride +
                           (size_t)(kx + BST_GRID_MARGIN));
 }
-/* Fills the columns left of fx = 0 from the symmetry, once all others are set. */
+/* Fills the columns left of fx = 0 by symmetry, after all others. */
 void bst_optics_grid_otf_mirror(bst_optics_grid_otf *table);
-/* Adds the value at (fx, fy): sextic (six-point Lagrange) along both axes; nothing beyond. */
+/* Adds the value at (fx, fy), by six-point Lagrange interpolation along both axes; nothing beyond
+ * the table. */
 void bst_optics_grid_otf_add(const bst_optics_grid_otf *table, double fx, double fy, double out[2]);
 
-/* Gaussians that a node's squared OTF is the sum of. */
+/* number of Gaussians that approximate a node's squared OTF */
 enum { BST_PSF_GAUSSIANS = 8 };
 
 /* One node of the field grid. */
 typedef struct bst_psf_node {
-    /* squared OTF: sum of weight exp(-4 pi^2 variance f^2), of PSFs that are no Gaussians */
+    /* squared OTF of a non-Gaussian PSF: sum of weight exp(-4 pi^2 variance f^2) */
     double gaussian_px2[BST_PSF_GAUSSIANS], gaussian_weight[BST_PSF_GAUSSIANS];
     double equivalent_fwhm_px;
-    double centroid_px[2];               /* of a point's image, from its place */
-    double sigma_px;                     /* Gaussian part: the profile itself, or 0 */
-    const bst_optics_radial_otf *radial; /* NULL: none; lent by the PSF */
-    bst_optics_radial_otf own_radial;    /* where nodes differ in it */
+    double centroid_px[2];               /* centroid of a point's image relative to its chief ray */
+    double sigma_px;                     /* Gaussian part: the whole profile, or 0 */
+    const bst_optics_radial_otf *radial; /* NULL: none; borrowed from the PSF */
+    bst_optics_radial_otf own_radial;    /* if it differs between nodes */
     bst_optics_grid_otf grid;
 } bst_psf_node;
 
-/* Wavelengths of a band's average at most. */
+/* maximum number of wavelengths of a band average */
 enum { BST_PSF_WAVELENGTHS = 64 };
-/* The average as a sum: the integral of f is that of weight * f(wavelength). */
+/* Quadrature over the band: the integral of f is the sum of weight * f(wavelength). */
 typedef struct bst_psf_rule {
     int count;
     double wavelength_m[BST_PSF_WAVELENGTHS], weight[BST_PSF_WAVELENGTHS];
@@ -82,26 +83,26 @@ typedef struct bst_psf_rule {
     bool thermal;
 } bst_psf_rule;
 
-/* Shares of the spectra by temperature, and the error of mixing for an obstruction of diameter
- * `inner`. q: wavelength times focal ratio over pixel pitch at each wavelength. */
+/* Fractions of the spectra by temperature, and the mixing error, for an obstruction of diameter
+ * `inner`. q: wavelength times focal ratio over pixel pitch. */
 typedef struct bst_psf_colours bst_psf_colours;
 bst_status bst_psf_colours_create(bst_ctx *ctx, const bst_psf_rule *rule, const double *q,
                                   double inner,
                                   bst_psf_colours **out) BST_MUST_CHECK; /* free() it */
-/* Temperature of the black body of a spectrum. */
+/* Black-body temperature of a spectrum of the PSF. */
 double bst_psf_anchor_k(bool thermal, int spectrum);
 
 struct bst_psf {
     atomic_int owners;
     int32_t model;
     int columns, rows, spectra;
-    double fwhm_px; /* the camera's */
+    double fwhm_px; /* of the camera */
     double width_px, height_px;
     double diffusion_px, fill[2];
     double cutoff, reach_px;
-    bst_psf *base; /* NULL, or the PSF that lends its tables to this wider one */
-    bst_optics_radial_otf shared[BST_PSF_SPECTRA]; /* diffraction: unaberrated annulus, the same at
-                                               all nodes of a spectrum */
+    bst_psf *base; /* NULL, or the PSF whose tables this widened one borrows */
+    bst_optics_radial_otf shared[BST_PSF_SPECTRA]; /* diffraction: annulus without aberrations,
+                                                      common to all nodes of a spectrum */
     bst_psf_colours *colours;                      /* NULL: one spectrum */
     bst_psf_node *nodes;                           /* [spectra][rows][columns] */
 };
@@ -110,7 +111,7 @@ static inline int bst_psf_node_count(const bst_psf *psf) {
     return psf->columns * psf->rows * psf->spectra;
 }
 
-/* What fills psf->nodes and psf->cutoff for the models that need more than a formula. */
+/* Fill psf->nodes and psf->cutoff for models without closed form. */
 bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
                                     const bst_psf_spectrum *spectrum, bst_psf *psf) BST_MUST_CHECK;
 
@@ -121,10 +122,10 @@ bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
 bst_status bst_psf_make_sampled(bst_ctx *ctx, const bst_camera *camera,
                                 const bst_psf_samples *samples, bst_psf *psf) BST_MUST_CHECK;
 
-/* Sets the Gaussians of a node. */
+/* Fits the Gaussians of a node's squared OTF. */
 void bst_psf_fit_gaussians(const bst_psf *psf, int node, bst_psf_node *out);
 
-/* OTF of the profile (1 + (r / alpha)^2)^-beta at f >= 0. */
+/* OTF of the Moffat profile (1 + (r / alpha)^2)^-beta at f >= 0. */
 double bst_optics_moffat_otf(double alpha_px, double beta, double f);
 /* OTF of a circular aperture of diameter 1 with a concentric obstruction of diameter `inner` at a
  * shift s of pupils, in diameters (O'Neill 1956, J. Opt. Soc. Am. 46, 285). */

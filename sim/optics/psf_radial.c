@@ -51,7 +51,7 @@ double bst_optics_moffat_otf(double alpha_px, double beta, double f) {
     return 2.0 * step * sum;
 }
 
-/* Area common to two circles of radii a >= b whose centres are d apart. */
+/* Area common to two circles of radii a >= b with centres d apart. */
 static double lens(double a, double b, double d) {
     if (d >= a + b) {
         return 0.0;
@@ -59,8 +59,8 @@ static double lens(double a, double b, double d) {
     if (d <= a - b) {
         return BST_PI * b * b;
     }
-    /* half-angle formulae keep their precision where the circles touch: with the triangle of
-     * sides a, b, d and half perimeter s, tan^2(A / 2) = (s - b)(s - c) / (s (s - a)) */
+    /* half-angle formulas are precise near tangency: triangle of sides a, b, d with half perimeter
+     * s, tan^2(A / 2) = (s - b)(s - c) / (s (s - a)) */
     double s = 0.5 * (a + b + d);
     double to_a = fmax(s - a, 0.0), to_b = fmax(s - b, 0.0), to_d = fmax(s - d, 0.0);
     double at_a = 2.0 * atan2(sqrt(to_a * to_d), sqrt(s * to_b));

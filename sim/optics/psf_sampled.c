@@ -5,11 +5,10 @@
 
 #include "sim/optics/psf_internal.h"
 
-/* Longest side of samples, and of the grid that they are transformed on. */
+/* maximum side of samples, and of the transform grid */
 enum { LONGEST_SAMPLES = 2048, LONGEST_GRID = 4096 };
 
-/* Beyond the frequency where a sampled PSF's OTF stays below this it is cut: single-precision
- * samples say nothing there. */
+/* OTF level below which a sampled PSF is cut off: the noise of single-precision samples */
 #define CUT 1e-6
 
 typedef struct transform {
@@ -42,7 +41,7 @@ static bst_status transform_create(bst_ctx *ctx, int longest, transform *t) {
     return t->plan ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transform of a PSF");
 }
 
-/* Sum and centre of the light. */
+/* Sum and centroid of PSF samples. */
 static bst_status measure(bst_ctx *ctx, const float *p, int width, int height, int plane,
                           double *sum, double centre[2]) {
     double total = 0.0, x = 0.0, y = 0.0;
@@ -69,8 +68,8 @@ static bst_status measure(bst_ctx *ctx, const float *p, int width, int height, i
     return BST_OK;
 }
 
-/* OTF at integer multiples of the grid's frequency, kx >= 0; any ky and kx (periodic), moved so
- * that `centre` is the origin. */
+/* OTF at integer multiples of the grid frequency, kx >= 0; ky and kx periodic; shifted so that
+ * `centre` is the origin. */
 static void at_node(const transform *t, double sum, const double centre[2], int kx, int ky,
                     double out[2]) {
     int n = t->side, x = ((kx % n) + n) % n, y = ((ky % n) + n) % n;

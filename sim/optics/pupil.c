@@ -7,10 +7,10 @@
 
 #include "boresight/vec.h"
 
-/* Lines per cell on which a cell's open share is measured. */
+/* lines per cell for measuring its open fraction */
 enum { LINES = 16 };
 
-/* Open stretches of one line through the aperture. */
+/* maximum open intervals on one line through the aperture */
 enum { STRETCHES = 80 };
 typedef struct stretches {
     double from[STRETCHES], to[STRETCHES];
@@ -26,7 +26,7 @@ struct bst_pupil_work {
     fftwf_plan forward, back;
 };
 
-/* The next even number of the form 2^a 3^b 5^c. */
+/* Next even number of the form 2^a 3^b 5^c, fast for the FFT. */
 static int quick_size(int least) {
     for (int n = least + least % 2;; n += 2) {
         int rest = n;
@@ -41,13 +41,13 @@ static int quick_size(int least) {
     }
 }
 
-/* Side of the grid: shifts of up to a whole aperture must not wrap around. */
+/* Side of the grid: shifts by a whole aperture must not wrap around. */
 static int side_for(int cells) {
     return quick_size(2 * cells + 6);
 }
 
 bst_status bst_pupil_work_create(bst_ctx *ctx, int cells, bst_pupil_work **out) {
-    /* FFTW's planner is shared by the whole process */
+    /* FFTW's planner is shared by the process */
     fftwf_make_planner_thread_safe();
     bst_pupil_work *w = calloc(1, sizeof *w);
     *out = NULL;
@@ -77,7 +77,7 @@ static void drop_plans(bst_pupil_work *w) {
     w->side = 0;
 }
 
-/* Plans for apertures of `cells` cells. */
+/* Creates the FFT plans for apertures of `cells` cells. */
 static bst_status plan(bst_ctx *ctx, bst_pupil_work *w, int cells) {
     int side = side_for(cells);
     if (side != w->side) {
@@ -103,7 +103,7 @@ void bst_pupil_work_free(bst_pupil_work *w) {
     }
 }
 
-/* Takes (from, to) out of the open stretches. */
+/* Removes (from, to) from the open intervals. */
 static void close_stretch(stretches *s, double from, double to) {
     int count = s->count;
     for (int i = 0; i < count && from < to; i++) {
@@ -122,12 +122,12 @@ static void close_stretch(stretches *s, double from, double to) {
         } else if (to < b) {
             s->from[i] = to;
         } else {
-            s->to[i] = a; /* nothing left */
+            s->to[i] = a; /* nothing remains */
         }
     }
 }
 
-/* The part of the line at y that a vane in direction (c, s) covers. */
+/* Removes the part of the line at y that a vane in direction (c, s) covers. */
 static void close_vane(stretches *open, double half_width, double c, double s, double y) {
     double from = -1.0, to = 1.0;
     if (fabs(s) > 1e-12) { /* within half_width of the vane's axis */
@@ -137,7 +137,7 @@ static void close_vane(stretches *open, double half_width, double c, double s, d
     } else if (fabs(y * c) >= half_width) {
         return;
     }
-    if (fabs(c) > 1e-12) { /* on its side of the centre */
+    if (fabs(c) > 1e-12) { /* on the vane's side of the centre */
         double start = -y * s / c;
         if (c > 0.0) {
             from = fmax(from, start);

@@ -8,7 +8,7 @@ void bst_zernike_noll(int j, int *n, int *m) {
     while (k > degree) {
         k -= ++degree;
     }
-    /* within a degree the orders grow in pairs; even j are cosines */
+    /* within a degree the orders increase in pairs; even j are cosines */
     int order = degree % 2 + 2 * ((k + (degree + 1) % 2) / 2);
     *n = degree;
     *m = j % 2 == 0 ? order : -order;
@@ -26,8 +26,8 @@ static double factorial(int n) {
     return n < 2 ? 1.0 : n * factorial(n - 1);
 }
 
-/* Noll's equations (1) and (2), the powers of r multiplied out: r^m cos(m t) and r^m sin(m t) are
- * real and imaginary part of (x + i y)^m, what is left of r is a power of x^2 + y^2. */
+/* Noll's equations (1) and (2) with expanded powers of r: r^m cos(m t) and r^m sin(m t) are real
+ * and imaginary part of (x + i y)^m; the remaining factor is a power of x^2 + y^2. */
 void bst_zernike_add(bst_zernike_polynomial *sum, int j, double amount) {
     int n, signed_m;
     bst_zernike_noll(j, &n, &signed_m);
@@ -36,7 +36,7 @@ void bst_zernike_add(bst_zernike_polynomial *sum, int j, double amount) {
     for (int k = 0; k <= (n - m) / 2; k++) {
         double radial = (k % 2 ? -1.0 : 1.0) * factorial(n - k) /
                         (factorial(k) * factorial((n + m) / 2 - k) * factorial((n - m) / 2 - k));
-        int power = (n - m) / 2 - k; /* of x^2 + y^2 */
+        int power = (n - m) / 2 - k; /* exponent of x^2 + y^2 */
         for (int l = sine; l <= m; l += 2) {
             double angular = binomial(m, l) * (l / 2 % 2 ? -1.0 : 1.0);
             for (int t = 0; t <= power; t++) {

@@ -1,10 +1,10 @@
-/* Every module that comes with Boresight. */
+/* Registry of all modules shipped with Boresight. */
 #ifndef BST_REGISTRY_REGISTRY_H
 #define BST_REGISTRY_REGISTRY_H
 
 #include "sim/engine/scenario/scenario.h"
 
-/* Every module that a scenario can name. Static: lives for ever. */
+/* All modules that a scenario can name; static storage. */
 const bst_scenario_registry *bst_registry_shipped(void);
 
 #endif

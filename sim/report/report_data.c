@@ -12,20 +12,20 @@
 #include "sim/world/frame_updates.h"
 #include "sim/world/world.h"
 
-/* Frames that are kept in memory; of longer runs every second, third ... one. */
+/* maximum number of frames in memory; longer runs are subsampled */
 #define MOST_FRAMES 1000000
 
 typedef struct task {
     double from_s;
-    int64_t object; /* -1: the sensor's own */
+    int64_t object; /* index of the object; -1: the sensor's own target */
 } task;
 
 typedef struct reading {
     const bst_run_reader *run;
     bst_run_scene *scene; /* NULL: none */
     int observer, camera_index;
-    int64_t object; /* the sensor's own target: its number in the scenario and in truth; -1: none */
-    task *tasks;    /* what it was given to look for, in the order of time */
+    int64_t object; /* the sensor's own target: its index in scenario and truth; -1: none */
+    task *tasks;    /* successive targets, by time */
     size_t task_count;
     bst_report_sensor *out;
 } reading;
@@ -59,8 +59,8 @@ static const bst_report_frame unknown = {.tracked_s = NAN,
                                          .longitude_rad = NAN,
                                          .mode = -1};
 
-/* Calls `take` for each row of a query on one sensor. A table that is not there is no error:
- * *missing. */
+/* Calls `take` for each row of a query on one sensor. *missing: no such table, which is no
+ * error. */
 static bst_status each_row(bst_ctx *ctx, reading *r, const char *sql, int64_t parameter,
                            bst_status (*take)(bst_ctx *ctx, reading *r, const bst_io_rows *rows),
                            bool *missing) {
@@ -77,14 +77,14 @@ static bst_status each_row(bst_ctx *ctx, reading *r, const char *sql, int64_t pa
            (status = take(ctx, r, rows)) == BST_OK) {
     }
     bst_io_rows_close(rows);
-    if (status == BST_ERR_FORMAT) { /* a database with a damaged page: what came before it holds */
+    if (status == BST_ERR_FORMAT) { /* damaged database: rows read before the damage are valid */
         r->out->damaged = true;
         return BST_OK;
     }
     return status;
 }
 
-/* The frame of an exposure; NULL when it is not kept. Frames ascend. */
+/* The report frame of an exposure; NULL: not kept. Frames are in ascending order. */
 static bst_report_frame *find(const reading *r, int64_t exposure_id) {
     bst_report_frame *frames = r->out->frames;
     size_t low = 0, high = r->out->count;
@@ -106,7 +106,7 @@ static bst_vec3 vec3_of(const bst_io_rows *rows, int column) {
                       bst_io_rows_real(rows, column + 2)};
 }
 
-/* Adds a frame; NULL when it is one of those left out. */
+/* Adds a report frame; NULL: skipped by subsampling. */
 static bst_report_frame *add_frame(reading *r, int64_t id, double mid_s) {
     bst_report_sensor *s = r->out;
     int64_t number = s->exposures++;
@@ -122,7 +122,7 @@ static bst_report_frame *add_frame(reading *r, int64_t id, double mid_s) {
 }
 
 static bst_status take_task(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
-    if ((r->task_count & (r->task_count - 1)) == 0) { /* room doubles */
+    if ((r->task_count & (r->task_count - 1)) == 0) { /* doubles the capacity */
         task *more = realloc(r->tasks, (r->task_count ? 2 * r->task_count : 1) * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the tasks");
@@ -133,10 +133,10 @@ static bst_status take_task(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     return BST_OK;
 }
 
-/* What the sensor is to look at then; -1: nothing. */
+/* Target of the sensor at a time; -1: none. */
 static int64_t object_at(const reading *r, double seconds) {
     size_t low = 0, high = r->task_count;
-    while (low < high) { /* the first that begins later */
+    while (low < high) { /* finds the first task that begins later */
         size_t middle = low + (high - low) / 2;
         if (r->tasks[middle].from_s <= seconds) {
             low = middle + 1;
@@ -147,7 +147,8 @@ static int64_t object_at(const reading *r, double seconds) {
     return low > 0 && r->tasks[low - 1].object >= 0 ? r->tasks[low - 1].object : r->object;
 }
 
-/* The target as the world has it. */
+/* Computes the target's direction, brightness and visibility for a frame, from the world of the
+ * run. */
 static bst_status look(bst_ctx *ctx, reading *r, bst_report_frame *f, bst_quat q_cam_from_gcrf,
                        double pixel_scale_arcsec) {
     bst_world_sight sight;
@@ -232,7 +233,7 @@ static bst_status take_frame(bst_ctx *ctx, reading *r, const bst_io_rows *rows) 
     return BST_OK;
 }
 
-/* The sensor's exposures, from the first table that has them. */
+/* Reads the exposures of a sensor from the first table that has them. */
 static bst_status read_frames(bst_ctx *ctx, reading *r) {
     static const struct {
         const char *count, *rows;
@@ -265,7 +266,8 @@ static bst_status read_frames(bst_ctx *ctx, reading *r) {
 
 /* ------------------------------------------------------------------ truth */
 
-/* What the table truth says of the target where it was in the field. */
+/* Reads the target's position and SNR from the table truth, for frames with the target in the
+ * field. */
 static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
     bst_report_frame *f = find(r, bst_io_rows_int(rows, 0));
@@ -278,8 +280,8 @@ static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_io_rows *rows) 
     if (f->known) {
         return BST_OK;
     }
-    /* no world: the recorded place, relative to the boresight; in the field it differs from the
-     * angle by the lens' distortion alone */
+    /* without world: recorded position relative to the boresight; in the field it differs from the
+     * angle only by distortion */
     f->known = true;
     f->error_x_px = bst_io_rows_real(rows, 1) - f->boresight_x_px;
     f->error_y_px = bst_io_rows_real(rows, 2) - f->boresight_y_px;
@@ -297,7 +299,7 @@ static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_io_rows *rows) 
     return BST_OK;
 }
 
-/* Number of the target in the table truth. */
+/* Index of the target in the table truth. */
 static int64_t find_object(const bst_run_reader *run, const char *name) {
     bst_ctx unheard = {0};
     bst_io_rows *rows;
@@ -346,7 +348,7 @@ static bst_status take_mode(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     if (s->mode_count > 0 && s->modes[s->mode_count - 1].mode == mode) {
         return BST_OK;
     }
-    if ((s->mode_count & (s->mode_count - 1)) == 0) { /* room doubles */
+    if ((s->mode_count & (s->mode_count - 1)) == 0) { /* doubles the capacity */
         bst_report_mode *more =
             realloc(s->modes, (s->mode_count ? 2 * s->mode_count : 1) * sizeof *more);
         if (!more) {
@@ -368,7 +370,7 @@ static void spread_modes(bst_report_sensor *s) {
     }
 }
 
-/* Marks the first frame after each task. */
+/* Marks the first frame of each task. */
 static void spread_tasks(const reading *r) {
     bst_report_sensor *s = r->out;
     size_t k = 0;
@@ -402,7 +404,7 @@ static bst_status read_all(bst_ctx *ctx, reading *r) {
     BST_TRY(each_row(ctx, r, "SELECT time_s, object FROM tasks WHERE sensor = ?1 ORDER BY rowid", 0,
                      take_task, &missing));
     BST_TRY(read_frames(ctx, r));
-    /* of one target only its own rows are asked for */
+    /* with a single target only its own rows are queried */
     bool one = r->task_count == 0;
     if (r->object >= 0 || !one) {
         BST_TRY(each_row(ctx, r,

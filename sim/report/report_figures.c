@@ -7,7 +7,7 @@
 #include "sim/report/report.h"
 
 bst_loop_frame bst_report_loop_frame(const bst_report_frame *f) {
-    /* where modes were not recorded a frame in track is taken for one in mode track */
+    /* if modes were not recorded, a frame in track counts as mode track */
     int mode = f->mode < 0 && f->in_track ? BST_MODE_TRACK : f->mode;
     return (bst_loop_frame){.exposure_id = f->exposure_id,
                             .time_s = f->mid_s,
@@ -22,7 +22,7 @@ bst_loop_frame bst_report_loop_frame(const bst_report_frame *f) {
                             .mode = mode};
 }
 
-/* Marks the frames and notes the times, as sim/eval/loop_summary.c does when it gets messages. */
+/* Marks acquired and settled frames and their times, by the rules of sim/eval/loop_summary.c. */
 static void mark(bst_report_sensor *s) {
     double acquired_s = NAN;
     bool settled = false;
@@ -105,8 +105,8 @@ static void take_summary(bst_report_sensor *s, const cJSON *summary) {
     }
 }
 
-/* Frames of a run that closed properly but by an earlier version have their pointing figures by
- * other rules: all of them are then worked out here. */
+/* Checks whether a summary has all pointing figures: those of earlier versions follow other rules
+ * and are recomputed here. */
 static bool is_complete(const cJSON *summary) {
     return cJSON_GetObjectItemCaseSensitive(summary, "pointing_frames") != NULL;
 }

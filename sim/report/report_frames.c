@@ -9,8 +9,8 @@
 #include "sim/io/frame_picture.h"
 #include "sim/report/report.h"
 
-/* Frames that are shown; sides of a frame and of its inset, units of the SVG and pixels of the
- * pictures; sensor pixels in an inset; grey levels; marks that are drawn at most. */
+/* Number of frames shown; sides of a frame and its inset in SVG units; sensor pixels in an inset;
+ * grey levels; maximum number of marks. */
 enum { SHOWN = 6, SIDE = 352, INSET = 180, INSET_PX = 48, GREYS = 16, MOST_MARKS = 400 };
 
 static const struct {
@@ -25,13 +25,13 @@ static const struct {
     [BST_OVERLAY_BORESIGHT] = {"#ec80ff", "boresight"},
 };
 
-/* Part of a frame that an SVG shows at (x, y), `scale` units a pixel. */
+/* Part of a frame that is shown in an SVG at (x, y) with `scale` units per pixel. */
 typedef struct part {
-    double x, y, width, height; /* units */
+    double x, y, width, height; /* SVG units */
     int column, row, columns, rows;
     double scale;
     bool labels;
-    double marks; /* size of the marks, 1 for usual */
+    double marks; /* size of the marks, 1: normal */
 } part;
 
 static bst_status put_pixels(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
@@ -59,7 +59,7 @@ static bst_status put_pixels(bst_ctx *ctx, FILE *out, const bst_fits_read_frame 
     return status;
 }
 
-/* A mark at (x, y), units, `size` times as large as usual. */
+/* Writes a mark into the SVG at (x, y), `size` times the normal size. */
 static void put_mark(FILE *out, bst_io_overlay_kind kind, double x, double y, double radius,
                      double size) {
     double r = radius, arm = 11.0 * size, gap = 4.0 * size;
@@ -95,7 +95,7 @@ static bool is_detection(const bst_io_overlay_mark *m) {
            m->kind == BST_OVERLAY_DETECTION;
 }
 
-/* Where a mark lies in a part; false: not there, or at a place that is not a number. */
+/* Position of a mark in a part of the frame; false: outside, or not finite. */
 static bool find_mark(const bst_io_overlay_mark *m, const part *p, double *x, double *y) {
     *x = (m->x_px - p->column + 0.5) * p->scale;
     *y = (m->y_px - p->row + 0.5) * p->scale;
@@ -103,7 +103,7 @@ static bool find_mark(const bst_io_overlay_mark *m, const part *p, double *x, do
 }
 
 static void put_label(FILE *out, const bst_io_overlay_mark *m, const part *p, double x, double y) {
-    /* beside the mark, or where that would leave the frame on its other side */
+    /* next to the mark; on its other side near the edge of the frame */
     bool left = x > p->width - 110.0;
     bool track = m->kind == BST_OVERLAY_TRACK;
     fprintf(out, "<text class=\"m\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" style=\"fill:%s\">",
@@ -113,9 +113,8 @@ static void put_label(FILE *out, const bst_io_overlay_mark *m, const part *p, do
     fputs("</text>", out);
 }
 
-/* Draws the most important MOST_MARKS of a part's marks of detections and as many of the others,
- * the first of them on top. *detections and *drawn count those of detections, in the part and
- * drawn. */
+/* Draws up to MOST_MARKS detections and as many other marks, the most important in front.
+ * *detections and *drawn: number of detections in the part, and drawn. */
 static void put_marks(FILE *out, const bst_io_overlay *overlay, const part *p, int *detections,
                       int *drawn) {
     double x, y;
@@ -141,7 +140,7 @@ static void put_marks(FILE *out, const bst_io_overlay *overlay, const part *p, i
     fputs("</svg>\n", out);
 }
 
-/* Where the inset's middle is: the target, else the track, else the boresight, else the middle. */
+/* Centre of the inset: target, else track, else boresight, else centre of the frame. */
 static void find_middle(const bst_io_overlay *overlay, const bst_fits_read_frame *frame, double *x,
                         double *y) {
     static const bst_io_overlay_kind order[] = {BST_OVERLAY_TARGET, BST_OVERLAY_TRACK,
@@ -161,7 +160,7 @@ static void find_middle(const bst_io_overlay *overlay, const bst_fits_read_frame
     }
 }
 
-/* What is known of the frame, below the inset. */
+/* Writes facts about the frame below the inset. */
 static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double x, double y) {
     char lines[4][80] = {"", "", "", ""};
     if (!f) {
@@ -199,7 +198,7 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
     }
 }
 
-/* Detections of a frame, and how many of them are drawn. */
+/* Number of detections in a frame, and drawn. */
 typedef struct shown {
     int detections, drawn;
 } shown;
@@ -231,7 +230,7 @@ static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *
     bst_html_format(out, "Picture of the %s with what was detected and what is true",
                     overlay->caption ? overlay->caption : "frame");
     fputs("\">\n", out);
-    /* a small frame is enlarged by the program that shows it */
+    /* the browser enlarges small frames */
     bool small = scale > 1.0;
     BST_TRY(put_pixels(ctx, out, frame, stretch, &whole,
                        small ? frame->width : (int)fmax(1.0, whole.width),
@@ -254,8 +253,7 @@ static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *
 
 /* ------------------------------------------------------------------ which frames */
 
-/* Indices of the frames to show, rising: evenly spread, and among them the first with the target in
- * track. */
+/* Selects the frames to show: evenly spaced, including the first one with the target in track. */
 static int choose(const bst_report_sensor *s, const int64_t *ids, int64_t frames,
                   int64_t chosen[SHOWN]) {
     int64_t count = frames < SHOWN ? frames : SHOWN;
@@ -265,7 +263,7 @@ static int choose(const bst_report_sensor *s, const int64_t *ids, int64_t frames
     for (size_t i = 0; i < s->count && count == SHOWN; i++) {
         if (s->frames[i].in_track) {
             for (int64_t k = 0; k < frames; k++) {
-                /* the second place is for it, where it does not come later than the third */
+                /* it takes the second place unless it comes after the third */
                 if (ids[k] == s->frames[i].exposure_id && k > 0 && k < chosen[2]) {
                     chosen[1] = k;
                 }
@@ -291,7 +289,7 @@ static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s
     bool cube = bst_fits_reader_info(fits)->cube;
     for (int64_t i = 0; i < frames; i++) {
         BST_TRY(bst_fits_reader_id(ctx, fits, i, &ids[i]));
-        if (ids[i] < 0) { /* a cube that lost its table */
+        if (ids[i] < 0) { /* a cube without its table */
             BST_TRY(bst_frame_marks_exposure(ctx, marks, cube ? i : i + 1, &ids[i]));
         }
     }
@@ -359,7 +357,7 @@ bst_status bst_report_frames(bst_ctx *ctx, FILE *out, bst_run_reader *run,
     bst_frame_marks_free(marks);
     bst_fits_reader_close(fits);
     if (status == BST_ERR_FORMAT || status == BST_ERR_IO) {
-        /* a damaged file: what could be read is there */
+        /* damaged file: the readable frames are on the page */
         bst_run_reader_note_problem(run, "%s", ctx->message);
         fputs("<p class=\"bad\">No more frames can be read: ", out);
         bst_html_text(out, bst_report_local(run, ctx->message));

@@ -16,13 +16,13 @@
 #include "sim/io/fits_reader.h"
 #include "sim/io/run_reader.h"
 
-/* Copies a member when it is there, else makes it null. */
+/* Copies a JSON member; null if it is missing. */
 static void copy(cJSON *to, const char *key, const cJSON *from, const char *from_key) {
     const cJSON *item = bst_json_member(from, from_key);
     cJSON_AddItemToObject(to, key, item ? cJSON_Duplicate(item, true) : cJSON_CreateNull());
 }
 
-/* A query's rows handed to `add`; a failure becomes a problem of the run. */
+/* Calls `add` for each row of a query; an error becomes a problem of the run. */
 static void each_row(bst_run_reader *run, const char *sql, int64_t parameter,
                      void (*add)(cJSON *to, const bst_io_rows *rows), cJSON *to) {
     bst_ctx ctx = {0};
@@ -98,7 +98,7 @@ static void add_identity(bst_run_reader *run, cJSON *out) {
 }
 
 static void put_program(cJSON *to, const bst_io_rows *rows) {
-    /* "boresight 0.1.0" */
+    /* program and version: "boresight 0.1.0" */
     const char *text = bst_io_rows_text(rows, 0), *space = strchr(text, ' ');
     cJSON_ReplaceItemInObjectCaseSensitive(to, "version",
                                            cJSON_CreateString(space ? space + 1 : text));
@@ -116,7 +116,7 @@ static void put_sensor(cJSON *to, const bst_io_rows *rows) {
     cJSON_AddItemToArray(to, node);
 }
 
-/* What the sensor's FITS file holds. */
+/* Adds the content of the sensor's FITS file to the information. */
 static void add_file(bst_run_reader *run, cJSON *sensor, int64_t kept) {
     const char *name = bst_json_member_text(sensor, "file", "");
     char path[4096];
@@ -124,7 +124,7 @@ static void add_file(bst_run_reader *run, cJSON *sensor, int64_t kept) {
     bst_ctx ctx = {0};
     bst_fits_reader *fits = NULL;
     bool complete = bst_run_reader_state(run) == BST_RUN_COMPLETE;
-    /* a name from a damaged database is not to lead out of the folder */
+    /* a file name from a damaged database must stay inside the folder */
     bool usable = *name && !strchr(name, '/') &&
                   bst_run_reader_file(&ctx, run, name, path, sizeof path) == BST_OK;
     if (!usable || stat(path, &info) != 0) {
@@ -136,7 +136,7 @@ static void add_file(bst_run_reader *run, cJSON *sensor, int64_t kept) {
     }
     cJSON_AddNumberToObject(sensor, "file_bytes", (double)info.st_size);
     if (bst_fits_reader_open(&ctx, path, &fits) != BST_OK) {
-        /* a run that was killed early leaves a file without a whole header */
+        /* a killed run may leave a file without a complete header */
         if (complete) {
             bst_run_reader_note_problem(run, "%s", ctx.message);
         }
@@ -186,7 +186,7 @@ static void put_table(cJSON *to, const bst_io_rows *rows) {
     cJSON_AddItemToArray(to, node);
 }
 
-/* Puts a column under its table. */
+/* Adds a column to the description of its table. */
 static void put_column(cJSON *to, const bst_io_rows *rows) {
     cJSON *table;
     cJSON_ArrayForEach(table, to) {
@@ -214,7 +214,7 @@ static void add_tables(bst_run_reader *run, cJSON *out) {
     cJSON_ArrayForEach(table, list) {
         char sql[200];
         const char *name = bst_json_member_text(table, "name", "");
-        /* the writer's names need no quoting; others are not asked for */
+        /* recorded names need no quoting; others are skipped */
         if (!strpbrk(name, "\"'") && strlen(name) < 100) {
             snprintf(sql, sizeof sql, "SELECT count(*) FROM \"%s\"", name);
             each_row(run, sql, 0, put_count, table);
@@ -377,7 +377,7 @@ static void print_sensors(const cJSON *info) {
     }
 }
 
-/* The figures of a summary with the units that their keys carry. */
+/* Prints the figures of a summary with the units from their keys. */
 static void print_figures(const char *name, const cJSON *summary) {
     const cJSON *item;
     if (!cJSON_IsObject(summary)) {

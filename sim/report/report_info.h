@@ -1,4 +1,4 @@
-/* What a run's folder holds. */
+/* Content of a run's folder, for `boresight info`. */
 #ifndef BST_REPORT_REPORT_INFO_H
 #define BST_REPORT_REPORT_INFO_H
 
@@ -7,11 +7,11 @@
 
 #include "sim/io/run_reader.h"
 
-/* Scenario, version, span of time, sensors, tables, summary figures, events, files and problems.
- * The caller frees it with cJSON_Delete. */
+/* Collects scenario, version, time span, sensors, tables, summary, events, files and problems as
+ * JSON. The caller frees it with cJSON_Delete. */
 cJSON *bst_report_info(bst_run_reader *run);
 
-/* Prints it for people; `columns`: those of the tables too. */
+/* Prints the information as text; `columns`: including table columns. */
 void bst_report_info_print(const bst_run_reader *run, const cJSON *info, bool columns);
 
 #endif

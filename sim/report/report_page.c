@@ -65,7 +65,7 @@ void bst_report_page_end(FILE *out) {
     fputs("</body>\n</html>\n", out);
 }
 
-/* Text in which a number such as 1.6e-05 is not broken at its hyphen. */
+/* Writes text in which numbers such as 1.6e-05 are not broken at the hyphen. */
 static void put_prose(FILE *out, const char *text) {
     while (*text) {
         size_t space = strspn(text, " "), word = strcspn(text + space, " ");
@@ -80,7 +80,7 @@ static void put_prose(FILE *out, const char *text) {
         for (size_t i = 0, n; i < word; i += n) {
             n = word - i < sizeof part - 1 ? word - i : sizeof part - 1;
             while (n < word - i && n > 1 && ((unsigned char)from[i + n] & 0xC0) == 0x80) {
-                n--; /* not inside a character */
+                n--; /* do not cut inside a character */
             }
             memcpy(part, from + i, n);
             part[n] = '\0';
@@ -158,7 +158,7 @@ const char *bst_report_page_number(char text[32], double value, int digits) {
     if (!isfinite(value)) {
         return strcpy(text, "-");
     }
-    /* no exponent for what is readable without one */
+    /* no exponent for numbers of moderate size */
     double size = fabs(value);
     if (size >= 1e-3 && size < 1e6) {
         int after = digits - 1 - (int)floor(log10(size));

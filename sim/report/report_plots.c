@@ -9,7 +9,7 @@
 
 /* ------------------------------------------------------------------ helpers */
 
-/* The last mode that began by then; -1: none. *k goes on from call to call. */
+/* Mode at a time; -1: none. *k: index kept between calls in ascending order. */
 static int mode_at(const bst_report_sensor *s, double seconds, size_t *k) {
     while (*k + 1 < s->mode_count && s->modes[*k + 1].from_s <= seconds) {
         (*k)++;
@@ -177,7 +177,7 @@ static double others(const bst_report_frame *f) {
     return f->detections - f->stars;
 }
 
-/* The numbers of a series, moved to its beginning. */
+/* Moves the finite values of a series to its front; returns their number. */
 static size_t gather(double *series, size_t n) {
     size_t count = 0;
     for (size_t i = 0; i < n; i++) {
@@ -188,7 +188,8 @@ static size_t gather(double *series, size_t n) {
     return count;
 }
 
-/* "RMS 0.21, median 0.18, 95 % below 0.36, 99 % below 0.44, largest 0.6 px"; NAN p99: left out */
+/* Formats statistics: "RMS 0.21, median 0.18, 95 % below 0.36, 99 % below 0.44, largest 0.6 px";
+ * NAN p99 is omitted. */
 static void describe(char text[200], double rms, double median, double p95, double p99,
                      double largest, const char *unit) {
     char words[5][32], tail[48] = "";
@@ -264,7 +265,7 @@ static void plot_axes(const bst_report_drawing *d) {
     }
     bst_report_statistics m = bst_report_measure(sizes, count);
     free(sizes);
-    /* the settling at the start is not to flatten the rest */
+    /* the acquisition transient must not compress the chart */
     double limit = fmin(m.worst, 4.0 * m.p95);
     bst_report_page_figure(d->out, BST_PAGE_WIDE);
     bst_chart c = bst_report_time_chart(d, "Pointing error along the sensor's columns and rows",
@@ -321,7 +322,7 @@ static void plot_track(const bst_report_drawing *d) {
 }
 
 static void plot_nees(const bst_report_drawing *d) {
-    /* chi-square with 2 degrees of freedom: -2 ln of the share above */
+    /* chi-square with 2 degrees of freedom: -2 ln(upper tail) */
     const double lower = -2.0 * log(0.975), upper = -2.0 * log(0.025);
     size_t n = d->sensor->count, inside = 0;
     double low = lower, high = upper;
@@ -426,7 +427,8 @@ static double chi_square_2(double x, const void *user) {
     return 0.5 * exp(-0.5 * x);
 }
 
-/* Histogram of one axis' pointing error with the normal curve of its mean and spread. */
+/* Draws the histogram of one axis of the pointing error with a normal curve of equal mean and
+ * sigma. */
 static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity quantity,
                               const char *label, int colour) {
     bst_report_fill(d, quantity, d->y);
@@ -434,7 +436,7 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
     if (n < 20) {
         return;
     }
-    bst_report_statistics m = bst_report_measure(d->y, n); /* sorts */
+    bst_report_statistics m = bst_report_measure(d->y, n); /* sorts d->y */
     double inner =
         0.5 * (bst_report_percentile(d->y, n, 0.8413) - bst_report_percentile(d->y, n, 0.1587));
     double law[2] = {m.median, fmax(inner, 1e-9)}, half = 5.0 * law[1];

@@ -21,11 +21,11 @@ typedef struct page {
     bst_run_sensor list[BST_EXPORT_SENSORS];
     bst_report_sensor sensors[BST_EXPORT_SENSORS];
     int count;
-    double span_s; /* simulated, as far as the run goes */
+    double span_s; /* simulated duration so far */
     bst_report_warnings warnings;
 } page;
 
-/* The summary of a sensor; NULL when the run has none. */
+/* Summary of a sensor in the manifest; NULL: none. */
 static const cJSON *summary_of(const page *p, int i) {
     const cJSON *manifest = bst_run_reader_manifest(p->run);
     const cJSON *own = bst_json_member(bst_json_member(manifest, "sensors"), p->sensors[i].name);
@@ -62,7 +62,7 @@ static bst_status read_sensors(bst_ctx *ctx, page *p) {
     }
     for (int i = 0; i < count; i++) {
         bst_report_sensor *s = &p->sensors[i];
-        /* the summary's key needs the name, which the reading makes */
+        /* the key in the summary is the sensor's name */
         snprintf(s->name, sizeof s->name, "%s/%s", p->list[i].observer, p->list[i].name);
         BST_TRY(bst_report_read(ctx, p->run, p->has_scene ? &p->scene : NULL, &p->list[i],
                                 summary_of(p, i), s));
@@ -267,7 +267,7 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         p->out);
     bst_status status;
     while ((status = bst_io_rows_next(&unheard, rows, &more)) == BST_OK && more) {
-        /* of very many the first and the last ones */
+        /* of very many events, show the first and last ones */
         bool middle =
             total > MOST_EVENTS && shown >= MOST_EVENTS / 2 && shown < total - MOST_EVENTS / 2;
         if (!middle) {
@@ -305,7 +305,7 @@ static bst_status put_sensor(bst_ctx *ctx, const page *p, int i) {
     return BST_OK;
 }
 
-/* The summary alone, of a run without tables. */
+/* Writes the summary of a run without tables. */
 static void put_summary(const page *p) {
     const cJSON *summary = bst_json_member(bst_run_reader_manifest(p->run), "summary"), *item;
     bst_report_page_section(p->out, 2, "Summary");

@@ -1,19 +1,20 @@
-/* Which of what was swept matters, and for what: designs one_at_a_time and morris. */
+/* Report of a study's sensitivity: ranked effects of the swept parameters for designs one_at_a_time
+ * and morris. */
 #include <math.h>
 #include <string.h>
 
 #include "sim/report/report_study.h"
 
-/* Metrics that are told beside the wall time; axes in a chart. */
+/* maximum number of metrics besides wall time; axes in a chart */
 enum { METRICS = 6, AXES = 24 };
 
-/* What an axis does to a metric: a row of the table sensitivity or speed_sensitivity. */
+/* Effect of an axis on a metric: a row of the table sensitivity or speed_sensitivity. */
 typedef struct effect {
     const bst_report_study_axis_view *axis;
-    double size, error; /* ranks, and its standard error */
+    double size, error; /* effect by which axes are ranked, and its standard error */
     double sigma;       /* spread of the elementary effects */
     int count;
-    /* one at a time: where the metric goes at the least and the greatest value of the axis */
+    /* one at a time: the metric at the smallest and largest value of the axis */
     double at[2], value[2];
 } effect;
 
@@ -26,7 +27,7 @@ static const bst_report_study_axis_view *axis_of(const bst_report_study_view *v,
     return NULL;
 }
 
-/* The effects of a design's axes on a metric, as they are ranked; `table` is theirs. */
+/* Reads the ranked effects of a design's axes on a metric from `table`. */
 static bst_status read_effects(bst_ctx *ctx, const bst_report_study_view *v, const char *table,
                                const char *design, const char *metric, effect list[AXES],
                                int *count) {
@@ -57,7 +58,7 @@ static bst_status read_effects(bst_ctx *ctx, const bst_report_study_view *v, con
     return status;
 }
 
-/* The 95 % interval, taken for normal. */
+/* Limits of the 95 % interval, assumed normal. */
 static double low_of(const effect *e) {
     return isfinite(e->error) ? fmax(0.0, e->size - 1.96 * e->error) : e->size;
 }
@@ -120,7 +121,7 @@ static void put_morris(FILE *out, const bst_report_study_metric_view *m, const e
     for (int i = 0; i < count; i++) {
         bst_chart_dots(&d, &list[i].size, &list[i].sigma, 1, BST_CHART_BLUE);
         snprintf(text, sizeof text, "%d", i + 1);
-        /* neighbours in rank are often at one place */
+        /* avoids overlap: neighbours in rank are often close */
         bst_chart_word(&d, list[i].size, list[i].sigma, i % 2 ? -5.0 : 5.0, -4.0,
                        i % 2 ? "end" : "start", text);
     }
@@ -133,12 +134,12 @@ static void put_morris(FILE *out, const bst_report_study_metric_view *m, const e
 
 /* ------------------------------------------------------------------ one at a time */
 
-/* Equal values; that of an axis is NAN where the scenario does not say it. */
+/* Equality of axis values; NAN (not in the scenario) equals NAN. */
 static bool same_value(double a, double b) {
     return a == b || (isnan(a) && isnan(b));
 }
 
-/* Whether a setting differs from setting 0, the scenario's own, in this axis alone. */
+/* Checks whether a setting differs from setting 0, the scenario's own, in this axis only. */
 static bool differs_in(const bst_report_study_view *v, const bst_report_study_axis_view *axis,
                        int64_t setting) {
     for (int i = 0; i < v->axis_count; i++) {

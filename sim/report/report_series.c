@@ -1,4 +1,4 @@
-/* Quantities of a sensor's frames as series of numbers. */
+/* Series of a sensor's frame quantities for charts: selection, statistics, histogram. */
 #include <math.h>
 #include <stdlib.h>
 

@@ -1,4 +1,4 @@
-/* Who saw what: the tables passes and sightings of a run with several objects. */
+/* Report of sightings: the tables passes and sightings of a run with several objects. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -9,8 +9,8 @@
 #include "sim/core/text.h"
 #include "sim/report/report_plots.h"
 
-/* Objects in the timeline and in the table; sensors with a colour of their own; points of the
- * curves. */
+/* maximum objects in the timeline and in the table; sensors with their own colour; points of the
+ * curves */
 enum { ROWS = 40, LISTED = 25, SENSORS = 7, POINTS = 400 };
 
 typedef struct sensor_names {
@@ -62,7 +62,7 @@ static void put_cards(FILE *out, const bst_run_reader *run) {
     const cJSON *f = cJSON_GetObjectItemCaseSensitive(bst_run_reader_manifest(run), "sightings");
     char text[32], note[120], more[32];
     if (!cJSON_IsObject(f)) {
-        return; /* the run has no summary: the charts tell */
+        return; /* without summary: charts only */
     }
     fputs("<div class=\"cards\">\n", out);
     snprintf(text, sizeof text, "%.0f", number_of(f, "objects_seen"));
@@ -96,7 +96,7 @@ static void put_cards(FILE *out, const bst_run_reader *run) {
 
 /* ------------------------------------------------------------------ timeline */
 
-/* Numbers of the objects with most detections. */
+/* Selects the objects with the most detections. */
 static bst_status choose(bst_ctx *ctx, const bst_run_reader *run, int64_t objects[ROWS],
                          char names[ROWS][48], int *count) {
     bst_io_rows *rows;
@@ -127,7 +127,7 @@ static bst_status put_passes(bst_ctx *ctx, const bst_chart *c, const bst_run_rea
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
         int64_t sensor = bst_io_rows_int(rows, 0), detected = bst_io_rows_int(rows, 3);
         double from = bst_io_rows_real(rows, 1) / unit_s, to = bst_io_rows_real(rows, 2) / unit_s;
-        double least = 1.5 * (c->x.high - c->x.low) / c->inner_width; /* that can be seen */
+        double least = 1.5 * (c->x.high - c->x.low) / c->inner_width; /* minimum visible width */
         char title[200];
         snprintf(title, sizeof title, "%s: %.6g s to %.6g s, detected in %" PRId64 " of %s",
                  sensor >= 0 && sensor < names->count ? names->names[sensor] : "a sensor",
@@ -182,12 +182,12 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
 
 /* Points of a curve over time. */
 typedef struct curve {
-    double unit_s; /* of x */
+    double unit_s; /* seconds per unit of x */
     double *x, *y; /* [room] */
     size_t room;
 } curve;
 
-/* First detections of objects by a sensor (-1: by any) as a curve of their number over time. */
+/* Draws the cumulative number of objects detected by a sensor (-1: any) over time. */
 static bst_status put_count(bst_ctx *ctx, bst_chart *c, const bst_run_reader *run, int sensor,
                             const curve *k, size_t *total) {
     double *x = k->x, *y = k->y;

@@ -38,7 +38,7 @@ static double longitude_deg(const bst_report_frame *f) {
     return f->longitude_rad / BST_DEG_RAD;
 }
 
-/* A small chart of one quantity over time. */
+/* Draws a small chart of one quantity over time. */
 static void put_quantity(const bst_report_drawing *d, bst_report_quantity quantity,
                          const char *label, const char *caption) {
     size_t n = d->sensor->count;
@@ -61,7 +61,7 @@ static void put_quantity(const bst_report_drawing *d, bst_report_quantity quanti
     bst_report_page_figure_end(d->out, caption);
 }
 
-/* Right ascensions of boresight (y) and target (z), made continuous where they do not go round. */
+/* Unwraps the right ascensions of boresight (y) and target (z) where they cross 360 degrees. */
 static void unwrap(const bst_report_drawing *d, double *low, double *high) {
     const bst_report_sensor *s = d->sensor;
     double before = NAN;

@@ -8,7 +8,7 @@
 #include "boresight/version.h"
 #include "sim/core/text.h"
 
-/* Rows of tables that are shown at most; figures in a table of settings. */
+/* Maximum rows of tables; metrics in the table of settings. */
 enum { MOST_SETTINGS = 200, MOST_FAILED = 50, MOST_WORST = 8, COLUMNS = 6 };
 
 static void put_cell(FILE *out, bool number, const char *text) {
@@ -116,7 +116,7 @@ static void gather_warnings(const bst_report_study_view *v, bst_report_warnings 
 
 /* ------------------------------------------------------------------ what was varied */
 
-/* "5 values from 3 to 48", or the values themselves. */
+/* Describes the values of an axis: "5 values from 3 to 48", or the values. */
 static void describe_axis(const bst_report_study_view *v, const bst_report_study_axis_view *a,
                           char text[400]) {
     size_t n = 0;
@@ -332,7 +332,7 @@ static int worst_first(const void *a, const void *b) {
                                     : (x->row > y->row) - (x->row < y->row);
 }
 
-/* The runs with the least custody, or else the largest pointing error. */
+/* Writes the runs with the lowest custody, or the largest pointing error. */
 static void put_worst(FILE *out, const bst_report_study_view *v) {
     const bst_report_study_metric_view *custody = find_metric(v, "custody"),
                                        *pointing = find_metric(v, "pointing_rms_px");
@@ -342,7 +342,7 @@ static void put_worst(FILE *out, const bst_report_study_view *v) {
     for (int64_t r = 0; list && custody && pointing && r < v->runs; r++) {
         double held = custody->of_run[r], error = pointing->of_run[r];
         if (v->done[r] && isfinite(held)) {
-            /* custody in steps of a hundredth; within one the pointing error decides */
+            /* custody in steps of 0.01; then by pointing error */
             double worse = isfinite(error) ? error / (1.0 + error) : 1.0;
             list[n++] = (ranked){100.0 - floor(100.0 * held) + 0.999 * worse, r};
         }
@@ -387,7 +387,7 @@ static void put_worst(FILE *out, const bst_report_study_view *v) {
 
 /* ------------------------------------------------------------------ cards */
 
-/* The mean over all runs of a study with one setting, with its interval. */
+/* Writes a card with the mean over all runs of a study with one setting, and its interval. */
 static void put_mean_card(FILE *out, const bst_report_study_view *v,
                           const bst_report_study_metric_view *m) {
     bst_io_rows *rows;
@@ -411,8 +411,8 @@ static void put_mean_card(FILE *out, const bst_report_study_view *v,
     bst_io_rows_close(rows);
 }
 
-/* From the least to the greatest mean of a setting: a mean over settings would depend on the values
- * that were swept. */
+/* Writes a card with the smallest and largest mean over settings: an overall mean would depend on
+ * the swept values. */
 static void put_range_card(FILE *out, const bst_report_study_view *v,
                            const bst_report_study_metric_view *m) {
     double low = INFINITY, high = -INFINITY;

@@ -1,20 +1,21 @@
-/* Curves of a study's series: a rate over a key, such as detection over SNR, for each setting. */
+/* Report charts of a study's series: a rate against a key, such as detection against SNR, for each
+ * setting. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sim/report/report_study.h"
 
-/* Settings in a chart, and charts; points of a curve. */
+/* maximum settings per chart, and charts; points per curve */
 enum { CURVES = 6, CHARTS = 12, POINTS = 256 };
 
 typedef struct series {
-    char table[80], ideal[64];  /* ideal: column of a bound; "" for none */
-    char x[2][64], unit[2][32]; /* the key, and the magnitude that goes with it; "" for none */
+    char table[80], ideal[64];  /* ideal: column of an upper limit; "": none */
+    char x[2][64], unit[2][32]; /* key, and a corresponding magnitude; "": none */
 } series;
 
-/* Finds the series that has a rate over a key: its statistics' columns begin with setting, runs,
- * the key. */
+/* Finds the series with a rate against a key: its statistics begin with the columns setting, runs,
+ * key. */
 static bool find_series(const bst_report_study_view *v, series *out) {
     bst_ctx unheard = {0};
     bst_io_rows *rows;
@@ -80,7 +81,7 @@ static bst_status read_curve(bst_ctx *ctx, const bst_report_study_view *v, const
     return status;
 }
 
-/* "read_noise_e 3, aperture_m 0.1" */
+/* Text of a setting: "read_noise_e 3, aperture_m 0.1". */
 static void describe(const bst_report_study_view *v, int64_t setting,
                      const bst_report_study_axis_view *without,
                      const bst_report_study_axis_view *only, char text[200]) {
@@ -96,14 +97,14 @@ static void describe(const bst_report_study_view *v, int64_t setting,
     }
 }
 
-/* Settings whose curves stand in one chart. */
+/* Settings whose curves share a chart. */
 typedef struct chart_group {
     int64_t settings[CURVES];
     int count;
-    const bst_report_study_axis_view *lines; /* in whose values they differ; NULL: one curve */
+    const bst_report_study_axis_view *lines; /* the axis in which they differ; NULL: one curve */
 } chart_group;
 
-/* One chart over s->x[x]. */
+/* Draws one chart against s->x[x]. */
 static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_report_study_view *v,
                             const series *s, int x, const chart_group *g) {
     const int64_t *group = g->settings;
@@ -169,7 +170,7 @@ static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_report_study_view
     return status;
 }
 
-/* The axis whose values become lines of one chart: the fewest values, CURVES at most. */
+/* Selects the axis whose values become the lines of a chart: fewest values, at most CURVES. */
 static const bst_report_study_axis_view *choose_lines(const bst_report_study_view *v) {
     const bst_report_study_axis_view *best = NULL;
     for (int i = 0; i < v->axis_count; i++) {
@@ -183,7 +184,7 @@ static const bst_report_study_axis_view *choose_lines(const bst_report_study_vie
     return best;
 }
 
-/* Whether two settings differ in no axis but `free_axis`. */
+/* Checks whether two settings differ in no axis except `free_axis`. */
 static bool alike(const bst_report_study_view *v, int64_t a, int64_t b,
                   const bst_report_study_axis_view *free_axis) {
     for (int i = 0; i < v->axis_count; i++) {

@@ -4,7 +4,7 @@
 
 #include "sim/report/report_study.h"
 
-/* Columns that are read at most, beside a few fixed ones. */
+/* maximum number of columns, besides a few fixed ones */
 enum { MOST_COLUMNS = 400, SQL_BYTES = 40000 };
 
 static bool is_name(const char *name) {
@@ -104,7 +104,7 @@ static bst_status take_scenario(bst_ctx *ctx, bst_report_study_view *v, const bs
     return BST_OK;
 }
 
-/* Several scenarios are varied in turn: an axis of its own, whose values are numbers of names. */
+/* Adds an axis for several scenarios, whose values are indices of names. */
 static bst_status add_scenarios(bst_ctx *ctx, bst_report_study_view *v) {
     int before = v->axis_count;
     BST_TRY(add_axis(ctx, v, "scenario", "the scenarios that are varied", "list", true));
@@ -138,8 +138,8 @@ static bst_status take_metric(bst_ctx *ctx, bst_report_study_view *v, const bst_
 
 /* ------------------------------------------------------------------ values */
 
-/* Value of an axis in a row: a number, or the number of a word. More words than there is room for
- * are as the last one. */
+/* Value of an axis in a row: a number, or an index of a word. Words beyond the capacity share the
+ * last index. */
 static double axis_value(bst_report_study_axis_view *a, const bst_io_rows *rows, int column) {
     if (bst_io_rows_kind(rows, column) != BST_CELL_TEXT) {
         return bst_io_rows_real(rows, column);
@@ -189,7 +189,7 @@ static bst_status take_run(bst_ctx *ctx, bst_report_study_view *v, const bst_io_
     return BST_OK;
 }
 
-/* Rows of the table speed, which has the runs of the table runs in their order. */
+/* Reads a row of the table speed, which has the order of the table runs. */
 static bst_status take_speed(bst_ctx *ctx, bst_report_study_view *v, const bst_io_rows *rows) {
     (void)ctx;
     while (v->read < v->runs && v->run_numbers[v->read] < bst_io_rows_int(rows, 0)) {
@@ -216,8 +216,8 @@ static bst_status take_statistics(bst_ctx *ctx, bst_report_study_view *v, const 
     return BST_OK;
 }
 
-/* "SELECT fixed, "name", ... FROM table": columns of the axes (all, or the swept ones), and of the
- * metrics. */
+/* Builds a query of fixed columns, axes (all or swept) and metrics: "SELECT fixed, "name", ... FROM
+ * table". */
 static void write_query(const bst_report_study_view *v, const char *fixed, const char *table,
                         bool all, char sql[SQL_BYTES]) {
     size_t n = (size_t)snprintf(sql, SQL_BYTES, "SELECT %s", fixed);
@@ -252,7 +252,7 @@ static void find_levels(bst_report_study_axis_view *a, int64_t settings) {
         a->levels[k] = value;
         a->level_count++;
     }
-    /* even in logarithms: the middle level is nearer to the geometric mean of the ends */
+    /* even in logarithms: the middle level is closer to the geometric mean of the ends */
     int n = a->level_count;
     if (n >= 3 && n <= BST_STUDY_LEVELS && !a->is_text && a->levels[0] > 0.0 &&
         a->levels[n - 1] >= 8.0 * a->levels[0]) {
@@ -263,8 +263,8 @@ static void find_levels(bst_report_study_axis_view *a, int64_t settings) {
     }
 }
 
-/* Means over the runs of each setting; of speed, with `least`, what the quickest took, as the table
- * speed_sensitivity has it. */
+/* Computes means over the runs of each setting; with `least`, the minimum, as the table
+ * speed_sensitivity uses for speed. */
 static void average(const bst_report_study_view *v, bst_report_study_metric_view *m, bool least) {
     for (int64_t r = 0; r < v->runs;) {
         int64_t setting = v->setting_of_run[r], n = 0;
@@ -294,7 +294,7 @@ static void finish(bst_report_study_view *v) {
         bst_chart_widen(m->of_run, (size_t)v->runs, false, &low, &high);
         m->varies = high > low;
         if (v->replicates <= 1) {
-            average(v, m, false); /* settings of one run have no statistics */
+            average(v, m, false); /* settings with one run have no statistics */
         }
     }
     average(v, &v->wall, true);
@@ -409,7 +409,7 @@ const char *bst_report_study_word(const bst_report_study_axis_view *axis, double
     if (axis->is_text && value >= 0.0 && value < axis->word_count) {
         snprintf(text, 32, "%.31s", axis->words[(int)value]);
     } else if (isnan(value)) {
-        snprintf(text, 32, "-"); /* the scenario does not say it */
+        snprintf(text, 32, "-"); /* the scenario does not set it */
     } else {
         snprintf(text, 32, "%.5g", value);
     }

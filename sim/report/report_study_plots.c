@@ -7,11 +7,11 @@
 #include "sim/report/report_plots.h"
 #include "sim/report/report_study.h"
 
-/* Lines in a chart; metrics that are drawn. */
+/* lines per chart; metrics drawn */
 enum { LINES = 6, KEY_METRICS = 6 };
 
 int bst_report_study_key_metrics(const bst_report_study_view *v, int *metrics, int room) {
-    /* what a study is mostly made for; then the others in their order */
+    /* metrics of most studies come first */
     static const char *const first[] = {"acquired",        "custody",           "time_to_confirm_s",
                                         "pointing_rms_px", "track_rms_px",      "snr_pd50",
                                         "loss_db_pd50",    "detected_fraction", "false_tracks",
@@ -46,15 +46,15 @@ const char *bst_report_study_label(const bst_report_study_metric_view *m, char t
 
 /* ------------------------------------------------------------------ a metric over an axis */
 
-/* One line: a point for each level of the axis. */
+/* A line of a chart: one point per level of the axis. */
 typedef struct curve {
     double x[BST_STUDY_LEVELS], mean[BST_STUDY_LEVELS], low[BST_STUDY_LEVELS],
         high[BST_STUDY_LEVELS];
     int count;
-    bool merged; /* points are means of several settings, low and high the least and greatest */
+    bool merged; /* points are means of several settings; low and high are the extremes */
 } curve;
 
-/* `other`: axis whose value is `level`; NULL: all settings. */
+/* Computes a line. `other`: axis whose value is `level`; NULL: all settings. */
 static void make_curve(const bst_report_study_view *v, const bst_report_study_metric_view *m,
                        const bst_report_study_axis_view *axis,
                        const bst_report_study_axis_view *other, double level, curve *out) {
@@ -84,7 +84,7 @@ static void make_curve(const bst_report_study_view *v, const bst_report_study_me
     }
 }
 
-/* The axis that gets a line for each of its values: of the others the one with fewest. */
+/* Selects the axis that gets one line per value: the one with the fewest values. */
 static const bst_report_study_axis_view *choose_lines(const bst_report_study_view *v,
                                                       const bst_report_study_axis_view *axis) {
     const bst_report_study_axis_view *best = NULL;
@@ -193,7 +193,7 @@ static void put_curves(FILE *out, const bst_report_study_view *v,
     free(list);
 }
 
-/* Designs that are no grid: a dot for each setting. */
+/* Draws designs without grid: a dot per setting. */
 static void put_dots(FILE *out, const bst_report_study_view *v,
                      const bst_report_study_metric_view *m,
                      const bst_report_study_axis_view *axis) {
@@ -225,7 +225,7 @@ void bst_report_study_plot_axes(FILE *out, const bst_report_study_view *v) {
                               swept = 0;
     for (int i = 0; i < v->axis_count; i++) {
         const bst_report_study_axis_view *a = &v->axes[i];
-        /* the others are told by their effects */
+        /* these designs are shown by their effects */
         bool told = strcmp(a->design, "morris") != 0 && strcmp(a->design, "one_at_a_time") != 0;
         swept += a->swept && a->level_count > 1 && told;
     }
@@ -275,7 +275,7 @@ void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v)
         qsort(values, n, sizeof *values, bst_compare_doubles);
         double quarter = values[n / 4], upper = values[n - 1 - n / 4], spread = upper - quarter;
         double low = values[0], high = values[n - 1];
-        /* a few far ones are not to hide the rest */
+        /* outliers must not compress the chart */
         if (spread > 0.0) {
             low = fmax(low, quarter - 8.0 * spread);
             high = fmin(high, upper + 8.0 * spread);
@@ -294,7 +294,7 @@ void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v)
         char label[128], name[160], caption[400];
         snprintf(name, sizeof name, "Histogram of %s", m->name);
         bst_report_page_figure(out, BST_PAGE_THIRD);
-        /* the greatest value is to lie inside the last bin */
+        /* the largest value must be inside the last bin */
         const bst_report_histogram_of histogram = {.name = name,
                                                    .label = bst_report_study_label(m, label),
                                                    .what = "runs",
@@ -305,7 +305,7 @@ void bst_report_study_plot_histograms(FILE *out, const bst_report_study_view *v)
                                                    .bins = 30,
                                                    .colour = BST_CHART_BLUE};
         bst_report_histogram(out, &histogram);
-        /* a meaning that refers to the metric before it says nothing here */
+        /* omit a description that refers to the previous metric */
         bool refers = strncmp(m->doc, "The same", 8) == 0;
         int used = snprintf(
             caption, sizeof caption, "%s%s%s", refers ? "" : m->doc,

@@ -5,10 +5,10 @@
 #include "sim/core/text.h"
 #include "sim/report/report_plots.h"
 
-/* A run of more than EXACT frames is drawn as shares of INTERVALS intervals. */
+/* A run with more than EXACT frames is drawn as fractions of INTERVALS intervals. */
 enum { LANES = 4, ROWS = LANES + 1, STATES = 4, INTERVALS = 230, EXACT = 2 * INTERVALS };
 
-/* A lane tells which of a few states holds; state -1: none of them. */
+/* A lane shows one of a few states over time; state -1: none. */
 typedef struct lane {
     const char *name;
     int (*state)(const bst_report_frame *f);
@@ -46,7 +46,7 @@ static const lane lanes[LANES] = {
     {"attitude from stars", attitude_of, {{"attitude", BST_CHART_CYAN}}},
 };
 
-/* Upper and lower edge of a row, on the axis. */
+/* upper and lower edge of a row on the axis */
 #define ROW_TOP(row) (ROWS - (row)-0.18)
 #define ROW_BOTTOM(row) (ROWS - (row)-0.82)
 
@@ -55,7 +55,7 @@ static void put_span(const bst_report_drawing *d, const bst_chart *c, int row, d
     double width = c->inner_width * (to - from) / (c->x.high - c->x.low);
     char title[128];
     snprintf(title, sizeof title, "%s: %.6g s to %.6g s", word, from * d->unit_s, to * d->unit_s);
-    /* nobody points at what is a hair wide */
+    /* no tooltip for very narrow spans */
     bst_chart_bar(c, from, to, ROW_BOTTOM(row), ROW_TOP(row), colour, width > 3.0 ? title : NULL);
 }
 
@@ -71,8 +71,7 @@ static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
     }
 }
 
-/* Draws the states of a lane frame by frame: one span for neighbours in the same state, each frame
- * until the next one. */
+/* Draws the states of a lane frame by frame; consecutive equal states form one span. */
 static void put_frames(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row) {
     const bst_report_sensor *s = d->sensor;
     for (size_t i = 0, next; i < s->count; i = next) {
@@ -86,12 +85,12 @@ static void put_frames(const bst_report_drawing *d, const bst_chart *c, const la
     }
 }
 
-/* Frames of an interval, and of them those in each state. */
+/* Number of frames in an interval, in total and per state. */
 typedef struct interval {
     int64_t frames, in[STATES];
 } interval;
 
-/* Whether all frames of an interval are in one state, or in none: *state, -1. */
+/* Checks whether all frames of an interval have the same state: *state, -1: none. */
 static bool is_uniform(const interval *v, int *state) {
     *state = -1;
     int64_t in = 0;
@@ -102,7 +101,7 @@ static bool is_uniform(const interval *v, int *state) {
     return in == 0 || (v->frames > 0 && v->in[*state] == v->frames);
 }
 
-/* The states of an interval on top of each other, each as high as its share of the frames. */
+/* Draws the states of an interval stacked by their fractions of the frames. */
 static void put_shares(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row,
                        const interval *v, double from, double to) {
     double bottom = ROW_BOTTOM(row), height = ROW_TOP(row) - ROW_BOTTOM(row);
@@ -121,7 +120,7 @@ static void put_shares(const bst_report_drawing *d, const bst_chart *c, const la
     }
 }
 
-/* Draws a lane of many frames by intervals: no state hides a rarer one. */
+/* Draws a lane with many frames by intervals: rare states stay visible. */
 static void put_intervals(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row) {
     const bst_report_sensor *s = d->sensor;
     interval intervals[INTERVALS] = {{0}};
@@ -168,7 +167,7 @@ void bst_report_timeline(const bst_report_drawing *d) {
             modes[s->modes[i].mode] = true;
         }
     }
-    /* shown even where they never came to be */
+    /* shown even if they never occurred */
     shown[1] = s->has_truth;
     shown[2] = s->has_truth && s->has_tracks;
     shown[3] = s->has_tracks;

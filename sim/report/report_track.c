@@ -9,16 +9,16 @@ typedef struct track {
     double time_s, snr;
     bst_vec3 direction, east, north;
     double rate_east_radps, rate_north_radps;
-    double cov[3]; /* of the direction, rad^2: east-east, east-north, north-north */
-    bool fresh;    /* it got a detection of this frame */
+    double cov[3]; /* direction covariance, rad^2: east-east, east-north, north-north */
+    bool fresh;    /* updated by a detection of this frame */
 } track;
 
 typedef struct cursor {
-    bst_io_rows *rows; /* NULL: all are read, or there is no such table */
+    bst_io_rows *rows; /* NULL: all rows read, or no such table */
     bool held;
 } cursor;
 
-/* Goes to the next row of exposure `id`, past those before it. */
+/* Advances to the next row of exposure `id`. */
 static bst_status advance(bst_ctx *ctx, cursor *c, int64_t id, bool *found) {
     *found = false;
     while (c->rows) {
@@ -59,7 +59,7 @@ static track read_track(const bst_io_rows *rows) {
         .cov = {bst_io_rows_real(rows, 7), bst_io_rows_real(rows, 8), bst_io_rows_real(rows, 9)}};
 }
 
-/* The track carried to the frame's middle, against the truth. */
+/* Compares the track, propagated to mid-exposure, with the truth. */
 static void judge(const bst_report_sensor *s, bst_report_frame *f, const track *t, bool own) {
     if (!t->there || !f->known) {
         return;

@@ -42,7 +42,7 @@ static void add_end(const bst_run_reader *run, bst_report_warnings *w) {
 /* ------------------------------------------------------------------ counters */
 
 typedef struct sensor_warnings {
-    const char *name; /* NULL: of no sensor */
+    const char *name; /* NULL: not of a sensor */
     bst_report_warnings *warnings;
 } sensor_warnings;
 
@@ -103,7 +103,7 @@ static void judge_sensor(const bst_report_sensor *s, bool complete, bst_report_w
                                 s->name, s->bad_pixels, s->bad_pixels == 1 ? " is" : "s are",
                                 s->bad_pixels == 1 ? "it" : "them");
     }
-    /* with tasks there is always a next target to slew to */
+    /* with tasks there is always a next target */
     if (complete && s->task_count < 2 && acquired && f->final_mode >= 0 &&
         f->final_mode != BST_MODE_TRACK) {
         bst_report_warnings_add(w, BST_SEVERITY_WARNING,
@@ -124,7 +124,7 @@ static void add_summaries(const bst_run_reader *run, const bst_report_sensor *se
 
 /* ------------------------------------------------------------------ tables */
 
-/* Adds one warning where a query counts more than none on some sensors: "text: a/b 3, a/c 4". */
+/* Adds one warning if a query counts rows on some sensors: "text: a/b 3, a/c 4". */
 static void count_rows(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
                        const char *sql, bst_run_severity severity, const char *text,
                        bst_report_warnings *w) {
@@ -183,7 +183,7 @@ static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
         bst_run_severity severity;
         const char *text;
     } known[] = {
-        {"mode", -1, ""}, /* shown by the charts */
+        {"mode", -1, ""}, /* the charts show it */
         {"target_selected", -1, ""},
         {"track_confirmed", -1, ""},
         {"track_resumed", -1, ""},
@@ -239,7 +239,8 @@ static void hear(void *user, bst_log_level level, const char *message) {
 
 const char *bst_report_folder(const bst_run_reader *run, char text[256]) {
     snprintf(text, 256, "%s", bst_run_reader_folder(run));
-    const char *slash = strrchr(text, '/'); /* the reader's folder ends with none but in "/" */
+    const char *slash =
+        strrchr(text, '/'); /* the path of the reader ends with no slash except "/" */
     return slash && slash[1] ? slash + 1 : text;
 }
 

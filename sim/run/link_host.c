@@ -9,7 +9,7 @@
 
 enum { MOST_PORTS = 12, MOST_PENDING = 24, MOST_FRAMES = 4, RING = 16384, MOST_ITEMS = 65536 };
 
-/* A frame that came over the link. */
+/* A frame received over the link. */
 typedef struct host_frame {
     bst_frame frame;
     uint16_t *pixels;
@@ -17,7 +17,7 @@ typedef struct host_frame {
     bool busy;
 } host_frame;
 
-/* A message that is to be written in the next step. */
+/* A message that is published in the next step. */
 typedef struct pending {
     bst_link_type type;
     void *payload;
@@ -32,15 +32,15 @@ struct bst_link_host {
     bst_simulation *sim;
     bst_module_desc source;
     bst_port ports[MOST_PORTS];
-    bst_link_type types[MOST_PORTS]; /* of the source's ports */
+    bst_link_type types[MOST_PORTS]; /* of the source's output ports */
     pending pending[MOST_PENDING];
     int pending_count;
     host_frame frames[MOST_FRAMES];
-    /* what the module wrote in the latest step, sent again when that is asked for again */
+    /* outputs of the module in the latest step; repeated on request */
     bst_link_output outputs[MOST_PORTS];
     size_t output_room[MOST_PORTS];
     int output_count;
-    int64_t step; /* the latest, -1: none */
+    int64_t step; /* latest step, -1: none */
     const char *keys_file;
 };
 
@@ -89,7 +89,7 @@ static bst_status source_step(void *self, struct bst_step *step) {
             port++;
         }
         if (port == host->source.port_count) {
-            continue; /* truth, for instance: no input of this module */
+            continue; /* not an input of this module, such as the truth */
         }
         void *out = bst_step_write(step, port, NULL);
         const bst_wire_message *about = bst_wire_message_of(one->type);
@@ -97,7 +97,7 @@ static bst_status source_step(void *self, struct bst_step *step) {
             write_ring(out, one->payload);
         } else if (one->frame) {
             const bst_link_frame *f = one->payload;
-            one->frame->frame.references = 1; /* the channel's */
+            one->frame->frame.references = 1; /* owned by the channel */
             *(bst_frame_message *)out = (bst_frame_message){.frame = &one->frame->frame,
                                                             .exposure_id = f->exposure_id,
                                                             .start_tick = f->start_tick,
@@ -258,7 +258,7 @@ const char *bst_link_host_instance(const bst_link_host *host) {
 
 /* ---- playing ---- */
 
-/* Keeps an input for the step that will follow. */
+/* Stores an input for the next step. */
 static bst_status keep(bst_ctx *ctx, bst_link_host *host, const bst_link_received *got) {
     const bst_wire_message *about = bst_wire_message_of(got->header.type);
     if (host->pending_count == MOST_PENDING) {
@@ -346,7 +346,7 @@ static bst_status check_welcome(bst_ctx *ctx, const bst_link_host *host,
     return BST_OK;
 }
 
-/* The next message, with a look at `stop` ten times a second. */
+/* Receives the next message; calls `stop` ten times a second. */
 static bst_status receive(bst_ctx *ctx, bst_link_peer *peer, double timeout_s, bool (*stop)(void),
                           bst_link_received *out) {
     const double slice_s = 0.1;

@@ -1,4 +1,4 @@
-/* The link of a run. */
+/* The link of a run: opening, recording and replay. */
 #ifndef BST_RUN_RUN_LINK_H
 #define BST_RUN_RUN_LINK_H
 
@@ -12,14 +12,14 @@ bst_status bst_run_link_check(bst_ctx *ctx, const bst_load_options *load,
                               const bst_scenario *scenario,
                               bst_simulation *simulation) BST_MUST_CHECK;
 
-/* Binds the address where modules are outside, and lets the signals that end a run end its waiting.
- */
+/* Binds the address if modules are external; stop signals end its waits. */
 bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) BST_MUST_CHECK;
-/* What peers are told when the simulation is freed; NULL allowed. */
-/* Has a linked simulation answered as in the run of this folder. BST_ERR_CONFIG: it has no link. */
+/* Makes a linked simulation use the recorded answers of the run in this folder. BST_ERR_CONFIG: it
+ * has no link. */
 bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation,
                                const char *folder) BST_MUST_CHECK;
-/* Records what peers answer into a run's folder; nothing without a link, or while replaying. */
+/* Starts recording the answers of peers into a run's folder; nothing without a link or in a
+ * replay. */
 bst_status bst_run_link_record(bst_ctx *ctx, bst_simulation *simulation,
                                const char *folder) BST_MUST_CHECK;
 

@@ -9,13 +9,13 @@
 
 #include "sim/core/text.h"
 
-/* A loss of a sensor: an amount of something in some of the frames, or (noun NULL) frames alone. */
+/* A kind of loss of a sensor: an amount in some frames, or (noun NULL) frames. */
 typedef struct kind {
     const char *key, *frames_key;
     size_t amount, frames;
     bst_run_severity severity;
     const char *what, *one, *many;
-    const char *sql; /* the sum of amounts and the number of frames */
+    const char *sql; /* query of the total amount and the number of frames */
 } kind;
 
 #define AT(member) offsetof(bst_run_losses, member)
@@ -135,7 +135,7 @@ void bst_run_losses_report_counter(const char *name, int64_t count, bst_run_loss
             return;
         }
     }
-    /* of a plug-in, or of the link */
+    /* counter of a plug-in or of the link */
     snprintf(text, sizeof text, "%.200s: counted %s", name,
              bst_text_of_count(amount, count, "time", "times"));
     fn(user, BST_SEVERITY_WARNING, text);

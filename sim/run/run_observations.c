@@ -24,7 +24,7 @@ bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run, bst_run_s
     BST_TRY(bst_run_reader_file(ctx, run, "scenario.json", path, sizeof path));
     BST_TRY(bst_json_load(ctx, path, &out->json));
     BST_TRY(bst_plugins_recorded_read(ctx, out->json, &out->scenario));
-    /* directions need no stars */
+    /* directions do not need stars */
     bst_world_config config = out->scenario.world;
     config.faint_stars = BST_FAINT_NONE;
     snprintf(config.star_catalogue, sizeof config.star_catalogue, "embedded");
@@ -106,11 +106,12 @@ typedef struct gathering {
     bst_run_track track;
     bst_run_observation *items;
     int64_t capacity;
-    bst_vec3 boresight; /* of the latest item */
-    double share;       /* of the attitude's variance that frames share, latest */
+    bst_vec3 boresight; /* of the latest observation */
+    double share;       /* common fraction of the attitude variance of consecutive frames, latest */
 } gathering;
 
-/* The detection's place on the sky, and what its errors and the attitude's make of it. */
+/* Computes the measured direction of a detection and its covariance from centroid and attitude
+ * errors. */
 static void measure(const gathering *g, const bst_io_rows *rows, const bst_light *light,
                     bst_od_observation *out) {
     double x = bst_io_rows_real(rows, X_PX), y = bst_io_rows_real(rows, Y_PX);
@@ -138,7 +139,8 @@ static void measure(const gathering *g, const bst_io_rows *rows, const bst_light
         j[0][i] = bst_vec3_dot(column, axes.e1);
         j[1][i] = bst_vec3_dot(column, axes.e2);
     }
-    for (int axis = 0; axis < 2; axis++) { /* about camera x and y; all of it: see set_shared */
+    for (int axis = 0; axis < 2;
+         axis++) { /* errors about camera x and y; a first frame's are all common, see set_shared */
         double sigma = bst_io_rows_real(rows, SIGMA + axis) * BST_ARCSEC_RAD;
         out->shared_rad[0][axis] = j[0][2 + axis] * sigma;
         out->shared_rad[1][axis] = j[1][2 + axis] * sigma;
@@ -152,8 +154,9 @@ static void measure(const gathering *g, const bst_io_rows *rows, const bst_light
     }
 }
 
-/* Stars leave the field as the camera turns: of two fields that are d apart along a side s they
- * have the part 1 - d / s in common, of which the exponential has the same integral. */
+/* Decorrelation of attitude errors: stars leave the field as the camera rotates. Two fields at
+ * distance d along a side s share the fraction 1 - d / s; the exponential used has the same
+ * integral. */
 static double change_of_stars(gathering *g, const bst_io_rows *rows) {
     const bst_camera *c = g->camera;
     bst_vec3 before = g->boresight;
@@ -164,8 +167,7 @@ static double change_of_stars(gathering *g, const bst_io_rows *rows) {
     return g->track.count > 1 ? 2.0 * bst_vec3_angle(before, g->boresight) / side : 0.0;
 }
 
-/* The shared part of the attitude's errors: its share as the last frame has it, which has seen the
- * most. */
+/* Sets the common part of the attitude errors, as estimated by the last frame. */
 static void set_shared(gathering *g) {
     for (int64_t i = 0; i < g->track.count && !g->filtered; i++) {
         for (int k = 0; k < 4; k++) {

@@ -1,5 +1,5 @@
-/* The directions that a run measured, as the onboard side has them: pixels of detections, attitude
- * from stars, the camera and the observer's orbit as they are known on board. No truth. */
+/* Measured directions of a recorded run from onboard data: detections, stellar attitude, onboard
+ * camera model and observer orbit. Without truth. */
 #ifndef BST_RUN_RUN_OBSERVATIONS_H
 #define BST_RUN_RUN_OBSERVATIONS_H
 
@@ -8,7 +8,7 @@
 #include "sim/world/world.h"
 #include "tracker/orbit/orbit_fit.h"
 
-/* A run's world, made again from its own scenario.json: observers as they believe to be. */
+/* World of a recorded run, recomputed from its scenario.json. */
 typedef struct bst_run_scene {
     const bst_run_reader *run; /* borrowed */
     struct bst_json *json;
@@ -18,48 +18,49 @@ typedef struct bst_run_scene {
     int64_t tick_rate_hz;
 } bst_run_scene;
 
-/* BST_ERR_FORMAT and others when the scenario, or a file that it names, cannot be read. To be
- * closed with bst_run_scene_close, also after an error. */
+/* Creates the world of a recorded run. BST_ERR_FORMAT and others: the scenario or one of its files
+ * cannot be read. Close it with bst_run_scene_close, also after an error. */
 bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run,
                               bst_run_scene *out) BST_MUST_CHECK;
 /* Frees the world, view and scenario of a scene; the struct itself belongs to the caller. */
 void bst_run_scene_close(bst_run_scene *scene);
-/* Indices of a sensor of the run's tables in the scenario. BST_ERR_FORMAT when it is not there. */
+/* Indices in the scenario of a sensor of the run's tables. BST_ERR_FORMAT: not found. */
 bst_status bst_run_scene_find(bst_ctx *ctx, const bst_run_scene *scene,
                               const bst_run_sensor *sensor, int *observer_index,
                               int *sensor_index) BST_MUST_CHECK;
 
 typedef struct bst_run_observation {
-    bst_time time; /* mid exposure */
+    bst_time time; /* mid-exposure */
     bst_od_observation od;
-    double v_mag, snr; /* NAN: not known */
+    double v_mag, snr; /* NAN: unknown */
 } bst_run_observation;
 
-/* A track that was confirmed, or was the target of interest. */
+/* A track that was confirmed or was the target of interest. */
 typedef struct bst_run_track {
     const bst_run_sensor *sensor;
     int64_t id;
-    bool target;       /* the tracker took it for its target at some time */
-    double exposure_s; /* of its first frame; NAN: not known */
+    bool target;       /* the tracker selected it as target at some time */
+    double exposure_s; /* of its first frame; NAN: unknown */
     const bst_run_observation *items;
     int64_t count;   /* at least 1 */
-    int64_t skipped; /* frames with a detection but no attitude from stars */
+    int64_t skipped; /* frames with a detection but without stellar attitude */
 } bst_run_track;
 
 typedef bst_status (*bst_run_track_fn)(void *user, bst_ctx *ctx, const bst_run_track *track);
 
-/* Calls `take` for each track of a sensor, by rising id; only track `id` when that is not 0. Items
- * are its frames with a detection. With `filtered` false a direction is the detection's place,
- * turned by the attitude that the stars of the same frame gave, aberration by the believed velocity
- * removed; its covariance is that of centroid and attitude: errors of different frames are
- * independent. Frames without such an attitude are left out. With `filtered` the tracker's own
- * state and its covariance, whose errors are correlated. BST_ERR_FORMAT when the run did not record
- * tracks or detections. */
+/* Calls `take` for each track of a sensor, by ascending id; id not 0: only this track. Items are
+ * frames with a detection.
+ *
+ * Notes:     filtered false: direction of the detection by the stellar attitude of the
+ *            same frame, aberration removed with the onboard velocity; covariance of centroid and
+ *            attitude, independent between frames. Frames without such an attitude are skipped.
+ *            filtered true: direction and covariance of the tracker's state; errors are correlated.
+ * Errors:    BST_ERR_FORMAT: tracks or detections were not recorded */
 bst_status bst_run_observations(bst_ctx *ctx, bst_run_scene *scene, const bst_run_sensor *sensor,
                                 int64_t id, bool filtered, bst_run_track_fn take,
                                 void *user) BST_MUST_CHECK;
 
-/* "2022-06-16T22:10:00" of now, for CREATION_DATE. */
+/* Current time as "2022-06-16T22:10:00", for CREATION_DATE. */
 void bst_run_creation_date(char text[32]);
 
 #endif

@@ -17,7 +17,7 @@ bst_status bst_run_pacing_begin(bst_ctx *ctx, const bst_scenario *scenario,
     return paced && link ? bst_link_gather(ctx, link) : BST_OK;
 }
 
-/* Whether another run of the scenario has the same results. */
+/* Checks whether a repeated run of the scenario has the same results. */
 static bool repeats(const bst_scenario *scenario, bst_simulation *sim,
                     const bst_pacing_figures *f) {
     if (scenario->pacing.mode == BST_PACING_FAST || scenario->pacing.overrun == BST_OVERRUN_HOLD) {

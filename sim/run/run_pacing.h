@@ -1,4 +1,4 @@
-/* The wall clock of a run: in the manifest and on the terminal. */
+/* Pacing of a run in manifest and terminal output. */
 #ifndef BST_RUN_RUN_PACING_H
 #define BST_RUN_RUN_PACING_H
 
@@ -6,13 +6,13 @@
 
 struct cJSON;
 
-/* Before stepping: a run whose clock goes on, or that waits for nobody, begins when all peers are
- * there. */
+/* Called before stepping: a run that follows the clock, or does not await peers, begins after all
+ * peers have connected. */
 bst_status bst_run_pacing_begin(bst_ctx *ctx, const bst_scenario *scenario,
                                 bst_simulation *simulation) BST_MUST_CHECK;
-/* "pacing" of the manifest: the mode, whether results repeat, and how the clock was kept. */
+/* Adds "pacing" to the manifest: mode, repeatability and timing figures. */
 void bst_run_pacing_add(struct cJSON *root, const bst_scenario *scenario, bst_simulation *sim);
-/* Rows of the table of results; nothing in lockstep. */
+/* Prints rows of the table of results; nothing in lockstep. */
 void bst_run_pacing_print(const bst_scenario *scenario, bst_simulation *sim);
 
 #endif

@@ -9,7 +9,7 @@
 
 enum { MAX_POINTS = 4096 };
 
-/* A copied frame with what belongs to it. */
+/* A copied frame with its overlay. */
 typedef struct picture {
     uint16_t *pixels; /* NULL: none yet */
     int width, height;
@@ -33,7 +33,7 @@ struct bst_run_pictures {
     double rate_hz;
     bst_time epoch;
     int target;
-    picture first, last, pending; /* pending: newest frame whose tracks have not come */
+    picture first, last, pending; /* pending: the newest frame, whose tracks have not arrived */
     int mode;
     bst_io_pointing_point points[MAX_POINTS];
     int point_count;
@@ -94,9 +94,10 @@ static bst_status copy_frame(bst_ctx *ctx, bst_run_pictures *p, const bst_frame_
     return BST_OK;
 }
 
-/* Pixel of the picture at a place of the sensor; `first`: the window's corner. */
+/* Picture pixel of a sensor position; `first`: corner of the window. */
 static double pixel_of(const picture *pic, double place_px, int first) {
-    double middle = 0.5 * (pic->binning - 1.0); /* of a binned pixel, from its first one's centre */
+    double middle = 0.5 * (pic->binning -
+                           1.0); /* centre of a binned pixel, relative to its first sensor pixel */
     return (place_px - first - middle) / pic->binning;
 }
 
@@ -134,7 +135,7 @@ static bst_status mark_detections(bst_ctx *ctx, picture *pic, const bst_detectio
     return BST_OK;
 }
 
-/* The target's own detections first, then the brightest. */
+/* Sorts detection marks: the target's own first, then by brightness. */
 static void sort_marks(const picture *pic) {
     for (int i = 0; i < pic->mark_count; i++) {
         bst_io_mark *m = &pic->marks[i];
@@ -146,8 +147,7 @@ static void sort_marks(const picture *pic) {
     bst_io_mark_sort(pic->marks, pic->mark_count);
 }
 
-/* The newest frame has been through the whole chain: it becomes the last one, and the first if
- * there was none. */
+/* Completes the newest frame: it becomes the last one, and the first if there was none. */
 static bst_status settle_pending(bst_ctx *ctx, bst_run_pictures *p, const bst_tracks *tracks) {
     picture *pic = &p->pending;
     for (int i = 0; i < tracks->count; i++) {
@@ -178,7 +178,7 @@ static bst_status settle_pending(bst_ctx *ctx, bst_run_pictures *p, const bst_tr
     picture swap = p->last;
     p->last = *pic;
     *pic = swap;
-    pic->processed = true; /* holds an old frame until the next comes */
+    pic->processed = true; /* an earlier frame until the next one arrives */
     return BST_OK;
 }
 
@@ -214,7 +214,7 @@ void bst_run_pictures_judged(bst_run_pictures *p, const bst_loop_frame *f) {
         return;
     }
     if (p->point_count == MAX_POINTS) {
-        /* every second point goes, and from now on every second frame is kept */
+        /* the buffer is full: keep every second point, and from now on every second frame */
         for (int i = 0; i < MAX_POINTS / 2; i++) {
             p->points[i] = p->points[2 * i];
         }
@@ -230,7 +230,7 @@ void bst_run_pictures_judged(bst_run_pictures *p, const bst_loop_frame *f) {
                                                           .visible = f->visible};
 }
 
-/* Strings of a panel. */
+/* Text of a panel. */
 typedef struct panel_text {
     char time[80];
 } panel_text;
@@ -266,7 +266,7 @@ static bst_quicklook_frame panel(const bst_run_pictures *p, const picture *pic, 
 bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *p, const char *folder,
                                   const char *title, const bst_loop_figures *figures) {
     char path[4096], label[160] = "never acquired";
-    /* without image processing nothing is ever settled: the newest frame is then all there is */
+    /* without image processing no frame is completed: show the newest one */
     const picture *first = p->first.pixels ? &p->first : p->pending.pixels ? &p->pending : NULL;
     const picture *last =
         p->last.pixels && p->last.exposure_id != p->first.exposure_id ? &p->last : NULL;

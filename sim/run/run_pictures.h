@@ -1,6 +1,5 @@
-/* What a run keeps of its frames for the pictures at the end: the first and the last processed
- * frame with what was found in them, and the pointing error over time. Memory is fixed: long runs
- * keep every n-th point. */
+/* Data for the pictures of a run: first and last processed frame with overlay, and pointing error
+ * over time. Constant memory: long runs keep every n-th point. */
 #ifndef BST_RUN_RUN_PICTURES_H
 #define BST_RUN_RUN_PICTURES_H
 
@@ -21,14 +20,14 @@ bst_status bst_run_pictures_create(bst_ctx *ctx, const bst_camera *camera, int64
 /* Frees the pictures of a run; NULL is allowed. */
 void bst_run_pictures_free(bst_run_pictures *pictures);
 
-/* A message of the pictured sensor. */
+/* Takes a message of the pictured sensor. */
 bst_status bst_run_pictures_message(bst_ctx *ctx, bst_run_pictures *pictures, const char *channel,
                                     const void *payload) BST_MUST_CHECK;
-/* A judged frame. */
+/* Takes an evaluated frame for the pointing plot. */
 void bst_run_pictures_judged(bst_run_pictures *pictures, const bst_loop_frame *frame);
 
-/* Writes quicklook.png (when there was a frame) and pointing.png (when there was a target), with
- * `figures` of the run, into `folder`. What cannot be drawn is a warning. */
+/* Writes quicklook.png (if there was a frame) and pointing.png (if there was a target) with
+ * `figures` of the run into `folder`. Failures are warnings. */
 bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *pictures,
                                   const char *folder, const char *title,
                                   const bst_loop_figures *figures) BST_MUST_CHECK;

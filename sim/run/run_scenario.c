@@ -30,29 +30,29 @@
 
 enum { WATCHED_CHANNELS = 32 };
 
-/* One sensor as the run watches it. */
+/* A sensor with its evaluation and pictures. */
 typedef struct watched_sensor {
     char scope[160];
     int recorder_index;
     bst_run_watched channels[WATCHED_CHANNELS];
     int channel_count;
     bst_loop_summary *summary;
-    int target; /* of its own cue, -1: none */
+    int target; /* object of its cue, -1: none */
     bst_run_metrics *metrics;
-    bst_run_pictures *pictures; /* of the first sensor of a run that is written; else NULL */
+    bst_run_pictures *pictures; /* of the first sensor of a recorded run; else NULL */
 } watched_sensor;
 
 typedef struct run_state {
     bst_ctx *ctx;
-    bst_ctx hooks;           /* of on_message and on_event, which may be called by another thread */
-    pthread_mutex_t summing; /* over the summaries while the run goes */
+    bst_ctx hooks;           /* for on_message and on_event, which another thread may call */
+    pthread_mutex_t summing; /* protects the summaries during the run */
     const bst_scenario *scenario;
     bst_recorder *recorder;
     watched_sensor *sensors;
     int sensor_count;
-    double most_s;                /* of stepping; 0: as long as it takes */
-    bool cut;                     /* which was over */
-    bst_run_sightings *sightings; /* NULL: not asked for */
+    double most_s;                /* limit of stepping time; 0: none */
+    bool cut;                     /* the limit was reached */
+    bst_run_sightings *sightings; /* NULL: not requested */
     bool progress;
     double started, shown; /* wall seconds */
 } run_state;
@@ -60,12 +60,12 @@ typedef struct run_state {
 static watched_sensor *find_sensor(run_state *run, const char *scope) {
     watched_sensor *sensor = run->sensors;
     while (strcmp(sensor->scope, scope) != 0) {
-        sensor++; /* every scope of the engine is watched */
+        sensor++; /* every scope of the engine belongs to a sensor */
     }
     return sensor;
 }
 
-/* Spares what nobody below looks at: much of it comes at the plant's rate. */
+/* Observer `wants`: rejects messages that nothing uses; many come at the plant's rate. */
 static bool wants(void *user, const char *scope, const char *channel, const void *payload,
                   int64_t tick, bst_hook_mark *mark) {
     run_state *run = user;
@@ -195,7 +195,7 @@ static cJSON *summary_of(const watched_sensor *sensor, double real_time_factor) 
     return bst_run_summary_json(&figures, real_time_factor);
 }
 
-/* How far the WCS of frames misfits the distortion of those cameras that have any. */
+/* Adds the misfit of the WCS for distorted cameras to the manifest. */
 static void add_misfits(cJSON *root, const bst_scenario *scenario) {
     const bst_observer_config *observers = scenario->observers.items;
     cJSON *node = cJSON_CreateObject();
@@ -217,7 +217,7 @@ static void add_misfits(cJSON *root, const bst_scenario *scenario) {
     }
 }
 
-/* `why`: the message of a run that failed, else NULL. */
+/* Writes the manifest. `why`: message of a failed run, else NULL. */
 static bst_status write_manifest(const run_state *run, bst_simulation *sim, const bst_run *store,
                                  double wall, bst_status ended, const char *why) {
     const bst_scenario *scenario = run->scenario;
@@ -286,7 +286,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     return status;
 }
 
-/* A line for all that was lost and counted. */
+/* Prints losses and counters of the run. */
 static void print_losses(const run_state *run, bst_simulation *sim) {
     bst_run_losses_printer printer = {.begun = false};
     for (int i = 0; i < run->sensor_count; i++) {
@@ -412,8 +412,8 @@ static void free_run(run_state *run) {
     pthread_mutex_destroy(&run->summing);
 }
 
-/* What a run leaves behind its frames and tables, and last of all the manifest, once everything
- * else is safe. `ended`: how the run ended; of a run that failed, what can be written is. */
+/* Writes the files after frames and tables: pictures, and last the manifest. `ended`: status of the
+ * run; after a failure it writes as much as possible. */
 static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *store, double wall,
                                bst_status ended, bst_ctx *ctx) {
     char why[BST_MESSAGE_BYTES];
@@ -446,7 +446,7 @@ static double seconds_run(const run_state *run, bst_simulation *sim) {
            (double)run->scenario->tick_rate_hz;
 }
 
-/* Steps the simulation. */
+/* Steps the simulation to its end. */
 static bst_status step_through(run_state *run, bst_simulation *sim, double *wall) {
     bst_ctx *ctx = run->ctx;
     const bst_engine_hooks hooks = {run, on_message, on_event, interrupted, wants, &run->hooks};
@@ -464,7 +464,7 @@ static bst_status step_through(run_state *run, bst_simulation *sim, double *wall
     return status;
 }
 
-/* Steps the simulation, and writes nothing. */
+/* Steps the simulation without writing. */
 static bst_status step_only(run_state *run, bst_simulation *sim, const bst_run_request *request,
                             double *wall) {
     if (request->metrics) {
@@ -480,8 +480,8 @@ static bst_status step_only(run_state *run, bst_simulation *sim, const bst_run_r
     return bst_run_sightings_finish(run->ctx, run->sightings, seconds_run(run, sim));
 }
 
-/* Steps the simulation and writes what belongs into the folder; the folder is complete when this
- * returns BST_OK. An interrupted run is closed properly and keeps its .partial name. */
+/* Steps the simulation and records it. BST_OK: the folder is complete. An interrupted run is closed
+ * and keeps its .partial name. */
 static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_request *request,
                           double *wall) {
     bst_ctx *ctx = run->ctx;
@@ -506,7 +506,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     if (stepped) {
         status = step_through(run, sim, wall);
     }
-    /* closing must not hide why the run ended */
+    /* an error while closing must not replace the reason of the end */
     bst_ctx closing = *ctx;
     if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
         bst_status summed =

@@ -1,5 +1,5 @@
-/* A scenario run from its start to its end, judged against the truth, written to a folder or not.
- */
+/* Runs a scenario from start to end with evaluation against the truth, and records it into a folder
+ * if requested. */
 #ifndef BST_RUN_RUN_SCENARIO_H
 #define BST_RUN_RUN_SCENARIO_H
 
@@ -8,13 +8,13 @@
 #include "sim/eval/sightings.h"
 
 typedef struct bst_run_request {
-    const char *out; /* folder of the results; NULL: nothing is written */
-    bool overwrite;  /* replace an earlier run there */
-    bool force;      /* start although its frames need more space than is free */
-    bool progress;   /* a line on the standard error */
-    bool print;      /* the table of results on the standard output */
-    bool metrics;    /* without a folder: work out sightings, too */
-    double most_s;   /* > 0, without a folder: stepping ends after so much time */
+    const char *out; /* output folder; NULL: nothing is written */
+    bool overwrite;  /* replace an existing run */
+    bool force;      /* start even if the disk is too small for the frames */
+    bool progress;   /* progress display on standard error */
+    bool print;      /* table of results on standard output */
+    bool metrics;    /* without folder: compute sightings too */
+    double most_s;   /* > 0, without folder: limit of stepping time */
 } bst_run_request;
 
 typedef struct bst_run_sensor_figures {
@@ -24,17 +24,17 @@ typedef struct bst_run_sensor_figures {
 } bst_run_sensor_figures;
 
 typedef struct bst_run_report {
-    bst_run_sensor_figures *sensors; /* in the scenario's order; the caller frees */
+    bst_run_sensor_figures *sensors; /* in the scenario's order; freed by the caller */
     int count;
-    double wall_s;      /* of stepping */
-    double part;        /* of the scenario's duration that was stepped; below 1 after most_s */
-    bool has_sightings; /* there are objects, and the record is to have them */
-    bst_sightings_figures sightings; /* with figures asked for, or a folder */
+    double wall_s; /* of stepping */
+    double part;   /* fraction of the scenario's duration that was stepped; below 1 after most_s */
+    bool has_sightings;              /* there are objects, and sightings are enabled */
+    bst_sightings_figures sightings; /* if metrics are requested or there is a folder */
 } bst_run_report;
 
-/* Runs a simulation that was made of the scenario and was not stepped yet. BST_ERR_INTERRUPTED when
- * the user asks to stop: then the folder keeps its .partial name, as after an error. `report`:
- * NULL, or filled with BST_OK. */
+/* Runs a simulation of the scenario that has not been stepped. BST_ERR_INTERRUPTED: stop requested;
+ * the folder then keeps its .partial name, as after an error. `report`: NULL, or filled with
+ * BST_OK. */
 bst_status bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim,
                             const bst_run_request *request, bst_run_report *report) BST_MUST_CHECK;
 

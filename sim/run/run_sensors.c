@@ -34,7 +34,7 @@ bst_status bst_run_sensors(bst_ctx *ctx, const bst_run_reader *run, const char *
         snprintf(s->observer, sizeof s->observer, "%s", bst_io_rows_text(rows, 1));
         snprintf(s->name, sizeof s->name, "%s", bst_io_rows_text(rows, 2));
         snprintf(s->target, sizeof s->target, "%s", bst_io_rows_text(rows, 3));
-        /* a name from a damaged database is not to lead out of the folder */
+        /* a file name from a damaged database must stay inside the folder */
         const char *file = bst_io_rows_text(rows, 4);
         snprintf(s->file, sizeof s->file, "%s", strchr(file, '/') ? "" : file);
         size_t n = strlen(all);

@@ -262,7 +262,7 @@ void bst_run_sightings_print(const bst_run_sightings *s) {
     bst_sightings_figures f;
     (void)bst_run_sightings_figures(s, &f);
     if (f.objects < 2) {
-        return; /* of one object the sensors' rows tell */
+        return; /* for one object the rows of the sensors suffice */
     }
     printf("objects\n");
     print("in the scenario", (double)f.objects, "");

@@ -4,14 +4,14 @@
 
 #include "sim/io/run_store.h"
 
-/* Less is written without a word. */
+/* smaller runs are not reported */
 #define WORTH_SAYING_BYTES 1e8
 
-/* Bytes of all frames and planes, before the tables. */
+/* Bytes of all frames and planes, without tables. */
 static double frame_bytes(const bst_scenario *scenario) {
     const bst_observer_config *observers = scenario->observers.items;
     const bst_recorder_config *record = &scenario->record;
-    /* Rice takes noise of some DN to about half */
+    /* Rice compresses noise of a few DN to about half */
     double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
                                     : bst_recorder_compresses(record)      ? 1.0
                                                                            : 2.0;
@@ -36,7 +36,7 @@ bst_status bst_run_check_space(bst_ctx *ctx, const bst_scenario *scenario, const
     if (!(bytes > WORTH_SAYING_BYTES)) {
         return BST_OK;
     }
-    if (free_bytes < 0.0) { /* not known */
+    if (free_bytes < 0.0) { /* unknown */
         bst_log(ctx, BST_LOG_INFO, "%s: the frames will take about %.1f GB", out, bytes * 1e-9);
         return BST_OK;
     }

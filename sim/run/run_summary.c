@@ -11,8 +11,8 @@ static void add_count(cJSON *node, const char *key, int64_t count) {
     cJSON_AddNumberToObject(node, key, (double)count);
 }
 
-/* The figures of a sensor under the keys that docs/reference/summary.md defines; scripts rely on
- * the order of the first seven. */
+/* Figures of a sensor with the keys of docs/reference/summary.md. Scripts rely on the order of the
+ * first seven. */
 cJSON *bst_run_summary_json(const bst_run_sensor_figures *figures, double real_time_factor) {
     cJSON *node = cJSON_CreateObject();
     const bst_loop_figures *f = &figures->loop;

@@ -11,9 +11,8 @@ static bool is_one_of(const char *channel, const char *const *names, int count) 
     return false;
 }
 
-/* Frames at the beginning and the end that may be shown, and one in so many between, should the run
- * be interrupted. Who looks at one holds it until he comes to it: the fewer, the fewer frames there
- * must be. */
+/* Frames at the beginning and end that may be pictured, and every n-th in between in case of an
+ * interrupt. A retained frame occupies the frame pool: the number is small. */
 enum { FIRST_SHOWN = 64, LAST_SHOWN = 16, SHOWN_EVERY = 64 };
 
 void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char *channel,

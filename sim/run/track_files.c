@@ -23,7 +23,8 @@ static bst_status stream_ok(bst_ctx *ctx, FILE *stream) {
     return ferror(stream) ? bst_fail(ctx, BST_ERR_IO, "writing failed; is the disk full?") : BST_OK;
 }
 
-/* Standard deviations of right ascension (an arc on the sky) and declination, and correlation. */
+/* Standard deviations of right ascension (arc on the sky) and declination, and their
+ * correlation. */
 static void sigmas(const bst_od_observation *o, double *east, double *north, double *correlation) {
     *east = sqrt(o->cov_11);
     *north = sqrt(o->cov_22);

@@ -1,4 +1,4 @@
-/* A track's measured directions in the formats that others read. */
+/* Writes the observations of a track as TDM, JSON or CSV. */
 #ifndef BST_RUN_TRACK_FILES_H
 #define BST_RUN_TRACK_FILES_H
 
@@ -6,17 +6,17 @@
 
 #include "sim/run/run_observations.h"
 
-/* Name of the object that a track is taken for: what the sensor looks for, or TRACK-7. */
+/* Name of the track's object: the sensor's target, or TRACK-7. */
 void bst_track_object(const bst_run_track *track, char *name, size_t bytes);
 
-/* A segment of a TDM whose head is written. `ephemeris` names the OEM with the observer's states
- * (NULL: none); `what` says what the angles are. */
+/* Writes a TDM segment after the head. `ephemeris`: OEM with the observer's states (NULL: none);
+ * `what`: description of the angles. */
 bst_status bst_track_write_tdm(bst_ctx *ctx, FILE *stream, const bst_run_track *track,
                                const char *ephemeris, const char *what) BST_MUST_CHECK;
 
-/* The observations as objects of a JSON array, as the community exchanges them: obTime, ra,
- * declination (deg), raUnc, declinationUnc, mag, snrEst, expDuration, senx ... senvelz (km, km/s,
- * GCRF). `first`: nothing stands before them in the array. norad 0: not known. */
+/* Writes observations as objects of a JSON array in a common format: obTime, ra, declination (deg),
+ * raUnc, declinationUnc, mag, snrEst, expDuration, senx ... senvelz (km, km/s, GCRF). `first`:
+ * first element of the array. norad 0: unknown. */
 bst_status bst_track_write_json(bst_ctx *ctx, FILE *stream, const bst_run_track *track, int norad,
                                 bool first) BST_MUST_CHECK;
 

@@ -1,4 +1,4 @@
-/* What axes and dispersions of a study hold: pointers, values, ranges, weights. */
+/* Reads the axes and dispersions of a study file: pointers, values, ranges, weights. */
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -76,7 +76,7 @@ bst_status bst_study_check_range(bst_ctx *ctx, const bst_study *study, const cha
     return BST_OK;
 }
 
-/* Running sums of a table's weights, the last of them 1. */
+/* Reads the weights of a table and normalises their cumulative sum to 1. */
 static bst_status read_weights(bst_ctx *ctx, const bst_study *study, const cJSON *node,
                                bst_study_axis *axis) {
     const cJSON *weights;

@@ -1,4 +1,4 @@
-/* What can be said of a study before its first run. */
+/* Checks a study before its first run. */
 #include <cjson/cJSON.h>
 #include <inttypes.h>
 #include <math.h>
@@ -74,7 +74,7 @@ static bst_status check_run(bst_ctx *ctx, const bst_study *study, const bst_stud
     return status;
 }
 
-/* "value 3 of read_noise_e" */
+/* Describes a value for messages: "value 3 of read_noise_e". */
 static void say_value(const bst_study_axis *axis, const bst_study_value *value, char *out,
                       size_t bytes) {
     char number[40];
@@ -95,7 +95,7 @@ typedef struct checker {
     bst_study_value *values;
 } checker;
 
-/* With the values as they are; `axis`: which of them is tried. */
+/* Checks a run with given values; `axis`: the one that is tested. */
 static bst_status try_values(checker *c, const bst_study_place *place, int axis, bool deep) {
     char value[200];
     bst_status status = check_run(c->ctx, c->study, c->kind, place, c->values, NULL, deep);
@@ -116,7 +116,7 @@ static bst_study_value listed_value(const cJSON *item) {
     return (bst_study_value){true, number, number ? item->valuedouble : 0.0, item};
 }
 
-/* Where the values of a range end. */
+/* First and last value of a range. */
 static void ends_of(const bst_study_axis *axis, double ends[2]) {
     if (axis->axis) {
         ends[0] = axis->axis->integer ? round(axis->axis->from) : axis->axis->from;
@@ -131,7 +131,8 @@ static void ends_of(const bst_study_axis *axis, double ends[2]) {
     }
 }
 
-/* Ends of ranges and values of lists of one axis, with the others as in the first setting. */
+/* Checks the ends of ranges and the listed values of one axis, with the others as in the first
+ * setting. */
 static bst_status try_axis(checker *c, const bst_study_place *place, int a) {
     const bst_study_axis *axis = &c->study->axes[a];
     bst_study_value kept = c->values[a];
@@ -153,7 +154,7 @@ static bst_status try_axis(checker *c, const bst_study_place *place, int a) {
     return status;
 }
 
-/* What one of a population's dispersions may give an object. */
+/* Checks the extreme values of one dispersion of a population. */
 static bst_status try_probe(checker *c, const bst_study_place *place, const bst_study_axis *axis,
                             const bst_study_population_probe *probe) {
     char value[200];
@@ -186,7 +187,7 @@ static bst_status try_objects(checker *c, const bst_study_place *place,
     return status;
 }
 
-/* Least and greatest numbers of objects, and what the objects may have. */
+/* Checks the smallest and largest numbers of objects, and the objects' dispersions. */
 static bst_status try_populations(checker *c, const bst_study_place *place) {
     int count = c->study->populations.count, first = c->study->axis_count - count;
     bst_study_population_list own;
@@ -201,7 +202,7 @@ static bst_status try_populations(checker *c, const bst_study_place *place) {
             c->values[first + i] = number_value(ends[e]);
             status = try_values(c, place, first + i, false);
         }
-        if (status == BST_OK && ends[1] > 0.0) { /* with the files and references of an object */
+        if (status == BST_OK && ends[1] > 0.0) { /* including files and references of an object */
             c->values[first + i] = number_value(fmax(ends[0], 1.0));
             status = try_values(c, place, first + i, true);
         }
@@ -211,7 +212,7 @@ static bst_status try_populations(checker *c, const bst_study_place *place) {
     return status;
 }
 
-/* Axes of a list go side by side: all values of one level together. */
+/* Checks parallel axes: all values of one level together. */
 static bst_status try_list(checker *c, const bst_study_place *place, int factor) {
     const bst_study_factor *f = &c->study->factors[factor];
     int64_t levels[BST_STUDY_AXES + 1];
@@ -226,8 +227,7 @@ static bst_status try_list(checker *c, const bst_study_place *place, int factor)
     return BST_OK;
 }
 
-/* What is wrong with the first setting: its values are put in one after the other, as far as the
- * scenario is right without them. */
+/* Finds the faulty value of the first setting by inserting its values one after the other. */
 static bst_status blame(checker *c, const bst_study_place *place) {
     const bst_study *study = c->study;
     bst_study_value first[BST_STUDY_AXES];
@@ -270,7 +270,7 @@ static bst_status try_base(checker *c, const bst_study_place *place) {
     return try_populations(c, place);
 }
 
-/* Runs as they will be. */
+/* Checks the runs themselves: all, or a sample. */
 static bst_status try_runs(checker *c) {
     const bst_study *study = c->study;
     int64_t count = study->runs < RUNS_TRIED ? study->runs : RUNS_TRIED;

@@ -1,4 +1,4 @@
-/* From the index of a run to its values. */
+/* Experimental designs: the values of a run from its index. */
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <string.h>
@@ -24,7 +24,7 @@ void bst_study_levels(const bst_study *study, int64_t setting, int64_t *levels) 
     }
 }
 
-/* The value at `unit` of an axis: 0 its first, 1 its last. */
+/* Value of an axis at `unit`: 0 the first, 1 the last. */
 static bst_study_value at_unit(const bst_study_axis *axis, double unit) {
     const bst_study_axis_config *c = axis->axis;
     double value = unit <= 0.0                     ? c->from
@@ -46,7 +46,7 @@ static bst_study_value at_level(const bst_study_axis *axis, int64_t level) {
     return at_unit(axis, last > 0 ? (double)level / (double)last : 0.0);
 }
 
-/* Of a design that places points in a unit cube. `steps`: a grid of so many places, else 0. */
+/* Value at a point of the unit cube. `steps`: number of grid levels; 0: continuous. */
 static bst_study_value at_place(const bst_study_axis *axis, double unit, int steps) {
     if (!axis->values) {
         return at_unit(axis, unit);
@@ -67,7 +67,7 @@ static void factor_values(const bst_study *study, const bst_study_factor *f, int
             *value = at_level(axis, level);
         }
     }
-    /* level 0 of one at a time is the scenario as it is */
+    /* level 0 of one_at_a_time is the unchanged scenario */
     for (int a = 0; f->design == BST_SWEEP_ONE_AT_A_TIME && a < f->axis_count && level > 0; a++) {
         const bst_study_axis *axis = &study->axes[f->first_axis + a];
         if (level <= own_levels(axis)) {

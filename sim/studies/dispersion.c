@@ -1,4 +1,4 @@
-/* Draws from the distributions of a study. */
+/* Draws random values from the distributions of a study. */
 #include <cjson/cJSON.h>
 #include <math.h>
 
@@ -23,7 +23,7 @@ bst_study_value bst_study_draw(const bst_study_axis *axis, bst_rng_key key, uint
             value.number = c->from * exp(u * log(c->to / c->from));
             break;
         case BST_DISTRIBUTION_NORMAL:
-            /* 8 % of the draws pass the narrowest limit */
+            /* 8 % of the draws are within the narrowest limit */
             do {
                 z = bst_rng_normal(key, a, ++b);
             } while (fabs(z) > c->truncate_sigma);

@@ -1,4 +1,4 @@
-/* From a run's values to its documents, and the study as a document. */
+/* Makes the scenario document of a run from its values, and the JSON of the study. */
 #include <cjson/cJSON.h>
 #include <inttypes.h>
 #include <math.h>
@@ -8,7 +8,7 @@
 
 #include "sim/studies/study_internal.h"
 
-/* Block of the study that settings of a kind are in; NULL: none. */
+/* Block of the study with the settings of its kind; NULL: none. */
 static const char *block_name(const bst_study *study) {
     return study->config.kind == BST_STUDY_PD      ? "pd"
            : study->config.kind == BST_STUDY_CUBES ? "cubes"
@@ -17,7 +17,7 @@ static const char *block_name(const bst_study *study) {
 
 /* ------------------------------------------------------------------ the scenarios */
 
-/* "set" of the study, in the words of "set" of scenarios. */
+/* Applies "set" of the study, with the syntax of "set" in scenarios. */
 static bst_status apply_set(bst_ctx *ctx, const bst_study *study, bst_json *json) {
     const cJSON *set = cJSON_GetObjectItemCaseSensitive(bst_json_root(study->json), "set");
     if (set && !cJSON_IsObject(set)) {
@@ -130,8 +130,7 @@ bst_status bst_study_document_probed(bst_ctx *ctx, const bst_study *study,
 
 /* ------------------------------------------------------------------ the study */
 
-/* Makes numbers raw items whose text reads back as the same bits, which cJSON does not guarantee.
- */
+/* Replaces numbers by raw text that is recovered exactly, which cJSON does not guarantee. */
 static void make_exact(cJSON *node) {
     for (cJSON *item = node ? node->child : NULL; item;) {
         cJSON *next = item->next;
@@ -159,7 +158,7 @@ void bst_study_number_text(double value, char text[40]) {
     }
 }
 
-/* Puts what the tables do not store beside what they echo. */
+/* Adds values that the configuration tables do not store to the echoed study. */
 static void add_raw(const bst_config_desc *table, const cJSON *given, cJSON *echo) {
     int index = 0;
     for (const bst_config_desc *d = table; d->key; d++) {

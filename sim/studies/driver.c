@@ -10,12 +10,12 @@
 
 enum { NEWS = 64, POLL_MS = 100, GRACE_S = 10, SMALL_SHARD = 16, MOST_RUNS_A_SHARD = 5000 };
 
-/* Shards in a row that may fail for reasons of the place before all is given up. */
+/* Consecutive shards that may fail for reasons of the machine before the study is given up. */
 enum { FAILURES_IN_A_ROW = 6 };
 
 typedef struct flight {
     bst_study_shard_job job;
-    int64_t done, failed; /* as told */
+    int64_t done, failed; /* as reported */
     double started;
 } flight;
 
@@ -24,14 +24,14 @@ typedef struct driver {
     bst_executor *executor;
     const bst_driver_options *options;
     bst_driver_outcome *outcome;
-    uint8_t *attempts; /* [runs] that were lost */
-    uint8_t *flying;   /* [runs] */
+    uint8_t *attempts; /* [runs] lost attempts */
+    uint8_t *flying;   /* [runs] in progress */
     flight *flights;
     int64_t flight_count, flight_room, next_id;
-    int64_t cursor; /* all runs before it are done, in flight or given up */
+    int64_t cursor; /* all earlier runs are complete, in progress or given up */
     int64_t given_up;
     int failures_in_a_row;
-    double run_s; /* measured, else as given */
+    double run_s; /* duration of a run: measured, else as given */
     double started;
     int64_t done_before;
     bool stopping;
@@ -55,7 +55,7 @@ static int64_t wanted_runs(const driver *d, int attempts) {
     return (int64_t)fmax(fmin(n, MOST_RUNS_A_SHARD), 1.0);
 }
 
-/* The next runs that nobody works on; count 0: none. */
+/* The next runs that no worker executes; count 0: none. */
 static bst_study_shard_job next_job(driver *d) {
     int64_t runs = d->results->study->runs, run = d->cursor;
     while (run < runs && !is_free(d, run)) {
@@ -110,7 +110,7 @@ static bst_status start_shards(bst_ctx *ctx, driver *d) {
     return n > 0 ? d->executor->start(ctx, d->executor->self, jobs, n) : BST_OK;
 }
 
-/* Takes the rows that a shard published: all of them, or a part under a name of its own. */
+/* Loads the rows that a shard published: all, or a part under its own file name. */
 static bst_status take_rows(bst_ctx *ctx, driver *d, const bst_study_shard_job *job, int64_t done) {
     char path[4096];
     bst_ctx quiet = {0};
@@ -130,7 +130,7 @@ static bst_status take_rows(bst_ctx *ctx, driver *d, const bst_study_shard_job *
                : bst_fail(ctx, status, "%s", quiet.message);
 }
 
-/* What a shard did not do is to be done again, unless it was tried too often. */
+/* Counts a lost attempt for the missing runs of a shard; they are repeated up to the limit. */
 static void count_attempt(driver *d, const bst_study_shard_job *job, bool blame) {
     for (int64_t run = job->first; run < job->first + job->count; run++) {
         d->flying[run] = 0;
@@ -142,7 +142,7 @@ static void count_attempt(driver *d, const bst_study_shard_job *job, bool blame)
     d->cursor = job->first < d->cursor ? job->first : d->cursor;
 }
 
-/* What the runs of a job took that have rows now; without what it took to start. */
+/* Mean duration of the completed runs of a job, without start-up. */
 static double mean_wall_s(const driver *d, const bst_study_shard_job *job) {
     double sum = 0.0;
     int64_t n = 0;
@@ -176,7 +176,7 @@ static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index,
         d->run_s = d->run_s > 0.0 ? 0.5 * (d->run_s + run_s) : run_s;
         d->failures_in_a_row = 0;
     }
-    /* a shard that says that it is done and gained nothing would be begun for ever */
+    /* a shard that ended without progress would be restarted forever */
     bool idle = gained == 0 && has_missing(d, &f.job);
     const char *why = news->text[0] || news->kind == BST_SHARD_LOST || !idle
                           ? news->text
@@ -212,7 +212,7 @@ static bst_status take_news(bst_ctx *ctx, driver *d, const bst_study_shard_news 
     return BST_OK;
 }
 
-static void tell(const driver *d) {
+static void report_progress(const driver *d) {
     if (!d->options->progress) {
         return;
     }
@@ -234,15 +234,15 @@ static void tell(const driver *d) {
     d->options->progress(d->options->user, &p);
 }
 
-/* Waits for news. True while there is work. */
-static bst_status go_on(bst_ctx *ctx, driver *d, bool *more) {
+/* Waits for news of the executor. True while there is work. */
+static bst_status await_news(bst_ctx *ctx, driver *d, bool *more) {
     bst_study_shard_news news[NEWS];
     int count;
     BST_TRY(d->executor->poll(ctx, d->executor->self, POLL_MS, news, NEWS, &count));
     for (int i = 0; i < count; i++) {
         BST_TRY(take_news(ctx, d, &news[i]));
     }
-    tell(d);
+    report_progress(d);
     if (!d->stopping && d->failures_in_a_row >= FAILURES_IN_A_ROW) {
         d->stopping = true;
         d->executor->cancel(d->executor->self, false);
@@ -270,7 +270,7 @@ static bst_status drive(bst_ctx *ctx, driver *d) {
             stop_at = INFINITY;
             d->executor->cancel(d->executor->self, true);
         }
-        BST_TRY(go_on(ctx, d, &more));
+        BST_TRY(await_news(ctx, d, &more));
     }
     return interrupted ? bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted") : BST_OK;
 }

@@ -1,4 +1,5 @@
-/* What the program hands in to have runs executed: studies themselves name no subsystem. */
+/* Interface of study kinds: functions that execute runs. sim/studies itself depends on no
+ * subsystem. */
 #ifndef BST_STUDIES_KIND_H
 #define BST_STUDIES_KIND_H
 
@@ -7,11 +8,11 @@
 #include "sim/studies/study.h"
 
 typedef enum bst_study_metric_kind {
-    BST_METRIC_VALUE,  /* a number; NAN: there is none */
-    BST_METRIC_FLAG,   /* 1 or 0: over runs it is a rate */
-    BST_METRIC_KEY,    /* of a series: rows of one key belong together over the runs of a setting */
+    BST_METRIC_VALUE, /* a number; NAN: none */
+    BST_METRIC_FLAG,  /* 1 or 0; over runs it is a rate */
+    BST_METRIC_KEY, /* of a series: rows with equal keys are combined over the runs of a setting */
     BST_METRIC_TRIALS, /* of a series: summed over runs */
-    BST_METRIC_HITS,   /* of a series: of the trials before it; together a rate */
+    BST_METRIC_HITS,   /* of a series: successes among the previous trials; together a rate */
 } bst_study_metric_kind;
 
 typedef struct bst_study_metric {
@@ -19,78 +20,78 @@ typedef struct bst_study_metric {
     int kind; /* bst_study_metric_kind */
 } bst_study_metric;
 
-/* At most; each kind asserts that its own fit. */
+/* maximum; each kind asserts its own numbers */
 enum { BST_STUDY_METRICS = 48, BST_SERIES_COLUMNS = 40 };
 
 struct bst_results;
 
-/* One run, ready to be executed. */
+/* A run ready for execution. */
 typedef struct bst_study_run {
     const bst_study *study;
     bst_study_place place;
     bst_json *scenario;
-    const struct cJSON *settings; /* of the kind */
-    const char *folder;           /* where it may leave files: "STUDY/runs/000017"; NULL: nowhere */
+    const struct cJSON *settings; /* settings of the kind */
+    const char *folder;           /* folder for files of the run: "STUDY/runs/000017"; NULL: none */
     const char *out;              /* the study's folder */
-    double most_s; /* > 0: only to learn how long it takes; it may end after so much time */
+    double most_s;                /* > 0: trial run, which may end after this time */
 } bst_study_run;
 
-/* What it gave. */
+/* Result of a run. */
 typedef struct bst_study_result {
     double metrics[BST_STUDY_METRICS];
-    double *series; /* [rows][series_count of the kind]; freed by who called run */
+    double *series; /* [rows][series_count of the kind]; freed by the caller of run */
     int rows;
-    double cpu_s;  /* processor time of the run on all threads; filled in by the caller of run */
-    double left_s; /* of a run that ended after most_s: what the rest of it would take */
+    double cpu_s;  /* processor time of the run on all threads; set by the caller of run */
+    double left_s; /* of a run ended by most_s: estimated remaining time */
 } bst_study_result;
 
-/* Where a worker is to work. */
+/* Resources of a worker. */
 typedef struct bst_study_worker_place {
-    int threads;        /* cores that are its own */
-    const char *device; /* OpenCL device, as bst_device_open takes it; "": the default. Lent for the
+    int threads;        /* number of its own cores */
+    const char *device; /* OpenCL device, as for bst_device_open; "": default. Valid for the
                            worker's life */
 } bst_study_worker_place;
 
 typedef struct bst_study_kind {
-    const char *name; /* as in the study file */
+    const char *name; /* name in the study file */
     const bst_study_metric *metrics;
     int metric_count;
-    const char *series_name; /* "curve"; NULL: none */
+    const char *series_name; /* such as "curve"; NULL: none */
     const bst_study_metric *series;
     int series_count;
     void *user;
-    /* Whether a run's documents are right, as far as that can be said without starting it. `deep`:
-     * also open the files that they name. */
+    /* Checks the documents of a run without starting it. `deep`: also opens the files that they
+     * name. */
     bst_status (*check)(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep);
-    /* What a worker keeps from run to run. */
+    /* Creates the state that a worker keeps between runs. */
     bst_status (*open)(bst_ctx *ctx, void *user, const bst_study_worker_place *place,
                        void **worker);
     void (*close)(void *worker);
-    /* Executes a run. BST_ERR_INTERRUPTED: it was asked to stop. BST_ERR_IO, BST_ERR_MEMORY and
-     * BST_ERR_DEVICE say that it could not be executed here and now; all other errors are the run's
-     * own, which it would have anywhere. */
+    /* Executes a run. BST_ERR_INTERRUPTED: stop requested. BST_ERR_IO, BST_ERR_MEMORY and
+     * BST_ERR_DEVICE: it could not be executed on this machine; other errors are results of the
+     * run. */
     bst_status (*run)(bst_ctx *ctx, void *worker, const bst_study_run *run, bst_study_result *out);
-    /* Writes the scenario with every default to `scenario` and the command that executes it by hand
-     * to `command`. */
+    /* Writes the scenario with all defaults to `scenario`, and the command to execute it to
+     * `command`. */
     bst_status (*emit)(bst_ctx *ctx, void *user, const bst_study_run *run, FILE *scenario,
                        FILE *command);
-    /* Whether what a run left in the study's folder is still there as its row (metrics) says. NULL:
-     * runs leave nothing that matters. */
+    /* Checks that the files of a run in the study's folder agree with its row (metrics). NULL: runs
+     * leave no files. */
     bool (*intact)(void *user, const bst_study_run *run, const double *metrics);
-    /* After the last run, before the tables are put in their place: what belongs beside them. NULL:
-     * nothing. */
+    /* Called after the last run, before the tables are published: writes additional files. NULL:
+     * none. */
     bst_status (*finish)(bst_ctx *ctx, void *user, const struct bst_results *results,
                          const char *out);
-    /* Whether the user asked to stop. */
+    /* True if the user requested a stop. */
     bool (*stop_requested)(void *user);
 } bst_study_kind;
 
-/* Index of a metric, -1 when there is none of that name. */
+/* Index of a metric by name; -1: none. */
 int bst_kind_metric(const bst_study_kind *kind, const char *name);
 
-/* Checks the study before anything runs: names of metrics; every value at the ends of ranges and of
- * lists, each by itself; the runs as they are, all or a thousand of them. `kind` is that of the
- * study. The message begins with what is varied. */
+/* Checks a study before anything runs: names of metrics, each value at the ends of ranges and in
+ * lists, and the runs themselves (all, or a thousand). `kind`: that of the study. The message
+ * begins with the varied parameter. */
 bst_status bst_study_check(bst_ctx *ctx, const bst_study *study,
                            const bst_study_kind *kind) BST_MUST_CHECK;
 

@@ -19,7 +19,7 @@ enum { MOST_WORKERS = 1024 };
 
 typedef struct pool_worker {
     pid_t pid;    /* 0: not started */
-    int to, from; /* our ends of its pipes */
+    int to, from; /* pipe ends of the pool */
     bool busy;
     bst_study_shard_job job;
 } pool_worker;
@@ -54,7 +54,7 @@ static bool send_bytes(int fd, const void *data, size_t bytes) {
     return true;
 }
 
-/* Not for every run of many short ones. A driver that is gone is nobody to work for. */
+/* Reports progress, limited in rate. A worker whose driver has gone stops. */
 static void report(void *user, const bst_study_shard_news *news) {
     reporter *r = user;
     double now = bst_wall_seconds();
@@ -66,7 +66,7 @@ static void report(void *user, const bst_study_shard_news *news) {
     }
 }
 
-/* False at the end of the pipe, and when a signal asks to stop. */
+/* False at the end of the pipe, and when a signal requests a stop. */
 static bool receive(int fd, void *data, size_t bytes) {
     char *at = data;
     while (bytes > 0) {
@@ -94,7 +94,7 @@ static void work(const pool *p, int index, int in, int out) {
     while (!o->kind->stop_requested(o->kind->user) && receive(in, &job, sizeof job)) {
         bst_study_shard_news news;
         bst_status status = bst_shard_execute(&ctx, &worker, &job, report, &to, &news);
-        (void)status; /* told in the news */
+        (void)status; /* reported in the news */
         if (!send_bytes(out, &news, sizeof news)) {
             break;
         }
@@ -142,7 +142,7 @@ static bst_status fork_worker(bst_ctx *ctx, pool *p, int index) {
         return bst_fail(ctx, BST_ERR_IO, "a worker cannot be started: %s", strerror(error));
     }
     if (pid == 0) {
-        /* Ctrl-C is the driver's to hear; without it there is nobody to work for */
+        /* Ctrl-C goes to the driver only */
         setpgid(0, 0);
         prctl(PR_SET_PDEATHSIG, SIGTERM);
         if (getppid() != driver) {
@@ -186,7 +186,7 @@ static bst_status start_one(bst_ctx *ctx, pool *p, const bst_study_shard_job *jo
         }
         w->busy = true;
         w->job = *job;
-        /* a worker that died meanwhile is noticed by the next poll */
+        /* the next poll notices a worker that has died */
         if (!send_bytes(w->to, job, sizeof *job) && errno != EPIPE) {
             return bst_fail(ctx, BST_ERR_IO, "a worker cannot be told: %s", strerror(errno));
         }
@@ -202,8 +202,8 @@ static bst_status start(bst_ctx *ctx, void *self, const bst_study_shard_job *job
     return BST_OK;
 }
 
-/* A worker whose pipe ended; true when it had a job. */
-static bool bury(pool_worker *w, bst_study_shard_news *news) {
+/* Handles a worker whose pipe has ended; true if it had a job. */
+static bool reap_worker(pool_worker *w, bst_study_shard_news *news) {
     int ended = 0;
     bool busy = w->busy;
     close_ends(w);
@@ -241,7 +241,7 @@ static bst_status poll_workers(bst_ctx *ctx, void *self, int timeout_ms, bst_stu
             w->busy = w->busy && news[*count].kind == BST_SHARD_AT_WORK;
             (*count)++;
         } else {
-            *count += bury(w, &news[*count]);
+            *count += reap_worker(w, &news[*count]);
         }
     }
     return BST_OK;

@@ -1,4 +1,4 @@
-/* The executor of one machine: worker processes, each on cores of its own. */
+/* Local executor of a study: worker processes, each bound to its own cores. */
 #ifndef BST_STUDIES_LOCAL_POOL_H
 #define BST_STUDIES_LOCAL_POOL_H
 
@@ -9,33 +9,31 @@ typedef struct bst_local_pool_options {
     const bst_study *study;
     const bst_study_kind *kind;
     const char *out;
-    int workers;   /* as bst_local_workers has it */
-    int lock_fd;   /* closed by workers, -1: none */
-    int cores;     /* of each worker, 0: all, in equal parts */
-    bool unpinned; /* leave the choice of cores to the system */
-    /* OpenCL devices, which the workers take in turn; NULL: the default one for all */
+    int workers;   /* as returned by bst_local_workers */
+    int lock_fd;   /* closed in workers; -1: none */
+    int cores;     /* per worker; 0: all cores in equal parts */
+    bool unpinned; /* do not bind workers to cores */
+    /* OpenCL devices, used in rotation; NULL: the default for all */
     const char *const *devices;
     int device_count;
 } bst_local_pool_options;
 
-/* Cores that this process may run on. */
+/* Number of cores that this process may use. */
 int bst_local_cores(void);
 
-/* How many workers there are where so many are asked for, 0: one for each device, or without
- * devices for each core that this process may run on. */
+/* Number of workers: as requested; 0: one per device, or without devices one per available core. */
 int bst_local_workers(int asked, int devices);
 
-/* Workers are started when they get their first shard: forks of this process, so that no OpenCL
- * device may have been opened in it. Before anything else each is bound to its own cores, limits
- * PoCL to as many threads (POCL_MAX_PTHREAD_COUNT, and POCL_AFFINITY unset: that binds the threads
- * of every process from core 0), and takes a cache of kernels that no other worker uses
- * (POCL_CACHE_DIR, in the user's cache folder, so that the next study finds it warm). What is given
- * is to live as long as the executor. */
+/* Creates the executor; workers are forked with their first shard. No OpenCL device may be open in
+ * this process. Each worker first binds to its cores, limits PoCL to as many threads
+ * (POCL_MAX_PTHREAD_COUNT; POCL_AFFINITY unset, because it binds all processes from core 0), and
+ * takes a kernel cache of its own (POCL_CACHE_DIR, in the user's cache folder, reused by the next
+ * study). The arguments must outlive the executor. */
 bst_status bst_local_pool_open(bst_ctx *ctx, const bst_local_pool_options *options,
                                bst_executor *out) BST_MUST_CHECK;
 
-/* Settles this process as such a worker: number `index` of `workers`, with so many cores (0: its
- * part of all). Returns its cores. */
+/* Sets up this process as worker `index` of `workers` with a number of cores (0: equal parts).
+ * Returns its cores. */
 int bst_local_settle(int index, int workers, int cores, bool unpinned);
 
 #endif

@@ -1,4 +1,4 @@
-/* What a worker does before it opens a device: cores, threads, cache of kernels. */
+/* Set-up of a worker before it opens a device: cores, threads, kernel cache. */
 #define _GNU_SOURCE /* sched_setaffinity */
 #include <fcntl.h>
 #include <sched.h>
@@ -18,8 +18,8 @@ int bst_local_cores(void) {
     return sched_getaffinity(0, sizeof set, &set) == 0 && CPU_COUNT(&set) > 0 ? CPU_COUNT(&set) : 1;
 }
 
-/* The index-th of `workers` parts of the cores, equal ones or of `wanted` each; one core when there
- * are fewer. */
+/* Binds to the index-th of `workers` parts of the cores: equal parts, or `wanted` cores each; one
+ * core if there are too few. */
 static int bind_to_cores(int index, int workers, int wanted, bool unpinned) {
     cpu_set_t all, own;
     if (sched_getaffinity(0, sizeof all, &all) != 0) {
@@ -44,7 +44,7 @@ static int bind_to_cores(int index, int workers, int wanted, bool unpinned) {
     return each;
 }
 
-/* Cores that Slurm grants a task, which it need not be bound to; 0: this is no such task. */
+/* Number of cores that Slurm grants a task, which need not be bound to them; 0: no Slurm task. */
 static int granted_cores(void) {
     const char *text = getenv("SLURM_CPUS_PER_TASK");
     char *end = NULL;
@@ -62,8 +62,8 @@ static bool cache_root(char *out, size_t bytes) {
     return n > 0 && (size_t)n < bytes;
 }
 
-/* The first cache that no living process uses; it stays locked until this one ends. Without one
- * PoCL's own is used: that is slower to start, and safe once it is warm. */
+/* Takes the first kernel cache that no running process uses and locks it until exit. Without one
+ * PoCL's default is used. */
 static void take_cache(void) {
     char root[2048], path[2200], lock[2300];
     if (!cache_root(root, sizeof root)) {
@@ -73,7 +73,7 @@ static void take_cache(void) {
         snprintf(path, sizeof path, "%s/worker-%d", root, i);
         snprintf(lock, sizeof lock, "%s/lock", path);
         bst_ctx quiet = {0};
-        /* PoCL loads what is in there */
+        /* PoCL loads code from this folder */
         if (bst_folder_make_private(&quiet, path) != BST_OK) {
             return;
         }

@@ -1,4 +1,4 @@
-/* Designs that place points in the unit cube of their axes. */
+/* Space-filling designs: points in the unit cube of a study's axes. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,7 +6,7 @@
 #include "boresight/rng.h"
 #include "sim/studies/study_internal.h"
 
-/* All designs of a study together, 128 MiB. */
+/* limit of all designs of a study: 128 MiB */
 static const double MOST_PLACED = 16777216.0;
 
 typedef struct ranked {
@@ -20,7 +20,7 @@ static int compare(const void *a, const void *b) {
                             : (x->index > y->index) - (x->index < y->index);
 }
 
-/* A random order of 0 .. n - 1: by uniform keys. */
+/* Random permutation of 0 .. n - 1, by sorting uniform keys. */
 static void shuffle(bst_rng_key key, uint64_t a, int64_t n, ranked *out) {
     for (int64_t i = 0; i < n; i++) {
         out[i] = (ranked){bst_rng_uniform(key, a, (uint64_t)i), i};
@@ -28,7 +28,7 @@ static void shuffle(bst_rng_key key, uint64_t a, int64_t n, ranked *out) {
     qsort(out, (size_t)n, sizeof *out, compare);
 }
 
-/* McKay, Beckman and Conover 1979, Technometrics 21, 239. */
+/* Latin hypercube: McKay, Beckman and Conover 1979, Technometrics 21, 239. */
 static void latin_hypercube(bst_rng_key order, bst_rng_key within, int axes, int64_t points,
                             ranked *scratch, double *unit) {
     for (int a = 0; a < axes; a++) {
@@ -40,13 +40,13 @@ static void latin_hypercube(bst_rng_key order, bst_rng_key within, int axes, int
     }
 }
 
-/* One path of Morris 1991, Technometrics 33, 161: a random place on the lower part of the grid of
- * `levels` places an axis, from which the axes go by delta = levels / (2 (levels - 1)) one after
- * the other in random order, each up or down. */
+/* One path of a Morris design (1991, Technometrics 33, 161): from a random point on the lower part
+ * of the grid of `levels` levels, each axis moves once by delta = levels / (2 (levels - 1)), in
+ * random order, up or down. */
 static void morris_path(bst_rng_key key, uint64_t path, int axes, int levels, ranked *scratch,
                         double *unit) {
     double delta = levels / (2.0 * (levels - 1.0));
-    int lower = levels / 2; /* places from which delta leads to another */
+    int lower = levels / 2; /* levels from which delta leads to another level */
     for (int a = 0; a < axes; a++) {
         bst_philox_words w = bst_rng_words(key, path, (uint64_t)a);
         double base = (double)(w.w[0] % (uint32_t)lower) / (levels - 1.0);
@@ -61,11 +61,11 @@ static void morris_path(bst_rng_key key, uint64_t path, int axes, int levels, ra
         double *point = unit + s * axes;
         memcpy(point, point - axes, (size_t)axes * sizeof *point);
         double *moved = &point[scratch[s - 1].index];
-        *moved += *moved > delta - 1e-9 ? -delta : delta; /* which is above all places below */
+        *moved += *moved > delta - 1e-9 ? -delta : delta; /* larger than all lower levels */
     }
 }
 
-/* Whether a design of so many points has room beside those placed before. */
+/* Checks that a design fits in memory with the earlier ones. */
 static bst_status check_size(bst_ctx *ctx, const bst_study *study, const bst_study_factor *factor) {
     double here = (double)factor->levels * factor->axis_count, placed = here;
     for (int f = 0; f < study->factor_count; f++) {

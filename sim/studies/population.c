@@ -1,4 +1,4 @@
-/* Objects whose number, orbits and brightnesses are drawn for each run. */
+/* Populations of a study: objects whose number, orbits and brightness are drawn for each run. */
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,10 +11,10 @@
 #include "sim/core/text.h"
 #include "sim/studies/study_internal.h"
 
-/* Draws of one object come from counters of their own: some may be made again. */
+/* separate counter range per object, for redraws */
 #define OBJECT_COUNTER(k) ((uint64_t)(k) << 16)
 enum { MOST_ATTEMPTS = 1 << 16 };
-/* Of the objects of a population: as of a document. */
+/* limit of the values in a population's objects */
 static const double MOST_VALUES = 8e6;
 
 /* ------------------------------------------------------------------ reading */
@@ -140,7 +140,8 @@ void bst_study_populations_free(bst_study_population_list *list) {
     *list = (bst_study_population_list){0};
 }
 
-/* The satellites of a population's file; a relative path starts from the folder of `study_file`. */
+/* Reads the satellites of a population's file; a relative path starts at the folder of
+ * `study_file`. */
 static bst_status read_file(bst_ctx *ctx, const bst_study *study, const char *study_file,
                             const bst_study_population *p, bst_study_population_file *out) {
     const char *given = p->config.elements_file, *slash = strrchr(study_file, '/');
@@ -244,11 +245,11 @@ bst_status bst_study_populations_of(bst_ctx *ctx, const bst_study *study,
     return status;
 }
 
-/* Inversion: Devroye 1986, Non-Uniform Random Variate Generation, X.3.1. */
+/* Poisson quantile by inversion: Devroye 1986, Non-Uniform Random Variate Generation, X.3.1. */
 static int64_t poisson(double mean, double u) {
     double term = exp(-mean), sum = term, reach = mean + 40.0 * sqrt(mean) + 100.0;
     int64_t k = 0;
-    while (u >= sum && (double)k < reach) { /* rounding may keep the sum from u */
+    while (u >= sum && (double)k < reach) { /* rounding may keep the sum below u */
         term *= mean / (double)++k;
         sum += term;
     }
@@ -268,7 +269,7 @@ static int64_t draw_number(const bst_study *study, const bst_study_population *p
         return n->from + (int64_t)fmin(floor(u * span), span - 1.0);
     }
     int64_t k = poisson(n->mean, u);
-    for (uint64_t b = 1; k > n->most; b++) { /* no less than half of the draws are within it */
+    for (uint64_t b = 1; k > n->most; b++) { /* at least half of the draws are within the limit */
         k = poisson(n->mean, bst_rng_uniform(key, counter, b));
     }
     return k;
@@ -282,7 +283,7 @@ void bst_study_population_numbers(const bst_study *study, uint64_t counter,
     int first = study->axis_count - study->populations.count;
     bool read = bst_study_populations_of(&quiet, study, values, &own, &list) == BST_OK;
     for (int i = 0; i < study->populations.count; i++) {
-        /* what cannot be read is the document's to say */
+        /* the document reports an unreadable value */
         values[first + i] =
             read ? (bst_study_value){true, true,
                                      (double)draw_number(study, &list->items[i], counter), NULL}
@@ -312,7 +313,7 @@ static int number_of(const cJSON *orbit) {
     return number;
 }
 
-/* Marks the satellite of an object or observer; *left: how many are not marked. */
+/* Marks the satellite of an object or observer as used; *left: number of unused satellites. */
 static void mark(const cJSON *owner, const bst_study_population_file *file, bool *taken,
                  int *left) {
     int number = number_of(cJSON_GetObjectItemCaseSensitive(owner, "orbit"));
@@ -324,8 +325,8 @@ static void mark(const cJSON *owner, const bst_study_population_file *file, bool
     }
 }
 
-/* Which satellites of the file the scenario has already, the observers among them; the caller
- * frees it. */
+/* Marks the satellites of the file that the scenario already has, including observers; the caller
+ * frees the list. */
 static bool *mark_all(const bst_json *json, const bst_study_population_file *file, int *left) {
     bool *taken = calloc((size_t)file->count + 1, sizeof *taken);
     const cJSON *lists[] = {bst_study_at(bst_json_root(json), "/world/objects"),
@@ -352,7 +353,7 @@ static int draw_satellite(const bst_study *study, const bst_study_population *p,
             break;
         }
     }
-    while (taken[i]) { /* all but a few of a great file are gone */
+    while (taken[i]) { /* almost all satellites of a large file are used */
         i = (i + 1) % file->count;
     }
     taken[i] = true;
@@ -369,7 +370,7 @@ static cJSON *satellite_orbit(const bst_study_population_file *file, int norad) 
 
 /* ------------------------------------------------------------------ objects of a run */
 
-/* What one of a population's dispersions gives object k. */
+/* Value of one dispersion of a population for object k. */
 static bst_study_value draw_of(const bst_study *study, const bst_study_population *p,
                                int dispersion, uint64_t counter, int k) {
     const bst_study_axis *axis = &p->axes[dispersion];
@@ -399,7 +400,7 @@ static bst_status disperse(bst_ctx *ctx, const bst_study *study, const bst_study
     return BST_OK;
 }
 
-/* The list that objects are added to; it is made where the scenario has none. */
+/* Finds the list of objects in a scenario; creates it if necessary. */
 static bst_status find_objects(bst_ctx *ctx, const bst_study *study, const bst_study_population *p,
                                bst_json *json, cJSON **out) {
     const cJSON *found = bst_study_at(bst_json_root(json), "/world/objects");
@@ -407,7 +408,7 @@ static bst_status find_objects(bst_ctx *ctx, const bst_study *study, const bst_s
         BST_TRY(bst_json_assign(ctx, json, "/world/objects", cJSON_CreateArray()));
         found = bst_study_at(bst_json_root(json), "/world/objects");
     }
-    *out = (cJSON *)found; /* of a document that is the caller's to change */
+    *out = (cJSON *)found; /* the caller may change the document */
     return cJSON_IsArray(found)
                ? BST_OK
                : bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: /world/objects of %s is no list",
@@ -428,12 +429,12 @@ static bst_status add_object(bst_ctx *ctx, const bst_study_population *p, const 
     return BST_OK;
 }
 
-/* A population of a run, and how many of it there are. */
+/* A population of a run and its number of objects. */
 typedef struct wanted {
     const bst_study_population *population;
     const bst_study_population_file *file;
     int number;
-    uint64_t counter;                        /* of the random numbers: the run's number */
+    uint64_t counter;                        /* counter of the random numbers: the run number */
     const bst_study_population_probe *probe; /* NULL: none */
 } wanted;
 
@@ -468,7 +469,7 @@ static bst_status add_population(bst_ctx *ctx, const bst_study *study, const wan
         for (int d = 0; d < p->config.dispersions.count && status == BST_OK; d++) {
             bool probed = probe && k == 0;
             if (probed && d != probe->dispersion) {
-                continue; /* so that the probe alone is to blame */
+                continue; /* only the probe shall cause errors */
             }
             bst_study_value drawn = probed ? probe->value : draw_of(study, p, d, counter, k);
             status = disperse(ctx, study, p, &drawn, d, first + k, json);

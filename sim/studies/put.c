@@ -1,4 +1,4 @@
-/* Values of a run at the JSON pointers that they belong to. */
+/* Inserts the values of a run at their JSON pointers in the scenario. */
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdio.h>
@@ -34,7 +34,7 @@ const cJSON *bst_study_at(const cJSON *node, const char *pointer) {
     return node;
 }
 
-/* The number that is at a pointer now. */
+/* Reads the present number at a pointer. */
 static bst_status present_number(bst_ctx *ctx, const bst_study *study, const bst_study_axis *axis,
                                  const bst_json *json, const char *pointer, double *out) {
     const cJSON *node = bst_study_at(bst_json_root(json), pointer);

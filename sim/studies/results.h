@@ -1,4 +1,4 @@
-/* Results of runs: rows in memory, and the files of shards that carry them. */
+/* Results of a study: rows in memory, and shard files that contain them. */
 #ifndef BST_STUDIES_RESULTS_H
 #define BST_STUDIES_RESULTS_H
 
@@ -6,16 +6,16 @@
 
 typedef enum bst_row_state { BST_ROW_MISSING, BST_ROW_DONE, BST_ROW_FAILED } bst_row_state;
 
-/* Why a run failed. */
+/* Error of a failed run. */
 typedef struct bst_study_row_error {
     int64_t run;
     char *text;
 } bst_study_row_error;
 
-/* Rows of a series of one run. */
+/* Series rows of one run. */
 typedef struct bst_study_series_part {
     int64_t run;
-    size_t first; /* row */
+    size_t first; /* index of the first row */
     int rows;
 } bst_study_series_part;
 
@@ -32,12 +32,12 @@ typedef struct bst_results {
     int64_t part_count, part_room;
     double *series; /* [series_rows][series_count] */
     size_t series_rows, series_room;
-    int64_t done, failed; /* runs of these states */
-    int64_t doubled;      /* rows that were there already */
-    int64_t differing;    /* of them: other than what was there */
+    int64_t done, failed; /* number of runs in these states */
+    int64_t doubled;      /* rows loaded more than once */
+    int64_t differing;    /* of these, rows that differ from the first */
 } bst_results;
 
-/* Forgets the row of a run: it is to be made again. */
+/* Removes the row of a run, which is then repeated. */
 void bst_results_forget(bst_results *results, int64_t run);
 
 /* Allocates empty results for all runs of a study.
@@ -50,14 +50,14 @@ bst_status bst_results_create(bst_ctx *ctx, const bst_study *study, const bst_st
 /* Frees the memory of the results and clears the struct, which belongs to the caller. */
 void bst_results_free(bst_results *results);
 
-/* Why a run failed; NULL when it did not. */
+/* Error text of a failed run; NULL: not failed. */
 const char *bst_results_error(const bst_results *results, int64_t run);
-/* Sorts errors and series by run, once all is loaded. */
+/* Sorts errors and series by run, after all files are loaded. */
 void bst_results_sort(bst_results *results);
 
 /* ------------------------------------------------------------------ files of shards */
 
-/* A shard's rows on their way to its file. */
+/* Rows of a shard, before they are written. */
 typedef struct bst_study_shard_draft {
     FILE *stream;
     char *text;
@@ -72,29 +72,28 @@ typedef struct bst_study_shard_draft {
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_study_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                                  int64_t first, bst_study_shard_draft *out) BST_MUST_CHECK;
-/* The next run's row. `error`: NULL when it did what it should. */
+/* Adds the row of the next run. `error`: NULL if it succeeded. */
 void bst_study_shard_add(bst_study_shard_draft *draft, const bst_study_result *result,
                          double wall_s, const char *error);
-/* Publishes the rows as OUT/shards/FIRST-LAST.rows: whole, on the disk, and only if no such file is
- * there yet (then what is there stands). Without rows: nothing. Frees the draft in every case. */
+/* Publishes the rows as OUT/shards/FIRST-LAST.rows: atomically, flushed, and only if no such file
+ * exists. Without rows it does nothing. Frees the draft, also after an error. */
 bst_status bst_study_shard_publish(bst_ctx *ctx, bst_study_shard_draft *draft,
                                    const char *out) BST_MUST_CHECK;
 /* Frees a draft without writing it, and clears it. */
 void bst_study_shard_drop(bst_study_shard_draft *draft);
 
-/* Path of the file of runs first .. first + count - 1. */
+/* Path of the shard file of runs first .. first + count - 1. */
 bst_status bst_study_shard_path(bst_ctx *ctx, const char *out, int64_t first, int64_t count,
                                 char *path, size_t bytes) BST_MUST_CHECK;
-/* Takes the rows of a file. Rows that are there already stay as they are. BST_ERR_NOT_FOUND: there
- * is no such file; BST_ERR_FORMAT: it is damaged, or its rows are not those of the runs of its
- * name; BST_ERR_STATE: it is another study's. */
+/* Loads the rows of a shard file; existing rows are kept. BST_ERR_NOT_FOUND; BST_ERR_FORMAT:
+ * damaged, or rows of other runs; BST_ERR_STATE: of another study. */
 bst_status bst_results_load(bst_ctx *ctx, bst_results *results, const char *path) BST_MUST_CHECK;
-/* Takes all files of OUT/shards that have runs of first .. first + count - 1. `clean`: removes what
- * dead workers left, and puts aside (bst_results_reject) damaged files and what is no file. */
+/* Loads all files of OUT/shards with runs of first .. first + count - 1. `clean`: removes drafts of
+ * dead workers, and renames damaged files (bst_results_reject). */
 bst_status bst_results_load_folder(bst_ctx *ctx, bst_results *results, const char *out,
                                    int64_t first, int64_t count, bool clean) BST_MUST_CHECK;
-/* Puts a shard's file aside as PATH.rejected, so that its runs can be made again under its name,
- * and logs a warning that begins with `why`. */
+/* Renames a shard file to PATH.rejected, so that its runs can be repeated, and logs a warning that
+ * begins with `why`. */
 void bst_results_reject(bst_ctx *ctx, const char *path, const char *why);
 
 #endif

@@ -11,8 +11,8 @@ typedef struct sums {
     double magnitude, magnitude_square, value, value_square;
 } sums;
 
-/* A metric's mean over the runs of a setting. Of speed the least: whatever else a worker has to do
- * with its first run, or the machine with others' work, only adds to it. */
+/* Mean of a metric over the runs of a setting; of speed the minimum, because start-up and other
+ * load only add time. */
 static double setting_value(const bst_results *r, int metric, int64_t setting) {
     int64_t replicates = r->study->config.replicates, n = 0;
     double sum = 0.0, least = INFINITY;
@@ -41,7 +41,8 @@ static void add(sums *s, double magnitude, double value) {
     s->value_square += value * value;
 }
 
-/* Steps of all paths: each moves one axis. first: setting of the factor's level 0. */
+/* Adds the elementary effects of all Morris paths: each step changes one axis. first: setting of
+ * the factor's level 0. */
 static void add_paths(const bst_results *r, const bst_study_factor *f, int metric, int64_t first,
                       int64_t stride, sums *list) {
     int k = f->axis_count;
@@ -72,7 +73,7 @@ static void add_axes(const bst_results *r, const bst_study_factor *f, int metric
         double least = own, most = own, begin = NAN, end = NAN;
         for (int64_t i = 0; i < count; i++, level++) {
             double y = setting_value(r, metric, first + level * stride);
-            least = fmin(least, y); /* a NAN is passed over */
+            least = fmin(least, y); /* fmin and fmax ignore NAN */
             most = fmax(most, y);
             begin = i == 0 ? y : begin;
             end = y;

@@ -1,4 +1,4 @@
-/* Series: several rows a run, such as a curve's points. */
+/* Tables of a study's series: several rows per run, such as the points of a curve. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static bst_status write_rows(bst_ctx *ctx, const bst_tables_job *j) {
     return bst_table_end(ctx, &t, status);
 }
 
-/* Sums over the rows of one key. */
+/* Sums over the rows with one key. */
 typedef struct keyed {
     double key;
     int64_t runs;
@@ -69,7 +69,8 @@ static void add_row(const bst_study_kind *kind, const double *row, keyed *list, 
     }
 }
 
-/* setting, runs, then each column of the series; for hits also their rate and its interval. */
+/* Columns of the statistics table: setting, runs, then each column of the series; hits also with
+ * rate and interval. */
 static int statistics_columns(const bst_study_kind *kind, bst_io_column *columns) {
     int n = 0;
     columns[n++] = (bst_io_column){"setting", BST_COLUMN_INT, "", "Number of the setting."};

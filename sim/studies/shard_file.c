@@ -1,4 +1,4 @@
-/* Files of shards: text, one line a row, with a checksum at the end. */
+/* Shard files: text, one line per row, with a checksum at the end. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -104,7 +104,7 @@ static void sync_folder(const char *out) {
     }
 }
 
-/* Gives a draft its name unless another shard has it; file systems without hard links rename. */
+/* Renames a draft to its final name unless it exists; without hard links by rename. */
 static bool take_name(const char *draft, const char *path) {
     struct stat info;
     if (link(draft, path) == 0) {
@@ -112,7 +112,7 @@ static bool take_name(const char *draft, const char *path) {
         return true;
     }
     if (errno == EEXIST) {
-        /* what is no file, a link that leads nowhere for instance, holds no rows */
+        /* anything but a regular file, such as a dangling link, has no rows */
         bool taken = stat(path, &info) == 0 && S_ISREG(info.st_mode);
         return taken ? unlink(draft) == 0 : rename(draft, path) == 0;
     }
@@ -187,7 +187,7 @@ static bool read_numbers(char **at, int count, double *out) {
     return **at == '\0';
 }
 
-/* Equal as results are: bit by bit, NAN like NAN. */
+/* Bitwise equality of result rows; NAN equals NAN. */
 static bool same(const double *a, const double *b, int count) {
     for (int i = 0; i < count; i++) {
         if (a[i] != b[i] && !(isnan(a[i]) && isnan(b[i]))) {
@@ -197,16 +197,16 @@ static bool same(const double *a, const double *b, int count) {
     return true;
 }
 
-/* One line of a shard: the row of a run, or a row of the run's series. */
+/* One line of a shard file: the row of a run, or of its series. */
 typedef struct shard_row {
-    char kind; /* 'R' done, 'F' failed, 'S' of the series */
+    char kind; /* 'R' done, 'F' failed, 'S' series */
     int64_t run;
     double wall_s, cpu_s;
-    double values[BST_STUDY_METRICS]; /* R: the metrics; S: the columns of the series */
-    char *error;                      /* F: into the line, as it is in the file */
+    double values[BST_STUDY_METRICS]; /* R: metrics; S: columns of the series */
+    char *error;                      /* F: points into the line, still escaped */
 } shard_row;
 
-/* Reads a line. False: it is no row of this study's kind. */
+/* Parses a line of a shard file. False: not a row of this study's kind. */
 static bool read_row(const bst_results *r, char *line, shard_row *out) {
     char *at = line + 1, *end;
     out->kind = line[0];
@@ -233,7 +233,7 @@ static bool read_row(const bst_results *r, char *line, shard_row *out) {
     return line[0] == 'F' ? *end == ' ' : read_numbers(&end, r->kind->metric_count, out->values);
 }
 
-/* A row of the series of the latest run that was taken. */
+/* Adds a series row of the latest run. */
 static bst_status take_series(bst_ctx *ctx, bst_results *r, const shard_row *row) {
     size_t columns = (size_t)r->kind->series_count;
     if (r->series_rows == r->series_room) {
@@ -251,7 +251,7 @@ static bst_status take_series(bst_ctx *ctx, bst_results *r, const shard_row *row
     return BST_OK;
 }
 
-/* Takes a row of a run that has none yet, with room for its error or its series. */
+/* Adds the row of a run without row, with its error or series. */
 static bst_status take_run(bst_ctx *ctx, bst_results *r, const shard_row *row) {
     int metrics = r->kind->metric_count;
     bool failed = row->kind == 'F';
@@ -280,7 +280,7 @@ static bst_status take_run(bst_ctx *ctx, bst_results *r, const shard_row *row) {
     return BST_OK;
 }
 
-/* Takes the rows of a shard that was found whole. */
+/* Adds the rows of a verified shard file. */
 static bst_status take_rows(bst_ctx *ctx, bst_results *r, char *text, const char *end) {
     int metrics = r->kind->metric_count;
     bool skip = false;
@@ -307,7 +307,7 @@ static bst_status damaged(bst_ctx *ctx, const char *path) {
     return bst_fail(ctx, BST_ERR_FORMAT, "%s: is damaged", path);
 }
 
-/* The runs that a shard's name says it has; false for another name. */
+/* Run range in the name of a shard file; false: another name. */
 static bool runs_of_name(const char *path, int64_t *from, int64_t *to) {
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
     int end = 0;
@@ -315,7 +315,7 @@ static bool runs_of_name(const char *path, int64_t *from, int64_t *to) {
            !name[end] && *from >= 0 && *to >= *from;
 }
 
-/* The rows of a shard are those of the runs of its name, in their order. */
+/* Checks that the rows of a shard are those of the runs in its name, in order. */
 static bst_status check_runs(bst_ctx *ctx, const char *path, const char *text) {
     int64_t from, to, next;
     if (!runs_of_name(path, &from, &to)) {
@@ -340,7 +340,7 @@ static bst_status check_runs(bst_ctx *ctx, const char *path, const char *text) {
                                      "%s: ends before run %" PRId64 " of %" PRId64, path, next, to);
 }
 
-/* Cuts the line at *text off and goes on to the next; NULL at the end. */
+/* Terminates the line at *text and advances to the next; NULL at the end. */
 static char *next_line(char **text) {
     char *line = *text, *end = line ? strchr(line, '\n') : NULL;
     if (!end) {
@@ -351,8 +351,8 @@ static char *next_line(char **text) {
     return line;
 }
 
-/* Whether all lines up to `end` are rows, of which `count` are those of runs, and a series follows
- * a run that did what it should. Cuts the lines off. */
+/* Checks that all lines up to `end` are rows, `count` of them of runs, with series only after
+ * successful runs. Terminates the lines. */
 static bool are_rows(const bst_results *r, char *text, const char *end, int64_t count) {
     int64_t seen = 0;
     shard_row row = {.run = -1};
@@ -398,7 +398,7 @@ static bst_status take_text(bst_ctx *ctx, bst_results *r, const char *path, char
         return damaged(ctx, path);
     }
     BST_TRY(check_runs(ctx, path, text));
-    /* a shard with a fault anywhere gives no row: what is wrong there may be wrong in others */
+    /* a file with any fault is rejected completely: its other rows may be wrong too */
     return are_rows(r, text, last, count) ? take_rows(ctx, r, text, last) : damaged(ctx, path);
 }
 
@@ -426,13 +426,13 @@ void bst_results_reject(bst_ctx *ctx, const char *path, const char *why) {
     }
 }
 
-/* Whether a file of a shard's name is none: a link that leads nowhere, a folder, a pipe. */
+/* Checks for a dangling link, folder or pipe with the name of a shard file. */
 static bool is_no_file(const char *path) {
     struct stat info;
     return lstat(path, &info) == 0 && (stat(path, &info) != 0 || !S_ISREG(info.st_mode));
 }
 
-/* Loads one file by its name in the folder. */
+/* Loads a shard file by its name in the folder. */
 static bst_status load_name(bst_ctx *ctx, bst_results *r, const char *folder, const char *name,
                             int64_t first, int64_t count, bool clean) {
     int64_t from, to;

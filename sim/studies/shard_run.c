@@ -9,7 +9,7 @@
 #include "sim/core/wall_clock.h"
 #include "sim/studies/results.h"
 
-/* Whether an error says nothing of the run itself. */
+/* Checks whether an error is due to the machine and not to the run. */
 static bool is_of_the_place(bst_status status) {
     return status == BST_ERR_IO || status == BST_ERR_MEMORY || status == BST_ERR_DEVICE ||
            status == BST_ERR_INTERRUPTED;
@@ -44,7 +44,7 @@ static bst_status run_documents(bst_ctx *ctx, bst_shard_worker *w, bst_study_run
     return status;
 }
 
-/* Of all threads of this process so far. */
+/* Processor time of all threads of this process so far. */
 static double processor_seconds(void) {
     struct timespec used;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);

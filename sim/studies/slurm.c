@@ -22,7 +22,7 @@ static int sleep_ms(int ms) {
     return nanosleep(&pause, NULL);
 }
 
-/* The submitted tasks by array and index, for a look at the queue. */
+/* Submitted tasks, sorted by array and index, for matching the queue. */
 typedef struct submitted {
     bst_slurm_task **tasks;
     size_t count;
@@ -48,7 +48,7 @@ static bst_status sort_submitted(bst_ctx *ctx, const bst_slurm *s, submitted *ou
     return BST_OK;
 }
 
-/* One line of squeue: array, index, state, reason. */
+/* Parses a line of squeue: array, index, state, reason. */
 static void take_state(void *user, const char *line) {
     const submitted *s = user;
     long long array = 0, index = 0;
@@ -107,7 +107,7 @@ static bst_status look(bst_ctx *ctx, bst_slurm *s) {
     return BST_OK;
 }
 
-/* Reads the exit code that a task left; false when there is none (yet). */
+/* Reads the exit code file of a task; false: none (yet). */
 static bool has_ended(const bst_slurm *s, const bst_slurm_task *t, int *code, char node[64]) {
     char path[BST_SLURM_PATH_BYTES], file[BST_SLURM_TOKEN_BYTES + 40];
     snprintf(file, sizeof file, "%s-ended-%lld", s->token, (long long)t->job.id);
@@ -139,7 +139,7 @@ static void scancel(const bst_slurm *s, const char *which) {
     const char *const *argv = strcmp(which, "running") == 0   ? running
                               : strcmp(which, "pending") == 0 ? pending
                                                               : all;
-    /* a controller that does not answer cannot be asked; the tasks then end by themselves */
+    /* if the controller does not answer, the tasks end by themselves */
     bst_status ignored = bst_slurm_run(NULL, s, argv, NULL, NULL, &code, said);
     (void)ignored;
 }
@@ -154,7 +154,7 @@ static void cancel_task(const bst_slurm *s, const bst_slurm_task *t) {
     (void)ignored;
 }
 
-/* The end of a task's log, after `text`. */
+/* Appends the end of a task's log to `text`. */
 static void add_log(const bst_slurm *s, const bst_slurm_task *t, char text[BST_SHARD_TEXT_BYTES]) {
     char path[BST_SLURM_PATH_BYTES], file[BST_SLURM_TOKEN_BYTES + 64],
         tail[BST_SHARD_TEXT_BYTES / 2];
@@ -169,7 +169,7 @@ static void add_log(const bst_slurm *s, const bst_slurm_task *t, char text[BST_S
     }
 }
 
-/* What is to be told of a task now; false when nothing. */
+/* Makes the news of a task; false: none. */
 static bool tell(const bst_slurm *s, const bst_slurm_task *t, double now,
                  bst_study_shard_news *news) {
     *news = (bst_study_shard_news){.id = t->job.id, .runs_done = -1, .runs_failed = -1};
@@ -275,7 +275,7 @@ static bst_status slurm_poll(bst_ctx *ctx, void *self, int timeout_ms, bst_study
         }
         double left_ms = 1e3 * (until - now);
         if (sleep_ms(left_ms < 200 ? (int)left_ms + 1 : 200) != 0) {
-            return BST_OK; /* a signal came: the driver sees to it */
+            return BST_OK; /* interrupted by a signal: the driver handles it */
         }
     }
 }

@@ -66,7 +66,8 @@ bst_status bst_slurm_run(bst_ctx *ctx, const bst_slurm *s, const char *const arg
     return BST_OK;
 }
 
-/* Whether Slurm's message is of a controller that does not answer now, not of a wrong request. */
+/* Checks whether a message means that the controller does not answer, not that the request is
+ * wrong. */
 static bool is_silence(const char *said) {
     static const char *const signs[] = {
         "contact slurm controller", "Unable to contact", "timed out",
@@ -80,7 +81,7 @@ static bool is_silence(const char *said) {
 }
 
 void bst_slurm_take_array(void *user, const char *line) {
-    *(int64_t *)user = strtoll(line, NULL, 10); /* "JOB" or "JOB;CLUSTER" */
+    *(int64_t *)user = strtoll(line, NULL, 10); /* output "JOB" or "JOB;CLUSTER" */
 }
 
 static bst_status write_table(bst_ctx *ctx, const bst_slurm *s, const char *path) {
@@ -98,7 +99,7 @@ static bst_status write_table(bst_ctx *ctx, const bst_slurm *s, const char *path
                 : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
 }
 
-/* Writes a word so that a shell reads it back as it is. */
+/* Writes a word with shell quoting. */
 static void quote(FILE *out, const char *word) {
     fputc('\'', out);
     for (; *word; word++) {
@@ -111,8 +112,8 @@ static void quote(FILE *out, const char *word) {
     fputc('\'', out);
 }
 
-/* The script of a batch: finds its shard in the table, runs it, leaves its exit code behind.
- * Signals that ask the shard to end reach the script too; it outlives them. */
+/* Writes the script of a batch: a task finds its shard in the table, runs it, and writes its exit
+ * code. The script receives the signals that end the shard, and survives them. */
 static bst_status write_script(bst_ctx *ctx, const bst_slurm *s, const char *path,
                                const char *table) {
     FILE *file = fopen(path, "w");
@@ -163,8 +164,7 @@ static void add_number(const char *argv[MOST_WORDS], int *words, char *text, siz
     add_option(argv, words, text, text_bytes, option, value > 0 ? digits : "");
 }
 
-/* Submits the tasks of the batch `s->batches`, `count` of them; *array is 0 when the controller is
- * silent. */
+/* Submits `count` tasks as batch `s->batches`; *array 0: the controller does not answer. */
 static bst_status submit_batch(bst_ctx *ctx, bst_slurm *s, int64_t count, int64_t *array) {
     char file[BST_SLURM_TOKEN_BYTES + 32], script[BST_SLURM_PATH_BYTES],
         table[BST_SLURM_PATH_BYTES], log[BST_SLURM_PATH_BYTES];

@@ -21,7 +21,7 @@ double bst_study_quantile(const double *sorted, int64_t n, double q) {
 
 static void describe(const double *values, int64_t rows, int columns, int column, double *scratch,
                      bst_statistics *s) {
-    double sum = 0.0, square = 0.0, first = NAN; /* equal values have themselves for a mean */
+    double sum = 0.0, square = 0.0, first = NAN; /* the mean of equal values is exact */
     int64_t n = 0;
     for (int64_t i = 0; i < rows; i++) {
         double x = values[i * columns + column];
@@ -47,18 +47,17 @@ static void describe(const double *values, int64_t rows, int columns, int column
     s->p95 = bst_study_quantile(scratch, n, 0.95);
 }
 
-/* Numbers that are drawn from again. Values are taken from the column's mean, so that sums do not
- * cancel. */
+/* Numbers for resampling, relative to the mean of their column to avoid cancellation. */
 typedef struct sample {
-    const double *centred, *there; /* [rows][columns]; there: 1 for a number, 0 for none; NULL when
-                                      all are numbers */
+    const double *centred,
+        *there; /* [rows][columns]; there: 1 for a number, 0 for none; NULL: all are numbers */
     int64_t rows;
     int columns;
     bst_rng_key key;
-    double *sums, *counts; /* [columns], for use */
+    double *sums, *counts; /* [columns], work space */
 } sample;
 
-/* Means of a resample into means[columns]; NAN where none of its numbers was drawn. */
+/* Computes the means of a bootstrap resample; NAN if none of a column's numbers was drawn. */
 static void resample(const sample *s, uint64_t number, double *restrict means) {
     const double *restrict centred = s->centred, *restrict there = s->there;
     double *restrict sums = s->sums, *restrict counts = s->counts;
@@ -71,7 +70,7 @@ static void resample(const sample *s, uint64_t number, double *restrict means) {
         if (i % 4 == 0) {
             words = bst_rng_words(s->key, number, (uint64_t)(i / 4));
         }
-        /* rows are far below 2^32: the draw is even to rows / 2^32 */
+        /* rows are far below 2^32: the draw is uniform to rows / 2^32 */
         int64_t row = (int64_t)(((uint64_t)words.w[i % 4] * (uint64_t)rows) >> 32);
         const double *from = centred + row * columns;
         for (int c = 0; c < columns; c++) {

@@ -14,7 +14,7 @@
 
 static const double MOST_RUNS = 1e9;
 
-/* A name for a column from the last parts of a pointer. */
+/* Makes a column name from the last parts of a JSON pointer. */
 static void name_of_pointer(const char *pointer, int parts, char *out, size_t bytes) {
     const char *from = pointer + strlen(pointer);
     while (from > pointer && parts > 0) {
@@ -76,7 +76,7 @@ static bst_status name_axis(bst_ctx *ctx, const bst_study *study, const char *gi
     for (int parts = 1; parts <= 8; parts++) {
         name_of_pointer(axis->path, parts, name, sizeof name);
         if (*name >= '0' && *name <= '9') {
-            continue; /* an element's number says nothing without its list's name */
+            continue; /* an index is meaningless without the name of its list */
         }
         for (char *c = name; *c; c++) {
             *c = is_word((char[]){*c, '\0'}) ? *c : '_';
@@ -221,7 +221,7 @@ static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *no
     return BST_OK;
 }
 
-/* The number of objects of each is a value of a run. */
+/* Adds the number of objects of each population as a value of a run. */
 static bst_status add_populations(bst_ctx *ctx, bst_study *study, const char *file) {
     BST_TRY(bst_study_populations_open(ctx, study, file));
     for (int i = 0; i < study->populations.count; i++) {
@@ -275,12 +275,12 @@ static bst_status add_axes(bst_ctx *ctx, bst_study *study, const char *file) {
     return BST_OK;
 }
 
-/* With a byte after it that no text has. */
+/* Hashes a text with a terminating byte that no text contains. */
 static uint64_t hash_text(uint64_t h, const char *text) {
     return bst_fnv(bst_fnv(h, text, strlen(text)), "\xff", 1);
 }
 
-/* All that rows follow from: not what is made of them, nor where files lie. */
+/* Hashes everything that affects the rows, but not output options or file locations. */
 static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
     static const char *const without[] = {"scenarios", "metrics", "resamples", "keep", "name"};
     uint64_t h = hash_text(BST_FNV_START, bst_version());

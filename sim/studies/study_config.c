@@ -59,7 +59,7 @@ static const bst_config_desc sweep_table[] = {
              "What is varied."),
     BST_CONFIG_END};
 
-/* What every dispersion has beside where its numbers go. */
+/* Keys of every dispersion besides its pointers. */
 #define DISPERSION_LAW                                                                            \
     BST_ENUM(                                                                                     \
         bst_study_dispersion_config, distribution, distributions, "\"uniform\"",                  \

@@ -1,4 +1,4 @@
-/* The study file: what is varied, how often, what is kept. */
+/* Configuration structs of the study file: scenarios, sweeps, dispersions, populations, metrics. */
 #ifndef BST_STUDIES_STUDY_CONFIG_H
 #define BST_STUDIES_STUDY_CONFIG_H
 
@@ -40,7 +40,7 @@ typedef enum bst_study_number_law {
     BST_NUMBER_POISSON
 } bst_study_number_law;
 
-/* The keys "also" and "values" are read where axes are made. */
+/* The keys "also" and "values" are read when axes are created. */
 typedef struct bst_study_axis_config {
     char path[256];
     char name[64];
@@ -56,7 +56,7 @@ typedef struct bst_study_sweep_config {
     bst_config_list axes; /* bst_study_axis_config */
 } bst_study_sweep_config;
 
-/* The keys "also", "values" and "weights" are read where axes are made. */
+/* The keys "also", "values" and "weights" are read when axes are created. */
 typedef struct bst_study_dispersion_config {
     char path[256];
     char name[64];
@@ -66,7 +66,7 @@ typedef struct bst_study_dispersion_config {
     bool integer;
 } bst_study_dispersion_config;
 
-/* How many objects a population has in a run. */
+/* Distribution of a population's number of objects per run. */
 typedef struct bst_study_number_config {
     int32_t distribution; /* bst_study_number_law */
     int64_t count;        /* fixed */
@@ -75,15 +75,16 @@ typedef struct bst_study_number_config {
     int64_t most;         /* poisson */
 } bst_study_number_config;
 
-/* Objects that are drawn for each run. The key "object" is read where populations are. */
+/* A population of objects drawn for each run. The key "object" is read when populations are
+ * created. */
 typedef struct bst_study_population_config {
     char name[40];
     bst_study_number_config number;
     char elements_file[512];
-    bst_config_list dispersions; /* bst_study_dispersion_config, with paths in the object */
+    bst_config_list dispersions; /* bst_study_dispersion_config, with paths inside the object */
 } bst_study_population_config;
 
-/* How a run of kind "pd" measures: as the options of boresight pd. */
+/* Measurement settings of kind "pd", as the options of `boresight pd`. */
 typedef struct bst_study_pd_config {
     char sensor[160];
     double snr_first, snr_last, snr_step;

@@ -1,4 +1,4 @@
-/* The folder that a study's results go into. */
+/* The folder of a study's results: lock and study.json. */
 #include "sim/studies/study_folder.h"
 
 #include <cjson/cJSON.h>
@@ -13,7 +13,7 @@
 #include "sim/core/folder.h"
 #include "sim/io/manifest.h"
 
-/* Locks the folder against another driver; -1 with a message. */
+/* Locks the folder against other drivers; -1 with a message. */
 static int lock_folder(bst_ctx *ctx, const char *out, bool shared) {
     char path[4200];
     snprintf(path, sizeof path, "%.4000s/lock", out);
@@ -33,7 +33,7 @@ static int lock_folder(bst_ctx *ctx, const char *out, bool shared) {
     return fd;
 }
 
-/* The study of the folder is this one, or there is none yet. */
+/* Writes study.json, or checks that the folder belongs to this study. */
 static bst_status settle_study(bst_ctx *ctx, const bst_study *study, const char *out, bool resume) {
     char path[4200];
     bst_study there;

@@ -33,7 +33,7 @@ bst_status bst_tables_begin(bst_ctx *ctx, const char *folder, bst_tables_out *ou
     if (sqlite3_open(out->draft, &out->db) != SQLITE_OK) {
         status = fail_sql(ctx, out);
     }
-    /* a draft that did not get its name is of no use to anybody */
+    /* a draft without final name is useless */
     if (status == BST_OK) {
         status = execute(ctx, out,
                          "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;"

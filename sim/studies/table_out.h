@@ -1,4 +1,4 @@
-/* Tables that are written to a database and a CSV file at once. */
+/* Writes the tables of a study to a database and to CSV files. */
 #ifndef BST_STUDIES_TABLE_OUT_H
 #define BST_STUDIES_TABLE_OUT_H
 
@@ -8,8 +8,7 @@
 struct sqlite3;
 struct sqlite3_stmt;
 
-/* A new database "FOLDER/study.sqlite" and the CSV files beside it: all appear when it is finished,
- * or none does. */
+/* A new database "FOLDER/study.sqlite" and its CSV files: all appear at the end, or none. */
 typedef struct bst_tables_out {
     struct sqlite3 *db;
     char folder[2048], draft[2176];
@@ -28,20 +27,20 @@ typedef struct bst_table_out {
  *
  * Errors:    BST_ERR_ARGUMENT for too long a path, BST_ERR_IO */
 bst_status bst_tables_begin(bst_ctx *ctx, const char *folder, bst_tables_out *out) BST_MUST_CHECK;
-/* With BST_OK: puts the database in its place. With another status, or when that fails: removes it.
- */
+/* Ends the tables. Status BST_OK: renames the database to its final name. Otherwise, or on failure:
+ * removes it. */
 bst_status bst_tables_end(bst_ctx *ctx, bst_tables_out *tables, bst_status status) BST_MUST_CHECK;
 
-/* A table to be made. */
+/* Definition of a table. */
 typedef struct bst_table_design {
     const char *name, *doc;
     const bst_io_column *columns; /* [count] */
     int count;
-    bool csv; /* also as a file of its own */
+    bool csv; /* also as a CSV file */
 } bst_table_design;
 
-/* A table of `count` columns, and FOLDER/<name>.csv if `csv`; columns are noted in the table
- * "columns", with unit and meaning. */
+/* Begins a table of `count` columns, and FOLDER/<name>.csv if `csv`; the table "columns" describes
+ * unit and meaning. */
 bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const bst_table_design *design,
                            bst_table_out *out) BST_MUST_CHECK;
 

@@ -134,7 +134,7 @@ static bst_status write_metrics(bst_ctx *ctx, const bst_tables_job *j) {
 
 /* ------------------------------------------------------------------ values of axes */
 
-/* Number or text, by what all values of the axis are. */
+/* Checks whether all values of an axis are numbers. */
 static bool is_numeric(const bst_study_axis *axis) {
     for (const cJSON *v = axis->values ? axis->values->child : NULL; v; v = v->next) {
         if (!cJSON_IsNumber(v)) {
@@ -149,7 +149,7 @@ bst_io_column bst_study_axis_column(const bst_study_axis *axis) {
                            axis->path};
 }
 
-/* The scenario's own value, where an axis leaves it. */
+/* The scenario's own value, where a run does not set the axis. */
 static const cJSON *own_value(const bst_study *s, const bst_study_axis *axis, int base) {
     const cJSON *own = bst_study_at(bst_json_root(s->bases[base].json), axis->path);
     return own ? own : bst_study_at(bst_json_root(s->json), axis->path);
@@ -172,7 +172,7 @@ bst_io_value bst_study_axis_value(const bst_study *s, int a, const bst_study_val
     return bst_io_text_value(*text);
 }
 
-/* Values of the first `count` axes into row; texts[count] are freed by the caller. */
+/* Values of the first `count` axes as cells of a row; the caller frees texts[count]. */
 static void axis_values(const bst_study *s, int count, const bst_study_value *values, int base,
                         bst_io_value *row, char **texts) {
     for (int a = 0; a < count; a++) {

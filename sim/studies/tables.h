@@ -1,4 +1,4 @@
-/* A study's rows as tables: study.sqlite, and CSV files of the same names as its tables. */
+/* Tables of a study: study.sqlite, and CSV files with the names of its tables. */
 #ifndef BST_STUDIES_TABLES_H
 #define BST_STUDIES_TABLES_H
 

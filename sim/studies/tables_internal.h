@@ -1,4 +1,4 @@
-/* What the parts that write tables share. */
+/* Internal functions of the study tables. */
 #ifndef BST_STUDIES_TABLES_INTERNAL_H
 #define BST_STUDIES_TABLES_INTERNAL_H
 
@@ -9,7 +9,7 @@
 typedef struct bst_tables_job {
     bst_results *results;
     bst_tables_out *out;
-    int metrics[BST_STUDY_METRICS]; /* that are told, of the kind's */
+    int metrics[BST_STUDY_METRICS]; /* selected metrics of the kind */
     int metric_count;
     bst_io_column *columns; /* scratch for one table */
     bst_io_value *row;
@@ -28,9 +28,10 @@ bst_io_column bst_study_axis_column(const bst_study_axis *axis);
 bst_io_value bst_study_axis_value(const bst_study *study, int axis, const bst_study_value *value,
                                   int base, char **text);
 
-/* Ranked tables of designs that tell which axes matter, where the study has any. */
+/* Writes the ranked sensitivity tables of designs one_at_a_time and morris, if the study has
+ * any. */
 bst_status bst_study_write_sensitivity(bst_ctx *ctx, const bst_tables_job *job) BST_MUST_CHECK;
-/* The kind's series, run by run, and over the runs of each setting. */
+/* Writes the series of the kind: per run, and over the runs of each setting. */
 bst_status bst_study_write_series(bst_ctx *ctx, const bst_tables_job *job) BST_MUST_CHECK;
 
 #endif

@@ -1,4 +1,5 @@
-/* Kind "cubes" of studies: one run is a labelled sequence of frames, for training and tests. */
+/* Study kind "cubes": a run makes a labelled sequence of frames for training and testing of
+ * detectors. */
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
@@ -52,7 +53,7 @@ static const bst_study_metric metrics[METRICS] = {
 
 enum { KEPT = 8 };
 
-/* A sequence on its way. */
+/* State of writing one sequence. */
 typedef struct cube {
     const bst_study_cubes_config *config;
     const bst_scenario *scenario;
@@ -61,12 +62,12 @@ typedef struct cube {
     const char *target; /* FITS OBJECT; NULL: none */
     bst_fits *fits;
     bst_fits *masks;           /* NULL: none */
-    bst_fits_frame mask_frame; /* the newest frame, without what its truth adds */
+    bst_fits_frame mask_frame; /* header of the newest frame, without values from its truth */
     bst_study_labels labels;
     double background;
-    bst_frame_message waiting; /* the frame whose truth has not come */
+    bst_frame_message waiting; /* the frame that waits for its truth */
     bool waits;
-    bst_truth *truths[KEPT]; /* that came before their frames */
+    bst_truth *truths[KEPT]; /* truths that precede their frames */
     size_t truth_bytes[KEPT];
     int next;
     bst_ctx *ctx;
@@ -84,7 +85,7 @@ static bst_status read_settings(bst_ctx *ctx, const bst_study_run *run, bst_stud
     return BST_OK;
 }
 
-/* The sensor that was named, or the first; -1 when there is none of that name. */
+/* Finds the sensor by name, or the first one; -1: no such name. */
 static int find_sensor(const bst_scenario *scenario, const char *wanted, int *observer,
                        char scope[160]) {
     const bst_observer_config *observers = scenario->observers.items;
@@ -171,7 +172,7 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
     return BST_OK;
 }
 
-/* The mask of the newest frame, whose message comes before that of its planes. */
+/* Writes the segmentation mask of the newest frame from its planes. */
 static bst_status take_planes(cube *c, const bst_planes *p) {
     if (!c->masks || !p->segmentation || p->exposure_id != c->mask_frame.id) {
         return BST_OK;
@@ -257,7 +258,7 @@ static bool interrupted(void *user, int64_t tick) {
 
 /* ------------------------------------------------------------------ a sequence */
 
-/* "OUT/ImageFiles/000017.fits", and where it is written. */
+/* Paths of the final file and its draft, such as "OUT/ImageFiles/000017.fits". */
 static bst_status path_of(bst_ctx *ctx, const bst_study_run *run, const char *folder,
                           const char *end, char path[4096]) {
     int n =

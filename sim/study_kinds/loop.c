@@ -1,4 +1,4 @@
-/* Kind "loop" of studies: one run is a simulation, judged as boresight run judges it. */
+/* Study kind "loop": a run is a simulation with the evaluation of `boresight run`. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,7 +73,7 @@ bst_status bst_study_warm_device(bst_ctx *ctx, bst_study_warm *warm) {
         return BST_OK;
     }
     bst_status status = bst_device_open(ctx, warm->selector, 0, &warm->device);
-    /* no fault of the run: a worker without its device executes none */
+    /* not an error of the run: a worker without device can execute none */
     return status == BST_ERR_NOT_FOUND ? bst_fail_prefix(ctx, BST_ERR_DEVICE, "--device") : status;
 }
 
@@ -84,7 +84,7 @@ void bst_study_warm_stars(bst_study_warm *warm, bst_scenario *scenario) {
         bst_stars_close(warm->stars);
         warm->stars = NULL;
         snprintf(warm->catalogue, sizeof warm->catalogue, "%s", name);
-        /* who makes the world says what is wrong with it */
+        /* the creation of the world reports the error */
         bst_status status = bst_stars_open(&quiet, name, &warm->stars);
         (void)status;
     }
@@ -141,7 +141,7 @@ enum {
     FALSE_TRACKS,
     OBJECTS_SEEN,
     OBJECTS_TRACKED,
-    METRICS, /* of a sensor; what follows is of all of them together */
+    METRICS, /* of one sensor; the following ones are of all sensors together */
     TASKS = METRICS,
     TASKS_DONE,
     PASSES_SEEN,
@@ -238,7 +238,7 @@ static const bst_study_metric metrics[ALL_METRICS] = {
     [TRACKS_RMS_ARCSEC] = {"tracks_rms_arcsec", "arcsec",
                            "Confirmed tracks of all objects against the truth, RMS.",
                            BST_METRIC_VALUE}};
-/* of each sensor where there are several */
+/* per sensor, if there are several */
 static const bst_study_metric series[METRICS + 1] = {
     METRIC_LIST, [METRICS] = {"sensor", "", "Number of the sensor.", BST_METRIC_KEY}};
 

@@ -1,4 +1,4 @@
-/* Kind "pd" of studies: one run is a curve of detection over SNR, as boresight pd measures it. */
+/* Study kind "pd": a run measures a detection curve over SNR like `boresight pd`. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,7 +32,7 @@ enum {
     METRICS
 };
 
-/* The ideal detector knows the place, and has one test for each pixel of the frame. */
+/* The ideal detector knows the position, and makes one test per pixel of the frame. */
 #define BELOW_ZERO                                                                               \
     " of known place and shape. Below 0: noise of the trials (loss_db_sigma), or the gain of a " \
     "detector that takes the highest of several places where the ideal one tests one."
@@ -141,7 +141,7 @@ static bst_pd_options options_of(const bst_study_pd_config *c, const bst_study_w
                             .quiet = true};
 }
 
-/* V of a target of an SNR: its light goes with it. */
+/* V magnitude of a target for an SNR, proportional to its light. */
 static double v_mag_at(const bst_pd_scene *s, double snr) {
     return snr > 0.0 ? s->v_mag[0] - 2.5 * log10(snr / s->snr[0]) : NAN;
 }

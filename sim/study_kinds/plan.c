@@ -1,4 +1,4 @@
-/* boresight study --dry-run: what a study will do, by its numbers and by two of its runs. */
+/* `boresight study --dry-run`: prints number of runs, time and disk space, measured on two runs. */
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -19,10 +19,10 @@
 #include "sim/study_kinds/study_kinds.h"
 
 enum { TRIED = 2, PATIENCE_MS = 60000 };
-/* Of a run that is tried; how long the rest takes follows from that. */
+/* seconds of a trial run, from which the total time is extrapolated */
 static const double TRIED_S = 1.0;
 
-/* What the runs that are tried told. */
+/* Results of the trial runs. */
 typedef struct trial {
     int32_t count;
     double wall_s[TRIED];
@@ -41,7 +41,7 @@ static void try_runs(const bst_study *study, const bst_study_kind *kind, const c
     while (t.count < TRIED && t.count < study->runs) {
         bst_study_result result;
         char error[BST_MESSAGE_BYTES];
-        /* the last one has what it can of the first */
+        /* the last run is limited in time by the first */
         int64_t run = t.count == 0 ? 0 : study->runs - 1;
         if (bst_shard_run_one(&ctx, &worker, run, &result, error, &t.wall_s[t.count]) != BST_OK) {
             snprintf(t.error, sizeof t.error, "%.250s", ctx.message);
@@ -57,12 +57,12 @@ static void try_runs(const bst_study *study, const bst_study_kind *kind, const c
         }
     }
     if (t.count == 0 && write(fd, &t, sizeof t) < 0) {
-        t.count = 0; /* nobody listens */
+        t.count = 0; /* the parent has gone */
     }
     bst_shard_worker_close(&worker);
 }
 
-/* Bytes of the files below a folder, which is removed. */
+/* Removes a folder; returns the bytes of its files. */
 static double take_away(const char *path) {
     double bytes = 0.0;
     DIR *dir = opendir(path);
@@ -87,7 +87,7 @@ static double take_away(const char *path) {
     return bytes;
 }
 
-/* Two runs in a process and a folder of their own; *bytes: what they left. */
+/* Executes two trial runs in a process and folder of their own; *bytes: their output. */
 static trial attempt(const bst_study *study, const bst_study_kind *kind, int workers,
                      const char *device, double *bytes) {
     trial t = {.count = 0}, news;

@@ -1,4 +1,4 @@
-/* boresight study --slurm: the site file, and what a task of a job array runs. */
+/* `boresight study --slurm`: reads the site file, and defines the command of an array task. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include "sim/studies/slurm.h"
 #include "sim/study_kinds/study_kinds.h"
 
-/* The user's own site file, "" when there is none. */
+/* The user's own site file; "": none. */
 static const char *own_site(char *path, size_t bytes) {
     const char *config = getenv("XDG_CONFIG_HOME"), *home = getenv("HOME");
     int n = config && *config ? snprintf(path, bytes, "%s/boresight/slurm.json", config)

@@ -60,7 +60,7 @@ static void add_counts(const bst_results *r, const bst_study_card_metrics *m, cJ
     }
 }
 
-/* Range and mean of what each axis had. */
+/* Adds range and mean of each axis to the data card. */
 static bst_status add_axes(bst_ctx *ctx, const bst_results *r, cJSON *card) {
     const bst_study *s = r->study;
     cJSON *list = cJSON_AddArrayToObject(card, "varied");

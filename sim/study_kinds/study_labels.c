@@ -7,7 +7,7 @@
 
 #define DEG (180.0 / BST_PI)
 
-/* As JSON: what is not finite becomes null. */
+/* Writes a JSON number; null if not finite. */
 static void put_number(FILE *stream, const char *key, double value) {
     if (isfinite(value)) {
         fprintf(stream, ",\"%s\":%.12g", key, value);
@@ -29,7 +29,7 @@ static void put_text(FILE *stream, const char *key, const char *text) {
     putc('"', stream);
 }
 
-/* Along one axis: extent, start, middle and end. */
+/* Writes extent, start, middle and end along one axis. */
 static void put_axis(FILE *stream, char axis, const double v[3], double box) {
     fprintf(stream,
             ",\"%c_min\":%.12g,\"%c_max\":%.12g,\"%c_center\":%.12g,\"%c_start\":%.12g,\"%c_mid\":"
@@ -48,7 +48,7 @@ static bool put_object(bst_study_labels *l, const bst_frame_message *f, double e
     const double xs[3] = {item->x_start_px, item->x_mid_px, item->x_end_px};
     const double ys[3] = {item->y_start_px, item->y_mid_px, item->y_end_px};
     double x[3], y[3];
-    /* boxes hold the light, which the optics put beside the chief ray */
+    /* boxes enclose the light, which the optics shift from the chief ray */
     double beside_x = item->x_centroid_px - item->x_chief_px,
            beside_y = item->y_centroid_px - item->y_chief_px;
     for (int k = 0; k < 3; k++) {

@@ -1,4 +1,4 @@
-/* Labels of a sequence of frames, object by object as in SatNet, in one file a sequence. */
+/* Labels of a sequence of frames in SatNet style, one file per sequence. */
 #ifndef BST_STUDY_KINDS_STUDY_LABELS_H
 #define BST_STUDY_KINDS_STUDY_LABELS_H
 
@@ -11,15 +11,14 @@ typedef struct bst_study_labels {
     FILE *stream;
     const bst_world *world;
     double box_px, star_limit_v_mag;
-    bool mask;                         /* seg_id is the number in the segmentation mask */
-    int64_t frames, satellites, stars; /* labels so far */
+    bool mask;                         /* seg_id is the item number in the segmentation mask */
+    int64_t frames, satellites, stars; /* labels written so far */
     double snr_sum;                    /* of the satellites */
-    double longest_px;                 /* way of a satellite through a frame */
+    double longest_px;                 /* length of a satellite's streak in a frame */
 } bst_study_labels;
 
-/* The frame's part of the list "frames": its time and the objects whose light is in it, as
- * boresight export --satnet has them. Coordinates are fractions of the image between pixel edges.
- */
+/* Writes a frame's entry of the list "frames": its time, and the objects with light in it, as
+ * `boresight export --satnet`. Coordinates are fractions of the image between pixel edges. */
 void bst_study_labels_frame(bst_study_labels *labels, const bst_frame_message *frame,
                             const char *start_utc, double exposure_s, const bst_truth *truth);
 

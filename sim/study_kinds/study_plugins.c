@@ -47,7 +47,7 @@ static void path_of(const char *out, char path[4200]) {
     snprintf(path, 4200, "%.4000s/plugins.json", out);
 }
 
-/* The digest that the folder's list has of a library; NULL: it is not in there. */
+/* Recorded SHA-256 digest of a library; NULL: not in the list. */
 static const char *recorded(const cJSON *list, const char *file) {
     const cJSON *item;
     cJSON_ArrayForEach(item, list) {

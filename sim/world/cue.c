@@ -53,7 +53,8 @@ double bst_world_region_half_length_rad(const bst_region_config *region) {
     }
 }
 
-/* A place by angles along and across the great circle from a to b, from its middle. */
+/* Direction in a cue's region by angles along and across the great circle between its ends, from
+ * its centre. */
 static bst_vec3 on_arc(const double ends_deg[4], double along_rad, double across_rad) {
     bst_vec3 a = bst_vec3_from_radec(ends_deg[0] * BST_DEG_RAD, ends_deg[1] * BST_DEG_RAD);
     bst_vec3 b = bst_vec3_from_radec(ends_deg[2] * BST_DEG_RAD, ends_deg[3] * BST_DEG_RAD);
@@ -81,7 +82,7 @@ bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, const bs
     return BST_OK;
 }
 
-/* Regions that have no length, or no middle. */
+/* Rejects cue regions whose arc has no length or no unique centre. */
 static bst_status check_region(bst_ctx *ctx, const char *scenario, int observer, int sensor,
                                const bst_region_config *region) {
     double half = bst_world_region_half_length_rad(region);
@@ -108,7 +109,7 @@ bst_status bst_world_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *
             scenario, observer, sensor, cue->object);
     }
     BST_TRY(check_region(ctx, scenario, observer, sensor, &cue->region));
-    /* as the onboard side reckons it: with its clock, from where it believes to be */
+    /* direction by the onboard clock, orbit estimate and catalogued target orbit */
     bst_vec3 nominal;
     bst_world_state eye;
     double now_s = bst_world_nav_seconds(world, observer, sensor, 0.0);
@@ -123,8 +124,7 @@ bst_status bst_world_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *
         return bst_fail_prefix(ctx, status == BST_ERR_NUMERIC ? BST_ERR_CONFIG : status,
                                "%s: /observers/%d/sensors/%d/cue", scenario, observer, sensor);
     }
-    /* The error is a rotation about the image axis at right angles to the one along which the cue
-     * is wrong. */
+    /* The cue error is a rotation about the image axis perpendicular to the offset axis. */
     const double *x = s->config.x_axis_gcrf;
     bst_vec3 hint = {x[0], x[1], x[2]};
     if (!(bst_vec3_norm(hint) > 0.0)) {

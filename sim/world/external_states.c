@@ -15,7 +15,7 @@ typedef struct kept_state {
 
 struct bst_external_states {
     pthread_mutex_t lock;
-    kept_state states[KEPT]; /* a ring: number n is states[n % KEPT] */
+    kept_state states[KEPT]; /* ring buffer: state n is at states[n % KEPT] */
     int64_t count;
 };
 
@@ -54,7 +54,7 @@ bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *s, doubl
                                      bool *steered, bst_world_state *out) {
     pthread_mutex_lock(&s->lock);
     int64_t low = s->count > KEPT ? s->count - KEPT : 0, high = s->count;
-    /* the last one that is not later, or of those that are still known the first */
+    /* the last state at or before `seconds`; else the oldest one that is kept */
     *steered = s->count > 0 && (low > 0 || s->states[0].seconds <= seconds);
     while (high - low > 1) {
         int64_t middle = low + (high - low) / 2;

@@ -1,4 +1,4 @@
-/* States of an object that another program sends during a run. */
+/* States of a space object that another program sends during a run. */
 #ifndef BST_WORLD_EXTERNAL_STATES_H
 #define BST_WORLD_EXTERNAL_STATES_H
 
@@ -6,22 +6,23 @@
 
 #include "sim/world/world.h"
 
-/* The latest few thousand states; may be used by several threads. */
+/* Ring of the latest states of one object; several threads may use it. */
 typedef struct bst_external_states bst_external_states;
 
-/* Creates the states of an object that another program commands; its functions lock them.
+/* Creates the ring of states of an externally commanded object; its functions are thread-safe.
  *
  * Returned:  *out  NULL on error
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_external_states_create(bst_ctx *ctx, bst_external_states **out) BST_MUST_CHECK;
 void bst_external_states_free(bst_external_states *external); /* NULL allowed */
 
-/* From `seconds` after the epoch on the object is in this state (GCRF) and moves on by two-body
- * motion. What was before is not changed: BST_ERR_ARGUMENT unless it is later than the last one. */
+/* Adds a state (GCRF) of an externally commanded object at `seconds` after the epoch. Two-body
+ * motion continues it. BST_ERR_ARGUMENT: not later than the previous state. */
 bst_status bst_external_states_add(bst_ctx *ctx, bst_external_states *external, double seconds,
                                    const bst_world_state *state) BST_MUST_CHECK;
 
-/* *steered false: before the first state. Passes on errors of bst_kepler_propagate. */
+/* State of an externally commanded object at a time. *steered false: before the first state. Errors
+ * of bst_kepler_propagate. */
 bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *external, double seconds,
                                      bool *steered, bst_world_state *out) BST_MUST_CHECK;
 

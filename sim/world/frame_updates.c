@@ -9,9 +9,9 @@
 
 enum { FORMAT_VERSION = 1, LAST_FRAME = 10000000 };
 
-/* How far a quaternion's norm may be from 1: six digits were written. */
+/* tolerance of a quaternion's norm: files have six digits */
 #define NORM_SLACK 1e-5
-/* The same for the ends of a pointing history. */
+/* tolerance of the first and last time of a pointing history */
 #define TIME_SLACK_S 1e-6
 
 struct bst_frame_updates {
@@ -68,7 +68,7 @@ typedef struct frame_config {
     bst_config_list objects; /* object_config */
 } frame_config;
 
-/* What a frame does not give is told apart by looking the key up: the defaults are not used. */
+/* A key that a frame omits is found by lookup in the JSON: the defaults here are unused. */
 static const bst_config_desc frame_table[] = {
     BST_INT(frame_config, frame, "", 0, LAST_FRAME, NULL, "Number of the exposure, from 0."),
     BST_REALS(frame_config, q_cam_from_gcrf_start, "", -1.001, 1.001, "[0, 0, 0, 1]",
@@ -85,19 +85,20 @@ static const bst_config_desc frame_table[] = {
     BST_LIST(frame_config, objects, object_config, object_table, 0, 10000, "[]", "Objects."),
     BST_CONFIG_END};
 
-/* A file that is being read. */
+/* State of reading a frame-updates file. */
 typedef struct reader {
     bst_ctx *ctx;
     const bst_json *json;
     bst_frame_updates *out;
     const bst_camera *camera;
-    double exposure_s; /* that holds now, as the next two */
+    double exposure_s; /* current values, as the next two */
     bst_window window;
     int binning;
-    const cJSON *node; /* of the frame being read */
+    const cJSON *node; /* of the current frame */
     char path[80];     /* "/frames/3 (frame 7)" */
 } reader;
 
+/* Reports a wrong key of a frame with file, path and allowed values. */
 static bst_status fail_key(const reader *r, const char *key, const char *what,
                            const char *allowed) {
     char path[160];
@@ -114,7 +115,7 @@ static bool has(const reader *r, const char *key) {
     return cJSON_GetObjectItemCaseSensitive(r->node, key) != NULL;
 }
 
-/* Room for one more item of an array that grows. */
+/* Grows an array by one item if it is full. */
 static void *grow(void *items, int64_t count, int64_t *capacity, size_t bytes) {
     if (count < *capacity) {
         return items;
@@ -145,7 +146,7 @@ static bst_status add_node(reader *r, const char *key, double time_s, const doub
     return BST_OK;
 }
 
-/* The pointing history, or the attitudes at start and end. */
+/* Reads the pointing of a frame: its history, or the attitudes at start and end. */
 static bst_status read_pointing(reader *r, const frame_config *c) {
     static const char start_key[] = "q_cam_from_gcrf_start", end_key[] = "q_cam_from_gcrf_end";
     bool start = has(r, start_key), end = has(r, end_key), history = has(r, "pointing");
@@ -238,6 +239,7 @@ static bst_status read_objects(reader *r, const bst_config_list *list) {
     return BST_OK;
 }
 
+/* Reads all keys of one frame into an update. */
 static bst_status take_frame(reader *r, const frame_config *c, bst_frame_update *update) {
     *update = (bst_frame_update){.frame = c->frame, .exposure_s = -1.0};
     if (has(r, "exposure_s")) {
@@ -328,7 +330,7 @@ static bst_status read_json(reader *r) {
         BST_TRY(read_frame(r, node, u->count));
         u->count++;
     }
-    /* the arrays have their last place now */
+    /* the arrays are complete; their addresses are final */
     const bst_world_pointing_node *node = u->nodes;
     const bst_frame_object *object = u->objects;
     for (int i = 0; i < count; i++) {
@@ -407,7 +409,7 @@ static int64_t ticks(const bst_frame_cursor *cursor, double seconds) {
     return (int64_t)floor(seconds * cursor->tick_rate_hz + 0.5);
 }
 
-/* Takes what the file says of the cursor's frame. */
+/* Applies the update of the cursor's frame to the exposure settings. */
 static void apply(bst_frame_cursor *c) {
     const bst_frame_updates *u = c->updates;
     c->update = u && c->next < u->count && u->items[c->next].frame == c->frame
@@ -438,7 +440,7 @@ bst_frame_cursor bst_frame_cursor_begin(const bst_frame_updates *updates, const 
     bst_ctx quiet = {0};
     if (bst_exposure_window(&quiet, exposure, camera->width_px, camera->height_px, &c.window) !=
         BST_OK) {
-        /* the exposure clock says so */
+        /* the exposure clock reports the window in use */
         c.window = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
     }
     c.start_tick = ticks(&c, c.start_s);

@@ -6,7 +6,7 @@
 #include <string.h>
 
 struct bst_name_index {
-    size_t slots; /* a power of two, at least twice the names */
+    size_t slots; /* a power of two, at least twice the number of names */
     int count;
     struct {
         const char *name;
@@ -32,7 +32,7 @@ void bst_name_index_free(bst_name_index *index) {
     free(index);
 }
 
-/* The slot that holds `name`, or the free one where it belongs. Hash: FNV-1a (Fowler, Noll, Vo). */
+/* The slot of object name `name`, or the free slot for it. Hash: FNV-1a (Fowler, Noll, Vo). */
 static size_t slot_of(const bst_name_index *index, const char *name) {
     uint64_t hash = 14695981039346656037u;
     for (const char *c = name; *c; c++) {

@@ -1,4 +1,4 @@
-/* Names to numbers: a hash table that does not slow down with a catalogue of objects. */
+/* Hash table from object names to object indices, for catalogues of thousands of objects. */
 #ifndef BST_WORLD_NAME_INDEX_H
 #define BST_WORLD_NAME_INDEX_H
 
@@ -6,14 +6,14 @@
 
 typedef struct bst_name_index bst_name_index;
 
-/* Room for up to `capacity` names. Freed with bst_name_index_free. */
+/* Creates an index for up to `capacity` object names. Free it with bst_name_index_free. */
 bst_status bst_name_index_create(bst_ctx *ctx, int capacity, bst_name_index **out) BST_MUST_CHECK;
 void bst_name_index_free(bst_name_index *index); /* NULL allowed */
 
-/* The number that goes with `name`, -1 when it is not there. */
+/* Index of the object with this name; -1: not found. */
 int bst_name_index_find(const bst_name_index *index, const char *name);
 
-/* Adds a name (borrowed) that is not there yet. */
+/* Adds a name that is not in the index yet; the name is borrowed. */
 void bst_name_index_add(bst_name_index *index, const char *name, int number);
 
 #endif

@@ -1,4 +1,4 @@
-/* What an observer's computer believes of its orbit and clock. */
+/* Onboard navigation: the observer's orbit and clock with the errors that the scenario sets. */
 #include "sim/world/world_internal.h"
 
 static const bst_knowledge_config *knowledge_of(const bst_world *world, int observer, int sensor) {

@@ -1,4 +1,5 @@
-/* The world's space objects: those of the list, then those of the catalogues. */
+/* Creates the world's space objects: the listed ones, constellations, then catalogues of element
+ * sets. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,15 +9,15 @@
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/world_build.h"
 
-/* One satellite of a catalogue. */
+/* An element set of a catalogue that may become an object. */
 typedef struct candidate {
     const bst_elements *set;
     const bst_catalogue_config *catalogue;
-    double age_s; /* distance of the set's epoch from the scenario's */
+    double age_s; /* time between the epochs of element set and scenario */
     int catalogue_index, order;
 } candidate;
 
-/* By number, then nearest epoch, then place in the files. */
+/* Orders element sets by catalogue number, then nearest epoch, then position in the files. */
 static int compare_candidates(const void *a, const void *b) {
     const candidate *x = a, *y = b;
     if (x->set->norad != y->set->norad) {
@@ -41,7 +42,7 @@ static bst_status reserve(const bst_world_builder *b, int capacity) {
     return bst_name_index_create(b->ctx, capacity, &world->object_names);
 }
 
-/* Owned by the world from then on. */
+/* Creates the brightness model of an object; the world owns it. */
 static bst_status make_brightness(const bst_world_builder *b, const bst_brightness_config *config,
                                   const char *list, int index, const bst_brightness **out) {
     bst_world *world = b->world;
@@ -85,7 +86,8 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
     return BST_OK;
 }
 
-/* The name in the file, with the number where it is empty or taken. */
+/* Names a catalogue object as in its file; adds the catalogue number if the name is empty or
+ * taken. */
 static void name_object(const bst_world *world, const bst_elements *set,
                         bst_world_object_info *info) {
     snprintf(info->name, sizeof info->name, "%s", set->name);
@@ -95,7 +97,8 @@ static void name_object(const bst_world *world, const bst_elements *set,
     }
 }
 
-/* Sets that SGP4 cannot start from are left out and counted: a catalogue of thousands has some. */
+/* Creates objects from element sets. Element sets that SGP4 rejects are counted and skipped: large
+ * catalogues contain some. */
 static bst_status build_candidates(const bst_world_builder *b, const candidate *list, int count,
                                    int first_brightness) {
     bst_world *world = b->world;
@@ -133,7 +136,8 @@ static bst_status build_candidates(const bst_world_builder *b, const candidate *
     return BST_OK;
 }
 
-/* Leaves one candidate per satellite, none of those that are listed, in the order of the files. */
+/* Keeps one element set per satellite, without satellites that are listed, in the order of the
+ * files. */
 static int choose(candidate *list, int count, const int *listed, int listed_count) {
     qsort(list, (size_t)count, sizeof *list, compare_candidates);
     int kept = 0;
@@ -149,7 +153,7 @@ static int choose(candidate *list, int count, const int *listed, int listed_coun
     return kept;
 }
 
-/* The element sets of the catalogues as they come. */
+/* The element sets of the catalogue files. */
 typedef struct catalogue_sets {
     bst_elements *sets[16];
     int count[16];

@@ -1,4 +1,4 @@
-/* The files that drive sensors frame by frame, as a world holds them. */
+/* Loads the frame-updates files of all sensors of a world. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

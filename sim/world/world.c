@@ -18,7 +18,7 @@ static bst_status open_stars(const bst_world_builder *b, const char *name, const
                             : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, where);
 }
 
-/* A copy of its own of the list that describes the camera's field. */
+/* Copies the list that describes a camera's field, for the world to own. */
 static bst_status copy_field(const bst_world_builder *b, bst_camera *camera) {
     bst_config_list *field = &camera->optics.field;
     const void *given = field->items;
@@ -34,7 +34,8 @@ static bst_status copy_field(const bst_world_builder *b, bst_camera *camera) {
     return BST_OK;
 }
 
-/* The PSF of a sensor's camera; that of a file is made once the file's samples are there. */
+/* Creates the PSF of a sensor's camera. A PSF from a file is created later, with the samples of the
+ * file. */
 static bst_status make_psf(const bst_world_builder *b, bst_camera *camera, int observer,
                            int sensor) {
     camera->psf = NULL;
@@ -69,7 +70,7 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
                                b->scenario, observer, sensor);
     }
     camera->spectrum = band;
-    /* the lists belong to the configuration */
+    /* the configuration owns the lists */
     camera->band.response = camera->band.transmission = (bst_config_list){0};
     return BST_OK;
 }
@@ -77,7 +78,7 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
 static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int observer,
                            int sensor) {
     bst_scene_pst *pst;
-    double own_um = camera->pixel_um > 0.0 ? camera->pixel_um : 0.0; /* NAN: not known */
+    double own_um = camera->pixel_um > 0.0 ? camera->pixel_um : 0.0; /* NAN: unknown */
     double pixel_um = camera->optics.pixel_um > 0.0 ? camera->optics.pixel_um : own_um;
     bst_status status =
         bst_scene_pst_create(b->ctx, &camera->background, pixel_um, b->base_dir, &pst);
@@ -87,11 +88,11 @@ static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int o
                                observer, sensor);
     }
     camera->pst = pst;
-    camera->background.pst = (bst_config_list){0}; /* as above */
+    camera->background.pst = (bst_config_list){0}; /* the configuration owns it */
     return BST_OK;
 }
 
-/* The object that an observer in a constellation is; -1: none. */
+/* Index of the object that an observer in a constellation is; -1: none. */
 static int own_object(const bst_world_builder *b, const bst_orbit_config *orbit) {
     const bst_constellation_config *list = b->constellations->items;
     char name[64];
@@ -144,7 +145,7 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
     return BST_OK;
 }
 
-/* Whether a camera's background has the light of stars that are not drawn. */
+/* True if a camera's background includes stars that are not rendered. */
 static bool needs_starlight(const bst_config_list *observers) {
     const bst_observer_config *configs = observers->items;
     for (int i = 0; i < observers->count; i++) {

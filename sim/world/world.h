@@ -1,5 +1,4 @@
-/* The true world of one run: time, Earth orientation, stars, space objects, observers and their
- * sensors. */
+/* The true world of a run: time, Earth orientation, stars, space objects, observers and sensors. */
 #ifndef BST_WORLD_WORLD_H
 #define BST_WORLD_WORLD_H
 
@@ -10,10 +9,10 @@
 #include "sim/catalogue/stars.h"
 #include "sim/world/scene/brightness.h"
 
-typedef struct bst_world bst_world; /* immutable once made; shareable between threads */
+typedef struct bst_world bst_world; /* immutable after creation; shareable between threads */
 
-/* A cheap per-user window on the world: caches rotations and bodies near the times asked for. One
- * per module instance; not shareable between threads; memory does not grow. */
+/* A user's view of the world: caches rotations and body positions near the requested times. One per
+ * module instance; for one thread; constant memory. */
 typedef struct bst_world_view bst_world_view;
 
 typedef struct bst_world_object_info {
@@ -30,9 +29,9 @@ typedef struct bst_world_state {
     bst_vec3 velocity_mps;
 } bst_world_state;
 
-/* The instant `seconds` after the scenario's epoch. */
+/* Time `seconds` after the scenario's epoch. */
 bst_time bst_world_time(const bst_world *world, double seconds);
-/* Earth orientation of the scenario; lent. */
+/* Earth orientation data of the scenario; owned by the world. */
 const bst_astro_eop *bst_world_earth_orientation(const bst_world *world);
 /* Logs a warning if a run ends after the Earth-orientation table, with the uncertainty of the
  * predicted orientation at its end.
@@ -43,32 +42,32 @@ void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const 
                                       double duration_s);
 /* Star catalogue of a world; it belongs to the world. */
 const bst_stars *bst_world_stars(const bst_world *world);
-/* Number of objects. */
+/* Number of space objects in the world. */
 int bst_world_object_count(const bst_world *world);
 
 /* Description of an object; it belongs to the world.
  *
  * Given:     object  index, 0 to one less than the number of objects */
 const bst_world_object_info *bst_world_object(const bst_world *world, int object);
-/* Time from the epoch of a body's element set to the scenario's epoch, s; bodies are numbered
- * objects first, then observers. False: its orbit is no element set. */
+/* Age of the element set of a body at the scenario's epoch, s. Body: object index, or number of
+ * objects + observer index. False: its orbit has no element set. */
 bool bst_world_element_age(const bst_world *world, int body, double *seconds);
-/* Law of motion of an object, without its state: SGP4 with a drag term, or forces. */
+/* Motion model of an object without its state: SGP4 with drag term, or force model. */
 typedef struct bst_world_motion_law {
-    bool sgp4;                     /* an element set */
-    double bstar;                  /* of the set, 1 / Earth radii */
-    const bst_force_model *forces; /* of an integrated orbit, lent by the world; NULL: none known */
+    bool sgp4;                     /* motion by an element set */
+    double bstar;                  /* of the element set, 1 / Earth radii */
+    const bst_force_model *forces; /* of a numerical orbit, owned by the world; NULL: unknown */
 } bst_world_motion_law;
-/* Law of motion of an object; for an orbit relative to another object, the law of that object. */
+/* Motion model of an object; for an orbit relative to another object, the model of that object. */
 bst_world_motion_law bst_world_object_motion(const bst_world *world, int object);
-/* Index of the object with this name, -1 when there is none. */
+/* Index of the object with this name; -1: none. */
 int bst_world_find_object(const bst_world *world, const char *name);
-/* From `seconds` after the epoch on the object of this name is in this state (GCRF) and moves on by
- * two-body motion, until its next one. Truth only: what is known on board stays. BST_ERR_NOT_FOUND:
- * there is none that is steered; BST_ERR_ARGUMENT: not later than the state before. */
+/* Sets the state (GCRF) of an externally commanded object from `seconds` after the epoch; two-body
+ * motion continues it. It changes the truth only, not onboard knowledge. BST_ERR_NOT_FOUND: no such
+ * object accepts states; BST_ERR_ARGUMENT: not later than the previous state. */
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
                            const bst_world_state *state) BST_MUST_CHECK;
-/* Number of observers. */
+/* Number of observers in the world. */
 int bst_world_observer_count(const bst_world *world);
 /* Number of sensors of an observer. */
 int bst_world_sensor_count(const bst_world *world, int observer);
@@ -78,17 +77,17 @@ const char *bst_world_observer_name(const bst_world *world, int observer);
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);
 
 struct bst_frame_updates;
-/* The file that drives the sensor frame by frame (sim/world/frame_updates.h); NULL: none. */
+/* Frame updates of a sensor (sim/world/frame_updates.h); NULL: none. */
 const struct bst_frame_updates *bst_world_frame_updates(const bst_world *world, int observer,
                                                         int sensor);
 struct bst_exposure_config;
-/* The sensor's exposure settings as the scenario has them. */
+/* Exposure settings of a sensor, as in the scenario. */
 const struct bst_exposure_config *bst_world_exposure(const bst_world *world, int observer,
                                                      int sensor);
 
-/* Body attitude that the spacecraft starts in and holds: +z towards the cue at the epoch as the
- * onboard side reckons it, with all its errors, +x as near as can be to the sensor's x_axis_gcrf.
- * The camera has these axes when both gimbal angles are zero. */
+/* Initial attitude of the spacecraft body: +z towards the cue at the epoch (by onboard knowledge,
+ * with all errors), +x as close as possible to the sensor's x_axis_gcrf. The camera has these axes
+ * at zero gimbal angles. */
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor);
 
 /* Creates a view of a world, with a sky clock of its own; one thread may use it at a time.
@@ -99,11 +98,10 @@ bst_quat bst_world_body_attitude(const bst_world *world, int observer, int senso
  * Ownership: free *out with bst_world_view_free */
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world,
                                  bst_world_view **out) BST_MUST_CHECK;
-/* Frees a view; the world itself stays; NULL is allowed. */
+/* Frees a view; the world is not affected; NULL is allowed. */
 void bst_world_view_free(bst_world_view *view);
 
-/* True state of an object or observer `seconds` after the epoch. BST_ERR_NUMERIC when its orbit has
- * no state then (decayed). */
+/* True state of an object at `seconds` after the epoch. BST_ERR_NUMERIC: its orbit has decayed. */
 bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int object,
                                        double seconds, bst_world_state *out) BST_MUST_CHECK;
 
@@ -113,12 +111,12 @@ bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int o
  * Errors:    those of bst_world_view_object_state */
 bst_status bst_world_view_observer_state(bst_ctx *ctx, bst_world_view *view, int observer,
                                          double seconds, bst_world_state *out) BST_MUST_CHECK;
-/* What the onboard side of a sensor believes then: the observer's state with its orbit error, and
- * the bodies, both at the time that its clock shows. */
+/* Onboard navigation of a sensor: observer state with orbit error, and Sun and Moon, both at the
+ * time of the onboard clock. */
 bst_status bst_world_view_nav(bst_ctx *ctx, bst_world_view *view, int observer, int sensor,
                               double seconds, bst_world_state *state,
                               bst_bodies *bodies) BST_MUST_CHECK;
-/* Rotations and bodies then, interpolated. */
+/* Earth rotation matrices at a time after the epoch, interpolated. */
 bst_status bst_world_view_earth_frames(bst_ctx *ctx, bst_world_view *view, double seconds,
                                        bst_astro_earth_frames *out) BST_MUST_CHECK;
 
@@ -129,17 +127,16 @@ bst_status bst_world_view_earth_frames(bst_ctx *ctx, bst_world_view *view, doubl
 bst_status bst_world_view_bodies(bst_ctx *ctx, bst_world_view *view, double seconds,
                                  bst_bodies *out) BST_MUST_CHECK;
 
-/* What an observer sees of an object: light time solved, Sun and shadow at the time the light left.
- */
+/* An object as seen by an observer: light time, phase and shadow at emission, brightness. */
 typedef struct bst_world_sight {
     bst_vec3 geometric;     /* unit, GCRF: object at emission minus observer at reception */
-    bst_vec3 apparent;      /* the same with stellar aberration */
-    double range_m;         /* geocentric: observer at reception to object at emission */
-    double light_time_s;    /* barycentric: length of the light's path over c */
-    double phase_rad;       /* Sun - object - observer */
-    double sunlit_fraction; /* of the Sun's disc, 0..1 */
+    bst_vec3 apparent;      /* with stellar aberration */
+    double range_m;         /* from the observer at reception to the object at emission */
+    double light_time_s;    /* barycentric length of the light path over c */
+    double phase_rad;       /* angle Sun - object - observer */
+    double sunlit_fraction; /* visible fraction of the Sun's disc, 0..1 */
     double v_mag;           /* of reflected light; +INFINITY when dark */
-    bst_scene_glow glow;    /* all its light */
+    bst_scene_glow glow;    /* reflected and emitted light */
     bool occulted;          /* behind the Earth */
 } bst_world_sight;
 

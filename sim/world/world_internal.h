@@ -1,4 +1,4 @@
-/* Inside of the world, shared by the files of sim/world only. */
+/* Internal types of the world, shared by the files of sim/world. */
 #ifndef BST_WORLD_WORLD_INTERNAL_H
 #define BST_WORLD_WORLD_INTERNAL_H
 
@@ -13,21 +13,21 @@
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
 
-/* A burn with what it has made of the orbit; worked out once. */
+/* A burn and its effect on the orbit, computed once. */
 typedef struct bst_world_burn {
     double time_s;
-    bst_world_state base;      /* the catalogued orbit at that time */
-    bst_world_state deviation; /* from it, right after this burn, of all burns so far */
+    bst_world_state base;      /* catalogued orbit at the burn */
+    bst_world_state deviation; /* cumulative deviation from it after this burn */
 } bst_world_burn;
 
-/* An orbit ready to be evaluated; immutable. */
+/* An orbit ready for evaluation; immutable. */
 typedef struct bst_world_orbit {
     int32_t source; /* BST_ORBIT_... */
     /* sgp4 */
     bst_sgp4 *sgp4;
     double epoch_offset_s; /* scenario epoch minus element epoch */
     double bstar;          /* 1 / Earth radii */
-    /* relative */
+    /* relative: the reference orbit */
     const struct bst_world_orbit *reference;
     double at_s;
     bst_vec3 offset_rtn_m, rate_rtn_mps;
@@ -36,41 +36,41 @@ typedef struct bst_world_orbit {
     const bst_state_table *injected;
     int file_object;
     bool in_teme;        /* injected */
-    double from_s, to_s; /* span of the states, after the epoch */
+    double from_s, to_s; /* time span of the states, after the epoch */
     /* numerical */
     bst_gravity *gravity;
     bst_force_model forces;
-    bst_trajectory *unburnt, *burnt; /* burnt NULL: there are no burns */
+    bst_trajectory *unburnt, *burnt; /* with and without burns; burnt NULL: no burns */
 
     bst_world_burn *burns;
     int burn_count;
-    struct bst_external_states *external; /* owned; NULL: its states do not come by message */
+    struct bst_external_states *external; /* owned; NULL: not externally commanded */
     const char *name;                     /* for messages; borrowed */
 } bst_world_orbit;
 
 typedef struct world_object {
     bst_world_object_info info;
     bst_world_orbit orbit;
-    bool catalogued; /* from a catalogue, not from the list */
+    bool catalogued; /* from a catalogue file, not from the list */
 } world_object;
 
 typedef struct world_sensor {
     bst_sensor_config config;
     int cue_object;         /* -1: none */
-    bst_vec3 cue_rotation;  /* the cue's error: rotation vector, GCRF */
+    bst_vec3 cue_rotation;  /* cue error: rotation vector, GCRF */
     bst_quat body_attitude; /* see bst_world_body_attitude */
 } world_sensor;
 
 typedef struct world_observer {
     char name[64];
     int norad;      /* 0: none */
-    int own_object; /* that this observer is, of a constellation; -1: none */
+    int own_object; /* object of a constellation that this observer is; -1: none */
     bst_world_orbit orbit;
     world_sensor *sensors;
     int sensor_count;
 } world_observer;
 
-/* A file of states that objects share. */
+/* A file of states shared by several objects. */
 typedef struct bst_world_file {
     char *key;
     bst_oem *oem;
@@ -79,7 +79,7 @@ typedef struct bst_world_file {
 
 struct bst_frame_updates;
 
-/* The file that drives a sensor frame by frame. */
+/* Frame updates of one sensor. */
 typedef struct world_updates {
     int observer, sensor;
     bst_camera camera;
@@ -90,14 +90,14 @@ typedef struct world_updates {
 struct bst_world {
     bst_time epoch;
     bst_astro_eop *eop;
-    bst_sky_clock_grid *sky_grid; /* of all clocks of the world */
-    bool shadow_atmosphere;       /* the air at the edge of the Earth's shadow counts for light */
+    bst_sky_clock_grid *sky_grid; /* shared by all clocks of the world */
+    bool shadow_atmosphere;       /* sunlight at the edge of the shadow includes the atmosphere */
     bst_stars *stars;
-    bst_faint_sky *faint;     /* NULL: neither statistical stars nor their light */
-    double faint_limit_v_mag; /* single statistical stars down to this; -INFINITY: none */
+    bst_faint_sky *faint;     /* NULL: no statistical stars and no light of them */
+    double faint_limit_v_mag; /* magnitude limit of single statistical stars; -INFINITY: none */
     world_object *objects;
     int object_count;
-    bst_brightness **brightness; /* of the listed objects, then of the catalogues */
+    bst_brightness **brightness; /* of listed objects, then of catalogues */
     int brightness_count;
     bst_name_index *object_names;
     bst_world_file *files;
@@ -109,24 +109,23 @@ struct bst_world {
     struct bst_ephemeris *ephemeris;
 };
 
-/* State at `seconds` after the scenario's epoch; `with_burns` false gives the orbit as catalogued.
- */
+/* State of an orbit at `seconds` after the epoch; `with_burns` false: the catalogued orbit. */
 bst_status bst_world_orbit_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
                                  bst_time epoch, double seconds, bool with_burns,
                                  bst_world_state *out) BST_MUST_CHECK;
 
-/* The same of an orbit from a file, without burns. */
+/* State of an orbit from a file, without burns. */
 bst_status bst_world_orbit_file_state(bst_ctx *ctx, const bst_world_orbit *orbit,
                                       bst_sky_clock *clock, bst_time epoch, double seconds,
                                       bst_world_state *out) BST_MUST_CHECK;
 
-/* Fills orbit->burns (by time, freed by the caller's owner) once the orbit itself is made.
- * BST_ERR_NUMERIC when the orbit has no state at a burn. */
+/* Sets the burns of an orbit, sorted by time, after the orbit was created. The caller frees them.
+ * BST_ERR_NUMERIC: no state at a burn. */
 bst_status bst_world_orbit_set_burns(bst_ctx *ctx, bst_world_orbit *orbit, bst_sky_clock *clock,
                                      bst_time epoch, const bst_burn_config *burns,
                                      int count) BST_MUST_CHECK;
 
-/* Where and when light arrives. */
+/* Reception of light: observer position and time. */
 typedef struct bst_world_reception {
     const bst_world_state *observer;
     bst_sky_clock *clock;
@@ -135,15 +134,15 @@ typedef struct bst_world_reception {
     double seconds; /* after the epoch */
 } bst_world_reception;
 
-/* Light-time solution: where the object was when the light left that reaches the observer at
- * `seconds`. *geometric_m: from the observer at reception to the object at emission in barycentric
- * axes (its direction is what stars are compared with); *emission_s: the time of emission. */
+/* Light-time solution of an object's orbit for an observer at `seconds`. *geometric_m: from the
+ * observer at reception to the object at emission, barycentric axes (comparable with star
+ * directions); *emission_s: time of emission. */
 bst_status bst_world_orbit_line_of_sight(bst_ctx *ctx, const bst_world_orbit *object,
                                          const bst_world_reception *at, bool with_burns,
                                          bst_vec3 *geometric_m, bst_world_state *object_state,
                                          double *emission_s) BST_MUST_CHECK;
 
-/* Who looks, and when: an exposure. */
+/* Observer and time span of an exposure. */
 typedef struct bst_world_view_span {
     int observer;
     double start_s, end_s;
@@ -151,26 +150,25 @@ typedef struct bst_world_view_span {
 
 struct bst_scene_source_path;
 struct bst_scene_path_light;
-/* The path of an object as an observer sees it in a span, the sight at the middle, and
- * what its light follows from.
- * BST_ERR_NUMERIC when either has no orbit at some time of it. */
+/* Path of an object relative to an observer during a span, the sight at mid-span, and the inputs of
+ * its brightness. BST_ERR_NUMERIC if an orbit does not cover the span. */
 bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
                                int object, struct bst_scene_source_path *path,
                                struct bst_scene_path_light *light,
                                bst_world_sight *mid) BST_MUST_CHECK;
 
-/* Indices (ascending) of the objects that may be seen in a cone of apparent directions at any time
- * of a span, and few others; room for all. */
+/* Indices (ascending) of the objects that may be in a cone of apparent directions during a span,
+ * and few others; room for all. */
 bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
                                bst_vec3 axis, double half_angle_rad, int *indices,
                                int *count) BST_MUST_CHECK;
 
-/* Works out a sensor's cue: object index, error rotation, body attitude. `scenario` names the file
- * in messages. */
+/* Computes a sensor's cue: object index, error rotation, body attitude. `scenario`: file name for
+ * messages. */
 bst_status bst_world_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
                                  int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
 
-/* A sensor, and the time and the observer's state for which its cue is worked out. */
+/* A sensor, and the time and observer state at which its cue is evaluated. */
 typedef struct bst_world_cue_at {
     int observer, sensor;
     bst_sky_clock *clock;
@@ -178,15 +176,13 @@ typedef struct bst_world_cue_at {
     const bst_world_state *eye;
 } bst_world_cue_at;
 
-/* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit as
- * seen from an observer in state `eye`, light time in. */
+/* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit
+ * from observer state `eye`, with light time. */
 bst_status bst_world_cue_nominal_direction(bst_ctx *ctx, const bst_world *world,
                                            const bst_world_cue_at *at,
                                            bst_vec3 *out) BST_MUST_CHECK;
 
-/* The vector (m, GCRF, geometric) of which that is the direction; 0 where the cue is a direction
- * only. */
-/* A place of the cue's region (kind other than none) by its angles from the middle, as
+/* Direction of a point of the cue's region (kind other than none) by angles from its centre, as
  * bst_knowledge_region_direction_at. */
 bst_status bst_world_region_place(bst_ctx *ctx, const bst_world *world, const bst_world_cue_at *at,
                                   double along_rad, double across_rad,
@@ -201,17 +197,16 @@ double bst_world_region_half_length_rad(const bst_region_config *region);
 bst_status bst_world_cue_nominal_line(bst_ctx *ctx, const bst_world *world,
                                       const bst_world_cue_at *at, bst_vec3 *line_m) BST_MUST_CHECK;
 
-/* The same of any object. */
+/* Vector from an observer to an object on its nominal orbit, m. */
 bst_status bst_world_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,
                                          bst_sky_clock *clock, double seconds,
                                          const bst_world_state *eye,
                                          bst_vec3 *line_m) BST_MUST_CHECK;
 
-/* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
+/* Onboard clock reading at `seconds` after the epoch, as time after the epoch. */
 double bst_world_nav_seconds(const bst_world *world, int observer, int sensor, double seconds);
 
-/* Adds to an observer's state, that of when the onboard clock shows believed_s, the error with
- * which the onboard side of a sensor knows it. */
+/* Adds the navigation error of a sensor to the observer's state at onboard time believed_s. */
 void bst_world_nav_estimate(const bst_world *world, int observer, int sensor, double believed_s,
                             bst_world_state *state);
 

@@ -1,4 +1,4 @@
-/* Objects by name, and files by path. */
+/* Lookup of objects by name and of state files by path. */
 #include <stdio.h>
 
 #include "sim/world/world_build.h"

@@ -7,7 +7,7 @@ Usage, from the repository root:
 A fenced block of language sh or console is run, all blocks of a page in one shell session each, page after page, in a
 scratch folder that looks like the repository. A comment on the line before a block changes that:
 
-    <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 5 s (a command's own --duration is kept)
+    <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 2 s (a command's own --duration is kept)
                                 (a shipped study is only planned: --dry-run)
     <!-- test: exit=1 -->       the block ends with this exit code
     <!-- test: background -->   the block runs beside the next ones of its page and must end with 0 by its end
@@ -28,7 +28,7 @@ import tempfile
 import unittest
 
 ROOT = os.getcwd()
-SECONDS = 5
+SECONDS = 2
 LANGUAGES = {"sh", "console", "text", "json", "c", "python", "cmake", "{toctree}"}
 # variables that later blocks of a page use; not the variables of one command
 SETTING = re.compile(r"""export .*|\w+=(\S*|"[^"]*")""")

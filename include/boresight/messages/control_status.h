@@ -14,16 +14,16 @@ typedef enum bst_mode {
     BST_MODE_SEARCH,  /* step-stare pattern about the cue */
     BST_MODE_ACQUIRE, /* a candidate is being centred and confirmed */
     BST_MODE_TRACK,
-    BST_MODE_REACQUIRE, /* target lost: predicted place, then search about it */
+    BST_MODE_REACQUIRE, /* target lost: predicted position, then search around it */
     BST_MODE_STARE,     /* open loop, inertial */
     BST_MODE_RATE,      /* open loop, on the cue */
     BST_MODE_COAST,     /* on the prediction of a target that cannot be seen */
-    BST_MODE_FIXED,     /* open loop, a direction held in inertial space or in the body */
+    BST_MODE_FIXED,     /* open loop, constant direction in inertial space or in the body */
     BST_MODE_SCAN,      /* open loop, along an arc at a constant rate */
     BST_MODE_COUNT
 } bst_mode;
 
-/* control_status (latest): for the record, the progress line and the evaluator. */
+/* control_status (latest): mode and aim of control; for record, progress display and evaluation. */
 typedef struct bst_control_status {
     int64_t tick;
     int32_t mode; /* bst_mode */

@@ -11,7 +11,7 @@
 typedef enum bst_label {
     BST_LABEL_UNKNOWN = 0,
     BST_LABEL_STAR,   /* identified in the onboard catalogue; without star_id: moves like a star */
-    BST_LABEL_OBJECT, /* not a star: moves, or no catalogue star is there */
+    BST_LABEL_OBJECT, /* not a star: it moves, or the catalogue has no star there */
     BST_LABEL_ARTEFACT,  /* cut by the edge, spike of a bright star, or no source by its shape */
     BST_LABEL_HOT_PIXEL, /* sharper than the PSF, at the same pixel again, or one pixel alone */
     BST_LABEL_HIT,       /* radiation: sharper than the PSF, in this frame only */
@@ -22,8 +22,9 @@ enum {
     BST_DETECTION_EDGE = 1u << 1,
     BST_DETECTION_STREAK = 1u << 2, /* elongated beyond the PSF */
     BST_DETECTION_BLEND = 1u << 3,
-    BST_DETECTION_BLOOM = 1u << 5, /* charge overflowed along its columns: placed by its wings */
-    BST_DETECTION_STACK = 1u << 4, /* seen in the sum of several frames, this one the last */
+    BST_DETECTION_BLOOM =
+        1u << 5, /* charge overflowed along its columns: centroid from its wings */
+    BST_DETECTION_STACK = 1u << 4, /* detected in a stack of frames that ends with this one */
 };
 
 typedef struct bst_detection {
@@ -38,8 +39,9 @@ typedef struct bst_detection {
     uint32_t star_id;         /* Tycho-2 identity, 0 when none */
     int32_t label;            /* bst_label */
     double label_probability; /* that the label is right, 0 to 1; 0 where the label is UNKNOWN */
-    double rate_x_pxps, rate_y_pxps; /* against the stars; only of BST_DETECTION_STACK, else 0 */
-    double rate_sigma_pxps;          /* of each */
+    double rate_x_pxps,
+        rate_y_pxps;        /* rate against the stars; only with BST_DETECTION_STACK, else 0 */
+    double rate_sigma_pxps; /* per axis */
 } bst_detection;
 
 /* detections (queue): what image processing (or the generator) found in one frame. */
@@ -51,12 +53,12 @@ typedef struct bst_detections {
     bst_quat q_telemetry_from_gcrf; /* telemetry alone, mid-exposure */
     double background_e, noise_e;   /* median per pixel */
     double threshold_snr;
-    /* V of one electron per second, by zero_point_stars of the frame's stars; when these are 0, by
-     * the camera's own figures */
+    /* V of one electron per second, from zero_point_stars of the frame's stars; if there are none,
+     * the camera's nominal value */
     double zero_point_mag, zero_point_sigma_mag;
     int32_t zero_point_stars;
     int32_t stars_identified;
-    int32_t windows;     /* regions of interest about predictions that were searched; 0: all */
+    int32_t windows; /* number of searched regions of interest around predictions; 0: full frame */
     int32_t count, lost; /* items; detections beyond the capacity */
     int32_t bad_pixels;  /* on the sensor, learned by image processing so far */
     bst_detection items[];

@@ -1,4 +1,4 @@
-/* Channel exposure: when each exposure began and ended, and how the sensor was set. */
+/* Channel exposure: times and sensor settings of each exposure. */
 #ifndef BORESIGHT_MESSAGES_EXPOSURE_H
 #define BORESIGHT_MESSAGES_EXPOSURE_H
 
@@ -15,7 +15,7 @@ typedef struct bst_exposure {
     int64_t start_tick, end_tick; /* rolling shutter: of the window's middle row */
     bst_window window;
     int binning;
-    bool dropped;              /* the frame is lost in transfer: truth is written, but no frame */
+    bool dropped; /* the frame is lost in transfer: the truth is published, but no frame */
     double pixel_scale_arcsec; /* 0: the camera's */
 } bst_exposure;
 

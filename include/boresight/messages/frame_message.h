@@ -9,8 +9,8 @@
 
 #define BST_CHANNEL_FRAME "frame"
 
-/* frame (queue). The channel slot owns one reference of `frame`; NULL: given to a hook that does
- * not read the pixels. */
+/* frame (queue). The channel slot owns one reference of `frame`; NULL for an observer that does not
+ * read pixels. */
 typedef struct bst_frame_message {
     bst_frame *frame;
     int64_t exposure_id;

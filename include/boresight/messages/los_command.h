@@ -15,15 +15,15 @@
  * dt = (t - tick) / tick rate. All members after the rate zero: constant rate, by the nearest
  * angles of the mount. */
 typedef struct bst_los_command {
-    int64_t tick;                      /* of reference */
-    bst_vec3 direction_gcrf;           /* unit, apparent */
-    bst_vec3 rate_gcrf_radps;          /* d(direction)/dt, perpendicular to direction */
-    bst_vec3 accel_gcrf_radps2;        /* d2(direction)/dt2 */
-    bool near_given;                   /* if several angles give this direction: */
-    double near_rad[BST_MOUNT_AXES];   /* those nearest to these (by axis of mount_status), at
-                                          `tick`; else those nearest to the present angles */
+    int64_t tick;                    /* of reference */
+    bst_vec3 direction_gcrf;         /* unit, apparent */
+    bst_vec3 rate_gcrf_radps;        /* d(direction)/dt, perpendicular to direction */
+    bst_vec3 accel_gcrf_radps2;      /* d2(direction)/dt2 */
+    bool near_given;                 /* preferred angles if several give this direction: */
+    double near_rad[BST_MOUNT_AXES]; /* angles by axis of mount_status at `tick`; false: nearest to
+                                        the present angles */
     double near_radps[BST_MOUNT_AXES]; /* their rates */
-    bool roll_given;                   /* the body goes to this angle of bst_body_roll: */
+    bool roll_given;                   /* commanded angle of bst_body_roll: */
     double roll_rad;
 } bst_los_command;
 

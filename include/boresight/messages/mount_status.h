@@ -12,7 +12,7 @@
 enum { BST_MOUNT_AXES = 3 }; /* greatest number of axes of a mount */
 
 enum {
-    BST_AXIS_STUCK = 1u << 0,     /* commanded to move and does not */
+    BST_AXIS_STUCK = 1u << 0,     /* does not follow its command */
     BST_AXIS_SATURATED = 1u << 1, /* at its rate, acceleration or torque limit */
     BST_AXIS_AT_STOP = 1u << 2,   /* held by the end of its travel */
 };
@@ -20,10 +20,10 @@ enum {
 /* One axis of a mount. Limits are those for commands. */
 typedef struct bst_mount_axis {
     bst_vec3 axis_body; /* unit: axis of rotation, right-handed, when all angles are zero */
-    double angle_rad;   /* encoder, with whole turns: a cable is wound by as much */
+    double angle_rad;   /* encoder, with whole turns: cable winding */
     double rate_radps;
     double rate_limit_radps, accel_limit_radps2; /* 0: none */
-    double min_rad, max_rad; /* travel; both 0: turns without end, and angle_rad in (-pi, pi] */
+    double min_rad, max_rad; /* travel; both 0: unlimited rotation, angle_rad in (-pi, pi] */
     bool redundant; /* not needed to reach a direction: the mount follows its axis_near_rad, or
                        chooses its angle */
     uint32_t flags; /* BST_AXIS_... */
@@ -36,10 +36,10 @@ typedef struct bst_body_roll {
     double rate_limit_radps, accel_limit_radps2;
 } bst_body_roll;
 
-/* mount_status (latest): geometry, limits and state of the mount, as far as it is known onboard,
- * at the rate of pointing_telemetry. The attitude of the camera in the body is
- * q_body_from_cam = R(axis 0, angle 0) R(axis 1, angle 1) ... q_body_from_cam_at_zero, axes in
- * order from the body outwards to the camera, R(a, t) the rotation by t about a. */
+/* mount_status (latest): geometry, limits and state of the mount, as known onboard, at the rate of
+ * pointing_telemetry. The attitude of the camera in the body is q_body_from_cam = R(axis 0, angle
+ * 0) R(axis 1, angle 1) ... q_body_from_cam_at_zero, axes in order from the body outwards to the
+ * camera, R(a, t) the rotation by t about a. */
 typedef struct bst_mount_status {
     int64_t tick; /* of validity */
     int32_t axes; /* 0: follows any command at once (an ideal mount) */

@@ -1,4 +1,4 @@
-/* Channel nav_telemetry: what the spacecraft knows of its own orbit. */
+/* Channel nav_telemetry: onboard navigation: orbit of the spacecraft, Sun and Moon. */
 #ifndef BORESIGHT_MESSAGES_NAV_TELEMETRY_H
 #define BORESIGHT_MESSAGES_NAV_TELEMETRY_H
 
@@ -8,7 +8,7 @@
 
 #define BST_CHANNEL_NAV_TELEMETRY "nav_telemetry"
 
-/* nav_telemetry (latest): what the spacecraft knows of its own orbit. */
+/* nav_telemetry (latest): orbit of the spacecraft by onboard navigation. */
 typedef struct bst_nav_telemetry {
     int64_t tick;               /* of validity */
     bst_vec3 position_gcrf_m;   /* geocentric */

@@ -16,20 +16,18 @@ typedef enum bst_plane {
     BST_PLANE_COUNT
 } bst_plane;
 
-/* planes (latest): of the frame written in the same step, the expected electrons per pixel from
- * stars, from objects, and from sky and dark current; the brightest source of each pixel; and its
- * saturation. For hooks of the engine only: the images belong to their writer, which overwrites
- * them in its next step. */
+/* planes (latest): for the frame of the same step: expected electrons per pixel from stars,
+ * objects, and sky with dark current; brightest source of each pixel; saturation. For observers of
+ * the engine only: the writer overwrites the images in its next step. */
 typedef struct bst_planes {
     int64_t exposure_id;
-    int width, height;                              /* of the frame: its window over its binning */
-    const float *electrons[BST_PLANE_SEGMENTATION]; /* [height][width] by bst_plane; NULL: not
-                                                       asked for */
-    const int32_t *segmentation; /* [height][width]: 0, or 1 + number of the item of `truth` that
-                                    gives most light there; NULL: not asked for */
-    const uint8_t *saturation;   /* [height][width]: 0, or 1: the well is full (one of those that
-                                    were added), 2: the converter is at its top, 3: both; NULL: not
-                                    asked for */
+    int width, height; /* of the frame: its window over its binning */
+    const float
+        *electrons[BST_PLANE_SEGMENTATION]; /* [height][width] by bst_plane; NULL: not requested */
+    const int32_t *segmentation; /* [height][width]: 0, or 1 + index of the item of `truth` with
+                                    most light in the pixel; NULL: not requested */
+    const uint8_t *saturation; /* [height][width]: 0; 1: full well (of a binned pixel); 2: converter
+                                  limit; 3: both; NULL: not requested */
 } bst_planes;
 
 #endif

@@ -1,4 +1,4 @@
-/* Channel predictions: predicted places of tracks and the filtered attitude error. */
+/* Channel predictions: predicted positions of tracks and the filtered attitude error. */
 #ifndef BORESIGHT_MESSAGES_PREDICTIONS_H
 #define BORESIGHT_MESSAGES_PREDICTIONS_H
 

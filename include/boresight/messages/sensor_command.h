@@ -1,4 +1,4 @@
-/* Channel sensor_command: exposure, window and binning that control asks for. */
+/* Channel sensor_command: exposure, window and binning requested by control. */
 #ifndef BORESIGHT_MESSAGES_SENSOR_COMMAND_H
 #define BORESIGHT_MESSAGES_SENSOR_COMMAND_H
 

@@ -15,13 +15,13 @@ typedef enum bst_track_status {
     BST_TRACK_COASTING, /* confirmed, no detection in the latest frames */
 } bst_track_status;
 
-/* Why the object of a track cannot be seen, by its estimated orbit. */
+/* Reason why the object of a track is not visible, by its estimated orbit. */
 typedef enum bst_track_hidden {
     BST_HIDDEN_NOT = 0,
     BST_HIDDEN_SHADOW,  /* in the Earth's shadow */
     BST_HIDDEN_EARTH,   /* behind the Earth */
-    BST_HIDDEN_AWAITED, /* visible again, but not detected again yet */
-    BST_HIDDEN_DIM,     /* visible, but too dim: far away, or lit from behind */
+    BST_HIDDEN_AWAITED, /* visible again, not yet detected again */
+    BST_HIDDEN_DIM,     /* visible, but too faint: distant, or at a large phase angle */
 } bst_track_hidden;
 
 typedef struct bst_track {
@@ -35,16 +35,16 @@ typedef struct bst_track {
     double covariance[4][4];
     double v_mag;
     double snr;   /* of the latest detection */
-    double score; /* log-likelihood ratio of an object against chance pairings of detections */
+    double score; /* log-likelihood ratio of an object against chance associations */
     int32_t hits, misses_in_row;
     int64_t first_tick, last_update_tick;
     double x_px, y_px; /* latest detection, full-sensor coordinates */
-    bool uncorrelated; /* confirmed, and neither the target nor the object of the cue */
-    int32_t hidden;    /* bst_track_hidden; other than 0: coasting, and no detection is taken for it
-                          before one of its place and motion has been confirmed on its own */
+    bool uncorrelated; /* confirmed, and neither target nor object of the cue */
+    int32_t hidden;    /* bst_track_hidden; not 0: coasting, and it takes a detection only after a
+                          separate track at its position and motion has been confirmed */
 } bst_track;
 
-/* Attitude from stars, and the telemetry's error that follows from it. */
+/* Attitude from stars, and the resulting error of telemetry. */
 typedef struct bst_attitude_fix {
     bool valid;
     int32_t stars;
@@ -54,8 +54,8 @@ typedef struct bst_attitude_fix {
                                  q_telemetry */
     double sigma_rad[3];      /* standard deviation about camera x, y, z */
     double rms_px;            /* of the star residuals */
-    double shared; /* share of the variance about camera x and y that successive frames have in
-                      common, 0 to 1: errors that stay with the stars */
+    double shared; /* fraction of the variance about camera x and y that successive frames share, 0
+                      to 1: errors tied to the stars */
 } bst_attitude_fix;
 
 /* tracks (queue): the tracker's state after one frame, valid at `tick` (mid-exposure). */
@@ -64,7 +64,7 @@ typedef struct bst_tracks {
     int64_t tick;
     bst_attitude_fix attitude;
     int64_t target_id; /* track of interest, 0 when none */
-    int32_t at_rest;   /* tracks that do not move against the stars; not in items */
+    int32_t at_rest;   /* number of tracks that do not move relative to the stars; not in items */
     int32_t count, lost;
     bst_track items[];
 } bst_tracks;

@@ -24,18 +24,18 @@ typedef struct bst_truth_item {
     int32_t norad; /* object: catalogue number, else 0 */
     uint32_t flags;
     double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;
-    /* Means over the exposure, weighted with the source's light in time: of the chief ray, whose
-     * the other places are too and whose place the WCS gives; and of the light on the focal plane,
-     * which coma and other odd aberrations, the phase of a disc and vignetting move from there. */
+    /* Light-weighted means over the exposure: of the chief ray, to which the other positions and
+     * the WCS refer; and of the centroid on the focal plane, shifted by coma and other odd
+     * aberrations, disc phase and vignetting. */
     double x_chief_px, y_chief_px, x_centroid_px, y_centroid_px;
-    double delay_s; /* rolling shutter: the exposure of the source's own row, whose these places
-                       are, has its middle so much later than the header's ticks; else 0 */
-    double ra_rad,
-        dec_rad; /* ICRS; star: catalogue place at epoch; object: geometric with light time, mid */
+    double delay_s; /* rolling shutter: delay of the middle of the source's own row exposure, to
+                       which these positions refer, relative to the header's ticks; else 0 */
+    double ra_rad, dec_rad; /* ICRS; star: catalogue position at epoch; object: geometric with light
+                               time, mid-exposure */
     double v_mag;
     double electrons;       /* detected in the exposure, whole PSF */
     double snr;             /* sqrt(sum s^2 / sigma^2), sigma without the source's own light */
-    double sunlit_fraction; /* object: of the Sun's disc, mid */
+    double sunlit_fraction; /* object: visible fraction of the Sun's disc, mid-exposure */
     double phase_rad;       /* object: Sun - object - observer */
     double range_m;         /* object: mid */
 } bst_truth_item;
@@ -46,21 +46,21 @@ typedef struct bst_truth {
     int64_t start_tick, end_tick;
     bool dropped;
     bst_quat q_cam_from_gcrf_mid;  /* at the middle of the exposure, jitter included */
-    bst_quat q_cam_from_gcrf_mean; /* averaged over the exposure, so that it shows stars at their
-                                      mean places: the attitude of the header's WCS */
-    bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid */
-    bst_vec3 velocity_bary_mps;            /* mid; with sun_m it gives the light's corrections */
-    bst_vec3 sun_m;                        /* observer to Sun, mid */
-    double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
+    bst_quat q_cam_from_gcrf_mean; /* mean over the exposure: shows stars at their mean positions;
+                                      attitude of the header's WCS */
+    bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid-exposure */
+    bst_vec3 velocity_bary_mps; /* mid-exposure; with sun_m for aberration and light deflection */
+    bst_vec3 sun_m;             /* observer to Sun, mid-exposure */
+    double boresight_x_px, boresight_y_px; /* intersection of the boresight with the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
-    double earth_fraction, moon_fraction, sun_fraction; /* of the window's area that their discs
-                                                           cover, 0 to 1 */
-    double hits_e;      /* charge of the radiation hits on the sensor, electrons */
+    double earth_fraction, moon_fraction,
+        sun_fraction;   /* fraction of the window's area that the discs cover, 0 to 1 */
+    double hits_e;      /* total charge of the radiation hits, electrons */
     int32_t hits;       /* radiation hits */
-    double error_sigma; /* largest expected rendering error of a pixel, in units of its noise; NAN:
+    double error_sigma; /* largest predicted rendering error of a pixel, in units of its noise; NAN:
                            unknown */
     int64_t nodes;      /* quadrature points of the sources' tracks */
-    bool one_track;     /* the stars followed one track */
+    bool one_track;     /* all stars were rendered with one track */
     double pixel_scale_arcsec; /* of this exposure */
     int32_t count, lost;       /* items; sources beyond the capacity */
     bst_truth_item items[];

@@ -5,7 +5,7 @@
 
 #include "sim/analysis/calibration/calibrate_internal.h"
 
-/* SNR about the threshold in which Pd is fitted, stars whose mean place is one, grid of places. */
+/* SNR around the threshold in which Pd is fitted */
 static const double PD_REACH = 4.0;
 enum { LEAST_COMMON = 8, GRID = 48, CAPACITY = 4096 };
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
@@ -64,8 +64,7 @@ static double length_of(const bst_truth_item *t) {
     return isfinite(length) ? length : 0.0;
 }
 
-/* Path of the stars in the middle of the frame: of the star that is nearest to it; false where
- * there is none. */
+/* Path of the stars at the centre of the frame, from the star nearest to it; false: none. */
 static bool star_path(const bst_truth *truth, double x, double y, double *dx, double *dy) {
     double nearest = INFINITY;
     *dx = *dy = 0.0;
@@ -82,7 +81,7 @@ static bool star_path(const bst_truth *truth, double x, double y, double *dx, do
     return isfinite(nearest);
 }
 
-/* Whether a place is further than `reach` from every source of the truth that shows. */
+/* Checks that a position is further than `reach` from every visible source of the truth. */
 static bool is_free(const bst_truth *truth, double x, double y, double reach, int except,
                     double snr) {
     for (int i = 0; i < truth->count; i++) {
@@ -107,9 +106,10 @@ static int snr_node(double snr) {
     return best;
 }
 
-/* What all places of a frame have in common: the generator has it from the camera's path. */
+/* Position error that all stars of a frame share; the generator gets it from the camera's
+ * motion. */
 typedef struct common_error {
-    double x, y, weight; /* of 1 / variance, px^-2 */
+    double x, y, weight; /* sum of 1 / variance, px^-2 */
     int count;
 } common_error;
 
@@ -121,7 +121,7 @@ static double place_weight(const bst_calibration_fitter *c, const bst_truth_item
 
 static void add_place(bst_calibration_fitter *c, const bst_truth_item *t, const bst_detection *d,
                       double noise_e, const common_error *common) {
-    /* the mean follows each of its members by its share */
+    /* each star contributes its own weight to the mean */
     double own = place_weight(c, t, noise_e) / common->weight;
     if (common->count < LEAST_COMMON || own > 0.5) {
         return;
@@ -137,7 +137,7 @@ static void add_place(bst_calibration_fitter *c, const bst_truth_item *t, const 
     const double squares[2] = {along * along / at.var_along_px2,
                                across * across / at.var_across_px2};
     for (int k = 0; k < 2; k++) {
-        /* what is further off is another source's light */
+        /* a larger error belongs to the light of another source */
         if (squares[k] < CALIBRATE_MOST_SIGMAS * CALIBRATE_MOST_SIGMAS) {
             calibrate_mean *sum = k == 0 && length > 1.0 ? &c->along[node] : &c->across[node];
             sum->sum += squares[k];
@@ -169,7 +169,8 @@ static bst_status add_trial(bst_ctx *ctx, bst_calibration_fitter *c, const bst_t
     return BST_OK;
 }
 
-/* above: of the threshold at the pixels' own noise over that for normal noise. */
+/* Adds the false alarms of a frame. above: threshold at the pixels' own noise over that for normal
+ * noise. */
 static bst_status add_alarms(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth *truth,
                              const bst_detections *detections, double reach, double taken,
                              double above) {
@@ -180,7 +181,7 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibration_fitter *c, const bst_
         double y = height * ((double)(k / GRID) + 0.5) / GRID;
         open += is_free(truth, x, y, reach, -1, 1.0);
     }
-    /* background that is found too bright takes from noise */
+    /* an overestimated background also reduces the noise */
     double less = exp(-taken * (detections->threshold_snr + 0.5 * taken));
     c->alarms_expected += c->path.false_alarms_per_frame * less * open / (GRID * GRID);
     for (int i = 0; i < detections->count; i++) {
@@ -215,9 +216,9 @@ static void add_noise(bst_calibration_fitter *c, const bst_detections *detection
     c->light_bias += theory->faint_light_e * (detections->background_e - theory->background_e);
 }
 
-/* Whether a star is whole on the frame, with nothing near it. */
-static bool stands_alone(const bst_calibration_fitter *c, const bst_truth *truth, int i,
-                         double reach) {
+/* Checks that a star is completely on the frame, without neighbours. */
+static bool is_isolated(const bst_calibration_fitter *c, const bst_truth *truth, int i,
+                        double reach) {
     const bst_truth_item *t = &truth->items[i];
     const bst_camera *camera = c->path.camera;
     double x = t->x_centroid_px, y = t->y_centroid_px, edge = reach + 0.5 * length_of(t);
@@ -229,7 +230,7 @@ static bool stands_alone(const bst_calibration_fitter *c, const bst_truth *truth
            is_free(truth, x, y, reach + 0.5 * length_of(t), i, 0.5);
 }
 
-/* What holds for the stars of a frame. */
+/* Values that hold for all stars of a frame. */
 typedef struct frame_facts {
     const bst_detections *detections;
     const bst_generator_result *theory;
@@ -237,14 +238,14 @@ typedef struct frame_facts {
     const common_error *common;
 } frame_facts;
 
-/* A star that stands alone, and its detection: number k, or -1. */
+/* Adds an isolated star with its detection: index k, or -1. */
 static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth_item *t, int k,
                            const frame_facts *f) {
     const bst_detections *detections = f->detections;
     const bst_generator_result *theory = f->theory;
     const bst_camera *camera = c->path.camera;
     double plain = sqrt(f->dark_e + camera->read_noise_e * camera->read_noise_e);
-    /* what its background has too much is missing from the output */
+    /* the excess of its background is missing in the filter output */
     double missing = (detections->background_e - theory->background_e) /
                      (bst_crlb_table_norm(&c->bound, length_of(t)) * detections->noise_e);
     double threshold = theory->filter.threshold + detections->threshold_snr - theory->threshold_snr;
@@ -275,7 +276,7 @@ bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *c,
                                  .sigma_px = c->sigma_px};
     if (!star_path(truth, 0.5 * (double)camera->width_px, 0.5 * (double)camera->height_px,
                    &frame.streak_dx_px, &frame.streak_dy_px)) {
-        return BST_OK; /* how the camera moved is not known */
+        return BST_OK; /* the camera motion is unknown */
     }
     bst_generator_result theory;
     BST_TRY(bst_generator_run(ctx, c->theory, &frame, &theory));
@@ -287,13 +288,13 @@ bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *c,
     add_noise(c, detections, &theory);
     double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
-    /* first what all have in common, then each */
+    /* first the common error, then each star */
     common_error common = {0.0, 0.0, 0.0, 0};
     for (int pass = 0; pass < 2; pass++) {
         for (int i = 0; i < truth->count; i++) {
             const bst_truth_item *t = &truth->items[i];
             int k = c->pairing.detection_of[i];
-            if ((pass == 0 && k < 0) || !stands_alone(c, truth, i, reach)) {
+            if ((pass == 0 && k < 0) || !is_isolated(c, truth, i, reach)) {
                 continue;
             }
             if (pass == 0) {

@@ -1,4 +1,4 @@
-/* Fits the observation generator's calibration to what the image path detected. */
+/* Fits the calibration of the observation generator to detections of the image path. */
 #ifndef BST_ANALYSIS_CALIBRATION_CALIBRATE_H
 #define BST_ANALYSIS_CALIBRATION_CALIBRATE_H
 
@@ -17,10 +17,10 @@ bst_status bst_calibration_fitter_create(bst_ctx *ctx, bst_calibration_fitter **
 /* Frees a fitter; NULL is allowed. */
 void bst_calibration_fitter_free(bst_calibration_fitter *calibrator);
 
-/* Settings of the image path from here on, which theory goes by: of the frames that follow. */
+/* Settings of the image path for the following frames; theory uses them. */
 typedef struct bst_calibration_path {
-    const bst_camera *camera; /* the true one */
-    double jitter_px;         /* of the line of sight, per axis, that widens the true PSF */
+    const bst_camera *camera; /* the true camera */
+    double jitter_px;         /* of the line of sight, per axis; widens the true PSF */
     double false_alarms_per_frame, streak_min_px, streak_max_px;
 } bst_calibration_path;
 
@@ -32,19 +32,19 @@ typedef struct bst_calibration_path {
 bst_status bst_calibration_fitter_begin(bst_ctx *ctx, bst_calibration_fitter *calibrator,
                                         const bst_calibration_path *path) BST_MUST_CHECK;
 
-/* Takes one full frame without binning. */
+/* Adds one full, unbinned frame to the fit. */
 bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *calibrator,
                                       const bst_truth *truth, const bst_detections *detections,
                                       double exposure_s) BST_MUST_CHECK;
 
-/* What was seen, for people. */
+/* Numbers of used data, for messages. */
 typedef struct bst_calibration_counts {
     long frames, sources, detected, false_alarms, places;
 } bst_calibration_counts;
 
-/* The calibration: maximum likelihood for Pd (probit) and false alarms, mean squares for places,
- * least squares for noise. Where too little was seen theory's value stays. BST_ERR_STATE when there
- * is not enough for Pd or false alarms: the message says of what. */
+/* Computes the calibration: maximum likelihood for Pd (probit) and false alarms, mean squares for
+ * positions, least squares for noise. With too few data the theoretical value is kept.
+ * BST_ERR_STATE: not enough data for Pd or false alarms; the message names which. */
 bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *calibrator,
                                       bst_obsgen_calibration *out,
                                       bst_calibration_counts *counts) BST_MUST_CHECK;

@@ -3,10 +3,10 @@
 #include "boresight/vec.h"
 #include "sim/analysis/calibration/calibrate_internal.h"
 
-/* Least numbers for a fit. */
+/* minimum numbers of data for a fit */
 enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30 };
 
-/* Log-likelihood of the trials of one streak length. */
+/* Log-likelihood of the detection trials of one streak length. */
 static double likelihood(const bst_calibration_fitter *c, int node, double gain, double slope) {
     double sum = 0.0;
     for (long i = 0; i < c->trial_count; i++) {
@@ -24,12 +24,13 @@ static double likelihood(const bst_calibration_fitter *c, int node, double gain,
         double z = slope * (snr - (double)t->threshold) /
                    sqrt((double)t->variance + (double)t->shot * snr);
         double p = 0.5 * erfc(-z * 0.70710678118654752);
-        sum += log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* a few are paired by mistake */
+        sum +=
+            log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* limits the effect of a few wrong pairs */
     }
     return sum;
 }
 
-/* The gain of one streak length at a slope, by golden section. */
+/* Best gain of one streak length at a slope, by golden section search. */
 static double best_gain(const bst_calibration_fitter *c, int node, double slope, double *value) {
     const double part = 0.38196601125010515;
     double low = 0.5, high = 1.3, a = low + part * (high - low), b = high - part * (high - low);
@@ -70,7 +71,7 @@ static void fit_detection(const bst_calibration_fitter *c, bst_obsgen_calibratio
         double total = 0.0, gain[BST_OBSGEN_LENGTHS] = {0};
         for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
             double value = 0.0;
-            /* a length that only few frames had would be told by their oddities */
+            /* a length with few frames would be dominated by their peculiarities */
             if (count[n] >= LEAST_SOURCES && count[n] >= c->trial_count / 50) {
                 gain[n] = best_gain(c, n, slope, &value);
             }
@@ -84,7 +85,7 @@ static void fit_detection(const bst_calibration_fitter *c, bst_obsgen_calibratio
             }
         }
     }
-    /* a length that was not seen has the gain of the nearest one that was */
+    /* a length without data gets the gain of the nearest length with data */
     double seen[BST_OBSGEN_LENGTHS];
     for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
         seen[n] = out->gain[n];
@@ -99,10 +100,10 @@ static void fit_detection(const bst_calibration_fitter *c, bst_obsgen_calibratio
     }
 }
 
-/* Standard deviation of normal errors of which those beyond CALIBRATE_MOST_SIGMAS were left out,
- * from the mean square of the rest: f^2 (1 - 2 c phi(c) / (2 Phi(c) - 1)), c =
- * CALIBRATE_MOST_SIGMAS / f. */
-static double uncut(double square) {
+/* Standard deviation of normal errors after truncation at CALIBRATE_MOST_SIGMAS, from the mean
+ * square of the remaining errors: f^2 (1 - 2 c phi(c) / (2 Phi(c) - 1)), c = CALIBRATE_MOST_SIGMAS
+ * / f. */
+static double untruncated_sigma(double square) {
     double low = 0.1, high = 5.0;
     for (int i = 0; i < 40; i++) {
         double f = 0.5 * (low + high), c = CALIBRATE_MOST_SIGMAS / f;
@@ -116,7 +117,7 @@ static void fit_places(const calibrate_mean *seen, double *factors) {
     double before = 1.0;
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
         if (seen[i].count >= LEAST_PLACES) {
-            before = uncut(seen[i].sum / (double)seen[i].count);
+            before = untruncated_sigma(seen[i].sum / (double)seen[i].count);
         }
         factors[i] = fmin(fmax(before, 0.1), 20.0);
     }
@@ -145,7 +146,7 @@ bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *c,
     }
     out->phase_bias_px = c->bias_weight > 0.0 ? c->bias_sum / c->bias_weight : 0.0;
     out->threshold_offset = c->threshold_offset / (double)c->frames;
-    /* noise^2 = factor^2 theory^2 + crowding light */
+    /* noise^2 = factor^2 theory^2 + light of faint stars */
     double determinant = c->nn * c->qq - c->nq * c->nq;
     double flat = c->ny / c->nn, crowding = out->crowding;
     if (determinant > 1e-9 * c->nn * c->qq) {

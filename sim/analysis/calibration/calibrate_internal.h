@@ -1,4 +1,4 @@
-/* Inside of the calibration, shared by its two files: what is gathered and what is made of it. */
+/* Internal state of the calibration fit: collected data and functions of both files. */
 #ifndef BST_ANALYSIS_CALIBRATION_CALIBRATE_INTERNAL_H
 #define BST_ANALYSIS_CALIBRATION_CALIBRATE_INTERNAL_H
 
@@ -6,14 +6,14 @@
 #include "sim/analysis/calibration/calibrate.h"
 #include "sim/analysis/calibration/pairing.h"
 
-/* Errors of places over the bound that count. */
+/* position errors up to this multiple of the bound are used */
 static const double CALIBRATE_MOST_SIGMAS = 2.5;
 
-/* A source that stands alone, near the threshold. */
+/* A detection trial: an isolated source near the threshold. */
 typedef struct calibrate_trial {
     float amplitude, threshold, length;
     float variance,
-        shot; /* of the filter's output: without the source, and by its photons, SNR 1 */
+        shot; /* noise of the filter output: without the source, and by its photons at SNR 1 */
     bool detected;
 } calibrate_trial;
 
@@ -36,8 +36,8 @@ struct bst_calibration_fitter {
     calibrate_mean across[BST_OBSGEN_SNRS], along[BST_OBSGEN_SNRS];
     double bias_sum, bias_weight;
     double threshold_offset;
-    double nn, nq, qq, ny, qy; /* least squares of noise^2 by theory's and by the light left over */
-    double light_square, light_bias; /* of background by the light in it */
+    double nn, nq, qq, ny, qy;       /* least squares of noise^2 by theory and by residual light */
+    double light_square, light_bias; /* of the background by the residual light */
     long identified, identifiable;
     long hits, hits_told;
     long frames, detected;

@@ -17,14 +17,14 @@
 #include "sim/core/text.h"
 #include "sim/io/fits_frames.h"
 
-/* One kind of frames. */
+/* One kind of calibration frames. */
 typedef struct series {
     const char *name, *type; /* file name, IMAGETYP */
     int64_t count;
-    double exposure_s, level_e; /* light: electrons per pixel of mean response */
+    double exposure_s, level_e; /* flat field: electrons per pixel of mean response */
 } series;
 
-/* One sensor on its way through the series. */
+/* State of making the frames of one sensor. */
 typedef struct job {
     const bst_calibration_frames *request;
     const bst_scenario *scenario;
@@ -68,7 +68,7 @@ static bst_status write_frame(bst_ctx *ctx, const job *j, const series *s, int64
     return status;
 }
 
-/* The name under which a file is written, so that it appears whole or not at all. */
+/* Draft name of a file, which is renamed when complete. */
 static bst_status draft_of(bst_ctx *ctx, const char *path, char *draft, size_t bytes) {
     struct stat there;
     int fd;
@@ -77,7 +77,7 @@ static bst_status draft_of(bst_ctx *ctx, const char *path, char *draft, size_t b
     }
     BST_TRY(bst_draft_make(ctx, path, draft, bytes, &fd));
     close(fd);
-    unlink(draft); /* bst_fits_create wants a new name */
+    unlink(draft); /* bst_fits_create requires a new name */
     return BST_OK;
 }
 
@@ -121,7 +121,7 @@ static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
     return status;
 }
 
-/* Half of what the pixel or the converter holds, whichever is less. */
+/* Half of the full well or of the converter's range, whichever is smaller. */
 static double half_level_e(const bst_camera *c) {
     double top_e = ((double)((1 << c->bits) - 1) - c->offset_dn) * c->gain_e_per_dn;
     return 0.5 * fmin(c->full_well_e, top_e);
@@ -134,7 +134,7 @@ static bst_status do_sensor(bst_ctx *ctx, job *j) {
     bst_renderer_options options = bst_renderer_default_options();
     options.pattern = bst_detector_pattern_key(&s->camera, j->name);
     options.pool_frames = 2;
-    /* these frames have no point sources: a PSF from a file or of the aperture is not needed */
+    /* these frames have no point sources and need no PSF */
     bst_camera camera = s->camera;
     camera.optics.psf = BST_PSF_GAUSSIAN;
     BST_TRY(bst_renderer_create(ctx, j->device, &camera, &options, &j->renderer));

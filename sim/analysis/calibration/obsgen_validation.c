@@ -15,14 +15,14 @@
 #include "sim/core/text.h"
 #include "sim/io/manifest.h"
 
-/* Edges of the bins of SNR; sources below the first are not looked for. */
+/* edges of the SNR bins; fainter sources are ignored */
 static const double edges[] = {3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0, 30.0, 1e9};
-/* A figure that is further off than its margin and so many standard deviations is wrong; one that
- * is nearer, but whose interval is not inside, needs more runs. */
+/* A figure beyond its margin by this many standard deviations is wrong; if only its interval
+ * exceeds the margin, more runs are needed. */
 static const double BEYOND_SIGMAS = 2.0;
 enum { BINS = sizeof edges / sizeof *edges - 1, RESAMPLES = 2000, LEAST_TRIALS = 200 };
 
-/* Sums of one run: what a figure is the ratio of. */
+/* Sums of one run, of which a figure is the ratio. */
 typedef struct share {
     double sum, count;
 } share;
@@ -58,7 +58,7 @@ static bst_status on_frame(void *user, bst_ctx *ctx, const bst_truth *truth,
         int k = j->pairing.detection_of[i];
         s->pd[bin].sum += k >= 0;
         s->pd[bin].count += 1.0;
-        /* what has a pixel's place or worse was not fitted */
+        /* detections with a sigma of a pixel or more were not fitted */
         const bst_detection *d = k >= 0 ? &detections->items[k] : NULL;
         if (d && t->snr >= 5.0 && fmax(d->cov_xx, d->cov_yy) < 1.0) {
             double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
@@ -120,7 +120,7 @@ static bst_status play(bst_ctx *ctx, const bst_obsgen_validation_options *o, boo
     return status;
 }
 
-/* Where a figure stands in run_sums, and how it is told. */
+/* Definition of a figure: its sums in run_sums, name and margin. */
 typedef struct figure_of {
     char name[64];
     size_t offset;
@@ -140,14 +140,14 @@ static double value_of(const figure_of *f, const run_sums *runs, const int *chos
     return f->root ? sqrt(value) : value;
 }
 
-/* What resampling says of a figure. */
+/* Bootstrap result of a figure. */
 typedef struct sampling {
     double low, high; /* 95 % interval */
     double sigma;     /* standard deviation */
 } sampling;
 
-/* Resamples the runs. Both sides have the same runs in a sample: run i has one seed, and so the
- * same cue, drift, jitter and stars, on both, which their difference does not hold. */
+/* Bootstrap over runs. A sample takes the same runs from both sides: run i has one seed, and
+ * therefore equal cue, drift, jitter and stars, which cancel in the difference. */
 static sampling bootstrap(const figure_of *f, const run_sums *image, const run_sums *generator,
                           int seeds, int *chosen) {
     static const double low = 0.025;

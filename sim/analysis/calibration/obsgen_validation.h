@@ -1,5 +1,5 @@
-/* Whether the observation generator is statistically the image path: the same scenario with both,
- * many runs each. */
+/* Statistical comparison of the observation generator with the image path: the same scenario, many
+ * runs each. */
 #ifndef BST_ANALYSIS_CALIBRATION_OBSGEN_VALIDATION_H
 #define BST_ANALYSIS_CALIBRATION_OBSGEN_VALIDATION_H
 
@@ -7,17 +7,17 @@
 
 typedef struct bst_obsgen_validation_options {
     const char *scenario;
-    const char *calibration; /* NULL: as the scenario says */
-    const char *device;      /* NULL: default */
+    const char *calibration; /* NULL: from the scenario */
+    const char *device;      /* NULL: default device */
     const bst_load_options *load;
     int seeds, threads;
     const char *json; /* NULL: none */
 } bst_obsgen_validation_options;
 
-/* Runs, prints a table of what was measured of both with the 95 % bootstrap interval over runs of
- * the difference or ratio, and says in *equivalent whether every interval is inside its margin:
- * Pd by SNR of the truth within 0.02, false alarms within 10 %, RMS of places and of the track of
- * interest within 5 %, time to confirm within 10 %. What a scenario does not have is not judged. */
+/* Executes the runs and prints a table of both sides with 95 % bootstrap intervals of the
+ * differences or ratios. *equivalent: every interval is within its margin. Margins: Pd by true SNR
+ * 0.02, false alarms 10 %, RMS of positions and of the track of interest 5 %, time to confirm 10 %.
+ * Figures that the scenario lacks are skipped. */
 bst_status bst_obsgen_validation_run(bst_ctx *ctx, const bst_obsgen_validation_options *options,
                                      bool *equivalent) BST_MUST_CHECK;
 

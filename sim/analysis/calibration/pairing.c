@@ -26,7 +26,7 @@ static bst_status reserve(bst_ctx *ctx, bst_pairing *p, int items, int detection
     return BST_OK;
 }
 
-/* Distance of a detection from a source in units of what is allowed; above 1: not its. */
+/* Distance of a detection from a source relative to the allowed distance; above 1: no match. */
 static double off(const bst_truth_item *t, const bst_detection *d, double fwhm_px) {
     double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
     double lx = t->x_end_px - t->x_start_px, ly = t->y_end_px - t->y_start_px;
@@ -48,7 +48,7 @@ bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *p, const bst_truth *truth
         if (!shows) {
             continue;
         }
-        int at = n++; /* by brightness: few are out of the catalogue's order */
+        int at = n++; /* insertion by brightness: the catalogue is almost sorted */
         while (at > 0 && truth->items[p->order[at - 1]].snr < t->snr) {
             p->order[at] = p->order[at - 1];
             at--;

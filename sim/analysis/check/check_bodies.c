@@ -19,7 +19,7 @@ enum { MOST_SPANS = 1000 };
 
 static const char *const body_names[BST_FIELD_BODIES] = {"Earth", "Moon", "Sun"};
 
-/* Where a sensor looks. */
+/* Known pointing of a sensor. */
 typedef enum gaze { GAZE_UNKNOWN, GAZE_CUE, GAZE_STARE, GAZE_IDEAL } gaze;
 
 typedef struct looking {
@@ -32,10 +32,10 @@ typedef struct looking {
     bst_knowledge_view *cue;
     bst_world_view *view;
     const bst_world *world;
-    double half_rad; /* from the boresight to the farthest corner */
+    double half_rad; /* from the boresight to the most distant corner */
 } looking;
 
-/* Whether a module gives sensors other targets than their cues while a run goes. */
+/* Checks whether a module changes the sensors' targets during a run. */
 static bool has_tasking(const bst_scenario *scenario) {
     for (int m = 0; m < scenario->module_count; m++) {
         if (!scenario->modules[m].off && strcmp(scenario->modules[m].desc->role, "tasking") == 0) {
@@ -77,7 +77,7 @@ static gaze gaze_of(const bst_scenario *scenario, looking *l) {
     }
 }
 
-/* Geometric direction of the boresight: aberration is small next to a field. */
+/* Geometric direction of the boresight; aberration is negligible against the field. */
 static bst_status boresight_at(bst_ctx *ctx, looking *l, double seconds, bool *known,
                                bst_vec3 *direction) {
     *known = true;
@@ -96,7 +96,7 @@ static bst_status boresight_at(bst_ctx *ctx, looking *l, double seconds, bool *k
                                           known, direction);
 }
 
-/* By how much the field is free of each body, rad. */
+/* Angles between the edge of the field and each body, rad. */
 static bst_status clearances(bst_ctx *ctx, looking *l, double seconds,
                              double clear[BST_FIELD_BODIES]) {
     bool known;
@@ -123,7 +123,7 @@ static bst_status clearances(bst_ctx *ctx, looking *l, double seconds,
     return BST_OK;
 }
 
-/* Instant between two at which a body enters or leaves the field. */
+/* Finds the time at which a body enters or leaves the field, by bisection. */
 static bst_status edge_between(bst_ctx *ctx, looking *l, int body, double from_s, double to_s,
                                bool inside_first, double *at_s) {
     while (to_s - from_s > EDGE_S) {
@@ -135,7 +135,7 @@ static bst_status edge_between(bst_ctx *ctx, looking *l, int body, double from_s
     return BST_OK;
 }
 
-/* What is known of one body while time goes on. */
+/* State of scanning for one body over time. */
 typedef struct meeting {
     bool inside;
     double from_s;

@@ -7,14 +7,14 @@
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
 
-/* What a tracker follows. */
+/* Accelerations that a tracker can follow. */
 typedef struct limits {
     double acceleration_radps2, jump_radps;
     double period_s;
-    const char *type; /* of the tracker */
+    const char *type; /* type of the tracker */
 } limits;
 
-/* False: the tracker is not one whose filter is known here. */
+/* False: the tracker's filter is unknown. */
 static bool limits_of(const bst_scenario *scenario, int observer, int sensor, limits *out) {
     const bst_scenario_module_config *tracker =
         bst_scenario_module(scenario, observer, sensor, "tracker");
@@ -28,7 +28,7 @@ static bool limits_of(const bst_scenario *scenario, int observer, int sensor, li
     }
     bst_loop_timing timing;
     bst_loop_timing_of(scenario, observer, sensor, &timing);
-    /* one that tells no manoeuvre goes on with its quiet model */
+    /* without manoeuvre detection the tracker keeps its quiet model */
     bool told = strcmp(tracker->desc->type, "imm") == 0 || (events > 0.0 && window > 0.0);
     double followed = quiet * BST_ARCSEC_RAD * sqrt(gate / timing.period_s);
     double found = told ? 0.5 * swift * BST_ARCSEC_RAD * sqrt(gate / (3.0 * timing.period_s)) : 0.0;
@@ -42,7 +42,7 @@ static bool limits_of(const bst_scenario *scenario, int observer, int sensor, li
     return timing.period_s > 0.0;
 }
 
-/* Speed across the line of sight that a burn gives, m/s, and the range, m. */
+/* Cross-line-of-sight velocity change of a burn, m/s, and the range, m. */
 static bst_status speed_across(bst_ctx *ctx, bst_world_view *view, int object, int observer,
                                const bst_burn_config *burn, double *across_mps, double *range_m) {
     bst_world_state target, eye;

@@ -7,7 +7,7 @@ typedef struct limits {
     double rate_radps, accel_radps2; /* INFINITY: none */
 } limits;
 
-/* The lowest of the axes that are needed to reach a direction. */
+/* Lowest limits of the axes needed to reach a direction. */
 static limits lowest(const bst_mount_status *mount) {
     limits low = {INFINITY, INFINITY};
     for (int a = 0; a < mount->axes; a++) {
@@ -34,7 +34,7 @@ double bst_check_mount_slew_s(const bst_mount_status *mount, double angle_rad) {
                                  : bst_search_slew_s(angle_rad, low.rate_radps, low.accel_radps2);
 }
 
-/* Of the greatest step of a search; 0: it has one place. */
+/* Largest step of a search pattern; 0: it has one position. */
 static double step_of(const bst_check_mount_moves *m) {
     double side = fmax(m->width_rad, m->height_rad), least = fmin(m->width_rad, m->height_rad);
     double reach = fmin(m->control->search_sigmas * m->cue_sigma_rad,
@@ -44,11 +44,11 @@ static double step_of(const bst_check_mount_moves *m) {
 }
 
 static double dwell_of(const bst_check_mount_moves *m) {
-    /* the first whole frame at rest begins up to a period after the arrival */
+    /* the first complete frame at rest begins up to a period after arrival */
     return (double)m->control->dwell_frames * m->period_s + m->exposure_s;
 }
 
-/* "0.25 s", "1709 s": three digits, and no exponent. */
+/* Formats seconds with three digits, without exponent: "0.25 s", "1709 s". */
 static const char *seconds_text(double seconds, char out[32]) {
     snprintf(out, 32, seconds < 100.0 ? "%.3g s" : "%.0f s", seconds);
     return out;
@@ -61,7 +61,7 @@ double bst_check_search_place_s(const bst_check_mount_moves *moves) {
 
 static int check_search(bst_ctx *ctx, const char *name, const bst_check_mount_moves *m) {
     double step = step_of(m), allowed = m->control->dwell_timeout_s;
-    /* too short a time for the frames alone is the rule short_times' */
+    /* a time too short for the frames alone is reported by the rule short_times */
     if (step == 0.0 || bst_check_search_place_s(m) <= allowed || dwell_of(m) > allowed) {
         return 0;
     }

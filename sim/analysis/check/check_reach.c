@@ -12,10 +12,10 @@
 #include "sim/onboard/knowledge.h"
 #include "sim/world/world_config.h"
 
-/* Steps of the look: a thousandth of the run within these. */
+/* steps of the prediction: a thousandth of the run within these limits */
 #define LEAST_STEP_S 0.5
 #define MOST_STEP_S 10.0
-/* What the limits lose is followed from so long before to so long after they are exceeded. */
+/* margin before and after the time in which limits are exceeded */
 #define RUN_UP_S 5.0
 #define RUN_OUT_S 120.0
 enum { MOST_SPANS = 10000, MOST_LOSSES = 4 };
@@ -26,7 +26,7 @@ typedef struct seeing {
     bst_knowledge *knowledge;
     bst_knowledge_view *cue;
     bst_world_view *view;
-    bool turns; /* the body follows a law */
+    bool turns; /* the body follows a pointing law */
     bst_pointing_law law;
     bst_mount_status mount;
 } seeing;
@@ -67,7 +67,7 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds,
 /* ---- what was found ---- */
 
 typedef struct found {
-    double duration_s; /* that is examined */
+    double duration_s; /* examined duration */
     bst_check_spans spans[BST_REACH_COUNT];
 } found;
 
@@ -85,7 +85,7 @@ static void warn(bst_ctx *ctx, const char *name, const found *f, double examined
     }
 }
 
-/* What the mount's limits lose about [from_s, until_s]; *until_s: the end of the last loss. */
+/* Finds losses by the mount's limits around [from_s, until_s]; *until_s: end of the last loss. */
 static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *problem,
                         double tolerance_rad, int reason, double from_s, double *until_s,
                         found *f) {
@@ -93,7 +93,7 @@ static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *pr
     bst_pointing_feasibility middle;
     int count;
     double end_s = fmin(*until_s + RUN_OUT_S, f->duration_s);
-    /* on the way to the pole it is the acceleration that is too great first */
+    /* approaching the pole, the acceleration limit is exceeded first */
     BST_TRY(bst_pointing_feasibility_at(ctx, problem, 0.5 * (from_s + *until_s), &middle));
     reason = middle == BST_REACH_KEYHOLE ? (int)middle : reason;
     const bst_pointing_feasibility_span span = {fmax(from_s - RUN_UP_S, 0.0), end_s, tolerance_rad};
@@ -170,12 +170,12 @@ static bst_status set_mount(bst_ctx *ctx, const bst_scenario_module_config *gimb
             bst_vec3_unit((bst_vec3){a->second_axis[0], a->second_axis[1], a->second_axis[2]}),
         .roll_rad = a->roll_deg * BST_DEG_RAD};
     if (s->turns && a->law == BST_LAW_FREE) {
-        s->mount.axes = 0; /* nobody knows how it will be turned */
+        s->mount.axes = 0; /* the motion is unknown */
     }
     return BST_OK;
 }
 
-/* Where the boresight is at the start, in the body. */
+/* Initial boresight in body axes. */
 static bst_vec3 start_boresight(const bst_mount_status *mount) {
     bst_quat q = BST_QUAT_IDENTITY;
     for (int a = 0; a < mount->axes; a++) {
@@ -185,7 +185,7 @@ static bst_vec3 start_boresight(const bst_mount_status *mount) {
     return bst_quat_rotate(bst_quat_mul(q, mount->q_body_from_cam_at_zero), (bst_vec3){0, 0, 1});
 }
 
-/* Slew, search and scan under the limits of the mount. */
+/* Checks slew, search and scan against the limits of the mount. */
 static bst_status moves(bst_ctx *ctx, const bst_scenario *scenario, seeing *s,
                         const bst_control_config *config, const char *name) {
     if (s->mount.axes == 0) {

@@ -1,20 +1,20 @@
-/* The words of `check` for the times in which something holds. */
+/* Text for the time spans in warnings of `boresight check`. */
 #ifndef BST_ANALYSIS_CHECK_CHECK_SPANS_H
 #define BST_ANALYSIS_CHECK_CHECK_SPANS_H
 
 #include <stdbool.h>
 
-/* Times in which one condition holds, in seconds after the epoch; {0}: none. */
+/* Time spans of one condition, in seconds after the epoch; {0}: none. */
 typedef struct bst_check_spans {
     int count;
-    double from_s, until_s; /* of the first */
-    double sum_s;           /* of all */
+    double from_s, until_s; /* of the first span */
+    double sum_s;           /* total duration */
 } bst_check_spans;
 
 typedef struct bst_check_span_words {
-    char from[80];  /* "from 1.0 s until 2.0 s": the first */
-    char more[128]; /* " (the first of 3 times, 40 s in all)", and the part of the run that was
-                     * examined; often "" */
+    char from[80];  /* first span: "from 1.0 s until 2.0 s" */
+    char more[128]; /* " (the first of 3 times, 40 s in all)", and the examined part of the run; may
+                       be "" */
 } bst_check_span_words;
 
 /* Adds an interval of time, in order of time; only the first one is kept, and the sum of lengths.

@@ -10,17 +10,17 @@
 #include "sim/engine/scenario/loop_timing.h"
 #include "sim/world/world_config.h"
 
-/* Errors of element sets near their epoch grow to 1 to 3 km a day along low orbits, less in high
- * ones (Vallado et al. 2006, AIAA 2006-6753, section VII). */
+/* Errors of element sets grow by 1 to 3 km per day in low orbits, less in high ones (Vallado et al.
+ * 2006, AIAA 2006-6753, section VII). */
 #define OLD_ELEMENTS_DAYS 14.0
-/* Share of a catalogue's sets. */
+/* fraction of a catalogue's element sets */
 #define MANY_OLD 0.1
-/* From the axis at which a pixel of a gnomonic projection covers half as much sky as at the middle,
- * cos^3 = 1/2; and the one beyond which no optics is drawn as a plane. */
+/* field half angle at which a gnomonic pixel covers half the solid angle of the central one, cos^3
+ * = 1/2; and the limit of planar projections */
 #define WIDE_HALF_FIELD_DEG 37.5
 #define WIDEST_HALF_FIELD_DEG 80.0
 
-/* One sensor of a scenario, as the rules see it. */
+/* A sensor of the scenario, to which rules are applied. */
 typedef struct subject {
     bst_ctx *ctx;
     const bst_scenario *scenario;
@@ -47,7 +47,7 @@ static bst_status no_duration(bst_ctx *ctx, const bst_scenario *scenario, const 
     return BST_OK;
 }
 
-/* Element sets that are old, and how old the oldest is. */
+/* Old element sets: number and largest age. */
 typedef struct ages {
     int old, sets;
     double most_days;
@@ -77,8 +77,8 @@ static void warn_of_age(bst_ctx *ctx, const char *file, const char *what, const 
             file, a->old, a->sets, what, OLD_ELEMENTS_DAYS, a->oldest, a->most_days);
 }
 
-/* Observers and objects that the scenario lists count singly; of a whole catalogue a few old sets
- * are normal. */
+/* Listed observers and objects are reported individually; a few old sets in a catalogue are
+ * normal. */
 static bst_status old_elements(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world) {
     int objects = bst_world_object_count(world), listed_count = scenario->world.objects.count;
     ages listed = {0}, catalogued = {0};

@@ -1,5 +1,5 @@
-/* What a scenario may say but hardly means: rules, each with a name, that `boresight check` and
- * `boresight run` apply before anything is simulated. */
+/* Rules of `boresight check`: plausibility of a scenario before the simulation. Each rule has a
+ * name. */
 #ifndef BST_ANALYSIS_CHECK_SCENARIO_RULES_H
 #define BST_ANALYSIS_CHECK_SCENARIO_RULES_H
 
@@ -7,13 +7,13 @@
 
 #include "sim/engine/simulation.h"
 
-/* Given: the scenario and its simulation, created but not run. Logs a warning for each finding,
- * with its place in the scenario, what was found and what to do. Returns the error of the first
- * rule whose finding is an error, or of what a rule asks. */
+/* Applies all rules to a scenario and its simulation, created but not run. Logs a warning for each
+ * finding: JSON path, finding and remedy. Returns the error of the first rule that treats its
+ * finding as an error. */
 bst_status bst_check_rules_apply(bst_ctx *ctx, const bst_scenario *scenario,
                                  const bst_simulation *simulation) BST_MUST_CHECK;
 
-/* Prints each rule's name and what it looks for, one a line. */
+/* Prints name and purpose of each rule. */
 void bst_check_rules_print(FILE *out);
 
 #endif

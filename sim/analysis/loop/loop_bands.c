@@ -1,5 +1,5 @@
-/* What disturbs an axis: jitter of the platform and errors of its believed attitude, as bands of
- * frequency. */
+/* Disturbances of a mount axis as frequency bands: platform jitter and attitude knowledge
+ * errors. */
 #include "gimbal/spacecraft/spacecraft_response.h"
 #include "sim/analysis/loop/loop_model.h"
 
@@ -9,8 +9,7 @@ void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, doubl
     }
 }
 
-/* A table cut at its points, and these at a quarter of an octave, up to what the plant's steps can
- * follow. */
+/* Splits a jitter table at its points and at quarter octaves, up to the plant's sampling limit. */
 static void table_bands(const bst_jitter_density *table, double scale, double top_hz,
                         bst_loop_axis *axis) {
     for (int i = 0; i + 1 < table->count; i++) {
@@ -49,8 +48,8 @@ bst_status bst_loop_platform_bands(bst_ctx *ctx, const bst_platform_config *plat
     return BST_OK;
 }
 
-/* The mount points by the believed attitude: its error moves the line of sight as jitter does, in
- * bands from a day's to ten times a second's. */
+/* Adds bands of the attitude knowledge error: the mount uses the estimated attitude, so that its
+ * error moves the line of sight like jitter. From one per day to ten times per second. */
 void bst_loop_body_bands(const bst_spacecraft_config *config, int body_axis, double pixel_rad,
                          bst_loop_axis *axis) {
     if (config->type != BST_CRAFT_RIGID_BODY) {

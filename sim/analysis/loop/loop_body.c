@@ -1,4 +1,4 @@
-/* The attitude loop of a spacecraft that has one. */
+/* Analysis of a spacecraft's attitude control loop. */
 #include "gimbal/spacecraft/spacecraft_response.h"
 #include "sim/analysis/loop/loop_model.h"
 

@@ -21,7 +21,8 @@ static const bst_scenario_module_config *find_module(const bst_scenario *scenari
 
 /* ---- the mount ---- */
 
-/* Continuous: accelerations from angle and rate errors, 2 d w s + w^2 over s^2. */
+/* Open loop of the second-order mount, continuous: accelerations from angle and rate errors, 2 d w
+ * s + w^2 over s^2. */
 static double complex second_order_open(const void *user, double omega) {
     const bst_loop_servo *servo = user;
     double complex s = I * omega;
@@ -35,14 +36,14 @@ static bst_status second_order_servo(bst_ctx *ctx, const bst_mount_two_axis_conf
     servo->continuous = true;
     servo->natural_radps = two_pi * config->natural_frequency_hz;
     servo->damping = config->damping;
-    /* a band up to a thousand times the natural frequency */
+    /* frequencies up to a thousand times the natural frequency */
     servo->loop = (bst_loop){
         .open = second_order_open, .user = servo, .dt_s = 0.5e-3 / config->natural_frequency_hz};
     return bst_loop_analyse(ctx, &servo->loop, &servo->margins);
 }
 
-/* Steps the axis after a tiny command: a step, or (rate 1) one that begins to move. Returns the
- * number of samples until it is at rest. */
+/* Simulates the axis after a tiny step, or (rate 1) ramp, of the command. Returns the number of
+ * samples until it is at rest. */
 static int axis_response(const bst_axis_spec *spec, double rate, int most, double *out) {
     bst_axis axis;
     bst_axis_init(&axis, spec);
@@ -139,7 +140,7 @@ static bst_status build_second_order(bst_ctx *ctx, const bst_scenario_module_con
         bst_loop_axis *axis = &model->axis[a];
         axis->name = names[a];
         status = second_order_servo(ctx, config, &axis->servo);
-        /* the outer axis moves the image along x, as a turn about body y does */
+        /* the outer axis moves the image along x, as a rotation about body y */
         double drift = config->platform.drift_arcsec_per_s[a == 0 ? 1 : 0] / arcsec_px;
         if (status == BST_OK) {
             const bst_loop_tracked tracked = {control,        &servo, &config->platform,
@@ -163,7 +164,7 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
         return BST_OK;
     }
     if (control && control->desc->config != bst_control_config_table) {
-        control = NULL; /* somebody else's */
+        control = NULL; /* of another type */
     }
     bst_loop_model *model = calloc(1, sizeof *model);
     if (!model) {

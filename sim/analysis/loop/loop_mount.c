@@ -1,4 +1,4 @@
-/* The loops of the full mounts. */
+/* Analysis of the servo loops of full mounts. */
 #include <stdlib.h>
 
 #include "gimbal/mount/axis.h"
@@ -20,7 +20,7 @@ static bst_status build_servo(bst_ctx *ctx, int type, const bst_mount_config *co
     servo->there = true;
     double mode = config->flexible.frequency_hz[k];
     double share = config->flexible.inertia_share[k];
-    /* the mode with the joint held, and free */
+    /* flexible mode with locked and free joint */
     servo->hint_hz[0] = mode;
     servo->hint_hz[1] = mode / sqrt(1.0 - share);
     servo->loop = (bst_loop){.open = servo_open,
@@ -31,12 +31,12 @@ static bst_status build_servo(bst_ctx *ctx, int type, const bst_mount_config *co
     return bst_loop_analyse(ctx, &servo->loop, &servo->margins);
 }
 
-/* One axis under its servo, stepped: the linear model with the reference's shaper. */
+/* Simulation of one axis with its servo: the linear model with the reference shaper. */
 typedef struct axis_run {
     const bst_mount_axis_model *model;
     bst_axis shaper;
     bst_compensator compensator;
-    double state[4], torque[32], reference[32]; /* rings by step */
+    double state[4], torque[32], reference[32]; /* ring buffers by step */
 } axis_run;
 
 static double step_axis(axis_run *run, int n, double target_rad, double target_radps) {
@@ -51,7 +51,7 @@ static double step_axis(axis_run *run, int n, double target_rad, double target_r
     run->reference[(n + linear->delay_steps + 1) % 32] = shaper->reference_rad;
     double sight = run->state[0] + linear->line_of_sight_share * run->state[2];
     double error = run->reference[n % 32] - run->state[0];
-    /* the torque that this reading brings about: delay_steps later, over the step after */
+    /* torque from this measurement: acts delay_steps later for one step */
     double asked = bst_compensator_step(&run->compensator, error, accel) +
                    run->model->model_feed_forward *
                        (run->model->viscous_nms * rate + run->model->spring_nm * angle) /
@@ -72,8 +72,8 @@ static double step_axis(axis_run *run, int n, double target_rad, double target_r
     return sight;
 }
 
-/* As axis_response of second_order: what the mount does after a step, or a start, of the command.
- */
+/* Simulates a mount axis after a step or ramp of the command, as axis_response for the second-order
+ * mount. */
 static int mount_response(const bst_mount_axis_model *model, const bst_axis_spec *spec, bool ramp,
                           int most, double *out) {
     axis_run run = {.model = model, .compensator = model->compensator};
@@ -95,7 +95,7 @@ static bst_status respond(bst_ctx *ctx, const bst_mount_config *config,
                           const bst_mount_axis_model *model, int k, double dt_s,
                           bst_control_servo_response *out) {
     bst_axis_spec spec = {.rate_limit_radps = config->rate_limit_degps[k] * BST_DEG_RAD,
-                          .accel_limit_radps2 = 1e6, /* far beyond a tiny command */
+                          .accel_limit_radps2 = 1e6, /* far above a tiny command */
                           .natural_frequency_radps = 1.0,
                           .damping = 1.0,
                           .dt_s = dt_s};
@@ -128,7 +128,7 @@ bst_status bst_loop_build_mount(bst_ctx *ctx, int type, const bst_mount_config *
         if (k == 2 || !axis->servo.margins.stable) {
             continue; /* a third axis takes over from the outer one */
         }
-        /* what the axis turns about at zero angles is what it makes up for */
+        /* rotation axis at zero angles */
         bst_vec3 about = bst_mount_axis_body(type, k);
         int camera_axis = fabs(about.x) > fabs(about.y) ? 0 : 1;
         const double *d = config->platform.drift_arcsec_per_s;

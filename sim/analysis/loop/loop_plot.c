@@ -9,7 +9,7 @@ static const double two_pi = 2.0 * BST_PI;
 
 enum { CURVE_POINTS = 600, STEP_POINTS = 400, STEP_LENGTH = 4096 };
 
-/* Frequencies from a thousandth of the crossover to half the rate. */
+/* Plot frequencies: from a thousandth of the crossover to half the sampling rate. */
 static double curve_hz(const bst_loop *loop, double crossover_hz, int i) {
     double high = 0.5 / loop->dt_s, low = crossover_hz > 0.0 ? 1e-2 * crossover_hz : 1e-4 * high;
     return low * pow(0.9999 * high / low, (double)i / (CURVE_POINTS - 1));
@@ -37,7 +37,7 @@ static void put_frequency_data(FILE *o, const char *name, const bst_loop *loop,
 static void put_step_data(FILE *o, const char *name, const bst_loop *loop,
                           const bst_loop_margins *m) {
     double out[STEP_POINTS];
-    /* samples no denser than a two-hundredth of the crossover's period */
+    /* at most 200 samples per period of the crossover */
     double every = m->crossover_hz > 0.0 ? 1.0 / (m->crossover_hz * loop->dt_s) : 1.0;
     bst_loop slow = *loop;
     if (every > 100.0) {
@@ -56,7 +56,8 @@ static void put_step_data(FILE *o, const char *name, const bst_loop *loop,
     fputs("BST_END\n", o);
 }
 
-/* Disturbance to pointing error, beyond half the frame rate too; and the jitter's density. */
+/* Writes the transfer from disturbance to pointing error, also above half the frame rate, and the
+ * jitter density. */
 static void put_rejection_data(FILE *o, const bst_loop_axis *axis, double period_s) {
     fputs("$rejection << BST_END\n", o);
     for (int i = 0; i < CURVE_POINTS; i++) {

@@ -1,4 +1,4 @@
-/* The tracking loop round an axis of the mount, and what it leaves of the disturbances. */
+/* The tracking loop of a mount axis: closes it and predicts the residual pointing error. */
 #include "sim/analysis/loop/loop_model.h"
 
 static void predict(bst_loop_axis *axis, double drift_pxps, const bst_loop_options *options,

@@ -50,8 +50,8 @@ static bst_status choose(bst_ctx *ctx, const bst_orbit_request *q, bst_run_scene
                                  bst_run_reader_folder(scene->run));
 }
 
-/* The law by which the object moves in the scenario. A track that belongs to none of the objects
- * moves as all of them, where they all are element sets. */
+/* Motion law of the track's object. A track without object gets the common law if all objects have
+ * element sets. */
 static bst_world_motion_law motion_of(const bst_world *world, int object) {
     if (object >= 0) {
         return bst_world_object_motion(world, object);

@@ -28,14 +28,14 @@ typedef struct orbit {
     const bst_run_track *track;
     bst_od_observation *items;
     double *chi2;
-    const bst_astro_eop *eop; /* the scenario's, or own_eop */
+    const bst_astro_eop *eop; /* of the scenario, or own_eop */
     bst_astro_eop *own_eop;
     bst_sky_clock *clock;
     bst_gravity *gravity;
     bst_force_model forces;
     bst_od_sgp4 sgp4;
-    bst_world_motion_law motion; /* in the scenario */
-    const char *model;           /* what it is fitted with, in words */
+    bst_world_motion_law motion; /* law in the scenario */
+    const char *model;           /* description of the force model */
     bst_od_options options;
     bst_od_solution solution;
     bst_od_report report;
@@ -110,7 +110,7 @@ static bst_status solve(bst_ctx *ctx, orbit *o) {
     return bst_od_path_create(ctx, &o->options.motion, &o->solution.state, &o->path);
 }
 
-/* Mean elements through a revolution about the epoch of the solution, or the arc where it is
+/* Fits mean elements to one revolution around the epoch of the solution, or to the arc if it is
  * longer. */
 static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
     enum { PLACES = 73 };
@@ -122,11 +122,12 @@ static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
     double half = BST_PI * sqrt(a * a * a / BST_EARTH_MU_M3PS2);
     half = fmax(half, fmax(o->items[o->track->count - 1].observer.time_s - s->time_s,
                            s->time_s - o->items[0].observer.time_s));
-    /* an epoch to the microsecond, as it is written */
+    /* the epoch is written to the microsecond */
     double epoch_s = round(s->time_s * 1e6) * 1e-6;
     bst_vec3 r = {0}, v = {0};
     bst_status status = BST_OK;
-    for (int pass = 0; pass < 2 && status == BST_OK; pass++) { /* away from the epoch, both ways */
+    for (int pass = 0; pass < 2 && status == BST_OK;
+         pass++) { /* from the epoch backwards and forwards */
         for (int i = 0; i <= PLACES / 2 && status == BST_OK; i++) {
             int index = pass ? PLACES / 2 + i : PLACES / 2 - i;
             double offset = half * (index - PLACES / 2) / (PLACES / 2);
@@ -156,7 +157,7 @@ static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
 
 /* ------------------------------------------------------------------ files */
 
-/* Rows of the OEM: every step from the first observation on. */
+/* Rows of the OEM at constant steps from the first observation. */
 typedef struct rows {
     const orbit *o;
     double from_s, step_s, to_s;
@@ -307,7 +308,7 @@ static bst_status write_file(bst_ctx *ctx, const orbit *o, const char *path,
 
 /* ------------------------------------------------------------------ the command */
 
-/* A variance this many times as stated is no error of a covariance any more. */
+/* maximum variance factor that a covariance error can explain */
 static const double MOST_FACTOR = 4.0;
 
 static void print_orbit(const orbit *o) {

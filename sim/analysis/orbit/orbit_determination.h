@@ -1,10 +1,10 @@
-/* An orbit from measured directions, and the files that say what it is. */
+/* Orbit determination from measured directions, with its output files (`boresight orbit`). */
 #ifndef BST_ANALYSIS_ORBIT_ORBIT_DETERMINATION_H
 #define BST_ANALYSIS_ORBIT_ORBIT_DETERMINATION_H
 
 #include "sim/analysis/orbit/orbit_choice.h"
 
-/* What moves the object: the law of its orbit in the scenario, or another. */
+/* Force model: the motion law of the scenario, or another one. */
 enum {
     BST_ORBIT_FORCES_SCENARIO,
     BST_ORBIT_FORCES_FULL, /* gravity to degree 20, Sun and Moon */
@@ -13,20 +13,20 @@ enum {
     BST_ORBIT_FORCES_SGP4
 };
 
-/* Whether the observer's stellar aberration is still in the angles of a TDM. */
+/* Aberration in the angles of a TDM: removed or contained. */
 enum { BST_ORBIT_ABERRATION_REMOVED, BST_ORBIT_ABERRATION_CONTAINED };
 
 typedef struct bst_orbit_determination {
-    bst_orbit_request choice;                    /* whose directions */
+    bst_orbit_request choice;                    /* track whose directions are used */
     const char *oem, *omm, *tdm, *json, *report; /* files to write; NULL: none */
     double sigma_arcsec;                         /* of a TDM's angles, per axis */
-    double predict_s, step_s;                    /* of the OEM: beyond the arc, between states */
-    double reject_chi2;                          /* observations beyond it are left out; 0: none */
+    double predict_s, step_s; /* of the OEM: extension beyond the arc, time step */
+    double reject_chi2;       /* observations with a larger chi-square are rejected; 0: none */
     int forces, aberration;
 } bst_orbit_determination;
 
-/* Determines the orbit of the track that is chosen of a run's folder or a TDM, `path`, prints it
- * and writes the files. Errors: what reading, the solution and writing fail with. */
+/* Determines the orbit of a track of a run's folder or a TDM, `path`; prints it and writes the
+ * files. Errors of reading, solution and writing. */
 bst_status bst_orbit_determine(bst_ctx *ctx, const bst_orbit_determination *request,
                                const char *path) BST_MUST_CHECK;
 

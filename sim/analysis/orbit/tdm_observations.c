@@ -22,7 +22,7 @@ static int64_t count_of(const bst_tdm *tdm, const bst_tdm_pair *pair) {
     return count;
 }
 
-/* The pair of participants that is asked for, or that has the most angles. */
+/* Selects the requested pair of participants, or the one with most angles. */
 static bst_status choose_pair(bst_ctx *ctx, const bst_tdm_request *q, const bst_tdm *tdm,
                               const bst_tdm_pair **out) {
     int64_t most = 0;
@@ -46,7 +46,7 @@ static int by_time(const void *a, const void *b) {
     return (d > 0.0) - (d < 0.0);
 }
 
-/* Angles, and the observer's states that they are completed with. */
+/* Angles of a TDM, and the source of observer states. */
 typedef struct sources {
     const bst_tdm *tdm;
     const bst_oem *oem;
@@ -55,7 +55,7 @@ typedef struct sources {
     bst_time epoch; /* of the first angles */
 } sources;
 
-/* The observer's state when the light came, and the direction as a track has it. */
+/* Adds the observer state at reception, and converts the angles to a direction. */
 static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const sources *s,
                            const bst_tdm_angles *a, bst_run_observation *o) {
     bst_bodies bodies;
@@ -82,7 +82,7 @@ static bst_status gather(bst_ctx *ctx, const bst_tdm_request *q, sources *s,
     const bst_tdm *tdm = s->tdm;
     const char *name = q->observer_name ? q->observer_name : pair->observer;
     if (!q->observer_name && bst_oem_object_count(s->oem) == 1) {
-        name = ""; /* the only one, whatever it is called */
+        name = ""; /* there is only one: its name does not matter */
     }
     bst_status status = bst_oem_find(ctx, s->oem, name, &s->object);
     if (status != BST_OK) {

@@ -1,4 +1,5 @@
-/* boresight pd: detection measured on frames full of targets of known place and light. */
+/* Functions of `boresight pd`: measures the probability of detection on frames with targets of
+ * known position and brightness. */
 #ifndef BST_ANALYSIS_PD_PD_H
 #define BST_ANALYSIS_PD_PD_H
 
@@ -12,54 +13,54 @@
 
 enum { BST_PD_POINTS = 200, BST_PD_PHASES = 10 };
 
-/* What is asked for. */
+/* Options of a measurement. */
 typedef struct bst_pd_options {
-    double low, high, step; /* SNR; with by_magnitude V */
+    double low, high, step; /* SNR; V magnitude if by_magnitude */
     bool by_magnitude;
     int64_t trials;        /* per point */
-    int64_t empty_frames;  /* without targets; 0: for 400 false alarms, 50 to 400 */
+    int64_t empty_frames;  /* frames without targets; 0: for 400 false alarms, 50 to 400 frames */
     double streak_px;      /* 0: targets at rest in the frame */
-    bool known_rate;       /* the camera turns and image processing is told how */
-    double false_alarms;   /* per frame; <= 0: as the scenario says */
-    double background_e;   /* sky per pixel and exposure; < 0: the scenario's */
-    double jitter_px;      /* blur per axis; < 0: what image processing is set to */
-    double apart_px;       /* least distance between targets beyond their own length */
-    double cell_px;        /* of the grid of targets; 0: apart_px + length + 40 */
-    bool stars;            /* the scenario's stars and sky behind the targets */
-    int64_t stack;         /* frames that are searched together; 0: each by itself */
-    double rates_px;       /* per frame: targets of a stack move, up to this in x and in y */
-    double star_streak_px; /* the camera turns, so that stars streak and targets do not */
-    bool by_module;        /* step the scenario's module also where a function would do */
+    bool known_rate;       /* the camera rotates, and image processing gets its rate */
+    double false_alarms;   /* per frame; <= 0: from the scenario */
+    double background_e;   /* sky per pixel and exposure; < 0: from the scenario */
+    double jitter_px;      /* blur per axis; < 0: as configured for image processing */
+    double apart_px;       /* minimum distance between targets, beyond their length */
+    double cell_px;        /* cell size of the target grid; 0: apart_px + length + 40 */
+    bool stars;            /* with the stars and sky of the scenario */
+    int64_t stack;         /* frames that are searched together; 0: single frames */
+    double rates_px;       /* per frame: maximum motion of a stack's targets in x and y */
+    double star_streak_px; /* the camera follows the targets: stars are streaks */
+    bool by_module;        /* step the scenario's module also if a function is available */
     const char *sensor;    /* "observer/sensor"; NULL: the first */
     const char *device;
     int threads;
-    bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
-    bool quiet;         /* no progress line */
+    bst_device *opened; /* an open device to use; the caller closes it; NULL: none */
+    bool quiet;         /* no progress display */
 } bst_pd_options;
 
-/* One target of a frame. */
+/* One target in a frame. */
 typedef struct bst_pd_target {
     int point;              /* index of its SNR */
-    double flux_e, noise_e; /* noise of a pixel without the target's light, at its place */
+    double flux_e, noise_e; /* noise of a pixel at its position without its own light */
 } bst_pd_target;
 
-/* One frame: its targets and what is needed to render and process it. */
+/* One frame: targets and input of renderer and image processing. */
 typedef struct bst_pd_frame {
     int count;
     bst_eval_match_target *places; /* [count] */
     bst_pd_target *targets;
     bst_scene_source *sources; /* targets, then the stars */
     int source_room;
-    bst_pd_stars stars; /* that may be found */
+    bst_pd_stars stars; /* stars that may be detected */
     bst_scene_source_path *paths;
-    bst_camera_motion motion; /* the camera's, as told to image processing */
+    bst_camera_motion motion; /* camera motion that image processing receives */
     double time_s[2];
     bst_quat q[2];
     bst_los_track track;
     bst_render_request request;
 } bst_pd_frame;
 
-/* The camera that looks, and the grid on which targets are placed. */
+/* Camera, target grid and noise of a measurement. */
 typedef struct bst_pd_scene {
     bst_pd_options options;
     const bst_scenario *scenario;
@@ -69,74 +70,72 @@ typedef struct bst_pd_scene {
     bst_camera camera; /* as rendered: widened by the jitter */
     struct bst_world *world;
     struct bst_knowledge *knowledge;
-    struct bst_psf *psf; /* of the widened camera; NULL: it was not widened */
+    struct bst_psf *psf; /* PSF of the widened camera; NULL: not widened */
     bst_device *device;
     bst_renderer *renderer;
-    bst_pd_sky *sky; /* NULL: no stars, and one level of sky all over */
+    bst_pd_sky *sky; /* NULL: no stars, uniform sky */
     double exposure_s, sky_e, dark_e;
-    double noise_e;       /* of a pixel without the source's own light, at the boresight */
-    double fwhm_px;       /* of the PSF: how near a detection must be */
-    double own_light;     /* as bst_eval_matched_filter_pd has it, mean of places and directions */
-    double sigma_px;      /* of the Gaussian with the PSF's noise-equivalent area */
-    bst_pd_image *image;  /* of targets; NULL: the PSF is that Gaussian */
-    struct bst_psf *seen; /* that it is made from */
-    double *sharpness;    /* of a streak, by its angle from an axis; NULL: targets are at rest */
+    double noise_e;       /* at the boresight, without the source's own light */
+    double fwhm_px;       /* of the PSF: matching distance of detections */
+    double own_light;     /* as in bst_eval_matched_filter_pd, mean over positions and directions */
+    double sigma_px;      /* of the Gaussian with the same noise-equivalent area */
+    bst_pd_image *image;  /* image model of targets; NULL: the PSF is Gaussian */
+    struct bst_psf *seen; /* PSF of the image model */
+    double *sharpness;    /* sum p^2 of a streak by its angle from an axis; NULL: point targets */
     double cell_px, apart_px;
     int columns, rows;
     int points;
     double snr[BST_PD_POINTS];    /* at the boresight */
-    double flux_e[BST_PD_POINTS]; /* of that SNR, of the mean place in a pixel */
+    double flux_e[BST_PD_POINTS]; /* flux for that SNR, mean over the pixel phase */
     double v_mag[BST_PD_POINTS];
     bst_pd_frame frames[2]; /* one is rendered while the other is processed */
 } bst_pd_scene;
 
-/* Opens world, camera, device and renderer of the scenario's sensor. Errors name what to change. */
+/* Opens world, camera, device and renderer for the scenario's sensor. Errors name the remedy. */
 bst_status bst_pd_scene_open(bst_ctx *ctx, const bst_scenario *scenario,
                              const bst_pd_options *options, bst_pd_scene *out) BST_MUST_CHECK;
-/* Frees everything that a scene holds and clears it; a device that the caller lent stays open. */
+/* Frees the content of a scene and clears it; the caller's device stays open. */
 void bst_pd_scene_close(bst_pd_scene *scene);
-/* Targets per full frame. */
+/* Number of targets per full frame. */
 int bst_pd_scene_room(const bst_pd_scene *scene);
-/* Frame `number` (0, 1, ...) into `frame`: places, light and noise follow from the scenario's seed
- * and the number alone. Without targets: its noise is another. */
+/* Defines frame `number` (0, 1, ...): positions, brightness and noise depend only on the scenario's
+ * seed and the number. Frames without targets have different noise. */
 bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *scene, int64_t number, bool targets,
                             bst_pd_frame *frame) BST_MUST_CHECK;
-/* sum p^2 of a target of unit flux. */
+/* Sum of squared pixel fractions of a target of unit flux. */
 double bst_pd_sharpness(const bst_pd_scene *scene, const bst_eval_match_target *place);
 
-/* Frames that a detector takes before it answers. */
+/* Number of frames that a detector needs for an answer. */
 int bst_pd_scene_stacked(const bst_pd_scene *scene);
 
-/* What was counted and measured at one SNR, of matched targets. Along and across the streak; x and
- * y of targets at rest. */
+/* Counts and errors of matched targets at one SNR. Along and across the streak; x and y of point
+ * targets. */
 typedef struct bst_pd_tally {
     int64_t trials, matched;
     double error_sum[2], error_square[2], bound_square[2]; /* px, px^2 */
-    double flux_sum, flux_square, flux_bound_square;       /* over the true flux */
-    double chi_square; /* of the place with the covariance that was told; 2 a target if that is true
-                        */
-    int64_t bounds;    /* targets that the bounds are the sum of */
-    double phase_sum[2][BST_PD_PHASES]; /* error along x and y by the place within the pixel */
+    double flux_sum, flux_square, flux_bound_square;       /* relative to the true flux */
+    double chi_square; /* of the position with the reported covariance; expectation 2 per target */
+    int64_t bounds;    /* number of targets in the sums of bounds */
+    double phase_sum[2][BST_PD_PHASES]; /* error in x and y by position within the pixel */
     int64_t phase_count[2][BST_PD_PHASES];
 } bst_pd_tally;
 
 typedef struct bst_pd_result {
     bst_pd_tally tallies[BST_PD_POINTS];
     int64_t frames, empty_frames;
-    int64_t false_alarms;      /* in the frames without targets */
-    int64_t stars;             /* detections in them that may be stars: no false alarms */
-    int64_t unmatched, second; /* in those with: detections that are no target's; a target's
-                                  beyond its first */
-    int64_t chance_trials, chance_hits; /* targets that are not there */
-    int64_t lost;                       /* detections that found no room */
+    int64_t false_alarms;               /* in frames without targets */
+    int64_t stars;                      /* detections in them that may be stars and do not count */
+    int64_t unmatched, second;          /* in frames with targets: detections without target; second
+                                           detections of a target */
+    int64_t chance_trials, chance_hits; /* fictitious targets, for chance matches */
+    int64_t lost;                       /* detections beyond the capacity */
     double pixels;                      /* of a frame */
-    double threshold_snr;               /* as image processing told it */
-    double wall_s, process_s;           /* process_s: of the frames without targets, mean */
+    double threshold_snr;               /* as reported by image processing */
+    double wall_s, process_s;           /* process_s: of frames without targets, mean */
 } bst_pd_result;
 
-/* What finds the targets: image processing that comes with Boresight, as the scenario configures it
- * and with room for all targets; another module of the role "imgproc" (or that one, with by_module)
- * is stepped as in a run. */
+/* Detector under test: the built-in image processing as the scenario configures it, or, stepped as
+ * in a run, another "imgproc" module (or the built-in one with by_module). */
 typedef struct bst_pd_detector bst_pd_detector;
 
 /* Opens the sensor's image processing as a detector: as a function if possible, else as a module.
@@ -149,24 +148,24 @@ bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *scene,
                                 bst_pd_detector **out) BST_MUST_CHECK;
 /* Frees a detector; NULL is allowed. */
 void bst_pd_detector_close(bst_pd_detector *detector);
-/* What it finds in one frame, at most `capacity`. */
+/* Detects targets in one frame; at most `capacity` detections. */
 bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *detector, const bst_pd_scene *scene,
                          bst_frame *frame, const bst_pd_frame *targets, bst_detections *out,
                          int capacity) BST_MUST_CHECK;
 
-/* Renders, processes and counts. BST_ERR_INTERRUPTED when the user asks to stop. */
+/* Renders, processes and counts all frames. BST_ERR_INTERRUPTED: stop requested. */
 bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *scene, bst_pd_detector *detector,
                       bst_pd_result *out) BST_MUST_CHECK;
 
-/* Figures of a result. */
+/* Figures of a measurement. */
 typedef struct bst_pd_figures {
     double false_alarms_per_frame, false_alarms_low, false_alarms_high, pfa, chance;
     bst_pd_needed pd50, pd90;
     double loss_db_pd50, loss_db_pd90, loss_db_sigma_pd50, loss_db_sigma_pd90;
-    /* in SNR per frame over one frame by itself at the same false alarms per frame: of the ideal
-     * detector, and of this one (NAN unless told) */
+    /* SNR gain per frame over a single frame at equal false alarms per frame: of the ideal
+     * detector, and of this one (NAN: not computed) */
     double gain_db_pd50, gain_db_pd90, gain_over_single_db_pd50, gain_over_single_db_pd90;
-    /* against a matched filter, whose output has the target's own photon noise too */
+    /* relative to a matched filter with the target's own photon noise */
     double own_light_db_pd50, own_light_db_pd90;
 } bst_pd_figures;
 
@@ -176,8 +175,7 @@ typedef struct bst_pd_figures {
  * Given:     scene, result  the measured scene and its counts; at least one empty frame */
 void bst_pd_figures_of(const bst_pd_scene *scene, const bst_pd_result *result, bst_pd_figures *out);
 
-/* What the detector needs in one frame by itself: fills in gain_over_single of a stack's figures.
- */
+/* Sets gain_over_single of a stack's figures from the figures of a single frame. */
 void bst_pd_compare_single(const bst_pd_figures *single, bst_pd_figures *stack);
 
 /* Prints the table of a measurement to stdout. */

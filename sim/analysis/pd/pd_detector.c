@@ -1,5 +1,5 @@
-/* The detectors that pd can drive: image processing that comes with Boresight, by its function, and
- * any module of the role "imgproc", by its step in an engine of its own that feeds it frames. */
+/* Detectors for `boresight pd`: built-in image processing by function call, and any "imgproc"
+ * module in an engine of its own with a source of frames. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@
 
 enum { ROOM_PER_TARGET = 4, MOST_DETECTIONS = 65536, SAMPLES = 5, RING = 64 };
 
-/* What the feeding module publishes in its next step. */
+/* Messages that the source publishes in its next step. */
 typedef struct feed {
     bst_frame *frame;
     const bst_pd_frame *targets;
@@ -27,15 +27,15 @@ struct bst_pd_detector {
     bst_imgproc_config config;
     bst_imgproc_maps maps;
     bst_imgproc *ip;
-    bst_stack *stack; /* NULL: frames by themselves */
-    int64_t taken;    /* frames */
+    bst_stack *stack; /* NULL: single frames */
+    int64_t taken;    /* number of frames */
     /* by module */
     bst_engine *engine;
     feed feed, *feed_config;
     int64_t period_ticks, steps;
-    bst_detections *out; /* of the frame in work */
+    bst_detections *out; /* detections of the current frame */
     int capacity;
-    bool told; /* the module published detections of it */
+    bool told; /* the module has published them */
 };
 
 enum { PORT_EXPOSURE, PORT_FRAME, PORT_POINTING, PORT_NAV, PORT_COUNT };
@@ -57,7 +57,7 @@ static void destroy_feed(void *self) {
     (void)self;
 }
 
-/* Attitudes at even times of an exposure that ends now. */
+/* Fills the pointing telemetry with equidistant attitudes of the exposure that ends now. */
 static void tell_pointing(const feed *f, bst_pointing_telemetry *t, int capacity, int64_t start) {
     t->capacity = capacity;
     t->settled = true;
@@ -93,7 +93,7 @@ static bst_status step_feed(void *self, struct bst_step *step) {
                             .window = window,
                             .binning = 1,
                             .bits = f->bits};
-    f->frame = NULL; /* the channel's now */
+    f->frame = NULL; /* owned by the channel now */
     return BST_OK;
 }
 
@@ -126,8 +126,8 @@ static bst_status keep_detections(void *user, const char *scope, const char *cha
     return BST_OK;
 }
 
-/* The scenario's module and its feeder, without the delays of its inputs: a frame is handed over
- * and its detections are waited for. */
+/* Creates an engine with the scenario's module and the source, without input delays: the detections
+ * of a frame come at once. */
 static bst_status open_engine(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *d) {
     const bst_scenario *scenario = s->scenario;
     char feeder[256], module[256];
@@ -231,7 +231,7 @@ void bst_pd_detector_close(bst_pd_detector *d) {
     }
 }
 
-/* Of a stack only what it shows counts, once it is full. */
+/* Adds a frame to a stack; only detections of a full stack count. */
 static void stack_frame(bst_pd_detector *d, const bst_pd_frame *targets) {
     bst_stack_frame frame =
         bst_imgproc_stack_frame(d->ip, (double)d->taken++, targets->motion.q_cam_from_gcrf);
@@ -274,9 +274,9 @@ bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *d, const bst_pd_scene *s
     d->feed.frame = frame;
     d->feed.targets = targets;
     d->steps++;
-    /* the feeder steps at period * steps; what follows has until before its next step */
+    /* the source steps at period * steps; the module must finish before its next step */
     bst_status status = bst_engine_run(ctx, d->engine, (d->steps + 1) * d->period_ticks);
-    bst_frame_release(d->feed.frame); /* NULL once it was handed over */
+    bst_frame_release(d->feed.frame); /* NULL after publication */
     d->feed.frame = NULL;
     BST_TRY(status);
     if (!d->told) {

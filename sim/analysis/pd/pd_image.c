@@ -9,19 +9,19 @@
 enum {
     PER_PX = 16,
     REACH_PX = 12,
-    POWER_REACH_PX = 7, /* light beyond counts for less than 2e-4 of a sum of squares */
+    POWER_REACH_PX = 7, /* light beyond this contributes less than 2e-4 to the sum of squares */
     PATH_PER_PX = 2,
-    SIDE = 2 * PER_PX * (REACH_PX + 1) + 1, /* a pixel more, for differences */
+    SIDE = 2 * PER_PX * (REACH_PX + 1) + 1, /* one more pixel for differences */
 };
 
 struct bst_pd_image {
     const bst_psf *psf;
-    int room;      /* pixels of a stamp's side */
+    int room;      /* pixels per side of a stamp */
     double *table; /* [nodes][SIDE][SIDE] */
     double *share, *by_x, *by_y;
 };
 
-/* A stamp's first pixel and sides. */
+/* First pixel and size of a stamp. */
 typedef struct stamp {
     int x0, y0, width, height;
 } stamp;
@@ -65,18 +65,18 @@ void bst_pd_image_free(bst_pd_image *m) {
     }
 }
 
-/* The nodes that mix at a target's place. */
+/* PSF field nodes that are interpolated at a target's position. */
 typedef struct mix {
     int count, node[4];
     double weight[4];
 } mix;
 
-/* Derivative along an axis at a sample: fourth-order central difference. */
+/* Derivative along an axis by fourth-order central differences. */
 static double slope(const double *at, int stride) {
     return (8.0 * (at[stride] - at[-stride]) - (at[2 * stride] - at[-2 * stride])) * PER_PX / 12.0;
 }
 
-/* Adds a part of the light that stands at (x, y) from the stamp's first pixel. */
+/* Adds a part of the light at (x, y) relative to the stamp's first pixel. */
 static void add_place(bst_pd_image *m, const stamp *s, const mix *nodes, double x, double y,
                       double weight, bool slopes) {
     int at_x = (int)lround(x * PER_PX), at_y = (int)lround(y * PER_PX);
@@ -93,7 +93,7 @@ static void add_place(bst_pd_image *m, const stamp *s, const mix *nodes, double 
                                    (size_t)(v + middle) * SIDE + (size_t)(u + middle);
                 m->share[k] += w * at[0];
                 if (slopes) {
-                    /* by the source's place, which is the other way */
+                    /* derivative with respect to the source position: opposite sign */
                     m->by_x[k] -= w * slope(at, 1);
                     m->by_y[k] -= w * slope(at, SIDE);
                 }
@@ -102,7 +102,7 @@ static void add_place(bst_pd_image *m, const stamp *s, const mix *nodes, double 
     }
 }
 
-/* Share of a target's light by pixel, and its derivatives; returns the number of pixels. */
+/* Pixel fractions of a target and their derivatives; returns the number of pixels. */
 static int draw(bst_pd_image *m, const bst_eval_match_target *place, bool slopes) {
     double half_x = 0.5 * fabs(place->dx_px) + REACH_PX;
     double half_y = 0.5 * fabs(place->dy_px) + REACH_PX;

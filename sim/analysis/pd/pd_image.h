@@ -1,4 +1,4 @@
-/* Images of targets by a PSF that is no Gaussian, for their signal-to-noise ratio and bound. */
+/* Images of targets with a non-Gaussian PSF, for SNR and Cramer-Rao bound. */
 #ifndef BST_ANALYSIS_PD_PD_IMAGE_H
 #define BST_ANALYSIS_PD_PD_IMAGE_H
 
@@ -8,18 +8,18 @@
 
 typedef struct bst_pd_image bst_pd_image;
 
-/* Tables of the PSF, for targets that move by up to longest_px during an exposure. `psf` must
- * outlive them. BST_ERR_MEMORY. */
+/* Creates tables of the PSF for targets that move by up to longest_px during an exposure. `psf`
+ * must outlive them. BST_ERR_MEMORY. */
 bst_status bst_pd_image_create(bst_ctx *ctx, const bst_psf *psf, double longest_px,
                                bst_pd_image **out) BST_MUST_CHECK;
 /* Frees an image of the PSF; NULL is allowed. */
 void bst_pd_image_free(bst_pd_image *image);
 
-/* Sums of share^2 and share^3 over the pixels of a target of unit flux, at its own place in the
- * field and in the pixel (to 1/32 px). */
+/* Sums of share^2 and share^3 over the pixels of a target of unit flux, for its position in field
+ * and pixel (to 1/32 px). */
 void bst_pd_image_powers(bst_pd_image *image, const bst_eval_match_target *place, double out[2]);
 
-/* As bst_location_bound_of, of a target with flux_e. */
+/* Cramer-Rao bound of a target with flux_e, as bst_location_bound_of. */
 bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *image, const bst_eval_match_target *place,
                               double flux_e, const bst_eval_bound_noise *noise,
                               bst_location_bound *out) BST_MUST_CHECK;

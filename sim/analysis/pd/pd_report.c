@@ -8,13 +8,13 @@
 #include "sim/eval/detection_theory.h"
 #include "sim/io/plot.h"
 
-/* One SNR's figures. */
+/* Figures at one SNR. */
 typedef struct row {
     double pd, low, high, ideal, matched_filter;
     double over_bound[2], over_bound_both; /* RMS error over the bound: along (x), across (y) */
     double rms_px[2], bias_px[2];
     double flux_over_bound, flux_bias, chi_square;
-    double phase_bias_px, phase_sigma_px; /* largest mean error over the place in the pixel */
+    double phase_bias_px, phase_sigma_px; /* largest mean error as a function of pixel phase */
 } row;
 
 static double ratio(double square, double count, double bound_square, double bounds) {
@@ -236,7 +236,7 @@ cJSON *bst_pd_json(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_f
     return root;
 }
 
-/* Bounds of the plot's error panel: RMS over bound is near 1. */
+/* Writes the data of the error panel, limited to values near 1. */
 static void put_points(FILE *o, const bst_pd_scene *s, const bst_pd_result *r,
                        const bst_pd_figures *f) {
     fputs("$points << BST_END\n", o);

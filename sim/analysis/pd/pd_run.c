@@ -9,8 +9,8 @@
 #include "sim/eval/detection_theory.h"
 #include "sim/eval/location_bound.h"
 
-/* Targets of each SNR whose bound is worked out: it differs little with the place in the pixel, and
- * a long streak's takes a millisecond. */
+/* Targets per SNR whose bound is computed: it depends little on the pixel phase, and a long streak
+ * takes a millisecond. */
 enum { BOUNDS_AT_REST = 100, BOUNDS_OF_STREAKS = 12 };
 
 static const double BOUND_MARGIN_PX = 16.0;
@@ -29,7 +29,8 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_eval_match_
                             const bst_pd_target *target, bst_pd_tally *tally) {
     const bst_pd_scene *s = r->scene;
     if (tally->bounds >= (s->sharpness ? BOUNDS_OF_STREAKS : BOUNDS_AT_REST) ||
-        (s->options.known_rate && tally->bounds > r->result->frames)) { /* one direction a frame */
+        (s->options.known_rate &&
+         tally->bounds > r->result->frames)) { /* one direction per frame */
         return BST_OK;
     }
     bst_eval_bound_source source = {.x_px = place->x_px,
@@ -47,8 +48,8 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_eval_match_
         BST_TRY(bst_location_bound_gaussian(ctx, &source, &noise, BOUND_MARGIN_PX, &bound));
     }
     bst_location_bound_along(&bound, place->dx_px, place->dy_px, along);
-    /* of n frames the mean has 1 / n of the variance; the place at their end has that of the rate
-     * too, which is 3 (n - 1) / (n + 1) of it */
+    /* the mean of n frames has 1 / n of the variance; the position at their end also has that of
+     * the rate, 3 (n - 1) / (n + 1) of it */
     double n = bst_pd_scene_stacked(s), share = 1.0 / n, end = (4.0 * n - 2.0) / (n * (n + 1.0));
     tally->bound_square[0] += end * along[0];
     tally->bound_square[1] += end * along[1];
@@ -77,7 +78,7 @@ static void add_error(const bst_eval_match_target *place, const bst_pd_target *t
         (d->cov_yy * x * x - 2.0 * d->cov_xy * x * y + d->cov_xx * y * y) / determinant;
     const double at[2] = {place->x_px, place->y_px}, off[2] = {x, y};
     for (int a = 0; a < 2; a++) {
-        double phase = at[a] + 0.5 - floor(at[a] + 0.5); /* 1/2: the pixel's centre */
+        double phase = at[a] + 0.5 - floor(at[a] + 0.5); /* 1/2: centre of the pixel */
         int bin = (int)fmin(phase * BST_PD_PHASES, BST_PD_PHASES - 1.0);
         tally->phase_sum[a][bin] += off[a];
         tally->phase_count[a][bin]++;
@@ -121,11 +122,11 @@ static void count_chance(runner *r, const bst_pd_frame *f) {
     out->empty_frames += bst_pd_scene_stacked(r->scene);
 }
 
-/* `answers`: the frame is the last of those that are searched together. */
+/* Processes a frame and counts. `answers`: it is the last frame of a stack. */
 static bst_status process(bst_ctx *ctx, runner *r, bst_frame *frame, const bst_pd_frame *f,
                           bool targets, bool answers) {
     const uint16_t *pixels;
-    BST_TRY(bst_frame_map(frame, ctx, &pixels)); /* waits for it, before the clock runs */
+    BST_TRY(bst_frame_map(frame, ctx, &pixels)); /* waits for the renderer before timing starts */
     double started = bst_wall_seconds();
     bst_status status =
         bst_pd_detect(ctx, r->detector, r->scene, frame, f, r->detections, r->capacity);
@@ -143,7 +144,7 @@ static bst_status process(bst_ctx *ctx, runner *r, bst_frame *frame, const bst_p
     return count_targets(ctx, r, f);
 }
 
-/* Frames of one kind: each is asked for before the one before is processed. */
+/* Renders and processes frames; each is requested before the previous one is processed. */
 static bst_status do_frames(bst_ctx *ctx, runner *r, int64_t count, bool targets,
                             bst_progress *progress, int64_t done) {
     bst_pd_scene *s = r->scene;
@@ -223,8 +224,8 @@ bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *detector,
 }
 
 static double loss_sigma(bst_pd_needed needed, double pfa, int64_t alarms, double pd) {
-    /* d ln(snr) of both; Q^-1(pfa) changes by -d ln(pfa) / hazard, the hazard of a normal tail
-     * being near Q^-1 itself */
+    /* d ln(snr) of both; Q^-1(pfa) changes by -d ln(pfa) / hazard; the hazard of a normal tail is
+     * about Q^-1 */
     double t = bst_eval_ideal_snr(pfa, 0.5), ideal = bst_eval_ideal_snr(pfa, pd);
     double of_alarms = 1.0 / (sqrt((double)alarms) * t * ideal);
     return 20.0 / log(10.0) * hypot(needed.sigma / needed.snr, of_alarms);

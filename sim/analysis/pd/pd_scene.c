@@ -13,7 +13,7 @@
 #include "sim/world/scene/skylight.h"
 #include "sim/world/world_config.h"
 
-/* Angles at which a streak's sharpness is tabled, from an axis to the next. */
+/* number of angles at which a streak's sum of squares is tabulated, over 90 degrees */
 enum { ANGLES = 46 };
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
@@ -25,7 +25,7 @@ static const bst_sensor_config *sensor_config(const bst_scenario *scenario, int 
     return &sensors[sensor];
 }
 
-/* The sensor that was named, or the first that has image processing. */
+/* Finds the named sensor, or the first one with image processing. */
 static bst_status find_sensor(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_observer_config *observers = s->scenario->observers.items;
     for (int m = 0; m < s->scenario->module_count; m++) {
@@ -63,13 +63,13 @@ static bst_status read_psf(bst_ctx *ctx, bst_pd_scene *s) {
     return status;
 }
 
-/* Noise of a pixel that has no source. */
+/* Noise of a pixel without source. */
 static double noise_at(const bst_pd_scene *s, double x_px, double y_px) {
     double sky_e = s->sky ? bst_pd_sky_e(s->sky, x_px, y_px) : s->sky_e;
     return sqrt(sky_e + s->dark_e + s->camera.read_noise_e * s->camera.read_noise_e);
 }
 
-/* The scenario's sky, looked at once for its level at the boresight. */
+/* Evaluates the scenario's sky for its level at the boresight. */
 static bst_status open_sky(bst_ctx *ctx, bst_pd_scene *s) {
     BST_TRY(bst_pd_sky_open(ctx, s, &s->sky));
     const double time_s[2] = {0.0, s->exposure_s};
@@ -84,7 +84,7 @@ static bst_status open_sky(bst_ctx *ctx, bst_pd_scene *s) {
     return BST_OK;
 }
 
-/* Camera, its PSF and the noise of a pixel. */
+/* Sets up camera, PSF and noise. */
 static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_sensor_config *config = sensor_config(s->scenario, s->observer, s->sensor);
     if (config->exposure.binning > 1) {
@@ -129,11 +129,11 @@ static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
     }
     s->sigma_px = s->fwhm_px / FWHM_PER_SIGMA;
     s->seen = psf;
-    /* a camera's turn draws some targets longer than those in the middle */
+    /* distortion by camera rotation lengthens some targets */
     return bst_pd_image_create(ctx, psf, 1.1 * s->options.streak_px, &s->image);
 }
 
-/* The mean over places in the pixel, which differ little for a streak. */
+/* Mean over positions in the pixel; they differ little for a streak. */
 static bst_status make_sharpness(bst_ctx *ctx, bst_pd_scene *s) {
     s->sharpness = calloc(ANGLES, sizeof *s->sharpness);
     if (!s->sharpness) {
@@ -156,7 +156,7 @@ static bst_status make_sharpness(bst_ctx *ctx, bst_pd_scene *s) {
     return BST_OK;
 }
 
-/* sum of the squared shares of a 1-D Gaussian about x. */
+/* sum of squared pixel fractions of a 1-D Gaussian at x */
 static double axis_sharpness(double x, double sigma) {
     double scale = 1.0 / (sigma * sqrt(2.0)), sum = 0.0;
     int first = (int)floor(x - 6.0 * sigma), last = (int)ceil(x + 6.0 * sigma);
@@ -184,13 +184,13 @@ double bst_pd_sharpness(const bst_pd_scene *s, const bst_eval_match_target *plac
     return axis_sharpness(place->x_px, s->sigma_px) * axis_sharpness(place->y_px, s->sigma_px);
 }
 
-/* A place in the pixel on the middle of the sensor. */
+/* A pixel position at the centre of the sensor. */
 static bst_eval_match_target middle_of(const bst_pd_scene *s, double x, double y) {
     return (bst_eval_match_target){.x_px = floor(bst_camera_centre_x(&s->camera)) + x,
                                    .y_px = floor(bst_camera_centre_y(&s->camera)) + y};
 }
 
-/* What the targets' own light adds to the noise of a matched filter's output. */
+/* Computes the noise that the target's own light adds to a matched filter. */
 static bst_status set_own_light(bst_ctx *ctx, bst_pd_scene *s) {
     for (int p = 0; p < 4; p++) {
         bst_eval_bound_source source = {.x_px = 0.125 + 0.5 * (p % 2),
@@ -336,12 +336,12 @@ int bst_pd_scene_room(const bst_pd_scene *s) {
     return s->columns * s->rows;
 }
 
-/* Direction among the stars of a place on the focal plane in the attitude q. */
+/* Direction of a focal-plane position at attitude q. */
 static bst_vec3 direction(const bst_camera *c, bst_quat q, double x, double y) {
     return bst_quat_rotate(bst_quat_conj(q), bst_camera_unproject(c, x, y));
 }
 
-/* Where a direction among the stars is seen at the start (0) or end (1) of the exposure. */
+/* Image position of a direction at the start (0) or end (1) of the exposure. */
 static bool seen(const bst_camera *c, const bst_pd_frame *f, int end, bst_vec3 v, double *x,
                  double *y) {
     return bst_camera_project(c, bst_quat_rotate(f->q[end], v), x, y);
@@ -372,7 +372,7 @@ static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int
     }
     f->places[i] = (bst_eval_match_target){x, y, dx, dy};
     double flux = s->flux_e[point], noise_e = noise_at(s, x, y);
-    if (!s->options.by_magnitude) { /* the SNR is that of its own place */
+    if (!s->options.by_magnitude) { /* SNR at its own position */
         flux = s->snr[point] * noise_e / sqrt(bst_pd_sharpness(s, &f->places[i]));
     }
     double light = bst_camera_illumination(c, x, y);
@@ -380,14 +380,14 @@ static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int
     f->targets[i] = (bst_pd_target){point, s->options.by_magnitude ? flux * light : flux, noise_e};
 }
 
-/* A turn of the camera that moves the middle of the image along (dx, dy). */
+/* Rotation of the camera that moves the image centre along (dx, dy). */
 static bst_vec3 turn_for(const bst_camera *c, double dx, double dy) {
     double x = bst_camera_centre_x(c), y = bst_camera_centre_y(c);
     return bst_vec3_cross(bst_camera_unproject(c, x - 0.5 * dx, y - 0.5 * dy),
                           bst_camera_unproject(c, x + 0.5 * dx, y + 0.5 * dy));
 }
 
-/* The camera's attitude through the exposure. */
+/* Sets the camera attitude during the exposure. */
 static void set_motion(bst_pd_scene *s, bst_pd_frame *f, double heading, double roll) {
     const bst_pd_options *o = &s->options;
     f->motion = (bst_camera_motion){.q_cam_from_gcrf = s->sky ? bst_pd_sky_attitude(s->sky, roll)
@@ -409,8 +409,8 @@ int bst_pd_scene_stacked(const bst_pd_scene *s) {
     return s->options.stack > 0 ? (int)s->options.stack : 1;
 }
 
-/* As many targets of each SNR, each in every part of the frame in turn; frames beyond the last
- * trial serve for chance. */
+/* Places equally many targets of each SNR, alternating over the frame; frames after the last trial
+ * serve for chance matches. */
 static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_rng_key key,
                           bst_pd_frame *f) {
     int room = bst_pd_scene_room(s), stacked = bst_pd_scene_stacked(s);
@@ -443,7 +443,7 @@ static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_r
     }
 }
 
-/* Stars beside the targets: copied, for a request has one list. */
+/* Adds stars to the targets; copied, because a request has a single list. */
 static bst_status add_stars(bst_ctx *ctx, bst_pd_scene *s, const bst_scene_source *stars, int count,
                             int targets, bst_pd_frame *f) {
     int wanted = f->count + count;
@@ -462,7 +462,7 @@ static bst_status add_stars(bst_ctx *ctx, bst_pd_scene *s, const bst_scene_sourc
 bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *s, int64_t number, bool targets,
                             bst_pd_frame *f) {
     uint64_t seed = s->scenario->seed, run = (uint64_t)s->scenario->run;
-    uint64_t n = (uint64_t)(number / bst_pd_scene_stacked(s)); /* one attitude for a stack */
+    uint64_t n = (uint64_t)(number / bst_pd_scene_stacked(s)); /* one attitude per stack */
     bst_rng_key camera = bst_rng_make_key(seed, run, s->name, "pd camera");
     bst_rng_key key = bst_rng_make_key(seed, run, s->name, "pd targets");
     double heading = 2.0 * BST_PI * bst_rng_uniform(camera, n, 0);

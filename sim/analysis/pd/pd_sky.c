@@ -8,9 +8,9 @@
 
 enum { CELL_PX = 32 };
 
-/* Where the scenegen module of the sensor has no limit of its own. */
+/* default if the scenegen module of the sensor has no limit */
 static const double USUAL_V_LIMIT = 16.0;
-/* Light beyond the frame's edge that still reaches into it. */
+/* light outside the frame that reaches into it */
 static const double MARGIN_PX = 32.0;
 
 struct bst_pd_sky {
@@ -24,7 +24,7 @@ struct bst_pd_sky {
     int room;
 };
 
-/* "v_limit" of the sensor's rendering module, as its table has it. */
+/* Reads "v_limit" of the sensor's rendering module. */
 static double v_limit_of(const bst_pd_scene *s) {
     for (int m = 0; m < s->scenario->module_count; m++) {
         const bst_scenario_module_config *module = &s->scenario->modules[m];
@@ -142,7 +142,7 @@ bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *
     for (int c = 0; c < cells; c++) {
         out->first[c + 1] += out->first[c];
     }
-    /* filled from the back of each cell, so that first[] ends at its own beginning */
+    /* filled from the back of each cell, so that first[] ends at its start */
     for (int i = 0; i < out->count; i++) {
         int cell = cell_of(out, sky->unsorted[i].x_px, sky->unsorted[i].y_px);
         out->places[--out->first[cell + 1]] = sky->unsorted[i];
@@ -160,8 +160,8 @@ void bst_pd_stars_free(bst_pd_stars *stars) {
     *stars = (bst_pd_stars){.count = 0};
 }
 
-/* Whether a star lies on a detection that is as long as it says: many stars in a crowd, or one and
- * its neighbours, make a streak. */
+/* Checks whether a star is on a detection, including its reported length: neighbouring stars can
+ * form a streak. */
 static bool holds(const bst_detection *d, double reach_px, const bst_eval_match_target *star) {
     if (!(d->flags & BST_DETECTION_STREAK)) {
         return false;
@@ -176,13 +176,14 @@ bool bst_pd_is_star(const bst_pd_stars *s, double reach_px, const bst_detection 
     if (s->count == 0) {
         return false;
     }
-    /* all stars streak alike, but for distortion */
+    /* all stars have equal streaks, except for distortion */
     double half = 0.0;
     for (int i = 0; i < s->count; i += 1 + s->count / 16) {
         half = fmax(half, 0.55 * hypot(s->places[i].dx_px, s->places[i].dy_px));
     }
     if (d->flags & BST_DETECTION_EDGE) {
-        reach_px *= 2.0; /* the star may be beyond the edge, and its place is where its light is */
+        reach_px *=
+            2.0; /* the star may be outside the frame; its position is the centroid of its light */
     }
     half = d->flags & BST_DETECTION_STREAK ? fmax(half, fmin(0.5 * d->length_px, 256.0)) : half;
     int around = (int)ceil((reach_px + half) / s->cell_px);

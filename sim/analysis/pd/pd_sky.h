@@ -1,4 +1,4 @@
-/* The scenario's stars and sky behind the targets of pd. */
+/* Stars and sky of the scenario as background for `boresight pd`. */
 #ifndef BST_ANALYSIS_PD_PD_SKY_H
 #define BST_ANALYSIS_PD_PD_SKY_H
 
@@ -7,28 +7,28 @@
 
 struct bst_pd_scene;
 
-/* Stars that a detector may find in one frame: those of at least BST_PD_STAR_SNR, in cells. */
+/* Stars that a detector may find in a frame: SNR of at least BST_PD_STAR_SNR, sorted into cells. */
 #define BST_PD_STAR_SNR 1.0
 typedef struct bst_pd_stars {
-    bst_eval_match_target *places; /* [count] by cell */
-    int *first;                    /* [columns * rows + 1] of each cell */
+    bst_eval_match_target *places; /* [count], sorted by cell */
+    int *first;                    /* [columns * rows + 1], index of the first star of each cell */
     int count, room, columns, rows;
     double cell_px;
 } bst_pd_stars;
 
 typedef struct bst_pd_sky bst_pd_sky;
 
-/* Opens the sky that the scenario's sensor sees at the epoch, where it is cued to look. */
+/* Opens the sky of the scenario's sensor at the epoch, in the direction of its cue. */
 bst_status bst_pd_sky_open(bst_ctx *ctx, const struct bst_pd_scene *scene,
                            bst_pd_sky **out) BST_MUST_CHECK;
 /* Frees a sky; NULL is allowed. */
 void bst_pd_sky_close(bst_pd_sky *sky);
-/* Attitude in which the camera looks there, turned about the boresight by `roll_rad`. */
+/* Camera attitude towards that direction, rotated about the boresight by `roll_rad`. */
 bst_quat bst_pd_sky_attitude(const bst_pd_sky *sky, double roll_rad);
-/* Looks: stars and background along `track`, held in `sky` until the next look. */
+/* Computes stars and background along `track`; `sky` holds them until the next call. */
 bst_status bst_pd_sky_look(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
                            const bst_scene_source **stars, int *count) BST_MUST_CHECK;
-/* Places of those that can be found, into `out`, which grows. */
+/* Appends the positions of detectable stars to `out`. */
 bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
                             const bst_scene_source *stars, int count,
                             bst_pd_stars *out) BST_MUST_CHECK;
@@ -42,8 +42,8 @@ double bst_pd_sky_e(const bst_pd_sky *sky, double x_px, double y_px);
 /* Map of the sky at its latest time; NULL if the sky is uniform. It belongs to the sky. */
 const struct bst_skylight_map *bst_pd_sky_map(const bst_pd_sky *sky);
 
-/* Whether a detection may be a star: it lies within reach_px of one, of a streak as targets are
- * matched, or is a streak itself on which one lies; twice that at an edge. */
+/* True if a detection may be a star: within reach_px of one (of a streak as targets are matched),
+ * or a streak with a star on it; twice that at an edge. */
 bool bst_pd_is_star(const bst_pd_stars *stars, double reach_px, const bst_detection *detection);
 
 #endif

@@ -39,7 +39,7 @@ int bst_step_lane(const struct bst_step *step) {
 
 static const bst_sample no_sample = {NULL, 0, -1, true};
 
-/* The message at a position of a port's log, -1: none. */
+/* The message at a position of an input port's log. Position -1: an empty sample. */
 static bst_sample sample_at(struct bst_step *step, const port_state *port, int64_t position) {
     if (position < 0) {
         return no_sample;
@@ -88,7 +88,7 @@ bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine, bst_status s
                                                   : bst_fail(ctx, status, "%s", own->message);
 }
 
-/* Lets go of what a slot owns. */
+/* Releases the resources that a message of a channel owns, such as the frame buffer. */
 static void release_slot(const channel *ch, slot *s) {
     if (s->owned && ch->type->release) {
         ch->type->release(s->payload);
@@ -96,6 +96,7 @@ static void release_slot(const channel *ch, slot *s) {
     s->owned = false;
 }
 
+/* Makes the step of a module instance fail when the step returns. */
 static void fail_in_step(struct bst_step *step, const char *what) {
     if (step->hook_status == BST_OK) {
         step->hook_status = bst_fail(step->ctx, BST_ERR_STATE, "%s %s", step->self->name, what);
@@ -110,10 +111,10 @@ void bst_step_set_lookahead(struct bst_step *step, int port_index, int64_t tick)
     port->silent_until = tick > port->silent_until ? tick : port->silent_until;
 }
 
-/* Of a message that is shown without what it owns. */
+/* upper limit of a payload that is copied without the frame that it owns */
 enum { BARE_BYTES = 256 };
 
-/* Shows a message to the observers, or notes it down for them. */
+/* Passes a published message to the engine's observers, or logs it if the executor runs. */
 static bst_status notify(struct bst_step *step, channel *ch, const void *payload) {
     bst_engine *engine = step->engine;
     const bst_engine_hooks *hooks = &engine->hooks;
@@ -125,7 +126,7 @@ static bst_status notify(struct bst_step *step, channel *ch, const void *payload
     if (ch->mark.bare && ch->type->release && ch->payload_bytes <= sizeof bare) {
         memcpy(bare, payload, ch->payload_bytes);
         ch->type->retain(bare);
-        ch->type->release(bare); /* the copy's */
+        ch->type->release(bare); /* the reference that the copy has taken */
         payload = bare;
     }
     if (engine->executor) {
@@ -136,7 +137,7 @@ static bst_status notify(struct bst_step *step, channel *ch, const void *payload
         hooks->message(hooks->user, ch->scope, ch->type->name, payload, step->tick));
 }
 
-/* Has an input's instance step when a message becomes visible to it. */
+/* Schedules the reader of a message for the tick at which the message becomes visible to it. */
 static bst_status reach(struct bst_step *step, const channel *ch, const slot *s,
                         channel_reader reader) {
     bst_engine *engine = step->engine;
@@ -154,6 +155,7 @@ static bst_status reach(struct bst_step *step, const channel *ch, const slot *s,
     return BST_OK;
 }
 
+/* Publishes what a module instance has written to an output port. */
 static bst_status publish(struct bst_step *step, int port_index) {
     bst_engine *engine = step->engine;
     channel *ch = &engine->channels[step->self->ports[port_index].channel];
@@ -190,7 +192,7 @@ void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
         fail_in_step(step, "writes an output within its own lookahead");
     }
     if (port->writing) {
-        /* a second message in one step: the first goes out */
+        /* a second message in one step: the first one is published now */
         bst_status status = publish(step, port_index);
         if (step->hook_status == BST_OK) {
             step->hook_status = status;
@@ -240,7 +242,7 @@ void bst_engine_release_read(bst_engine *engine, int process) {
             }
         }
         if (ch->released < ch->log.oldest) {
-            ch->released = ch->log.oldest; /* writing over them has let them go */
+            ch->released = ch->log.oldest; /* overwritten messages have already been released */
         }
         for (; ch->released < read_by_all; ch->released++) {
             release_slot(ch, bst_log_slot(&ch->log, ch->released));

@@ -4,6 +4,7 @@
 
 #include "sim/engine/kernel/engine_internal.h"
 
+/* Checks the flags and ports of a module instance: can it step after all others of a tick? */
 static bool may_be_deferred(const bst_engine *engine, const instance *self) {
     if (!(self->spec.desc->flags & BST_MODULE_DEFERRABLE) || self->spec.period_ticks > 0 ||
         self->trigger_count == 0 || self->spec.member_count > 0) {
@@ -22,8 +23,8 @@ static bool may_be_deferred(const bst_engine *engine, const instance *self) {
             (port->direction == BST_PORT_OUT && (ch->type->release || ch->type->lends))) {
             return false;
         }
-        /* it steps only at ticks that its sensor's other modules know: when what they wrote becomes
-         * visible */
+        /* Inputs must become visible only at ticks that the process of the sensor knows
+         * in advance. */
         if (port->direction == BST_PORT_IN &&
             (writer->deferred ? trigger && state->delay_ticks > 0
                               : ch->type->kind == BST_CHANNEL_QUEUE && !trigger)) {
@@ -36,8 +37,8 @@ static bool may_be_deferred(const bst_engine *engine, const instance *self) {
     return true;
 }
 
-/* Whether an instance that is not deferred reads what this one writes. */
-static bool awaited(const bst_engine *engine, int index) {
+/* Checks whether an instance that is not deferred reads an output of this instance. */
+static bool has_prompt_reader(const bst_engine *engine, int index) {
     for (int i = 0; i < engine->instance_count; i++) {
         const instance *other = engine->instances[i];
         for (int p = 0; !other->deferred && p < other->port_count; p++) {
@@ -50,7 +51,9 @@ static bool awaited(const bst_engine *engine, int index) {
     return false;
 }
 
-static void put_last(bst_engine *engine) {
+/* Moves deferred instances to the end of the stepping order and renumbers the writers
+ * of channels. */
+static void move_deferred_last(bst_engine *engine) {
     for (int i = 1; i < engine->instance_count; i++) {
         for (int k = i;
              k > 0 && engine->instances[k - 1]->deferred && !engine->instances[k]->deferred; k--) {
@@ -74,13 +77,14 @@ void bst_engine_set_deferred(bst_engine *engine) {
         changed = false;
         for (int i = 0; i < engine->instance_count; i++) {
             instance *self = engine->instances[i];
-            if (self->deferred && (!may_be_deferred(engine, self) || awaited(engine, i))) {
+            if (self->deferred &&
+                (!may_be_deferred(engine, self) || has_prompt_reader(engine, i))) {
                 self->deferred = false;
                 changed = true;
             }
         }
     }
-    put_last(engine);
+    move_deferred_last(engine);
     for (int i = 0; i < engine->instance_count; i++) {
         engine->instances[i]->order = i;
     }

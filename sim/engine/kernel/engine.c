@@ -40,7 +40,7 @@ void bst_engine_free(bst_engine *engine) {
     }
     bst_executor_free(engine);
     bst_pacing_free(engine->pacing);
-    /* what the channels own goes back to its makers before they are destroyed */
+    /* Messages release their frames into the writers' pools; therefore before the modules. */
     for (int c = 0; c < engine->channel_count; c++) {
         bst_log_free(engine->channels[c].type, &engine->channels[c].log);
     }
@@ -157,7 +157,7 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
     return bst_engine_make_schedule(ctx, engine);
 }
 
-/* One step of an instance, and what it publishes. */
+/* Steps one module instance and publishes its outputs. */
 static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
     instance *self = engine->instances[index];
     if (self->next_period <= tick) {
@@ -180,7 +180,7 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
         return bst_fail_prefix(ctx, status, "%s at %.6f s", self->name,
                                (double)tick / (double)engine->tick_rate_hz);
     }
-    BST_TRY(bst_engine_commit(&step)); /* a hook's failure is not the instance's */
+    BST_TRY(bst_engine_commit(&step)); /* an observer's failure is not attributed to the module */
     bst_engine_set_due(engine, index, bst_engine_earliest(self));
     return BST_OK;
 }
@@ -213,8 +213,8 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
         int failed;
         BST_TRY(bst_engine_step_tick(ctx, engine, &engine->heap, tick, &long_step, &failed));
         bst_engine_release_read(engine, 0);
-        /* reading the clock costs as much as a plant step: only now and then, or after a step that
-         * may be long */
+        /* reading the clock costs as much as a plant step; therefore only every 256 steps or after
+         * a long step */
         if (engine->hooks.interrupted && (++since_clock >= 256 || long_step)) {
             since_clock = 0;
             double now = bst_wall_seconds();

@@ -9,7 +9,7 @@ typedef struct bst_engine bst_engine;
 
 /* Reading an input later than it was written. */
 typedef struct bst_input_delay {
-    int port; /* index into desc->ports; of one that links sensors, for each */
+    int port; /* index into desc->ports */
     int64_t ticks;
 } bst_input_delay;
 
@@ -18,38 +18,38 @@ enum { BST_MAX_DELAYS = 16 };
 /* One module to run. */
 typedef struct bst_instance_spec {
     const bst_module_desc *desc;
-    const char *scope;    /* "observer/sensor": where its channels live */
+    const char *scope;    /* "observer/sensor": scope of its channels */
     const char *instance; /* "observer/sensor/module": unique */
     const void *config;   /* outlives the engine */
-    int64_t period_ticks; /* 0: triggers only */
+    int64_t period_ticks; /* 0: stepped by triggers only */
     int64_t offset_ticks; /* first periodic step */
     bst_input_delay delays[BST_MAX_DELAYS];
     int delay_count;
-    /* what the module gets to see; filled into its env as the descriptor's flags allow */
+    /* what the module may access; copied into its env if the descriptor's flags permit */
     const struct bst_world *world;
     const struct bst_knowledge *knowledge;
     struct bst_device *device;
     struct bst_link *link;
     int observer, sensor;
-    double exposure_s; /* the longest of the sensor that the scenario sets */
+    double exposure_s; /* longest exposure that the scenario sets for the sensor */
     double frame_exposure_s, frame_period_s, frame_latency_s;
-    int64_t los_period_ticks, los_offset_ticks; /* of its gimbal; 0: there is none with a period */
-    const bst_fleet_member *members; /* of a module that links sensors; outlive the engine */
-    int member_count;                /* 0: it is one sensor's, and has its scope */
+    int64_t los_period_ticks, los_offset_ticks; /* of the gimbal's steps; 0: not periodic */
+    const bst_fleet_member *members; /* of a multi-sensor module; must outlive the engine */
+    int member_count;                /* 0: a module of one sensor, whose scope it has */
     uint32_t planes;                 /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma;
     uint64_t seed, run;
 } bst_instance_spec;
 
-/* State of the hook `wants` for a channel; zero at first. */
+/* State of the observer's `wants` for one channel; zero at first. */
 typedef struct bst_hook_mark {
     void *of;
     int64_t unwanted_before; /* tick; `wants` is not called for earlier messages */
-    bool bare; /* `message` gets this one without what it owns: a frame's message without frame */
+    bool bare; /* `message` gets only the metadata: a frame message without its frame */
 } bst_hook_mark;
 
 /* Observers of a run; any member may be NULL. One thread at a time calls `message` and `event`, in
- * order of tick and then of stepping; with bst_engine_parallel it may be any thread. The calling
+ * order of tick and stepping order; with bst_engine_parallel it may be any thread. The calling
  * thread calls `interrupted`. */
 typedef struct bst_engine_hooks {
     void *user;
@@ -78,66 +78,71 @@ typedef struct bst_engine_hooks {
 bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) BST_MUST_CHECK;
 /* Stops the engine's threads and frees it with its modules and channels; NULL is allowed. */
 void bst_engine_free(bst_engine *engine);
-/* Sets the hooks of an engine; they are copied. Not during bst_engine_run or bst_engine_advance. */
+/* Sets the observers of an engine. The struct is copied. Not during bst_engine_run or
+ * bst_engine_advance. */
 void bst_engine_set_hooks(bst_engine *engine, const bst_engine_hooks *hooks);
 
 /* Adds a module; before bst_engine_load. The spec is copied, its strings too. */
 bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine,
                           const bst_instance_spec *spec) BST_MUST_CHECK;
 
-/* Wires the channels, sorts the modules (topologically; ties by instance name), creates them.
- * Errors (BST_ERR_CONFIG): an input that nobody writes, two writers of a channel, a cycle without a
+/* Connects the channels, sorts the modules topologically (ties by instance name) and creates them.
+ * Errors (BST_ERR_CONFIG): an input without a writer, two writers of a channel, a cycle without a
  * declared delay (the message shows it), a delay on a ring that is extended in place, two instances
  * of one name. */
 bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 
-/* Has bst_engine_run use `threads` threads, the calling one among them, by
- * docs/explanation/executor.md: sensors that share nothing but what multi-sensor modules link are
- * stepped at the same time (with one thread, or with pacing, the calling thread steps all of
- * them); deferred modules (BST_MODULE_DEFERRABLE that no other waits for), and the hooks `message`
- * and `event`, have a thread besides in any case, and a second one where a module looks ahead.
- * Results are those of one thread, to the bit. Modules of different sensors may share only what is
- * constant or locked. After bst_engine_load, and bst_engine_pace if it is called, and before the
- * engine runs. */
+/* Makes bst_engine_run use several threads (docs/explanation/executor.md). The results are those of
+ * one thread, to the bit.
+ *
+ * Given:     threads  including the calling thread
+ * Notes:     Sensors that only multi-sensor modules connect are stepped concurrently. With one
+ *            thread, or with pacing, the calling thread steps all sensors.
+ *            Deferred modules and the observers `message` and `event` always have an additional
+ *            thread,
+ *            and a second one if a module has `ahead`.
+ *            Modules of different sensors may share only what is constant or locked.
+ *            Call it after bst_engine_load and bst_engine_pace, before the engine runs. */
 bst_status bst_engine_parallel(bst_ctx *ctx, bst_engine *engine, int threads) BST_MUST_CHECK;
 
-/* Has bst_engine_run keep to the wall clock (BST_PACING_REALTIME), or only watch how long frames
- * take (the other modes). After bst_engine_load, before bst_engine_parallel. */
+/* Makes bst_engine_run follow the wall clock (BST_PACING_REALTIME), or only measure frame times
+ * (other modes). Call it after bst_engine_load and before bst_engine_parallel. */
 bst_status bst_engine_pace(bst_ctx *ctx, bst_engine *engine,
                            const bst_pacing_config *config) BST_MUST_CHECK;
-/* Timing of a paced run so far; false if the engine is not paced. */
+/* Timing figures of a paced run so far. False if the engine is not paced. */
 bool bst_engine_pacing(const bst_engine *engine, bst_pacing_figures *out);
 
-/* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */
+/* Steps all module instances that are due before `until_tick` (exclusive), and finishes the run. */
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
 
-/* The same, when more is to come: what modules do at the end of a run is left to bst_engine_run. */
+/* As bst_engine_run, without the modules' actions at the end of a run: more steps follow. */
 bst_status bst_engine_advance(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
-/* Has an instance (by its name) step at a tick besides those of its own; between two calls of
- * bst_engine_advance. BST_ERR_NOT_FOUND. */
+/* Schedules one additional step of an instance at a tick, between two calls of bst_engine_advance.
+ * BST_ERR_NOT_FOUND: no instance has the name. */
 bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *instance,
                            int64_t tick) BST_MUST_CHECK;
 
-/* Tick of the last step, -1 before the first. */
+/* Tick of the last step of any module instance; -1 before the first. */
 int64_t bst_engine_tick(const bst_engine *engine);
-/* Number of instances. */
+/* Number of module instances of an engine. */
 int bst_engine_instance_count(const bst_engine *engine);
 
 /* Name of an instance ("observer/sensor/module"); it belongs to the engine.
  *
  * Given:     index  position in the order of stepping, from 0 */
 const char *bst_engine_instance_name(const bst_engine *engine, int index);
-/* Steps that an instance has made. */
+/* Number of steps that a module instance has made. */
 int64_t bst_engine_instance_steps(const bst_engine *engine, int index);
-/* Conditions counted so far by name ("queue_overflow", "stale_input", what modules count); false
- * after the last. */
+/* Counters of the run by name: "queue_overflow", "stale_input" and those of modules. False after
+ * the last one. */
 bool bst_engine_counter(const bst_engine *engine, int index, const char **name, int64_t *count);
 
-/* Period in ticks of a rate. BST_ERR_CONFIG when tick_rate / rate is no integer: the message names
- * the nearest rates that are. */
+/* Period in ticks of a rate. BST_ERR_CONFIG if tick_rate / rate is no integer; the message names
+ * the nearest allowed rates. */
 bst_status bst_period_ticks(bst_ctx *ctx, int64_t tick_rate_hz, double rate_hz,
                             int64_t *out) BST_MUST_CHECK;
-/* Whole ticks of a time. BST_ERR_CONFIG when it is none, naming the nearest times that are. */
+/* Converts a time to whole ticks. BST_ERR_CONFIG if it is no multiple of a tick; the message names
+ * the nearest allowed times. */
 bst_status bst_seconds_to_ticks(bst_ctx *ctx, int64_t tick_rate_hz, double seconds,
                                 int64_t *out) BST_MUST_CHECK;
 

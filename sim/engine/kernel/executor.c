@@ -1,5 +1,5 @@
-/* Threads that step logical processes and call observers. Which thread does what is left to chance;
- * what comes out is not. See docs/explanation/executor.md. */
+/* Threads that step logical processes and call observers. The assignment of work to threads varies;
+ * the results do not. See docs/explanation/executor.md. */
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,17 +10,18 @@
 
 /* ---- choice of work; with the lock held ---- */
 
-/* Whether a thread may step a process. */
+/* Checks whether a thread may step a logical process. */
 static bool may_step(const bst_executor *x, const logical_process *self, bool caller) {
     return !x->caller_only || caller == (self->kind == BST_PROCESS_SENSORS);
 }
 
+/* Predicted duration of a process's next window, from the last two. */
 static double expected_s(const logical_process *self) {
     return self->took_s[0] > self->took_s[1] ? self->took_s[0] : self->took_s[1];
 }
 
-/* The process to be stepped next: the multi-sensor modules, which others wait for, or the one that
- * is farthest behind, or of these the one that took longest; NULL: none can be. */
+/* Selects the logical process to step next: first multi-sensor modules, which others wait for, then
+ * the one with the smallest clock, then the one with the longest window. NULL: none can step. */
 static logical_process *next_process(bst_executor *x, bool caller) {
     logical_process *best = NULL;
     for (int k = 0; k < x->count; k++) {
@@ -39,7 +40,7 @@ static logical_process *next_process(bst_executor *x, bool caller) {
     return best;
 }
 
-/* A sample that a module may look at ahead of its step. */
+/* The next sample on which a deferred module may call `ahead`. */
 static sample_point *next_look(bst_executor *x, logical_process **of) {
     for (int k = 0; k < x->count; k++) {
         sample_point *sample = bst_sync_next_look(&x->processes[k]);
@@ -71,12 +72,12 @@ static void look_ahead(bst_executor *x, logical_process *self, sample_point *sam
     bst_sync_wake(x);
 }
 
-/* Does one thing that there is to do; false: there is none for this thread. */
-static bool do_something(bst_executor *x, bool caller) {
+/* Does one unit of work: a window, observers or a look-ahead. False: no work for this thread. */
+static bool do_work(bst_executor *x, bool caller) {
     if (!x->running || x->heard != BST_OK) {
         return false;
     }
-    bool others = !(x->caller_only && caller); /* the caller has its process alone */
+    bool others = !(x->caller_only && caller); /* the calling thread only steps its own process */
     if (others && bst_observers_behind(x) && bst_observers_ready(x)) {
         bst_observers_work(x);
         return true;
@@ -97,17 +98,19 @@ static bool do_something(bst_executor *x, bool caller) {
     return sample != NULL;
 }
 
+/* Sleeps until the state of the executor changes; with its lock held. */
 static void await_change(bst_executor *x) {
     x->sleeping++;
     pthread_cond_wait(&x->changed, &x->lock);
     x->sleeping--;
 }
 
+/* Main function of an executor thread. */
 static void *work(void *user) {
     bst_executor *x = user;
     pthread_mutex_lock(&x->lock);
     while (!x->stop) {
-        if (!do_something(x, false)) {
+        if (!do_work(x, false)) {
             await_change(x);
         }
     }
@@ -115,7 +118,7 @@ static void *work(void *user) {
     return NULL;
 }
 
-/* Whether nothing is under way, and nothing can begin. */
+/* Checks whether the executor has no work in progress and none can begin. */
 static bool finished(bst_executor *x) {
     bool busy = x->observing || x->looking > 0;
     for (int k = 0; k < x->count && !busy; k++) {
@@ -127,7 +130,7 @@ static bool finished(bst_executor *x) {
 
 /* ---- a run ---- */
 
-/* What is under way is brought to its end, and all processes to one tick. */
+/* Stops the run: windows in progress complete, and all processes end at one tick. */
 static void interrupt(bst_executor *x) {
     int64_t end = 0;
     for (int k = 0; k < x->count; k++) {
@@ -139,7 +142,7 @@ static void interrupt(bst_executor *x) {
     x->interrupted = true;
 }
 
-/* The calling thread's part, until all is done. */
+/* The calling thread works until the run is complete, and polls for interrupts every 20 ms. */
 static void work_to_end(bst_executor *x) {
     const bst_engine_hooks *hooks = &x->engine->hooks;
     double asked = bst_wall_seconds();
@@ -154,13 +157,13 @@ static void work_to_end(bst_executor *x) {
             if (interrupted) {
                 interrupt(x);
             }
-        } else if (!do_something(x, true)) {
+        } else if (!do_work(x, true)) {
             await_change(x);
         }
     }
 }
 
-/* The process whose step failed first, in the order of a run on one thread; NULL: none. */
+/* The process whose module failed first, in the order of a run on one thread; NULL: none. */
 static const logical_process *first_failure(const bst_executor *x) {
     const logical_process *first = NULL;
     for (int k = 0; k < x->count; k++) {
@@ -174,7 +177,7 @@ static const logical_process *first_failure(const bst_executor *x) {
     return first;
 }
 
-/* Why a run ended, in the order in which a run on one thread would have come upon it. */
+/* Status of a run: the first failure in the order of a run on one thread. */
 static bst_status outcome(bst_ctx *ctx, const bst_executor *x) {
     bst_engine *engine = x->engine;
     const logical_process *failed = first_failure(x);
@@ -220,18 +223,18 @@ bst_status bst_executor_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
     return status;
 }
 
-/* ---- making it ---- */
+/* ---- creation ---- */
 
-/* Threads besides the calling one that can have something to do. */
+/* Number of threads, besides the calling one, that can have work. */
 static int helpers_wanted(const bst_executor *x, int threads) {
-    int tasks = 1, least = 1; /* observers */
+    int tasks = 1, least = 1; /* one task for observers */
     for (int k = 0; k < x->count; k++) {
         const logical_process *self = &x->processes[k];
         bool looks = self->looker >= 0;
         tasks += looks + !(x->caller_only && self->kind == BST_PROCESS_SENSORS);
         least = looks ? 2 : least;
     }
-    tasks -= !x->caller_only; /* the calling thread does one of them */
+    tasks -= !x->caller_only; /* the calling thread takes one task */
     int wanted = threads - 1 > least ? threads - 1 : least;
     return wanted < tasks ? wanted : tasks;
 }
@@ -241,7 +244,7 @@ static bst_status start_threads(bst_ctx *ctx, bst_executor *x, int wanted) {
     if (!x->threads) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d threads", wanted);
     }
-    sigset_t all, before; /* signals are the main thread's */
+    sigset_t all, before; /* signals go to the main thread */
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     int error = 0;
@@ -268,7 +271,7 @@ bst_status bst_engine_parallel(bst_ctx *ctx, bst_engine *engine, int threads) {
     pthread_mutex_init(&x->lock, NULL);
     pthread_mutex_init(&x->asking, NULL);
     pthread_cond_init(&x->changed, NULL);
-    engine->executor = x; /* freed with the engine, whatever happens */
+    engine->executor = x; /* freed with the engine, also after an error */
     bst_status status = bst_partition_make(ctx, x, threads);
     return status == BST_OK ? start_threads(ctx, x, helpers_wanted(x, threads)) : status;
 }

@@ -1,38 +1,41 @@
-/* Inside of the executor: partition.c, logical_process.c, synchronisation.c, observers.c and
- * executor.c. See docs/explanation/executor.md. */
+/* Internal types of the parallel executor: partition.c, logical_process.c, synchronisation.c,
+ * observers.c and executor.c. See docs/explanation/executor.md. */
 #ifndef BST_ENGINE_KERNEL_EXECUTOR_INTERNAL_H
 #define BST_ENGINE_KERNEL_EXECUTOR_INTERNAL_H
 
 #include "sim/engine/kernel/engine_internal.h"
 
 enum {
-    /* windows of one process whose records observers have not yet seen */
+    /* windows of one process that observers have not yet processed */
     BST_MOST_SEGMENTS = 16,
-    /* steps of deferred modules that are under way behind their sensor's process */
+    /* pending steps of deferred modules behind their sensor's process */
     BST_MOST_SAMPLES = 16,
-    /* A process runs ahead of the slowest one by at most so many seconds of simulated time. */
+    /* maximum lead of a process over the slowest one, in seconds of simulated time */
     BST_MOST_LEAD_S = 16,
-    /* Records that are done in one go. */
+    /* Records that observers process in one call. */
     BST_RECORDS_AT_ONCE = 32,
-    /* Frames of a process that may be held at the beginning of a window. A window ends at the tick
-     * in which a frame is recorded or copied: one for observers and one for a deferred module. */
+    /* Frames of a process that may be retained at the beginning of a window. A window ends at the
+     * tick in which a frame is recorded or copied: one for observers and one for a
+     * deferred module. */
     BST_MOST_FRAMES_HELD = BST_OVERLAP_FRAMES - 2
 };
 
 /* ---- what observers are to see ---- */
 
-/* The messages and events of one window, one after the other. */
+/* The messages and events of one window, in sequence. */
 typedef struct record_segment {
     char *bytes;
     size_t used, room;
 } record_segment;
 
-/* Of one process. `filled` and `observed` count segments and are under the executor's lock. */
+/* Records of one process for observers. `filled` and `observed` count segments; the executor's lock
+ * protects them. */
 typedef struct observer_log {
     record_segment segments[BST_MOST_SEGMENTS];
     int64_t filled;
     int64_t observed;
-    /* of the thread that observes: what it may read, the segment that it is at, and where in it */
+    /* used only by the observing thread: end of the readable segments, current segment, position in
+     * it */
     int64_t readable, reading;
     size_t read;
 } observer_log;
@@ -40,25 +43,26 @@ typedef struct observer_log {
 /* ---- logical processes ---- */
 
 typedef enum process_kind {
-    BST_PROCESS_SENSORS,  /* modules of one sensor, or of all that cannot be separated */
+    BST_PROCESS_SENSORS,  /* modules of one sensor, or of all sensors if they cannot be separated */
     BST_PROCESS_LINK,     /* multi-sensor modules */
     BST_PROCESS_DEFERRED, /* deferred modules of one sensor */
 } process_kind;
 
-/* What a module's `ahead` has done for a sample. */
+/* State of a module's `ahead` for a sample. */
 typedef enum look_state { BST_LOOK_NONE, BST_LOOK_BUSY, BST_LOOK_DONE } look_state;
 
-/* A tick at which a deferred process steps, with its inputs copied. */
+/* A tick at which a deferred process steps; its inputs have been copied. */
 typedef struct sample_point {
     int64_t tick;
-    int64_t number; /* of those in which the module that looks ahead steps; -1: it does not */
-    int64_t after;  /* tick of the one before with a number */
+    int64_t number; /* counts the samples in which the module with `ahead` steps; -1: it does not
+                       step */
+    int64_t after;  /* tick of the previous numbered sample */
     look_state look;
 } sample_point;
 
-/* An input from another process. */
+/* An input that is written by another logical process. */
 typedef struct process_input {
-    int source;       /* process */
+    int source;       /* index of the writing process */
     port_copies mode; /* BST_COPY_EACH or BST_COPY_SAMPLED */
     const port_state *output;
     int64_t delay_ticks;
@@ -66,72 +70,75 @@ typedef struct process_input {
 
 typedef struct logical_process {
     process_kind kind;
-    int *members; /* instances, in stepping order */
+    int *members; /* indices of instances, in stepping order */
     int member_count;
     process_input *inputs;
     int input_count;
-    bool delivers; /* messages of another process make an instance step */
+    bool delivers; /* messages of another process trigger an instance */
     int source;    /* of a deferred process: the process that copies its inputs; else -1 */
-    int looker;    /* of a deferred process: the instance that may look ahead, -1: none */
-    bool linked;   /* of sensors: the multi-sensor modules read from it */
-    int frames;    /* held by observers and copies; atomic */
+    int looker;    /* of a deferred process: the instance with `ahead`; -1: none */
+    bool linked;   /* of a sensor process: multi-sensor modules read from it */
+    int frames;    /* frames retained by observers and copies; atomic */
 
-    /* of the thread that steps it */
+    /* used only by the thread that steps the process */
     bst_heap heap;
     bst_ctx ctx;
     bst_status status;
     int64_t failed_tick;
     int failed_instance;
-    int64_t last_tick; /* of its last step, -1: none */
-    int64_t link_tick; /* of sensors: when inputs of the multi-sensor modules are to be copied */
-    int64_t reached;   /* every tick below is done */
-    int64_t tick;      /* under way */
+    int64_t last_tick; /* tick of the last step, -1: none */
+    int64_t link_tick; /* of a sensor process: next tick at which inputs of multi-sensor modules are
+                          copied */
+    int64_t reached;   /* all ticks below are complete */
+    int64_t tick;      /* current tick */
     bool interrupted;
     bool shows_frame; /* a frame was recorded in this window */
 
-    /* of a deferred process, of the thread that steps its source */
-    int64_t sample_due; /* when a message becomes visible that makes it step */
-    bool sampled;       /* in the window under way, at the tick: */
+    /* of a deferred process; used by the thread that steps its source process */
+    int64_t sample_due; /* tick at which the next trigger message becomes visible */
+    bool sampled;       /* in the current window, at sampled_tick: */
     int64_t sampled_tick;
-    bool sampled_looks; /* the module that looks ahead steps */
+    bool sampled_looks; /* the module with `ahead` steps */
 
     observer_log log;
 
-    /* under the executor's lock */
-    int64_t clock;   /* every tick below is done, and other processes may know */
-    int order;       /* at tick `clock`, instances before are done */
-    int64_t limit;   /* of the window under way */
-    int64_t horizon; /* of the multi-sensor modules: their next step */
+    /* protected by the executor's lock */
+    int64_t clock;   /* all ticks below are complete, as published to other processes */
+    int order;       /* at tick `clock`, the instances before this one are complete */
+    int64_t limit;   /* end of the current window, exclusive */
+    int64_t horizon; /* of multi-sensor modules: their next step */
     bool busy;
-    double took_s[2]; /* the last windows: frames come every other one */
+    double took_s[2]; /* duration of the last two windows: frames occur in every second one */
     int windows;
     sample_point samples[BST_MOST_SAMPLES];
-    int64_t first_sample, next_sample; /* those between wait for their step */
+    int64_t first_sample, next_sample; /* samples in between wait for their step */
     int64_t numbered, numbers_done, last_numbered_tick;
     int looking;
-    int64_t *cursors[BST_STEP_LANES]; /* of the looker's inputs */
+    int64_t *cursors[BST_STEP_LANES]; /* of the inputs of the module with `ahead` */
 } logical_process;
 
 struct bst_executor {
     bst_engine *engine;
     logical_process *processes;
     int count;
-    int link;         /* process of multi-sensor modules, -1: none of their own */
-    bool link_ahead;  /* when it steps is known: by its periods alone */
-    bool caller_only; /* the one process of sensors belongs to the calling thread, which does
-                         nothing else */
+    int link; /* process of the multi-sensor modules; -1: they have no process of their own */
+    bool link_ahead;  /* multi-sensor modules step by their periods only, so that their ticks are
+                         known */
+    bool caller_only; /* the only sensor process belongs to the calling thread, which does nothing
+                         else */
     pthread_t *threads;
     int thread_count;
-    pthread_mutex_t lock; /* over what follows, and what processes have under it */
+    pthread_mutex_t
+        lock; /* protects all members below, and the members of processes marked above */
     pthread_cond_t changed;
     int sleeping;
     bool running, stop;
-    int64_t end; /* ticks below are to be done */
+    int64_t end; /* ticks below are part of the run */
     bool interrupted;
-    bool observing; /* somebody calls observers */
+    bool observing; /* a thread is calling observers */
     int looking;
     bst_status heard; /* first failure of an observer */
-    bst_ctx ctx;      /* of observers */
+    bst_ctx ctx;      /* of the observers */
     pthread_mutex_t asking;
 };
 
@@ -144,33 +151,34 @@ bst_status bst_partition_make(bst_ctx *ctx, bst_executor *x, int threads) BST_MU
 void bst_partition_free(bst_executor *x);
 
 /* logical_process.c */
-/* Steps a process to its limit, or until others should know how far it is. */
+/* Steps the modules of a process up to its limit, or until its progress should be published. */
 void bst_process_step(bst_executor *x, logical_process *self);
-/* Calls a module's `ahead` for a sample. */
+/* Calls a module's `ahead` for a sample of a deferred process. */
 void bst_process_look(bst_executor *x, logical_process *self, const sample_point *sample);
 
-/* synchronisation.c; all with the lock held */
-/* Whether a process can be stepped now; then its limit is set. */
+/* synchronisation.c; call these with the lock held */
+/* Checks whether a process can be stepped now, and sets the limit of its window. */
 bool bst_sync_can_step(bst_executor *x, logical_process *self);
-/* After a window: others learn how far the process is. */
+/* Publishes the progress of a process after a window. */
 void bst_sync_end_window(bst_executor *x, logical_process *self);
-/* What deferred processes and multi-sensor modules learn from a process that is so far. */
+/* Updates deferred processes and multi-sensor modules with the progress of a process. */
 void bst_sync_follow(bst_executor *x, const logical_process *source);
-/* All records before this tick and instance are there. */
+/* All records before this tick and instance exist. */
 void bst_sync_complete_before(const bst_executor *x, int64_t *tick, int *order);
-/* The first sample that a module may look at, NULL: none. */
+/* The first sample that a module with `ahead` may process; NULL: none. */
 sample_point *bst_sync_next_look(logical_process *self);
-/* Wakes threads that wait. */
+/* Wakes the executor's waiting threads. */
 void bst_sync_wake(bst_executor *x);
 
 /* observers.c */
-/* Whether there is something to do; with the lock held. */
+/* Checks whether observers have records to process; with the lock held. */
 bool bst_observers_ready(bst_executor *x);
-/* Whether much of it waits; with the lock held. */
+/* Checks whether half of the segments of a process wait for observers; with the lock held. */
 bool bst_observers_behind(const bst_executor *x);
-/* Does some of it. Called, and returns, with the lock held. */
+/* Passes up to BST_RECORDS_AT_ONCE records to the observers. Called, and returns, with the lock
+ * held. */
 void bst_observers_work(bst_executor *x);
-/* Lets go of what nobody will observe. */
+/* Releases the records that no observer will receive. */
 void bst_observers_discard(bst_executor *x);
 
 static inline bool bst_before(int64_t tick, int order, int64_t other_tick, int other) {

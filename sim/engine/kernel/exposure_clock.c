@@ -13,32 +13,32 @@ enum { PORT_COMMAND, PORT_EXPOSURE };
 typedef struct exposure_clock {
     int64_t tick_rate_hz;
     int64_t exposure_ticks, period_ticks;
-    bst_window full, own, window; /* of the sensor, of the scenario, of the exposure */
+    bst_window full, own, window; /* of the sensor, of the scenario, of the current exposure */
     int binning;
-    double pixel_scale_arcsec; /* 0: the camera's */
-    bst_frame_cursor
-        updates; /* what drives the sensor frame by frame; none: updates.updates NULL */
+    double pixel_scale_arcsec; /* 0: the camera's scale */
+    bst_frame_cursor updates;  /* exposures from a file, frame by frame; updates NULL: none */
     double dropped_fraction;
-    double burst_begins, burst_ends; /* probability from one frame to the next; ends 0: no bursts */
-    bool in_burst;                   /* the frame before was lost */
+    double burst_begins,
+        burst_ends; /* transition probabilities per frame; burst_ends 0: no bursts */
+    bool in_burst;  /* the previous frame was lost */
     bst_rng_key drop_key;
     int64_t id;
-    int64_t start_tick; /* of the running or the next exposure */
+    int64_t start_tick; /* tick of the current or next exposure */
     int64_t next_start_tick;
     bool open;
-    /* rolling shutter: an exposure opens lead_ticks before start_tick, which is that of its middle
-     * row, and is told when its last row's is over and the line of sight is known until then */
+    /* Rolling shutter: the exposure opens lead_ticks before start_tick, the start of its middle
+     * row. It is published when its last row is complete and its line of sight is known. */
     double row_time_s;
     int64_t lead_ticks, los_period_ticks, los_offset_ticks;
 } exposure_clock;
 
-/* From one exposure's start to the next one's. */
+/* Ticks between the starts of two exposures. */
 static int64_t cycle_of(const exposure_clock *clock) {
     int64_t busy = clock->exposure_ticks + 2 * clock->lead_ticks;
     return busy > clock->period_ticks ? busy : clock->period_ticks;
 }
 
-/* Every exposure and period of a file is whole ticks. */
+/* Checks that every exposure time and period of a file is a whole number of ticks. */
 static bst_status check_updates(const bst_module_env *env, const bst_frame_updates *updates) {
     for (int i = 0; i < bst_frame_updates_count(updates); i++) {
         const bst_frame_update *u = bst_frame_updates_item(updates, i);
@@ -58,7 +58,7 @@ static bst_status check_updates(const bst_module_env *env, const bst_frame_updat
     return BST_OK;
 }
 
-/* A rolling shutter opens before the exposure's ticks, and closes after them. */
+/* Checks that the first exposure and all periods leave time for the rows of a rolling shutter. */
 static bst_status check_rows(const bst_module_env *env, const exposure_clock *clock) {
     double rate = (double)env->tick_rate_hz, lead_s = (double)clock->lead_ticks / rate;
     if (clock->start_tick < clock->lead_ticks) {
@@ -87,10 +87,10 @@ static bst_status check_rows(const bst_module_env *env, const exposure_clock *cl
     return BST_OK;
 }
 
-/* Gilbert's channel: a frame is lost when the state is "burst". Bursts end with probability 1/L
- * from one frame to the next, so that they last L frames on average, and begin as often as gives
- * the fraction. Source: E. N. Gilbert, "Capacity of a Burst-Noise Channel", Bell System Technical
- * Journal 39 (1960), with all frames lost in the bad state and none in the good one. */
+/* Gilbert's two-state channel for bursts of lost frames. A burst ends with probability 1/L per
+ * frame, so that its mean length is L frames. The rate of bursts follows from the lost fraction.
+ * Reference: E. N. Gilbert, "Capacity of a Burst-Noise Channel", Bell System Technical Journal 39
+ * (1960), with all frames lost in the bad state and none in the good state. */
 static bst_status set_losses(const bst_module_env *env, const bst_exposure_config *c,
                              exposure_clock *clock) {
     double share = c->dropped_fraction, frames = c->dropped_burst_frames;
@@ -99,7 +99,7 @@ static bst_status set_losses(const bst_module_env *env, const bst_exposure_confi
     if (frames == 0.0 || share == 0.0 || share == 1.0) {
         return BST_OK;
     }
-    /* between two bursts there is one frame at least */
+    /* at least one frame between two bursts */
     double fewest = fmax(1.0, share / (1.0 - share));
     if (frames < fewest) {
         return bst_fail(env->ctx, BST_ERR_CONFIG,
@@ -112,7 +112,7 @@ static bst_status set_losses(const bst_module_env *env, const bst_exposure_confi
     return BST_OK;
 }
 
-/* Whether the frame that ends is lost. */
+/* Draws whether the exposure that ends loses its frame. */
 static bool loses_frame(exposure_clock *clock) {
     if (!(clock->dropped_fraction > 0.0)) {
         return false;
@@ -179,8 +179,8 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     return BST_OK;
 }
 
-/* Tick at which all of the open exposure is over and known. */
-static int64_t told_tick(const exposure_clock *clock) {
+/* Tick at which the complete open exposure can be published. */
+static int64_t publication_tick(const exposure_clock *clock) {
     int64_t tick = clock->start_tick + clock->exposure_ticks;
     if (clock->row_time_s != 0.0) {
         tick += clock->lead_ticks;
@@ -190,7 +190,7 @@ static int64_t told_tick(const exposure_clock *clock) {
     return tick;
 }
 
-/* Whole ticks of a commanded time; no exposure or period is longer than a day. */
+/* Converts a commanded exposure time or period to whole ticks, at most one day. */
 static int64_t commanded_ticks(const exposure_clock *clock, double seconds) {
     return (int64_t)floor(fmin(seconds, 86400.0) * (double)clock->tick_rate_hz + 0.5);
 }
@@ -200,7 +200,7 @@ static int clip_end(int start, int length, int limit) {
     return end < limit ? (int)end : limit;
 }
 
-/* Takes what control asked for, clipped to what the sensor can do. */
+/* Takes exposure, period and window from a sensor command, within the limits of the sensor. */
 static void latch(exposure_clock *clock, const bst_sensor_command *command) {
     if (command->exposure_s > 0.0) {
         clock->exposure_ticks = commanded_ticks(clock, command->exposure_s);
@@ -230,8 +230,9 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
     clock->binning = clock->binning < side ? clock->binning : side;
 }
 
+/* Opens an exposure: latches the sensor command and fixes start and end ticks. */
 static void open_exposure(exposure_clock *clock, bst_sample command) {
-    if (clock->updates.updates) { /* the file alone decides: what is commanded is not heard */
+    if (clock->updates.updates) { /* updates from a file take precedence over commands */
         clock->exposure_ticks = clock->updates.exposure_ticks;
         clock->period_ticks = clock->updates.period_ticks;
         clock->window = clock->updates.window;
@@ -244,7 +245,7 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
     clock->open = true;
 }
 
-/* `late`: the run is behind its clock, and does without the frame. */
+/* Ends an exposure and fills its message. `late`: pacing drops the frame. */
 static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) {
     bool lost = loses_frame(clock);
     *out = (bst_exposure){.id = clock->id,
@@ -265,14 +266,15 @@ static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) 
 static bst_status step(void *self, struct bst_step *step) {
     exposure_clock *clock = self;
     int64_t tick = bst_step_tick(step);
-    /* in one tick an exposure may end and the next one begin, and end too when it has no length */
+    /* an exposure may end and the next one begin in the same tick; an exposure of zero length ends
+     * too */
     for (;;) {
         int64_t open_tick = clock->start_tick - clock->lead_ticks;
         if (!clock->open && open_tick <= tick) {
             open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
         }
-        if (!clock->open || told_tick(clock) > tick) {
-            bst_step_wake_at(step, clock->open ? told_tick(clock) : open_tick);
+        if (!clock->open || publication_tick(clock) > tick) {
+            bst_step_wake_at(step, clock->open ? publication_tick(clock) : open_tick);
             return BST_OK;
         }
         bool late = bst_pacing_frame(step, clock->id);

@@ -1,11 +1,11 @@
-/* A logical process steps its modules by a schedule of its own, in windows. It copies what others
- * read at the ticks at which they step. */
+/* Steps the modules of a logical process by its own schedule, in windows. At each step of a reader
+ * in another process it copies the messages for that reader. */
 #include <string.h>
 
 #include "sim/core/wall_clock.h"
 #include "sim/engine/kernel/executor_internal.h"
 
-/* A window ends when this much is noted down for observers, or after this long. */
+/* A window ends after this many bytes of records for observers, or after this time. */
 static const size_t most_noted = 1 << 18;
 static const double longest_window_s = 0.02;
 
@@ -28,7 +28,8 @@ bst_status bst_process_reach(struct bst_step *step, const channel *ch, const slo
     return BST_OK;
 }
 
-/* Copies what an input will see at `tick`: the newest message, or those of a queue. */
+/* Copies the messages that an input sees at `tick`: the newest one, or all unread ones of
+ * a queue. */
 static bst_status copy_visible(bst_ctx *ctx, bst_engine *engine, port_state *port, int64_t tick) {
     const channel *ch = &engine->channels[port->channel];
     if (ch->type->kind == BST_CHANNEL_LATEST) {
@@ -48,7 +49,7 @@ static bst_status copy_visible(bst_ctx *ctx, bst_engine *engine, port_state *por
     return BST_OK;
 }
 
-/* Copies what `reader` will see of this process at `tick`. */
+/* Copies the inputs that `reader` takes from this process at `tick`. */
 static bst_status copy_inputs(bst_executor *x, logical_process *self, const logical_process *reader,
                               int64_t tick) {
     bst_engine *engine = x->engine;
@@ -65,7 +66,7 @@ static bst_status copy_inputs(bst_executor *x, logical_process *self, const logi
     return BST_OK;
 }
 
-/* Passes over the messages that make deferred modules step at `tick`, and finds the next one. */
+/* Marks the triggers of deferred modules at `tick` as processed and finds the next trigger. */
 static void announce(bst_engine *engine, logical_process *reader, int64_t tick) {
     reader->sample_due = INT64_MAX;
     reader->sampled_looks = false;
@@ -85,7 +86,7 @@ static void announce(bst_engine *engine, logical_process *reader, int64_t tick) 
     }
 }
 
-/* When multi-sensor modules step next by their periods, after `tick`. */
+/* Next tick after `tick` at which a multi-sensor module steps by its period. */
 static int64_t next_link_tick(const bst_executor *x, int64_t tick) {
     const logical_process *link = &x->processes[x->link];
     int64_t next = INT64_MAX;
@@ -98,17 +99,17 @@ static int64_t next_link_tick(const bst_executor *x, int64_t tick) {
     return next;
 }
 
-/* Whether this process copies inputs of another one at a tick at which that one steps. */
-static bool feeds(const bst_executor *x, const logical_process *self,
-                  const logical_process *other) {
+/* Checks whether a deferred process takes its inputs from this process. */
+static bool is_source_of(const bst_executor *x, const logical_process *self,
+                         const logical_process *other) {
     return other->kind == BST_PROCESS_DEFERRED && &x->processes[other->source] == self;
 }
 
-/* At the end of a tick. *any: another process may step now. */
+/* Copies the inputs of other processes at the end of a tick. *any: another process may step now. */
 static bst_status copy_for_others(bst_executor *x, logical_process *self, int64_t tick, bool *any) {
     for (int k = 0; self->kind == BST_PROCESS_SENSORS && k < x->count; k++) {
         logical_process *other = &x->processes[k];
-        if (feeds(x, self, other) && other->sample_due <= tick) {
+        if (is_source_of(x, self, other) && other->sample_due <= tick) {
             BST_TRY(copy_inputs(x, self, other, tick));
             announce(x->engine, other, tick);
             other->sampled = *any = true;
@@ -125,7 +126,7 @@ static bst_status copy_for_others(bst_executor *x, logical_process *self, int64_
 
 /* ---- windows ---- */
 
-/* Makes instances due for what other processes have written. */
+/* Schedules instances for messages that other processes have written. */
 static void deliver(bst_engine *engine, const logical_process *self) {
     for (int m = 0; m < self->member_count; m++) {
         int i = self->members[m];
@@ -135,7 +136,7 @@ static void deliver(bst_engine *engine, const logical_process *self) {
     }
 }
 
-/* Drops copies that no later step can see. */
+/* Drops copies of messages that no later step can read. */
 static void trim(bst_executor *x, const logical_process *self) {
     for (int m = 0; m < self->member_count && self->input_count > 0; m++) {
         instance *member = x->engine->instances[self->members[m]];
@@ -148,18 +149,19 @@ static void trim(bst_executor *x, const logical_process *self) {
     }
 }
 
-/* The next tick at which there is something to do. */
+/* The next tick at which a module steps or another process samples its inputs. */
 static int64_t next_tick(const bst_executor *x, const logical_process *self) {
     int64_t tick = self->heap.count > 0 ? x->engine->due[self->heap.items[0]] : INT64_MAX;
     for (int k = 0; self->kind == BST_PROCESS_SENSORS && k < x->count; k++) {
         const logical_process *other = &x->processes[k];
-        if (feeds(x, self, other) && other->sample_due < tick) {
+        if (is_source_of(x, self, other) && other->sample_due < tick) {
             tick = other->sample_due;
         }
     }
     return self->linked && self->link_tick < tick ? self->link_tick : tick;
 }
 
+/* Steps all due modules of a process in one tick, copies outputs and releases frames. */
 static bst_status step_tick(bst_executor *x, logical_process *self, int64_t tick, bool *long_step,
                             bool *over) {
     bst_engine *engine = x->engine;
@@ -174,15 +176,15 @@ static bst_status step_tick(bst_executor *x, logical_process *self, int64_t tick
     return BST_OK;
 }
 
-/* After a step that failed: whether multi-sensor modules, which step before it in this tick, have
- * their inputs. */
+/* After a failed step: copies the inputs of multi-sensor modules that step before it in
+ * this tick. */
 static bool fed_link(bst_executor *x, logical_process *self, int64_t tick) {
     return self->linked && self->link_tick <= tick &&
            self->failed_instance > x->processes[x->link].members[0] &&
            copy_inputs(x, self, &x->processes[x->link], tick) == BST_OK;
 }
 
-/* The steps of a deferred process are numbered for the module that looks ahead. */
+/* Selects the work space for a deferred module with `ahead`, by the number of the sample. */
 static void take_lane(bst_executor *x, const logical_process *self) {
     if (self->kind == BST_PROCESS_DEFERRED && self->looker >= 0) {
         const sample_point *sample = &self->samples[self->first_sample % BST_MOST_SAMPLES];
@@ -237,7 +239,7 @@ void bst_process_look(bst_executor *x, logical_process *self, const sample_point
     int64_t *cursors = self->cursors[lane];
     for (int p = 0; p < looker->port_count; p++) {
         const port_state *port = &looker->ports[p];
-        if (port->copies != BST_COPY_NONE) { /* past what earlier steps read */
+        if (port->copies != BST_COPY_NONE) { /* skip what earlier steps have read */
             bst_log_lock(port->log);
             cursors[p] = port->log->oldest;
             (void)bst_log_pass(port->log, &cursors[p], port->delay_ticks, sample->after);
@@ -252,5 +254,6 @@ void bst_process_look(bst_executor *x, logical_process *self, const sample_point
                             .tick = sample->tick,
                             .lane = lane,
                             .ahead = cursors};
-    (void)looker->spec.desc->ahead(looker->self, &step); /* the step repeats what fails */
+    (void)looker->spec.desc->ahead(looker->self,
+                                   &step); /* the regular step repeats and reports an error */
 }

@@ -1,4 +1,4 @@
-/* Messages by the tick at which they were written: what inputs read, whichever thread reads. */
+/* Message logs of channels: which message an input reads, by ticks, on any thread. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,7 +48,7 @@ int64_t bst_log_next_visible(const message_log *log, int64_t cursor, int64_t del
 
 /* ---- copies ---- */
 
-/* Doubles the room of a copy that is full. */
+/* Doubles the capacity of a full copy of a message log. */
 static bst_status grow(bst_ctx *ctx, message_log *log) {
     int depth = log->depth > 0 ? 2 * log->depth : 4;
     slot *slots = calloc((size_t)depth, sizeof *slots);
@@ -92,7 +92,7 @@ bst_status bst_log_copy(bst_ctx *ctx, message_log *to, const channel *ch, const 
     return status;
 }
 
-/* First position that a step after `tick` may see. */
+/* First position of the log that a step after `tick` may read. */
 static int64_t first_needed(const channel *ch, const port_state *port, int64_t tick) {
     const message_log *log = port->log;
     int64_t newest = bst_log_newest(log, port->delay_ticks, tick);
@@ -100,7 +100,7 @@ static int64_t first_needed(const channel *ch, const port_state *port, int64_t t
         return log->oldest;
     }
     if (ch->type->release) {
-        return newest + 1; /* frames are held for no reader that leaves them in the queue */
+        return newest + 1; /* frames are not retained for a reader that leaves them in the queue */
     }
     bool queue = ch->type->kind == BST_CHANNEL_QUEUE;
     int64_t needed = queue && port->cursor < newest ? port->cursor : newest;

@@ -1,5 +1,5 @@
-/* Each process logs the records for observers in its own order. A thread that has nothing to step
- * passes them on, one thread at a time, merged by tick and stepping order: the order of a run on
+/* Observers of a parallel run. Each logical process logs its messages and events in its own order.
+ * An idle thread passes them to the observers, merged by tick and stepping order as on
  * one thread. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,13 +9,13 @@
 
 enum { ALIGN = 16, KIND_BYTES = 48 };
 
-/* Before the content of each message or event. */
+/* Header of each logged message or event. */
 typedef struct record {
-    size_t bytes; /* with the content */
+    size_t bytes; /* including the content */
     int64_t tick;
     int instance;
     const channel *ch; /* NULL: an event */
-    int *frames;       /* counts the message, which holds a frame; else NULL */
+    int *frames;       /* counter of retained frames if the message holds a frame; else NULL */
 } record;
 
 typedef struct event_text {
@@ -24,7 +24,7 @@ typedef struct event_text {
 
 enum { RECORD_BYTES = (sizeof(record) + ALIGN - 1) / ALIGN * ALIGN };
 
-/* ---- noting down ---- */
+/* ---- recording ---- */
 
 static bst_status append(bst_ctx *ctx, record_segment *to, const record *head, const void *content,
                          size_t bytes) {
@@ -58,7 +58,7 @@ static record_segment *segment_of(logical_process *self) {
     return &self->log.segments[self->log.filled % BST_MOST_SEGMENTS];
 }
 
-/* Whether another process has failed before: then what was noted down since is for nobody. */
+/* Checks whether another process has failed: observers do not get later records. */
 static bool another_failed(const bst_executor *x, const logical_process *self) {
     for (int k = 0; k < x->count; k++) {
         const logical_process *other = &x->processes[k];
@@ -69,8 +69,8 @@ static bool another_failed(const bst_executor *x, const logical_process *self) {
     return false;
 }
 
-/* Has what was noted down until now observed: the payload is overwritten when the step is over.
- * Only a process that has the calling thread for itself may wait. */
+/* Waits until observers have processed all records: the payload is overwritten after the step. Only
+ * a process with exclusive use of the calling thread may wait. */
 static bst_status await_observers(struct bst_step *step, logical_process *self) {
     bst_executor *x = step->engine->executor;
     pthread_mutex_lock(&x->lock);
@@ -127,9 +127,9 @@ bool bst_observers_want(bst_engine *engine, channel *ch, const void *payload, in
     return wanted;
 }
 
-/* ---- showing ---- */
+/* ---- calling observers ---- */
 
-/* The first record before segment `end` that was not yet shown, NULL: there is none. */
+/* The first unprocessed record before segment `end`; NULL: none. */
 static record *first_record(observer_log *log, int64_t end) {
     while (log->reading < end) {
         record_segment *s = &log->segments[log->reading % BST_MOST_SEGMENTS];
@@ -142,7 +142,7 @@ static record *first_record(observer_log *log, int64_t end) {
     return NULL;
 }
 
-/* The log with the next record to be shown, NULL: none is left. */
+/* The log with the next record in the merged order; NULL: none. */
 static observer_log *next_log(bst_executor *x) {
     observer_log *from = NULL;
     const record *next = NULL;
@@ -181,14 +181,16 @@ bool bst_observers_behind(const bst_executor *x) {
     return false;
 }
 
-static void let_go(record *r) {
+/* Releases the frame of a logged message. */
+static void release_record(record *r) {
     if (r->frames) {
         r->ch->type->release((char *)r + RECORD_BYTES);
         __atomic_fetch_sub(r->frames, 1, __ATOMIC_RELAXED);
     }
 }
 
-static bst_status show(bst_executor *x, const record *r) {
+/* Passes a logged message or event to the observers. */
+static bst_status call_observer(bst_executor *x, const record *r) {
     const bst_engine_hooks *hooks = &x->engine->hooks;
     const void *content = (const char *)r + RECORD_BYTES;
     if (r->ch) {
@@ -215,11 +217,11 @@ void bst_observers_work(bst_executor *x) {
         if (!r || !bst_before(r->tick, r->instance, tick, order)) {
             break;
         }
-        heard = show(x, r);
-        let_go(r);
+        heard = call_observer(x, r);
+        release_record(r);
         log->read += r->bytes;
     }
-    (void)next_log(x); /* passes over segments that are done */
+    (void)next_log(x); /* removes completed segments */
     pthread_mutex_lock(&x->lock);
     for (int k = 0; k < x->count; k++) {
         x->processes[k].log.observed = x->processes[k].log.reading;
@@ -232,11 +234,11 @@ void bst_observers_work(bst_executor *x) {
 void bst_observers_discard(bst_executor *x) {
     for (int k = 0; k < x->count; k++) {
         observer_log *log = &x->processes[k].log;
-        /* with what a window that failed left behind */
+        /* including the segment of a window that failed */
         int64_t end =
             log->filled - log->reading < BST_MOST_SEGMENTS ? log->filled + 1 : log->filled;
         for (record *r = first_record(log, end); r; r = first_record(log, end)) {
-            let_go(r);
+            release_record(r);
             log->read += r->bytes;
         }
     }

@@ -46,11 +46,11 @@ const double bst_pacing_edges_ms[BST_PACING_BINS - 1] = {1,  2,  5,  10,  15,  2
 
 enum { RECENT = 256 };
 
-/* An exposure that has ended, until its detections come. */
+/* An exposure that has ended and waits for its detections. */
 typedef struct recent_frame {
     const char *scope;
     int64_t id, tick;
-    double made_s; /* by the wall clock */
+    double made_s; /* wall-clock time of its end */
 } recent_frame;
 
 struct bst_pacing {
@@ -58,20 +58,21 @@ struct bst_pacing {
     double rate_hz;
     pthread_mutex_t lock; /* detections may come from another thread */
     bool started;
-    double origin_s; /* of the wall clock, at tick 0 */
-    double asked_s;  /* when `interrupted` was */
+    double origin_s; /* wall-clock time of tick 0 */
+    double asked_s;  /* last call of the observer `interrupted` */
     bst_pacing_figures figures;
     recent_frame recent[RECENT];
     int next;
 };
 
-/* What a frame's deadline is: by the sensor's period, unless it is given. */
+/* Deadline of a frame in seconds of wall time: the configured value, else the sensor's frame
+ * period. */
 static double deadline_of(const bst_pacing *p, const instance *writer) {
     double period_s = writer->spec.frame_period_s / p->config.speed;
     return p->config.deadline_s > 0.0 ? p->config.deadline_s : period_s > 0.0 ? period_s : 0.1;
 }
 
-/* The channel of each sensor that shows that a frame has been dealt with. */
+/* Selects the channel whose messages complete a frame of a sensor: detections, else frame. */
 static void choose_channels(bst_engine *engine) {
     static const char *const names[] = {BST_CHANNEL_DETECTIONS, BST_CHANNEL_FRAME};
     for (size_t n = 0; n < sizeof names / sizeof *names; n++) {
@@ -87,6 +88,7 @@ static void choose_channels(bst_engine *engine) {
     }
 }
 
+/* Warns if the pacing asks for more than 60 frames per second of wall time. */
 static void warn_of_rates(bst_ctx *ctx, const bst_engine *engine, const bst_pacing *p) {
     for (int i = 0; i < engine->instance_count; i++) {
         const instance *self = engine->instances[i];
@@ -135,7 +137,7 @@ bool bst_engine_pacing(const bst_engine *engine, bst_pacing_figures *out) {
     return true;
 }
 
-/* The wall time of a tick. */
+/* Wall-clock time at which a tick is due. */
 static double due_s(const bst_pacing *p, int64_t tick) {
     return p->origin_s + (double)tick / p->rate_hz / p->config.speed;
 }
@@ -154,7 +156,8 @@ bst_status bst_pacing_wait(bst_ctx *ctx, bst_engine *engine, int64_t tick) {
     while (now < due) {
         double until = due - now > 0.05 ? now + 0.05 : due, whole = floor(until);
         struct timespec at = {(time_t)whole, (long)((until - whole) * 1e9)};
-        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, NULL); /* a signal ends it too */
+        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at,
+                              NULL); /* a signal also ends the sleep */
         now = bst_wall_seconds();
         if (engine->hooks.interrupted && now - p->asked_s > 0.02) {
             p->asked_s = now;
@@ -167,7 +170,7 @@ bst_status bst_pacing_wait(bst_ctx *ctx, bst_engine *engine, int64_t tick) {
     return BST_OK;
 }
 
-/* Drops are in the recording of a linked run. */
+/* Reads or writes a dropped frame in the recording of a linked run. */
 static bool drop_in_recording(struct bst_step *step, const bst_pacing *p, bool drop) {
     struct bst_link *link = step->self->spec.link;
     if (link && p->config.mode == BST_PACING_REALTIME && p->config.overrun == BST_OVERRUN_DROP) {
@@ -187,7 +190,7 @@ bool bst_pacing_frame(struct bst_step *step, int64_t id) {
         return drop_in_recording(step, p, false);
     }
     pthread_mutex_lock(&p->lock);
-    /* without a clock to keep to, nothing is late */
+    /* only real-time pacing can be late */
     double now = bst_wall_seconds();
     double behind = p->config.mode == BST_PACING_REALTIME ? now - due_s(p, step->tick) : 0.0;
     double deadline = deadline_of(p, step->self);
@@ -214,14 +217,14 @@ bool bst_pacing_frame(struct bst_step *step, int64_t id) {
     return drop_in_recording(step, p, drop);
 }
 
-/* Which exposure a message is about. */
+/* Exposure number of a frame or detections message. */
 static int64_t exposure_of(const channel *ch, const void *payload) {
     return strcmp(ch->type->name, BST_CHANNEL_FRAME) == 0
                ? ((const bst_frame_message *)payload)->exposure_id
                : ((const bst_detections *)payload)->exposure_id;
 }
 
-/* From an exposure's end until the writer of a channel is due to step for it. */
+/* Delay in ticks from an exposure's end to the step of the channel's writer. */
 static int64_t declared_delay(const instance *writer) {
     int64_t longest = 0;
     for (int t = 0; t < writer->trigger_count; t++) {
@@ -240,7 +243,9 @@ void bst_pacing_done(const struct bst_step *step, const channel *ch, const void 
         const recent_frame *r = &p->recent[i];
         if (r->scope && r->id == id && strcmp(r->scope, ch->scope) == 0) {
             int64_t due = r->tick + declared_delay(step->self);
-            tick = due < tick ? due : tick; /* an answer that was not awaited: when it was due */
+            tick = due < tick
+                       ? due
+                       : tick; /* a late external answer: count from the time at which it was due */
             made_s = r->made_s;
         }
     }
@@ -264,7 +269,7 @@ bool bst_pacing_by_clock(const bst_engine *engine) {
     return p && p->config.mode == BST_PACING_REALTIME && !p->config.replay;
 }
 
-/* ---- the thread ---- */
+/* ---- scheduling of the thread ---- */
 
 typedef struct saved_thread {
     int policy;

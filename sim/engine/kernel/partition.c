@@ -1,6 +1,5 @@
-/* Which modules make up a logical process, and the inputs between processes. Sensors are separate
- * where nothing passes between them but through multi-sensor modules, with a delay on the way
- * back. */
+/* Partitions module instances into logical processes and connects their inputs. Sensors get
+ * separate processes if only delayed outputs of multi-sensor modules connect them. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,8 +24,9 @@ static bool is_modified(const bst_engine *engine, const channel *ch) {
     return false;
 }
 
-/* Whether an input can cross from one process to another: a sensor's from its own modules or,
- * delayed, from a multi-sensor one, and a multi-sensor module's without making it step. */
+/* Checks whether an input permits a separate process: an input of a sensor's module is from its own
+ * sensor, or delayed from a multi-sensor module; an input of a multi-sensor module is
+ * no trigger. */
 static bool can_cross(const bst_engine *engine, const instance *self, int p) {
     const bst_port *port = bst_instance_port(self, p);
     const channel *ch = &engine->channels[self->ports[p].channel];
@@ -38,13 +38,14 @@ static bool can_cross(const bst_engine *engine, const instance *self, int p) {
             !ch->type->in_place && !is_modified(engine, ch));
 }
 
+/* Checks whether the sensors of an engine can be stepped in separate logical processes. */
 static bool can_separate(const bst_engine *engine) {
     const char *scope = NULL;
     bool several = false;
     for (int i = 0; i < engine->instance_count; i++) {
         const instance *self = engine->instances[i];
         if (self->spec.desc->flags & BST_MODULE_NEEDS_LINK) {
-            return false; /* one conversation with another program */
+            return false; /* one connection to another program serves all sensors */
         }
         if (belongs_to_sensor(self)) {
             several |= scope && strcmp(scope, self->scope) != 0;
@@ -54,7 +55,7 @@ static bool can_separate(const bst_engine *engine) {
             const port_state *port = &self->ports[p];
             const channel *ch = port->channel >= 0 ? &engine->channels[port->channel] : NULL;
             bool output = bst_instance_port(self, p)->direction == BST_PORT_OUT;
-            /* who lends waits in its step until observers are done: only one process may */
+            /* a lending writer waits in its step for observers: only one process may do so */
             if (ch &&
                 (output ? ch->type->lends && self->spec.planes : !can_cross(engine, self, p))) {
                 return false;
@@ -64,7 +65,7 @@ static bool can_separate(const bst_engine *engine) {
     return several && !engine->pacing;
 }
 
-/* The process of those before that have the scope, -1: none. */
+/* Number of the process of an earlier instance with the same scope; -1: none. */
 static int find_process(const bst_engine *engine, int before, const char *scope, bool deferred) {
     for (int i = 0; i < before; i++) {
         const instance *other = engine->instances[i];
@@ -76,8 +77,8 @@ static int find_process(const bst_engine *engine, int before, const char *scope,
     return -1;
 }
 
-/* Gives each instance its process: those of sensors first, then that of multi-sensor modules, then
- * deferred ones. Returns how many there are. */
+/* Assigns a process to each instance: first sensors, then multi-sensor modules, then deferred
+ * modules. Returns the number of processes. */
 static int number_processes(bst_executor *x, bool separate) {
     bst_engine *engine = x->engine;
     int count = 0;
@@ -144,7 +145,8 @@ static bst_status fill_process(bst_ctx *ctx, bst_executor *x, int number) {
     return enough ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for logical processes");
 }
 
-/* An input from another process gets a log of its own, to which that one copies messages. */
+/* Connects an input to another process: it gets a copy of the message log, which that process
+ * fills. */
 static bst_status connect(bst_ctx *ctx, bst_executor *x, instance *reader, int p) {
     bst_engine *engine = x->engine;
     port_state *port = &reader->ports[p];
@@ -175,7 +177,7 @@ static bst_status connect(bst_ctx *ctx, bst_executor *x, instance *reader, int p
     return BST_OK;
 }
 
-/* The first instance that looks ahead and steps only for messages of other processes. */
+/* Selects the first instance with `ahead` whose triggers all come from other processes. */
 static bst_status find_looker(bst_ctx *ctx, bst_executor *x, logical_process *self) {
     for (int m = 0; m < self->member_count && self->looker < 0; m++) {
         const instance *member = x->engine->instances[self->members[m]];
@@ -195,7 +197,7 @@ static bst_status find_looker(bst_ctx *ctx, bst_executor *x, logical_process *se
     return BST_OK;
 }
 
-/* Whether multi-sensor modules step by their periods alone, which says when. */
+/* Checks whether all multi-sensor modules step periodically and declare a lookahead. */
 static bool steps_by_periods(const bst_executor *x) {
     bool all = x->link >= 0;
     const logical_process *link = all ? &x->processes[x->link] : NULL;

@@ -1,5 +1,4 @@
-/* Which instance is stepped next: a binary heap ordered by tick, then by place in the stepping
- * order. */
+/* Schedule of module instances: a binary heap ordered by due tick, then by stepping order. */
 #include <stdlib.h>
 
 #include "sim/engine/kernel/engine_internal.h"
@@ -37,11 +36,12 @@ int64_t bst_engine_earliest(const instance *self) {
     return due;
 }
 
-static bool before(const bst_engine *engine, int a, int b) {
+/* Order of two instances in the heap. */
+static bool is_due_before(const bst_engine *engine, int a, int b) {
     return engine->due[a] < engine->due[b] || (engine->due[a] == engine->due[b] && a < b);
 }
 
-static void put(bst_engine *engine, bst_heap *heap, int place, int i) {
+static void place_in_heap(bst_engine *engine, bst_heap *heap, int place, int i) {
     heap->items[place] = i;
     engine->place[i] = place;
 }
@@ -50,19 +50,19 @@ void bst_engine_set_due(bst_engine *engine, int i, int64_t due) {
     engine->due[i] = due;
     bst_heap *heap = engine->instances[i]->heap;
     int place = engine->place[i], n = heap->count;
-    while (place > 0 && before(engine, i, heap->items[(place - 1) / 2])) {
-        put(engine, heap, place, heap->items[(place - 1) / 2]);
+    while (place > 0 && is_due_before(engine, i, heap->items[(place - 1) / 2])) {
+        place_in_heap(engine, heap, place, heap->items[(place - 1) / 2]);
         place = (place - 1) / 2;
     }
     for (int child = 2 * place + 1; child < n; child = 2 * place + 1) {
-        if (child + 1 < n && before(engine, heap->items[child + 1], heap->items[child])) {
+        if (child + 1 < n && is_due_before(engine, heap->items[child + 1], heap->items[child])) {
             child++;
         }
-        if (!before(engine, heap->items[child], i)) {
+        if (!is_due_before(engine, heap->items[child], i)) {
             break;
         }
-        put(engine, heap, place, heap->items[child]);
+        place_in_heap(engine, heap, place, heap->items[child]);
         place = child;
     }
-    put(engine, heap, place, i);
+    place_in_heap(engine, heap, place, i);
 }

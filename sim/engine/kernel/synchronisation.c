@@ -1,5 +1,5 @@
-/* How far a process may step: until others may still write something that it would read. Every
- * function is called with the executor's lock held. */
+/* Conservative synchronisation: limits the window of a logical process by what other processes may
+ * still write to its inputs. Every function is called with the executor's lock held. */
 #include "sim/engine/kernel/executor_internal.h"
 
 void bst_sync_wake(bst_executor *x) {
@@ -8,6 +8,7 @@ void bst_sync_wake(bst_executor *x) {
     }
 }
 
+/* The clock of the slowest logical process. */
 static int64_t least_clock(const bst_executor *x) {
     int64_t least = INT64_MAX;
     for (int k = 0; k < x->count; k++) {
@@ -16,18 +17,19 @@ static int64_t least_clock(const bst_executor *x) {
     return least;
 }
 
-/* Before which tick no unseen message of an input becomes visible. */
+/* No message that an input has not yet seen becomes visible before this tick. */
 static int64_t safe_before(const bst_executor *x, const process_input *input) {
     const logical_process *source = &x->processes[input->source];
     int64_t silent = source->clock;
     if (input->mode == BST_COPY_SAMPLED) {
-        return silent; /* nothing was copied for later ticks */
+        return silent; /* copies exist up to the clock only */
     }
     silent = source->horizon > silent ? source->horizon : silent;
     silent = input->output->lookahead > silent ? input->output->lookahead : silent;
     return bst_tick_sum(silent, input->delay_ticks);
 }
 
+/* End of the next window of a logical process, exclusive. */
 static int64_t limit_of(const bst_executor *x, const logical_process *self) {
     int64_t rate = x->engine->tick_rate_hz, limit = x->end;
     int64_t lead = bst_tick_sum(least_clock(x), BST_MOST_LEAD_S * rate);
@@ -41,7 +43,7 @@ static int64_t limit_of(const bst_executor *x, const logical_process *self) {
         return next < limit ? next : limit;
     }
     if (self->linked && !x->link_ahead) {
-        /* until what they read is copied for the multi-sensor modules, which step then */
+        /* until the inputs of multi-sensor modules are copied, at the tick of their step */
         int64_t link_tick = x->processes[x->link].horizon;
         int64_t last = link_tick < self->clock ? self->clock : bst_tick_sum(link_tick, 1);
         limit = last < limit ? last : limit;
@@ -54,7 +56,7 @@ static int64_t limit_of(const bst_executor *x, const logical_process *self) {
     return limit;
 }
 
-/* Whether what a process made earlier has gone far enough. */
+/* Checks the backlog of a process: records, retained frames and samples are below their limits. */
 static bool has_room(const bst_executor *x, const logical_process *self) {
     if (self->log.filled - self->log.observed >= BST_MOST_SEGMENTS ||
         __atomic_load_n(&self->frames, __ATOMIC_RELAXED) > BST_MOST_FRAMES_HELD) {
@@ -89,8 +91,9 @@ bool bst_sync_can_step(bst_executor *x, logical_process *self) {
                : self->limit > self->clock;
 }
 
-/* A deferred process has done all before the next sample, or before what its source has done. */
-static void follow(const bst_executor *x, logical_process *self) {
+/* Sets the clock of an idle deferred process to its next sample, else to the clock of
+ * its source. */
+static void follow_source(const bst_executor *x, logical_process *self) {
     if (!self->busy && self->status == BST_OK) {
         self->clock = self->first_sample < self->next_sample
                           ? self->samples[self->first_sample % BST_MOST_SAMPLES].tick
@@ -98,7 +101,7 @@ static void follow(const bst_executor *x, logical_process *self) {
     }
 }
 
-/* Multi-sensor modules that are not due have nothing to do. */
+/* Advances the clock of multi-sensor modules to the tick before which none is due. */
 static void advance_link(const bst_executor *x) {
     logical_process *link = x->link >= 0 ? &x->processes[x->link] : NULL;
     if (link && !link->busy && link->status == BST_OK) {
@@ -109,6 +112,7 @@ static void advance_link(const bst_executor *x) {
     }
 }
 
+/* Adds the sampled tick of a source process to the samples of a deferred process. */
 static void take_sample(logical_process *self) {
     if (self->sampled) {
         sample_point *sample = &self->samples[self->next_sample++ % BST_MOST_SAMPLES];
@@ -127,14 +131,13 @@ void bst_sync_follow(bst_executor *x, const logical_process *source) {
         logical_process *other = &x->processes[k];
         if (other->kind == BST_PROCESS_DEFERRED && &x->processes[other->source] == source) {
             take_sample(other);
-            follow(x, other);
+            follow_source(x, other);
         }
     }
     advance_link(x);
 }
 
-/* The first step of a multi-sensor module at `tick` or later, where it steps by its period alone.
- */
+/* First step of a multi-sensor module at `tick` or later, if it steps by its period only. */
 static int64_t next_step(const bst_executor *x, const instance *member, int64_t tick) {
     int64_t period = member->spec.period_ticks, past = tick - member->spec.offset_ticks;
     if (!x->link_ahead || tick > INT64_MAX - period) {
@@ -143,7 +146,7 @@ static int64_t next_step(const bst_executor *x, const instance *member, int64_t 
     return past <= 0 ? member->spec.offset_ticks : tick + (period - past % period) % period;
 }
 
-/* What multi-sensor modules say of their next messages. */
+/* Publishes the lookahead of multi-sensor modules' outputs. */
 static void take_lookahead(bst_executor *x, logical_process *self) {
     const bst_engine *engine = x->engine;
     self->horizon = engine->due[self->heap.items[0]];
@@ -177,7 +180,7 @@ void bst_sync_end_window(bst_executor *x, logical_process *self) {
     } else if (self->kind == BST_PROCESS_DEFERRED && self->status == BST_OK) {
         const sample_point *done = &self->samples[self->first_sample++ % BST_MOST_SAMPLES];
         self->numbers_done += done->number >= 0;
-        follow(x, self);
+        follow_source(x, self);
     }
     bst_sync_follow(x, self);
     bst_sync_wake(x);

@@ -18,8 +18,8 @@ static int by_name(const void *a, const void *b) {
     return strcmp((*(instance *const *)a)->name, (*(instance *const *)b)->name);
 }
 
-/* Every channel that some instance writes. */
-static bst_status collect_channels(bst_ctx *ctx, bst_engine *engine) {
+/* Lists the channels that instances write. */
+static bst_status list_channels(bst_ctx *ctx, bst_engine *engine) {
     int most = 0;
     for (int i = 0; i < engine->instance_count; i++) {
         most += engine->instances[i]->port_count;
@@ -28,7 +28,7 @@ static bst_status collect_channels(bst_ctx *ctx, bst_engine *engine) {
     if (!engine->channels) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for channels");
     }
-    /* those that yield to other writers come last */
+    /* optional writers, which yield to others, come last */
     for (int k = 0; k < 2 * engine->instance_count; k++) {
         int i = k % engine->instance_count;
         bool yields = k >= engine->instance_count;
@@ -122,7 +122,7 @@ static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
     return BST_OK;
 }
 
-/* Whether instance b must step after instance a within a tick. */
+/* Checks whether instance b must step after instance a within a tick. */
 static bool must_follow(const bst_engine *engine, int a, int b) {
     const instance *later = engine->instances[b], *earlier = engine->instances[a];
     for (int p = 0; p < later->port_count; p++) {
@@ -140,7 +140,7 @@ static bool must_follow(const bst_engine *engine, int a, int b) {
         if (port->direction != BST_PORT_IN || a == b) {
             continue;
         }
-        /* readers come after those who change the message */
+        /* readers step after the instances that modify the message */
         for (int q = 0; q < earlier->port_count; q++) {
             if (bst_instance_port(earlier, q)->direction == BST_PORT_MODIFY &&
                 earlier->ports[q].channel == state->channel) {
@@ -151,8 +151,7 @@ static bool must_follow(const bst_engine *engine, int a, int b) {
     return false;
 }
 
-/* The message of a cycle among the instances that are not yet placed: follows predecessors until
- * one repeats. */
+/* Reports an undeclared cycle of instances: follows predecessors until one repeats. */
 static bst_status report_cycle(bst_ctx *ctx, const bst_engine *engine, const bool *placed) {
     int n = engine->instance_count;
     int *path = calloc((size_t)n + 1, sizeof *path);
@@ -193,7 +192,8 @@ static bst_status report_cycle(bst_ctx *ctx, const bst_engine *engine, const boo
 static bst_status sort_instances(bst_ctx *ctx, bst_engine *engine) {
     int n = engine->instance_count;
     bool *placed = calloc((size_t)n + 1, sizeof *placed);
-    int *order = calloc((size_t)n + 1, sizeof *order); /* order[k]: old index of the k-th */
+    int *order =
+        calloc((size_t)n + 1, sizeof *order); /* order[k]: previous index of the k-th instance */
     instance **sorted = calloc((size_t)n + 1, sizeof *sorted);
     bst_status status = placed && order && sorted
                             ? BST_OK
@@ -243,13 +243,13 @@ bst_status bst_engine_wire(bst_ctx *ctx, bst_engine *engine) {
                             engine->instances[i]->name);
         }
     }
-    BST_TRY(collect_channels(ctx, engine));
+    BST_TRY(list_channels(ctx, engine));
     BST_TRY(connect_inputs(ctx, engine));
     return sort_instances(ctx, engine);
 }
 
-/* How often an instance may step: its own period and every trigger. Upstream triggers are settled a
- * few rounds, as chains are short and may run through delayed inputs. */
+/* Estimates the step rate of each instance from its period and its triggers. A few iterations
+ * suffice because trigger chains are short; they may include delayed inputs. */
 static void settle_rates(bst_engine *engine) {
     for (int round = 0; round < 8; round++) {
         for (int i = 0; i < engine->instance_count; i++) {
@@ -271,7 +271,7 @@ static void settle_rates(bst_engine *engine) {
     }
 }
 
-/* Who reads each channel, and which channels own what must be let go. */
+/* Lists the readers of each channel, and the channels whose messages own frames. */
 static bst_status list_readers(bst_ctx *ctx, bst_engine *engine) {
     int most = 0;
     for (int i = 0; i < engine->instance_count; i++) {
@@ -304,7 +304,7 @@ static bst_status list_readers(bst_ctx *ctx, bst_engine *engine) {
     return BST_OK;
 }
 
-/* Seconds for which a message may have to wait for this reader. */
+/* Longest time in seconds that a message must be kept for this reader. */
 static double longest_wait_s(const bst_engine *engine, const channel *ch, channel_reader r) {
     const instance *self = engine->instances[r.instance];
     double wait = (double)self->ports[r.port].delay_ticks / (double)engine->tick_rate_hz;
@@ -326,8 +326,8 @@ static bst_status allocate_channel(bst_ctx *ctx, const bst_engine *engine, chann
                         "the delay or the rates' ratio",
                         ch->scope, ch->type->name, waiting);
     }
-    /* delay / period + 1, and one more each for the message being written and for one more
-     * writer's step in the tick */
+    /* delay / period + 1, one for the message being written and one for a later writer in
+     * the tick */
     ch->log.depth = ch->type->in_place ? 1 : (int)ceil(waiting) + 3;
     ch->capacity = engine->instances[ch->writer]->ports[ch->writer_port].capacity;
     ch->payload_bytes = ch->type->header_bytes + ch->type->item_bytes * (size_t)ch->capacity;

@@ -15,7 +15,7 @@ static const char *const detection_choices[] = {"all", "no_stars", "objects", NU
 /* bst_fits_compression, and auto */
 static const char *const compression_choices[] = {"none", "rice", "auto", NULL};
 
-/* in the order of bst_plane; also the names of their files */
+/* in the order of bst_plane; also the file names */
 static const char *const plane_choices[] = {"stars",        "targets",    "background",
                                             "segmentation", "saturation", NULL};
 static const char *const plane_names[] = {"STARS", "TARGETS", "BACKGROUND", "SEGMENTATION",
@@ -75,7 +75,7 @@ bst_status bst_recorder_config_check(bst_ctx *ctx, const bst_recorder_config *co
     return BST_OK;
 }
 
-/* A channel that is recorded: what of it needs which table. */
+/* A recorded channel: the tables that need it and the function that writes the rows. */
 typedef struct channel_rows {
     const char *channel;
     bst_recorder_table table;
@@ -139,7 +139,8 @@ static bst_status copy_name(bst_ctx *ctx, char *to, size_t bytes, const char *fr
     return BST_OK;
 }
 
-/* "frames.fits", or one file per sensor; `what` is "frames" or a plane. */
+/* Name of the FITS file of a sensor: "frames.fits", or one file per sensor. `what`: "frames" or a
+ * plane. */
 static void frames_file(const bst_recorder *recorder, const bst_recorder_state *s, const char *what,
                         char *name, size_t bytes) {
     if (recorder->sensor_count == 1) {
@@ -180,7 +181,7 @@ static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_
     return bst_run_commit(ctx, recorder->run);
 }
 
-/* Rows are committed after the frames that they speak of. */
+/* Flushes FITS frames before the rows that refer to them are committed. */
 static bst_status flush_frames(bst_ctx *ctx, void *user) {
     bst_recorder *recorder = user;
     for (int i = 0; i < recorder->sensor_count; i++) {
@@ -248,14 +249,15 @@ static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_s
     return bst_fits_create(ctx, path, layout, &info, out);
 }
 
-/* Fits the frame's WCS; a field too wide for one gets none, and is told of once. */
+/* Fits the WCS of a frame. If the field is too wide, the frame has no WCS; an event reports it
+ * once. */
 static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_recorder_truth_head *head,
                       bst_fits_frame *frame) {
     bst_camera camera = s->camera;
     if (head->pixel_scale_arcsec > 0.0 &&
         head->pixel_scale_arcsec != s->camera.pixel_scale_arcsec &&
         bst_world_camera_at_scale(ctx, &s->camera, head->pixel_scale_arcsec, &camera) != BST_OK) {
-        camera = s->camera; /* cannot be: the frame was rendered so */
+        camera = s->camera; /* unreachable: the frame was rendered with these values */
     }
     frame->pixel_scale_arcsec = camera.pixel_scale_arcsec;
     frame->has_wcs =
@@ -271,7 +273,7 @@ static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_recorder_tr
     memcpy(frame->body_fraction, head->body_fraction, sizeof frame->body_fraction);
 }
 
-/* Writes a frame and its row. head NULL: its truth never came. */
+/* Writes a frame to FITS and its row to the table. head NULL: the truth is missing. */
 static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                               const bst_frame_message *m, const bst_recorder_truth_head *head) {
     bst_recorder_state *s = &recorder->sensors[sensor];
@@ -302,7 +304,7 @@ static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                   index);
 }
 
-/* Writes the frame that waits, with or without its truth, and lets go of it. */
+/* Writes the retained frame, with or without its truth, and releases it. */
 static bst_status write_waiting(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                 const bst_recorder_truth_head *head) {
     bst_recorder_state *s = &recorder->sensors[sensor];
@@ -315,7 +317,7 @@ static bst_status write_waiting(bst_ctx *ctx, bst_recorder *recorder, int sensor
     return status;
 }
 
-/* Planes come right after their frame, and have its keys. */
+/* Records planes of a frame with the FITS header of that frame. */
 static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
                               int64_t written_tick) {
     (void)written_tick;
@@ -429,7 +431,7 @@ bst_status bst_recorder_close(bst_ctx *ctx, bst_recorder *recorder) {
     bst_status status = BST_OK;
     for (int i = 0; i < recorder->sensor_count; i++) {
         bst_status waiting = write_waiting(status == BST_OK ? ctx : NULL, recorder, i, NULL);
-        status = status == BST_OK ? waiting : status; /* the first failure's message is kept */
+        status = status == BST_OK ? waiting : status; /* the message of the first failure is kept */
     }
     bst_status committed = bst_run_commit(status == BST_OK ? ctx : NULL, recorder->run);
     status = status == BST_OK ? committed : status;

@@ -1,4 +1,4 @@
-/* What recorder.c (channels, frames) and recorder_rows.c (tables) share. */
+/* Types that recorder.c (channels, frames) and recorder_rows.c (tables) share. */
 #ifndef BST_ENGINE_RECORDER_RECORDER_INTERNAL_H
 #define BST_ENGINE_RECORDER_RECORDER_INTERNAL_H
 
@@ -29,7 +29,7 @@ typedef enum bst_recorder_table {
     BST_TABLE_COUNT
 } bst_recorder_table;
 
-/* What a frame's header needs of its truth. */
+/* Values of the truth that the FITS header of its frame needs. */
 typedef struct bst_recorder_truth_head {
     bool valid;
     int64_t exposure_id;
@@ -40,22 +40,22 @@ typedef struct bst_recorder_truth_head {
     double body_fraction[3]; /* as bst_fits_frame */
 } bst_recorder_truth_head;
 
-/* Truth may run ahead of its frame by the readout delay: so many exposures at most. */
+/* Truth precedes its frame by the readout delay; maximum number of exposures in between. */
 #define BST_TRUTH_HEADS 64
 
 typedef struct bst_recorder_state {
     char observer[64], sensor[64], target[64];
     bst_camera camera;
     bool has_truth;
-    bst_fits *fits; /* made with the first frame */
+    bst_fits *fits; /* created with the first frame */
     bst_fits *planes[BST_PLANE_COUNT];
-    bst_fits_frame shown; /* what was last written of a frame */
+    bst_fits_frame shown; /* header of the last frame written */
     bool wcs_warned;
     bool frame_waits;
-    bst_frame_message frame; /* one reference held while frame_waits */
+    bst_frame_message frame; /* retained while frame_waits */
     bst_recorder_truth_head heads[BST_TRUTH_HEADS];
     int next_head;
-    /* the last period of the telemetry's grid in which each of these was recorded */
+    /* the last recorded grid point of telemetry, for each of these tables */
     int64_t last_los, last_pointing, last_mount, last_nav, last_control;
     int32_t last_mode;
     int64_t last_target;
@@ -69,15 +69,15 @@ struct bst_recorder {
     char program[64];
     const struct bst_world *world;         /* NULL: objects have no names */
     bool *object_seen;                     /* [objects of the world] */
-    bst_io_table *tables[BST_TABLE_COUNT]; /* NULL: not wanted */
+    bst_io_table *tables[BST_TABLE_COUNT]; /* NULL: the table is not recorded */
     int sensor_count;
     bst_recorder_state sensors[];
 };
 
-/* Creates the tables of the run store that the configuration asks for. */
+/* Creates the tables of the run store that the configuration selects. */
 bst_status bst_recorder_make_tables(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_CHECK;
 
-/* The row of a frame; fits_index < 0 and wcs NULL when there are none. */
+/* Writes the row of a frame. fits_index < 0: not in FITS; wcs NULL: none. */
 bst_status bst_recorder_frame_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                   const bst_frame_message *message, const bst_wcs *wcs,
                                   int64_t fits_index) BST_MUST_CHECK;
@@ -91,7 +91,7 @@ bst_status bst_recorder_run_row(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_C
 bst_status bst_recorder_sensor_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const char *file) BST_MUST_CHECK;
 
-/* Rows of one message. */
+/* Functions that write the rows of one message. */
 #define BST_RECORDER_ROWS(name)                                                            \
     bst_status name(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload, \
                     int64_t written_tick) BST_MUST_CHECK

@@ -1,4 +1,4 @@
-/* Messages to rows. */
+/* Writes the rows of run.sqlite from messages: frames, truth, detections, tracks, telemetry. */
 #include <math.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 #define DEG (180.0 / BST_PI)
 #define ARCSEC (1.0 / BST_ARCSEC_RAD)
 
-/* A row that is being filled, column by column. */
+/* A row under construction, column by column. */
 typedef struct row {
     bst_io_value cells[BST_TABLE_COLUMNS];
     int count;
@@ -61,7 +61,7 @@ int64_t bst_recorder_not_due_before(const bst_recorder *recorder, int64_t last) 
 
 bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
     double hz = recorder->config.telemetry_hz, rate = (double)recorder->tick_rate_hz;
-    /* a grid point that falls on a tick may come out a rounding error below it */
+    /* tick * hz / rate of an exact grid point may be below the integer by a rounding error */
     double period = (double)tick * hz / rate;
     int64_t now = (int64_t)floor(period + 1e-9);
     if (recorder->config.telemetry_hz <= 0.0 || now <= *last) {
@@ -135,6 +135,7 @@ bst_status bst_recorder_frame_row(bst_ctx *ctx, bst_recorder *recorder, int sens
     return append(ctx, recorder, BST_TABLE_FRAMES, &r);
 }
 
+/* Writes the row of an exposure from its truth message. */
 static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                const bst_truth *t) {
     row r = {.count = 0};
@@ -169,7 +170,7 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     return append(ctx, recorder, BST_TABLE_EXPOSURES, &r);
 }
 
-/* The row of an object, once. */
+/* Writes the row of an object at its first appearance. */
 static bst_status object_row(bst_ctx *ctx, bst_recorder *recorder, uint32_t id) {
     if (!recorder->object_seen || recorder->object_seen[id]) {
         return BST_OK;
@@ -268,6 +269,7 @@ static const char *label_name(int32_t label) {
     }
 }
 
+/* Checks whether a detection is recorded, by its label. */
 static bool kept(const bst_recorder *recorder, const bst_detection *item) {
     switch (recorder->config.detections_of) {
         case BST_RECORD_NO_STARS:

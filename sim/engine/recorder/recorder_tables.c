@@ -1,4 +1,4 @@
-/* The tables of run.sqlite. Order of the columns = order in which recorder_rows.c fills them. */
+/* Definitions of the tables of run.sqlite. recorder_rows.c fills the columns in this order. */
 #include "sim/engine/recorder/recorder_internal.h"
 
 #define INT(name, unit, doc) \

@@ -1,4 +1,4 @@
-/* Rows of tasks. */
+/* Writes the rows of the tasking module's tasks. */
 #include "sim/engine/recorder/recorder_internal.h"
 
 static bst_io_value integer(int64_t value) {

@@ -14,6 +14,7 @@ static bool has_port(const bst_scenario_module_config *module, bst_port_directio
     return false;
 }
 
+/* Declared delay in seconds of a module's input channel. */
 static double delay_of(const bst_scenario *scenario, const bst_scenario_module_config *module,
                        const char *channel) {
     for (int i = 0; i < module->delay_count; i++) {
@@ -24,7 +25,7 @@ static double delay_of(const bst_scenario *scenario, const bst_scenario_module_c
     return 0.0;
 }
 
-/* The next step of the gimbal at or after a delay, when frames and gimbal start together. */
+/* The first gimbal step at or after a delay, if frames and gimbal steps start together. */
 static double on_grid(double seconds, double grid_s) {
     return grid_s > 0.0 ? ceil(seconds / grid_s - 1e-9) * grid_s : seconds;
 }

@@ -1,18 +1,18 @@
-/* What a scenario says of the times in a sensor's tracking loop. */
+/* Delays and periods of a sensor's tracking loop, from the scenario. */
 #ifndef BST_ENGINE_SCENARIO_LOOP_TIMING_H
 #define BST_ENGINE_SCENARIO_LOOP_TIMING_H
 
 #include "sim/engine/scenario/scenario.h"
 
 typedef struct bst_loop_timing {
-    double exposure_s, period_s; /* as commanded, else the exposure block's */
-    double frame_latency_s;      /* from an exposure's end until its tracks reach control */
-    double command_delay_s;      /* from a command's publication until the gimbal reads it */
-    double gimbal_period_s;      /* 0: it has none */
+    double exposure_s, period_s; /* as control commands them, else from the exposure block */
+    double frame_latency_s;      /* from the end of an exposure until control reads its tracks */
+    double command_delay_s;      /* from the publication of a command until the gimbal reads it */
+    double gimbal_period_s;      /* 0: no periodic gimbal */
 } bst_loop_timing;
 
-/* The sum of the declared delays on the way of a frame (exposure, frame, detections, tracks; of the
- * module that stands in for others where one does) and of a command. */
+/* Sums the declared delays of a frame (exposure, frame, detections, tracks) and of a command. If a
+ * substitute module replaces others, its delays count. */
 void bst_loop_timing_of(const bst_scenario *scenario, int observer, int sensor,
                         bst_loop_timing *out);
 

@@ -24,17 +24,17 @@ static const bst_config_desc *find_key(const bst_config_desc *table, const char 
     return NULL;
 }
 
-/* Whether a value can be copied as it is. */
+/* Checks whether a configuration value can be copied without ownership. */
 static bool plain(bst_config_type type) {
     return type == BST_CONFIG_BOOL || type == BST_CONFIG_INT || type == BST_CONFIG_REAL ||
            type == BST_CONFIG_ENUM || type == BST_CONFIG_PATH || type == BST_CONFIG_STRING;
 }
 
-/* The module of the same sensor whose value a key takes; NULL: it is its own. */
-static const bst_scenario_module_config *giver(const bst_scenario *s,
-                                               const bst_scenario_module_config *module,
-                                               const bst_config_desc *key,
-                                               const bst_config_desc **theirs) {
+/* The module of the same sensor that supplies the value of a key; NULL: the key's own value. */
+static const bst_scenario_module_config *value_source(const bst_scenario *s,
+                                                      const bst_scenario_module_config *module,
+                                                      const bst_config_desc *key,
+                                                      const bst_config_desc **theirs) {
     for (int m = 0; module->desc->substitutes_for && m < s->module_count; m++) {
         const bst_scenario_module_config *other = &s->modules[m];
         if (other->observer != module->observer || other->sensor != module->sensor ||
@@ -53,7 +53,7 @@ static const bst_scenario_module_config *giver(const bst_scenario *s,
 bool bst_module_substitution_taken(const bst_scenario *s, const bst_scenario_module_config *module,
                                    const char *key) {
     const bst_config_desc *own = find_key(module->desc->config, key), *theirs;
-    return own && giver(s, module, own, &theirs) != NULL;
+    return own && value_source(s, module, own, &theirs) != NULL;
 }
 
 bool bst_module_substitution_delayed(const bst_scenario *s,
@@ -72,7 +72,7 @@ static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scena
                                 bst_scenario_module_config *module) {
     for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
         const bst_config_desc *theirs;
-        const bst_scenario_module_config *other = giver(s, module, d, &theirs);
+        const bst_scenario_module_config *other = value_source(s, module, d, &theirs);
         if (!other) {
             continue;
         }
@@ -103,7 +103,7 @@ static bool writes(const bst_module_desc *desc, const char *channel) {
     return false;
 }
 
-/* Whether a module that is stood in for writes this channel. */
+/* Checks whether a module that is substituted writes this channel. */
 static bool is_inner(const bst_scenario *s, const bst_scenario_module_config *module,
                      const char *channel) {
     for (int m = 0; m < s->module_count; m++) {
@@ -134,8 +134,8 @@ static bst_status add_delay(bst_ctx *ctx, bst_scenario_module_config *module, in
     return BST_OK;
 }
 
-/* The delays of its inputs are those of the same inputs of the others; what one of them waits for
- * another is waited for with the last trigger. */
+/* Copies input delays from the substituted modules. Delays between these modules are added to the
+ * last trigger. */
 static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s,
                               bst_scenario_module_config *module) {
     const bst_module_desc *own = module->desc;

@@ -10,6 +10,7 @@
 #include "boresight/stages.h"
 #include "boresight/version.h"
 
+/* Checks the interface version and the ports of a plug-in's modules. */
 static bst_status check_modules(bst_ctx *ctx, const bst_plugin *plugin) {
     for (int i = 0; plugin->modules && plugin->modules[i]; i++) {
         const bst_module_desc *m = plugin->modules[i];
@@ -30,6 +31,7 @@ static bst_status check_modules(bst_ctx *ctx, const bst_plugin *plugin) {
     return BST_OK;
 }
 
+/* Checks the interface version and the kinds of a plug-in's stages. */
 static bst_status check_stages(bst_ctx *ctx, const bst_plugin *plugin) {
     for (int i = 0; plugin->stages && plugin->stages[i]; i++) {
         const bst_stage_desc *s = plugin->stages[i];
@@ -60,8 +62,8 @@ static bst_status check_stages(bst_ctx *ctx, const bst_plugin *plugin) {
     return BST_OK;
 }
 
-/* Loads the libboresight that is installed with the running program, where the dynamic linker finds
- * none: it then takes it for every library that needs one of this name. False: there is none. */
+/* Loads the libboresight that is installed with the program if the dynamic linker finds none. Later
+ * libraries then use it. False: there is none. */
 static bool load_own_library(void) {
     char path[8192];
     ssize_t length = readlink("/proc/self/exe", path, 4096);
@@ -109,7 +111,7 @@ bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) {
                         " nor " BST_PLUGIN_STAGES,
                         out->file);
     }
-    /* of the libboresight that it is linked with */
+    /* of the libboresight that the plug-in is linked with */
     const char *(*version)(void) = NULL;
     *(void **)(void *)&version = dlsym(library, "bst_version");
     if (version && strcmp(version(), bst_version()) != 0) {
@@ -122,7 +124,7 @@ bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) {
     return check_stages(ctx, out);
 }
 
-/* What a library has: module "x" of role "y", ... */
+/* Lists the content of a plug-in for error messages: module "x" of role "y", ... */
 static void list_content(const bst_plugin *plugin, char *text, size_t bytes) {
     text[0] = '\0';
     for (int i = 0; plugin->modules && plugin->modules[i]; i++) {
@@ -140,6 +142,7 @@ static void list_content(const bst_plugin *plugin, char *text, size_t bytes) {
     }
 }
 
+/* Error: a plug-in has no module or stage that fits, or several. */
 static bst_status not_one(bst_ctx *ctx, const bst_plugin *plugin, const char *what,
                           const char *name, const char *type, int fitting) {
     char content[300];

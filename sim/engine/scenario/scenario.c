@@ -56,7 +56,7 @@ const bst_config_desc bst_scenario_table[] = {
     BST_CONFIG_END,
 };
 
-/* Names are parts of instance names and file names. */
+/* Checks a name of an observer, sensor or object: it becomes part of instance and file names. */
 static bst_status check_name(bst_ctx *ctx, const bst_scenario *s, const char *path,
                              const char *name) {
     const char *allowed = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
@@ -88,7 +88,7 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
     return BST_OK;
 }
 
-/* Fills in what Keplerian elements leave open, so that the resolved scenario shows it. */
+/* Completes Keplerian elements with derived values, so that the resolved scenario contains them. */
 static bst_status resolve_state(bst_ctx *ctx, const bst_scenario *s, const char *list, int index,
                                 bst_orbit_config *orbit) {
     bool keplerian =
@@ -146,6 +146,7 @@ static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     return BST_OK;
 }
 
+/* Rejects "extends" that was not resolved, and "set" in a scenario that extends none. */
 static bst_status check_extended(bst_ctx *ctx, const bst_json *json) {
     const cJSON *root = bst_json_root(json);
     if (cJSON_GetObjectItemCaseSensitive(root, "extends")) {

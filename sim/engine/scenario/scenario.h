@@ -1,4 +1,4 @@
-/* A scenario: one JSON document, read, checked and resolved. */
+/* A scenario: one JSON document, read, checked and resolved to configuration structs. */
 #ifndef BST_ENGINE_SCENARIO_SCENARIO_H
 #define BST_ENGINE_SCENARIO_SCENARIO_H
 
@@ -8,20 +8,20 @@
 #include "sim/link/link.h"
 #include "sim/world/world_config.h"
 
-/* Treatment of "plugin" in a scenario. */
+/* Treatment of "plugin" blocks in a scenario. */
 typedef enum bst_scenario_plugin_policy {
     BST_PLUGINS_LOAD = 0,
-    BST_PLUGINS_SKIP,   /* blocks with a plug-in are not read: for commands that need no modules, so
-                           that viewing results runs no foreign code */
+    BST_PLUGINS_SKIP, /* skip blocks with a plug-in: for commands that view results, which must not
+                         run foreign code */
     BST_PLUGINS_REFUSE, /* an error */
 } bst_scenario_plugin_policy;
 
-/* All modules that a scenario may name; the list is the program's (or a test's). */
+/* Registry of all modules that a scenario may name; the program or a test supplies it. */
 typedef struct bst_scenario_registry {
     const bst_module_desc *const *modules;
     int count;
     bst_scenario_plugin_policy policy;
-    /* libraries of those modules that are plug-ins, to report which ones a scenario uses */
+    /* the plug-ins that supplied some of these modules */
     const bst_plugin *plugins;
     int plugin_count;
 } bst_scenario_registry;
@@ -33,19 +33,19 @@ typedef struct bst_scenario_plugin_use {
     char type[64];
 } bst_scenario_plugin_use;
 
-/* One entry of a sensor's "modules" block, or "tasking". */
+/* One entry of a sensor's "modules" block, or of "tasking". */
 typedef struct bst_scenario_module_config {
-    int observer, sensor; /* -1: it links those of the scenario */
+    int observer, sensor; /* -1: a multi-sensor module */
     char name[64];        /* key in the block; equals the role of the built-in modules */
     const bst_module_desc *desc;
     void *config;   /* desc->config_bytes, filled */
-    double rate_hz; /* 0: triggers only */
+    double rate_hz; /* 0: stepped by triggers only */
     double offset_s;
     int64_t period_ticks, offset_ticks;
     bst_input_delay delays[BST_MAX_DELAYS];
     int delay_count;
-    bool off;    /* another stands in for it, or it for others that are there: does not step */
-    bool plugin; /* its block names the plug-in that it comes from */
+    bool off;    /* disabled: a substitute replaces it, or it is a substitute that is not used */
+    bool plugin; /* its block names a plug-in */
 } bst_scenario_module_config;
 
 typedef struct bst_scenario {
@@ -61,37 +61,38 @@ typedef struct bst_scenario {
     bst_recorder_config record;
     bst_link_config link;
     bst_pacing_config pacing;
-    /* filled by bst_scenario_read, not by the table */
-    char file[512];     /* for messages */
-    char base_dir[512]; /* folder that relative paths start from */
+    /* set by bst_scenario_read, not by the configuration table */
+    char file[512];     /* name for messages */
+    char base_dir[512]; /* base folder of relative paths */
     bst_time epoch;
     int64_t duration_ticks;
     bst_scenario_module_config *modules;
     int module_count;
-    bst_scenario_plugin_use *plugins; /* all that are used, in the order in which they were read */
+    bst_scenario_plugin_use *plugins; /* all plug-ins in use, in reading order */
     int plugin_count;
 } bst_scenario;
 
 extern const bst_config_desc bst_scenario_table[];
 
-/* Reads and checks a scenario (bst_json_load_extended); nothing is opened or written but the JSON.
- * Paths of files that exist are made absolute; a file that a module's table names (BST_CONFIG_PATH,
- * outside of lists) has to. Plug-ins are loaded into the process: see bst_plugin_open. Free with
- * bst_scenario_free, also after an error. */
+/* Reads and checks a scenario; it reads no other file than the JSON (bst_json_load_extended) and
+ * plug-ins.
+ * Notes:     Paths of existing files become absolute. A file in a module's table must exist
+ *            (BST_CONFIG_PATH, outside of lists). Plug-ins are loaded: see bst_plugin_open.
+ * Ownership: free with bst_scenario_free, also after an error */
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
                              const bst_scenario_registry *registry,
                              bst_scenario *out) BST_MUST_CHECK;
-/* Frees everything that a scenario holds; the struct itself belongs to the caller. */
+/* Frees the content of a scenario; the caller owns the struct. */
 void bst_scenario_free(bst_scenario *scenario);
 
-/* The module of a role ("gimbal", "control") that steps for a sensor; NULL: there is none, or
- * another stands in for it. Lent by the scenario. */
+/* The module of a role ("gimbal", "control") that steps for a sensor. NULL: none, or a substitute
+ * replaces it. The scenario owns it. */
 const bst_scenario_module_config *bst_scenario_module(const bst_scenario *scenario, int observer,
                                                       int sensor, const char *role);
 
 /* Value of a module's key of type real or integer, in the key's unit.
  *
- * Given:    module  NULL: as a module without the key
+ * Given:    module NULL: false is returned
  *           key     its name, as in the scenario
  * Returned: true and *out; false where the module has no such number, *out unchanged */
 bool bst_scenario_module_number(const bst_scenario_module_config *module, const char *key,
@@ -99,7 +100,7 @@ bool bst_scenario_module_number(const bst_scenario_module_config *module, const 
 
 /* The scenario with every default written out; the caller deletes it. NULL when out of memory. */
 struct cJSON *bst_scenario_echo(const bst_scenario *scenario);
-/* JSON Schema (draft 2020-12) of scenarios for these modules; the caller deletes it. */
+/* JSON Schema (draft 2020-12) of scenarios with these modules; the caller deletes it. */
 struct cJSON *bst_scenario_schema(const bst_scenario_registry *registry);
 
 #endif

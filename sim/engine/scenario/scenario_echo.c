@@ -6,7 +6,7 @@
 #include "sim/engine/scenario/module_substitution.h"
 #include "sim/engine/scenario/scenario.h"
 
-/* JSON pointer of a module's block. */
+/* JSON pointer of a module's block in the scenario. */
 static void module_path(const bst_scenario_module_config *module, char *path, size_t bytes) {
     if (module->observer < 0) {
         snprintf(path, bytes, "/tasking");
@@ -43,7 +43,7 @@ static cJSON *echo_module(const bst_scenario *s, const bst_scenario_module_confi
     while (own && own->child) {
         cJSON *item = cJSON_DetachItemViaPointer(own, own->child);
         if (bst_module_substitution_taken(s, module, item->string)) {
-            cJSON_Delete(item); /* said where it comes from */
+            cJSON_Delete(item); /* the block states the source of the value */
         } else {
             cJSON_AddItemToObject(node, item->string, item);
         }

@@ -1,38 +1,38 @@
-/* Parts of reading a scenario that only its own files share. */
+/* Internal functions that read a scenario, shared by the scenario_*.c files. */
 #ifndef BST_ENGINE_SCENARIO_SCENARIO_INTERNAL_H
 #define BST_ENGINE_SCENARIO_SCENARIO_INTERNAL_H
 
 #include "sim/engine/scenario/scenario.h"
 
-/* Keys that every module has besides those of its own table; scenario_modules.c. */
+/* Configuration keys common to all modules (scenario_modules.c). */
 extern const bst_config_desc bst_module_common_table[];
 
-/* The folder of a file: what relative paths in it start from. */
+/* Folder of a file, the base of its relative paths. */
 void bst_scenario_folder(const char *file, char *folder, size_t bytes);
 
-/* scenario_paths.c: makes the files that a table names absolute. `must_exist`: a file that is not
- * there is an error, outside of lists. */
+/* Makes the file paths of a configuration table absolute (scenario_paths.c). `must_exist`: a
+ * missing file is an error, outside of lists. */
 bst_status bst_scenario_paths(bst_ctx *ctx, const bst_json *json, const bst_scenario *s,
                               const char *where, const bst_config_desc *table, void *object,
                               bool must_exist) BST_MUST_CHECK;
 
-/* scenario_modules.c: reads the modules of all sensors, and "tasking". */
+/* Reads the "modules" blocks of all sensors and "tasking" (scenario_modules.c). */
 bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json,
                                 const bst_scenario_registry *registry,
                                 bst_scenario *out) BST_MUST_CHECK;
 
-/* What plug-ins are looked up in, and the scenario that uses them. */
+/* Context for loading the plug-ins of stages. */
 typedef struct bst_scenario_stages {
     const bst_scenario_registry *registry;
     bst_scenario *scenario;
 } bst_scenario_stages;
 
-/* scenario_plugins.c: opens the plug-in that `text`, at the JSON pointer `where`, names. *out NULL:
- * the registry says that plug-ins are left unread. */
+/* Opens the plug-in that a block names (scenario_plugins.c). `text`: its path; `where`: JSON
+ * pointer. *out NULL: the registry skips plug-ins. */
 bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_scenario_stages *in,
                                const char *where, const char *text, bst_plugin *out,
                                bool *skip) BST_MUST_CHECK;
-/* Notes that a module or stage of it is used at `where`. */
+/* Records that a scenario uses a module or stage of a plug-in at the JSON pointer `where`. */
 bst_status bst_scenario_plugin_used(bst_ctx *ctx, bst_scenario *s, const bst_plugin *plugin,
                                     const char *where, const char *type) BST_MUST_CHECK;
 

@@ -7,7 +7,7 @@
 #include "sim/engine/scenario/module_substitution.h"
 #include "sim/engine/scenario/scenario_internal.h"
 
-/* Keys that every module has besides those of its own table. */
+/* Configuration keys common to all modules. */
 typedef struct common_config {
     char plugin[512], type[64];
     double rate_hz, offset_s;
@@ -38,7 +38,7 @@ static bool is_common(const char *key) {
     return false;
 }
 
-/* A copy of `node` with only the common keys, or only the others. */
+/* Copies a module's block with only the common keys, or only the others. */
 static cJSON *part_of(const cJSON *node, bool common) {
     cJSON *part = cJSON_CreateObject();
     for (const cJSON *item = node->child; item && part; item = item->next) {
@@ -61,7 +61,7 @@ static const bst_module_desc *find_module(const bst_scenario_registry *registry,
     return NULL;
 }
 
-/* "a", "b", "c": the types of a role, or all roles when role is NULL. */
+/* Lists the types of a role for error messages: "a", "b", "c"; role NULL: all roles. */
 static void list_names(const bst_scenario_registry *registry, const char *role, char *buffer,
                        size_t bytes) {
     buffer[0] = '\0';
@@ -72,7 +72,7 @@ static void list_names(const bst_scenario_registry *registry, const char *role, 
         }
         if (!role &&
             (m->flags & BST_MODULE_MULTI_SENSOR || find_module(registry, m->role, NULL) != m)) {
-            continue; /* a role is listed once, and those that link sensors are not theirs */
+            continue; /* list a role once; skip multi-sensor modules for a sensor's block */
         }
         size_t used = strlen(buffer);
         snprintf(buffer + used, bytes - used, "%s\"%s\"", used ? ", " : "",
@@ -134,7 +134,7 @@ static bool fits(const bst_module_desc *desc, const bst_scenario_module_config *
            (module->observer < 0 ? BST_MODULE_MULTI_SENSOR : 0);
 }
 
-/* The descriptor that a block asks for; of a plug-in that is left unread, NULL. */
+/* Finds the module descriptor for a block. NULL: the block's plug-in is skipped. */
 static bst_status find_desc(bst_ctx *ctx, const bst_json *json,
                             const bst_scenario_registry *registry, bst_scenario *scenario,
                             const common_config *common, const char *path,
@@ -172,7 +172,7 @@ static bst_status find_desc(bst_ctx *ctx, const bst_json *json,
     }
     module->desc = find_module(registry, module->name, common->type);
     if (!module->desc && registry->policy == BST_PLUGINS_SKIP) {
-        return BST_OK; /* of a plug-in that the command line named */
+        return BST_OK; /* the command line has loaded the plug-in */
     }
     if (!module->desc) {
         list_names(registry, module->name, names, sizeof names);
@@ -191,7 +191,7 @@ static bst_status find_desc(bst_ctx *ctx, const bst_json *json,
     return BST_OK;
 }
 
-/* desc of *module stays NULL when the block names a plug-in that is left unread. */
+/* Reads the block of one module. desc of *module stays NULL if its plug-in is skipped. */
 static bst_status read_module(bst_ctx *ctx, const bst_json *json,
                               const bst_scenario_registry *registry, bst_scenario *scenario,
                               const cJSON *node, const char *path,
@@ -281,7 +281,8 @@ bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json,
                     return bst_config_fail(ctx, out->file, path, block, "wrong type", "an object");
                 }
                 if (pass == 0) {
-                    total += cJSON_GetArraySize(block) + 1; /* one may be made */
+                    total +=
+                        cJSON_GetArraySize(block) + 1; /* plus one substitute that may be added */
                     continue;
                 }
                 bool whole = true;
@@ -292,7 +293,7 @@ bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json,
                     char module_path[300];
                     snprintf(module_path, sizeof module_path, "%s/%.60s", path, node->string);
                     BST_TRY(read_module(ctx, json, registry, out, node, module_path, module));
-                    if (!module->desc) { /* left unread */
+                    if (!module->desc) { /* its plug-in is skipped */
                         *module = (bst_scenario_module_config){.desc = NULL};
                         out->module_count--;
                         whole = false;

@@ -10,9 +10,9 @@ void bst_scenario_folder(const char *file, char *folder, size_t bytes) {
     snprintf(folder, bytes, "%.*s", slash ? (int)(slash - file) : 1, slash ? file : ".");
 }
 
-/* Makes the path of a file that exists absolute, so that the resolved scenario can be run from any
- * folder. A file that does not exist is left to those who open it, from the folder of the scenario
- * that names it; `must_exist`: it is an error, when the path is relative. */
+/* Makes the path of an existing file absolute, so that the resolved scenario runs from any folder.
+ * A missing file is left to the function that opens it; with `must_exist`, a missing relative path
+ * is an error. */
 static bst_status resolve_path(bst_ctx *ctx, const bst_json *json, const bst_scenario *s,
                                const char *where, bool must_exist, char *path, size_t bytes) {
     if (!*path) {
@@ -30,7 +30,7 @@ static bst_status resolve_path(bst_ctx *ctx, const bst_json *json, const bst_sce
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: there is no file %s", s->file, where, joined);
     }
     if (!real && path[0] != '/' && strcmp(folder, s->base_dir) != 0) {
-        /* opened relative to base_dir */
+        /* paths are relative to base_dir */
         real = realpath(folder, NULL);
         snprintf(joined, sizeof joined, "%s/%s", real ? real : folder, path);
         free(real);
@@ -53,7 +53,7 @@ static bst_status resolve_path(bst_ctx *ctx, const bst_json *json, const bst_sce
     return status;
 }
 
-/* Whether a path is one of the words that stand for something else than a file. */
+/* Checks whether a path value is a keyword of the option and no file. */
 static bool is_word(const bst_config_desc *desc, const char *path) {
     for (const char *const *word = desc->choices; word && *word; word++) {
         if (strcmp(*word, path) == 0) {

@@ -4,8 +4,8 @@
 
 #include "sim/engine/scenario/scenario_internal.h"
 
-/* Schema of one module: its own keys, the common ones, and "type" fixed. `plugin`: of a plug-in,
- * whose block names it by "plugin", by "type", or both. */
+/* JSON Schema of one module: its own keys, the common keys and a fixed "type". `plugin`: the block
+ * names a plug-in by "plugin", "type" or both. */
 static cJSON *module_schema(const bst_module_desc *m, bool plugin) {
     static const bst_config_desc none[] = {BST_CONFIG_END};
     cJSON *node = bst_config_schema(m->config ? m->config : none);
@@ -63,7 +63,7 @@ static cJSON *module_schema(const bst_module_desc *m, bool plugin) {
     return node;
 }
 
-/* A module of a plug-in that nothing is known of. */
+/* JSON Schema of a module of an unknown plug-in. */
 static cJSON *unknown_module(void) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "type", "object");
@@ -77,7 +77,8 @@ static cJSON *unknown_module(void) {
     return node;
 }
 
-static bool is_plugged(const bst_scenario_registry *registry, const bst_module_desc *module) {
+/* Checks whether a module of the registry comes from a plug-in. */
+static bool is_from_plugin(const bst_scenario_registry *registry, const bst_module_desc *module) {
     for (int i = 0; i < registry->plugin_count; i++) {
         const bst_module_desc *const *m = registry->plugins[i].modules;
         for (; m && *m; m++) {
@@ -89,7 +90,7 @@ static bool is_plugged(const bst_scenario_registry *registry, const bst_module_d
     return false;
 }
 
-/* The schema of a stage's block where it names a plug-in, for the known ones of the kind. */
+/* JSON Schema of a stage's block with a plug-in, for the registered stages of the kind. */
 static cJSON *stage_schemas(const bst_scenario_registry *registry, const char *kind) {
     static const bst_config_desc none[] = {BST_CONFIG_END};
     cJSON *list = cJSON_CreateArray();
@@ -114,7 +115,7 @@ static cJSON *stage_schemas(const bst_scenario_registry *registry, const char *k
     return list;
 }
 
-/* Puts what is known of plug-ins' stages where bst_config_schema left room for them. */
+/* Inserts the schemas of plug-in stages at the placeholders of bst_config_schema. */
 static void fill_stages(cJSON *node, const bst_scenario_registry *registry) {
     for (cJSON *item = node->child; item; item = item->next) {
         fill_stages(item, registry);
@@ -132,7 +133,7 @@ static void fill_stages(cJSON *node, const bst_scenario_registry *registry) {
     }
 }
 
-/* A scenario that extends another needs nothing else; only such a one has "set". */
+/* A scenario that extends another requires no other key; only there is "set" allowed. */
 static void extended_schema(cJSON *root, cJSON *properties) {
     cJSON *extends = cJSON_GetObjectItemCaseSensitive(properties, "extends");
     cJSON *set = cJSON_GetObjectItemCaseSensitive(properties, "set");
@@ -185,9 +186,9 @@ cJSON *bst_scenario_schema(const bst_scenario_registry *registry) {
             cJSON_AddArrayToObject(role, "oneOf");
         }
         cJSON_AddItemToArray(cJSON_GetObjectItemCaseSensitive(role, "oneOf"),
-                             module_schema(m, is_plugged(registry, m)));
+                             module_schema(m, is_from_plugin(registry, m)));
     }
-    /* of a plug-in that is not known anything may be said; where some are known, these are meant */
+    /* a block of an unknown plug-in may have any keys; known plug-ins have their own schemas */
     for (int i = 0; i < registry->count; i++) {
         const bst_module_desc *m = registry->modules[i];
         cJSON *into = m->flags & BST_MODULE_MULTI_SENSOR ? properties : roles;
@@ -196,7 +197,7 @@ cJSON *bst_scenario_schema(const bst_scenario_registry *registry) {
         bool known = false;
         for (int k = 0; k < registry->count; k++) {
             known = known || (strcmp(registry->modules[k]->role, m->role) == 0 &&
-                              is_plugged(registry, registry->modules[k]));
+                              is_from_plugin(registry, registry->modules[k]));
         }
         const cJSON *last = cJSON_GetArrayItem(choices, cJSON_GetArraySize(choices) - 1);
         if (!known && !cJSON_GetObjectItemCaseSensitive(last, "title")) {

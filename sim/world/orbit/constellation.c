@@ -5,9 +5,9 @@
 
 #include "boresight/vec.h"
 
-/* WGS-72, as SGP4 has it: m^3/s^2, m. */
+/* WGS-72 constants of SGP4: m^3/s^2, m. */
 static const double MU_72 = 3.986008e14, RADIUS_72_M = 6378135.0;
-/* Below this height nothing stays in orbit. */
+/* lowest perigee height of a constellation: below it no orbit lasts */
 static const double LEAST_HEIGHT_M = 100e3;
 
 bst_status bst_constellation_check(bst_ctx *ctx, const bst_constellation_config *c) {
@@ -33,6 +33,7 @@ bst_status bst_constellation_check(bst_ctx *ctx, const bst_constellation_config 
     return BST_OK;
 }
 
+/* Converts an angle in degrees to radians in [0, 2 pi). */
 static double turned_rad(double deg) {
     double d = fmod(deg, 360.0);
     return (d < 0.0 ? d + 360.0 : d) * BST_DEG_RAD;

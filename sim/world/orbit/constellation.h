@@ -1,20 +1,20 @@
-/* Walker constellations: satellites on circular (or equal) orbits in planes at equal angles. */
+/* Walker constellations: satellites on equal orbits in planes at equal angles in node. */
 #ifndef BST_WORLD_ORBIT_CONSTELLATION_H
 #define BST_WORLD_ORBIT_CONSTELLATION_H
 
 #include "sim/astro/elements.h"
 #include "sim/world/world_config.h"
 
-/* Checks the numbers that belong together: satellites a multiple of the planes, phasing below the
- * planes, the perigee above the air. BST_ERR_CONFIG with the keys but without their place. */
+/* Checks a constellation: number of satellites a multiple of the planes, phasing below the number
+ * of planes, perigee above the atmosphere. BST_ERR_CONFIG names the keys, without the path. */
 bst_status bst_constellation_check(bst_ctx *ctx,
                                    const bst_constellation_config *config) BST_MUST_CHECK;
 
 /* Mean elements for SGP4 (true equator and mean equinox of date) of one satellite at the
- * constellation's at_s; `epoch` is the scenario's. Plane and slot count from 1. In the notation
- * i: t/p/f: nodes 360/p degrees apart (star: 180/p), t/p satellites a plane at equal mean
- * anomalies, and a phase of f 360/t degrees from one plane to the next towards the east. The mean
- * motion is that of Kepler's third law for the semi-major axis. Source: Walker, Satellite
+ * constellation's at_s; `epoch`: the scenario's epoch. Plane and slot count from 1. In the notation
+ * i: t/p/f: nodes 360/p degrees apart (star: 180/p), t/p satellites per plane, equally spaced in
+ * mean anomaly, and a phase of f 360/t degrees from one plane to the next towards the east. The
+ * mean motion follows from the semi-major axis by Kepler's third law. Source: Walker, Satellite
  * constellations, J. British Interplanetary Society 37 (1984) 559. */
 bst_elements bst_constellation_elements(const bst_constellation_config *config, bst_time epoch,
                                         int plane, int slot);

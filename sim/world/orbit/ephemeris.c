@@ -8,66 +8,66 @@
 #include "sim/core/parallel.h"
 #include "sim/core/simd.h"
 
-/* Knots of the polynomial, and those that its error is estimated from: its own and one more on
- * either side. */
+/* Knots of the interpolating polynomial, and knots for its error estimate: one more on either
+ * side. */
 enum { POINTS = 10, CHECKED = POINTS + 2, BEFORE = CHECKED / 2 - 1 };
-/* Each of so many shares of the bodies makes its next knot at another time in the interval. */
+/* the bodies form groups that compute their next knot at different times */
 enum { SHARES = 16 };
-/* Knots kept per body; a power of two. More than CHECKED, so that the next ones can be made one by
- * one and looking back a little costs nothing. */
+/* Knots kept per body; a power of two. More than CHECKED: the next knots are computed one by one,
+ * and short steps back in time are free. */
 enum { RING = 16, ROTATIONS = 32 };
 enum { STEP_CLASSES = 5, SHORTEST_STEP_S = 16 };
 
-/* Largest product |(u - o_0) ... (u - o_9)| / 10! between the two middle knots, in steps: times the
- * tenth difference it is the error of the polynomial. */
+/* Maximum of |(u - o_0) ... (u - o_9)| / 10! between the two middle knots, in steps. Times the
+ * tenth difference it is the polynomial's error. */
 #define ERROR_OF_DIFFERENCE 2.4033e-4
-/* The estimate is kept below the tolerance by this: a jump that a tenth difference shows a
- * thirtieth of would still be seen. */
+/* Safety factor of the error estimate: a jump of which a tenth difference shows only a thirtieth is
+ * still detected. */
 #define SAFETY 16.0
 #define ROUNDING_M 20e-6
-/* What comes nearer to the Earth's centre than SGP4's radius has decayed; which is decided by SGP4
- * itself. */
+/* geocentric radius below which an SGP4 orbit has decayed; SGP4 itself decides */
 #define DECAYED_M 6378136.0
 
-/* Table of all objects at one instant of this grid. */
+/* Tables of the positions of all objects, on a grid of time. */
 enum { TABLE_STEP_S = 8, TABLES = 4 };
-/* An object of a table is within this of where it is said to be. */
+/* error of a position in a table */
 #define TABLE_ERROR_M 1000.0
-#define TABLE_SPAN_S 60.0 /* for which its bound of the speed holds */
+#define TABLE_SPAN_S 60.0 /* validity of the speed limit in a table */
 #define HIGHEST_SPEED_MPS 11500.0
 /* Aberration and light time shift directions by less than 3 v / c, v < 45 km/s. */
 #define SHIFT_RAD 5e-4
-/* From so many bodies on a pool of threads is worth having, and so many make a part of its work. */
+/* Minimum number of bodies for the thread pool, and bodies per task. */
 enum { BODIES_FOR_THREADS = 1024, GRAIN = 256 };
 
 typedef struct body {
     const bst_world_orbit *orbit; /* NULL: not interpolated */
     int step_class;
-    int64_t first, last; /* the knots that the slots hold; last < first: none */
+    int64_t first, last; /* first and last knot in the ring; last < first: none */
     double place_m[3][RING];
 } body;
 
-/* TEME to GCRF at the knots of a class of steps. */
+/* Rotations TEME to GCRF at the knots of one step size. */
 typedef struct rotations {
     int64_t knot[ROTATIONS];
-    bst_mat3 gcrf_from_teme[ROTATIONS]; /* NAN: outside the Earth orientation's data */
+    bst_mat3 gcrf_from_teme[ROTATIONS]; /* NAN: no Earth orientation data */
 } rotations;
 
 typedef struct table {
     int64_t index; /* time / TABLE_STEP_S */
     bool valid;
-    int users; /* threads that read it without the lock */
-    /* NAN: unknown, may be anywhere */
+    int users; /* threads that read the table without the lock */
+    /* positions, GCRF; NAN: unknown, to be treated as anywhere */
     double *x_m, *y_m, *z_m;
-    double *speed_mps; /* bound of the speed; -INFINITY: has no orbit around that time */
+    double *speed_mps; /* upper limit of the speed; -INFINITY: no orbit around that time */
 } table;
 
 struct bst_ephemeris {
     const bst_world *world;
-    pthread_mutex_t lock;                      /* over all that follows */
-    bst_parallel *pool;                        /* NULL: none */
-    bst_sky_clock *clock_knots, *clock_tables; /* two: each knows the time around its last one */
-    double limit_m;                            /* of the estimated error */
+    pthread_mutex_t lock; /* protects all members below */
+    bst_parallel *pool;   /* NULL: none */
+    bst_sky_clock *clock_knots,
+        *clock_tables; /* two clocks: each caches the time around its last call */
+    double limit_m;    /* upper limit of the estimated error */
     body *bodies;
     int body_count, object_count;
     rotations rotations[STEP_CLASSES];
@@ -81,10 +81,10 @@ static double step_of(int step_class) {
 
 /* ---- the polynomial ---- */
 
-/* Weights of the ten knots at u steps after the fifth of them, 0 <= u <= 1, and their derivatives
- * by u. */
+/* Lagrange weights of the ten knots at u steps after the fifth knot, 0 <= u <= 1, and their
+ * derivatives with respect to u. */
 static void lagrange(double u, double weight[POINTS], double slope[POINTS]) {
-    /* products of the factors before and after each, with their derivatives */
+    /* products of the factors before and after each knot, with derivatives */
     static const double divisor[POINTS] = {-362880, 40320, -10080, 4320,   -2880,
                                            2880,    -4320, 10080,  -40320, 362880};
     double left = 1.0, left_slope = 0.0, right[POINTS], right_slope[POINTS];
@@ -110,8 +110,9 @@ static double tenth_difference(const double *p) {
            210.0 * (p[4] + p[6]) - 252.0 * p[5];
 }
 
-/* Whether the polynomial through the inner ten of twelve knots is good enough. False for NAN. */
-static bool smooth(double p[3][CHECKED], double limit_m) {
+/* Checks the estimated error of the polynomial through the inner ten of twelve knots. False for
+ * NAN. */
+static bool is_accurate(double p[3][CHECKED], double limit_m) {
     double a = 0.0, b = 0.0;
     for (int i = 0; i < 3; i++) {
         double first = tenth_difference(p[i]), second = tenth_difference(p[i] + 1);
@@ -121,15 +122,16 @@ static bool smooth(double p[3][CHECKED], double limit_m) {
     return ERROR_OF_DIFFERENCE * sqrt(a) <= limit_m && ERROR_OF_DIFFERENCE * sqrt(b) <= limit_m;
 }
 
-/* Whether the polynomial from knot `first` + 1 on would run over a place where the model jumps. */
-static bool jumps(const bst_world_orbit *orbit, double step, int64_t first) {
+/* Checks whether a discontinuity of SGP4's deep-space integrator lies within the polynomial of an
+ * orbit. */
+static bool spans_jump(const bst_world_orbit *orbit, double step, int64_t first) {
     double period = 60.0 * bst_sgp4_step_minutes(orbit->sgp4);
     if (!(period > 0.0)) {
         return false;
     }
     double from = orbit->epoch_offset_s + (double)(first + 1) * step;
     double jump = ceil(from / period) * period;
-    jump = jump == 0.0 ? period : jump; /* none at the epoch itself */
+    jump = jump == 0.0 ? period : jump; /* no discontinuity at the epoch itself */
     return jump <= from + (POINTS - 1) * step;
 }
 
@@ -139,6 +141,7 @@ static int slot_of(int64_t knot, int slots) {
     return (int)((uint64_t)knot & (uint64_t)(slots - 1));
 }
 
+/* Rotation TEME to GCRF at a knot of the ephemeris, from the cache. */
 static const bst_mat3 *rotation_at(bst_ephemeris *e, int step_class, int64_t knot) {
     rotations *r = &e->rotations[step_class];
     int slot = slot_of(knot, ROTATIONS);
@@ -154,6 +157,7 @@ static const bst_mat3 *rotation_at(bst_ephemeris *e, int step_class, int64_t kno
     return &r->gcrf_from_teme[slot];
 }
 
+/* SGP4 position (m, GCRF) of an orbit; NAN if decayed. */
 static bst_vec3 place_at(const bst_world_orbit *orbit, const bst_mat3 *gcrf_from_teme,
                          double seconds) {
     double r_km[3], v_kmps[3];
@@ -204,7 +208,7 @@ bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *pos
     }
     double step = step_of(b->step_class), whole = floor(seconds / step);
     int64_t first = (int64_t)whole - BEFORE;
-    if (jumps(b->orbit, step, first)) {
+    if (spans_jump(b->orbit, step, first)) {
         return false;
     }
     double p[3][CHECKED];
@@ -217,7 +221,7 @@ bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *pos
         }
     }
     pthread_mutex_unlock(&e->lock);
-    if (!smooth(p, e->limit_m)) {
+    if (!is_accurate(p, e->limit_m)) {
         return false;
     }
     double weight[POINTS], slope[POINTS], r[3] = {0}, v[3] = {0};
@@ -238,21 +242,22 @@ bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *pos
 
 /* ---- tables ---- */
 
-/* What the bodies of one class have in common at the instant of a table. */
+/* Data of a table that all bodies with the same step size share. */
 typedef struct table_class {
-    int64_t first;       /* of the CHECKED knots */
-    double late;         /* of the interval between knots, how much has gone by */
-    double weight[RING]; /* by slot; 0 for those that do not take part */
+    int64_t first;       /* first of the CHECKED knots */
+    double late;         /* fraction of the current interval between knots */
+    double weight[RING]; /* by ring slot; 0: the knot is not used */
 } table_class;
 
 typedef struct table_job {
     bst_ephemeris *e;
     table *table;
     table_class classes[STEP_CLASSES];
-    bst_mat3 gcrf_from_teme[3]; /* a grid step before, at and after the table's instant */
+    bst_mat3 gcrf_from_teme[3]; /* one grid step before, at and after the time of the table */
 } table_job;
 
-/* The row of an orbit that is no polynomial then; false when there is no orbit. */
+/* Computes the table entry of an object that cannot be interpolated. False: no orbit at that
+ * time. */
 static bool table_row_directly(const table_job *job, const bst_world_orbit *orbit, int i) {
     double seconds = (double)job->table->index * TABLE_STEP_S;
     bst_vec3 p = place_at(orbit, &job->gcrf_from_teme[1], seconds);
@@ -290,7 +295,7 @@ static void table_rows(void *user, int begin, int end) {
         if (isnan(p[0]) && !table_row_directly(job, b->orbit, i)) {
             continue;
         }
-        /* no faster than it would escape from the lowest place that it may come to */
+        /* at most the escape speed at the lowest radius that it can reach */
         double low = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) -
                      (TABLE_SPAN_S * HIGHEST_SPEED_MPS + TABLE_ERROR_M);
         double speed = 1.02 * sqrt(2.0 * BST_EARTH_MU_M3PS2 / fmax(low, 6.2e6));
@@ -312,7 +317,7 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
         out->late = seconds / step - whole;
         int ahead = out->late + (double)(SHARES - 1) / SHARES >= 1.0;
         for (int j = 0; j < CHECKED + ahead; j++) {
-            (void)rotation_at(e, c, out->first + j); /* the threads only read */
+            (void)rotation_at(e, c, out->first + j); /* the worker threads only read rotations */
         }
     }
     for (int i = 0; i < 3; i++) {
@@ -323,7 +328,7 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
         }
         job.gcrf_from_teme[i] = sky.frames.gcrf_from_teme;
     }
-    /* the next table in turn makes few knots: not worth waking anybody, who may come late */
+    /* the next consecutive table needs few new knots: one thread is faster */
     const table *before = &e->tables[slot_of(index - 1, TABLES)];
     bool in_turn = before->valid && before->index == index - 1;
     t->index = index;
@@ -331,10 +336,11 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
     t->valid = true;
 }
 
-/* The table of an instant, made where it is missing; with the lock held. */
+/* The table of positions at a time; computes it if it is missing. With the lock held. */
 static table *table_at(bst_ephemeris *e, int64_t index) {
     table *t = &e->tables[slot_of(index, TABLES)];
-    while (t->users > 0 && t->index != index) { /* somebody looks far back, and is soon done */
+    while (t->users > 0 &&
+           t->index != index) { /* another thread reads an old table; this is short */
         pthread_mutex_unlock(&e->lock);
         sched_yield();
         pthread_mutex_lock(&e->lock);
@@ -345,15 +351,15 @@ static table *table_at(bst_ephemeris *e, int64_t index) {
     return t;
 }
 
-/* The cone of a search, and how far objects may be from where a table has them. */
+/* A search cone with the uncertainty of the tabulated positions. */
 typedef struct search {
     bst_vec3 apex_m, axis;
     double sin_half, cos_half, span_s, sure_m;
-    double least_mps; /* bound of the speed where the table's does not hold, else 0 */
+    double least_mps; /* speed limit outside the validity of the table, else 0 */
 } search;
 
-/* Distances of n objects from `begin` on from the cone's surface, less how far they may be off;
- * behind the apex the distance is longer than this. NAN: unknown. */
+/* Distance of n objects from the surface of the cone, minus their position uncertainty. NAN:
+ * unknown. Behind the apex the value is an upper limit. */
 BST_CLONES_256 static void distances(const table *t, int begin, int n, const search *c,
                                      double *outside_m) {
     const double *px = t->x_m + begin, *py = t->y_m + begin, *pz = t->z_m + begin,
@@ -424,9 +430,9 @@ double bst_ephemeris_places(bst_ephemeris *e, double seconds, double *x_m, doubl
 
 /* ---- making it ---- */
 
-/* Eccentric anomaly, e < 1. */
+/* Solves Kepler's equation for the eccentric anomaly, e < 1. */
 static double kepler(double m, double e) {
-    double x = m + e; /* not below the root: the steps descend to it */
+    double x = m + e; /* start above the root: Newton's steps descend to it */
     for (int i = 0; i < 20; i++) {
         double step = (x - e * sin(x) - m) / (1.0 - e * cos(x));
         x -= step;
@@ -437,7 +443,8 @@ static double kepler(double m, double e) {
     return x;
 }
 
-/* Estimated error of the polynomial around the perigee of a two-body orbit, per semi-major axis. */
+/* Estimated interpolation error at the perigee of a two-body orbit, relative to the semi-major
+ * axis. */
 static double perigee_error(double e, double radians_per_step) {
     double p[3][POINTS + 1] = {{0}};
     for (int j = 0; j <= POINTS / 2; j++) {
@@ -448,7 +455,7 @@ static double perigee_error(double e, double radians_per_step) {
     return ERROR_OF_DIFFERENCE * fabs(tenth_difference(p[0]));
 }
 
-/* The longest step that is good enough at perigee, where the path bends most. */
+/* The longest step between knots that is accurate at perigee, where the curvature is largest. */
 static int choose_class(const bst_ephemeris *e, const bst_world_orbit *orbit) {
     double r_km[3], v_kmps[3];
     if (bst_sgp4_propagate(orbit->sgp4, orbit->epoch_offset_s / 60.0, r_km, v_kmps) !=
@@ -466,7 +473,7 @@ static int choose_class(const bst_ephemeris *e, const bst_world_orbit *orbit) {
     }
     double rate = sqrt(mu / a) / a;
     int c = STEP_CLASSES - 1;
-    /* the rest is left to what is no two-body motion: twice and three times the orbital rate */
+    /* limit the step also for perturbations at two and three times the orbital rate */
     while (c > 0 && !(rate * step_of(c) < 0.5 &&
                       a * perigee_error(eccentricity, rate * step_of(c)) < 0.05 * e->limit_m)) {
         c--;
@@ -474,6 +481,7 @@ static int choose_class(const bst_ephemeris *e, const bst_world_orbit *orbit) {
     return c;
 }
 
+/* Smallest pixel scale (rad) of all cameras of the world. */
 static double sharpest_pixel(const bst_world *world) {
     double sharpest = INFINITY;
     for (int i = 0; i < world->observer_count; i++) {

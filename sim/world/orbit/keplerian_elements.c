@@ -1,12 +1,13 @@
-/* Keplerian elements as scenarios give them. */
+/* Completes the Keplerian elements of a scenario: size and anomaly. */
 #include <math.h>
 
 #include "boresight/vec.h"
 #include "sim/world/world_config.h"
 
-static const double AGREES = 1e-6; /* of the radius; degrees of an anomaly */
+static const double AGREES =
+    1e-6; /* tolerance of redundant elements: relative radius; anomaly in degrees */
 
-/* Mean anomaly (rad) of a true one on an ellipse or a hyperbola (Vallado, Fundamentals of
+/* Mean anomaly (rad) from the true anomaly on an ellipse or a hyperbola (Vallado, Fundamentals of
  * Astrodynamics and Applications, 4th ed., section 2.2). */
 static double mean_of_true(double e, double nu) {
     if (e < 1.0) {
@@ -19,11 +20,10 @@ static double mean_of_true(double e, double nu) {
     return e * sinh(h) - h;
 }
 
-/* True anomaly (rad) of a mean one: Kepler's equation by bisection, to rounding. */
+/* True anomaly (rad) from the mean anomaly: Kepler's equation by bisection, to rounding. */
 static double true_of_mean(double e, double mean) {
     double turns = e < 1.0 ? 2.0 * BST_PI * round(mean / (2.0 * BST_PI)) : 0.0, m = mean - turns;
-    /* e sinh H - H = |M| has H below asinh(|M| / (e - 1)) + 1 ... of an ellipse E is within a half
-     */
+    /* the root of e sinh H - H = |M| is below asinh(|M| / (e - 1)) + 1 */
     double low = e < 1.0 ? -BST_PI : -asinh(fabs(m) / (e - 1.0)) - 1.0, high = -low;
     for (int i = 0; i < 200; i++) {
         double x = 0.5 * (low + high);
@@ -37,6 +37,7 @@ static double true_of_mean(double e, double mean) {
     return 2.0 * atan(sqrt((e + 1.0) / (e - 1.0)) * tanh(0.5 * x));
 }
 
+/* Computes semi-major axis or perigee radius from the other. */
 static bst_status resolve_size(bst_ctx *ctx, bst_initial_state_config *s) {
     double a = s->semi_major_axis_m, e = s->eccentricity, by_axis = a * (1.0 - e);
     if (isnan(a) && isnan(s->perigee_radius_m)) {

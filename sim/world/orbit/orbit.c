@@ -4,7 +4,7 @@
 #include "sim/world/external_states.h"
 #include "sim/world/world_internal.h"
 
-/* Columns of the rotation from radial, transverse, normal axes to GCRF. */
+/* Radial, transverse and normal axes of an orbit state, in GCRF. */
 static void rtn_axes(const bst_world_state *s, bst_vec3 *r, bst_vec3 *t, bst_vec3 *n) {
     *r = bst_vec3_unit(s->position_m);
     *n = bst_vec3_unit(bst_vec3_cross(s->position_m, s->velocity_mps));
@@ -52,7 +52,7 @@ static bst_status relative_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst
     bst_vec3 offset = from_rtn(
         r, t, n, bst_vec3_axpy(orbit->offset_rtn_m, seconds - orbit->at_s, orbit->rate_rtn_mps));
     bst_vec3 rate = from_rtn(r, t, n, orbit->rate_rtn_mps);
-    /* the axes turn with the orbit: h / r^2 about the normal */
+    /* the axes rotate with the orbit: h / r^2 about the normal */
     double radius2 = bst_vec3_dot(ref.position_m, ref.position_m);
     bst_vec3 spin = bst_vec3_scale(bst_vec3_cross(ref.position_m, ref.velocity_mps), 1.0 / radius2);
     out->position_m = bst_vec3_add(ref.position_m, offset);
@@ -61,10 +61,10 @@ static bst_status relative_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst
     return BST_OK;
 }
 
-/* Deviation from the catalogued orbit at `seconds`, not before `burn`: the difference of two
- * two-body orbits from the time of the burn, so that the perturbations that the analytic orbit
- * already has are kept (Encke's idea; the neglected difference of perturbations grows as the
- * separation does: below 1 m per km in an hour at GEO). */
+/* Deviation of a manoeuvred orbit from the catalogued orbit at `seconds`, not before `burn`. It is
+ * the difference of two two-body orbits from the burn, so that the catalogued orbit keeps its
+ * perturbations (Encke's method). The neglected difference of perturbations is below 1 m per km of
+ * separation in an hour at GEO. */
 static bst_status deviation_at(bst_ctx *ctx, const bst_world_burn *burn, double seconds,
                                bst_world_state *out) {
     bst_world_state base, moved;
@@ -151,8 +151,8 @@ bst_status bst_world_orbit_line_of_sight(bst_ctx *ctx, const bst_world_orbit *ob
                                          bst_vec3 *geometric_m, bst_world_state *object_state,
                                          double *emission_s) {
     /* Barycentric light time: the Earth moves by v_earth * tau between emission and reception, and
-     * the observer's aberration is taken with its barycentric velocity. Leaving either out would be
-     * 20 arcsec wrong. Three rounds shrink the error by (v/c)^3. */
+     * the observer's aberration is taken with its barycentric velocity. Omitting either causes an
+     * error of 20 arcsec. Three iterations reduce the error by (v/c)^3. */
     double tau = 0.0;
     for (int i = 0; i < 3; i++) {
         BST_TRY(bst_world_orbit_state(ctx, object, at->clock, at->epoch, at->seconds - tau,

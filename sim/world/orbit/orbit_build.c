@@ -1,4 +1,4 @@
-/* Orbits from their configuration. */
+/* Creates the orbits of objects and observers from their configuration. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,8 +14,7 @@ bst_status bst_world_orbit_build_sgp4(const bst_world_builder *b, const bst_elem
     BST_TRY(bst_time_from_utc_jd(b->ctx, set->epoch_utc_jd1, set->epoch_utc_jd2, &epoch));
     orbit->source = BST_ORBIT_SGP4;
     orbit->name = name;
-    /* days of UTC count as uniform, as the theory does: leap seconds since the elements' epoch do
-     * not count */
+    /* SGP4 counts uniform days of UTC: leap seconds since the element epoch do not count */
     double jd1, jd2, seconds = bst_time_diff(b->world->epoch, epoch);
     bst_time_utc(b->world->epoch, &jd1, &jd2);
     double uniform = (jd1 - set->epoch_utc_jd1 + (jd2 - set->epoch_utc_jd2)) * 86400.0;
@@ -24,7 +23,7 @@ bst_status bst_world_orbit_build_sgp4(const bst_world_builder *b, const bst_elem
     return bst_sgp4_create(b->ctx, set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &orbit->sgp4);
 }
 
-/* From the two lines in the scenario. */
+/* Reads the element set from the two TLE lines in the scenario. */
 static bst_status build_lines(const bst_world_builder *b, const bst_orbit_config *config,
                               const char *path, const char *name, bst_world_orbit *orbit,
                               int *norad) {
@@ -59,7 +58,7 @@ static bst_status build_sgp4(const bst_world_builder *b, const bst_orbit_config 
     if (bst_elements_load(b->ctx, file.text, &options, &sets, &count) != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/elements_file", b->scenario, path);
     }
-    /* of several sets the one whose epoch is nearest to the scenario's */
+    /* of several element sets, the one with the nearest epoch */
     int best = 0;
     double best_offset = INFINITY;
     bst_status status = BST_OK;
@@ -122,7 +121,7 @@ static bst_status build_member(const bst_world_builder *b, const bst_orbit_confi
     return status == BST_OK ? BST_OK : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, path);
 }
 
-/* The state that an orbit of another source, asked once, gives a numerical one to begin with. */
+/* Initial state of a numerical orbit from an orbit of another source. */
 static bst_status state_of_other(const bst_world_builder *b, const bst_orbit_config *config,
                                  const char *path, const char *name, bst_world_state *out,
                                  int *norad) {
@@ -153,7 +152,7 @@ static bst_status build_numerical(const bst_world_builder *b, const bst_orbit_co
     return bst_world_orbit_build_numerical(b, config, burns, &other, path, orbit);
 }
 
-/* `path` of the orbit is "OWNER/orbit"; burns are at "OWNER/burns". */
+/* Checks the burns of an orbit. `path`: "OWNER/orbit"; the burns are at "OWNER/burns". */
 static bst_status check_burns(const bst_world_builder *b, const bst_config_list *list, int source,
                               const char *path) {
     const bst_burn_config *burns = list->items;

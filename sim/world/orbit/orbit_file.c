@@ -1,4 +1,4 @@
-/* Orbits from files of states: ephemerides (OEM) and states injected per frame. */
+/* Orbits from files of states: ephemerides (OEM) and states per frame. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,19 +6,18 @@
 #include "sim/astro/kepler.h"
 #include "sim/world/world_build.h"
 
-/* How far beyond its ends a file is continued: what light time before a run's first exposure and a
- * controller's look ahead need. A body in free fall goes on by two-body motion (Earth's oblateness
- * makes 0.1 m of it at LEO), any other, as one at rest or on the ground, by its own acceleration.
- */
+/* Extrapolation beyond both ends of a file: for light time before the first exposure and for the
+ * controller's prediction. A free-falling body continues by two-body motion (error 0.1 m at LEO
+ * from oblateness). Other bodies, such as ground points, continue with their own acceleration. */
 #define MARGIN_S 5.0
-/* Over which the acceleration at an end is taken. */
+/* interval for the acceleration at an end */
 #define ACCELERATION_S 1.0
-/* What of it injected states may leave out of a run at either end: their frames begin after the
- * epoch and end before the run does. The rest is for light time and the look ahead. */
+/* Part of MARGIN_S by which per-frame states may start late or end early: their frames begin after
+ * the epoch and end before the run. The remainder covers light time and prediction. */
 #define IDLE_S 2.5
 
-/* The file as it was read for another object, or a new entry that is still empty. The entry's name
- * is `key` (a path, with what else the reading depends on); NULL when there is no memory. */
+/* Finds a file that another object has already opened, else adds an empty entry. `key`: the path
+ * with the options of reading. NULL: out of memory. */
 static bst_world_file *find_file(bst_world *world, const char *key) {
     for (int i = 0; i < world->file_count; i++) {
         if (strcmp(world->files[i].key, key) == 0) {
@@ -110,10 +109,10 @@ static bst_status state_within(bst_ctx *ctx, const bst_world_orbit *orbit, bst_s
     return BST_OK;
 }
 
-/* Continues `end`, the state at the file's end that is nearer, by `beyond_s`. */
-static bst_status go_on(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
-                        bst_time epoch, const bst_world_state *end, double beyond_s,
-                        bst_world_state *out) {
+/* Extrapolates `end`, the state at the nearer end of the file, by `beyond_s`. */
+static bst_status extrapolate(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
+                              bst_time epoch, const bst_world_state *end, double beyond_s,
+                              bst_world_state *out) {
     double end_s = beyond_s > 0.0 ? orbit->to_s : orbit->from_s;
     double step = fmin(ACCELERATION_S, orbit->to_s - orbit->from_s) * (beyond_s > 0.0 ? -1.0 : 1.0);
     double r = bst_vec3_norm(end->position_m);
@@ -144,19 +143,19 @@ bst_status bst_world_orbit_file_state(bst_ctx *ctx, const bst_world_orbit *orbit
     double end_s = fmax(orbit->from_s, fmin(orbit->to_s, seconds));
     double beyond_s = seconds - end_s;
     if (!(fabs(beyond_s) <= MARGIN_S)) {
-        end_s = seconds; /* for the reader's own message */
+        end_s = seconds; /* the reader produces its own error message */
         beyond_s = 0.0;
     }
     bst_status status = state_within(ctx, orbit, clock, epoch, end_s, out);
     if (status == BST_OK && beyond_s != 0.0) {
         bst_world_state end = *out;
-        status = go_on(ctx, orbit, clock, epoch, &end, beyond_s, out);
+        status = extrapolate(ctx, orbit, clock, epoch, &end, beyond_s, out);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
 }
 
-/* Fails unless the file that the orbit, or what it is relative to, comes from covers the run, and
- * the run as a clock shows it that is clock_offset_s ahead. */
+/* Checks that the file of an orbit, or of its reference orbit, covers the run, also by a clock that
+ * is clock_offset_s ahead. */
 static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world *world,
                              const bst_world_orbit *orbit, double duration_s, double clock_offset_s,
                              const char *path) {
@@ -184,8 +183,8 @@ static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world
                     clock_offset_s != 0.0 ? ", with the onboard clock's offset" : "");
 }
 
-/* Fails where the onboard orbit error lies along axes that the states of a file do not have: those
- * of a body at rest, or in motion straight up. */
+/* Rejects an onboard orbit error in RTN axes if the states of a file define no such axes: bodies at
+ * rest or in vertical motion. */
 static bst_status check_axes(bst_ctx *ctx, const char *scenario, const bst_world *world,
                              int observer, int sensor) {
     const bst_world_orbit *orbit = &world->observers[observer].orbit;

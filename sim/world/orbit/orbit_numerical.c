@@ -1,4 +1,4 @@
-/* Numerical orbits from their configuration. */
+/* Creates numerically integrated orbits from their configuration. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -9,10 +9,10 @@
 #include "sim/optics/curve_file.h"
 #include "sim/world/world.h"
 
-/* Range of standard magnitudes. */
+/* range to which standard magnitudes refer */
 #define STANDARD_RANGE_M 1e6
-/* From this ratio of radius and range on a sphere's nearness is looked at; below, it is right to
- * 1e-5. */
+/* ratio of sphere radius to range above which the finite distance is modelled; the error below is
+ * 1e-5 */
 #define NEAR_RATIO 1e-5
 
 enum { BY_TIME, BY_PHASE };
@@ -79,7 +79,7 @@ void bst_brightness_free(bst_brightness *brightness) {
     }
 }
 
-/* Unit vectors at right angles to a unit vector and each other. */
+/* Two unit vectors perpendicular to a unit vector and to each other. */
 static void frame_about(bst_vec3 axis, bst_vec3 *e1, bst_vec3 *e2) {
     bst_vec3 helper = fabs(axis.z) < 0.9 ? (bst_vec3){0, 0, 1} : (bst_vec3){1, 0, 0};
     *e1 = bst_vec3_unit(bst_vec3_cross(helper, axis));
@@ -115,7 +115,7 @@ double bst_scene_earthshine(double specular_fraction, double earth_albedo, bst_v
     bst_vec3 sum = {0};
     for (int n = 0; n < 8 * PANELS; n++) {
         double weight, place = gauss8(n % 8, &weight);
-        /* 1 - cos of the angle, so that brightness is smooth at the Earth's limb */
+        /* uniform in 1 - cos of the angle: smooth at the Earth's limb */
         double t = 0.5 * BST_PI * (n / 8 + 0.5 + 0.5 * place) / PANELS,
                drop = cap * sin(t) * sin(t);
         double c = 1.0 - drop, s = sqrt(drop * (2.0 - drop));
@@ -141,12 +141,13 @@ double bst_scene_earthshine(double specular_fraction, double earth_albedo, bst_v
     return total / (au * au);
 }
 
-/* Light of a diffuse sphere over its disc as seen: radius q of its own (sine of the angle over that
- * of the limb), angle a from the direction of the Sun; q = sin t keeps the limb's slope finite. */
+/* Light of the visible disc of a diffuse sphere near the observer. Integrates over q, the sine of
+ * the angle from the centre over that of the limb, and a, the angle from the Sun's direction; q =
+ * sin t avoids the infinite slope at the limb. */
 static double disc_light(double ratio, double phi) {
     enum { PANELS = 3, N = 8 * PANELS };
-    /* rings are wholly lit on one side of this angle from the point below the eye, and cut by the
-     * terminator, or dark, on the other */
+    /* Rings are fully lit on one side of this angle from the sub-observer point. On the other side
+     * the terminator cuts them or they are dark. */
     double border = fabs(0.5 * BST_PI - phi), t0 = border, sum = 0.0;
     for (int i = 0; i < 60; i++) {
         t0 = fmin(border + asin(ratio * sin(fmin(t0, 0.5 * BST_PI))), 0.5 * BST_PI);
@@ -156,7 +157,7 @@ static double disc_light(double ratio, double phi) {
         for (int i = 0; i < N; i++) {
             double weight, place = gauss8(i % 8, &weight);
             double t = from + span * (i / 8 + 0.5 + 0.5 * place) / PANELS, q = sin(t);
-            double gamma = t - asin(ratio * q); /* from the point below the eye */
+            double gamma = t - asin(ratio * q); /* angle from the sub-observer point */
             double up = cos(gamma) * cos(phi), out = sin(gamma) * sin(phi);
             /* integral of max(0, up + out cos a) over a full turn */
             double k = out > 0.0 ? fmin(fmax(-up / out, -1.0), 1.0) : up > 0.0 ? -1.0 : 1.0;
@@ -172,7 +173,7 @@ double bst_scene_sphere_nearness(double ratio, double phase_rad) {
     return ratio > 0.0 && far > 0.0 ? disc_light(ratio, fabs(phase_rad)) / far : 1.0;
 }
 
-/* Reflected sunlight over sunlight at 1 au, were the whole Sun seen, as a magnitude. */
+/* V magnitude of reflected sunlight at the range of the object, with the full Sun visible. */
 static double full_v_mag(const bst_brightness *b, const bst_scene_lighting *l, double phase,
                          double range_m, double sun_distance_m) {
     const bst_brightness_config *c = &b->config;
@@ -230,7 +231,7 @@ void bst_brightness_at(const bst_brightness *b, const bst_scene_lighting *l, bst
     out->specular_share = law > 0.0 ? c->specular_fraction / (4.0 * BST_PI) / law : 0.0;
     double ratio = sqrt(l->area_m2 / BST_PI) / range_m, disc = 1.0;
     if (c->model != BST_BRIGHTNESS_SPHERE) {
-        ratio = 0.0; /* the magnitude is what it is at any range */
+        ratio = 0.0; /* a fixed magnitude does not depend on range */
     }
     if (ratio > NEAR_RATIO && ratio < 1.0) {
         double nearness = bst_scene_sphere_nearness(ratio, phase);

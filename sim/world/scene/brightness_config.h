@@ -1,5 +1,5 @@
-/* The block `brightness` of an object: how its light follows from where it is. All zero but
- * `earth_albedo` is a diffuse sphere of the object's area and albedo that is black and cold. */
+/* The block `brightness` of an object. All zero except `earth_albedo`: a cold diffuse sphere of the
+ * object's area and albedo. */
 #ifndef BST_WORLD_SCENE_BRIGHTNESS_CONFIG_H
 #define BST_WORLD_SCENE_BRIGHTNESS_CONFIG_H
 
@@ -9,15 +9,16 @@ enum { BST_BRIGHTNESS_SPHERE, BST_BRIGHTNESS_STANDARD, BST_BRIGHTNESS_LIGHT_CURV
 
 typedef struct bst_brightness_config {
     int32_t model;            /* BST_BRIGHTNESS_... */
-    double specular_fraction; /* of the reflected light, as from a mirror ball; the rest diffuse */
+    double specular_fraction; /* fraction of reflected light as from a mirror ball; the remainder is
+                                 diffuse */
     double standard_v_mag;    /* at 1000 km, phase 90 degrees, Sun at 1 au */
     char light_curve_file[512];  /* CSV */
-    double light_curve_period_s; /* 0: the curve is held at its ends */
+    double light_curve_period_s; /* 0: the first and last values hold beyond the ends */
     bool earthshine;
     double earth_albedo;
     double emissivity;
     double temperature_k, shadow_temperature_k;
-    bool resolved; /* drawn as a disc when it is large enough */
+    bool resolved; /* rendered as a disc if it is large enough */
 } bst_brightness_config;
 
 extern const bst_config_desc bst_brightness_config_table[];

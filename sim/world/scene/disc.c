@@ -28,12 +28,12 @@ static aspect make_aspect(const bst_scene_source *source, bst_vec3 light) {
     return a;
 }
 
-/* Cosine of the light's angle of incidence at a place of the disc: x, y in units in which the limb
- * has q = 1, q the sine of the angle from the middle over that of the limb. The surface there is
- * nearer to the point below the eye than it would be from far away. */
+/* Cosine of the light's angle of incidence at a point of a sphere's disc: x, y in units in which
+ * the limb has q = 1, q the sine of the angle from the centre over that of the limb. At a finite
+ * distance the surface point is nearer to the sub-observer point. */
 static double incidence(const aspect *a, double x, double y) {
     double q2 = fmin(x * x + y * y, 1.0), k = a->radius;
-    /* cosine and sine over q of asin(q) - asin(k q) */
+    /* cosine, and sine over q, of asin(q) - asin(k q) */
     double far = sqrt(1.0 - q2), near = sqrt(1.0 - k * k * q2);
     return (far * near + k * q2) * a->cosine + (near - k * far) * x * a->sine;
 }
@@ -58,8 +58,8 @@ static bst_status push(bst_ctx *ctx, bst_disc_points *list, bst_vec3 offset, dou
     return BST_OK;
 }
 
-/* Longitude from the sub-eye meridian towards the light at which it begins to be lit, at
- * latitude asin(y); pi / 2 where nothing is. */
+/* Longitude of the terminator at latitude asin(y), from the sub-observer meridian towards the
+ * light; pi / 2: nothing is lit. */
 static double terminator(const aspect *a, double y) {
     double across = sqrt(fmax(1.0 - y * y, 0.0)), dark = -0.5 * BST_PI, lit = 0.5 * BST_PI;
     if (a->radius < 1e-9) {
@@ -78,7 +78,7 @@ static double terminator(const aspect *a, double y) {
     return lit;
 }
 
-/* Appends the points of a light (or, without one, of a disc of equal radiance). */
+/* Appends the quadrature points of one light, or of a disc of uniform radiance. */
 static bst_status add_light(bst_ctx *ctx, const aspect *a, bool uniform, double share,
                             double panel_rad, bst_disc_points *out) {
     int first = out->count;
@@ -103,7 +103,7 @@ static bst_status add_light(bst_ctx *ctx, const aspect *a, bool uniform, double 
     for (int i = first; i < out->count && total > 0.0; i++) {
         out->items[i].share *= share / total;
     }
-    if (!(total > 0.0)) { /* a crescent thinner than numbers */
+    if (!(total > 0.0)) { /* the crescent is below numerical resolution */
         return push(ctx, out, offset_at(a, 1.0, 0.0), share);
     }
     return BST_OK;
@@ -111,7 +111,7 @@ static bst_status add_light(bst_ctx *ctx, const aspect *a, bool uniform, double 
 
 bst_vec3 bst_disc_specular(const bst_scene_source *source) {
     aspect a = make_aspect(source, source->shape->sun);
-    /* the normal halves the phase angle */
+    /* the specular normal bisects the phase angle */
     double half = 0.5 * atan2(a.sine, a.cosine);
     return offset_at(&a, sin(half), 0.0);
 }

@@ -4,13 +4,13 @@
 
 #include "sim/world/scene/stray.h"
 
-/* Share of the Moon's light that comes evenly from its whole disc: what keeps a thin crescent from
- * being infinitely bright. */
+/* Fraction of the Moon's light that is uniform over its disc. It limits the radiance of a thin
+ * crescent. */
 #define MOON_EVEN 0.01
 
-/* The Earth's limb is followed up to this many scale heights. The sunlit Earth (V = 2.4 per square
- * arcsecond at an albedo of 0.3) is e^18 times a dark sky of 22: of the limb's glow 2 % of that sky
- * are left there (tests/world/test_skylight.c). */
+/* Limb glow of the Earth is computed up to this many scale heights. The sunlit Earth (V = 2.4 per
+ * square arcsecond at an albedo of 0.3) is e^18 times a dark sky of V = 22. At this height the limb
+ * glow is 2 % of that sky (tests/world/test_skylight.c). */
 #define LIMB_HEIGHTS 22.0
 
 static double sun_radiance_scale(double sun_distance_m) {
@@ -18,7 +18,7 @@ static double sun_radiance_scale(double sun_distance_m) {
     return pow(10.0, -0.4 * BST_SUN_V_MAG) / (au * au);
 }
 
-/* Observer at `dt` from mid-exposure: free fall about a point mass. */
+/* Position of the observer `dt` after mid-exposure: free fall about a point mass. */
 static bst_vec3 eye_at(const bst_scene_surroundings *a, double dt) {
     double r = bst_vec3_norm(a->eye_m);
     double fall = r > 0.0 ? -0.5 * dt * dt * BST_EARTH_MU_M3PS2 / (r * r * r) : 0.0;
@@ -35,9 +35,9 @@ static bst_mat3 columns(bst_vec3 x, bst_vec3 y, bst_vec3 z) {
     return (bst_mat3){{{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}}};
 }
 
-/* Angle of the direction from the edge of the Earth, positive outside, in the coordinates in which
- * it is a sphere. near: the point of the ray that is nearest to the centre, or where it meets the
- * surface; unit. height: of the nearest point above the surface, Earth radii. */
+/* Angle between a direction and the edge of the Earth, positive outside, in coordinates in which
+ * the Earth is a unit sphere. near: the nearest point of the ray to the centre, or its intersection
+ * with the surface; unit. height: of the nearest point above the surface, Earth radii. */
 static double earth_edge(const bst_scene_body_disc *d, int k, bst_vec3 direction, bst_vec3 *near,
                          double *height) {
     bst_vec3 way = bst_vec3_unit(bst_mat3_mul_vec(&d->frame[k], direction));
@@ -61,7 +61,7 @@ static double edge_at(const bst_scene_body_disc *d, int body, int k, bst_vec3 di
                                   : bst_vec3_angle(direction, d->centre[k]) - d->radius_rad;
 }
 
-/* How far the disc moves across the camera, and how many stretches follow from that. */
+/* Sets the number of time intervals for a disc from its motion across the camera. */
 static void choose_parts(bst_scene_body_disc *d, int body, double scale_rad, double sensor_px) {
     double moved = 0.0, size = body == BST_BODY_EARTH
                                    ? asin(fmin(1.0, 1.0 / bst_vec3_norm(d->eye[4])))
@@ -71,8 +71,8 @@ static void choose_parts(bst_scene_body_disc *d, int body, double scale_rad, dou
         moved += fabs(edge_at(d, body, k + 1, z) - edge_at(d, body, k, z));
         moved += bst_vec3_angle(d->centre[k], d->centre[k + 1]);
     }
-    /* an edge that moves by less than a quarter of the disc's and of the sensor's size is nearly
-     * straight and moves nearly evenly */
+    /* an edge that moves by less than a quarter of disc and sensor is nearly straight and nearly
+     * uniform in motion */
     double step = 0.25 * fmin(size, sensor_px * scale_rad);
     d->parts = 1;
     while (d->parts < BST_DISC_PARTS && moved > step * d->parts) {
@@ -80,7 +80,8 @@ static void choose_parts(bst_scene_body_disc *d, int body, double scale_rad, dou
     }
 }
 
-/* Angle of a scale height at the limb, seen from so many Earth radii. */
+/* Angle subtended by one scale height of the atmosphere at the limb, from a distance in Earth
+ * radii. */
 static double limb_fade_rad(const bst_discs *discs, double distance) {
     return discs->limb_scale / sqrt(fmax(distance * distance - 1.0, 1e-4));
 }
@@ -96,8 +97,8 @@ static void make_earth(const bst_camera *camera, const bst_scene_surroundings *a
     bst_vec3 sun_from_moon = bst_vec3_sub(a->bodies.sun_m, a->bodies.moon_m);
     d->moonlight = camera->background.earth_albedo / BST_PI *
                    pow(10.0, -0.4 * bst_scene_moon_v_mag(a->bodies.moon_m, sun_from_moon));
-    /* aberration by the observer's motion about the Earth turns all directions near the boresight
-     * alike */
+    /* aberration by the observer's motion about the Earth shifts all directions near the boresight
+     * equally */
     bst_light moving = {a->eye_mps, a->light.sun_m};
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         bst_vec3 eye = eye_at(a, a->exposure_s * ((double)k / BST_DISC_PARTS - 0.5));
@@ -117,7 +118,7 @@ static void make_earth(const bst_camera *camera, const bst_scene_surroundings *a
         d->sun[k] = bst_vec3_unit(bst_mat3_mul_vec(&a->itrf_from_gcrf, a->bodies.sun_m));
     }
     double fade_px = limb_fade_rad(out, bst_vec3_norm(d->eye[BST_DISC_PARTS / 2])) / out->scale_rad;
-    /* where the limb fades slowly the coarse map follows it by itself */
+    /* the coarse map resolves a limb that fades slowly */
     d->reach_px = fade_px < 128.0 ? LIMB_HEIGHTS * fade_px : 0.0;
 }
 
@@ -150,14 +151,15 @@ static void make_round(const bst_camera *camera, const bst_scene_surroundings *a
         pow(10.0, -0.4 * bst_scene_moon_v_mag(from_eye, to_sun)) / (solid * (even + MOON_EVEN));
 }
 
-/* How far beyond a body's edge the boresight may be for its light to reach the sensor, rad. */
+/* Largest angle between the boresight and a body's edge at which its light reaches the sensor,
+ * rad. */
 static double reach_rad(const bst_camera *camera, const bst_discs *discs, int body,
                         double distance) {
     double limb = body == BST_BODY_EARTH ? LIMB_HEIGHTS * limb_fade_rad(discs, distance) : 0.0;
     return bst_camera_half_diagonal_rad(camera) + limb + 50.0 * discs->sigma_px * discs->scale_rad;
 }
 
-/* Angle of the camera's turn from mid-exposure, at most. */
+/* Largest rotation of the camera from its attitude at mid-exposure. */
 static double largest_turn_rad(const bst_scene_surroundings *a) {
     bst_quat mid = bst_quat_unit(a->q[BST_DISC_PARTS / 2]);
     double least = 1.0;
@@ -168,12 +170,11 @@ static double largest_turn_rad(const bst_scene_surroundings *a) {
     return 2.0 * acos(least);
 }
 
-/* Whether a body stays out of the field, from its place at mid-exposure alone and bounds of what
- * else moves its edge: the camera's turn, the observer's way, aberration (twice that of Earth and
- * observer) and, of the Earth, the difference between its own coordinates and those in which it is
- * a sphere. */
-static bool stays_away(const bst_camera *camera, const bst_scene_surroundings *a,
-                       const bst_discs *discs, int body, double turn_rad) {
+/* Checks that a body stays outside the field during the exposure. It uses the position at
+ * mid-exposure and limits for camera rotation, observer motion, aberration (twice that of Earth and
+ * observer) and the Earth's oblateness. */
+static bool stays_outside(const bst_camera *camera, const bst_scene_surroundings *a,
+                          const bst_discs *discs, int body, double turn_rad) {
     static const double TURN_MARGIN = 1e-6;
     const double radii[] = {BST_EARTH_RADIUS_M, BST_MOON_RADIUS_M, BST_SUN_RADIUS_M};
     bst_vec3 places[] = {{0, 0, 0}, a->bodies.moon_m, a->bodies.sun_m};
@@ -205,7 +206,7 @@ void bst_discs_make(const bst_camera *camera, const bst_scene_surroundings *arou
                        .limb_scale = camera->background.limb_scale_height_m / BST_EARTH_RADIUS_M};
     for (int i = 0; i < BST_BODY_COUNT; i++) {
         bst_scene_body_disc *d = &out->body[i];
-        if (stays_away(camera, around, out, i, turn_rad)) {
+        if (stays_outside(camera, around, out, i, turn_rad)) {
             continue;
         }
         if (i == BST_BODY_EARTH) {
@@ -276,8 +277,8 @@ static double ramp(double z, double sigma) {
     return 0.5 * z * erfc(-u / sqrt(2.0)) + sigma * exp(-0.5 * u * u) / sqrt(2.0 * BST_PI);
 }
 
-/* Mean share of light inside an edge that is softened by sigma and moves evenly, for a place that
- * is first `from` and then `to` px outside of it. */
+/* Mean fraction of light inside an edge that is blurred by sigma and moves uniformly, for a point
+ * that moves from `from` to `to` px outside it. */
 static double inside(double from, double to, double sigma) {
     if (fabs(to - from) < 1e-3 * sigma) {
         return 0.5 * erfc(0.5 * (from + to) / (sigma * sqrt(2.0)));
@@ -285,8 +286,8 @@ static double inside(double from, double to, double sigma) {
     return fmin(fmax((ramp(-from, sigma) - ramp(-to, sigma)) / (to - from), 0.0), 1.0);
 }
 
-/* Normal of the ellipsoid, unit, Earth axes: x / a, y / a, z / b of a point of the scaled
- * sphere. */
+/* Normal of the Earth's ellipsoid (unit, ITRF) at a point of the unit-sphere coordinates: x / a, y
+ * / a, z / b. */
 static bst_vec3 normal_at(bst_vec3 near) {
     return bst_vec3_unit((bst_vec3){near.x, near.y, near.z / (1.0 - BST_EARTH_FLATTENING)});
 }
@@ -307,7 +308,7 @@ bool bst_discs_terminator(const bst_discs *discs, const bst_vec3 directions[4]) 
     return day && night;
 }
 
-/* Light of the Earth's disc, or of its limb above it, at the middle of a stretch. */
+/* Radiance of the Earth's disc, or of its limb glow, at the middle of a time interval. */
 static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, double share,
                              double *sunlight) {
     const bst_scene_body_disc *d = &discs->body[BST_BODY_EARTH];
@@ -325,7 +326,7 @@ static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, 
 }
 
 static double moon_radiance(const bst_scene_body_disc *d, int k, bst_vec3 direction) {
-    /* place on the disc, in radii */
+    /* position on the disc, in radii */
     bst_vec3 across =
         bst_vec3_axpy(direction, -bst_vec3_dot(direction, d->centre[k]), d->centre[k]);
     bst_vec3 p = bst_vec3_scale(across, 1.0 / sin(d->radius_rad));
@@ -340,7 +341,7 @@ static double moon_radiance(const bst_scene_body_disc *d, int k, bst_vec3 direct
 
 bst_disc_light bst_discs_light(const bst_discs *discs, bst_vec3 direction) {
     bst_disc_light light = {0};
-    double beyond = 0.0; /* Sun and Moon, which the Earth hides */
+    double beyond = 0.0; /* light of Sun and Moon, which the Earth occults */
     for (int i = BST_BODY_COUNT - 1; i >= 0; i--) {
         const bst_scene_body_disc *d = &discs->body[i];
         if (!d->present) {

@@ -9,10 +9,10 @@
 #include "sim/world/scene/los_track.h"
 #include "sim/world/scene/skylight.h"
 
-/* How far an apparent place lies from the catalogue's, at most: aberration and light deflection. */
+/* upper limit of aberration and light deflection */
 #define APPARENT_SHIFT_RAD (30.0 * BST_ARCSEC_RAD)
 
-/* Statistical stars that a field query keeps for the next one: 40 MiB. */
+/* statistical stars cached for the next field query: 40 MiB */
 #define FAINT_CACHE_STARS 1048576
 
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
@@ -78,9 +78,8 @@ static bst_vec3 deviation(bst_quat from, bst_quat to) {
     return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
 }
 
-/* The attitude that shows a star near the boresight at the mean of its places in the exposure. The
- * mean of the rotation alone is beside it when the camera turns about its axis while it slews: the
- * track of the star is bent. */
+/* Attitude that maps a star near the boresight to its mean position in the exposure. The mean
+ * rotation differs if the camera rolls while it slews, because the star trail is curved. */
 static bst_quat attitude_of_mean_place(const bst_field *field) {
     bst_quat mean = field->sigma_q[0];
     bst_vec3 axis = bst_quat_rotate(bst_quat_conj(mean), (bst_vec3){0, 0, 1});
@@ -91,13 +90,13 @@ static bst_quat attitude_of_mean_place(const bst_field *field) {
         y += seen.y / seen.z / (BST_FIELD_SIGMA_POINTS - 1);
     }
     if (!isfinite(x) || !isfinite(y)) {
-        return mean; /* turned by a right angle: there is no image of anything */
+        return mean; /* rotation by 90 degrees: no image */
     }
     return bst_quat_mul(bst_quat_from_rotvec((bst_vec3){-y, x, 0.0}), mean);
 }
 
-/* Sigma points of the exposure, the mean attitude, and the largest displacement (px) of any image
- * point from its place at mid-exposure. */
+/* Computes the sigma points of the exposure, the mean attitude, and the largest displacement (px)
+ * of any image point from mid-exposure. */
 static void summarise_track(bst_field *field, const bst_los_track *track, bst_quat *mean,
                             double *reach_px) {
     enum { D = BST_FIELD_SIGMA_DIMENSIONS };
@@ -110,7 +109,7 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
         double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
         reach = fmax(reach, bst_los_track_turned_px(field->camera, d));
-        /* moments of the piecewise linear path between the samples */
+        /* moments of the piecewise linear path between samples */
         double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
         for (int i = 0; i < D; i++) {
             first[i] += 0.5 * w * (previous[i] + now[i]);
@@ -133,11 +132,11 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
             for (int m = 0; m < j; m++) {
                 c -= chol[i][m] * chol[j][m];
             }
-            /* a direction without spread gives a zero column */
+            /* zero variance gives a zero column */
             chol[i][j] = i == j ? sqrt(fmax(c, 0.0)) : chol[j][j] > 1e-300 ? c / chol[j][j] : 0.0;
         }
     }
-    const double spread = sqrt((double)D); /* centre weight 0 */
+    const double spread = sqrt((double)D); /* the centre has zero weight */
     for (int p = 0; p < BST_FIELD_SIGMA_POINTS; p++) {
         double point[D];
         for (int i = 0; i < D; i++) {
@@ -173,7 +172,8 @@ static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
-/* Notes in the truth how much of the window bright bodies cover; whether any is to be drawn. */
+/* Records in the truth how much of the window Earth, Moon and Sun cover. True: a disc must be
+ * rendered. */
 static bool bodies_in_field(const bst_camera *camera, const bst_scene_surroundings *around,
                             bst_window window, bst_truth *truth) {
     bst_discs discs;
@@ -213,15 +213,15 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
     double x, y;
     bst_vec3 v = bst_quat_rotate(q, direction);
     if (field->camera->geometry.general && bst_camera_beyond_fold(field->camera, v, margin_px)) {
-        return true; /* no image now, but it may come within the exposure */
+        return true; /* behind the camera now, but it may enter during the exposure */
     }
     return bst_camera_project(field->camera, v, &x, &y) && x >= window.x0 - margin_px &&
            y >= window.y0 - margin_px && x <= window.x0 + window.width - 1 + margin_px &&
            y <= window.y0 + window.height - 1 + margin_px;
 }
 
-/* Whether the object is the observer's own satellite as a catalogue has it: its orbit there need
- * not be the observer's to the metre. */
+/* Checks whether a catalogue object is the observer's own satellite; both orbits may differ by
+ * metres. */
 static bool is_self(const bst_field *field, int index) {
     const world_object *object = &field->world->objects[index];
     if (index == field->world->observers[field->observer].own_object) {
@@ -231,25 +231,25 @@ static bool is_self(const bst_field *field, int index) {
            object->info.norad == field->world->observers[field->observer].norad;
 }
 
-/* A query under way. */
+/* State of one field query. */
 typedef struct query {
-    double start_s, end_s; /* of the track */
+    double start_s, end_s; /* start and end of the attitude track */
     double mid_s, exposure_s;
-    bst_los_track own; /* of the exposure itself */
+    bst_los_track own; /* track of the exposure alone */
     bst_quat mean;
     bst_window window;
-    double margin_px; /* of the window, with what the attitude moves during the exposure */
+    double margin_px; /* around the window, including the motion during the exposure */
     bst_vec3
-        centre; /* cone of directions that holds the window with its margin: axis, half angle */
+        centre; /* cone of directions that contains the window with its margin: axis, half angle */
     double radius;
     bst_world_state eye;
     bst_bodies bodies;
     bst_mat3 itrf_from_gcrf;
     bst_light light, geocentric;
-    double v_limit, faint_limit; /* of stars; of statistical ones */
+    double v_limit, faint_limit; /* magnitude limits: catalogue stars; statistical stars */
 } query;
 
-/* Times, mean attitude and the margin that the motion asks for. */
+/* Prepares the attitude track of a field query: times, mean attitude, and margin for the motion. */
 static bst_status settle_track(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
                                const bst_field_options *options, query *q) {
     double reach_px;
@@ -269,7 +269,7 @@ static bst_status settle_track(bst_ctx *ctx, bst_field *field, const bst_los_tra
     return BST_OK;
 }
 
-/* Where observer, Earth, Sun and Moon are at mid-exposure, and how light comes from there. */
+/* Computes observer, Earth, Sun and Moon at mid-exposure, with aberration and light deflection. */
 static bst_status place_observer(bst_ctx *ctx, bst_field *field, query *q) {
     bst_astro_earth_frames frames;
     BST_TRY(bst_world_view_observer_state(ctx, field->view, field->observer, q->mid_s, &q->eye));
@@ -281,6 +281,7 @@ static bst_status place_observer(bst_ctx *ctx, bst_field *field, query *q) {
     return BST_OK;
 }
 
+/* Fills the header of the truth message: times, attitudes, observer. */
 static void fill_header(const bst_field *field, const query *q, bst_truth *truth) {
     const bst_camera *camera = field->camera;
     truth->q_cam_from_gcrf_mid = field->q_mid;
@@ -296,6 +297,7 @@ static void fill_header(const bst_field *field, const query *q, bst_truth *truth
     truth->dark_e = bst_camera_dark_e_per_s(camera) * q->exposure_s;
 }
 
+/* Computes the cone of directions that contains the window. */
 static void find_cone(const bst_field *field, query *q) {
     const bst_camera *camera = field->camera;
     bst_window window = q->window;
@@ -314,7 +316,7 @@ static void find_cone(const bst_field *field, query *q) {
     }
 }
 
-/* Bright bodies in the field, and the background that they, the sky and undrawn stars give. */
+/* Computes the background of the exposure: bright bodies, sky and stars that are not rendered. */
 static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q,
                                   bst_truth *truth) {
     const bst_camera *camera = field->camera;
@@ -349,7 +351,7 @@ static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q
     return BST_OK;
 }
 
-/* The catalogue's stars, then the statistical ones down to faint_limit. */
+/* Collects catalogue stars, then statistical stars down to faint_limit, in the cone. */
 static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, double julian_year,
                               int *count) {
     int known, drawn = 0;
@@ -375,7 +377,7 @@ static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, do
     }
 }
 
-/* The source that a star is; false when its image does not touch the window. */
+/* Makes the source of a star. False: its image does not touch the window. */
 static bool make_star(const bst_field *field, const query *q, const bst_star *star,
                       bst_scene_source *s) {
     const bst_camera *camera = field->camera;
@@ -396,8 +398,8 @@ static bool make_star(const bst_field *field, const query *q, const bst_star *st
     if (coloured && !isnan(star->b_minus_v)) {
         bst_psf_colour(camera->psf, bst_optics_star_spectrum_k((double)star->b_minus_v), s->colour);
     }
-    /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
-     * move with the Earth, stands for the star */
+    /* the Earth occults stars too: a distant point on the line of sight, in axes that move with the
+     * Earth, represents the star */
     bst_vec3 ray = bst_light_apparent_star(&q->geocentric, star->icrs);
     s->occulted = bst_astro_earth_occults(
         q->eye.position_m, bst_vec3_axpy(q->eye.position_m, 1e12, ray), q->bodies.pole);
@@ -408,7 +410,7 @@ static bool make_star(const bst_field *field, const query *q, const bst_star *st
     return true;
 }
 
-/* Stars, then objects. */
+/* Collects the sources of a field query: stars, then objects. */
 static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, int *count) {
     int star_count, near_count, n = 0;
     double tt1, tt2;

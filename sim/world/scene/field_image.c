@@ -30,7 +30,7 @@ bst_scene_image_moments bst_scene_image_by_light(const bst_camera *camera,
         (void)bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
                                  &x, &y);
         double dx = x - m.x_mean, dy = y - m.y_mean;
-        if (n == 0) { /* moments about the first place */
+        if (n == 0) { /* moments about the first position */
             m.x_mean = x;
             m.y_mean = y;
             dx = dy = 0.0;
@@ -105,7 +105,7 @@ void bst_scene_image_centroid(const bst_camera *camera, const bst_scene_source *
         sigma = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
                 2.3548200450309493;
     }
-    /* light of variance v on an illumination of slope s per px: by v s */
+    /* a light distribution of variance v on an illumination with slope s per px shifts by v s */
     double here = bst_camera_illumination(camera, m->x_mean, m->y_mean), variance = sigma * sigma;
     if (here > 0.0) {
         double sx = 0.5 / here *
@@ -121,8 +121,8 @@ void bst_scene_image_centroid(const bst_camera *camera, const bst_scene_source *
     *y_px += shift[1];
 }
 
-/* Variance of what is independent from place to place, both axes, px^2: of white errors second
- * differences have 6 times that; smooth paths have hardly any. */
+/* Variance of uncorrelated jitter in a path, both axes, px^2. Second differences have 6 times the
+ * variance of white errors; smooth paths contribute little. */
 static double roughness(const double *x, const double *y, int count) {
     double sum = 0.0;
     for (int k = 1; k + 1 < count; k++) {
@@ -211,7 +211,7 @@ double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_trac
     enum { COARSE = 8, FEWEST = 20 };
     const double piece_px = 3.0;
     light_path path;
-    /* most jitter shows in a few places */
+    /* few positions suffice to detect strong jitter */
     if (!path_in_pieces(camera, track, source, u01, COARSE, &path) ||
         roughness(path.x, path.y, COARSE + 1) > 0.5 * excess_px2) {
         return NAN;

@@ -1,31 +1,29 @@
-/* Where the light of a source falls; inside of sim/world. */
+/* Moments and widths of a source's image on the detector. Internal to sim/world. */
 #ifndef BST_WORLD_SCENE_FIELD_IMAGE_H
 #define BST_WORLD_SCENE_FIELD_IMAGE_H
 
 #include "sim/optics/streak_image.h"
 #include "sim/world/scene/field.h"
 
-/* Mean and covariance over the exposure of where a source's image is, px; NAN when it is behind the
+/* Mean and covariance of the image position of a source over the exposure, px. NAN: behind the
  * camera. */
 typedef struct bst_scene_image_moments {
     double x_mean, y_mean, xx, xy, yy;
 } bst_scene_image_moments;
 
-/* Of a source whose brightness changes, weighted by its light, from time u0 to u1 of the track (0
- * to 1: all of it). */
+/* Image moments of a source with variable brightness, weighted by its light, from time u0 to u1 of
+ * the track (0 to 1). */
 bst_scene_image_moments bst_scene_image_by_light(const bst_camera *camera,
                                                  const bst_los_track *track,
                                                  const bst_scene_source *source, double u0,
                                                  double u1);
 
-/* Where the centroid of the light is of a source whose chief ray has these moments: the PSF's own
- * centroid lies beside it, and where the illumination falls over the image, light is lost on one
- * side. NAN when the moments are. */
+/* Centroid of the light of a source, from the moments of its chief ray. The PSF's own centroid and
+ * the slope of the illumination shift it. NAN if the moments are NAN. */
 void bst_scene_image_centroid(const bst_camera *camera, const bst_scene_source *source,
                               const bst_scene_image_moments *m, double *x_px, double *y_px);
 
-/* Moves and widens the moments of a point by the places of the light on the source's disc, seen
- * with attitude q_mid. */
+/* Adds the extent of a source's disc, at attitude q_mid, to its image moments. */
 void bst_scene_image_add_disc(const bst_camera *camera, bst_quat q_mid,
                               const bst_scene_source *source, bst_scene_image_moments *m);
 
@@ -40,10 +38,9 @@ double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_trac
                                     const bst_scene_image_moments *moments, double excess_px2,
                                     double variance_px2);
 
-/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
- * pixel's own width, widened along and across the way from the first to the last
- * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
- * Returns the variance before that widening. */
+/* Widths of the blur of a smeared image: PSF and pixel, widened along and across the streak by the
+ * smear beyond a uniform straight streak (jitter, curvature). A non-Gaussian PSF counts as the
+ * Gaussian with the same noise-equivalent area. Returns the variance before widening. */
 double bst_image_blur(const bst_camera *camera, const bst_scene_source *source,
                       const bst_scene_image_moments *m, double dx, double dy, double *along,
                       double *across);

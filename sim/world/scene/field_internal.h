@@ -1,4 +1,4 @@
-/* A field query from the inside; shared by field.c and field_truth.c. */
+/* Internal state of a field query; shared by field.c and field_truth.c. */
 #ifndef BST_WORLD_SCENE_FIELD_INTERNAL_H
 #define BST_WORLD_SCENE_FIELD_INTERNAL_H
 
@@ -7,8 +7,8 @@
 #include "sim/world/scene/los_track.h"
 #include "sim/world/scene/skylight.h"
 
-/* Sigma points of (attitude deviation, time), over which a position is averaged (Julier and Uhlmann
- * 1997). Exact to second order; the first one, the mean itself, has no weight. */
+/* Sigma points in (attitude deviation, time) for the mean position (Julier and Uhlmann 1997). Exact
+ * to second order; the first point, the mean, has zero weight. */
 enum {
     BST_FIELD_SIGMA_DIMENSIONS = 4,
     BST_FIELD_SIGMA_POINTS = 2 * BST_FIELD_SIGMA_DIMENSIONS + 1
@@ -19,17 +19,17 @@ struct bst_field {
     bst_world_view *view;
     const bst_camera *camera;
     int observer;
-    bst_los_track_store track, middle; /* middle: of a rolling shutter's middle row */
+    bst_los_track_store track, middle; /* middle: track of a rolling shutter's middle row */
     bst_star *stars;
     int star_capacity;
-    bst_faint_stars *faint;      /* NULL: none */
-    bst_skylight *skylight;      /* NULL: always the same all over the sensor */
+    bst_faint_stars *faint;      /* NULL: no statistical stars */
+    bst_skylight *skylight;      /* NULL: the background is constant and uniform */
     const bst_skylight_map *map; /* of the latest query */
     bst_scene_source *sources;
     int source_capacity;
-    bst_scene_object_parts *parts; /* [part_capacity], of the objects among the sources */
+    bst_scene_object_parts *parts; /* [part_capacity], for the objects among the sources */
     int part_capacity;
-    int *near; /* objects that may be in the field; room for all */
+    int *near; /* candidate objects; room for all */
     bst_quat q_mid;
     double exposure_s;
     bst_quat sigma_q[BST_FIELD_SIGMA_POINTS];

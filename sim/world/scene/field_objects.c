@@ -1,12 +1,12 @@
-/* The objects of a field query. */
+/* Objects of a field query: paths, brightness and shape during the exposure. */
 #include "sim/world/scene/field_objects.h"
 
 #include "sim/optics/psf.h"
 
-/* Instants of the exposure over which what light is made of is averaged. */
+/* instants of the exposure at which an object's light is sampled */
 enum { TIMES = 16 };
 
-/* Whether the object's path over the image comes near the window; disc: its angular radius, rad. */
+/* Checks whether an object's image path touches the window. disc: its angular radius, rad. */
 static bool path_touches(const bst_scene_object_query *q, const bst_scene_source *s, double disc) {
     enum { PIECES = 8 };
     double disc_px = tan(disc) / bst_camera_scale_rad(q->camera) * bst_camera_stretch(q->camera);
@@ -19,7 +19,7 @@ static bool path_touches(const bst_scene_object_query *q, const bst_scene_source
         front[k] = bst_camera_project(q->camera, bst_quat_rotate(q->q_mid, at[k]), &x[k], &y[k]);
     }
     for (int k = 1; k < PIECES; k++) {
-        /* an eighth of this is what the path lies off the chord */
+        /* the path deviates from the chord by an eighth of this */
         bend = front[k - 1] && front[k] && front[k + 1]
                    ? fmax(bend,
                           hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]))
@@ -63,7 +63,7 @@ bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_scene_so
         int worst = 0;
         double most = 0.0;
         for (int k = 0; k + 1 < out->count; k++) {
-            /* by its area: that is what an image sees of it */
+            /* error in area: an image integrates the light */
             double miss = fabs(middle[k] - 0.5 * (out->rate[k] + out->rate[k + 1])) *
                           (out->u[k + 1] - out->u[k]);
             if (miss > most) {
@@ -99,7 +99,7 @@ bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_scene_so
     return true;
 }
 
-/* An object's brightness through an exposure, for bst_field_rate. */
+/* Context of an object's brightness during an exposure, for bst_field_rate. */
 typedef struct course {
     const bst_scene_object_query *query;
     int object;
@@ -114,7 +114,7 @@ static double course_at(void *user, double u) {
     return bst_scene_glow_electrons_per_s(c->query->camera, &sight.glow, NULL);
 }
 
-/* Adds the light of one instant to the parts of a shape, in electrons. */
+/* Adds the light of one instant to the components of a shape, in electrons. */
 static void add_parts(const bst_camera *camera, const bst_scene_glow *glow, double weight,
                       bst_scene_source_shape *shape) {
     double reflected, all = bst_scene_glow_electrons_per_s(camera, glow, &reflected);
@@ -125,7 +125,7 @@ static void add_parts(const bst_camera *camera, const bst_scene_glow *glow, doub
     shape->thermal += weight * (all - reflected);
 }
 
-/* What is seen at instant k of TIMES, or at mid-exposure where brightness is constant. */
+/* Brightness and lighting of an object at instant k of TIMES, or at mid-exposure if constant. */
 static bst_world_sight sight_at(const course *c, const bst_world_sight *mid,
                                 const bst_scene_source *source, int k) {
     bst_world_sight sight = *mid;
@@ -136,7 +136,7 @@ static bst_world_sight sight_at(const course *c, const bst_world_sight *mid,
     return sight;
 }
 
-/* Sunlight and emission, by their shares of the exposure's light. */
+/* Spectrum of an object: sunlight and thermal emission by their fractions of the light. */
 static void make_colour(const course *c, const bst_world_sight *mid, bst_scene_source *source) {
     const bst_camera *camera = c->query->camera;
     double sum[BST_PSF_COLOURS] = {0}, total = 0.0;
@@ -155,8 +155,8 @@ static void make_colour(const course *c, const bst_world_sight *mid, bst_scene_s
     }
 }
 
-/* The sphere as a disc, where it spans more than a fifth of a pixel. Its parts are those of the
- * whole exposure. */
+/* Makes an object's disc if it spans more than 0.2 px. The fractions are means over the
+ * exposure. */
 static bool make_shape(const course *c, const bst_world_sight *mid, const bst_scene_source *source,
                        bst_scene_source_shape *shape) {
     const bst_camera *camera = c->query->camera;

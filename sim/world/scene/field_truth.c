@@ -1,10 +1,10 @@
-/* The truth about a source: where its image is, how wide and how bright. */
+/* Truth items of sources: image position, size and SNR. */
 #include "sim/optics/psf.h"
 #include "sim/world/scene/field_image.h"
 #include "sim/world/scene/field_internal.h"
 #include "sim/world/scene/row_exposure.h"
 
-/* Of the image of a point; NAN when it is behind the camera. */
+/* Image moments of a point source; NAN: behind the camera. */
 static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_source *source) {
     bst_scene_image_moments m = {0};
     double x[BST_FIELD_SIGMA_POINTS], y[BST_FIELD_SIGMA_POINTS];
@@ -27,13 +27,14 @@ static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_
     return m;
 }
 
-/* Variance that a path has beyond a straight one, over the PSF's, from which on it is followed:
- * what a bend across is taken for a Gaussian's then makes 3 % of a long streak's signal-to-noise
- * ratio. */
+/* Variance of a path beyond a straight one, relative to the PSF's, above which the path is
+ * integrated. Below it the Gaussian approximation of the curvature changes the SNR of a long streak
+ * by at most 3 %. */
 static const double BENT = 0.12;
 
-/* What a rolling shutter sees of a source: it is exposed while the row where it is. */
-static bst_scene_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
+/* Image moments and positions of a source with a rolling shutter: the exposure of the row where it
+ * is. */
+static bst_scene_image_moments image_in_rows(const bst_field *field, const bst_los_track *track,
                                              const bst_scene_source *source, bst_window window,
                                              double u[2], bst_quat *q_mid, bst_truth_item *out) {
     const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
@@ -56,6 +57,7 @@ static bst_scene_image_moments place_in_rows(const bst_field *field, const bst_l
     return bst_scene_image_by_light(field->camera, track, source, u[0], u[1]);
 }
 
+/* Truth item of a source without image positions. */
 static bst_truth_item item_without_place(const bst_field *field, const bst_scene_source *source) {
     return (bst_truth_item){.kind = source->kind,
                             .id = source->id,
@@ -81,14 +83,14 @@ static bst_truth_item item_without_place(const bst_field *field, const bst_scene
                             .y_centroid_px = NAN};
 }
 
-/* The positions of a source at start, middle and end, and the moments of its image; u: the share of
- * the track in which it is exposed. */
-static bst_scene_image_moments place(const bst_field *field, const bst_los_track *track,
-                                     const bst_scene_source *source, bst_window window, double u[2],
-                                     bst_quat *q_mid, bst_truth_item *out) {
+/* Positions of a source at start, middle and end, and the moments of its image. u: the part of the
+ * track in which it is exposed. */
+static bst_scene_image_moments source_image(const bst_field *field, const bst_los_track *track,
+                                            const bst_scene_source *source, bst_window window,
+                                            double u[2], bst_quat *q_mid, bst_truth_item *out) {
     const bst_camera *camera = field->camera;
     if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
-        return place_in_rows(field, track, source, window, u, q_mid, out);
+        return image_in_rows(field, track, source, window, u, q_mid, out);
     }
     (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
     (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
@@ -99,15 +101,15 @@ static bst_scene_image_moments place(const bst_field *field, const bst_los_track
                         : smear_of(field, source);
 }
 
-/* How long and wide an image is, px and px^2. */
+/* Length and widths of an image, px and px^2. */
 typedef struct image_width {
-    double length;        /* from the first to the last place */
+    double length;        /* from the first to the last position */
     double along, across; /* as of bst_image_blur */
     double sharp;         /* variance of the PSF alone */
-    double widened;       /* variance that adding pixels adds */
+    double widened;       /* variance that binning adds */
 } image_width;
 
-/* The sum of the squared shares of the light in pixels. `path`: without the source's disc. */
+/* Sum of squared pixel fractions of an image. `path`: moments without the source's disc. */
 static double squared_light(const bst_camera *camera, const bst_los_track *track,
                             const bst_scene_source *source, const double u[2],
                             const bst_scene_image_moments *image,
@@ -118,7 +120,7 @@ static double squared_light(const bst_camera *camera, const bst_los_track *track
     double square = gauss, sigma;
     bool plain = !camera->psf || bst_psf_gaussian(camera->psf, &sigma);
     if (!plain) {
-        /* jitter widens both ways alike; what the path has more along itself is its length */
+        /* jitter widens both axes equally; the excess along the path is its length */
         double blurred = across * across - sharp;
         double drawn = sqrt(12.0 * fmax(image->xx + image->yy - 2.0 * blurred, 0.0));
         square = bst_psf_squared_image(camera->psf, source->colour, image->x_mean, image->y_mean,
@@ -126,7 +128,7 @@ static double squared_light(const bst_camera *camera, const bst_los_track *track
     }
     double excess = along * along + across * across - 2.0 * sharp;
     if (excess > BENT * (sharp + widened)) {
-        /* a disc's own light widens the path */
+        /* the disc widens the path */
         double disc = 0.5 * fmax(image->xx + image->yy - path->xx - path->yy, 0.0);
         double exact = bst_scene_image_squared_path(camera, track, source, u, path, excess,
                                                     sharp + widened + disc);
@@ -143,8 +145,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     const bst_camera *camera = field->camera;
     *out = item_without_place(field, source);
     bst_quat q_mid = field->q_mid;
-    double u[2] = {0.0, 1.0}; /* of the track, while the source is exposed */
-    bst_scene_image_moments image = place(field, track, source, window, u, &q_mid, out);
+    double u[2] = {0.0, 1.0}; /* part of the track in which the source is exposed */
+    bst_scene_image_moments image = source_image(field, track, source, window, u, &q_mid, out);
     bst_scene_image_moments path = image;
     out->x_chief_px = image.x_mean;
     out->y_chief_px = image.y_mean;
@@ -157,7 +159,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     }
     double dark =
         bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
-    /* pixels that are added are read once; their sum is the image blurred by a wider box */
+    /* binned pixels are read once; their sum is the image blurred by a wider box */
     double added = (double)binning * binning, widened = (added - 1.0) / 12.0;
     double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
@@ -176,8 +178,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         image.y_mean >= window.y0 - 0.5 && image.y_mean < window.y0 + window.height - 0.5) {
         out->flags |= BST_TRUTH_IN_FIELD;
     }
-    /* peak of the image: of a point 1 / (2 pi sigma^2), of a long streak 1 / (sqrt(2 pi) sigma
-     * length) */
+    /* peak of the image: point 1 / (2 pi sigma^2); long streak 1 / (sqrt(2 pi) sigma length) */
     double peak =
         out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
     if (peak + dark > camera->full_well_e) {

@@ -11,7 +11,7 @@ static bst_quat same_sign(bst_quat q, bst_quat as) {
     return dot < 0.0 ? (bst_quat){-q.x, -q.y, -q.z, -q.w} : q;
 }
 
-/* Attitude at `tick` between samples number and number + 1. */
+/* Attitude at `tick`, interpolated between samples number and number + 1. */
 static bst_quat between(const bst_los_history *history, int64_t number, int64_t tick) {
     const bst_los_sample *a = ring_sample(history, number);
     if (a->tick >= tick) {
@@ -53,7 +53,7 @@ bst_status bst_los_track_cut(bst_ctx *ctx, bst_los_track_store *store,
                         newest < 0 ? -1LL : (long long)ring_sample(history, newest)->tick,
                         (long long)start_tick, (long long)end_tick);
     }
-    /* last sample not after the start, by bisection: ticks ascend */
+    /* last sample at or before the start, by bisection */
     int64_t low = oldest, high = newest;
     while (low < high) {
         int64_t middle = low + (high - low + 1) / 2;
@@ -87,7 +87,7 @@ bst_status bst_los_track_cut(bst_ctx *ctx, bst_los_track_store *store,
 }
 
 bst_quat bst_los_track_attitude(const bst_los_track *track, double time_s) {
-    int k = 0, high = track->count - 2; /* the first stretch that ends at time_s or later */
+    int k = 0, high = track->count - 2; /* the first interval that ends at time_s or later */
     while (k < high) {
         int middle = (k + high) / 2;
         if (track->time_s[middle + 1] < time_s) {

@@ -8,12 +8,12 @@
 
 enum { MOST_STEP_PX = 32, STAR_NODES = 8 };
 
-/* Nodes of the sky are not farther apart than this. */
+/* upper limit of the angular distance between nodes of the sky background */
 #define MOST_STEP_RAD (0.3 * BST_DEG_RAD)
 
 #define DEG2_PER_SR (1.0 / (BST_DEG_RAD * BST_DEG_RAD))
 
-/* Values at nodes of the sensor. */
+/* Sky background at nodes of the sensor. */
 typedef struct lattice {
     int step, x0, y0, columns, rows;
     float *value;
@@ -28,15 +28,15 @@ struct bst_skylight {
     bst_skylight_map map;
 };
 
-/* One exposure on its way to a map. */
+/* State of computing the background map of one exposure. */
 typedef struct painter {
     const bst_skylight *b;
     const bst_scene_surroundings *around;
     bst_discs discs;
     bst_mat3 gcrf_from_cam;
     bst_vec3 sun;
-    double sun_e, star_e; /* of one star of V = 0 per steradian, per pixel and second */
-    double even_e;        /* all over the sensor, per pixel and second, behind the vignetting */
+    double sun_e, star_e; /* electrons per pixel and second of one star of V = 0 per steradian */
+    double even_e;        /* uniform background per pixel and second, after vignetting */
     double earth_e;       /* the Earth's own emission, per pixel and second */
 } painter;
 
@@ -58,8 +58,8 @@ bool bst_skylight_may_vary(const bst_camera *camera) {
     return bst_skylight_varies(camera) || bst_discs_wanted(camera);
 }
 
-/* Bilinear between the four nodes about a place; with a step of a power of two the weights are
- * exact, so that neighbouring lattices give the same bits. */
+/* Bilinear interpolation between nodes. The step is a power of two: the weights are exact, and
+ * overlapping maps agree to the bit. */
 static float interpolate(const lattice *l, float x, float y) {
     float u = (x - (float)l->x0) / (float)l->step, v = (y - (float)l->y0) / (float)l->step;
     int i = (int)floorf(u), j = (int)floorf(v);
@@ -118,8 +118,8 @@ void bst_skylight_free(bst_skylight *b) {
     }
 }
 
-/* Nodes about a rectangle of pixels, at least 3 each way. */
-static bst_status span(bst_ctx *ctx, lattice *l, int step, bst_window w) {
+/* Sets the nodes around a rectangle of pixels, at least 3 per axis. */
+static bst_status set_nodes(bst_ctx *ctx, lattice *l, int step, bst_window w) {
     l->step = step;
     l->x0 = w.x0 / step * step;
     l->y0 = w.y0 / step * step;
@@ -143,7 +143,7 @@ static bst_vec3 to_gcrf(const painter *p, bst_vec3 direction) {
     return bst_mat3_mul_vec(&p->gcrf_from_cam, direction);
 }
 
-/* Light of the stars that are not drawn, stars of V = 0 per steradian. */
+/* Radiance of stars that are not rendered, stars of V = 0 per steradian. */
 static double star_light(const painter *p, bst_vec3 icrs) {
     const bst_background_config *c = &p->b->camera->background;
     bool sky = c->model == BST_BACKGROUND_SKY;
@@ -161,17 +161,17 @@ static double star_light(const painter *p, bst_vec3 icrs) {
     return sum;
 }
 
-/* Sky without bright bodies at the nodes, electrons per pixel and second. */
+/* Computes the sky without bright bodies at the nodes, electrons per pixel and second. */
 static bst_status paint_sky(bst_ctx *ctx, const painter *p, bst_skylight *b, bst_window window) {
     const bst_camera *camera = b->camera;
     const bst_background_config *c = &camera->background;
     bool sky = c->model == BST_BACKGROUND_SKY;
     double uniform =
         sky ? 0.0 : bst_camera_background_e_per_s(camera) - bst_camera_optics_e_per_s(camera);
-    BST_TRY(span(ctx, &b->sky, b->step, window));
+    BST_TRY(set_nodes(ctx, &b->sky, b->step, window));
     lattice *s = &b->sky, *l = &b->stars;
     bst_window nodes = {s->x0, s->y0, (s->columns - 1) * s->step + 1, (s->rows - 1) * s->step + 1};
-    BST_TRY(span(ctx, l, STAR_NODES * b->step, nodes));
+    BST_TRY(set_nodes(ctx, l, STAR_NODES * b->step, nodes));
     for (int j = 0; j < l->rows; j++) {
         for (int i = 0; i < l->columns; i++) {
             bst_vec3 d = bst_camera_unproject(camera, l->x0 + i * l->step, l->y0 + j * l->step);
@@ -192,7 +192,8 @@ static bst_status paint_sky(bst_ctx *ctx, const painter *p, bst_skylight *b, bst
     return BST_OK;
 }
 
-/* Everything at one place, electrons per pixel of the exposure; sky_e from paint_sky. */
+/* Total background at a pixel position, electrons per pixel of the exposure; sky_e from
+ * paint_sky. */
 static float paint(const painter *p, double x, double y, double sky_e) {
     const bst_camera *camera = p->b->camera;
     const bst_background_config *c = &camera->background;
@@ -210,7 +211,7 @@ static float paint(const painter *p, double x, double y, double sky_e) {
     return (float)(fmax(e, 0.0) * p->around->exposure_s);
 }
 
-/* How far a node is from the nearest edge of anything, px. */
+/* Distance of a node from the nearest edge of a disc or of the vignetting, px. */
 static double edge_px(const painter *p, double x, double y) {
     const bst_camera *camera = p->b->camera;
     double limit = camera->optics.vignetting.limit_px, edge = INFINITY;
@@ -224,8 +225,8 @@ static double edge_px(const painter *p, double x, double y) {
     return edge;
 }
 
-/* Whether the cell whose first corner is (x, y) may hold an edge: half a cell's diagonal from its
- * corners, with room for pixels that are larger than at the boresight. */
+/* Checks whether the cell with first corner (x, y) may contain an edge: within half a cell's
+ * diagonal, with a margin for larger pixels off axis. */
 static bool cell_has_edge(const painter *p, int x, int y) {
     int step = p->b->step;
     double near = INFINITY;
@@ -255,11 +256,11 @@ static bool sensor_has_edge(const painter *p) {
     return false;
 }
 
-/* The window pixel by pixel: by itself where there is an edge, else between the nodes. */
+/* Computes the background per pixel: exactly in cells with an edge, else by interpolation. */
 static bst_status paint_pixels(bst_ctx *ctx, const painter *p, bst_skylight *b, bst_window window) {
     lattice *out = &b->pixels;
     const lattice *n = &b->nodes, *s = &b->sky;
-    BST_TRY(span(ctx, out, 1, window));
+    BST_TRY(set_nodes(ctx, out, 1, window));
     out->columns = window.width;
     out->rows = window.height;
     int x1 = window.x0 + window.width, y1 = window.y0 + window.height;
@@ -293,8 +294,8 @@ static void prepare(painter *p) {
     p->even_e = bst_camera_optics_e_per_s(camera);
     bst_discs_make(camera, a, &p->discs);
     if (c->model == BST_BACKGROUND_SKY && camera->pst) {
-        /* what a unit of irradiance gives per area of the detector is what it gives in all over the
-         * light-gathering area and transmission of the optics, which the PST holds */
+        /* irradiance per detector area equals that at the entrance times PST; the PST includes
+         * light-gathering area and transmission */
         double gathered = 0.25 * BST_PI * camera->aperture_m * camera->aperture_m *
                           (1.0 - camera->obscuration) * camera->throughput;
         double pitch = bst_scene_pst_pixel_m(camera->pst);
@@ -311,7 +312,7 @@ bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surr
     painter p = {.b = b, .around = around};
     prepare(&p);
     BST_TRY(paint_sky(ctx, &p, b, window));
-    BST_TRY(span(ctx, &b->nodes, b->step, window));
+    BST_TRY(set_nodes(ctx, &b->nodes, b->step, window));
     lattice *n = &b->nodes;
     for (int j = 0; j < n->rows; j++) {
         for (int i = 0; i < n->columns; i++) {

@@ -111,14 +111,14 @@ double bst_scene_moon_v_mag(bst_vec3 moon_from_eye_m, bst_vec3 sun_from_moon_m) 
 }
 
 double bst_scene_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m, bst_vec3 pole) {
-    /* a body of the Sun's size in the same direction and as large in the sky */
+    /* compares with a body of the Sun's angular size in the same direction */
     bst_vec3 from_eye = bst_vec3_sub(body_m, eye_m);
     return bst_astro_sun_fraction(
         eye_m, bst_vec3_axpy(eye_m, BST_SUN_RADIUS_M / radius_m, from_eye), pole);
 }
 
-/* Integral over the visible part of a sunlit Lambertian sphere, midpoints of cells that are equal
- * in solid angle. */
+/* Irradiance from the visible sunlit part of a Lambertian Earth, by midpoints of cells of equal
+ * solid angle. */
 static double earth_irradiance(const bst_scene_pst *pst, double albedo, bst_vec3 eye_m,
                                bst_vec3 sun_m, bst_vec3 boresight) {
     enum { RINGS = 16, SPOKES = 32 };

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A source that asks for room in the truth. */
+/* A source that competes for an item of the truth message. */
 typedef struct bst_truth_pick {
     double rate;
     int index;
@@ -29,6 +29,8 @@ static int by_index(const void *a, const void *b) {
     return (p > q) - (p < q);
 }
 
+/* Selects the sources of the truth message if it has no room for all: objects, then the brightest
+ * stars. */
 static bst_status pick_sources(bst_ctx *ctx, bst_truth_list *list, const bst_scene_source *sources,
                                int count, int capacity) {
     if (count > list->capacity) {
@@ -48,8 +50,8 @@ static bst_status pick_sources(bst_ctx *ctx, bst_truth_list *list, const bst_sce
     return BST_OK;
 }
 
-/* Light of a source's brightest binned pixel over that of its brightest sensor pixel: of a streak
- * that is taken for a Gaussian of its own spread. */
+/* Ratio of light in the brightest binned pixel and in the brightest sensor pixel. A streak counts
+ * as a Gaussian with its variance. */
 static double binned_share(const bst_camera *camera, int binning, const bst_truth_item *item) {
     if (binning < 2) {
         return 1.0;
@@ -85,7 +87,7 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
         double light = isfinite(x) ? bst_camera_illumination(camera, x, y) : 1.0;
         double dark_e = truth->dark_e + bst_field_background_e(q->field, truth, x, y);
         double peak_e = light * q->peak_e(q->user, k, item);
-        /* the wells fill before pixels are added, the converter after */
+        /* wells saturate before binning, the converter after it */
         if (peak_e >= camera->full_well_e - dark_e ||
             peak_e * binned_share(camera, binning, item) >= top_e - added * dark_e) {
             item->flags |= BST_TRUTH_SATURATED;

@@ -1,10 +1,10 @@
-/* The sources of a field query as the items of a truth message. */
+/* Fills the truth message with the sources of a field query. */
 #ifndef BST_WORLD_SCENE_TRUTH_LIST_H
 #define BST_WORLD_SCENE_TRUTH_LIST_H
 
 #include "sim/world/scene/field.h"
 
-/* Work space, kept from frame to frame. All zero: empty. */
+/* Work space, reused for every frame. All zero: empty. */
 typedef struct bst_truth_list {
     struct bst_truth_pick *picks;
     int capacity;
@@ -13,8 +13,8 @@ typedef struct bst_truth_list {
 /* Frees the memory of a list and clears the struct, which belongs to the caller. */
 void bst_truth_list_free(bst_truth_list *list);
 
-/* Expected electrons of source `index` (of those queried) in its brightest sensor pixel, without
- * background and before vignetting. */
+/* Expected electrons of source `index` in its brightest sensor pixel, without background and before
+ * vignetting. */
 typedef double (*bst_truth_peak_fn)(const void *user, int index, const bst_truth_item *item);
 
 typedef struct bst_truth_request {
@@ -29,11 +29,11 @@ typedef struct bst_truth_request {
     const void *user;
 } bst_truth_request;
 
-/* Fills the items of `truth` (room for `capacity`), whose header bst_field_query has filled, by
- * bst_field_truth_item; flags those whose brightest pixel fills its well, or the converter once
- * pixels are added. Where there is no room for all, the objects and the brightest stars stay, in
- * the order of the sources; the others are counted in truth->lost. source_of (may be NULL):
- * [capacity], the source of each item. BST_ERR_MEMORY. */
+/* Fills the items of `truth` (room for `capacity`) by bst_field_truth_item, after bst_field_query
+ * has filled its header. Flags sources that saturate a pixel's well or, after binning, the
+ * converter. If there is no room for all, objects and the brightest stars are kept in source order;
+ * truth->lost counts the others. source_of (may be NULL): [capacity], the source index of each
+ * item. BST_ERR_MEMORY. */
 bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_truth_request *request,
                                bst_truth *truth, int capacity, int *source_of) BST_MUST_CHECK;
 

@@ -5,7 +5,7 @@
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/field_objects.h"
 
-/* An observer at an instant, as all objects in a frame need it. */
+/* State of an observer at one instant, shared by all objects in a frame. */
 typedef struct eye {
     bool valid;
     int observer;
@@ -14,30 +14,31 @@ typedef struct eye {
     bst_sky_rotation sky;
 } eye;
 
-/* Velocities of one observer at six whole seconds about one, by a quintic. */
+/* Velocities of one observer at six consecutive seconds, for quintic interpolation. */
 typedef struct pace {
     bool made, smooth;
     int observer;
     double second;
-    bst_vec3 velocity[BST_QUINTIC_POINTS]; /* from BST_QUINTIC_BEFORE seconds before `second` on */
+    bst_vec3 velocity[BST_QUINTIC_POINTS]; /* at whole seconds, starting BST_QUINTIC_BEFORE seconds
+                                              before `second` */
     bst_vec3 quintic[BST_QUINTIC_POINTS];
 } pace;
 
-/* Fifth difference, m/s, up to which velocities are interpolated: what that misses is 200 times
- * less. */
+/* Fifth difference, m/s, below which velocities are interpolated; the interpolation error is 200
+ * times smaller. */
 static const double SMOOTH_MPS = 1e-7;
 
 struct bst_world_view {
     const bst_world *world;
     bst_sky_clock *clock;
     pace pace;
-    eye eyes[BST_PATH_NODES]; /* the last ones used, by place in the exposure */
+    eye eyes[BST_PATH_NODES]; /* the latest ones, by node of the exposure */
 };
 
-/* Where a body comes from in a solution: both ends of a line of sight take the same way. */
+/* Source of positions in a light-time solution; observer and object use the same one. */
 typedef enum from { FROM_EPHEMERIS, FROM_ORBIT } from;
 
-/* The body that is looked at. */
+/* The observed object and the source of its positions. */
 typedef struct looked_at {
     int object;
     from source;
@@ -71,9 +72,10 @@ static const bst_world_orbit *orbit_of(const bst_world *world, int body) {
                                       : &world->observers[body - world->object_count].orbit;
 }
 
-/* Position, and velocity: the derivative, or the orbit's own (see state_of). */
-static bst_status place_of(bst_ctx *ctx, bst_world_view *view, int body, double seconds,
-                           from source, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
+/* Position of an object or observer, with the velocity from the derivative or from the orbit (see
+ * state_of). */
+static bst_status position_of(bst_ctx *ctx, bst_world_view *view, int body, double seconds,
+                              from source, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const bst_world *world = view->world;
     if (source == FROM_EPHEMERIS &&
         bst_ephemeris_at(world->ephemeris, body, seconds, position_m, velocity_mps)) {
@@ -87,10 +89,8 @@ static bst_status place_of(bst_ctx *ctx, bst_world_view *view, int body, double 
     return BST_OK;
 }
 
-/* The velocity is the orbit's own, as where an orbit is evaluated directly: SGP4's differs from the
- * derivative of its position by 0.1 m/s in low orbits, by metres per second at the perigee of
- * transfer orbits.
- */
+/* State with the orbit's own velocity. SGP4's velocity differs from the derivative of its position
+ * by 0.1 m/s in low orbits, by metres per second at the perigee of transfer orbits. */
 static bst_status state_of(bst_ctx *ctx, bst_world_view *view, int body, double seconds,
                            from source, bst_world_state *out) {
     const bst_world *world = view->world;
@@ -113,7 +113,7 @@ bst_status bst_world_view_observer_state(bst_ctx *ctx, bst_world_view *view, int
     return state_of(ctx, view, view->world->object_count + observer, seconds, FROM_EPHEMERIS, out);
 }
 
-/* The view's pace about a second; what the second before has known is not worked out again. */
+/* Computes the velocity knots around a second; reuses those of the previous second. */
 static void make_pace(bst_world_view *view, const bst_world_orbit *orbit, int observer,
                       double second) {
     pace *p = &view->pace;
@@ -136,7 +136,7 @@ static void make_pace(bst_world_view *view, const bst_world_orbit *orbit, int ob
     p->smooth = p->smooth && bst_quintic_make(p->quintic) <= SMOOTH_MPS;
 }
 
-/* The same of an observer that is asked for many times a second. */
+/* State of an observer at high rate, as the gimbal needs it: interpolates the velocity. */
 static bst_status dense_state(bst_ctx *ctx, bst_world_view *view, int observer, double seconds,
                               bst_world_state *out) {
     const bst_world *world = view->world;
@@ -181,6 +181,7 @@ bst_status bst_world_view_bodies(bst_ctx *ctx, bst_world_view *view, double seco
     return BST_OK;
 }
 
+/* State of an observer with Sun, Earth rotation and bodies at a time. */
 static bst_status eye_at(bst_ctx *ctx, bst_world_view *view, int observer, double seconds,
                          from source, eye *out) {
     *out = (eye){.observer = observer, .seconds = seconds};
@@ -191,7 +192,7 @@ static bst_status eye_at(bst_ctx *ctx, bst_world_view *view, int observer, doubl
     return BST_OK;
 }
 
-/* The same out of the view's memory. */
+/* State of an observer at a node of the exposure, from the view's cache. */
 static bst_status known_eye(bst_ctx *ctx, bst_world_view *view, int observer, double seconds,
                             int place, const eye **out) {
     eye *e = &view->eyes[place];
@@ -206,8 +207,8 @@ static double node_time(const bst_world_view_span *span, int i) {
     return span->start_s + (span->end_s - span->start_s) * i / (BST_PATH_NODES - 1);
 }
 
-/* Light time and aberration. now_m: the object at the instant of the eye. *emitted_m: when the
- * light left. See bst_world_orbit_line_of_sight. */
+/* Solves light time and aberration for an object. now_m: its position at reception. *emitted_m:
+ * position at emission. See bst_world_orbit_line_of_sight. */
 static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_at b,
                        bst_vec3 now_m, bst_vec3 *emitted_m, bst_world_sight *out) {
     double tau = 0.0;
@@ -216,7 +217,7 @@ static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_
     for (int i = 0; i < 3; i++) {
         if (i > 0) {
             BST_TRY(
-                place_of(ctx, view, b.object, e->seconds - tau, b.source, emitted_m, &velocity));
+                position_of(ctx, view, b.object, e->seconds - tau, b.source, emitted_m, &velocity));
         }
         geometric = bst_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
         tau = bst_vec3_norm(geometric) / BST_LIGHT_SPEED_MPS;
@@ -229,7 +230,7 @@ static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_
     return BST_OK;
 }
 
-/* How bright an object is that the light left at `emitted_m` and is seen from `eye_m`. */
+/* Brightness of an object with emission at `emitted_m`, seen from `eye_m`. */
 static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst_vec3 eye_m,
                      const bst_bodies *bodies, double seconds, bst_world_sight *out) {
     const bst_world_object_info *info = &world->objects[object].info;
@@ -252,7 +253,7 @@ static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst
     out->v_mag = out->glow.v_mag;
 }
 
-/* The same of a sight, and whether the Earth hides it. */
+/* Brightness of an object in a sight, and occultation by the Earth. */
 static void shine(const bst_world_view *view, const eye *e, int object, bst_vec3 emitted_m,
                   bst_world_sight *out) {
     shine_at(view->world, object, emitted_m, e->state.position_m, &e->sky.bodies,
@@ -270,11 +271,11 @@ bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer
     bst_vec3 now, velocity, emitted;
     from source = FROM_EPHEMERIS;
     BST_TRY(eye_at(ctx, view, observer, seconds, source, &e));
-    BST_TRY(place_of(ctx, view, object, seconds, source, &now, &velocity));
+    BST_TRY(position_of(ctx, view, object, seconds, source, &now, &velocity));
     if (too_near(now, e.state.position_m)) {
         source = FROM_ORBIT;
         BST_TRY(eye_at(ctx, view, observer, seconds, source, &e));
-        BST_TRY(place_of(ctx, view, object, seconds, source, &now, &velocity));
+        BST_TRY(position_of(ctx, view, object, seconds, source, &now, &velocity));
     }
     BST_TRY(look(ctx, view, &e, (looked_at){object, source}, now, &emitted, out));
     shine(view, &e, object, emitted, out);
@@ -288,7 +289,7 @@ static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
     for (int i = 0; i < BST_PATH_NODES; i++) {
         const eye *e = eyes[i];
         bst_vec3 now, velocity, emitted;
-        BST_TRY(place_of(ctx, view, b.object, e->seconds, b.source, &now, &velocity));
+        BST_TRY(position_of(ctx, view, b.object, e->seconds, b.source, &now, &velocity));
         path->place[i] = bst_vec3_sub(now, e->state.position_m);
         light->eye_m[i] = e->state.position_m;
         light->sun_m[i] = e->sky.bodies.sun_m;
@@ -337,7 +338,7 @@ bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, const bst_wor
     return BST_OK;
 }
 
-/* The quartic through five places. */
+/* Quartic through five positions. */
 static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
     bst_vec3 sum = {0};
     for (int k = 0; k < BST_PATH_NODES; k++) {

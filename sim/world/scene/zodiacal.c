@@ -6,7 +6,7 @@ static const double longitude_deg[LONGITUDES] = {0,  5,  10, 15,  20,  25,  30, 
                                                  60, 75, 90, 105, 120, 135, 150, 165, 180};
 static const double latitude_deg[LATITUDES] = {0, 5, 10, 15, 20, 25, 30, 45, 60, 75, 90};
 
-/* S10; 0: the table has none. */
+/* surface brightness in S10; 0: no value in the table */
 static const short table[LONGITUDES][LATITUDES] = {
     {0, 0, 0, 2450, 1260, 770, 500, 215, 117, 78, 60},
     {0, 0, 0, 2300, 1200, 740, 490, 212, 117, 78, 60},
@@ -29,7 +29,7 @@ static const short table[LONGITUDES][LATITUDES] = {
     {180, 166, 152, 139, 127, 116, 105, 82, 65, 56, 60},
 };
 
-#define INNER_DEG 15.0 /* half side of the square about the Sun where the table is not used */
+#define INNER_DEG 15.0 /* half width of the square around the Sun without table values */
 #define INNER_SLOPE 2.3
 #define SOLAR_LIMB_DEG 0.27
 
@@ -46,7 +46,7 @@ static double from_table(double longitude, double latitude) {
     double s, t;
     int i = segment(longitude_deg, LONGITUDES, longitude, &s);
     int j = segment(latitude_deg, LATITUDES, latitude, &t);
-    /* a corner without a value has no weight: the place lies on the cell's far side */
+    /* a corner without a value has zero weight: the point is on the far side of the cell */
     const double weight[4] = {(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t};
     const short value[4] = {table[i][j], table[i + 1][j], table[i][j + 1], table[i + 1][j + 1]};
     double sum = 0.0;
@@ -63,8 +63,7 @@ double bst_zodiacal_s10(double longitude_rad, double latitude_rad) {
     if (side >= INNER_DEG) {
         return from_table(longitude, latitude);
     }
-    /* out along the line from the Sun to the square's border; at the Sun itself along the ecliptic
-     */
+    /* follow the line from the Sun to the border of the square; at the Sun, along the ecliptic */
     double distance = hypot(longitude, latitude);
     double grow = distance > 0.0 ? INNER_DEG / side : 1.0;
     double at_longitude = distance > 0.0 ? fmin(longitude * grow, INNER_DEG) : INNER_DEG;

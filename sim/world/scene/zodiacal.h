@@ -1,4 +1,4 @@
-/* Zodiacal light by ecliptic latitude and longitude from the Sun. */
+/* Zodiacal light as a function of ecliptic latitude and longitude relative to the Sun. */
 #ifndef BST_WORLD_SCENE_ZODIACAL_H
 #define BST_WORLD_SCENE_ZODIACAL_H
 
@@ -16,8 +16,8 @@
  * longitude_rad: ecliptic longitude minus the Sun's; any multiple of 2 pi. */
 double bst_zodiacal_s10(double longitude_rad, double latitude_rad);
 
-/* The same towards `icrs` (unit) with the Sun at `sun` (any length), ICRS axes; the ecliptic is
- * that of J2000 (obliquity 84381.406 arcsec, IAU 2006). */
+/* Zodiacal brightness in S10 towards `icrs` (unit) with the Sun at `sun` (any length), ICRS axes.
+ * Ecliptic of J2000 (obliquity 84381.406 arcsec, IAU 2006). */
 double bst_zodiacal_towards(bst_vec3 icrs, bst_vec3 sun);
 
 #endif
