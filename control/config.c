@@ -1,6 +1,6 @@
 #include "control/control.h"
 
-/* in the order of the enums in control.h and search_pattern.h */
+/* order of the enums in control.h and search_pattern.h */
 static const char *const strategies[] = {"track", "stare", "rate", "fixed", "scan", NULL};
 static const char *const patterns[] = {"nearest_first", "raster", "spiral", "belt", NULL};
 static const char *const dwell_rates[] = {"belt", "sidereal", NULL};
@@ -54,8 +54,9 @@ const bst_config_desc bst_control_config_table[] = {
              "Expected error of the spacecraft's own attitude at the start (1 sigma)."),
     BST_REAL(C, drift_sigma_arcsec_per_s, "arcsec/s", 1e-6, 3600, "10",
              "Expected drift rate of the body at the start (1 sigma)."),
-    BST_REAL(C, arrive_tolerance_px, "px", 0.01, 10000, "20",
+    BST_REAL(C, arrival_tolerance_px, "px", 0.01, 10000, "20",
              "A slew has arrived when the servo has settled within this of the aim."),
+    BST_FORMER("arrive_tolerance_px", "arrival_tolerance_px"),
     BST_ENUM(C, search_pattern, patterns, "\"nearest_first\"",
              "Order of the places of a search: by distance from the middle; row by row, there and "
              "back; round about the middle; or, in a region, across it step by step along it."),
@@ -82,8 +83,9 @@ const bst_config_desc bst_control_config_table[] = {
              "Least log-likelihood ratio of a candidate against chance pairings of detections."),
     BST_REAL(C, acquire_timeout_s, "s", 0.1, 1e6, "20",
              "A candidate that is not confirmed within this time is given up."),
-    BST_REAL(C, track_entry_px, "px", 0.01, 10000, "3",
+    BST_REAL(C, track_handover_px, "px", 0.01, 10000, "3",
              "Track mode begins when the target is within this of the boresight."),
+    BST_FORMER("track_entry_px", "track_handover_px"),
     BST_REAL(C, reacquire_coast_s, "s", 0, 1e6, "20",
              "A lost target is awaited at its predicted place for this time before the search."),
     BST_REAL(C, reacquire_extent_deg, "deg", 0, 90, "1",

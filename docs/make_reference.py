@@ -5,7 +5,8 @@ usage: boresight schema | docs/make_reference.py OUT_FOLDER
        boresight study --schema | docs/make_reference.py OUT_FOLDER
 
 Writes OUT_FOLDER/index.md and one page for each large block. A block whose keys were listed before
-is not listed again: its section links to the first one.
+is not listed again: its section links to the first one. former_names.md lists the former names of
+keys, which the schema marks as deprecated.
 """
 import json
 import pathlib
@@ -89,6 +90,8 @@ def table(node):
     for key, child in node.get("properties", {}).items():
         if key in SKIPPED and child.get("type") == "string" and len(child) == 1:
             continue
+        if child.get("deprecated"):
+            continue
         if "then" in child:
             below.append((key, "", child))
             rows.append(f"| `{key}` | object, or a [plug-in](../../how-to/plugins.md) |  |  | "
@@ -115,6 +118,23 @@ class Writer:
         self.pages = {"index": [f"# {title}\n\n{intro}\n"]}
         self.titles = {}
         self.first = {}
+        self.former = []
+
+    def list_former(self, node, path):
+        """Former names of the keys of a block."""
+        for key, child in node.get("properties", {}).items():
+            if child.get("deprecated"):
+                now = child["description"].removeprefix("Former name of ").rstrip(".")
+                row = f"| `{path or '/'}` | `{key}` | `{now}` |"
+                if row not in self.former:
+                    self.former.append(row)
+
+    def write_former(self):
+        self.open_page("former_names", "Former names of keys")
+        self.say("former_names",
+                 "Documents with a former name still work. The program logs a warning that gives the present name, "
+                 "`boresight check` prints present names only. A key under both names is an error.\n\n"
+                 "| block | former name | present name |\n|---|---|---|\n" + "\n".join(self.former) + "\n")
 
     def open_page(self, name, title):
         self.pages[name] = [f"# {title}\n"]
@@ -138,6 +158,7 @@ class Writer:
 
     def block(self, node, path, page, level):
         rows, below = table(own(node))
+        self.list_former(own(node), path)
         if "then" in node:
             properties = node["then"]["properties"]
             rows.append(f"| `plugin` | string |  |  | {cell(properties['plugin']['description'])} |")
@@ -183,6 +204,7 @@ def main():
                         "program ignores. The path of a key is the JSON pointer that `--set` takes; replace `[]` "
                         "by the number of the element.")
     writer.block(schema, "", "index", 2)
+    writer.write_former()
     if writer.titles:
         links = "\n".join(f"- [{title}]({name}.md)" for name, title in writer.titles.items())
         toc = "\n".join(writer.titles)

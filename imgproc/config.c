@@ -12,10 +12,11 @@ const bst_config_desc bst_imgproc_config_table[] = {
     BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
             "Detections kept per frame, the brightest first."),
     BST_INT(
-        bst_imgproc_config, most_fits, "", 0, 65536, "2048",
+        bst_imgproc_config, max_fits, "", 0, 65536, "2048",
         "Detections per frame that are located by maximum likelihood, the brightest first, beside "
         "those that are taken for objects; the others stand at the matched filter's greatest "
         "output. 0: all."),
+    BST_FORMER("most_fits", "max_fits"),
     BST_INT(bst_imgproc_config, mesh_px, "px", 8, 1024, "64",
             "Side of the meshes in which background and noise are estimated."),
     BST_REAL(bst_imgproc_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",
@@ -42,19 +43,22 @@ const bst_config_desc bst_imgproc_config_table[] = {
             "star's streak come on top."),
     BST_INT(bst_imgproc_config, window_stars, "", 3, 64, "16",
             "track_windows: bright stars that are looked at, for the attitude."),
-    BST_INT(bst_imgproc_config, full_every, "", 1, 1000000, "60",
+    BST_INT(bst_imgproc_config, full_frame_period, "", 1, 1000000, "60",
             "track_windows: of so many frames ..."),
+    BST_FORMER("full_every", "full_frame_period"),
     BST_INT(
-        bst_imgproc_config, full_frames, "", 0, 1000000, "6",
+        bst_imgproc_config, full_frame_count, "", 0, 1000000, "6",
         "... the first so many are looked at as a whole, for all that no track predicts: enough "
         "in a row to confirm a track."),
+    BST_FORMER("full_frames", "full_frame_count"),
     BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
                "Search for objects too faint for one frame in stacks of frames."),
-    BST_ENUM(bst_imgproc_config, column_level, bst_column_level_words, "\"auto\"",
+    BST_ENUM(bst_imgproc_config, column_correction, bst_column_level_words, "\"auto\"",
              "Whether each column's level over the others' is taken off, with the noise that it "
              "brings: the smear of a frame transfer under light, offsets of columns. auto: where "
              "the onboard camera has frame_transfer_s, or column_offset_rms_e above a fifth of its "
              "read noise."),
+    BST_FORMER("column_level", "column_correction"),
     BST_OBJECT(bst_imgproc_config, bad_pixel_learning, bst_pixel_learner_config_table, "{}",
                "The bad-pixel map that is learned on board, besides bad_pixels and bad_pixel_file; "
                "not with a detector of one's own."),

@@ -27,8 +27,9 @@ const bst_config_desc bst_obsgen_calibration_table[] = {
     BST_REAL(C, threshold_offset, "", -3, 3, NULL,
              "Image processing's threshold less that of theory, SNR."),
     BST_REAL(C, noise_factor, "", 0.1, 10, NULL, "Noise that it measures over that of theory."),
-    BST_REAL(C, background_share, "", 0, 10, NULL,
+    BST_REAL(C, background_fraction, "", 0, 10, NULL,
              "Share of sources' mean light below its clip that its background contains."),
+    BST_FORMER("background_share", "background_fraction"),
     BST_REAL(C, crowding, "", 0, 10, NULL,
              "Share of the mean square of that light that its noise contains."),
     BST_REALS(C, gain, "", 0.1, 2, NULL,
@@ -37,9 +38,10 @@ const bst_config_desc bst_obsgen_calibration_table[] = {
     BST_REAL(C, slope, "", 0.1, 5, NULL, "Slope of the probit of Pd by SNR; ideal: 1."),
     BST_REAL(C, false_alarm_factor, "", 0, 1000, NULL,
              "False alarms over what the threshold was set for."),
-    BST_REAL(C, false_alarm_tail, "", 0.01, 10, NULL,
+    BST_REAL(C, false_alarm_steepness, "", 0.01, 10, NULL,
              "Steepness of the SNR of false alarms above the threshold T: P(> u) = exp(-tail (u^2 "
              "- T^2) / 2)."),
+    BST_FORMER("false_alarm_tail", "false_alarm_steepness"),
     BST_REALS(
         C, across_factor, "", 0.1, 20, NULL,
         "RMS error of a point's place, and of a streak's across it, over the bound, at SNR 5, "
@@ -53,8 +55,9 @@ const bst_config_desc bst_obsgen_calibration_table[] = {
              "them is deep enough without noise."),
     BST_REAL(C, star_id_probability, "", 0, 1, NULL,
              "Probability that a detected catalogue star is identified where stars are."),
-    BST_REAL(C, hit_told_probability, "", 0, 1, NULL,
+    BST_REAL(C, cosmic_ray_flag_probability, "", 0, 1, NULL,
              "Probability that a radiation hit with one pixel that stands out is told to be one."),
+    BST_FORMER("hit_told_probability", "cosmic_ray_flag_probability"),
     BST_CONFIG_END};
 #undef C
 
@@ -62,17 +65,17 @@ void bst_obsgen_calibration_theory(bst_obsgen_calibration *out) {
     *out = (bst_obsgen_calibration){.version = BST_OBSGEN_CALIBRATION_VERSION,
                                     .made_from = "theory",
                                     .noise_factor = 1.0,
-                                    .background_share = 1.0,
+                                    .background_fraction = 1.0,
                                     .crowding = 1.0,
                                     .gain = {1.0, 1.0, 1.0, 1.0},
                                     .slope = 1.0,
                                     .false_alarm_factor = 1.0,
-                                    .false_alarm_tail = 1.0,
+                                    .false_alarm_steepness = 1.0,
                                     .across_factor = {1, 1, 1, 1, 1, 1},
                                     .along_factor = {1, 1, 1, 1, 1, 1},
                                     .blend_distance_factor = 1.0,
                                     .star_id_probability = 1.0,
-                                    .hit_told_probability = 1.0};
+                                    .cosmic_ray_flag_probability = 1.0};
 }
 
 bst_status bst_obsgen_calibration_read(bst_ctx *ctx, const char *path,

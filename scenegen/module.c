@@ -17,13 +17,13 @@
 
 typedef struct fidelity_config {
     double tolerance_sigma;
-    int64_t most_nodes, temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree,
+    int64_t max_nodes, temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree,
         fft_taps;
 } fidelity_config;
 
 typedef struct scenegen_config {
     int renderer;
-    double v_limit, margin_px;
+    double star_limit_v_mag, margin_px;
     fidelity_config fidelity;
     int64_t truth_capacity, pool_frames;
     bst_stage_use frame_stage;
@@ -41,10 +41,11 @@ static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
              "Error of the image that is allowed in any pixel, in that pixel's noise. "
              "Nodes and stamps follow from it."),
-    BST_INT(fidelity_config, most_nodes, "", 0, 67108864, "0",
+    BST_INT(fidelity_config, max_nodes, "", 0, 67108864, "0",
             "Nodes (weighted points along the smear) that a frame may have beyond 16 for each "
             "source, 4 times as many where the paths of a slew need them; 0: 16777216. Where the "
             "tolerance asks for more, sources are drawn coarser (counter nodes_bounded)."),
+    BST_FORMER("most_nodes", "max_nodes"),
     BST_INT(fidelity_config, temporal_oversample, "", 0, 100000, "0",
             "Equal parts of the exposure whose middles stand for it, for comparison with other "
             "renderers; 0: as the tolerance needs. The error is not predicted then."),
@@ -67,8 +68,9 @@ static const bst_config_desc fidelity_table[] = {
 static const char *const renderers[] = {"auto", "single_kernel", "multi_kernel", NULL};
 
 static const bst_config_desc config[] = {
-    BST_REAL(scenegen_config, v_limit, "mag", -30.0, 30.0, "16",
+    BST_REAL(scenegen_config, star_limit_v_mag, "mag", -30.0, 30.0, "16",
              "Stars fainter than this are not drawn."),
+    BST_FORMER("v_limit", "star_limit_v_mag"),
     BST_REAL(scenegen_config, margin_px, "px", 0.0, 1e4, "0",
              "Sources this far outside the window are drawn too; at least what the PSF needs."),
     BST_ENUM(scenegen_config, renderer, renderers, "\"auto\"",
@@ -98,23 +100,24 @@ static const bst_port ports[PORT_COUNT] = {
 
 typedef struct scenegen {
     const bst_camera *camera, *world_camera;
-    bst_camera changed; /* the camera at the pixel scale and jitter of the latest exposure */
-    bst_psf *psf;       /* of it, if it is wider than the world's */
+    bst_camera changed; /* at the plate scale and jitter of the latest exposure */
+    bst_psf *psf;       /* PSF of `changed`, if wider than the world's */
     double jitter_rad2;
     struct bst_device *device;
     bst_renderer_options renderer_options;
-    double margin_px; /* that the scenario asks for */
+    double margin_px; /* requested by the scenario */
     bst_field_options options;
     int64_t tick_rate_hz;
     bst_rng_key key;
     bst_field *field;
     bst_renderer *renderer;
     bst_truth_list list;
-    long long saturated_told, saturated_before; /* frames; those of earlier renderers */
-    bst_plane_maker *planes;                    /* NULL: not asked for */
-    int *item_source; /* source of each item of the truth, for the planes */
+    /* frames reported so far; frames of earlier renderers */
+    long long saturated_told, saturated_before;
+    bst_plane_maker *planes; /* NULL: not requested */
+    int *item_source;        /* source of each truth item, for the planes */
     const bst_stage_use *stage_use;
-    void *stage; /* NULL: none */
+    void *stage; /* plug-in stage; NULL: none */
 } scenegen;
 
 static void destroy(void *self) {
@@ -168,7 +171,8 @@ static bst_status change_frame(bst_ctx *ctx, const scenegen *s, const bst_frame_
                             : bst_fail_prefix(ctx, status, "plug-in %s", s->stage_use->plugin);
 }
 
-/* The patterns of this sensor: its name is the instance's without the module's. */
+/* Random key of this sensor's fixed patterns; the sensor's name is the instance's without the
+ * module's. */
 static bst_rng_key pattern_key(const bst_module_env *env, const bst_camera *camera) {
     char name[256];
     snprintf(name, sizeof name, "%s", env->instance);
@@ -193,7 +197,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
     options.motion = (bst_smear_star_motion)c->renderer;
-    options.most_nodes = c->fidelity.most_nodes;
+    options.max_nodes = c->fidelity.max_nodes;
     options.temporal_oversample = (int)c->fidelity.temporal_oversample;
     options.spatial_oversample = (int)c->fidelity.spatial_oversample;
     options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
@@ -226,20 +230,21 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
         destroy(s);
         return status;
     }
-    s->options.v_limit = c->v_limit;
+    s->options.v_limit = c->star_limit_v_mag;
     s->options.margin_px = fmax(c->margin_px, bst_renderer_margin_px(s->renderer));
     bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
     *self = s;
     return BST_OK;
 }
 
+/* Expected brightest-pixel electrons of a truth item (callback). */
 static double peak_e(const void *user, int index, const bst_truth_item *item) {
     (void)item;
     return bst_renderer_peak_e(user, index);
 }
 
-/* Counts the saturated frames among those that are done. */
-static void tell_saturated(scenegen *s, struct bst_step *step) {
+/* Adds the saturated frames among the finished ones to the summary. */
+static void report_saturated(scenegen *s, struct bst_step *step) {
     long long frames = s->saturated_before + bst_renderer_saturated_frames(s->renderer);
     for (; s->saturated_told < frames; s->saturated_told++) {
         bst_step_count(step, "saturated");
@@ -250,12 +255,12 @@ static bst_status finish(void *self, struct bst_step *step) {
     scenegen *s = self;
     long long pixels;
     BST_TRY(bst_renderer_saturated(bst_step_ctx(step), s->renderer, &pixels));
-    tell_saturated(s, step);
+    report_saturated(s, step);
     return BST_OK;
 }
 
-/* Goes on with another pixel scale or jitter: everything that depends on the camera is made again.
- * Frames that were rendered before stay as they are. */
+/* Switches to another plate scale or jitter: recreates everything that depends on the camera.
+ * Frames rendered before are unchanged. */
 static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
                                 double jitter_rad2) {
     bst_camera camera;
@@ -284,9 +289,9 @@ static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
     return counted;
 }
 
-/* Renders the frame and publishes it; a frame that is lost on its way is only planned. */
-static bst_status draw(scenegen *s, struct bst_step *step, const bst_exposure *e,
-                       const bst_render_request *request) {
+/* Renders and publishes the frame; a frame to be dropped is only planned. */
+static bst_status render_frame(scenegen *s, struct bst_step *step, const bst_exposure *e,
+                               const bst_render_request *request) {
     bst_ctx *ctx = bst_step_ctx(step);
     if (e->dropped) {
         return bst_renderer_plan(ctx, s->renderer, request);
@@ -305,7 +310,7 @@ static bst_status draw(scenegen *s, struct bst_step *step, const bst_exposure *e
     return s->stage ? change_frame(ctx, s, message) : BST_OK;
 }
 
-/* What the truth says of the image: cosmic rays, predicted error, number of nodes. */
+/* Adds image properties to the truth: cosmic rays, predicted error, number of nodes. */
 static void describe_image(scenegen *s, struct bst_step *step, const bst_exposure *e,
                            bst_truth *truth) {
     bst_render_stats stats;
@@ -323,8 +328,9 @@ static void describe_image(scenegen *s, struct bst_step *step, const bst_exposur
     truth->one_track = stats.single_kernel;
 }
 
-static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
-                         const bst_los_history *history) {
+/* Renders an exposure and publishes its truth. */
+static bst_status process_exposure(scenegen *s, struct bst_step *step, const bst_exposure *e,
+                                   const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
     double scale_arcsec =
         e->pixel_scale_arcsec > 0.0 ? e->pixel_scale_arcsec : s->camera->pixel_scale_arcsec;
@@ -364,7 +370,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         .binning = e->binning,
         .key = s->key,
         .exposure_id = e->id};
-    BST_TRY(draw(s, step, e, &request));
+    BST_TRY(render_frame(s, step, e, &request));
     describe_image(s, step, e, truth);
     /* while the device renders */
     const bst_truth_request items = {.field = s->field,
@@ -386,7 +392,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         BST_TRY(bst_plane_maker_render(ctx, s->planes, s->renderer, s->camera, &request,
                                        s->item_source, truth->count, planes));
     }
-    tell_saturated(s, step);
+    report_saturated(s, step);
     return BST_OK;
 }
 
@@ -398,7 +404,7 @@ static bst_status step_module(void *self, struct bst_step *step) {
             return bst_fail(bst_step_ctx(step), BST_ERR_STATE,
                             "an exposure ended before any line of sight was published");
         }
-        BST_TRY(expose(self, step, exposure.payload, history.payload));
+        BST_TRY(process_exposure(self, step, exposure.payload, history.payload));
     }
     return BST_OK;
 }

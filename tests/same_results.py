@@ -5,7 +5,10 @@
 
 Runs, from the repository root, every shipped scenario for a short time (or its whole study, curve of detection and
 loop analysis in short) with both programs, and compares tables, frames, pictures and printed JSON. What tells a
-program's version, wall time or processor time is left out. Prints a line for each and ends with 1 if any differs.
+program's version, wall time or processor time is left out. Keys of printed JSON are compared under their present
+names (those that NEW's schema marks as deprecated are renamed). Where OLD does not know the present names of the shipped
+scenarios, run this from a checkout of OLD: NEW reads its scenarios with warnings. Prints a line for each and ends with 1
+if any differs.
 """
 import glob
 import hashlib
@@ -27,10 +30,26 @@ CLOCK = re.compile(r"(seconds|wall|cpu|rate_hz_real|real_time|speed|rss|memory|p
                    r"program|revision|host|created|build|device|path|took|process_ms)", re.I)
 
 
+PRESENT = {}  # present names of keys by former ones
+
+
+def former_names(node, out):
+    """Fills `out` from a JSON schema."""
+    if isinstance(node, list):
+        for item in node:
+            former_names(item, out)
+    elif isinstance(node, dict):
+        for key, child in node.items():
+            if isinstance(child, dict) and child.get("deprecated"):
+                out[key] = child["description"].removeprefix("Former name of ").rstrip(".")
+            former_names(child, out)
+
+
 def without_clock(value):
-    """A JSON value without what depends on when, where and how fast it was made."""
+    """A JSON value without what depends on when, where and how fast it was made, under present names."""
     if isinstance(value, dict):
-        return {k: without_clock(v) for k, v in value.items() if not CLOCK.search(k) or k.endswith("_px")}
+        return {PRESENT.get(k, k): without_clock(v) for k, v in value.items()
+                if not CLOCK.search(PRESENT.get(k, k)) or k.endswith("_px")}
     return [without_clock(v) for v in value] if isinstance(value, list) else value
 
 
@@ -126,6 +145,9 @@ def main():
     old, new = (os.path.abspath(p) for p in sys.argv[1:3])
     place = tempfile.mkdtemp(prefix="boresight-same-")
     study(place)
+    for words in (["schema"], ["study", "--schema"]):
+        shown = subprocess.run([new, *words], capture_output=True, text=True, check=True).stdout
+        former_names(json.loads(shown), PRESENT)
     wrong = 0
     try:
         for name, words in jobs():

@@ -2,13 +2,14 @@
 
 #define C bst_tracker_config
 
-/* in the order of bst_mtt_association */
+/* order of bst_mtt_association */
 static const char *const motions[] = {"constant_rate", "orbit", NULL};
 static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
 
 const bst_config_desc bst_tracker_config_table[] = {
-    BST_REAL(C, star_floor_px, "px", 0, 10, "0",
+    BST_REAL(C, star_systematic_px, "px", 0, 10, "0",
              "Standard deviation added to every star's centroid (catalogue, distortion)."),
+    BST_FORMER("star_floor_px", "star_systematic_px"),
     BST_REAL(C, star_reject_chi2, "", 4, 1e6, "18.4",
              "Stars that fit worse (2 degrees of freedom) do not count for the attitude."),
     BST_REAL(
@@ -48,18 +49,23 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Longest time without a detection, in the field or not."),
     BST_REAL(C, max_sigma_arcsec, "arcsec", 0.01, 1e6, "60",
              "A track whose direction is worse than this is deleted."),
-    BST_REAL(C, merge_px, "px", 0, 100, "6",
+    BST_REAL(C, merge_distance_px, "px", 0, 100, "6",
              "Objects nearer to each other than this may share one detection."),
-    BST_REAL(C, merge_floor_px, "px", 0, 100, "0.3",
+    BST_FORMER("merge_px", "merge_distance_px"),
+    BST_REAL(C, merged_systematic_px, "px", 0, 100, "0.3",
              "Standard deviation added to a shared detection."),
-    BST_REAL(C, object_floor_px, "px", 0, 10, "0.02",
+    BST_FORMER("merge_floor_px", "merged_systematic_px"),
+    BST_REAL(C, object_systematic_px, "px", 0, 10, "0.02",
              "Standard deviation added to the centroid of every detection that is not a star."),
-    BST_REAL(C, blend_sigma_px, "px", 0, 100, "0.5",
+    BST_FORMER("object_floor_px", "object_systematic_px"),
+    BST_REAL(C, blended_systematic_px, "px", 0, 100, "0.5",
              "Standard deviation added to detections flagged as blends or at an edge."),
+    BST_FORMER("blend_sigma_px", "blended_systematic_px"),
     BST_REAL(C, edge_margin_px, "px", 0, 1000, "4",
              "Tracks nearer to the sensor's edge than this are not missed when undetected."),
-    BST_REAL(C, feed_forward_deg, "deg", 0, 90, "5",
+    BST_REAL(C, cue_acceleration_radius_deg, "deg", 0, 90, "5",
              "Tracks this near to the cue follow its acceleration."),
+    BST_FORMER("feed_forward_deg", "cue_acceleration_radius_deg"),
     BST_REAL(C, target_direction_chi2, "", 0, 1e6, "18.4",
              "Largest misfit of the target's direction to the cue, 2 degrees of freedom."),
     BST_REAL(C, target_rate_chi2, "", 0, 1e6, "11.8",
@@ -72,22 +78,26 @@ const bst_config_desc bst_tracker_config_table[] = {
         "or "
         "has jumped by more while the target was not seen alone; a manoeuvre seen frame by frame "
         "lets nothing go."),
-    BST_REAL(C, target_rate_floor_arcsec_per_s, "arcsec/s", 0, 1e4, "0.1",
+    BST_REAL(C, target_rate_systematic_arcsec_per_s, "arcsec/s", 0, 1e4, "0.1",
              "Standard deviation of the cue's rate beyond what the cue states."),
+    BST_FORMER("target_rate_floor_arcsec_per_s", "target_rate_systematic_arcsec_per_s"),
     BST_REAL(C, target_max_rate_sigma_arcsec_per_s, "arcsec/s", 1e-6, 1e4, "0.8",
              "A track is judged against the cue once its rate is known to this."),
-    BST_REAL(C, target_memory_s, "s", 0, 1e6, "600",
+    BST_REAL(C, target_dormant_s, "s", 0, 1e6, "600",
              "A lost target's extrapolated place binds the next choice for this long."),
+    BST_FORMER("target_memory_s", "target_dormant_s"),
     BST_INT(C, target_min_hits, "", 2, 1000, "4",
             "Fewest hits of a new target; one more for every 2 of its chi-square against the cue."),
-    BST_REAL(C, star_rate_arcsec_per_s, "arcsec/s", 0, 1e4, "0.5",
+    BST_REAL(C, stationary_rate_arcsec_per_s, "arcsec/s", 0, 1e4, "0.5",
              "What is slower than this is taken for a star unless the cue expects it so slow; 0: "
              "nothing is."),
+    BST_FORMER("star_rate_arcsec_per_s", "stationary_rate_arcsec_per_s"),
     BST_REAL(C, motion_chi2, "", 0, 1e6, "25",
              "A track moves when its rate misfits rest by more, 2 degrees of freedom."),
     BST_INT(C, max_tracks, "", 1, 100000, "256", "Room for tracks of what may move."),
-    BST_INT(C, max_stars, "", 0, 100000, "4096",
+    BST_INT(C, max_stationary_tracks, "", 0, 100000, "4096",
             "Room for what is at rest: stars that the catalogue lacks."),
+    BST_FORMER("max_stars", "max_stationary_tracks"),
     BST_INT(C, max_detections, "", 1, 1000000, "8192",
             "Room for detections of one frame that are not stars."),
     BST_ENUM(
@@ -114,14 +124,18 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, manoeuvre_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e5, "3",
              "The same as process_noise_arcsec_per_s15 while an object manoeuvres: of the second "
              "model of "
-             "type imm; of ekf and ukf for manoeuvre_s after an event `manoeuvre`."),
-    BST_REAL(C, quiet_s, "s", 1e-3, 1e9, "3600",
+             "type imm; of ekf and ukf for manoeuvre_sojourn_s after an event `manoeuvre`."),
+    BST_REAL(C, quiescent_sojourn_s, "s", 1e-3, 1e9, "3600",
              "Mean time between the end of a manoeuvre and the next one."),
-    BST_REAL(C, manoeuvre_s, "s", 1e-3, 1e9, "60", "Mean length of a manoeuvre."),
-    BST_REAL(C, brightness_floor_mag, "mag", 0, 10, "0.2",
+    BST_FORMER("quiet_s", "quiescent_sojourn_s"),
+    BST_REAL(C, manoeuvre_sojourn_s, "s", 1e-3, 1e9, "60", "Mean length of a manoeuvre."),
+    BST_FORMER("manoeuvre_s", "manoeuvre_sojourn_s"),
+    BST_REAL(C, brightness_systematic_mag, "mag", 0, 10, "0.2",
              "Standard deviation added to every magnitude."),
-    BST_REAL(C, brightness_walk_mag, "mag", 0, 10, "0.05",
+    BST_FORMER("brightness_floor_mag", "brightness_systematic_mag"),
+    BST_REAL(C, brightness_random_walk_mag, "mag", 0, 10, "0.05",
              "Standard deviation by which an object's brightness changes from frame to frame."),
+    BST_FORMER("brightness_walk_mag", "brightness_random_walk_mag"),
     BST_INT(C, event_window, "", 0, 16, "8",
             "Manoeuvres and changes of brightness are told from so many detections of a track; 0: "
             "none are."),
@@ -129,23 +143,29 @@ const bst_config_desc bst_tracker_config_table[] = {
         C, false_events_per_hour, "1/h", 0, 1e4, "0.01",
         "Greatest number of false manoeuvres, and of false changes of brightness, per hour and "
         "track; 0: none are told."),
-    BST_INT(C, max_memory, "", 0, 100000, "64",
+    BST_INT(C, max_dormant_tracks, "", 0, 100000, "64",
             "Room for tracks that were lost; what is confirmed where one of them should be is that "
             "track again."),
-    BST_REAL(C, memory_s, "s", 0, 1e6, "7200", "Lost tracks are remembered for this long."),
-    BST_REAL(C, memory_sigma_deg, "deg", 0, 30, "1",
+    BST_FORMER("max_memory", "max_dormant_tracks"),
+    BST_REAL(C, max_dormant_s, "s", 0, 1e6, "7200", "Lost tracks are remembered for this long."),
+    BST_FORMER("memory_s", "max_dormant_s"),
+    BST_REAL(C, max_dormant_sigma_deg, "deg", 0, 30, "1",
              "Lost tracks whose direction is worse than this are forgotten."),
-    BST_REAL(C, memory_chi2, "", 0, 1e6, "18.5",
+    BST_FORMER("memory_sigma_deg", "max_dormant_sigma_deg"),
+    BST_REAL(C, dormant_gate_chi2, "", 0, 1e6, "18.5",
              "Largest misfit of a new track to a lost one, 4 degrees of freedom."),
-    BST_INT(C, max_merged, "", 0, 10000, "60",
+    BST_FORMER("memory_chi2", "dormant_gate_chi2"),
+    BST_INT(C, max_merged_frames, "", 0, 10000, "60",
             "Frames in a row that a track may live on detections that it shares; of two tracks "
             "that then "
             "still share one, that with more hits goes on."),
+    BST_FORMER("max_merged", "max_merged_frames"),
     BST_REAL(C, telemetry_gate_chi2, "", 1, 1e6, "30",
              "Attitudes from stars that contradict the telemetry's history by more (3 degrees of "
              "freedom) are not used ..."),
-    BST_INT(C, telemetry_patience, "", 1, 1000, "3",
+    BST_INT(C, max_telemetry_rejections, "", 1, 1000, "3",
             "... until so many in a row do: then the history starts anew."),
+    BST_FORMER("telemetry_patience", "max_telemetry_rejections"),
     BST_REAL(C, target_max_chi2, "", 0.1, 1e6, "4",
              "A track whose mean innovation (per degree of freedom) exceeds this is not taken for "
              "the target."),

@@ -17,20 +17,26 @@ const bst_config_desc bst_guidance_config_table[] = {
         G, slews, slews, "\"mount\"",
         "mount: a command jumps to the new aim and the mount gets there by itself. planned: by "
         "the fastest motion of the axes. Keep-out zones plan slews in any case."),
-    BST_REAL(G, slew_above_deg, "deg", 0.001, 180, "1", "Slews are planned above this distance."),
-    BST_REAL(G, limits_share, "", 0.1, 1, "0.95",
+    BST_REAL(G, min_planned_slew_deg, "deg", 0.001, 180, "1",
+             "Slews are planned above this distance."),
+    BST_FORMER("slew_above_deg", "min_planned_slew_deg"),
+    BST_REAL(G, limit_fraction, "", 0.1, 1, "0.95",
              "Share of the mount's rate and acceleration limits that plans and predictions use."),
-    BST_REAL(G, look_ahead_s, "s", 0, 86400, "0",
+    BST_FORMER("limits_share", "limit_fraction"),
+    BST_REAL(G, prediction_horizon_s, "s", 0, 86400, "0",
              "How far ahead of the aim limits, keep-out zones, the Earth and the mount's pole are "
              "looked for, and turns of the cable chosen; 0: not at all."),
-    BST_REAL(G, look_ahead_every_s, "s", 0.1, 86400, "10", "Time between two looks ahead."),
+    BST_FORMER("look_ahead_s", "prediction_horizon_s"),
+    BST_REAL(G, prediction_interval_s, "s", 0.1, 86400, "10", "Time between two looks ahead."),
+    BST_FORMER("look_ahead_every_s", "prediction_interval_s"),
     BST_REAL(G, loss_tolerance_px, "px", 0.01, 1e5, "2",
              "A target that passes the pole counts as lost beyond this distance."),
-    BST_BOOL(G, acceleration, "false",
+    BST_BOOL(G, acceleration_feed_forward, "false",
              "Commands carry the aim's acceleration: for lines of sight whose rate changes within "
              "a control period."),
+    BST_FORMER("acceleration", "acceleration_feed_forward"),
     BST_BOOL(G, body_roll, "false",
              "A rigid_body spacecraft rolls about the axis of its pointing law where that keeps a "
-             "target out of the mount's keyhole that look_ahead_s sees coming."),
+             "target out of the mount's keyhole that prediction_horizon_s sees coming."),
     BST_CONFIG_END};
 #undef G

@@ -1,6 +1,6 @@
 #include "gimbal/mount/mount_config.h"
 
-#define STEPS_PER_PERIOD 10.0 /* of the fastest mode */
+#define STEPS_PER_PERIOD 10.0 /* plant steps per period of the fastest mode */
 
 static const char *const axis_names[] = {"outer", "inner", "third"};
 
@@ -40,10 +40,12 @@ static const bst_config_desc flexible_table[] = {
               "Of the mode about each axis with the joint held (the antiresonance from torque to "
               "encoder); 0: rigid. With the joint free it is higher by 1 / sqrt(1 - share)."),
     BST_REALS(M, damping, "", 0, 1, "[0.005, 0.005, 0.005]", "Damping ratio with the joint held."),
-    BST_REALS(M, inertia_share, "", 0, 0.95, "[0.2, 0.2, 0.2]",
+    BST_REALS(M, inertia_fraction, "", 0, 0.95, "[0.2, 0.2, 0.2]",
               "Share that swings, of the axis' inertia at zero angles."),
-    BST_REALS(M, line_of_sight_share, "", -10, 10, "[1, 1, 1]",
+    BST_FORMER("inertia_share", "inertia_fraction"),
+    BST_REALS(M, line_of_sight_fraction, "", -10, 10, "[1, 1, 1]",
               "How far the line of sight follows the swinging part's angle."),
+    BST_FORMER("line_of_sight_share", "line_of_sight_fraction"),
     BST_CONFIG_END};
 #undef M
 
@@ -119,7 +121,7 @@ const bst_config_desc bst_mount_config_table[] = {
     BST_CONFIG_END};
 #undef G
 
-/* A tensor in body axes to the base frame (bst_mount_swap). */
+/* Converts a tensor from body axes to the base frame (bst_mount_swap). */
 static void to_base(int type, const double body[6], double out[6]) {
     bool swap = type != BST_MOUNT_AZIMUTH_ELEVATION;
     out[0] = body[swap ? 1 : 0];
@@ -130,8 +132,9 @@ static void to_base(int type, const double body[6], double out[6]) {
     out[5] = swap ? -body[4] : body[5];
 }
 
-/* A body's inertia tensor is positive and no principal moment exceeds the sum of the others: then
- * half the trace times 1 minus the tensor, the second moments of the mass, is positive too. */
+/* True for a physical inertia tensor: positive definite, and no principal moment above the sum of
+ * the others. Then half the trace times 1 minus the tensor, the second moments of mass, is positive
+ * too. */
 static bool is_inertia(const double j[6]) {
     double half = 0.5 * (j[0] + j[1] + j[2]), slack = 1e-9 * half;
     double x = half - j[0] + slack, y = half - j[1] + slack, z = half - j[2] + slack;
@@ -152,16 +155,16 @@ static bst_status put_flexible(bst_ctx *ctx, const bst_mount_flexible_config *f,
             continue;
         }
         double w = 2.0 * BST_PI * f->frequency_hz[k];
-        double swings = f->inertia_share[k] * eq.mass[k][k];
+        double swings = f->inertia_fraction[k] * eq.mass[k][k];
         double own = chain->inertia[k][k == 1 ? 1 : 0];
         if (swings <= 0.0 || swings >= 0.98 * own) {
             return bst_fail(ctx, BST_ERR_CONFIG,
-                            "flexible/inertia_share: %g of the %s axis' %g kg m^2 must be above "
+                            "flexible/inertia_fraction: %g of the %s axis' %g kg m^2 must be above "
                             "zero and less than the %g kg m^2 of its own stage: at most %.3g",
-                            f->inertia_share[k], axis_names[k], eq.mass[k][k], own,
+                            f->inertia_fraction[k], axis_names[k], eq.mass[k][k], own,
                             0.98 * own / eq.mass[k][k]);
         }
-        double free_hz = f->frequency_hz[k] / sqrt(1.0 - f->inertia_share[k]);
+        double free_hz = f->frequency_hz[k] / sqrt(1.0 - f->inertia_fraction[k]);
         double longest_s = 1.0 / (STEPS_PER_PERIOD * free_hz);
         if (dt_s > longest_s * (1.0 + 1e-9)) {
             return bst_fail(ctx, BST_ERR_CONFIG,
@@ -178,11 +181,11 @@ static bst_status put_flexible(bst_ctx *ctx, const bst_mount_flexible_config *f,
     return BST_OK;
 }
 
-/* What else makes the axes faster than the step: viscous friction and cables. */
+/* Checks the plant step against viscous friction and cables, which also make an axis fast. */
 static bst_status check_step(bst_ctx *ctx, const bst_mount_joints *joints, double dt_s) {
     for (int k = 0; k < joints->chain.stages; k++) {
         const bst_mount_joint *joint = &joints->joint[k];
-        /* the least inertia that the axis can have to itself */
+        /* smallest effective inertia of the axis */
         double inertia = joints->chain.inertia[k][k == 1 ? 1 : 0] - joints->chain.flex_inertia[k];
         double longest_s = joint->viscous_nms > 0.0 ? 0.5 * inertia / joint->viscous_nms : INFINITY;
         if (dt_s > longest_s) {

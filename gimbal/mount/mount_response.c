@@ -19,7 +19,7 @@ static void multiply(double a[5][5], double b[5][5], double out[5][5]) {
     }
 }
 
-/* exp(a): Taylor series of a / 2^s, squared s times. */
+/* Matrix exponential: Taylor series of a / 2^s, squared s times. */
 static void exponential(double a[5][5], double out[5][5]) {
     double norm = 0.0, scaled[5][5], term[5][5], next[5][5];
     for (int i = 0; i < 5; i++) {
@@ -52,7 +52,7 @@ static void exponential(double a[5][5], double out[5][5]) {
 
 void bst_mount_linearise(const bst_mount_joints *joints, int axis,
                          const double angle_rad[BST_CHAIN_MOST], double dt_s, int delay_steps,
-                         double line_of_sight_share, bst_mount_linear *out) {
+                         double line_of_sight_fraction, bst_mount_linear *out) {
     assert(joints && out && bst_is_positive(dt_s) && delay_steps >= 0);
     const bst_mount_chain *chain = &joints->chain;
     const bst_mount_joint *joint = &joints->joint[axis];
@@ -66,12 +66,12 @@ void bst_mount_linearise(const bst_mount_joints *joints, int axis,
     bst_mount_chain_equations eq;
     bst_mount_chain_equations_at(chain, &still, s, c, &base, &eq);
     double flex = chain->flex_inertia[axis];
-    double own = eq.mass[axis][axis]; /* without what swings on its springs */
+    double own = eq.mass[axis][axis]; /* without the masses on its springs */
     double all = own + flex;
     *out = (bst_mount_linear){.inertia_kgm2 = all,
                               .dt_s = dt_s,
                               .delay_steps = delay_steps,
-                              .line_of_sight_share = line_of_sight_share};
+                              .line_of_sight_fraction = line_of_sight_fraction};
     double k = chain->flex_stiffness[axis], d = chain->flex_damping[axis];
     double a[5][5] = {{0, 1, 0, 0, 0},
                       {-joint->spring_nm / own, -joint->viscous_nms / own, k / own, d / own,
@@ -101,7 +101,7 @@ void bst_mount_linearise(const bst_mount_joints *joints, int axis,
     }
 }
 
-/* The state that an input of one at omega drives, without the delay: (z - step)^-1 drive. */
+/* State response to a unit input at omega, without the delay: (z - step)^-1 drive. */
 static void driven(const bst_mount_linear *linear, double omega_radps, double complex x[4]) {
     double complex z = cexp(I * omega_radps * linear->dt_s), a[4][5];
     for (int i = 0; i < 4; i++) {
@@ -136,6 +136,7 @@ static void driven(const bst_mount_linear *linear, double omega_radps, double co
     }
 }
 
+/* Phase factor of the delay at omega. */
 static double complex late(const bst_mount_linear *linear, double omega_radps) {
     return cexp(-I * omega_radps * linear->dt_s * linear->delay_steps);
 }
@@ -149,7 +150,7 @@ double complex bst_mount_linear_encoder(const bst_mount_linear *linear, double o
 double complex bst_mount_linear_sight(const bst_mount_linear *linear, double omega_radps) {
     double complex x[4];
     driven(linear, omega_radps, x);
-    return (x[0] + linear->line_of_sight_share * x[2]) * late(linear, omega_radps);
+    return (x[0] + linear->line_of_sight_fraction * x[2]) * late(linear, omega_radps);
 }
 
 static double complex plant_of(const void *user, double omega_radps) {
@@ -178,7 +179,7 @@ bst_status bst_mount_axis_model_init(bst_ctx *ctx, int type, const bst_mount_con
                         joints.chain.stages, axis);
     }
     bst_mount_linearise(&joints, axis, angle_rad, dt_s, (int)config->servo.delay_steps,
-                        config->flexible.line_of_sight_share[axis], &out->linear);
+                        config->flexible.line_of_sight_fraction[axis], &out->linear);
     out->reference_feed_forward = config->servo.compensator.feed_forward;
     out->model_feed_forward = config->servo.model_feed_forward;
     out->viscous_nms = joints.joint[axis].viscous_nms;
@@ -199,8 +200,8 @@ void bst_mount_axis_response(const bst_mount_axis_model *model, double frequency
     out->compensator = c * inertia;
     out->disturbance = sight * ahead / inertia * closed;
     out->encoder_noise = -sight * c * closed;
-    /* The reference r has a constant acceleration over a step; the one of the step that the torque
-     * acts in is fed forward, and its rate and angle against viscous friction and cable. */
+    /* The reference r has constant acceleration over a step. That of the step in which the torque
+     * acts is fed forward, and its rate and angle against viscous friction and cable. */
     double complex rate = (z - 1.0) * 2.0 / (dt * (z + 1.0)), accel = (z - 1.0) / dt * rate;
     double complex fed =
         model->reference_feed_forward * accel +

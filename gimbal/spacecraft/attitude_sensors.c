@@ -11,8 +11,9 @@ const bst_config_desc bst_star_tracker_config_table[] = {
     BST_REAL(C, noise_arcsec, "arcsec", 1e-6, 36000, "3", "White noise across the boresight."),
     BST_REAL(C, noise_about_axis_arcsec, "arcsec", 1e-6, 36000, "20",
              "White noise about the boresight."),
-    BST_REALS(C, alignment_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
+    BST_REALS(C, misalignment_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
               "Constant error of its alignment, a rotation about body axes, unknown onboard."),
+    BST_FORMER("alignment_arcsec", "misalignment_arcsec"),
     BST_REAL(C, rate_hz, "Hz", 1e-3, 1000, "4", "Measurements a second; divides the gyro's rate."),
     BST_REAL(C, latency_s, "s", 0, 10, "0.1",
              "From the instant of a measurement to when the filter has it."),
@@ -37,8 +38,9 @@ const bst_config_desc bst_gyro_config_table[] = {
              "takes bias_degph for zero). The default is about what it comes to know."),
     BST_REALS(C, scale_factor_ppm, "1e-6", -1e5, 1e5, "[0, 0, 0]",
               "Errors of the scale factors, unknown onboard."),
-    BST_REALS(C, alignment_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
+    BST_REALS(C, misalignment_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
               "Constant error of its alignment, a rotation about body axes, unknown onboard."),
+    BST_FORMER("alignment_arcsec", "misalignment_arcsec"),
     BST_CONFIG_END};
 #undef C
 
@@ -55,7 +57,7 @@ void bst_spacecraft_star_tracker_init(bst_spacecraft_star_tracker *tracker,
         .across = bst_vec3_perpendicular(axis),
         .sigma_rad = {c->noise_arcsec * BST_ARCSEC_RAD,
                       c->noise_about_axis_arcsec * BST_ARCSEC_RAD},
-        .alignment = bst_quat_from_rotvec(bst_vec3_scale(arcsec(c->alignment_arcsec), -1.0)),
+        .alignment = bst_quat_from_rotvec(bst_vec3_scale(arcsec(c->misalignment_arcsec), -1.0)),
         .sun_exclusion_rad = c->sun_exclusion_deg * BST_DEG_RAD,
         .earth_exclusion_rad = c->earth_exclusion_deg * BST_DEG_RAD,
         .rate_limit_radps = c->rate_limit_degps * BST_DEG_RAD,
@@ -114,8 +116,8 @@ static bst_vec3 normal3(bst_rng_key key, uint64_t sample, uint64_t draw) {
 
 void bst_spacecraft_gyro_init(bst_spacecraft_gyro *gyro, const bst_spacecraft_gyro_config *c,
                               double dt_s, bst_rng_key key) {
-    bst_mat3 turned =
-        bst_quat_to_mat3(bst_quat_from_rotvec(bst_vec3_scale(arcsec(c->alignment_arcsec), -1.0)));
+    bst_mat3 turned = bst_quat_to_mat3(
+        bst_quat_from_rotvec(bst_vec3_scale(arcsec(c->misalignment_arcsec), -1.0)));
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
             turned.m[i][j] *= 1.0 + 1e-6 * c->scale_factor_ppm[i];

@@ -6,12 +6,15 @@
 #define C bst_disturbance_config
 const bst_config_desc bst_disturbance_config_table[] = {
     BST_BOOL(C, gravity_gradient, "true", "The Earth's gravity gradient."),
-    BST_REAL(C, solar_area_m2, "m^2", 0, 1e6, "0",
+    BST_REAL(C, srp_area_m2, "m^2", 0, 1e6, "0",
              "Area that meets sunlight, the same from all sides; no force in the Earth's shadow."),
-    BST_REAL(C, solar_coefficient, "", 0, 2, "1.3",
+    BST_FORMER("solar_area_m2", "srp_area_m2"),
+    BST_REAL(C, cr, "", 0, 2, "1.3",
              "Of the force of sunlight; 1: black, 2: a mirror that faces the Sun."),
-    BST_REALS(C, solar_lever_m, "m", -1e3, 1e3, "[0, 0, 0.1]",
+    BST_FORMER("solar_coefficient", "cr"),
+    BST_REALS(C, centre_of_pressure_m, "m", -1e3, 1e3, "[0, 0, 0.1]",
               "Centre of that area from the centre of mass, body axes."),
+    BST_FORMER("solar_lever_m", "centre_of_pressure_m"),
     BST_REALS(C, residual_dipole_am2, "A m^2", -1e4, 1e4, "[0, 0, 0]",
               "Magnetic dipole of the craft in the Earth's field (an axial dipole)."),
     BST_REALS(C, constant_torque_nm, "N m", -1e3, 1e3, "[0, 0, 0]", "Constant torque, body axes."),
@@ -33,9 +36,9 @@ bst_vec3 bst_spacecraft_solar_torque(const bst_disturbance_config *config,
                                      bst_quat q_body_from_gcrf, bst_vec3 sun_m, double sunlit) {
     double d = bst_vec3_norm(sun_m);
     double force = BST_SUNLIGHT_PRESSURE_PA * (BST_AU_M / d) * (BST_AU_M / d) *
-                   config->solar_area_m2 * config->solar_coefficient * sunlit;
+                   config->srp_area_m2 * config->cr * sunlit;
     bst_vec3 away = bst_quat_rotate(q_body_from_gcrf, bst_vec3_scale(sun_m, -force / d));
-    return bst_vec3_cross(bst_vec3_from_array(config->solar_lever_m), away);
+    return bst_vec3_cross(bst_vec3_from_array(config->centre_of_pressure_m), away);
 }
 
 bst_vec3 bst_spacecraft_dipole_field_t(bst_vec3 position_m) {
@@ -65,7 +68,7 @@ bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_
         sum = bst_vec3_add(sum, bst_spacecraft_gravity_gradient_torque(
                                     inertia_kgm2, q_body_from_gcrf, position_m));
     }
-    if (config->solar_area_m2 > 0.0 && sunlit > 0.0) {
+    if (config->srp_area_m2 > 0.0 && sunlit > 0.0) {
         sum =
             bst_vec3_add(sum, bst_spacecraft_solar_torque(config, q_body_from_gcrf, sun_m, sunlit));
     }

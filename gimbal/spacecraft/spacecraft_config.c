@@ -47,18 +47,20 @@ const bst_config_desc bst_spacecraft_config_table[] = {
               "Inertia tensor of all but a full mount, whose reaction has its share, wheels and "
               "appendages with it, about the centre of mass: xx, "
               "yy, zz, xy, xz, yz."),
-    BST_REALS(C, initial_turn_deg, "deg", -180, 180, "[0, 0, 0]",
+    BST_REALS(C, initial_attitude_error_deg, "deg", -180, 180, "[0, 0, 0]",
               "Turn of the body, about its axes, from the attitude that the law wants at the "
               "epoch."),
+    BST_FORMER("initial_turn_deg", "initial_attitude_error_deg"),
     BST_REALS(C, initial_rate_degps, "deg/s", -1000, 1000, "[0, 0, 0]",
               "Rate of the body at the epoch on top of the law's, body axes."),
     BST_REAL(C, initial_knowledge_arcsec, "arcsec", 1e-6, 648000, "3",
              "Standard deviation of the believed attitude's error about each axis when its filter "
              "begins."),
     BST_REAL(
-        C, running_s, "s", 0, 86400, "600",
+        C, filter_warm_up_s, "s", 0, 86400, "600",
         "How long the filter has been running at the epoch, on a body that turned evenly, with "
         "the star trackers that see stars then (with all, where none does); 0: it begins."),
+    BST_FORMER("running_s", "filter_warm_up_s"),
     BST_LIST(C, wheels, bst_wheel_config, bst_wheel_config_table, 0, BST_WHEELS_MOST, "[]",
              "Reaction wheels. None given: four like the default one on the edges of a pyramid "
              "about z, at [1, 1, 1] and so on; with the law `free` none."),

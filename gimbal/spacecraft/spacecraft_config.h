@@ -1,4 +1,4 @@
-/* The "spacecraft" block of a platform. */
+/* "spacecraft" block of a platform. */
 #ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_CONFIG_H
 #define BST_GIMBAL_SPACECRAFT_SPACECRAFT_CONFIG_H
 
@@ -30,8 +30,8 @@ typedef struct bst_spacecraft_config {
     int32_t type;       /* bst_spacecraft_type */
     int32_t integrator; /* bst_integrator */
     double inertia_kgm2[6];
-    double initial_turn_deg[3], initial_rate_degps[3];
-    double initial_knowledge_arcsec, running_s;
+    double initial_attitude_error_deg[3], initial_rate_degps[3];
+    double initial_knowledge_arcsec, filter_warm_up_s;
     bst_config_list wheels, modes, star_trackers;
     bst_spacecraft_gyro_config gyro;
     bst_disturbance_config disturbances;
@@ -53,7 +53,7 @@ const bst_wheel_config *bst_spacecraft_wheels(const bst_spacecraft_config *confi
 const bst_spacecraft_star_tracker_config *bst_spacecraft_trackers(
     const bst_spacecraft_config *config, int *count);
 
-/* The controller of a configuration. */
+/* Attitude controller parameters of a configuration. */
 bst_spacecraft_attitude_control_spec bst_spacecraft_attitude_control_of(
     const bst_spacecraft_config *config);
 

@@ -22,9 +22,9 @@ typedef struct bst_background_config {
     double diffuse_galactic_fraction;
     bool earth, moon, sun; /* discs, and in model `sky` with a PST their stray light */
     double earth_albedo, earth_night_mag_arcsec2, earth_temperature_k, limb_scale_height_m;
-    bst_config_list pst; /* bst_optics_pst_point; empty: no stray light */
-    char pst_file[512];  /* PST from a CSV file; "": none */
-    double pixel_um;     /* pitch, for stray light; 0: that of the optics */
+    bst_config_list pst;   /* bst_optics_pst_point; empty: no stray light */
+    char pst_file[512];    /* PST from a CSV file; "": none */
+    double pixel_pitch_um; /* pitch, for stray light; 0: that of the optics */
     /* added in either model: with u, v from -1 to 1 over the sensor's columns and rows,
      * stray + gradient . (u, v) + curvature . (u^2, u v, v^2) */
     double stray_e_per_s, gradient_e_per_s[2], curvature_e_per_s[3];

@@ -37,15 +37,15 @@ typedef struct bst_camera_geometry {
 
 typedef struct bst_camera {
     int64_t width_px, height_px;
-    double pixel_scale_arcsec;                 /* at the boresight; tangent (gnomonic) projection */
-    double focal_length_m, f_number, pixel_um; /* NAN: unknown; used for the scale only */
-    double aperture_m;                         /* diameter of the entrance pupil */
-    double obscuration;                        /* fraction of the pupil's area that is blocked */
-    double throughput;                         /* optics, 0..1 */
-    double quantum_efficiency;                 /* band mean, 0..1 */
-    double photon_flux_v0_per_s_m2;            /* photons of a V = 0 star in the camera's band */
-    double psf_fwhm_px;                        /* Gaussian, Moffat */
-    double background_mag_arcsec2;             /* uniform sky, V per square arcsecond */
+    double pixel_scale_arcsec; /* at the boresight; tangent (gnomonic) projection */
+    double focal_length_m, f_number, pixel_pitch_um; /* NAN: unknown; used for the scale only */
+    double aperture_m;                               /* diameter of the entrance pupil */
+    double obscuration;             /* fraction of the pupil's area that is blocked */
+    double throughput;              /* optics, 0..1 */
+    double quantum_efficiency;      /* band mean, 0..1 */
+    double photon_flux_v0_per_s_m2; /* photons of a V = 0 star in the camera's band */
+    double psf_fwhm_px;             /* Gaussian, Moffat */
+    double background_mag_arcsec2;  /* uniform sky, V per square arcsecond */
     double dark_current_e_per_s;
     double read_noise_e;
     double full_well_e;
@@ -78,7 +78,7 @@ extern const bst_config_desc bst_distortion_config[];
  *            600 arcsec, or if values differ by more than one part in 1000; the message names the
  *            keys, without their path
  * Notes:     scale = pitch / focal length (gnomonic projection). If values are redundant, the given
- *            scale is kept. f_number and pixel_um of the blocks `optics` and `background` are
+ *            scale is kept. f_number and pixel_pitch_um of the blocks `optics` and `background` are
  *            compared too. */
 bst_status bst_camera_resolve_scale(bst_ctx *ctx, bst_camera *camera) BST_MUST_CHECK;
 

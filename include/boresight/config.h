@@ -25,6 +25,7 @@ typedef enum bst_config_type {
     BST_CONFIG_LIST,    /* bst_config_list of structs, children, item_bytes */
     BST_CONFIG_RAW,     /* not stored: checked elsewhere (module blocks) */
     BST_CONFIG_STAGE,   /* bst_stage_use of include/boresight/stage.h; choices: the stage's kind */
+    BST_CONFIG_FORMER,  /* not stored: former name of the key that `fallback` names */
 } bst_config_type;
 
 /* Member for a LIST. `items` is one allocation of count * item_bytes that belongs to the config
@@ -34,6 +35,9 @@ typedef struct bst_config_list {
     int count;
 } bst_config_list;
 
+/* Longest name of a key, with the zero byte. */
+enum { BST_CONFIG_KEY_BYTES = 64 };
+
 /* One key. Tables end with an entry whose key is NULL. */
 typedef struct bst_config_desc {
     const char *key;
@@ -42,7 +46,7 @@ typedef struct bst_config_desc {
     double minimum,
         maximum;          /* range of numbers and of each element of REALS; list: number of items */
     const char *fallback; /* default as JSON text ("0.5", "\"ideal\"", "[0, 0, 1]"); NULL: the key
-                             is required */
+                             is required; FORMER: the present name of the key */
     const char *doc;      /* one sentence */
     size_t offset, size;  /* of the member in its struct */
     const char *const *choices; /* ENUM: names; PATH: keywords that are no file; NULL-terminated */
@@ -118,6 +122,10 @@ typedef struct bst_config_desc {
         .fallback = def_, .doc = doc_, .children = table_, .item_bytes = sizeof(item_),   \
         BST_FIELD_(s, m)                                                                  \
     }
+/* A former name of the key `now_` of the same table. Documents may still have it, with a warning
+ * that gives the present name; schemas mark it as deprecated. A key may have several. */
+#define BST_FORMER(former_, now_) \
+    { .key = former_, .type = BST_CONFIG_FORMER, .fallback = now_ }
 #define BST_CONFIG_END \
     { .key = NULL }
 
@@ -229,7 +237,8 @@ bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
  * Errors:    BST_ERR_CONFIG "FILE: PATH: what is wrong (found VALUE; allowed: ...)",
  *            BST_ERR_MEMORY; then `object` holds nothing to free
  * Notes:     for an unknown key the message suggests the nearest known one. "$schema" and
- *            "description" are allowed in every object. A plug-in is refused: use
+ *            "description" are allowed in every object. A former name (BST_FORMER) sets its key and
+ *            logs a warning; both names in one object are an error. A plug-in is refused: use
  *            bst_stage_read_config. */
 bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
                            const char *path, const bst_config_desc *table,

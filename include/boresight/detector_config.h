@@ -17,7 +17,7 @@ typedef struct bst_detector_cosmic_ray_config {
     double pixel_pitch_um, depth_um; /* pixel side, and thickness of the sensitive layer */
     double e_per_um;                 /* most probable charge per path */
     double straggling; /* width of the Landau-like spread over the most probable value */
-    double frame_s;    /* additional collection time of hits: transfer and read-out */
+    double readout_s;  /* additional collection time of hits: transfer and read-out */
 } bst_detector_cosmic_ray_config;
 
 typedef struct bst_detector_quantisation_config {
@@ -36,14 +36,14 @@ typedef struct bst_detector_config {
     double hot_fraction, hot_median_e_per_s, hot_spread_dex;
     double dead_fraction;
     int64_t bad_columns;
-    uint64_t pattern_seed;
+    uint64_t fixed_pattern_seed;
     double column_offset_rms_e, row_offset_rms_e, row_noise_e;
-    double read_tail_fraction, read_tail_rms_e;
+    double telegraph_noise_fraction, telegraph_noise_rms_e;
     double nonlinearity[3];
-    int32_t full_well; /* BST_WELL_... */
+    int32_t saturation; /* BST_WELL_... */
     double frame_transfer_s;
     double row_time_s; /* rolling shutter */
-    bst_detector_cosmic_ray_config hits;
+    bst_detector_cosmic_ray_config cosmic_rays;
     bst_detector_quantisation_config quantisation;
 } bst_detector_config;
 

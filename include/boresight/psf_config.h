@@ -53,7 +53,7 @@ typedef struct bst_optics_config {
     int32_t psf;                /* BST_PSF_... */
     double moffat_beta;         /* 0: 2.5 */
     double q, f_number;         /* 0: from the aperture and the pixel scale */
-    double pixel_um;            /* pitch */
+    double pixel_pitch_um;      /* pitch */
     double band_nm[2];          /* both 0: the camera's spectrum, else 507 and 595 */
     int32_t spectrum;           /* BST_SPECTRUM_... */
     int64_t wavelengths;        /* of the band's quadrature; 0: 8 */
@@ -63,7 +63,7 @@ typedef struct bst_optics_config {
     bst_optics_zernike_waves zernike_waves;
     double defocus_um;       /* distance of the detector behind the focus */
     double diffusion_px;     /* charge diffusion, standard deviation of a Gaussian */
-    double pixel_fill[2];    /* light-sensitive part of the pitch, along x and y; 0: 1 */
+    double fill_factor[2];   /* light-sensitive part of the pitch, along x and y; 0: 1 */
     char psf_file[512];      /* FITS, for BST_PSF_FILE */
     double psf_oversampling; /* of psf_file, samples per pixel; 0: its keyword OVERSAMP */
     int32_t file_centre;     /* BST_PSF_CENTROID, BST_PSF_ARRAY */

@@ -12,15 +12,15 @@
 struct bst_detector {
     bst_camera camera;
     bst_rng_key pattern;
-    int stride; /* of the maps: the sensor's width, rounded up to chunks */
+    int stride; /* of the maps: sensor width rounded up to chunks of 64 */
     cl_context context;
     cl_command_queue queue;
     cl_mem gain, dark, overlay, offsets, codes, flags;
-    cl_mem deposits; /* of the present frame; borrowed */
+    cl_mem deposits; /* of the current frame; lent */
     cl_kernel deposit_kernel;
     bst_cosmic_rays *hits;
     bst_cosmic_rays_summary summary;
-    float *rows; /* fixed offsets and those of one frame, DN: [2][height] */
+    float *rows; /* row offsets, fixed and of the frame, DN: [2][height] */
 };
 
 double bst_detector_near_full_e(double full_well_e) {
@@ -28,7 +28,7 @@ double bst_detector_near_full_e(double full_well_e) {
 }
 
 bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name) {
-    return bst_rng_make_key(camera->detector.pattern_seed, 0, name, "pattern");
+    return bst_rng_make_key(camera->detector.fixed_pattern_seed, 0, name, "pattern");
 }
 
 bool bst_detector_whole_columns(const bst_detector *detector) {
@@ -39,8 +39,8 @@ static bool has_offsets(const bst_detector_config *d) {
     return d->column_offset_rms_e > 0.0 || d->row_offset_rms_e > 0.0 || d->row_noise_e > 0.0;
 }
 
-/* Whether the amplifier bends so much that read noise must not go through it: the bend changes the
- * read noise's share of the variance by more than 3e-5. */
+/* True if the amplifier's nonlinearity changes the read noise's share of the variance by more than
+ * 3e-5, so that read noise must be added after it. */
 static bool charge_first(const bst_camera *c) {
     const double *n = c->detector.nonlinearity;
     double bend = 2.0 * fabs(n[0]) + 3.0 * fabs(n[1]) + 4.0 * fabs(n[2]);
@@ -60,9 +60,9 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
         snprintf(bend, sizeof bend, " -DNONLINEAR -DC1=%.9ef -DC2=%.9ef -DC3=%.9ef", n[0], n[1],
                  n[2]);
     }
-    if (d->read_tail_fraction > 0.0 && d->read_tail_rms_e > 0.0) {
+    if (d->telegraph_noise_fraction > 0.0 && d->telegraph_noise_rms_e > 0.0) {
         snprintf(tail, sizeof tail, " -DTAIL -DTAIL_GAP=%.9ef -DTAIL_RMS=%.9ef",
-                 -0.5 / log1p(-d->read_tail_fraction), d->read_tail_rms_e);
+                 -0.5 / log1p(-d->telegraph_noise_fraction), d->telegraph_noise_rms_e);
     }
     if (d->frame_transfer_s > 0.0) {
         snprintf(transfer, sizeof transfer, " -DTRANSFER_ROW_S=%.9ef",
@@ -75,7 +75,7 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
         detector->gain ? " -DGAIN_MAP" : "", detector->dark ? " -DDARK_MAP" : "",
         detector->overlay ? " -DOVERLAY" : "", detector->offsets ? " -DOFFSETS" : "",
         detector->codes ? " -DCODES" : "", bend, tail, transfer,
-        d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
+        d->saturation == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
 }
 
 static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, const void *data,
@@ -88,7 +88,7 @@ static bst_status make_map(bst_ctx *ctx, bst_detector *d,
                                               float *),
                            cl_mem *out) {
     size_t count = (size_t)d->stride * (size_t)d->camera.height_px;
-    count += make ? 0 : count / 64; /* the overlay's marks */
+    count += make ? 0 : count / 64; /* marks of the overlay's chunks */
     float *map = calloc(count, sizeof *map);
     if (!map) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a map of the detector");
@@ -101,6 +101,7 @@ static bst_status make_map(bst_ctx *ctx, bst_detector *d,
     return status;
 }
 
+/* Fixed column and row offsets on the device. */
 static bst_status make_offsets(bst_ctx *ctx, bst_detector *d) {
     size_t height = (size_t)d->camera.height_px, count = (size_t)d->stride + height;
     float *offsets = calloc(count, sizeof *offsets);
@@ -119,6 +120,7 @@ static bst_status make_offsets(bst_ctx *ctx, bst_detector *d) {
     return status;
 }
 
+/* Table of output codes on the device. */
 static bst_status make_codes(bst_ctx *ctx, bst_detector *d) {
     uint16_t *codes = malloc(65536 * sizeof *codes);
     if (!codes) {
@@ -146,9 +148,9 @@ static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
     if (c->quantisation.model != BST_QUANTISE_UNIFORM) {
         BST_TRY(make_codes(ctx, d));
     }
-    if (c->hits.rate_per_cm2_s > 0.0) {
+    if (c->cosmic_rays.rate_per_cm2_s > 0.0) {
         BST_TRY(make_map(ctx, d, NULL, &d->overlay));
-        BST_TRY(bst_cosmic_rays_create(ctx, &c->hits, (int)d->camera.width_px,
+        BST_TRY(bst_cosmic_rays_create(ctx, &c->cosmic_rays, (int)d->camera.width_px,
                                        (int)d->camera.height_px, d->stride, &d->hits));
     }
     return BST_OK;
@@ -226,13 +228,13 @@ void bst_detector_buffers(const bst_detector *d, cl_mem out[BST_DETECTOR_BUFFERS
     out[5] = d->flags;
 }
 
-/* Adds the exposure's deposits to the overlay (sign 1), or sets their pixels to 0 again (sign 0).
- */
+/* Adds the exposure's cosmic-ray deposits to the overlay (sign 1), or sets their pixels to 0 (sign
+ * 0). */
 static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
     if (d->summary.pixels == 0) {
         return BST_OK;
     }
-    /* a size of work-groups of its own for each count would have the kernel built for each */
+    /* a fixed work-group size avoids a new kernel build for each count */
     size_t local = BST_HIT_GROUP, global = ((size_t)d->summary.pixels + local - 1) / local * local;
     cl_int count = d->summary.pixels;
     cl_kernel k = d->deposit_kernel;
@@ -249,6 +251,7 @@ static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
         "placing radiation hits");
 }
 
+/* Draws and uploads the cosmic rays of an exposure. */
 static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
                              int64_t exposure_id, double collect_s) {
     const bst_cosmic_rays_pixel *pixels;
@@ -258,6 +261,7 @@ static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
     return deposit(ctx, d, 1.0f);
 }
 
+/* Draws and uploads the row offsets of an exposure. */
 static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
                              int64_t exposure_id) {
     size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);
@@ -283,7 +287,7 @@ bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *st
     d->summary = (bst_cosmic_rays_summary){0};
     if (d->hits) {
         BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
-                           exposure_s + c->hits.frame_s));
+                           exposure_s + c->cosmic_rays.readout_s));
     }
     if (c->row_noise_e > 0.0) {
         BST_TRY(begin_rows(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "row_noise"),

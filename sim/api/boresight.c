@@ -21,7 +21,7 @@ struct bst_sim {
 
 static bst_status read_model(bst_ctx *ctx, const char *path, const char *const *assignments,
                              int count, bst_model *model) {
-    BST_TRY(bst_json_load_extended(ctx, path, &model->json));
+    BST_TRY(bst_json_load_described(ctx, path, bst_registry_tables(), &model->json));
     for (int i = 0; i < count; i++) {
         BST_TRY(bst_json_set(ctx, model->json, assignments[i]));
     }

@@ -100,12 +100,13 @@ static void print_calibration(const bst_obsgen_calibration *c, const bst_calibra
         "places\n",
         n->frames, n->sources, n->detected, n->false_alarms, n->places);
     printf("threshold %+.3f, noise x %.4f, background share %.2f, crowding %.2f, slope %.2f\n",
-           c->threshold_offset, c->noise_factor, c->background_share, c->crowding, c->slope);
+           c->threshold_offset, c->noise_factor, c->background_fraction, c->crowding, c->slope);
     printf("gain at 0, 5, 20, 60 px: %.4f %.4f %.4f %.4f (loss %.2f %.2f %.2f %.2f dB)\n",
            c->gain[0], c->gain[1], c->gain[2], c->gain[3], -20.0 * log10(c->gain[0]),
            -20.0 * log10(c->gain[1]), -20.0 * log10(c->gain[2]), -20.0 * log10(c->gain[3]));
     printf("false alarms x %.3f, tail %.2f; phase bias %.4f px; stars identified %.4f\n",
-           c->false_alarm_factor, c->false_alarm_tail, c->phase_bias_px, c->star_id_probability);
+           c->false_alarm_factor, c->false_alarm_steepness, c->phase_bias_px,
+           c->star_id_probability);
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
         printf("place over bound at SNR %3.0f: %.3f across, %.3f along\n", bst_obsgen_snrs[i],
                c->across_factor[i], c->along_factor[i]);

@@ -270,7 +270,7 @@ static const bst_option OPTIONS[] = {
      .maximum = 5},
     {.name = "apart",
      .kind = BST_OPTION_REAL,
-     .offset = offsetof(pd_request, options.apart_px),
+     .offset = offsetof(pd_request, options.min_separation_px),
      .argument = "PX",
      .doc = "least distance between targets, their own length not counted (default 24)",
      .minimum = 1,
@@ -319,7 +319,7 @@ int bst_cmd_pd(int argc, char **argv) {
                     .options = {.trials = 1000,
                                 .background_e = -1.0,
                                 .jitter_px = -1.0,
-                                .apart_px = 24.0,
+                                .min_separation_px = 24.0,
                                 .rates_px = 3.0}};
     bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
     bst_options_bind(OPTIONS, &r, table);

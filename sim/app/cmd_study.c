@@ -15,6 +15,7 @@
 #include "sim/core/wall_clock.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/run_store.h"
+#include "sim/registry/registry.h"
 #include "sim/studies/driver.h"
 #include "sim/studies/local_pool.h"
 #include "sim/studies/shard_run.h"
@@ -358,7 +359,7 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
     bst_study study;
     bool folder = is_folder(given);
     snprintf(file, sizeof file, folder ? "%.4000s/study.json" : "%.4000s", given);
-    if (bst_study_open(ctx, file, &study) != BST_OK) {
+    if (bst_study_open(ctx, file, bst_registry_tables(), &study) != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }

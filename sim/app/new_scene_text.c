@@ -55,7 +55,7 @@ static void put_camera(FILE *f, const bst_new_request *q, const bst_new_scene *s
             s->side_px, s->side_px);
     if (q->focal_m > 0.0) {
         fprintf(f,
-                "                        \"pixel_um\": %.6g,\n"
+                "                        \"pixel_pitch_um\": %.6g,\n"
                 "                        \"focal_length_m\": %.9g,\n",
                 BST_NEW_PIXEL_UM, q->focal_m);
     } else {

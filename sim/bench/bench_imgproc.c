@@ -83,7 +83,7 @@ static bst_status process(bst_ctx *ctx, const bst_bench_options *options, shots 
                           bst_bench_result *out) {
     const bst_camera *camera = &s->view.camera;
     bst_imgproc_config config = {.capacity = room,
-                                 .most_fits = FITS,
+                                 .max_fits = FITS,
                                  .mesh_px = 64,
                                  .false_alarms_per_frame = 1.0,
                                  .jitter_px = s->view.scene.jitter_px,

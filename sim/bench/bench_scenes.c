@@ -88,18 +88,18 @@ static void set_detector(bst_camera *camera) {
                                              .hot_spread_dex = 0.5,
                                              .dead_fraction = 1e-4,
                                              .bad_columns = 2,
-                                             .pattern_seed = 1,
+                                             .fixed_pattern_seed = 1,
                                              .column_offset_rms_e = 1.0,
                                              .row_offset_rms_e = 1.0,
                                              .row_noise_e = 0.5,
-                                             .read_tail_fraction = 0.01,
-                                             .read_tail_rms_e = 12.0,
+                                             .telegraph_noise_fraction = 0.01,
+                                             .telegraph_noise_rms_e = 12.0,
                                              .nonlinearity = {-0.005, 0.001, 0.0},
-                                             .hits = {.rate_per_cm2_s = 5.0,
-                                                      .pixel_pitch_um = 10.0,
-                                                      .depth_um = 20.0,
-                                                      .e_per_um = 80.0,
-                                                      .straggling = 0.2}};
+                                             .cosmic_rays = {.rate_per_cm2_s = 5.0,
+                                                             .pixel_pitch_um = 10.0,
+                                                             .depth_um = 20.0,
+                                                             .e_per_um = 80.0,
+                                                             .straggling = 0.2}};
     camera->dark_current_e_per_s = 0.05;
 }
 

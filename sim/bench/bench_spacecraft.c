@@ -43,7 +43,7 @@ static bst_status make(bst_ctx *ctx, bst_spacecraft **out) {
                                            {3.4, 0.005, {0.0, 0.8, 0.1}}};
     c.wheels = (bst_config_list){wheels, 4};
     c.modes = (bst_config_list){modes, 2};
-    c.disturbances.solar_area_m2 = 2.0;
+    c.disturbances.srp_area_m2 = 2.0;
     bst_spacecraft_setup setup = {.dt_s = CRAFT_DT,
                                   .q_nominal = BST_QUAT_IDENTITY,
                                   .sky_at = sky_at,

@@ -80,7 +80,7 @@ static bst_status measure(bst_ctx *ctx, const char *folder, const char *file,
     kind.run = run_nothing;
     kind.series_count = 0;
     double started = bst_wall_seconds();
-    BST_TRY(bst_study_open(ctx, file, &study));
+    BST_TRY(bst_study_open(ctx, file, NULL, &study));
     bst_status status = bst_results_create(ctx, &study, &kind, &results);
     if (status == BST_OK) {
         status = make_rows(ctx, &study, &kind, folder);

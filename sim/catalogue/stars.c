@@ -39,6 +39,7 @@ struct bst_stars {
     bst_rng_key key;
 };
 
+/* Computes centre and radius that enclose each group of star cells. */
 static void group_cells(bst_stars *s) {
     for (uint32_t g = 0; g < GROUPS; g++) {
         cell_group *group = &s->groups[g];
@@ -79,11 +80,11 @@ enum { DRAW_DROPPED, DRAW_DISPLACED, DRAW_OFFSET };
 /* Applies the errors of an onboard catalogue to a star; false: it is missing. */
 static bool alter(const bst_stars *s, uint32_t id, bst_vec3 *direction) {
     const bst_star_errors_config *e = &s->errors;
-    if (bst_rng_uniform(s->key, id, DRAW_DROPPED) < e->dropped_fraction) {
+    if (bst_rng_uniform(s->key, id, DRAW_DROPPED) < e->missing_fraction) {
         return false;
     }
-    if (bst_rng_uniform(s->key, id, DRAW_DISPLACED) < e->displaced_fraction) {
-        double offset[2], sigma = e->displaced_sigma_arcsec * BST_ARCSEC_RAD;
+    if (bst_rng_uniform(s->key, id, DRAW_DISPLACED) < e->position_error_fraction) {
+        double offset[2], sigma = e->position_error_sigma_arcsec * BST_ARCSEC_RAD;
         bst_rng_normal2(s->key, id, DRAW_OFFSET, offset);
         bst_vec3 a = bst_vec3_perpendicular(*direction), b = bst_vec3_cross(*direction, a);
         *direction = bst_vec3_unit(
@@ -339,8 +340,8 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
     /* rounding must not exclude the antipode */
     double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
     /* displaced stars may come from outside */
-    double slack = stars->altered && stars->errors.displaced_fraction > 0.0
-                       ? MOST_SIGMAS * stars->errors.displaced_sigma_arcsec * BST_ARCSEC_RAD
+    double slack = stars->altered && stars->errors.position_error_fraction > 0.0
+                       ? MOST_SIGMAS * stars->errors.position_error_sigma_arcsec * BST_ARCSEC_RAD
                        : 0.0;
     int found = 0;
     for (uint32_t c = 0; c < BST_STAR_CELLS; c++) {

@@ -91,7 +91,7 @@ bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, dou
 /* Errors of the onboard star catalogue; the error of a star follows from its identity and the
  * seed. */
 typedef struct bst_star_errors_config {
-    double dropped_fraction, displaced_fraction, displaced_sigma_arcsec;
+    double missing_fraction, position_error_fraction, position_error_sigma_arcsec;
     uint64_t seed;
 } bst_star_errors_config;
 

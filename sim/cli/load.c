@@ -12,6 +12,7 @@
 #include "sim/cli/outputs.h"
 #include "sim/cli/plugins.h"
 #include "sim/link/external.h"
+#include "sim/registry/registry.h"
 
 /* Makes a module external: changes its type; keeps keys that are common to all modules or define
  * how frames are commanded. */
@@ -78,6 +79,7 @@ static bst_status assign_text(bst_ctx *ctx, bst_json *json, const char *pointer,
     return bst_json_assign(ctx, json, pointer, cJSON_CreateString(text));
 }
 
+/* Applies --set, --external and --link to the scenario document. */
 static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json *json) {
     for (int i = 0; i < options->set.count; i++) {
         if (bst_json_set(ctx, json, options->set.items[i]) != BST_OK) {
@@ -142,6 +144,7 @@ bst_status bst_load_check_sensor(bst_ctx *ctx, const bst_scenario *scenario, con
                     name, scenario->file, known);
 }
 
+/* Checks that no output overwrites a file that the scenario names. */
 static bst_status spare_named(bst_ctx *ctx, const bst_option *table, const cJSON *node) {
     for (const cJSON *item = node->child; item; item = item->next) {
         if (cJSON_IsString(item) && item->valuestring[0] == '/') {
@@ -172,9 +175,9 @@ static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const bst_
     return status;
 }
 
-bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
-                             bst_json **json, bst_scenario *out) {
-    BST_TRY(bst_json_load_extended(ctx, path, json));
+static bst_status load(bst_ctx *ctx, const char *path, const bst_load_options *options,
+                       bst_json **json, bst_scenario *out) {
+    BST_TRY(bst_json_load_described(ctx, path, bst_registry_tables(), json));
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {
         status = bst_plugins_scenario_read(ctx, *json, out);
@@ -189,5 +192,15 @@ bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_opti
         bst_json_free(*json);
         *json = NULL;
     }
+    return status;
+}
+
+bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
+                             bst_json **json, bst_scenario *out) {
+    /* the commands that are quiet later on warn of former names too */
+    bst_log_level level = ctx->log_level;
+    ctx->log_level = level < BST_LOG_WARNING ? BST_LOG_WARNING : level;
+    bst_status status = load(ctx, path, options, json, out);
+    ctx->log_level = level;
     return status;
 }

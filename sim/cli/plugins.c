@@ -156,7 +156,7 @@ bst_status bst_plugins_of_scenario(bst_ctx *ctx, const char *path,
                                    bst_scenario_registry *registry) {
     bst_json *json;
     bst_scenario scenario = {.format = 0};
-    BST_TRY(bst_json_load_extended(ctx, path, &json));
+    BST_TRY(bst_json_load_described(ctx, path, bst_registry_tables(), &json));
     registry->policy = policy_of_environment();
     bst_status status = bst_scenario_read(ctx, json, registry, &scenario);
     for (int i = 0; i < scenario.plugin_count && status == BST_OK; i++) {

@@ -55,7 +55,10 @@ static bst_status unknown_key(const reader *r, const char *path, const char *key
     char known[400] = "";
     for (const bst_config_desc *d = table; d->key; d++) {
         if (bst_text_is_nearer(key, d->key, &best)) {
-            nearest = d->key;
+            nearest = d->type == BST_CONFIG_FORMER ? d->fallback : d->key;
+        }
+        if (d->type == BST_CONFIG_FORMER) {
+            continue;
         }
         size_t used = strlen(known);
         snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", d->key);
@@ -251,6 +254,7 @@ static bst_status read_value(const reader *r, const cJSON *value, const char *pa
             return read_list(r, value, path, d, (bst_config_list *)(void *)member);
         case BST_CONFIG_RAW:
         case BST_CONFIG_STAGE:
+        case BST_CONFIG_FORMER:
             return BST_OK;
     }
     return bst_fail(r->ctx, BST_ERR_ARGUMENT, "%s: descriptor of unknown type %d", path,
@@ -319,6 +323,43 @@ static bst_status read_stage(const reader *r, const cJSON *node, const char *pat
     return status;
 }
 
+/* The present name of an entry's key. */
+static const char *present_name(const bst_config_desc *d) {
+    return d->type == BST_CONFIG_FORMER ? d->fallback : d->key;
+}
+
+/* Warns about a key that is given under a former name, and refuses it beside another name. */
+static bst_status check_former(const reader *r, const cJSON *node, const char *path,
+                               const bst_config_desc *table, const bst_config_desc *former) {
+    for (const bst_config_desc *d = table; d->key; d++) {
+        if (d != former && strcmp(present_name(d), former->fallback) == 0 &&
+            cJSON_GetObjectItemCaseSensitive(node, d->key)) {
+            return bst_fail(r->ctx, BST_ERR_CONFIG,
+                            "%s: %s/%s: former name of %s, which is given too (allowed: %s alone)",
+                            r->file, path, former->key, former->fallback, former->fallback);
+        }
+    }
+    char where[512];
+    snprintf(where, sizeof where, "%s/%s", path, former->key);
+    bst_log(r->ctx, BST_LOG_WARNING, "%s: %s: former name, now %s", bst_json_file(r->json, where),
+            where, former->fallback);
+    return BST_OK;
+}
+
+/* The value of a key under its present or a former name, *name; NULL: not given. */
+static const cJSON *find_value(const cJSON *node, const bst_config_desc *table,
+                               const bst_config_desc *key, const char **name) {
+    *name = key->key;
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(node, key->key);
+    for (const bst_config_desc *d = table; d->key && !value; d++) {
+        if (d->type == BST_CONFIG_FORMER && strcmp(d->fallback, key->key) == 0 &&
+            (value = cJSON_GetObjectItemCaseSensitive(node, d->key)) != NULL) {
+            *name = d->key;
+        }
+    }
+    return value;
+}
+
 static bst_status read_object(const reader *r, const cJSON *node, const char *path,
                               const bst_config_desc *table, void *object) {
     if (node && !cJSON_IsObject(node)) {
@@ -331,15 +372,23 @@ static bst_status read_object(const reader *r, const cJSON *node, const char *pa
         node = NULL; /* the other members keep their defaults */
     }
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
-        if (!find(table, item->string) && strcmp(item->string, "$schema") != 0 &&
+        const bst_config_desc *d = find(table, item->string);
+        if (!d && strcmp(item->string, "$schema") != 0 &&
             strcmp(item->string, "description") != 0) {
             return unknown_key(r, path, item->string, table);
         }
+        if (d && d->type == BST_CONFIG_FORMER) {
+            BST_TRY(check_former(r, node, path, table, d));
+        }
     }
     for (const bst_config_desc *d = table; d->key; d++) {
+        if (d->type == BST_CONFIG_FORMER) {
+            continue;
+        }
+        const char *name;
         char child_path[512];
-        snprintf(child_path, sizeof child_path, "%s/%s", path, d->key);
-        const cJSON *value = node ? cJSON_GetObjectItemCaseSensitive(node, d->key) : NULL;
+        const cJSON *value = find_value(node, table, d, &name);
+        snprintf(child_path, sizeof child_path, "%s/%s", path, name);
         if (value) {
             BST_TRY(read_value(r, value, child_path, d, object));
         } else if (d->fallback) {
@@ -479,6 +528,7 @@ static cJSON *echo_value(const bst_config_desc *d, const void *object) {
         }
         case BST_CONFIG_RAW:
         case BST_CONFIG_STAGE:
+        case BST_CONFIG_FORMER:
             return NULL;
     }
     return NULL;

@@ -1,3 +1,4 @@
+#include <stdio.h>
 #include <string.h>
 
 #include <cjson/cJSON.h>
@@ -51,7 +52,20 @@ static void add_description(cJSON *node, const bst_config_desc *d) {
     }
 }
 
+/* A former name: any value is valid, since the program checks it under the present name. */
+static cJSON *former_schema(const bst_config_desc *d) {
+    char text[BST_CONFIG_KEY_BYTES + 20];
+    cJSON *node = cJSON_CreateObject();
+    snprintf(text, sizeof text, "Former name of %s.", d->fallback);
+    cJSON_AddBoolToObject(node, "deprecated", 1);
+    cJSON_AddStringToObject(node, "description", text);
+    return node;
+}
+
 static cJSON *value_schema(const bst_config_desc *d) {
+    if (d->type == BST_CONFIG_FORMER) {
+        return former_schema(d);
+    }
     cJSON *node =
         d->type == BST_CONFIG_OBJECT ? bst_config_schema(d->children) : cJSON_CreateObject();
     switch (d->type) {
@@ -107,6 +121,7 @@ static cJSON *value_schema(const bst_config_desc *d) {
             break;
         case BST_CONFIG_OBJECT:
         case BST_CONFIG_RAW:
+        case BST_CONFIG_FORMER:
             break;
     }
     if (d->doc) {

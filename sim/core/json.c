@@ -7,6 +7,7 @@
 
 #include "boresight/config.h"
 #include "sim/core/file.h"
+#include "sim/core/former_names.h"
 #include "sim/core/json_internal.h"
 
 static const uint64_t MAX_BYTES = 64 << 20;
@@ -200,11 +201,11 @@ bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) {
     return BST_OK;
 }
 
-bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJSON *value) {
+/* Takes the value in any case. */
+static bst_status assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJSON *value) {
     char *path = strdup(pointer);
-    if (!path || !value) {
+    if (!path) {
         cJSON_Delete(value);
-        free(path);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
     cJSON *node = json->root;
@@ -247,6 +248,25 @@ bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJ
     return status;
 }
 
+bst_status bst_json_assign_from(bst_ctx *ctx, bst_json *json, const char *pointer, cJSON *value,
+                                const char *where) {
+    char *present = NULL;
+    bst_status status = value ? bst_json_present_pointer(ctx, json->tables, json->root, pointer,
+                                                         value, where, &present)
+                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    if (status == BST_OK) {
+        status = assign(ctx, json, present, value);
+    } else {
+        cJSON_Delete(value);
+    }
+    free(present);
+    return status;
+}
+
+bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJSON *value) {
+    return bst_json_assign_from(ctx, json, pointer, value, json->is_copy ? NULL : json->name);
+}
+
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     BST_TRY(bst_json_check_assignment(ctx, assignment));
     const char *equals = strchr(assignment, '=');
@@ -268,7 +288,9 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     char *pointer = strndup(assignment, (size_t)(equals - assignment));
     bst_status status = BST_ERR_MEMORY;
     if (pointer) {
-        status = bst_json_assign(ctx, json, pointer, value);
+        char where[BST_MESSAGE_BYTES];
+        snprintf(where, sizeof where, "--set %.300s", assignment);
+        status = bst_json_assign_from(ctx, json, pointer, value, where);
     } else {
         cJSON_Delete(value);
         bst_fail(ctx, status, "out of memory");

@@ -6,6 +6,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/former_names.h"
 #include "sim/core/json_internal.h"
 
 enum { MAX_FILES = 16 };
@@ -22,6 +23,8 @@ bst_status bst_json_copy(bst_ctx *ctx, const bst_json *json, bst_json **out) {
     if (copy) {
         copy->name = strdup(json->name);
         copy->root = cJSON_Duplicate(json->root, 1);
+        copy->tables = json->tables;
+        copy->is_copy = json->tables != NULL;
     }
     bst_status status = copy && copy->name && copy->root
                             ? BST_OK
@@ -56,7 +59,9 @@ static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_js
                                   file, pointer)
                        : bst_fail(ctx, BST_ERR_CONFIG, "%s: %.60s: unknown key", file, pointer);
         }
-        if (bst_json_assign(ctx, json, pointer, value) != BST_OK) {
+        char where[BST_MESSAGE_BYTES];
+        snprintf(where, sizeof where, "%.400s: /set", file);
+        if (bst_json_assign_from(ctx, json, pointer, value, by_pointer ? where : NULL) != BST_OK) {
             return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /set: %.200s", file, pointer);
         }
     }
@@ -71,6 +76,26 @@ static bst_status check_once(bst_ctx *ctx, const bst_json *own, const cJSON *set
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "%s: %.200s: is given relative_path \"set\" and in it", own->name,
                             item->string);
+        }
+    }
+    return BST_OK;
+}
+
+/* A value that "set" gives under a former and under the present name. */
+static bst_status check_former(bst_ctx *ctx, const bst_json *base, const cJSON *set,
+                               const char *file) {
+    for (const cJSON *item = set ? set->child : NULL; item; item = item->next) {
+        char *present;
+        BST_TRY(bst_json_present_pointer(ctx, base->tables, base->root, item->string, NULL, NULL,
+                                         &present));
+        bool twice = strcmp(present, item->string) != 0 &&
+                     cJSON_GetObjectItemCaseSensitive(set, present) != NULL;
+        free(present);
+        if (twice) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: /set: %.200s is given under its present name too (allowed: one "
+                            "of the two)",
+                            file, item->string);
         }
     }
     return BST_OK;
@@ -94,6 +119,9 @@ static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
     if (set && !cJSON_IsObject(set)) {
         status = bst_config_fail(ctx, base->name, "/set", set, "wrong type",
                                  "an object of values by JSON pointer");
+    }
+    if (status == BST_OK) {
+        status = check_former(ctx, base, set, base->name);
     }
     if (status == BST_OK) {
         status = move_values(ctx, own->root, false, base);
@@ -137,10 +165,17 @@ static char *relative_path(const char *file, const char *given) {
     return path;
 }
 
-static bst_status load(bst_ctx *ctx, const char *path, file_chain *chain, bst_json **out) {
+static bst_status load(bst_ctx *ctx, const char *path, const bst_document_tables *tables,
+                       file_chain *chain, bst_json **out) {
     BST_TRY(add_link(ctx, path, chain));
     BST_TRY(bst_json_load(ctx, path, out));
     bst_json *own = *out;
+    bst_status described = tables ? bst_json_describe(ctx, own, tables, true) : BST_OK;
+    if (described != BST_OK) {
+        bst_json_free(own);
+        *out = NULL;
+        return described;
+    }
     const cJSON *extends = cJSON_GetObjectItemCaseSensitive(own->root, "extends");
     if (!extends) {
         return BST_OK;
@@ -153,8 +188,8 @@ static bst_status load(bst_ctx *ctx, const char *path, file_chain *chain, bst_js
                                  "a string, the file that this one changes");
     } else {
         char *file = relative_path(path, extends->valuestring);
-        status =
-            file ? load(ctx, file, chain, &base) : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+        status = file ? load(ctx, file, tables, chain, &base)
+                      : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
         free(file);
         if (status != BST_OK) {
             bst_fail_prefix(ctx, status, "%.400s: /extends", path);
@@ -176,9 +211,14 @@ static bst_status load(bst_ctx *ctx, const char *path, file_chain *chain, bst_js
 }
 
 bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out) {
+    return bst_json_load_described(ctx, path, NULL, out);
+}
+
+bst_status bst_json_load_described(bst_ctx *ctx, const char *path,
+                                   const bst_document_tables *tables, bst_json **out) {
     *out = NULL;
     file_chain chain = {.count = 0};
-    bst_status status = load(ctx, path, &chain, out);
+    bst_status status = load(ctx, path, tables, &chain, out);
     for (int i = 0; i < chain.count; i++) {
         free(chain.files[i]);
     }

@@ -23,11 +23,17 @@ struct bst_json {
     struct cJSON *root;
     bst_json_origin *origins; /* for a file that extends another, later entries win; else NULL */
     int origin_count;
+    const struct bst_document_tables *tables; /* NULL: pointers are taken as they are */
+    bool is_copy; /* of a described document, which has warned of its former names */
 };
 
 /* Records that the value at `pointer` comes from `file`. */
 bst_status bst_json_note_origin(bst_ctx *ctx, bst_json *json, const char *pointer,
                                 const char *file) BST_MUST_CHECK;
+
+/* bst_json_assign; `where`: beginning of the warnings about former names, NULL: none. */
+bst_status bst_json_assign_from(bst_ctx *ctx, bst_json *json, const char *pointer,
+                                struct cJSON *value, const char *where) BST_MUST_CHECK;
 
 /* True if the first `length` bytes are a JSON pointer below the root without empty keys: "/" before
  * each key or array index. */

@@ -126,7 +126,7 @@ static const char transport[] =
     "are ignored |\n"
     "| `link_takeover` | `hello` for a part that another peer plays | the new peer plays it |\n"
     "| `link_left` | `end`, or a lost connection | the part waits for a `hello` |\n"
-    "| `link_unanswered` | no valid answer within `timeout_s` | `on_silence`: the run ends with an "
+    "| `link_unanswered` | no valid answer within `timeout_s` | `on_timeout`: the run ends with an "
     "error, or continues without the part |\n"
     "| `link_connected`, `link_disconnected` | connections; a part of more than 16 MiB ends one | "
     "the part waits for a `hello` |\n"

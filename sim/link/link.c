@@ -22,9 +22,10 @@ const bst_config_desc bst_link_config_table[] = {
              "For which the run waits for a peer's answer to a step."),
     BST_REAL(bst_link_config, connect_timeout_s, "s", 0.001, 86400, "60",
              "For which the first step of a part waits for a peer that plays it."),
-    BST_ENUM(bst_link_config, on_silence, silence_names, "\"stop\"",
+    BST_ENUM(bst_link_config, on_timeout, silence_names, "\"stop\"",
              "When no answer comes in time: the run ends with an error, or goes on without what "
              "the part would have said."),
+    BST_FORMER("on_silence", "on_timeout"),
     BST_BOOL(bst_link_config, shared_memory, "false",
              "Frames go by shared memory to peers that take them so."),
     BST_CONFIG_END};
@@ -247,8 +248,8 @@ int64_t bst_link_news(bst_link *link, int index, const char **name) {
     if (!bst_link_counter(link, index, name, &count)) {
         return -1;
     }
-    int64_t grown = count - link->told[index];
-    link->told[index] = count;
+    int64_t grown = count - link->reported[index];
+    link->reported[index] = count;
     return grown;
 }
 

@@ -21,7 +21,7 @@ typedef struct bst_link_config {
     char keys_file[512];      /* "": no authentication */
     double timeout_s;         /* for the answer to a step */
     double connect_timeout_s; /* for a peer's connection, before its first step */
-    int32_t on_silence;       /* bst_link_silence */
+    int32_t on_timeout;       /* bst_link_silence */
     bool shared_memory;
 } bst_link_config;
 
@@ -97,7 +97,7 @@ typedef struct bst_link_messages {
 } bst_link_messages;
 
 /* Executes one step of a part: sends the inputs (at most 63) and waits for the answer. *answered
- * false: time-out, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer, no answer, or the peer
+ * false: time-out, and on_timeout is BST_LINK_GO_ON. BST_ERR_IO: no peer, no answer, or the peer
  * reports a failure; BST_ERR_INTERRUPTED: bst_link_on_wait. */
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                              const bst_link_messages *messages, bool *answered) BST_MUST_CHECK;

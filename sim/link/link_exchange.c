@@ -43,7 +43,9 @@ static void send_step(bst_link *link, link_exchange *x, sending *s) {
     }
 }
 
-static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool *answered) {
+/* Handles a step without answer: ends the run, or continues without the peer (on_silence). */
+static bst_status handle_silence(bst_link *link, link_exchange *x, double waited_s,
+                                 bool *answered) {
     link_part *part = &link->parts[x->part];
     int peer = part->peer;
     if (peer >= 0) {
@@ -58,7 +60,7 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
     for (int i = 0; i < x->answer.output_count; i++) {
         x->answer.outputs[i].given = false; /* discard an incomplete answer */
     }
-    if (link->config.on_silence == BST_LINK_GO_ON) {
+    if (link->config.on_timeout == BST_LINK_GO_ON) {
         if (peer >= 0) {
             bst_link_unassign(link, peer); /* until the next `hello` */
         }
@@ -67,7 +69,7 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
     if (peer >= 0) {
         return bst_fail(x->ctx, BST_ERR_IO,
                         "link: \"%s\" has not answered step %lld of %s within %.3g s; "
-                        "/link/timeout_s allows more, /link/on_silence \"go_on\" does without",
+                        "/link/timeout_s allows more, /link/on_timeout \"go_on\" does without",
                         link->peers[peer].name, (long long)part->step - 1, part->about.instance,
                         waited_s);
     }
@@ -185,6 +187,7 @@ static bst_status take_until(bst_link *link, link_exchange *x, double until,
     }
 }
 
+/* True if the part can accept a further step without waiting. */
 static bool has_place(bst_link *link, link_exchange *x) {
     link_part *part = &link->parts[x->part];
     bool finished = false;
@@ -194,6 +197,7 @@ static bool has_place(bst_link *link, link_exchange *x) {
     return finished || part->peer < 0 || free_place(link, part);
 }
 
+/* True if all steps sent to the part have been answered. */
 static bool newest_finished(bst_link *link, link_exchange *x) {
     link_part *part = &link->parts[x->part];
     bool waiting = false;
@@ -228,7 +232,7 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     }
     if (part->peer >= 0 && bst_wall_seconds() - oldest > link->config.timeout_s) {
         bool answered;
-        BST_TRY(silent(link, &x, bst_wall_seconds() - oldest, &answered));
+        BST_TRY(handle_silence(link, &x, bst_wall_seconds() - oldest, &answered));
     }
     *ready = part->peer >= 0 && place;
     if (!*ready) {
@@ -239,8 +243,8 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
 }
 
 /* Executes a step without waiting for its answer, or only for hold_s. */
-static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                              const bst_link_messages *m, bool *answered) {
+static bst_status exchange_ahead(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                                 const bst_link_messages *m, bool *answered) {
     link_part *part = &link->parts[number];
     *answered = false;
     for (int i = 0; i < m->output_count; i++) {
@@ -289,15 +293,16 @@ bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
             double waited = bst_wall_seconds() - began;
             if (link->parts[i].peer < 0 && waited >= link->config.connect_timeout_s) {
                 bool answered;
-                return silent(link, &x, waited, &answered);
+                return handle_silence(link, &x, waited, &answered);
             }
         }
     }
     return BST_OK;
 }
 
-static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                          const bst_link_messages *m, bool *answered) {
+/* Sends a step to the peer and waits for its answer, repeating it for a reconnected peer. */
+static bst_status exchange_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                                   const bst_link_messages *m, bool *answered) {
     link->exchanges++;
     link_part *part = &link->parts[number];
     link_exchange x = {.ctx = ctx,
@@ -311,8 +316,8 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     sending s = {.inputs = m->inputs, .count = m->input_count};
     double began = bst_wall_seconds();
     bool first = !part->had_peer;
-    /* with on_silence = go on, do not wait again for a lost peer */
-    bool waits = part->peer >= 0 || first || link->config.on_silence == BST_LINK_STOP;
+    /* with on_timeout = go on, do not wait again for a lost peer */
+    bool waits = part->peer >= 0 || first || link->config.on_timeout == BST_LINK_STOP;
     double limit = !waits ? 0.0 : first ? link->config.connect_timeout_s : link->config.timeout_s;
     double end = began + limit, last = began + LINK_EXTENSIONS * link->config.timeout_s;
     *answered = true;
@@ -346,7 +351,7 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
             end = now + link->config.timeout_s < last ? now + link->config.timeout_s : last;
         }
         if (now >= end && !x.resend) {
-            return silent(link, &x, now - began, answered);
+            return handle_silence(link, &x, now - began, answered);
         }
     }
 }
@@ -359,8 +364,8 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t t
         return bst_link_tape_read(ctx, link, number, tick, m->outputs, m->output_count);
     }
     BST_TRY(bst_link_open(ctx, link));
-    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? awaited : not_awaited)(ctx, link, number, tick,
-                                                                          m, answered));
+    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? exchange_awaited : exchange_ahead)(
+        ctx, link, number, tick, m, answered));
     bst_link_tape_answer(link, number, tick, m->outputs, m->output_count);
     return BST_OK;
 }

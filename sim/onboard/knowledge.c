@@ -33,12 +33,13 @@ static void know_psf(bst_camera *c, double given_fwhm_px, const bst_psf **psf) {
     c->optics = (bst_optics_config){.vignetting = c->optics.vignetting};
 }
 
+/* Applies the calibration errors to the camera model known on board. */
 static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *errors,
                                bst_knowledge *k) {
     bst_camera *c = &k->camera;
     c->pixel_scale_arcsec *= 1.0 + 1e-6 * errors->scale_error_ppm;
     c->rotation_deg += errors->rotation_error_deg;
-    c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
+    c->distortion = errors->override_distortion ? errors->distortion : c->distortion;
     c->throughput *= 1.0 + errors->throughput_error;
     know_psf(c, errors->psf_fwhm_px, &k->psf);
     bst_status status = bst_camera_prepare(ctx, c);
@@ -75,7 +76,8 @@ bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observ
     }
     bst_status status = alter_camera(ctx, &config->knowledge.camera, k);
     const bst_star_errors_config *errors = &config->knowledge.stars;
-    if (status == BST_OK && (errors->dropped_fraction > 0.0 || errors->displaced_fraction > 0.0)) {
+    if (status == BST_OK &&
+        (errors->missing_fraction > 0.0 || errors->position_error_fraction > 0.0)) {
         status = bst_stars_with_errors(ctx, k->own_stars ? k->own_stars : world->stars, errors,
                                        &k->altered);
     }
@@ -176,10 +178,12 @@ static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, doub
     return bst_world_cue_nominal_direction(ctx, k->world, &at, out);
 }
 
+/* Rotation error of the cue; none for a task's target. */
 static bst_quat error_of(const bst_knowledge_view *view) {
     return view->tasked ? (bst_quat){0.0, 0.0, 0.0, 1.0} : view->cue_error;
 }
 
+/* Nominal cue direction at a full second, cached. */
 static const bst_onboard_cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
     bst_onboard_cue_knot *knot =
         &view->knots[((second % BST_CUE_KNOTS) + BST_CUE_KNOTS) % BST_CUE_KNOTS];

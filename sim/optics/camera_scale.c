@@ -4,10 +4,12 @@
 /* tolerance of redundant values: data sheets have three digits or more */
 static const double AGREES = 1e-3;
 
+/* True if two values of a camera parameter agree. */
 static bool agree(double a, double b) {
     return fabs(a - b) <= AGREES * fmax(fabs(a), fabs(b));
 }
 
+/* Fails: two settings of the camera give different values. */
 static bst_status contradict(bst_ctx *ctx, const char *first, double a, const char *second,
                              double b, const char *unit) {
     return bst_fail(
@@ -42,37 +44,40 @@ static bst_status focal_length(bst_ctx *ctx, bst_camera *c) {
 
 bst_status bst_camera_resolve_scale(bst_ctx *ctx, bst_camera *c) {
     BST_TRY(focal_length(ctx, c));
-    double pitch_m = 1e-6 * c->pixel_um;
+    double pitch_m = 1e-6 * c->pixel_pitch_um;
     double by_focal_arcsec = pitch_m / c->focal_length_m / BST_ARCSEC_RAD;
     if (isnan(c->pixel_scale_arcsec) && isnan(by_focal_arcsec)) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "the pixel scale is missing: give pixel_scale_arcsec, or pixel_um and "
-                        "focal_length_m, or pixel_um and f_number");
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "the pixel scale is missing: give pixel_scale_arcsec, or pixel_pitch_um and "
+            "focal_length_m, or pixel_pitch_um and f_number");
     }
     if (isnan(c->pixel_scale_arcsec)) {
         c->pixel_scale_arcsec = by_focal_arcsec;
         if (!(by_focal_arcsec >= 1e-3 && by_focal_arcsec <= 600.0)) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "pixel_um over the focal length gives a pixel scale of %.6g arcsec "
-                            "(allowed: 0.001 to 600)",
-                            by_focal_arcsec);
+            return bst_fail(
+                ctx, BST_ERR_CONFIG,
+                "pixel_pitch_um over the focal length gives a pixel scale of %.6g arcsec "
+                "(allowed: 0.001 to 600)",
+                by_focal_arcsec);
         }
     } else if (!isnan(by_focal_arcsec) && !agree(c->pixel_scale_arcsec, by_focal_arcsec)) {
         return contradict(ctx, "pixel_scale_arcsec", c->pixel_scale_arcsec,
-                          "pixel_um over the focal length", by_focal_arcsec, "arcsec");
+                          "pixel_pitch_um over the focal length", by_focal_arcsec, "arcsec");
     }
     double scale_rad = c->pixel_scale_arcsec * BST_ARCSEC_RAD;
     if (isnan(c->focal_length_m)) {
         c->focal_length_m = pitch_m / scale_rad;
     }
-    if (isnan(c->pixel_um)) {
-        c->pixel_um = 1e6 * scale_rad * c->focal_length_m;
+    if (isnan(c->pixel_pitch_um)) {
+        c->pixel_pitch_um = 1e6 * scale_rad * c->focal_length_m;
     }
     if (isnan(c->f_number)) {
         c->f_number = c->focal_length_m / c->aperture_m;
     }
     BST_TRY(same_as(ctx, "f_number", c->f_number, "optics/f_number", c->optics.f_number, ""));
-    BST_TRY(same_as(ctx, "pixel_um", c->pixel_um, "optics/pixel_um", c->optics.pixel_um, "um"));
-    return same_as(ctx, "pixel_um", c->pixel_um, "background/pixel_um", c->background.pixel_um,
-                   "um");
+    BST_TRY(same_as(ctx, "pixel_pitch_um", c->pixel_pitch_um, "optics/pixel_pitch_um",
+                    c->optics.pixel_pitch_um, "um"));
+    return same_as(ctx, "pixel_pitch_um", c->pixel_pitch_um, "background/pixel_pitch_um",
+                   c->background.pixel_pitch_um, "um");
 }

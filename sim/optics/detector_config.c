@@ -5,7 +5,7 @@
 static const char *const wells[] = {"clip", "bloom", NULL};
 static const char *const quantisers[] = {"uniform", "square_root", "table", NULL};
 
-static const bst_config_desc hits_table[] = {
+static const bst_config_desc cosmic_ray_table[] = {
     BST_REAL(bst_detector_cosmic_ray_config, rate_per_cm2_s, "1/cm2/s", 0, 1e6, "0",
              "Energetic particles through the detector; 0: none."),
     BST_REAL(bst_detector_cosmic_ray_config, pixel_pitch_um, "um", 0.5, 200, "13",
@@ -17,8 +17,9 @@ static const bst_config_desc hits_table[] = {
     BST_REAL(bst_detector_cosmic_ray_config, straggling, "", 0, 1, "0.15",
              "Spread of that charge from track to track: scale of a Moyal distribution, in most "
              "probable values."),
-    BST_REAL(bst_detector_cosmic_ray_config, frame_s, "s", 0, 1e4, "0",
+    BST_REAL(bst_detector_cosmic_ray_config, readout_s, "s", 0, 1e4, "0",
              "Time besides the exposure in which hits are collected (transfer and read-out)."),
+    BST_FORMER("frame_s", "readout_s"),
     BST_CONFIG_END,
 };
 
@@ -64,23 +65,27 @@ const bst_config_desc bst_detector_table[] = {
              "Share of pixels without response to light."),
     BST_INT(bst_detector_config, bad_columns, "", 0, 16384, "0",
             "Columns without response to light, from a random row on away from the read-out."),
-    BST_SEED(bst_detector_config, pattern_seed, "\"0x1\"",
+    BST_SEED(bst_detector_config, fixed_pattern_seed, "\"0x1\"",
              "Seed of all fixed patterns, which also depend on the names of observer and sensor; "
              "the same in all runs of a study."),
+    BST_FORMER("pattern_seed", "fixed_pattern_seed"),
     BST_REAL(bst_detector_config, column_offset_rms_e, "e", 0, 1e5, "0",
              "Fixed offsets of the columns, RMS."),
     BST_REAL(bst_detector_config, row_offset_rms_e, "e", 0, 1e5, "0",
              "Fixed offsets of the rows, RMS."),
     BST_REAL(bst_detector_config, row_noise_e, "e", 0, 1e5, "0",
              "Offsets of the rows that are new in every frame, RMS."),
-    BST_REAL(bst_detector_config, read_tail_fraction, "", 0, 1, "0",
+    BST_REAL(bst_detector_config, telegraph_noise_fraction, "", 0, 1, "0",
              "Share of reads with more noise (random telegraph signals and the like)."),
-    BST_REAL(bst_detector_config, read_tail_rms_e, "e", 0, 1e5, "0",
+    BST_FORMER("read_tail_fraction", "telegraph_noise_fraction"),
+    BST_REAL(bst_detector_config, telegraph_noise_rms_e, "e", 0, 1e5, "0",
              "Noise of those reads on top of the read noise, RMS."),
+    BST_FORMER("read_tail_rms_e", "telegraph_noise_rms_e"),
     BST_REALS(bst_detector_config, nonlinearity, "", -1, 1, "[0, 0, 0]",
               "c of the read charge q (1 + c1 u + c2 u^2 + c3 u^3), u = q / full_well_e."),
-    BST_ENUM(bst_detector_config, full_well, wells, "\"clip\"",
+    BST_ENUM(bst_detector_config, saturation, wells, "\"clip\"",
              "Charge above the full well is lost (clip) or flows along its column (bloom)."),
+    BST_FORMER("full_well", "saturation"),
     BST_REAL(bst_detector_config, frame_transfer_s, "s", 0, 100, "0",
              "Time of the transfer of a whole frame under light; 0: none."),
     BST_REAL(
@@ -88,7 +93,8 @@ const bst_config_desc bst_detector_table[] = {
         "Rolling shutter: each row of the window is exposed so much later than the row before; "
         "below 0: from the last row on. The exposure's times are those of the window's middle "
         "row. 0: all rows at once."),
-    BST_OBJECT(bst_detector_config, hits, hits_table, "{}", "Radiation hits."),
+    BST_OBJECT(bst_detector_config, cosmic_rays, cosmic_ray_table, "{}", "Radiation hits."),
+    BST_FORMER("hits", "cosmic_rays"),
     BST_OBJECT(bst_detector_config, quantisation, quantisation_table, "{}",
                "From the converter's digital numbers to the frame's."),
     BST_CONFIG_END,
@@ -102,7 +108,7 @@ double bst_detector_dark_factor(const bst_detector_config *d) {
 }
 
 bool bst_detector_config_whole_columns(const bst_detector_config *d) {
-    return d->full_well == BST_WELL_BLOOM || d->frame_transfer_s > 0.0;
+    return d->saturation == BST_WELL_BLOOM || d->frame_transfer_s > 0.0;
 }
 
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) {
@@ -110,7 +116,7 @@ bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d)
         return bst_fail(
             ctx, BST_ERR_CONFIG,
             "row_time_s: a rolling shutter goes neither with frame_transfer_s nor with "
-            "the full_well \"bloom\": charge that runs along columns belongs to sensors "
+            "the saturation \"bloom\": charge that runs along columns belongs to sensors "
             "that expose all rows at once; set one of them to its default");
     }
     return BST_OK;

@@ -66,12 +66,13 @@ const bst_config_desc bst_optics_config_table[] = {
     BST_REAL(bst_optics_config, moffat_beta, "", 1.5, 100, "2.5", "moffat: exponent."),
     BST_REAL(bst_optics_config, q, "", 0, 100, "0",
              "diffraction: wavelength times focal ratio over pixel pitch, at the middle of the "
-             "band; 0: from f_number and pixel_um, or else from aperture_m and "
+             "band; 0: from f_number and pixel_pitch_um, or else from aperture_m and "
              "pixel_scale_arcsec."),
     BST_REAL(bst_optics_config, f_number, "", 0, 1000, "0",
              "diffraction: focal ratio, for defocus, and for q where that is 0."),
-    BST_REAL(bst_optics_config, pixel_um, "um", 0, 1000, "0",
+    BST_REAL(bst_optics_config, pixel_pitch_um, "um", 0, 1000, "0",
              "diffraction: pixel pitch, for q where that is 0."),
+    BST_FORMER("pixel_um", "pixel_pitch_um"),
     BST_REALS(bst_optics_config, band_nm, "nm", 0, 1e6, "[0, 0]",
               "diffraction: ends of the band that the PSF is averaged over, evenly; both 0: the "
               "response of camera.band, or 507 to 595 where that has no spectrum."),
@@ -99,9 +100,10 @@ const bst_config_desc bst_optics_config_table[] = {
              "diffraction: distance of the detector behind the focus; needs f_number."),
     BST_REAL(bst_optics_config, diffusion_px, "px", 0, 20, "0",
              "Charge diffusion: standard deviation of a Gaussian."),
-    BST_REALS(bst_optics_config, pixel_fill, "", 0.05, 1, "[1, 1]",
+    BST_REALS(bst_optics_config, fill_factor, "", 0.05, 1, "[1, 1]",
               "Light-sensitive part of the pixel's pitch in x and y, for the PSF's shape; the "
               "light lost beside it belongs to quantum_efficiency."),
+    BST_FORMER("pixel_fill", "fill_factor"),
     BST_PATH(bst_optics_config, psf_file, "\"\"",
              "file: FITS image of the PSF before integration over the pixel, or a cube with one "
              "plane for each node of the field grid; relative to the scenario's folder."),

@@ -34,3 +34,10 @@ static const bst_scenario_registry registry = {.modules = modules,
 const bst_scenario_registry *bst_registry_shipped(void) {
     return &registry;
 }
+
+static const bst_document_tables tables = {bst_scenario_table, bst_scenario_tables_inside,
+                                           &registry};
+
+const bst_document_tables *bst_registry_tables(void) {
+    return &tables;
+}

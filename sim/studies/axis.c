@@ -48,11 +48,12 @@ bst_status bst_study_read_axis(bst_ctx *ctx, const bst_study *study, const cJSON
     const cJSON *pointer = cJSON_GetObjectItemCaseSensitive(node, "path");
     BST_TRY(check_pointer(ctx, study, path, pointer));
     axis->path = pointer->valuestring;
-    BST_TRY(read_raw_array(ctx, study, node, axis->where, "also", "an array of JSON pointers",
-                           &axis->also));
+    BST_TRY(read_raw_array(ctx, study, node, axis->where, "linked_paths",
+                           "an array of JSON pointers", &axis->linked_paths));
     int i = 0;
-    for (const cJSON *item = axis->also ? axis->also->child : NULL; item; item = item->next) {
-        snprintf(path, sizeof path, "%s/also/%d", axis->where, i++);
+    for (const cJSON *item = axis->linked_paths ? axis->linked_paths->child : NULL; item;
+         item = item->next) {
+        snprintf(path, sizeof path, "%s/linked_paths/%d", axis->where, i++);
         BST_TRY(check_pointer(ctx, study, path, item));
     }
     BST_TRY(read_raw_array(ctx, study, node, axis->where, "values", "an array of values",

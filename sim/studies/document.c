@@ -48,7 +48,7 @@ static bst_status read_base(bst_ctx *ctx, const bst_study *study, const char *st
     if (n < 0 || (size_t)n >= sizeof base->file) {
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: the path is too long", config->file);
     }
-    BST_TRY(bst_json_load_extended(ctx, base->file, &base->json));
+    BST_TRY(bst_json_load_described(ctx, base->file, study->tables, &base->json));
     if (!cJSON_IsObject(bst_json_root(base->json))) {
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: is no scenario", base->file);
     }

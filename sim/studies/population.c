@@ -28,10 +28,10 @@ static bst_status check_number(bst_ctx *ctx, const bst_study *study,
                         "\"to\")",
                         study->file, p->where, (long long)n->from, (long long)n->to);
     }
-    if (n->distribution == BST_NUMBER_POISSON && n->mean > (double)n->most) {
+    if (n->distribution == BST_NUMBER_POISSON && n->mean > (double)n->max) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "%s: %s/number/most: less than the mean (found %lld; allowed: %g or more)",
-                        study->file, p->where, (long long)n->most, n->mean);
+                        "%s: %s/number/max: less than the mean (found %lld; allowed: %g or more)",
+                        study->file, p->where, (long long)n->max, n->mean);
     }
     return BST_OK;
 }
@@ -191,7 +191,8 @@ bst_status bst_study_populations_open(bst_ctx *ctx, bst_study *study, const char
     for (int a = 0; a < study->axis_count; a++) {
         const bst_study_axis *axis = &study->axes[a];
         bool varies = bst_study_population_pointer(axis->path);
-        for (const cJSON *also = axis->also ? axis->also->child : NULL; also; also = also->next) {
+        for (const cJSON *also = axis->linked_paths ? axis->linked_paths->child : NULL; also;
+             also = also->next) {
             varies = varies || bst_study_population_pointer(also->valuestring);
         }
         study->populations_vary = study->populations_vary || varies;
@@ -269,7 +270,7 @@ static int64_t draw_number(const bst_study *study, const bst_study_population *p
         return n->from + (int64_t)fmin(floor(u * span), span - 1.0);
     }
     int64_t k = poisson(n->mean, u);
-    for (uint64_t b = 1; k > n->most; b++) { /* at least half of the draws are within the limit */
+    for (uint64_t b = 1; k > n->max; b++) { /* at least half of the draws are within the limit */
         k = poisson(n->mean, bst_rng_uniform(key, counter, b));
     }
     return k;
@@ -296,7 +297,7 @@ void bst_study_population_reach(const bst_study_population *p, double ends[2]) {
     const bst_study_number_config *n = &p->config.number;
     bool uniform = n->distribution == BST_NUMBER_UNIFORM;
     ends[0] = (double)(n->distribution == BST_NUMBER_FIXED ? n->count : uniform ? n->from : 0);
-    ends[1] = (double)(n->distribution == BST_NUMBER_FIXED ? n->count : uniform ? n->to : n->most);
+    ends[1] = (double)(n->distribution == BST_NUMBER_FIXED ? n->count : uniform ? n->to : n->max);
 }
 
 /* ------------------------------------------------------------------ satellites of a file */
@@ -384,7 +385,7 @@ static bst_status disperse(bst_ctx *ctx, const bst_study *study, const bst_study
                            const bst_study_value *drawn, int dispersion, int index,
                            bst_json *json) {
     const bst_study_axis *axis = &p->axes[dispersion];
-    const cJSON *also = axis->also ? axis->also->child : NULL;
+    const cJSON *also = axis->linked_paths ? axis->linked_paths->child : NULL;
     const char *own = axis->path;
     while (own) {
         char pointer[512];

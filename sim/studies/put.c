@@ -81,7 +81,8 @@ bst_status bst_study_put_all(bst_ctx *ctx, const bst_study *study, const bst_stu
         if (bst_study_population_pointer(axis->path) == populations) {
             BST_TRY(bst_study_put(ctx, study, axis, &values[a], axis->path, json));
         }
-        for (const cJSON *also = axis->also ? axis->also->child : NULL; also; also = also->next) {
+        for (const cJSON *also = axis->linked_paths ? axis->linked_paths->child : NULL; also;
+             also = also->next) {
             if (bst_study_population_pointer(also->valuestring) == populations) {
                 BST_TRY(bst_study_put(ctx, study, axis, &values[a], also->valuestring, json));
             }

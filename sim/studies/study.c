@@ -314,6 +314,7 @@ static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
 static bst_status open_study(bst_ctx *ctx, const char *file, bst_study *study) {
     snprintf(study->file, sizeof study->file, "%s", file);
     BST_TRY(bst_json_load(ctx, file, &study->json));
+    BST_TRY(bst_study_rename(ctx, study));
     BST_TRY(bst_config_read(ctx, study->json, bst_json_root(study->json), "", bst_study_table,
                             &study->config));
     if (!bst_text_is_file_name(study->config.name) || strchr(study->config.name, ' ')) {
@@ -331,8 +332,10 @@ static bst_status open_study(bst_ctx *ctx, const char *file, bst_study *study) {
     return status == BST_OK ? set_digest(ctx, study) : status;
 }
 
-bst_status bst_study_open(bst_ctx *ctx, const char *file, bst_study *out) {
+bst_status bst_study_open(bst_ctx *ctx, const char *file, const bst_document_tables *tables,
+                          bst_study *out) {
     memset(out, 0, sizeof *out);
+    out->tables = tables;
     bst_status status = open_study(ctx, file, out);
     if (status != BST_OK) {
         bst_study_close(out);

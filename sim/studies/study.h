@@ -4,6 +4,7 @@
 #ifndef BST_STUDIES_STUDY_H
 #define BST_STUDIES_STUDY_H
 
+#include "sim/core/former_names.h"
 #include "sim/studies/study_config.h"
 
 struct cJSON;
@@ -24,8 +25,8 @@ typedef struct bst_study_axis {
     char name[BST_STUDY_NAME_BYTES]; /* column name: unique; letters, digits, underscores */
     char where[64];                  /* JSON pointer for messages: "/sweeps/0/axes/1" */
     const char *path;
-    const struct cJSON *also;   /* pointers that get the same value; NULL: none */
-    const struct cJSON *values; /* NULL: a range */
+    const struct cJSON *linked_paths; /* pointers that get the same value; NULL: none */
+    const struct cJSON *values;       /* NULL: a range */
     int value_count;
     const bst_study_axis_config *axis;             /* NULL: not part of a sweep */
     const bst_study_dispersion_config *dispersion; /* NULL: no dispersion */
@@ -72,6 +73,7 @@ typedef struct bst_study_population_file {
 } bst_study_population_file;
 
 typedef struct bst_study {
+    const bst_document_tables *tables; /* of scenarios; NULL: none */
     bst_study_config config;
     char file[512];
     bst_json *json;
@@ -104,8 +106,10 @@ typedef struct bst_study_place {
 } bst_study_place;
 
 /* Reads a study and its scenarios. Errors name file, JSON path and allowed values. Nothing is
- * written. Free with bst_study_close, also after an error. */
-bst_status bst_study_open(bst_ctx *ctx, const char *file, bst_study *out) BST_MUST_CHECK;
+ * written. Free with bst_study_close, also after an error. `tables`: tables of scenarios, for
+ * former names of their keys; they outlive the study. NULL: none are replaced. */
+bst_status bst_study_open(bst_ctx *ctx, const char *file, const bst_document_tables *tables,
+                          bst_study *out) BST_MUST_CHECK;
 /* Frees the content of a study and clears it. */
 void bst_study_close(bst_study *study);
 

@@ -30,7 +30,8 @@ static const bst_config_desc scenario_table[] = {
 
 static const bst_config_desc axis_table[] = {
     BST_STRING(bst_study_axis_config, path, NULL, PATH_DOC),
-    RAW("also", "[]", ALSO_DOC),
+    RAW("linked_paths", "[]", ALSO_DOC),
+    BST_FORMER("also", "linked_paths"),
     BST_STRING(bst_study_axis_config, name, "\"\"", NAME_DOC),
     RAW("values", "[]",
         "The values one by one, of any type; else they are taken from the range from .. to."),
@@ -87,15 +88,19 @@ static const bst_config_desc sweep_table[] = {
                  "Round the result to a whole number.")
 
 static const bst_config_desc dispersion_table[] = {
-    BST_STRING(bst_study_dispersion_config, path, NULL, PATH_DOC), RAW("also", "[]", ALSO_DOC),
-    BST_STRING(bst_study_dispersion_config, name, "\"\"", NAME_DOC), DISPERSION_LAW,
+    BST_STRING(bst_study_dispersion_config, path, NULL, PATH_DOC),
+    RAW("linked_paths", "[]", ALSO_DOC),
+    BST_FORMER("also", "linked_paths"),
+    BST_STRING(bst_study_dispersion_config, name, "\"\"", NAME_DOC),
+    DISPERSION_LAW,
     BST_CONFIG_END};
 
 static const bst_config_desc object_dispersion_table[] = {
     BST_STRING(bst_study_dispersion_config, path, NULL,
                "What is varied: a JSON pointer into the object, such as \"/orbit/offset_rtn_m/0\" "
                "or \"/brightness/standard_v_mag\"."),
-    RAW("also", "[]", ALSO_DOC), DISPERSION_LAW, BST_CONFIG_END};
+    RAW("linked_paths", "[]", ALSO_DOC), BST_FORMER("also", "linked_paths"), DISPERSION_LAW,
+    BST_CONFIG_END};
 
 static const bst_config_desc number_table[] = {
     BST_ENUM(bst_study_number_config, distribution, number_laws, "\"fixed\"",
@@ -105,8 +110,9 @@ static const bst_config_desc number_table[] = {
     BST_INT(bst_study_number_config, from, "", 0, 10000, "0", "Least number (uniform)."),
     BST_INT(bst_study_number_config, to, "", 0, 10000, "0", "Greatest number (uniform)."),
     BST_REAL(bst_study_number_config, mean, "", 0, 500, "1", "Mean (poisson)."),
-    BST_INT(bst_study_number_config, most, "", 0, 10000, "1000",
+    BST_INT(bst_study_number_config, max, "", 0, 10000, "1000",
             "Greater numbers are drawn again; at least the mean (poisson)."),
+    BST_FORMER("most", "max"),
     BST_CONFIG_END};
 
 const bst_config_desc bst_population_table[] = {
@@ -145,10 +151,11 @@ const bst_config_desc bst_study_pd_table[] = {
              "Length of the targets' streaks; 0: points."),
     BST_REAL(bst_study_pd_config, star_streak_px, "px", 0, 1000, "0",
              "By how much stars streak, the camera turning with the targets."),
-    BST_REAL(bst_study_pd_config, apart_px, "px", 1, 1000, "24",
+    BST_REAL(bst_study_pd_config, min_separation_px, "px", 1, 1000, "24",
              "Least distance between targets, their own length not counted."),
+    BST_FORMER("apart_px", "min_separation_px"),
     BST_BOOL(bst_study_pd_config, known_rate, "false",
-             "The camera turns, and image processing is told."),
+             "The camera moves, and its motion is known to image processing."),
     BST_BOOL(bst_study_pd_config, stars, "false", "Keep the scenario's stars and sky."),
     BST_CONFIG_END};
 

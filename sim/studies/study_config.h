@@ -40,7 +40,7 @@ typedef enum bst_study_number_law {
     BST_NUMBER_POISSON
 } bst_study_number_law;
 
-/* The keys "also" and "values" are read when axes are created. */
+/* The keys "linked_paths" and "values" are read when axes are created. */
 typedef struct bst_study_axis_config {
     char path[256];
     char name[64];
@@ -56,7 +56,7 @@ typedef struct bst_study_sweep_config {
     bst_config_list axes; /* bst_study_axis_config */
 } bst_study_sweep_config;
 
-/* The keys "also", "values" and "weights" are read when axes are created. */
+/* The keys "linked_paths", "values" and "weights" are read when axes are created. */
 typedef struct bst_study_dispersion_config {
     char path[256];
     char name[64];
@@ -72,7 +72,7 @@ typedef struct bst_study_number_config {
     int64_t count;        /* fixed */
     int64_t from, to;     /* uniform */
     double mean;          /* poisson */
-    int64_t most;         /* poisson */
+    int64_t max;          /* poisson */
 } bst_study_number_config;
 
 /* A population of objects drawn for each run. The key "object" is read when populations are
@@ -90,7 +90,7 @@ typedef struct bst_study_pd_config {
     double snr_first, snr_last, snr_step;
     int64_t trials, empty_frames;
     double false_alarms_per_frame, background_e, jitter_px;
-    double streak_px, star_streak_px, apart_px;
+    double streak_px, star_streak_px, min_separation_px;
     bool known_rate, stars;
 } bst_study_pd_config;
 

@@ -40,7 +40,7 @@ static bst_status settle_study(bst_ctx *ctx, const bst_study *study, const char 
     snprintf(path, sizeof path, "%.4000s/study.json", out);
     if (access(path, F_OK) == 0) {
         bst_ctx quiet = {0};
-        bool same = bst_study_open(&quiet, path, &there) == BST_OK &&
+        bool same = bst_study_open(&quiet, path, study->tables, &there) == BST_OK &&
                     strcmp(there.digest, study->digest) == 0;
         bst_study_close(&there);
         if (!same) {

@@ -5,6 +5,9 @@
 #include "boresight/rng.h"
 #include "sim/studies/study.h"
 
+/* Replaces the former names in a study's document and in its pointers into scenarios, with a
+ * warning for each. Errors: BST_ERR_CONFIG if both names are given, BST_ERR_MEMORY. */
+bst_status bst_study_rename(bst_ctx *ctx, const bst_study *study) BST_MUST_CHECK;
 /* Reads the scenarios of a study; relative paths start at the folder of `file`. */
 bst_status bst_study_read_bases(bst_ctx *ctx, bst_study *study, const char *file) BST_MUST_CHECK;
 /* Computes the points of a latin_hypercube or morris design: factor->unit, levels and steps. */

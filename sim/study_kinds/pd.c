@@ -75,6 +75,7 @@ static const bst_study_metric series[SERIES] = {
     [ERROR_PX] = {"error_rms_px", "px", "RMS error of location per axis.", 0},
 };
 
+/* Reads the settings of a study of detection probability. */
 static bst_status read_settings(bst_ctx *ctx, const bst_study_run *run, bst_study_pd_config *c) {
     const char *file = run->study->file;
     BST_TRY(bst_config_read(ctx, run->study->json, run->settings, "/pd", bst_study_pd_table, c));
@@ -131,7 +132,7 @@ static bst_pd_options options_of(const bst_study_pd_config *c, const bst_study_w
                             .false_alarms = c->false_alarms_per_frame,
                             .background_e = c->background_e < 0.0 ? -1.0 : c->background_e,
                             .jitter_px = c->jitter_px < 0.0 ? -1.0 : c->jitter_px,
-                            .apart_px = c->apart_px,
+                            .min_separation_px = c->min_separation_px,
                             .stars = c->stars,
                             .rates_px = 3.0,
                             .star_streak_px = c->star_streak_px,
@@ -195,6 +196,7 @@ static bst_status fill(bst_ctx *ctx, const bst_pd_scene *s, const bst_pd_result 
     return BST_OK;
 }
 
+/* Measures the detection probability of one run. */
 static bst_status measure(bst_ctx *ctx, const bst_scenario *scenario, const bst_pd_options *options,
                           bst_study_result *out) {
     bst_pd_scene *scene = calloc(1, sizeof *scene);
@@ -261,7 +263,7 @@ static bst_status emit_pd(bst_ctx *ctx, void *user, const bst_study_run *run, FI
                    {"jitter", c.jitter_px, -1.0},
                    {"streak", c.streak_px, 0.0},
                    {"star-streak", c.star_streak_px, 0.0},
-                   {"apart", c.apart_px, 24.0}};
+                   {"apart", c.min_separation_px, 24.0}};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         if (numbers[i].value < numbers[i].unless || numbers[i].value > numbers[i].unless) {
             fprintf(command, " --%s %.17g", numbers[i].name, numbers[i].value);

@@ -79,8 +79,8 @@ bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *nam
     int object = bst_world_find_object(world, name);
     bst_external_states *external = object >= 0 ? world->objects[object].orbit.external : NULL;
     if (!external) {
-        return bst_fail(ctx, BST_ERR_NOT_FOUND, "no object \"%.64s\" whose key \"steered\" is true",
-                        name);
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "no object \"%.64s\" whose key \"external_states\" is true", name);
     }
     return bst_external_states_add(ctx, external, seconds, state);
 }

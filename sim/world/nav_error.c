@@ -13,7 +13,7 @@ void bst_world_nav_estimate(const bst_world *world, int observer, int sensor, do
                             bst_world_state *state) {
     const bst_orbit_error_config *error = &knowledge_of(world, observer, sensor)->orbit;
     const double *p = error->position_rtn_m, *v = error->velocity_rtn_mps;
-    double along = p[1] + error->along_track_mps * believed_s;
+    double along = p[1] + error->along_track_drift_mps * believed_s;
     if (p[0] == 0.0 && along == 0.0 && p[2] == 0.0 && v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0) {
         return;
     }

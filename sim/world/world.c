@@ -79,10 +79,11 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
 static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int observer,
                            int sensor) {
     bst_scene_pst *pst;
-    double own_um = camera->pixel_um > 0.0 ? camera->pixel_um : 0.0; /* NAN: unknown */
-    double pixel_um = camera->optics.pixel_um > 0.0 ? camera->optics.pixel_um : own_um;
+    double own_um = camera->pixel_pitch_um > 0.0 ? camera->pixel_pitch_um : 0.0; /* NAN: unknown */
+    double pixel_pitch_um =
+        camera->optics.pixel_pitch_um > 0.0 ? camera->optics.pixel_pitch_um : own_um;
     bst_status status =
-        bst_scene_pst_create(b->ctx, &camera->background, pixel_um, b->base_dir, &pst);
+        bst_scene_pst_create(b->ctx, &camera->background, pixel_pitch_um, b->base_dir, &pst);
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
                                "%s: /observers/%d/sensors/%d/camera/background", b->scenario,

@@ -66,7 +66,7 @@ static const bst_config_desc burn_table[] = {
     BST_CONFIG_END,
 };
 
-static const bst_config_desc object_table[] = {
+const bst_config_desc bst_object_config_table[] = {
     BST_STRING(bst_object_config, name, NULL, "Name, unique in the scenario."),
     BST_OBJECT(bst_object_config, orbit, orbit_table, NULL, "The object's orbit."),
     BST_REAL(bst_object_config, area_m2, "m2", 0, 1e6, "4",
@@ -76,9 +76,10 @@ static const bst_config_desc object_table[] = {
                "How its light follows from where it is; left out: a diffuse sphere."),
     BST_LIST(bst_object_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
              "Burns in the order of time. The cue does not know of them."),
-    BST_BOOL(bst_object_config, steered, "false",
+    BST_BOOL(bst_object_config, external_states, "false",
              "Its states may come while the run goes, from the peer of an external gimbal; the cue "
              "does not know of them."),
+    BST_FORMER("steered", "external_states"),
     BST_CONFIG_END,
 };
 
@@ -140,7 +141,8 @@ const bst_config_desc bst_world_config_table[] = {
              "Stars beyond the catalogue's limit: none, or drawn by place from a table of star "
              "counts. The onboard side does not know them."),
     BST_REAL(bst_world_config, faint_limit_v_mag, "mag", 6, 21, "16",
-             "Statistical stars are drawn one by one down to this V (and the renderer's v_limit); "
+             "Statistical stars are drawn one by one down to this V (and the renderer's "
+             "star_limit_v_mag); "
              "those fainter add to the background."),
     BST_SEED(bst_world_config, faint_seed, "\"0x5ca1ab1edeadbeef\"",
              "Seed of the statistical sky: the same sky in all runs."),
@@ -150,7 +152,7 @@ const bst_config_desc bst_world_config_table[] = {
              "Sunlight on objects at the edge of the Earth's shadow is refracted, weakened and "
              "reddened by the air; false: an Earth without air. The column sunlit_fraction is the "
              "geometric one in both cases."),
-    BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
+    BST_LIST(bst_world_config, objects, bst_object_config, bst_object_config_table, 0, 100000, "[]",
              "The space objects."),
     BST_LIST(bst_world_config, catalogues, bst_catalogue_config, catalogue_table, 0, 16, "[]",
              "Files of element sets whose satellites are there as well."),
@@ -244,12 +246,15 @@ static const bst_config_desc cue_table[] = {
 };
 
 static const bst_config_desc star_errors_table[] = {
-    BST_REAL(bst_star_errors_config, dropped_fraction, "", 0, 1, "0",
+    BST_REAL(bst_star_errors_config, missing_fraction, "", 0, 1, "0",
              "Fraction of the stars that are missing on board."),
-    BST_REAL(bst_star_errors_config, displaced_fraction, "", 0, 1, "0",
+    BST_FORMER("dropped_fraction", "missing_fraction"),
+    BST_REAL(bst_star_errors_config, position_error_fraction, "", 0, 1, "0",
              "Fraction of the stars whose onboard place is wrong."),
-    BST_REAL(bst_star_errors_config, displaced_sigma_arcsec, "arcsec", 0, 3600, "0",
+    BST_FORMER("displaced_fraction", "position_error_fraction"),
+    BST_REAL(bst_star_errors_config, position_error_sigma_arcsec, "arcsec", 0, 3600, "0",
              "By how much: 1 sigma per axis, Gaussian."),
+    BST_FORMER("displaced_sigma_arcsec", "position_error_sigma_arcsec"),
     BST_SEED(bst_star_errors_config, seed, "\"0x0\"",
              "Draws which ones; the same seed changes the same stars in the same way."),
     BST_CONFIG_END,
@@ -260,11 +265,12 @@ static const bst_config_desc camera_errors_table[] = {
              "Onboard pixel scale over the true one, minus 1."),
     BST_REAL(bst_camera_errors_config, rotation_error_deg, "deg", -180, 180, "0",
              "Onboard rotation of the focal plane minus the true one."),
-    BST_BOOL(bst_camera_errors_config, own_distortion, "false",
+    BST_BOOL(bst_camera_errors_config, override_distortion, "false",
              "Whether the onboard side has distortion coefficients of its own; false: it knows the "
              "camera's."),
+    BST_FORMER("own_distortion", "override_distortion"),
     BST_OBJECT(bst_camera_errors_config, distortion, bst_distortion_config, "{}",
-               "own_distortion: the coefficients on board."),
+               "override_distortion: the coefficients on board."),
     BST_REAL(
         bst_camera_errors_config, throughput_error, "", -0.9, 9, "0",
         "Onboard throughput over the true one, minus 1: what the camera's own zero point is wrong "
@@ -285,8 +291,9 @@ static const bst_config_desc orbit_error_table[] = {
               "Believed minus true position along radius, transverse and normal."),
     BST_REALS(bst_orbit_error_config, velocity_rtn_mps, "m/s", -1e5, 1e5, "[0, 0, 0]",
               "Believed minus true velocity; it does not move the believed position."),
-    BST_REAL(bst_orbit_error_config, along_track_mps, "m/s", -1e5, 1e5, "0",
+    BST_REAL(bst_orbit_error_config, along_track_drift_mps, "m/s", -1e5, 1e5, "0",
              "Growth of the transverse position error from the epoch on."),
+    BST_FORMER("along_track_mps", "along_track_drift_mps"),
     BST_CONFIG_END,
 };
 
@@ -322,8 +329,8 @@ const bst_config_desc bst_sensor_config_table[] = {
                "What the onboard side knows otherwise than it is."),
     BST_ENUM(bst_sensor_config, observation_source, observation_sources, "\"image\"",
              "Where detections come from: a rendered image that is processed (image), or the "
-             "statistics of both without an image (generator): then the module obsgen stands in "
-             "for scenegen and imgproc, with their settings."),
+             "statistics of both without an image (generator): then the module obsgen replaces "
+             "scenegen and imgproc and uses their settings."),
     {.key = "modules",
      .type = BST_CONFIG_RAW,
      .doc = "The modules of this sensor by role: {\"gimbal\": {\"type\": ...}, ...}."},

@@ -27,7 +27,7 @@ enum { BST_STATES_GCRF, BST_STATES_TEME };
 enum { BST_STATE_CARTESIAN, BST_STATE_KEPLERIAN, BST_STATE_ELEMENT_SET, BST_STATE_RELATIVE };
 
 typedef struct bst_initial_state_config {
-    int32_t from; /* BST_STATE_... */
+    int32_t source; /* BST_STATE_... */
     double at_s;
     double position_gcrf_m[3], velocity_gcrf_mps[3];
     double semi_major_axis_m, perigee_radius_m; /* NAN: not given; at least one is required */
@@ -89,7 +89,7 @@ typedef struct bst_object_config {
     double area_m2, albedo;
     bst_brightness_config brightness;
     bst_config_list burns; /* bst_burn_config, sorted by time */
-    bool steered;
+    bool external_states;
 } bst_object_config;
 
 typedef struct bst_catalogue_config {
@@ -165,8 +165,8 @@ bst_status bst_exposure_window(bst_ctx *ctx, const bst_exposure_config *config, 
 typedef struct bst_camera_errors_config {
     double scale_error_ppm;
     double rotation_error_deg;
-    bool own_distortion;              /* false: the onboard model has the true coefficients */
-    bst_camera_distortion distortion; /* with own_distortion: the onboard coefficients */
+    bool override_distortion;         /* false: the onboard model has the true coefficients */
+    bst_camera_distortion distortion; /* with override_distortion: the onboard coefficients */
     double throughput_error;          /* onboard over true, minus 1 */
     double psf_fwhm_px;               /* 0: the camera's */
     char psf_file[512];               /* "": none */
@@ -175,7 +175,7 @@ typedef struct bst_camera_errors_config {
 
 typedef struct bst_orbit_error_config {
     double position_rtn_m[3], velocity_rtn_mps[3];
-    double along_track_mps; /* rate of the position error after the epoch */
+    double along_track_drift_mps; /* rate of the position error after the epoch */
 } bst_orbit_error_config;
 
 typedef struct bst_knowledge_config {
@@ -210,6 +210,7 @@ typedef struct bst_observer_config {
 extern const bst_config_desc bst_initial_state_table[];
 extern const bst_config_desc bst_force_table[];
 extern const bst_config_desc bst_orbit_spacecraft_table[];
+extern const bst_config_desc bst_object_config_table[];
 extern const bst_config_desc bst_world_config_table[];
 extern const bst_config_desc bst_observer_config_table[];
 extern const bst_config_desc bst_sensor_config_table[];

@@ -61,9 +61,9 @@ static void known_factors_are_found(void **state) {
     made.slope = 0.9;
     made.threshold_offset = 0.1;
     made.noise_factor = 1.05;
-    made.crowding = made.background_share = 0.0;
+    made.crowding = made.background_fraction = 0.0;
     made.false_alarm_factor = 0.8;
-    made.false_alarm_tail = 0.7;
+    made.false_alarm_steepness = 0.7;
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
         made.across_factor[i] = 1.15;
     }
@@ -116,7 +116,7 @@ static void known_factors_are_found(void **state) {
     bst_assert_close(found.slope, 0.9, 0.06);
     /* 200 false alarms where nothing is near: four standard deviations */
     bst_assert_close(found.false_alarm_factor, 0.8, 0.25);
-    bst_assert_close(found.false_alarm_tail, 0.7, 0.25);
+    bst_assert_close(found.false_alarm_steepness, 0.7, 0.25);
     /* thousands of places in each; at the limit the pairing cuts the tails off */
     bst_assert_close(found.across_factor[1], 1.15, 0.06);
     bst_assert_close(found.across_factor[3], 1.15, 0.04);

@@ -112,7 +112,7 @@ static const bst_pd_options options = {.low = 2,
                                        .empty_frames = 8,
                                        .background_e = -1,
                                        .jitter_px = 0,
-                                       .apart_px = 20,
+                                       .min_separation_px = 20,
                                        .cell_px = 40};
 
 static void open_bench(bench *b, const char *imgproc) {

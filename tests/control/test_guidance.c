@@ -226,7 +226,7 @@ static void keeps_out_of_the_sun(void **state) {
     open_bench(&b, mount_at(60, 0), bst_vec3_scale(mount_at(150, 0), 0.5 * DEG));
     b.nav.sun_m = bst_vec3_scale(mount_at(60, 0), 1.5e11);
     b.guidance.config.sun_keep_out_deg = 25;
-    b.guidance.config.look_ahead_s = 200;
+    b.guidance.config.prediction_horizon_s = 200;
     run(&b, 110.0);
     assert_true(b.nearest_rad > 25 * DEG);
     assert_int_equal(b.told[BST_GUIDANCE_UNREACHABLE], 1);
@@ -246,7 +246,7 @@ static void keeps_out_of_the_sun(void **state) {
     open_bench(&b, mount_at(20, 0), (bst_vec3){0, 0, 0});
     b.nav.sun_m = bst_vec3_scale(mount_at(20, 0), 1.5e11);
     b.guidance.config.sun_keep_out_deg = 40;
-    b.guidance.config.look_ahead_s = 300;
+    b.guidance.config.prediction_horizon_s = 300;
     run(&b, 60.0);
     assert_int_equal(b.told[BST_GUIDANCE_UNREACHABLE], 1);
     assert_true(isinf(b.last[BST_GUIDANCE_UNREACHABLE].until_s));
@@ -259,7 +259,7 @@ static void occultation_ahead(void **state) {
     bench b;
     open_bench(&b, (bst_vec3){0, 0, 1}, (bst_vec3){1 * DEG, 0, 0});
     b.range_m = 2e7;
-    b.guidance.config.look_ahead_s = 150;
+    b.guidance.config.prediction_horizon_s = 150;
     run(&b, 40.0);
     assert_int_equal(b.told[BST_GUIDANCE_AHEAD], 1);
     assert_int_equal(b.last[BST_GUIDANCE_AHEAD].reason, BST_REACH_BEHIND_EARTH);

@@ -127,7 +127,7 @@ static void the_least_roll_that_is_enough_is_taken(void **state) {
         make_mount(&g, 5.0);
         pass p = {&g, cases[i].miss_deg};
         const bst_pointing_feasibility_problem problem = {
-            .look = look, .user = &p, .mount = &g.mount, .limits_share = cases[i].share};
+            .look = look, .user = &p, .mount = &g.mount, .limit_fraction = cases[i].share};
         g.mount.roll.angle_rad = cases[i].from_deg * DEG;
         g.roll_given = !isnan(cases[i].given_deg);
         g.roll_rad = g.roll_given ? cases[i].given_deg * DEG : 1.0;
@@ -144,7 +144,7 @@ static void without_a_way_the_roll_stays(void **state) {
     bst_ctx ctx = {0};
     pass p = {&g, 12.0};
     bst_pointing_feasibility_problem problem = {
-        .look = look, .user = &p, .mount = &g.mount, .limits_share = 1.0};
+        .look = look, .user = &p, .mount = &g.mount, .limit_fraction = 1.0};
     for (int given = 0; given < 2; given++) {
         make_mount(&g, 2.0); /* slower than the target, whatever the roll */
         g.roll_given = given == 1;
@@ -203,7 +203,7 @@ static void a_turn_of_the_outer_axis_is_a_loss(void **state) {
     g.mount.axis[0].max_rad = 180 * DEG;
     pass p = {&g, 0.0};
     const bst_pointing_feasibility_problem problem = {
-        .look = look_round, .user = &p, .mount = &g.mount, .limits_share = 1.0};
+        .look = look_round, .user = &p, .mount = &g.mount, .limit_fraction = 1.0};
     bool found;
     bst_assert_ok(&ctx, bst_guidance_choose_roll(&ctx, &g, &problem, 120.0, &found));
     assert_true(found);

@@ -36,7 +36,7 @@ static double worst(double latency_s, double period_s, bool acceleration) {
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_control_config_table, &config));
     config.strategy = BST_CONTROL_RATE;
     config.command_latency_s = latency_s;
-    config.guidance.acceleration = acceleration;
+    config.guidance.acceleration_feed_forward = acceleration;
     const bst_control_env env = {.tick_rate_hz = TICKS,
                                  .pixel_rad = 10 * BST_ARCSEC_RAD,
                                  .width_px = 1024,

@@ -64,7 +64,7 @@ static void reasons_and_times(void **state) {
     /* in the Sun's cone of 20 degrees, its axis on the pass: out where the pass is 20 degrees on */
     pass p = {.miss_rad = 60 * DEG, .sun_rad = 20 * DEG};
     p.sun = direction_at(&p, CLOSEST_S);
-    bst_pointing_feasibility_problem problem = {.look = look, .user = &p, .limits_share = 1.0};
+    bst_pointing_feasibility_problem problem = {.look = look, .user = &p, .limit_fraction = 1.0};
     bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_SUN); /* cue and Sun parallel */
     bst_assert_ok(
@@ -117,7 +117,7 @@ static void limits_of_the_mount(void **state) {
     bst_mount_status mount = mount_of(5, 5);
     pass p = {.miss_rad = 60 * DEG};
     bst_pointing_feasibility_problem problem = {
-        .look = look, .user = &p, .mount = &mount, .limits_share = 1.0};
+        .look = look, .user = &p, .mount = &mount, .limit_fraction = 1.0};
     bst_assert_ok(&ctx, bst_pointing_feasibility_at(&ctx, &problem, CLOSEST_S, &reach));
     assert_int_equal(reach, BST_REACH_OK);
     mount = mount_of(1.5, 5);
@@ -152,7 +152,7 @@ static void keyholes_as_simulated(void **state) {
         bst_mount_status mount = mount_of(5, 5);
         pass p = {.miss_rad = misses_deg[k] * DEG};
         bst_pointing_feasibility_problem problem = {
-            .look = look, .user = &p, .mount = &mount, .limits_share = 0.95};
+            .look = look, .user = &p, .mount = &mount, .limit_fraction = 0.95};
         bst_pointing_feasibility_loss losses[4];
         int count;
         bst_assert_ok(&ctx,
@@ -203,7 +203,7 @@ static void keyholes_as_simulated(void **state) {
     bst_mount_status mount = mount_of(5, 5);
     pass p = {.miss_rad = 40 * DEG};
     bst_pointing_feasibility_problem problem = {
-        .look = look, .user = &p, .mount = &mount, .limits_share = 0.95};
+        .look = look, .user = &p, .mount = &mount, .limit_fraction = 0.95};
     bst_pointing_feasibility_loss losses[4];
     int count;
     bst_assert_ok(&ctx, bst_pointing_feasibility_chase(&ctx, &problem, &span, losses, 4, &count));

@@ -350,7 +350,7 @@ static void quiet_times_are_kept(void **state) {
     fixture f;
     start(&f,
           "{\"targets\": [{\"object\": \"INMARSAT GX5\", \"frames\": 5, \"revisit_s\": 1}], "
-          "\"min_snr\": 0, \"settle_s\": 10, \"find_timeout_s\": 30, \"idle_s\": 7}");
+          "\"min_snr\": 0, \"settle_s\": 10, \"find_timeout_s\": 30, \"replan_interval_s\": 7}");
     f.tasking.sensors[1].period_s = 2.0;
     assert_true(plan(&f, 1, 0));
     assert_int_equal(bst_tasking_quiet_until(&f.tasking, 1), 80); /* four periods of five frames */

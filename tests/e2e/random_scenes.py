@@ -178,14 +178,14 @@ def camera(rng, generator):
     if rng.random() < 0.3:
         detector["column_offset_rms_e"] = rounded(rng.uniform(0.2, 0.4) * out["read_noise_e"], 2)
     if rng.random() < 0.4:
-        detector["hits"] = {"rate_per_cm2_s": rounded(log_uniform(rng, 1.0, 60.0), 2),
+        detector["cosmic_rays"] = {"rate_per_cm2_s": rounded(log_uniform(rng, 1.0, 60.0), 2),
                             "pixel_pitch_um": 13}
     hot, bloom = rng.random() < 0.3, rng.random() < 0.2
     if hot and not generator:
         detector["hot_fraction"] = rounded(log_uniform(rng, 1e-5, 3e-4), 2)
         detector["hot_median_e_per_s"] = 500
     if bloom and not generator:
-        detector["full_well"] = "bloom"
+        detector["saturation"] = "bloom"
     if detector:
         out["detector"] = detector
     return out, sigma
@@ -272,7 +272,7 @@ def modules(rng, c, sky, period, exposure, limit, strategy, leo):
         "gimbal": {"type": "second_order", "delay_s": {"los_command": rounded(0.05 * period, 3)},
                    "platform": platform},
         "scenegen": {"type": "opencl",
-                     "v_limit": rounded(limit + (1.0 if sky == "crowded" else 0.5), 3)},
+                     "star_limit_v_mag": rounded(limit + (1.0 if sky == "crowded" else 0.5), 3)},
         "obsgen": {"type": "statistical", "calibration_file": ""},
         "imgproc": imgproc,
         "tracker": {"type": "ekf", **({"motion": "orbit"} if leo else {})},

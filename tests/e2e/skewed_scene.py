@@ -37,13 +37,13 @@ def scenario(folder):
     sensor["cue"].update(offset_deg=0.1, offset_axis="y", offset_angle_deg=20, sigma_deg=0.1)
     sensor["knowledge"] = {"camera": {"throughput_error": THROUGHPUT_ERROR},
                            "orbit": {"position_rtn_m": NAV_RTN_M.tolist(), "velocity_rtn_mps": NAV_RTN_MPS.tolist(),
-                                     "along_track_mps": NAV_GROWTH_MPS}}
+                                     "along_track_drift_mps": NAV_GROWTH_MPS}}
     gimbal = sensor["modules"]["gimbal"]
     gimbal["type"], gimbal["third_axis"] = "cross_elevation", True
     gimbal["platform"]["drift_arcsec_per_s"] = [0, 0, 0]
     gimbal["platform"]["spacecraft"] = rigid[runs.SENSOR + "/modules/gimbal/platform/spacecraft"]
     sensor["modules"]["obsgen"]["calibration_file"] = os.path.abspath("scenarios/calibration/neossat.obsgen")
-    sensor["modules"]["control"]["guidance"] = {"acceleration": True}
+    sensor["modules"]["control"]["guidance"] = {"acceleration_feed_forward": True}
     scene["duration_s"] = DURATION_S
     scene["record"] = {"frames": "extensions", "compression": "none", "telemetry_hz": TELEMETRY_HZ}
     path = os.path.join(folder, "skewed.json")

@@ -93,7 +93,7 @@ class Calframes(unittest.TestCase):
         maps = {"flat_file": self.flat / self.flat.mean(),
                 "dark_file": (self.dark - np.median(self.dark)) / 20,
                 "bad_pixel_file": self.dark > 600}
-        sets = list(PATTERNS) + [DETECTOR + "/hits/rate_per_cm2_s=2"]
+        sets = list(PATTERNS) + [DETECTOR + "/cosmic_rays/rate_per_cm2_s=2"]
         for key, image in maps.items():
             path = os.path.join(self.folder, key + ".fits")
             fits.PrimaryHDU(image.astype(np.float32)).writeto(path)

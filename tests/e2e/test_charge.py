@@ -9,7 +9,7 @@ import runs
 
 DETECTOR = runs.SENSOR + "/camera/detector"
 CHARGE = [DETECTOR + "/hot_fraction=0.0005", DETECTOR + "/hot_median_e_per_s=1000",
-          DETECTOR + "/hits/rate_per_cm2_s=20",
+          DETECTOR + "/cosmic_rays/rate_per_cm2_s=20",
           runs.SENSOR + "/modules/imgproc/bad_pixel_learning/enabled=false"]
 
 

@@ -45,7 +45,7 @@ class Constellation(unittest.TestCase):
         cls.folder = runs.scratch()
         cls.out = os.path.join(cls.folder, "run")
         # long enough that objects come again, short of what a test may take
-        more = [] if FULL else ["/record/detections_of=all", f"/record/custody_s={CUSTODY_S}"]
+        more = [] if FULL else ["/record/detections_of=all", f"/record/custody_timeout_s={CUSTODY_S}"]
         cls.manifest = runs.run(SCENARIO, cls.out, *WIDE, *more, threads=2 if FULL else 1,
                                 duration=None if FULL else 1500)
         cls.db = runs.database(cls.out)

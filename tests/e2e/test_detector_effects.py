@@ -110,7 +110,7 @@ class Effects(unittest.TestCase):
 
     def test_blooming(self):
         for v_mag in (7, 5, 2.5, 0) if SEEDS else (5,):
-            for _, db in self.expose(f"bloom{v_mag}", DETECTOR + '/full_well="bloom"',
+            for _, db in self.expose(f"bloom{v_mag}", DETECTOR + '/saturation="bloom"',
                                      *bright(v_mag)):
                 found, error2 = target_errors(db, DURATION - 30)
                 self.assertGreater(len(found), 25)

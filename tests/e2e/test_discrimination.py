@@ -66,7 +66,7 @@ class Discrimination(unittest.TestCase):
         modules = runs.SENSOR + "/modules"
         runs.run("scenarios/galactic_core.json", folder + "/run", runs.NO_FRAMES,
                  "/world/objects=" + json.dumps(objects),
-                 camera + "/detector=" + json.dumps({"hits": {"rate_per_cm2_s": 35}}),
+                 camera + "/detector=" + json.dumps({"cosmic_rays": {"rate_per_cm2_s": 35}}),
                  modules + f"/scenegen/truth_capacity={3 * ROOM // 2}",
                  modules + f'/imgproc={{"type": "standard", "capacity": {ROOM}}}',
                  duration=3 * FRAMES + 1)

@@ -24,7 +24,7 @@ LIGHT = 299792458.0
 ARCSEC = np.radians(1 / 3600)
 PIXEL = 3 * ARCSEC
 CENTRE_PX = 511.5
-STAR_FLOOR_PX = 0.0  # the tracker's star_floor_px
+STAR_FLOOR_PX = 0.0  # the tracker's star_systematic_px
 
 
 def boresight(q):

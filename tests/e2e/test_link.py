@@ -294,7 +294,7 @@ class Driver(unittest.TestCase):
         for orbit in (scenario["world"]["objects"][0]["orbit"], scenario["observers"][0]["orbit"]):
             orbit["elements_file"] = os.path.join(folder, orbit["elements_file"])
         del scenario["$schema"]
-        scenario["world"]["objects"][0]["steered"] = True
+        scenario["world"]["objects"][0]["external_states"] = True
         sensor = scenario["observers"][0]["sensors"][0]
         sensor["modules"] = {"gimbal": {"type": "external"},
                              "scenegen": {"type": "opencl"}}
@@ -537,7 +537,7 @@ class BadPeers(unittest.TestCase):
     def test_the_run_goes_on_without_a_peer_that_has_died(self):
         address, out = ipc(), runs.scratch() + "/run"
         peer = python(SOURCES[0], address)
-        run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/on_silence=go_on",
+        run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/on_timeout=go_on",
                         "--set", "/link/timeout_s=1", duration=300)
         for _ in range(2):  # the second step is begun when the first is answered
             peer.stdout.readline()

@@ -39,7 +39,7 @@ def settings(name, integrated):
     path, norad, epoch, magnitude, _, _, more = TARGETS[name]
     orbit = {"source": "sgp4", "elements_file": path, "norad": norad}
     if integrated:
-        orbit |= {"source": "numerical", "state": {"from": "element_set"}}
+        orbit |= {"source": "numerical", "state": {"source": "element_set"}}
     cue = {"object": name, "offset_deg": 0.05, "offset_axis": "x", "sigma_deg": 0.05,
            "rate_sigma_arcsec_per_s": 0.5, "v_mag": magnitude, "v_mag_sigma": 2}
     objects = [{"name": name, "orbit": orbit, "area_m2": 4, "albedo": 0.25}]

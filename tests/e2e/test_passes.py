@@ -126,7 +126,7 @@ class KeepOut(unittest.TestCase):
                          r"out of reach from 0.0 s until 6[67]\.\d s: in the keep-out cone of the Earth's")
         self.assertEqual(foreseen("leo_leo_pass.json"), "")
         runs.run("scenarios/leo_leo_pass.json", out, runs.NO_FRAMES, "/record/truth_stars=false",
-                 GENERATOR, *cone, guidance + "look_ahead_s=200", seed=1, duration=120)
+                 GENERATOR, *cone, guidance + "prediction_horizon_s=200", seed=1, duration=120)
         rows = runs.database(out).execute(
             "SELECT mid_s, radians(boresight_ra_deg), radians(boresight_dec_deg), observer_gcrf_x_m,"
             " observer_gcrf_y_m, observer_gcrf_z_m FROM exposures WHERE mid_s > 5").fetchall()

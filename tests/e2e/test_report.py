@@ -243,7 +243,7 @@ class Crowded(OnePage):
     def setUpClass(cls):
         cls.made = os.path.join(runs.scratch(), "run")
         runs.run("scenarios/crowded_geo_track.json", cls.made, "/record/frames=cube",
-                 "/world/faint_limit_v_mag=17", runs.SENSOR + "/modules/scenegen/v_limit=17",
+                 "/world/faint_limit_v_mag=17", runs.SENSOR + "/modules/scenegen/star_limit_v_mag=17",
                  duration=30)
         assert report(cls.made).returncode == 0
         cls.page = Page(cls.made + "/report.html")

@@ -18,7 +18,7 @@ CAMERA = runs.SENSOR + "/camera/"
 SHUTTER = CAMERA + "detector/row_time_s=%g" % ROW_S
 COMMON = [runs.SENSOR + "/exposure/first_s=0.6", runs.SENSOR + "/exposure/period_s=2",
           runs.SENSOR + "/modules/gimbal/platform/history_s=4",
-          runs.SENSOR + "/modules/scenegen/v_limit=11"]
+          runs.SENSOR + "/modules/scenegen/star_limit_v_mag=11"]
 
 
 def tearDownModule():

@@ -15,7 +15,7 @@ from test_study import rows, study, tables, write
 
 TARGET = "INMARSAT GX5"
 POPULATIONS = [
-    {"name": "neighbours", "number": {"distribution": "poisson", "mean": 2, "most": 6},
+    {"name": "neighbours", "number": {"distribution": "poisson", "mean": 2, "max": 6},
      "object": {"orbit": {"source": "relative", "reference": TARGET, "offset_rtn_m": [0, 0, 0]},
                 "brightness": {"model": "standard_magnitude"}},
      "dispersions": [{"path": "/orbit/offset_rtn_m/1", "distribution": "normal", "sigma": 20e3},
@@ -25,7 +25,7 @@ POPULATIONS = [
      "elements_file": os.path.abspath("scenarios/objects_2022-06.tle"),
      "object": {"area_m2": 10}},
     {"name": "orbits", "object": {"orbit": {
-        "source": "numerical", "state": {"from": "keplerian", "semi_major_axis_m": 42.164e6},
+        "source": "numerical", "state": {"source": "keplerian", "semi_major_axis_m": 42.164e6},
         "forces": {"gravity": "two_body", "sun": False, "moon": False, "solar_pressure": False,
                    "drag": False}}},
      "dispersions": [{"path": "/orbit/state/mean_anomaly_deg", "from": 0, "to": 360},

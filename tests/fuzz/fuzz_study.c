@@ -40,7 +40,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
     bst_ctx ctx;
     bst_study study;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
-    bst_status status = bst_study_open(&ctx, fuzz_write_file("study.json", data, bytes), &study);
+    bst_status status =
+        bst_study_open(&ctx, fuzz_write_file("study.json", data, bytes), NULL, &study);
     FUZZ_CHECK_REASON(ctx, status);
     if (status == BST_OK) {
         if (study.runs < 1 || study.settings < 1 || study.axis_count > BST_STUDY_AXES) {

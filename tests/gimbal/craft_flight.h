@@ -38,7 +38,7 @@ static inline bst_spacecraft_config config_make(bst_spacecraft_law law) {
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_spacecraft_config_table, &c));
     c.type = BST_CRAFT_RIGID_BODY;
     c.attitude.law = (int32_t)law;
-    c.running_s = 0.0; /* its filter begins at the epoch; others by test */
+    c.filter_warm_up_s = 0.0; /* its filter begins at the epoch; others by test */
     /* the sets that it has without, to be changed */
     static bst_wheel_config wheels[4];
     static bst_spacecraft_star_tracker_config trackers[2];

@@ -85,7 +85,7 @@ static void test_tracker_noise(void **state) {
         }
     }
     /* the alignment error turns what is measured by just that */
-    c.alignment_arcsec[1] = 100.0;
+    c.misalignment_arcsec[1] = 100.0;
     c.noise_arcsec = c.noise_about_axis_arcsec = 1e-6;
     bst_spacecraft_star_tracker_init(&tracker, &c, bst_rng_make_key(2, 0, "a", "tracker"));
     bst_vec3 e = bst_attitude_filter_error(bst_spacecraft_star_tracker_measure(&tracker, 0, q), q);

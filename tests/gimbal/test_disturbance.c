@@ -38,7 +38,7 @@ static void test_gravity_gradient(void **state) {
 static void test_sunlight(void **state) {
     (void)state;
     bst_disturbance_config c = {
-        .solar_area_m2 = 3.0, .solar_coefficient = 1.5, .solar_lever_m = {0.0, 0.0, 0.2}};
+        .srp_area_m2 = 3.0, .cr = 1.5, .centre_of_pressure_m = {0.0, 0.0, 0.2}};
     bst_vec3 sun = {2.0 * BST_AU_M, 0, 0};
     bst_vec3 t = bst_spacecraft_solar_torque(&c, BST_QUAT_IDENTITY, sun, 1.0);
     /* force along -x at +z: about -y; a quarter of it at 2 au */
@@ -96,9 +96,9 @@ static void test_sum_of_all(void **state) {
     double force =
         1361.0 / 299792458.0 * 3.0 * 1.5 * 0.6 / (0.9869674609100836 * 0.9869674609100836);
     bst_disturbance_config c = {.gravity_gradient = true,
-                                .solar_area_m2 = 3.0,
-                                .solar_coefficient = 1.5,
-                                .solar_lever_m = {0.3, -0.2, 0.5},
+                                .srp_area_m2 = 3.0,
+                                .cr = 1.5,
+                                .centre_of_pressure_m = {0.3, -0.2, 0.5},
                                 .residual_dipole_am2 = {2, -1, 3},
                                 .constant_torque_nm = {1e-5, -2e-5, 3e-5}};
     bst_vec3 t = bst_disturbance_torque(&c, &inertia, q, place, sun, 0.6, none);

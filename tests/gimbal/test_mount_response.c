@@ -20,7 +20,7 @@ static bst_mount_config linear_config(void) {
     c.friction.viscous_nms_per_rad[1] = 0.4;
     c.flexible.frequency_hz[1] = 35.0;
     c.flexible.damping[1] = 0.02;
-    c.flexible.line_of_sight_share[1] = 0.7;
+    c.flexible.line_of_sight_fraction[1] = 0.7;
     c.encoder.noise_arcsec = c.encoder.resolution_arcsec = 0.0;
     c.servo.delay_steps = 2;
     return c;

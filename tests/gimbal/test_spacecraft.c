@@ -8,7 +8,7 @@ static void test_laws(void **state) {
     (void)state;
     for (int law = BST_LAW_INERTIAL; law <= BST_LAW_TARGET; law++) {
         bst_spacecraft_config c = config_make((bst_spacecraft_law)law);
-        c.initial_turn_deg[0] = 3.0;
+        c.initial_attitude_error_deg[0] = 3.0;
         flight f = start(&c, (uint64_t)law);
         fly(&f, 200.0 + f.dt_s); /* the last step is one of the controller's */
         double worst = 0.0;
@@ -42,7 +42,7 @@ static void test_half_turn(void **state) {
     static const double turns[3][3] = {{180, 0, 0}, {0, -179.999, 0}, {103.923, 103.923, 103.923}};
     for (int i = 0; i < 3; i++) {
         bst_spacecraft_config c = config_make(BST_LAW_INERTIAL);
-        memcpy(c.initial_turn_deg, turns[i], sizeof c.initial_turn_deg);
+        memcpy(c.initial_attitude_error_deg, turns[i], sizeof c.initial_attitude_error_deg);
         flight f = start(&c, 0);
         double last = off(fly(&f, 20.0)), coast_s = 180.0 / c.attitude.rate_limit_degps;
         for (int s = 20; s < (int)coast_s; s++) {
@@ -134,7 +134,7 @@ static void test_failed_wheel(void **state) {
     wheels[2].speed_rpm = 2000.0;
     wheels[2].coulomb_nm = 1e-3;
     wheels[2].viscous_nms = 1e-6;
-    c.initial_turn_deg[1] = 20.0;
+    c.initial_attitude_error_deg[1] = 20.0;
     flight f = start(&c, 0);
     fly(&f, 600.0);
     assert_true(off(bst_spacecraft_at(f.craft)) < 30.0 * BST_ARCSEC_RAD);
@@ -276,10 +276,10 @@ static void test_running(void **state) {
     for (int wrong = 0; wrong < 2; wrong++) {
         for (uint64_t run = 0; run < RUNS / (1u + 3u * (unsigned)wrong); run++) {
             bst_spacecraft_config c = config_make(BST_LAW_NADIR);
-            c.running_s = 600.0;
+            c.filter_warm_up_s = 600.0;
             if (wrong) {
                 c.gyro.scale_factor_ppm[1] = 3000.0;
-                c.gyro.alignment_arcsec[0] = 200.0;
+                c.gyro.misalignment_arcsec[0] = 200.0;
             }
             flight f = start(&c, 100 + run);
             for (int k = 0; k < TIMES; k++) {

@@ -83,7 +83,7 @@ static void test_a_day_with_everything(void **state) {
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_spacecraft_config_table, &c));
     c.type = BST_CRAFT_RIGID_BODY;
     c.attitude.law = BST_LAW_NADIR;
-    c.initial_turn_deg[0] = 40.0;
+    c.initial_attitude_error_deg[0] = 40.0;
     static bst_wheel_config wheels[4];
     static bst_spacecraft_star_tracker_config trackers[2];
     int count;
@@ -102,13 +102,13 @@ static void test_a_day_with_everything(void **state) {
     static bst_spacecraft_mode_config modes[2] = {{1.1, 0.005, {1.2, 0.0, 0.3}},
                                                   {3.4, 0.005, {0, 0.8, 0.1}}};
     c.modes = (bst_config_list){modes, 2};
-    trackers[0].alignment_arcsec[0] = 10.0;
+    trackers[0].misalignment_arcsec[0] = 10.0;
     c.gyro.scale_factor_ppm[1] = 100.0;
-    c.gyro.alignment_arcsec[2] = 30.0;
+    c.gyro.misalignment_arcsec[2] = 30.0;
     c.disturbances = (bst_disturbance_config){.gravity_gradient = true,
-                                              .solar_area_m2 = 2.0,
-                                              .solar_coefficient = 1.3,
-                                              .solar_lever_m = {0.0, 0.05, 0.1},
+                                              .srp_area_m2 = 2.0,
+                                              .cr = 1.3,
+                                              .centre_of_pressure_m = {0.0, 0.05, 0.1},
                                               .residual_dipole_am2 = {0.1, -0.1, 0.05},
                                               .constant_torque_nm = {1e-6, 0, -1e-6},
                                               .unload_dipole_am2 = 5.0};

@@ -51,7 +51,7 @@ static void test_margin_in_the_loop(void **state) {
     for (int i = 0; i < 12; i++) {
         c.attitude.bandwidth_hz = sqrt(low * high);
         flight f = {.dt_s = 1e-2};
-        c.initial_turn_deg[2] = 1e-3;
+        c.initial_attitude_error_deg[2] = 1e-3;
         bst_assert_ok(&ctx, create(&c, f.dt_s, 0, &f.craft));
         fly(&f, 60.0);
         double most = 0.0;

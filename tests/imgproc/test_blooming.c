@@ -57,7 +57,7 @@ static void one_source_of_each(void **state) {
             bst_ctx ctx = {0};
             synthetic s;
             synthetic_init(&s, SIDE, SIDE);
-            s.camera.detector.full_well = BST_WELL_BLOOM;
+            s.camera.detector.saturation = BST_WELL_BLOOM;
             s.config.threads = 1;
             bst_imgproc *ip = synthetic_processor(&ctx, &s);
             bst_detections *d = synthetic_detections(2048);
@@ -102,7 +102,7 @@ static void neighbours_stay(void **state) {
     bst_ctx ctx = {0};
     synthetic s;
     synthetic_init(&s, SIDE, SIDE);
-    s.camera.detector.full_well = BST_WELL_BLOOM;
+    s.camera.detector.saturation = BST_WELL_BLOOM;
     bst_imgproc *ip = synthetic_processor(&ctx, &s);
     bst_detections *d = synthetic_detections(2048);
     bst_rng_key key = bst_rng_make_key(8, 0, "test", "bleed");

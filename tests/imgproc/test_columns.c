@@ -114,13 +114,13 @@ static void wanted(void **state) {
         s.camera.detector.frame_transfer_s = k == 1 ? 0.01 : 0.0;
         /* of 8 e- of read noise: an eighth, and a quarter */
         s.camera.detector.column_offset_rms_e = k == 2 ? 1.0 : k == 3 ? 2.0 : 0.0;
-        s.config.column_level = BST_COLUMN_LEVEL_AUTO;
-        assert_int_equal(bst_column_level_wanted(s.config.column_level, &s.camera),
+        s.config.column_correction = BST_COLUMN_LEVEL_AUTO;
+        assert_int_equal(bst_column_level_wanted(s.config.column_correction, &s.camera),
                          k == 1 || k == 3);
-        s.config.column_level = BST_COLUMN_LEVEL_ON;
-        assert_true(bst_column_level_wanted(s.config.column_level, &s.camera));
-        s.config.column_level = BST_COLUMN_LEVEL_OFF;
-        assert_false(bst_column_level_wanted(s.config.column_level, &s.camera));
+        s.config.column_correction = BST_COLUMN_LEVEL_ON;
+        assert_true(bst_column_level_wanted(s.config.column_correction, &s.camera));
+        s.config.column_correction = BST_COLUMN_LEVEL_OFF;
+        assert_false(bst_column_level_wanted(s.config.column_correction, &s.camera));
     }
     synthetic_free(&s);
 }

@@ -239,7 +239,8 @@ static void drawn_among_points(void **state) {
 static void suspected_pixels(void **state) {
     (void)state;
     scene s = make();
-    const bst_pixel_learner_config config = {.enabled = true, .capacity = 64, .false_rate = 1e-5};
+    const bst_pixel_learner_config config = {
+        .enabled = true, .capacity = 64, .false_alarm_probability = 1e-5};
     bst_pixel_learner *learner;
     bst_assert_ok(&s.ctx, bst_pixel_learner_create(&s.ctx, &s.s.camera, &config, &learner));
     bst_pixel_show show = {.pixel = 200 * SIDE + 300, .sharp = {6, 6, 6, 6}};

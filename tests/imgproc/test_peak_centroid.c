@@ -1,4 +1,4 @@
-/* Places by the matched filter alone (most_fits), against the Cramer-Rao bound and what they claim.
+/* Places by the matched filter alone (max_fits), against the Cramer-Rao bound and what they claim.
  */
 #include <stdlib.h>
 
@@ -20,10 +20,10 @@ typedef struct scene {
     double x[PER_FRAME], y[PER_FRAME];
 } scene;
 
-static void open(scene *c, double dx, double dy, double snr, int most_fits, int threads) {
+static void open(scene *c, double dx, double dy, double snr, int max_fits, int threads) {
     *c = (scene){.key = bst_rng_make_key(21, 0, "test", "tops"), .dx = dx, .dy = dy};
     synthetic_init(&c->s, SIDE * SPACING + 28, SIDE * SPACING + 28);
-    c->s.config.most_fits = most_fits;
+    c->s.config.max_fits = max_fits;
     c->s.config.threads = threads;
     c->ip = synthetic_processor(&c->ctx, &c->s);
     c->d = synthetic_detections(2048);

@@ -33,8 +33,8 @@ static void begin_with(scene *s, uint64_t seed, double fwhm_px) {
     s->d = synthetic_detections(2048);
     synthetic_init(&s->s, SIDE, SIDE);
     s->s.camera.psf_fwhm_px = fwhm_px;
-    s->s.config.bad_pixel_learning =
-        (bst_pixel_learner_config){.enabled = true, .capacity = MOST, .false_rate = 1e-5};
+    s->s.config.bad_pixel_learning = (bst_pixel_learner_config){
+        .enabled = true, .capacity = MOST, .false_alarm_probability = 1e-5};
     s->s.config.threads = 1;
     s->ip = synthetic_processor(&s->ctx, &s->s);
     bst_assert_ok(&s->ctx, bst_imgproc_collect_shows(&s->ctx, s->ip, MOST));

@@ -6,7 +6,7 @@
 #include "sim/core/wall_clock.h"
 #include "sim/link/crc32c.h"
 
-void scene_open(link_scene *s, bool tcp, double timeout_s, bst_link_silence on_silence,
+void scene_open(link_scene *s, bool tcp, double timeout_s, bst_link_silence on_timeout,
                 bool shared_memory) {
     memset(s, 0, sizeof *s);
     bst_test_template(s->folder, "boresight_link");
@@ -19,7 +19,7 @@ void scene_open(link_scene *s, bool tcp, double timeout_s, bst_link_silence on_s
     }
     bst_link_config config = {.timeout_s = timeout_s,
                               .connect_timeout_s = timeout_s,
-                              .on_silence = on_silence,
+                              .on_timeout = on_timeout,
                               .shared_memory = shared_memory};
     snprintf(config.address, sizeof config.address, "%s", s->address);
     bst_link_run run = {.scenario = "test",

@@ -30,7 +30,7 @@ typedef struct link_scene {
 
 /* `tcp`: over a port of the loopback, else a socket in a folder of its own. Times out after
  * timeout_s. */
-void scene_open(link_scene *scene, bool tcp, double timeout_s, bst_link_silence on_silence,
+void scene_open(link_scene *scene, bool tcp, double timeout_s, bst_link_silence on_timeout,
                 bool shared_memory);
 void scene_close(link_scene *scene);
 /* Starts a peer in a thread of its own; scene_join waits for its end. */

@@ -56,7 +56,7 @@ static void one_round(const char *folder, const uint16_t *pixels, int number) {
     assert_true(child > 0);
     bst_ctx ctx = {0};
     bst_link_config config = {
-        .timeout_s = 0.01, .connect_timeout_s = 0.05, .on_silence = BST_LINK_GO_ON};
+        .timeout_s = 0.01, .connect_timeout_s = 0.05, .on_timeout = BST_LINK_GO_ON};
     snprintf(config.address, sizeof config.address, "%.127s", address);
     bst_link_run run = {.scenario = "breaks", .tick_rate_hz = 1000, .duration_ticks = 1000};
     bst_assert_ok(&ctx, bst_time_from_utc(&ctx, "2026-01-01T00:00:00Z", &run.epoch));

@@ -277,7 +277,7 @@ static void draws_depend_on_names_alone(void **state) {
     assert_int_equal(r.count, count);
     assert_int_equal(same_until(first, r.items, count), count);
     /* reversed, and every third source gone; crowding goes by all sources and is left out */
-    s.calibration.crowding = s.calibration.background_share = 0.0;
+    s.calibration.crowding = s.calibration.background_fraction = 0.0;
     start(&s);
     r = run(&s, 11);
     count = r.count;
@@ -356,8 +356,8 @@ static void a_pixels_noise_is_the_sum_of_its_parts(void **state) {
     bst_detector_config *d = &s.camera.detector;
     d->row_noise_e = 2.0;
     d->row_offset_rms_e = 3.0;
-    d->read_tail_fraction = 0.1;
-    d->read_tail_rms_e = 20.0;
+    d->telegraph_noise_fraction = 0.1;
+    d->telegraph_noise_rms_e = 20.0;
     d->prnu_rms = 0.03;
     d->dsnu_rms = 0.4;
     s.calibration.noise_factor = 1.25;

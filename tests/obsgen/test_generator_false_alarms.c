@@ -39,11 +39,11 @@ static void hits_come_at_the_detectors_rate(void **state) {
     (void)state;
     scene s;
     open_scene(&s);
-    s.camera.detector.hits = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 5.0,
-                                                              .pixel_pitch_um = 13.0,
-                                                              .depth_um = 15.0,
-                                                              .e_per_um = 80.0,
-                                                              .straggling = 0.12};
+    s.camera.detector.cosmic_rays = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 5.0,
+                                                                     .pixel_pitch_um = 13.0,
+                                                                     .depth_um = 15.0,
+                                                                     .e_per_um = 80.0,
+                                                                     .straggling = 0.12};
     start(&s);
     double seen = 0.0, told = 0.0;
     enum { FRAMES = 400 };
@@ -150,12 +150,12 @@ static void hits_on_a_binned_window(void **state) {
     for (int b = 1; b <= 2; b++) {
         scene s;
         open_scene(&s);
-        s.camera.detector.hits = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 20.0,
-                                                                  .pixel_pitch_um = pitch_um,
-                                                                  .depth_um = depth_um,
-                                                                  .e_per_um = 80.0,
-                                                                  .straggling = 0.0,
-                                                                  .frame_s = 0.7};
+        s.camera.detector.cosmic_rays = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 20.0,
+                                                                         .pixel_pitch_um = pitch_um,
+                                                                         .depth_um = depth_um,
+                                                                         .e_per_um = 80.0,
+                                                                         .straggling = 0.0,
+                                                                         .readout_s = 0.7};
         s.frame.window = (bst_window){96, 160, 800, 480};
         s.frame.binning = b;
         start(&s);

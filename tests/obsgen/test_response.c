@@ -109,7 +109,7 @@ static void a_psf_goes_by_its_own_image(void **state) {
                                     .wavelengths = 1,
                                     .diffusion_px = 0.2,
                                     .zernike_nm = 550.0,
-                                    .pixel_fill = {1.0, 1.0},
+                                    .fill_factor = {1.0, 1.0},
                                     .field_columns = 1,
                                     .field_rows = 1}};
     bst_psf *psf;

@@ -63,7 +63,7 @@ static void half_of_the_light_gives_its_root(void **state) {
     (void)state;
     scene s;
     open_scene(&s);
-    s.calibration.crowding = s.calibration.background_share = 0.0;
+    s.calibration.crowding = s.calibration.background_fraction = 0.0;
     start(&s);
     const double snr = 7.3, electrons = electrons_of(&s, snr);
     int found = 0, trials = 0;
@@ -107,7 +107,7 @@ static void unknown_jitter_costs_what_the_filter_misses(void **state) {
     for (int known = 0; known < 2; known++) {
         scene s;
         open_scene(&s);
-        s.calibration.crowding = s.calibration.background_share = 0.0;
+        s.calibration.crowding = s.calibration.background_fraction = 0.0;
         s.settings.jitter_px = known ? jitter : 0.0;
         s.frame.sigma_px = hypot(psf, jitter);
         start(&s);
@@ -183,7 +183,7 @@ static void offsets_of_columns_make_alarms(void **state) {
         scene s;
         open_scene(&s);
         s.settings.false_alarms_per_frame = 250.0;
-        s.settings.column_level = BST_COLUMN_LEVEL_OFF;
+        s.settings.column_correction = BST_COLUMN_LEVEL_OFF;
         s.camera.detector.column_offset_rms_e = with ? 4.0 : 0.0;
         start(&s);
         counts[with] = 0.0;
@@ -214,7 +214,7 @@ static void levelled_columns_are_even(void **state) {
         scene s;
         open_scene(&s);
         s.settings.false_alarms_per_frame = 250.0;
-        s.settings.column_level = BST_COLUMN_LEVEL_AUTO;
+        s.settings.column_correction = BST_COLUMN_LEVEL_AUTO;
         /* half of the read noise: auto takes it off */
         s.camera.detector.column_offset_rms_e = with ? 4.0 : 0.0;
         start(&s);

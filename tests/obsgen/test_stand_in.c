@@ -53,7 +53,7 @@ static void one_key_chooses(void **state) {
 
     const char *const sets[] = {SENSOR "/observation_source=generator",
                                 SENSOR "/modules/imgproc/false_alarms_per_frame=3",
-                                SENSOR "/modules/scenegen/v_limit=12"};
+                                SENSOR "/modules/scenegen/star_limit_v_mag=12"};
     bst_assert_ok(&ctx, read_with(&ctx, sets, 3, &json, &s));
     const bst_scenario_module_config *generator = module_of(&s, "obsgen");
     assert_non_null(generator);
@@ -62,7 +62,7 @@ static void one_key_chooses(void **state) {
     assert_false(module_of(&s, "tracker")->off);
     /* copied: no rounding */
     bst_assert_close(real_of(generator, "false_alarms_per_frame"), 3.0, 0.0);
-    bst_assert_close(real_of(generator, "v_limit"), 12.0, 0.0);
+    bst_assert_close(real_of(generator, "star_limit_v_mag"), 12.0, 0.0);
     bst_assert_close(real_of(generator, "jitter_px"), 0.14, 0.0);
     /* the read-out's 0.15 s, on the last trigger */
     assert_int_equal(generator->delay_count, 1);
@@ -76,7 +76,7 @@ static void one_key_chooses(void **state) {
     /* the echo says every setting once, and reads back as itself */
     bst_assert_ok(&ctx, bst_json_parse(&ctx, "echo", first, strlen(first), &json));
     bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_registry_shipped(), &s));
-    bst_assert_close(real_of(module_of(&s, "obsgen"), "v_limit"), 12.0, 0.0);
+    bst_assert_close(real_of(module_of(&s, "obsgen"), "star_limit_v_mag"), 12.0, 0.0);
     assert_int_equal(module_of(&s, "obsgen")->delays[0].ticks, 900);
     echo = bst_scenario_echo(&s);
     char *second = cJSON_Print(echo);
@@ -115,15 +115,16 @@ static void refuse(const char *const *sets, int count, const char *part) {
 
 static void what_is_said_twice_is_refused(void **state) {
     (void)state;
-    const char *const twice[] = {SENSOR "/observation_source=generator", SENSOR
-                                 "/modules/obsgen={\"type\": \"statistical\", \"v_limit\": 12}"};
+    const char *const twice[] = {
+        SENSOR "/observation_source=generator",
+        SENSOR "/modules/obsgen={\"type\": \"statistical\", \"star_limit_v_mag\": 12}"};
     refuse(twice, 2,
-           "/modules/obsgen/v_limit: said twice (found 12; allowed: nothing here: it is "
-           "the \"v_limit\" of this sensor's scenegen");
+           "/modules/obsgen/star_limit_v_mag: given twice (found 12; allowed: nothing here: it is "
+           "the \"star_limit_v_mag\" of this sensor's scenegen");
     const char *const delayed[] = {SENSOR
                                    "/modules/obsgen={\"type\": \"statistical\", \"delay_s\": "
                                    "{\"exposure\": 1}}"};
-    refuse(delayed, 1, "/modules/obsgen/delay_s: said twice");
+    refuse(delayed, 1, "/modules/obsgen/delay_s: given twice");
     const char *const unknown[] = {SENSOR "/observation_source=film"};
     refuse(unknown, 1, "/observation_source: ");
     const char *const file[] = {

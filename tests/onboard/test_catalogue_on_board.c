@@ -4,11 +4,11 @@
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
-#define KEPLER(name, at, e, more)                                                      \
-    "{\"name\": \"" name                                                               \
-    "\", \"orbit\": {\"source\": \"numerical\", \"state\": {\"from\": \"keplerian\", " \
-    "\"at_s\": " at ", \"perigee_radius_m\": 7.2e6, \"eccentricity\": " e              \
-    ", \"inclination_deg\": 60, \"raan_deg\": 30, \"arg_perigee_deg\": 40, "           \
+#define KEPLER(name, at, e, more)                                                        \
+    "{\"name\": \"" name                                                                 \
+    "\", \"orbit\": {\"source\": \"numerical\", \"state\": {\"source\": \"keplerian\", " \
+    "\"at_s\": " at ", \"perigee_radius_m\": 7.2e6, \"eccentricity\": " e                \
+    ", \"inclination_deg\": 60, \"raan_deg\": 30, \"arg_perigee_deg\": 40, "             \
     "\"true_anomaly_deg\": 50}, \"forces\": {\"gravity\": \"two_body\"}}" more "}"
 #define BESIDE                                                                              \
     "{\"name\": \"beside\", \"orbit\": {\"source\": \"relative\", \"reference\": \"GX5\", " \
@@ -143,7 +143,7 @@ static void sights_from_where_it_believes_to_be(void **state) {
     scene right = make(""),
           wrong = make(
               ", \"knowledge\": {\"orbit\": {\"position_rtn_m\": [300, -200, 500], "
-              "\"velocity_rtn_mps\": [0.5, 0.2, -0.4], \"along_track_mps\": 2}}");
+              "\"velocity_rtn_mps\": [0.5, 0.2, -0.4], \"along_track_drift_mps\": 2}}");
     const double t = 40;
     bst_world_state truth, eye;
     bst_bodies bodies;

@@ -95,7 +95,7 @@ static void an_orbit_error_moves_the_cue_by_the_parallax(void **state) {
         drop(&s);
     }
     /* growing along the track: 2 m/s for 100 s */
-    scene s = make("\"orbit\": {\"along_track_mps\": 2}");
+    scene s = make("\"orbit\": {\"along_track_drift_mps\": 2}");
     bst_assert_close(test_distance(believed(&s, 100).position_m, truth(&s, 100).position_m), 200,
                      1e-6);
     bst_assert_close(test_distance(believed(&s, 0).position_m, truth(&s, 0).position_m), 0, 1e-6);
@@ -124,7 +124,7 @@ static void the_start_follows_what_is_believed(void **state) {
     (void)state;
     static const char *const blocks[] = {
         "", "\"clock_offset_s\": 2", "\"orbit\": {\"position_rtn_m\": [0, 10000, 300]}",
-        "\"clock_offset_s\": -1, \"orbit\": {\"along_track_mps\": 5000}",
+        "\"clock_offset_s\": -1, \"orbit\": {\"along_track_drift_mps\": 5000}",
         "\"orbit\": {\"velocity_rtn_mps\": [0, 1000, 0]}"};
     const bool moves[] = {false, true, true, true, false};
     bst_vec3 right = {0};
@@ -190,7 +190,7 @@ static void the_camera_may_be_known_wrongly(void **state) {
     (void)state;
     scene s = make(
         "\"camera\": {\"scale_error_ppm\": 100, \"rotation_error_deg\": 0.5, "
-        "\"own_distortion\": true, \"distortion\": {\"k1\": 50}, \"psf_fwhm_px\": 2.4}");
+        "\"override_distortion\": true, \"distortion\": {\"k1\": 50}, \"psf_fwhm_px\": 2.4}");
     const bst_camera *known = bst_knowledge_camera(s.knowledge);
     const bst_camera *real = bst_world_camera(s.world, 0, 0);
     bst_assert_close(known->pixel_scale_arcsec, 3.0003, 1e-12);
@@ -207,9 +207,10 @@ static void the_camera_may_be_known_wrongly(void **state) {
     drop(&s);
     /* a fold is refused on board too */
     bst_ctx ctx = {0};
-    bst_world *world = test_world_with(GX5, CUE
-                                       ", \"knowledge\": {\"camera\": {\"own_distortion\": true, "
-                                       "\"distortion\": {\"k1\": -5000}}}");
+    bst_world *world =
+        test_world_with(GX5, CUE
+                        ", \"knowledge\": {\"camera\": {\"override_distortion\": true, "
+                        "\"distortion\": {\"k1\": -5000}}}");
     bst_knowledge *knowledge;
     assert_int_equal(bst_knowledge_create(&ctx, world, 0, 0, &knowledge), BST_ERR_CONFIG);
     assert_non_null(
@@ -231,8 +232,8 @@ static int query(scene *s, const bst_stars *stars, bst_vec3 centre, double radiu
 static void stars_are_dropped_and_displaced(void **state) {
     (void)state;
     scene s = make(
-        "\"stars\": {\"dropped_fraction\": 0.3, \"displaced_fraction\": 0.2, "
-        "\"displaced_sigma_arcsec\": 20, \"seed\": \"0x7\"}");
+        "\"stars\": {\"missing_fraction\": 0.3, \"position_error_fraction\": 0.2, "
+        "\"position_error_sigma_arcsec\": 20, \"seed\": \"0x7\"}");
     const bst_stars *own = bst_knowledge_stars(s.knowledge), *real = bst_world_stars(s.world);
     assert_ptr_not_equal(own, real);
     bst_vec3 pole = {0, 0, 1};
@@ -275,7 +276,7 @@ static void stars_are_dropped_and_displaced(void **state) {
         missing += bst_stars_find(&s.ctx, own, all[i].id, 2022.46, &one) != BST_OK;
     }
     assert_true(missing > 0.15 * n && missing < 0.45 * n);
-    scene again = make("\"stars\": {\"dropped_fraction\": 0.3, \"seed\": \"0x8\"}");
+    scene again = make("\"stars\": {\"missing_fraction\": 0.3, \"seed\": \"0x8\"}");
     assert_true(query(&again, bst_knowledge_stars(again.knowledge), pole, BST_PI, all) > 0);
     assert_true(all[0].id != known[0].id || all[1].id != known[1].id || all[2].id != known[2].id);
     drop(&again);

@@ -136,7 +136,7 @@ static bst_camera open_camera(void) {
                         .pixel_scale_arcsec = NAN,
                         .focal_length_m = NAN,
                         .f_number = NAN,
-                        .pixel_um = NAN};
+                        .pixel_pitch_um = NAN};
 }
 
 /* The scale is pitch over focal length (gnomonic): 13 um over 0.9 m are 2.97936 arcsec. */
@@ -146,7 +146,7 @@ static void scale_from_focal_length_and_pitch(void **state) {
     const double scale = 13e-6 / 0.9 / (BST_PI / 648000.0);
     for (int given = 0; given < 5; given++) {
         bst_camera c = open_camera();
-        c.pixel_um = given == 4 ? NAN : 13.0;
+        c.pixel_pitch_um = given == 4 ? NAN : 13.0;
         c.focal_length_m = given == 0 || given == 2 || given == 4 ? 0.9 : NAN;
         c.f_number = given == 1 || given == 2 ? 6.0 : NAN;
         c.pixel_scale_arcsec = given >= 3 ? scale : NAN;
@@ -155,7 +155,7 @@ static void scale_from_focal_length_and_pitch(void **state) {
         bst_assert_close(c.pixel_scale_arcsec, scale, 1e-14);
         bst_assert_close(c.focal_length_m, 0.9, 1e-14);
         bst_assert_close(c.f_number, 6.0, 1e-13);
-        bst_assert_close(c.pixel_um, 13.0, 1e-12);
+        bst_assert_close(c.pixel_pitch_um, 13.0, 1e-12);
         bst_camera again = c; /* the resolved scenario is read again */
         bst_assert_ok(&ctx, bst_camera_resolve_scale(&ctx, &again));
         assert_true(again.pixel_scale_arcsec == c.pixel_scale_arcsec);
@@ -163,7 +163,7 @@ static void scale_from_focal_length_and_pitch(void **state) {
     bst_camera c = open_camera();
     c.pixel_scale_arcsec = 3.0;
     bst_assert_ok(&ctx, bst_camera_resolve_scale(&ctx, &c));
-    assert_true(isnan(c.focal_length_m) && isnan(c.pixel_um) && isnan(c.f_number));
+    assert_true(isnan(c.focal_length_m) && isnan(c.pixel_pitch_um) && isnan(c.f_number));
 }
 
 static void scales_that_contradict(void **state) {
@@ -171,22 +171,23 @@ static void scales_that_contradict(void **state) {
     const struct {
         double scale, focal, ratio, pitch, optics_ratio, background_pitch;
         const char *says[2];
-    } cases[] = {{NAN, NAN, NAN, NAN, 0, 0, {"pixel_scale_arcsec", "pixel_um and f_number"}},
-                 {NAN, 0.9, NAN, NAN, 0, 0, {"the pixel scale is missing", "focal_length_m"}},
-                 {3.0, 0.9, NAN, 13, 0, 0, {"pixel_scale_arcsec gives 3 arcsec", "pixel_um over"}},
-                 {NAN, 0.9, 5, 13, 0, 0, {"focal_length_m gives 0.9 m", "f_number times aperture"}},
-                 {NAN, NAN, 6, 13, 8, 0, {"f_number gives 6", "optics/f_number gives 8"}},
-                 {NAN, NAN, 6, 13, 0, 10, {"pixel_um gives 13", "background/pixel_um gives 10"}},
-                 {NAN, 100, NAN, 0.01, 0, 0, {"pixel scale of 2.06265e-05", "0.001 to 600"}}};
+    } cases[] = {
+        {NAN, NAN, NAN, NAN, 0, 0, {"pixel_scale_arcsec", "pixel_pitch_um and f_number"}},
+        {NAN, 0.9, NAN, NAN, 0, 0, {"the pixel scale is missing", "focal_length_m"}},
+        {3.0, 0.9, NAN, 13, 0, 0, {"pixel_scale_arcsec gives 3 arcsec", "pixel_pitch_um over"}},
+        {NAN, 0.9, 5, 13, 0, 0, {"focal_length_m gives 0.9 m", "f_number times aperture"}},
+        {NAN, NAN, 6, 13, 8, 0, {"f_number gives 6", "optics/f_number gives 8"}},
+        {NAN, NAN, 6, 13, 0, 10, {"pixel_pitch_um gives 13", "background/pixel_pitch_um gives 10"}},
+        {NAN, 100, NAN, 0.01, 0, 0, {"pixel scale of 2.06265e-05", "0.001 to 600"}}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         bst_ctx ctx = {0};
         bst_camera c = open_camera();
         c.pixel_scale_arcsec = cases[i].scale;
         c.focal_length_m = cases[i].focal;
         c.f_number = cases[i].ratio;
-        c.pixel_um = cases[i].pitch;
+        c.pixel_pitch_um = cases[i].pitch;
         c.optics.f_number = cases[i].optics_ratio;
-        c.background.pixel_um = cases[i].background_pitch;
+        c.background.pixel_pitch_um = cases[i].background_pitch;
         assert_int_equal(bst_camera_resolve_scale(&ctx, &c), BST_ERR_CONFIG);
         for (int k = 0; k < 2; k++) {
             if (!strstr(ctx.message, cases[i].says[k])) {

@@ -282,7 +282,7 @@ static void no_light_is_lost(void **state) {
         camera.optics.zernike_waves.waves[5] = 0.3;
         camera.optics.spiders = (bst_optics_spiders){.count = 4, .width_m = 0.003};
         camera.optics.diffusion_px = 0.2;
-        camera.optics.pixel_fill[0] = 0.7;
+        camera.optics.fill_factor[0] = 0.7;
         bst_ctx ctx = {0};
         bst_psf *psf;
         double h[2];

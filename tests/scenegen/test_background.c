@@ -160,7 +160,7 @@ static void all_detectors_add_it_once(void **state) {
         int kind = way % 4, step = way < 4 ? 16 : 1, b = kind == 3 ? 2 : 1;
         bst_camera camera = uneven_camera();
         camera.detector.prnu_rms = 0.02;
-        camera.detector.full_well = kind == 1 ? BST_WELL_BLOOM : BST_WELL_CLIP;
+        camera.detector.saturation = kind == 1 ? BST_WELL_BLOOM : BST_WELL_CLIP;
         camera.detector.frame_transfer_s = kind == 2 ? 1e-9 : 0.0; /* no light falls in it */
         scene_track track = scene_track_make(&camera, &demo);
         bst_renderer *r;

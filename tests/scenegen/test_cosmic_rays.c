@@ -87,8 +87,8 @@ static void frames_hold_the_hits_of_their_exposure(void **state) {
     bst_device *device;
     bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
     bst_camera camera = scene_camera(W, H);
-    camera.detector.hits = example;
-    camera.detector.hits.rate_per_cm2_s = 2000.0;
+    camera.detector.cosmic_rays = example;
+    camera.detector.cosmic_rays.rate_per_cm2_s = 2000.0;
     bst_renderer *r;
     bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
     double time_s[2] = {0.0, 1.0};
@@ -137,14 +137,14 @@ static void windows_agree_with_every_effect(void **state) {
                                                 .column_offset_rms_e = 3.0,
                                                 .row_offset_rms_e = 3.0,
                                                 .row_noise_e = 2.0,
-                                                .read_tail_fraction = 0.02,
-                                                .read_tail_rms_e = 20.0,
+                                                .telegraph_noise_fraction = 0.02,
+                                                .telegraph_noise_rms_e = 20.0,
                                                 .nonlinearity = {-0.02, 0.0, 0.0},
-                                                .hits = example};
-        camera.detector.hits.rate_per_cm2_s = 50.0;
+                                                .cosmic_rays = example};
+        camera.detector.cosmic_rays.rate_per_cm2_s = 50.0;
         if (stage == 1) {
             camera.full_well_e = 20000.0;
-            camera.detector.full_well = BST_WELL_BLOOM;
+            camera.detector.saturation = BST_WELL_BLOOM;
             camera.detector.frame_transfer_s = 0.01;
         }
         stars = scene_stars(&camera, 100, 2e6, 6.0, 4);

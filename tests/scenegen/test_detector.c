@@ -314,8 +314,8 @@ static void read_noise_has_a_tail(void **state) {
     static float frame[PIXELS];
     fixture *f = open_with(state, 0.0, 0.0);
     f->camera.offset_dn = 1000.0;
-    f->camera.detector.read_tail_fraction = 0.02;
-    f->camera.detector.read_tail_rms_e = 30.0;
+    f->camera.detector.telegraph_noise_fraction = 0.02;
+    f->camera.detector.telegraph_noise_rms_e = 30.0;
     make(f);
     for (int k = 0; k < 8; k++) {
         expose(f, k, frame);
@@ -347,8 +347,8 @@ static void reads_of_the_tail_are_independent(void **state) {
     for (int s = 0; s < 2; s++) {
         fixture *f = open_with(state, 0.0, 0.0);
         f->camera.offset_dn = 30000.0;
-        f->camera.detector.read_tail_fraction = shares[s];
-        f->camera.detector.read_tail_rms_e = 3000.0;
+        f->camera.detector.telegraph_noise_fraction = shares[s];
+        f->camera.detector.telegraph_noise_rms_e = 3000.0;
         make(f);
         /* beyond 60 e: 7.5 standard deviations of the other reads */
         double p = shares[s] * erfc(60.0 / sqrt(2.0 * (3000.0 * 3000.0 + 64.0)));
@@ -415,7 +415,7 @@ static void full_wells_bloom(void **state) {
     f->request.count = 1;
     make(f);
     expose(f, 0, clipped);
-    f->camera.detector.full_well = BST_WELL_BLOOM;
+    f->camera.detector.saturation = BST_WELL_BLOOM;
     make(f);
     expose(f, 0, bloomed);
     double total = 0.0, cut = 0.0, above = 0.0, below = 0.0, highest = 0.0;

@@ -367,11 +367,11 @@ static void few_nodes_are_flagged(void **state) {
     outcome free_of_bounds = render(f, &s, &options);
     assert_false(free_of_bounds.stats.nodes_bounded);
     assert_false(free_of_bounds.stats.tolerance_missed);
-    options.most_nodes = free_of_bounds.stats.nodes;
+    options.max_nodes = free_of_bounds.stats.nodes;
     assert_false(render(f, &s, &options).stats.nodes_bounded);
     long long before = free_of_bounds.stats.nodes;
     for (int most = 256; most >= 128; most /= 2) {
-        options.most_nodes = most;
+        options.max_nodes = most;
         outcome o = render(f, &s, &options);
         assert_true(o.stats.nodes_bounded);
         assert_true(o.stats.nodes <= BST_SCENE_SLEW * most + (long long)BST_BLOCK * s.count);

@@ -62,7 +62,7 @@ static void flags_are_the_saturated_pixels(void **state) {
         bst_camera camera = scene_camera(W, H);
         camera.full_well_e = converter ? 1e6 : 20000.0;
         camera.bits = converter ? 14 : 16;
-        camera.detector.full_well = kind == 1 ? BST_WELL_BLOOM : BST_WELL_CLIP;
+        camera.detector.saturation = kind == 1 ? BST_WELL_BLOOM : BST_WELL_CLIP;
         long long saturated = render(f, &camera, w, b, frame, flags);
         (void)render(f, &camera, w, b, plain, NULL);
         size_t count = (size_t)(w.width / b) * (size_t)(w.height / b), found = 0;

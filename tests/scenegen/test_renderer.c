@@ -290,11 +290,11 @@ static void frames_under_way(void **state) {
     static uint16_t alone[FRAMES][W * H];
     bst_camera camera = scene_camera(W, H);
     camera.detector.row_noise_e = 20.0;
-    camera.detector.hits = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 200.0,
-                                                            .pixel_pitch_um = 15.0,
-                                                            .depth_um = 10.0,
-                                                            .e_per_um = 80.0,
-                                                            .straggling = 0.2};
+    camera.detector.cosmic_rays = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 200.0,
+                                                                   .pixel_pitch_um = 15.0,
+                                                                   .depth_um = 10.0,
+                                                                   .e_per_um = 80.0,
+                                                                   .straggling = 0.2};
     bst_scene_source *stars = scene_stars(&camera, STARS, 2e6, 6.0, 4);
     scene_track track = scene_track_make(&camera, &demo);
     bst_render_request q[FRAMES];

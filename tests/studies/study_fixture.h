@@ -42,7 +42,7 @@ static inline bst_status fixture_open(bst_ctx *ctx, const char *folder, const ch
              *body ? ", " : "", body);
     fixture_write(folder, "study.json", text);
     snprintf(path, sizeof path, "%s/study.json", folder);
-    return bst_study_open(ctx, path, study);
+    return bst_study_open(ctx, path, NULL, study);
 }
 
 #endif

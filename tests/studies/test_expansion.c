@@ -66,7 +66,7 @@ static void test_list(void **state) {
     bst_study_value v[8];
     const char *body =
         "\"sweeps\": [{\"design\": \"list\", \"axes\": [{\"path\": \"/word\", \"values\": [\"p\", "
-        "\"q\"]}, {\"path\": \"/a\", \"also\": [\"/b/list/1\"], \"values\": [7, 8]}]}]";
+        "\"q\"]}, {\"path\": \"/a\", \"linked_paths\": [\"/b/list/1\"], \"values\": [7, 8]}]}]";
     open_study(body, &s);
     assert_int_equal(s.runs, 2);
     bst_study_place place = bst_study_place_of(&s, 1);
@@ -353,7 +353,7 @@ static void test_digest(void **state) {
     char *text = cJSON_Print(echo);
     fixture_write(folder, "resolved.json", text);
     snprintf(path, sizeof path, "%s/resolved.json", folder);
-    bst_assert_ok(&ctx, bst_study_open(&ctx, path, &again));
+    bst_assert_ok(&ctx, bst_study_open(&ctx, path, NULL, &again));
     assert_string_equal(again.digest, digest);
     free(text);
     cJSON_Delete(echo);

@@ -103,7 +103,7 @@ static void test_numbers(void **state) {
     for (int k = 0; k < 5; k++) {
         four[k] /= all;
     }
-    check_numbers("{\"distribution\": \"poisson\", \"mean\": 3.5, \"most\": 4}", 20000, four, 6);
+    check_numbers("{\"distribution\": \"poisson\", \"mean\": 3.5, \"max\": 4}", 20000, four, 6);
 }
 
 /* A great mean: its moments, within 5 standard errors, where the first term is 1e-196. */
@@ -157,7 +157,7 @@ static void test_values(void **state) {
         "{\"path\": \"/orbit/offset_rtn_m/1\", \"distribution\": \"normal\", \"mean\": 1, "
         "\"sigma\": 3, \"truncate_sigma\": 2, \"apply\": \"add\"}, "
         "{\"path\": \"/brightness/standard_v_mag\", \"distribution\": \"log_uniform\", \"from\": "
-        "1, \"to\": 10, \"also\": [\"/brightness/also\"]}]}]",
+        "1, \"to\": 10, \"linked_paths\": [\"/brightness/also\"]}]}]",
         &s);
     double *u[3], product = 0.0, across = 0.0;
     for (int k = 0; k < 3; k++) {
@@ -331,7 +331,7 @@ static void test_satellites(void **state) {
     char *text = cJSON_Print(echo);
     fixture_write(folder, "resolved.json", text);
     snprintf(path, sizeof path, "%s/resolved.json", folder);
-    bst_assert_ok(&ctx, bst_study_open(&ctx, path, &again));
+    bst_assert_ok(&ctx, bst_study_open(&ctx, path, NULL, &again));
     assert_string_equal(again.digest, s.digest);
     char *a = text_of(&s, 17), *b = text_of(&again, 17);
     assert_string_equal(a, b);
@@ -345,7 +345,7 @@ static void test_satellites(void **state) {
     strcpy(digest, s.digest);
     bst_study_close(&s);
     write_sets(SATELLITES + 1);
-    bst_assert_ok(&ctx, bst_study_open(&ctx, path, &again));
+    bst_assert_ok(&ctx, bst_study_open(&ctx, path, NULL, &again));
     assert_string_not_equal(again.digest, digest);
     bst_study_close(&again);
 }
@@ -380,7 +380,7 @@ static void test_check(void **state) {
     static const char *const cases[][2] = {
         {NUMBER("{\"distribution\": \"uniform\", \"to\": 7}"), ""},
         {NUMBER("{\"distribution\": \"uniform\", \"to\": 8}"), "/populations/0: value 8 of t: too"},
-        {NUMBER("{\"distribution\": \"poisson\", \"mean\": 0.001, \"most\": 8}"),
+        {NUMBER("{\"distribution\": \"poisson\", \"mean\": 0.001, \"max\": 8}"),
          "/populations/0: value 8 of t: too many objects"},
         {NUMBER("{\"count\": 8}"), "too many objects"},
         {AREA("9"), ""},
@@ -420,8 +420,8 @@ static void test_errors(void **state) {
          "\"uniform\", \"from\": 3, \"to\": 2}}",
          "/populations/0/number: from 3 to 2 is no range"},
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"number\": {\"distribution\": "
-         "\"poisson\", \"mean\": 5, \"most\": 4}}",
-         "/populations/0/number/most: less than the mean (found 4"},
+         "\"poisson\", \"mean\": 5, \"max\": 4}}",
+         "/populations/0/number/max: less than the mean (found 4"},
         {"{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"dispersions\": [{\"path\": \"area\", "
          "\"to\": 1}]}",
          "/populations/0/dispersions/0/path: no JSON pointer (found \"area\"; allowed: a JSON "
@@ -466,7 +466,7 @@ static void test_run_errors(void **state) {
          "[{\"path\": \"/albedo\", \"to\": 1, \"apply\": \"multiply\"}]}]",
          "/populations/0/dispersions/0: /world/objects/0/albedo has no number"},
         {"\"populations\": [{\"name\": \"t\", \"object\": {\"orbit\": {}}, \"dispersions\": "
-         "[{\"path\": \"/b\", \"to\": 1, \"also\": [\"/" LONG_100 LONG_100 LONG_100 LONG_100
+         "[{\"path\": \"/b\", \"to\": 1, \"linked_paths\": [\"/" LONG_100 LONG_100 LONG_100 LONG_100
              LONG_100 "\"]}]}]",
          "/populations/0/dispersions/0: a pointer is too long"},
         {"\"sweeps\": [{\"axes\": [{\"path\": \"/populations/0/name\", \"values\": [\"u\"]}]}], "

@@ -28,7 +28,7 @@ static inline bst_mtt_params pixel_tracker(int max_tracks, int max_detections) {
                             .max_sigma_rad = 60 * AS,
                             .merge_rad = 6 * PX,
                             .merge_floor_rad = 0.3 * PX,
-                            .max_merged = 30,
+                            .max_merged_frames = 30,
                             .feed_forward_rad = 0.09};
 }
 

@@ -25,8 +25,8 @@ static inline bst_mtt_params defaults(void) {
                             .max_detections = 1200,
                             .noise_rad2ps3 = pow(0.02 * AS, 2),
                             .manoeuvre_noise_rad2ps3 = pow(3 * AS, 2),
-                            .quiet_s = 3600,
-                            .manoeuvre_s = 60,
+                            .quiescent_sojourn_s = 3600,
+                            .manoeuvre_sojourn_s = 60,
                             .gate_chi2 = 16,
                             .detection_probability = 0.9,
                             .false_alarms_per_frame = 1,
@@ -41,15 +41,15 @@ static inline bst_mtt_params defaults(void) {
                             .max_sigma_rad = 60 * AS,
                             .merge_rad = 18 * AS,
                             .merge_floor_rad = 0.9 * AS,
-                            .max_merged = 30,
+                            .max_merged_frames = 30,
                             .feed_forward_rad = 0.09,
-                            .brightness_floor_mag = 0.0,
-                            .brightness_walk_mag = 0.02,
+                            .brightness_systematic_mag = 0.0,
+                            .brightness_random_walk_mag = 0.02,
                             .event_window = 8,
-                            .max_memory = 64,
-                            .memory_s = 7200,
+                            .max_dormant_tracks = 64,
+                            .max_dormant_s = 7200,
                             .memory_sigma_rad = 1.0 * BST_DEG_RAD,
-                            .memory_chi2 = 18.5};
+                            .dormant_gate_chi2 = 18.5};
 }
 
 static inline bench *start(uint64_t seed, const bst_mtt_params *params) {

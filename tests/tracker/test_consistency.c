@@ -31,8 +31,8 @@ typedef struct figures {
     int lost;
 } figures;
 
-static const double noise_as = 0.02, manoeuvre_as = 1.0, quiet_s = 60.0, manoeuvre_s = 10.0,
-                    sigma_as = 0.3, dt_s = 1.0, gate = 16.0;
+static const double noise_as = 0.02, manoeuvre_as = 1.0, quiescent_sojourn_s = 60.0,
+                    manoeuvre_sojourn_s = 10.0, sigma_as = 0.3, dt_s = 1.0, gate = 16.0;
 
 static bst_mtt_params make_params(const setup *s, double alarms_per_frame) {
     double field_as2 = 4.0 * HALF_AS * HALF_AS;
@@ -42,8 +42,8 @@ static bst_mtt_params make_params(const setup *s, double alarms_per_frame) {
                             .association = s->association,
                             .noise_rad2ps3 = pow(noise_as * AS, 2),
                             .manoeuvre_noise_rad2ps3 = pow(manoeuvre_as * AS, 2),
-                            .quiet_s = quiet_s,
-                            .manoeuvre_s = manoeuvre_s,
+                            .quiescent_sojourn_s = quiescent_sojourn_s,
+                            .manoeuvre_sojourn_s = manoeuvre_sojourn_s,
                             .gate_chi2 = gate,
                             .detection_probability = fmin(s->pd, 0.999),
                             .false_alarms_per_frame = fmax(1e-3, alarms_per_frame),
@@ -138,9 +138,10 @@ static void monte_carlo(const setup *s, figures *out) {
             double n[2];
             if (s->manoeuvres) {
                 double u0 = bst_rng_uniform(key, 4, (uint64_t)k),
-                       both = 1 / quiet_s + 1 / manoeuvre_s;
+                       both = 1 / quiescent_sojourn_s + 1 / manoeuvre_sojourn_s;
                 double mixed = -expm1(-both * dt_s) / both;
-                turning = turning ? u0 > mixed / manoeuvre_s : u0 < mixed / quiet_s;
+                turning =
+                    turning ? u0 > mixed / manoeuvre_sojourn_s : u0 < mixed / quiescent_sojourn_s;
             }
             wander(&truth, turning, key, 1, (uint64_t)k);
             bst_rng_normal2(key, 2, (uint64_t)k, n);
@@ -167,8 +168,8 @@ static void monte_carlo(const setup *s, figures *out) {
                     .kind = params.filter,
                     .noise_rad2ps3 = params.noise_rad2ps3,
                     .manoeuvre_noise_rad2ps3 = params.manoeuvre_noise_rad2ps3,
-                    .quiet_s = params.quiet_s,
-                    .manoeuvre_s = params.manoeuvre_s};
+                    .quiescent_sojourn_s = params.quiescent_sojourn_s,
+                    .manoeuvre_sojourn_s = params.manoeuvre_sojourn_s};
                 bst_sky_state state = track->state;
                 bst_filter_models models = track->models;
                 bst_sky_innovation v;

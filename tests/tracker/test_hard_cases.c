@@ -76,8 +76,8 @@ static void a_million_updates_of_each_filter(void **state) {
         bst_filter_params params = {.kind = (bst_filter_kind)filter,
                                     .noise_rad2ps3 = pow(1e-3 * AS, 2),
                                     .manoeuvre_noise_rad2ps3 = pow(1.0 * AS, 2),
-                                    .quiet_s = 3600,
-                                    .manoeuvre_s = 60};
+                                    .quiescent_sojourn_s = 3600,
+                                    .manoeuvre_sojourn_s = 60};
         bst_sky_state s = {.direction = bst_vec3_from_radec(1.0, 89.9 * BST_DEG_RAD)};
         bst_tangent axes = bst_tangent_at(s.direction);
         s.rate_radps = bst_tangent_vector(&axes, 50 * AS, 10 * AS);
@@ -174,7 +174,7 @@ static void identity_through_an_hour(void **state) {
 static void memory_has_its_limits(void **state) {
     (void)state;
     bst_mtt_params params = defaults();
-    params.max_memory = 2;
+    params.max_dormant_tracks = 2;
     bench *b = start(3, &params);
     bst_vec3 d[3];
     for (int i = 0; i < 3; i++) {
@@ -235,7 +235,7 @@ static void false_events_are_as_rare_as_asked(void **state) {
             bst_sky_shift(&truth[i], bst_tangent_vector(&axes, s * n[0], s * n[1]),
                           bst_tangent_vector(&axes, r * (sqrt(0.75) * n[0] + 0.5 * n[2]),
                                              r * (sqrt(0.75) * n[1] + 0.5 * n[3])));
-            v_mag[i] += params.brightness_walk_mag * bst_rng_normal(b->key, 12, b->draw++);
+            v_mag[i] += params.brightness_random_walk_mag * bst_rng_normal(b->key, 12, b->draw++);
             see(b, truth[i].direction, v_mag[i]);
         }
         frame(b, k);
@@ -464,7 +464,7 @@ static void wrong_names_are_refused(void **state) {
     bst_mtt *mtt;
     bst_mtt_params params = defaults();
     params.filter = BST_FILTER_IMM;
-    params.manoeuvre_s = 0.0;
+    params.manoeuvre_sojourn_s = 0.0;
     assert_int_equal(bst_mtt_create(&ctx, &params, &mtt), BST_ERR_ARGUMENT);
     params = defaults();
     params.event_window = 17;

@@ -2,8 +2,8 @@
 #include "tests/tracker/sky_bench.h"
 
 /* Two confirmed tracks, of which one object is never seen apart from the other again: they live on
- * one detection for max_merged frames, then the one that was seen longer goes on with it and the
- * other one misses, and not both. */
+ * one detection for max_merged_frames frames, then the one that was seen longer goes on with it and
+ * the other one misses, and not both. */
 static void melted_for_good(void **state) {
     (void)state;
     for (int association = 0; association < 4; association++) {
@@ -81,8 +81,8 @@ static bool pass_slowly(uint64_t seed, bst_mtt_association association, double b
                         double rate_pxps) {
     bst_mtt_params params = defaults();
     params.association = association;
-    params.brightness_floor_mag = 0.2;
-    params.max_merged = 60;
+    params.brightness_systematic_mag = 0.2;
+    params.max_merged_frames = 60;
     bench *b = start(seed, &params);
     bst_vec3 centre = bst_vec3_from_radec(0.0, 0.5);
     double heading = 6.28 * uniform(b), relative = 6.28 * uniform(b), meet = 30 + 7 / rate_pxps;
@@ -93,21 +93,21 @@ static bool pass_slowly(uint64_t seed, bst_mtt_association association, double b
         bst_vec3 o[2] = {along(centre, heading, 20 * AS * k)};
         bst_vec3 beside = along(o[0], relative + BST_PI / 2, 1.5 * CROSSING_PX);
         o[1] = along(beside, relative, rate_pxps * (k - meet) * CROSSING_PX);
-        double apart_px = bst_vec3_angle(o[0], o[1]) / CROSSING_PX;
-        if (apart_px < MELT_PX) {
-            double drawn = exp(-pow(apart_px / CENTROID_PX, 2));
+        double min_separation_px = bst_vec3_angle(o[0], o[1]) / CROSSING_PX;
+        if (min_separation_px < MELT_PX) {
+            double drawn = exp(-pow(min_separation_px / CENTROID_PX, 2));
             double place = light > 0.5 ? 1.0 - drawn * (1.0 - light) : drawn * light;
             bst_vec3 to = bst_tangent_log(o[0], o[1]);
             see(b, bst_tangent_exp(o[0], bst_vec3_scale(to, place)),
                 v[1] + 2.5 * log10(light)); /* v of the sum */
         }
-        for (int i = 0; i < 2 && apart_px >= MELT_PX; i++) {
+        for (int i = 0; i < 2 && min_separation_px >= MELT_PX; i++) {
             if (uniform(b) < 0.98) {
                 see(b, o[i], v[i]);
             }
         }
         frame(b, k);
-        for (int i = 0; i < 2 && apart_px > MELT_PX; i++) {
+        for (int i = 0; i < 2 && min_separation_px > MELT_PX; i++) {
             const bst_mtt_track *track = track_at(b, o[i], 1.5 * CROSSING_PX);
             if (k < meet) {
                 before[i] = track ? track->id : before[i];

@@ -384,7 +384,7 @@ static bst_mtt_params with_stars(void) {
     bst_mtt_params params = defaults();
     params.star_rate_radps = 0.5 * AS;
     params.motion_chi2 = 25;
-    params.max_stars = 1000;
+    params.max_stationary_tracks = 1000;
     return params;
 }
 
@@ -469,7 +469,7 @@ static void stars_are_kept_while_there_is_room(void **state) {
     assert_int_equal(events_of(b, BST_MTT_LOST), 0);
     bst_mtt_free(b->mtt);
 
-    params.max_stars = 10;
+    params.max_stationary_tracks = 10;
     b = start(23, &params);
     for (int k = 0; k < 10; k++) {
         for (int i = 0; i < 50; i++) {

@@ -174,10 +174,10 @@ static void identity_over_the_gap(void **state) {
                                      .max_misses = 12,
                                      .max_coast_s = 120,
                                      .max_sigma_rad = 60 * AS,
-                                     .max_memory = 16,
-                                     .memory_s = 7200,
+                                     .max_dormant_tracks = 16,
+                                     .max_dormant_s = 7200,
                                      .memory_sigma_rad = BST_DEG_RAD,
-                                     .memory_chi2 = 18.5};
+                                     .dormant_gate_chi2 = 18.5};
             bst_mtt *mtt;
             bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
             bst_rng_key key = bst_rng_make_key(run, 1, "test", "orbit_track");
@@ -237,8 +237,8 @@ static void not_with_imm(void **state) {
                              .field_sr = 1e-4,
                              .confirm_hits = 3,
                              .confirm_frames = 5,
-                             .manoeuvre_s = 1,
-                             .quiet_s = 1};
+                             .manoeuvre_sojourn_s = 1,
+                             .quiescent_sojourn_s = 1};
     assert_int_equal(bst_mtt_create(&ctx, &params, &mtt), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "ekf"));
 }

@@ -126,7 +126,7 @@ static void moved_by_more_than_its_image(void **state) {
 static void what_rests_has_room_of_its_own(void **state) {
     (void)state;
     bst_mtt_params params = defaults();
-    params.max_stars = 3;
+    params.max_stationary_tracks = 3;
     params.max_tracks = 10;
     params.star_rate_radps = RATE;
     bench *b = start(3, &params);

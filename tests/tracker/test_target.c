@@ -14,8 +14,8 @@ static const bst_target_params params = {.direction_chi2 = 18.4,
                                          .min_hits = 4,
                                          .margin = 2,
                                          .margin_hits = 8,
-                                         .memory_s = 600,
-                                         .memory_chi2 = 23.5,
+                                         .max_dormant_s = 600,
+                                         .dormant_gate_chi2 = 23.5,
                                          .memory_noise_rad2ps3 = 0.04 * AS * AS};
 
 static bst_vec3 place(double a1_as, double a2_as) {

@@ -132,7 +132,7 @@ static bst_mtt_sight sight_of(const void *user, const bst_mtt_track *track, bst_
 enum { DARK_FROM = 300, DARK_TO = 3900, END = 3920 };
 
 typedef struct night {
-    double memory_s;
+    double max_dormant_s;
     int decoys;         /* detections at the predicted place in each dark frame, that do not last */
     double neighbour_m; /* another object so far ahead, seen all night; 0: none */
     /* results */
@@ -177,10 +177,10 @@ static void run_night(night *g, uint64_t seed) {
                              .max_misses = 12,
                              .max_coast_s = 120,
                              .max_sigma_rad = 60 * AS,
-                             .max_memory = 16,
-                             .memory_s = g->memory_s,
+                             .max_dormant_tracks = 16,
+                             .max_dormant_s = g->max_dormant_s,
                              .memory_sigma_rad = BST_DEG_RAD,
-                             .memory_chi2 = 18.5};
+                             .dormant_gate_chi2 = 18.5};
     bst_mtt *mtt;
     bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
     bst_rng_key key = bst_rng_make_key(seed, 1, "test", "night");
@@ -258,7 +258,7 @@ static void it_wakes_as_itself(void **state) {
     (void)state;
     for (uint64_t seed = 1; seed <= 4; seed++) {
         for (int decoys = 0; decoys <= 1; decoys++) {
-            night g = {.memory_s = 7200, .decoys = decoys};
+            night g = {.max_dormant_s = 7200, .decoys = decoys};
             run_night(&g, seed);
             assert_true(g.id > 0);
             assert_int_equal(g.slept, DARK_FRAMES);
@@ -273,7 +273,7 @@ static void it_wakes_as_itself(void **state) {
 static void a_neighbour_that_is_seen_all_night_does_not_become_it(void **state) {
     (void)state;
     for (uint64_t seed = 1; seed <= 4; seed++) {
-        night g = {.memory_s = 7200, .neighbour_m = 40e3}; /* 200 arcsec */
+        night g = {.max_dormant_s = 7200, .neighbour_m = 40e3}; /* 200 arcsec */
         run_night(&g, seed);
         assert_int_equal(g.id_after, g.id);
         assert_int_equal(g.lost, 0);
@@ -282,7 +282,7 @@ static void a_neighbour_that_is_seen_all_night_does_not_become_it(void **state) 
 
 static void a_night_longer_than_the_memory_ends_the_track(void **state) {
     (void)state;
-    night g = {.memory_s = 1800};
+    night g = {.max_dormant_s = 1800};
     run_night(&g, 1);
     assert_int_equal(g.lost, 1);
     assert_true(g.slept < DARK_FRAMES / 2 + 6);

@@ -76,9 +76,10 @@ static void the_oldest_are_forgotten(void **state) {
 static void an_object_is_steered_by_name(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_world *world = test_world_with("{\"name\": \"GX5\", " TEST_GX5
-                                       "}, {\"name\": \"mine\", \"steered\": true, " TEST_GX5 "}",
-                                       "");
+    bst_world *world =
+        test_world_with("{\"name\": \"GX5\", " TEST_GX5
+                        "}, {\"name\": \"mine\", \"external_states\": true, " TEST_GX5 "}",
+                        "");
     bst_world_view *view;
     bst_world_state before, at = circle(0.3, 50), now;
     bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));

@@ -3,7 +3,7 @@
 
 #define NUMERICAL "{\"name\": \"n\", \"orbit\": {\"source\": \"numerical\", "
 #define KEPLERIAN                                                                             \
-    "\"state\": {\"from\": \"keplerian\", \"at_s\": 100, \"perigee_radius_m\": 7e6, "         \
+    "\"state\": {\"source\": \"keplerian\", \"at_s\": 100, \"perigee_radius_m\": 7e6, "       \
     "\"eccentricity\": 0.1, \"inclination_deg\": 60, \"raan_deg\": 30, \"arg_perigee_deg\": " \
     "40, \"true_anomaly_deg\": 50}"
 
@@ -95,9 +95,9 @@ static void element_sets_and_other_objects_start_one_too(void **state) {
     bst_world *world = test_world_with(
         "{\"name\": \"GX5\", " TEST_GX5 "}, " NUMERICAL
         "\"elements_file\": \"scenarios/catalogue_2022-06.tle\", \"norad\": 44801, \"state\": "
-        "{\"from\": \"element_set\", \"at_s\": 500}}}, {\"name\": \"m\", \"orbit\": {\"source\": "
+        "{\"source\": \"element_set\", \"at_s\": 500}}}, {\"name\": \"m\", \"orbit\": {\"source\": "
         "\"numerical\", \"reference\": \"GX5\", \"offset_rtn_m\": [10, -200, 30], "
-        "\"rate_rtn_mps\": [0.1, 0, 0], \"state\": {\"from\": \"relative\", \"at_s\": -50}}}",
+        "\"rate_rtn_mps\": [0.1, 0, 0], \"state\": {\"source\": \"relative\", \"at_s\": -50}}}",
         "");
     assert_int_equal(bst_world_object(world, 1)->norad, 44801);
     bst_world_view *view = view_of(world);
@@ -161,26 +161,26 @@ static void wrong_ones_are_refused(void **state) {
     refuse(NUMERICAL "\"state\": {}}}",
            "test: /world/objects/0/orbit: the initial state lies at a height of -6378.1 km, orbits "
            "end below 80 km");
-    refuse(NUMERICAL "\"state\": {\"from\": \"keplerian\"}}}",
+    refuse(NUMERICAL "\"state\": {\"source\": \"keplerian\"}}}",
            "test: /world/objects/0/orbit/state: keplerian elements need semi_major_axis_m or "
            "perigee_radius_m");
     refuse(NUMERICAL
-           "\"state\": {\"from\": \"keplerian\", \"perigee_radius_m\": 7e6, "
+           "\"state\": {\"source\": \"keplerian\", \"perigee_radius_m\": 7e6, "
            "\"eccentricity\": 2, \"true_anomaly_deg\": 150}}}",
            "test: /world/objects/0/orbit/state: true_anomaly_deg 150: the hyperbola does not reach "
            "it");
     refuse(NUMERICAL
-           "\"state\": {\"from\": \"keplerian\", \"perigee_radius_m\": 7e6, "
+           "\"state\": {\"source\": \"keplerian\", \"perigee_radius_m\": 7e6, "
            "\"semi_major_axis_m\": 8e6, \"eccentricity\": 0.1}}}",
            "test: /world/objects/0/orbit/state: semi_major_axis_m and eccentricity give a perigee "
            "of 7200000 m, but perigee_radius_m gives 7000000 m; give one of the two");
     refuse(NUMERICAL
-           "\"state\": {\"from\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
+           "\"state\": {\"source\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
            "\"true_anomaly_deg\": 0, \"mean_anomaly_deg\": 90}}}",
            "test: /world/objects/0/orbit/state: true_anomaly_deg 0 is a mean anomaly of 0 degrees, "
            "but mean_anomaly_deg gives 90; give one of the two");
     refuse(NUMERICAL
-           "\"state\": {\"from\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
+           "\"state\": {\"source\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
            "\"eccentricity\": 1.5}}}",
            "test: /world/objects/0/orbit/state: semi_major_axis_m 8000000 and eccentricity 1.5: no "
            "orbit has them; an ellipse (eccentricity below 1) has an axis above 0, a hyperbola one "

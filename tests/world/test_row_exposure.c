@@ -199,7 +199,7 @@ static void contradictions_are_refused(void **state) {
     assert_int_equal(bst_detector_config_check(&ctx, &d), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "row_time_s"));
     d.frame_transfer_s = 0;
-    d.full_well = BST_WELL_BLOOM;
+    d.saturation = BST_WELL_BLOOM;
     assert_int_equal(bst_detector_config_check(&ctx, &d), BST_ERR_CONFIG);
 }
 

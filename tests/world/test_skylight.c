@@ -9,7 +9,7 @@
 
 static bst_scene_pst *make_pst(const bst_optics_pst_point *points, int count) {
     bst_ctx ctx = {0};
-    bst_background_config c = {.pst = {(void *)points, count}, .pixel_um = 10};
+    bst_background_config c = {.pst = {(void *)points, count}, .pixel_pitch_um = 10};
     bst_scene_pst *pst;
     bst_assert_ok(&ctx, bst_scene_pst_create(&ctx, &c, 0, "", &pst));
     return pst;
@@ -25,13 +25,13 @@ static void transmittance_is_log_linear(void **state) {
     bst_scene_pst_free(pst);
     bst_ctx ctx = {0};
     bst_optics_pst_point wrong[] = {{20, 1e-3}, {20, 1e-5}};
-    bst_background_config c = {.pst = {wrong, 2}, .pixel_um = 10};
+    bst_background_config c = {.pst = {wrong, 2}, .pixel_pitch_um = 10};
     assert_int_equal(bst_scene_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "pst/1/angle_deg"));
     c.pst.count = 1;
-    c.pixel_um = 0;
+    c.pixel_pitch_um = 0;
     assert_int_equal(bst_scene_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
-    assert_non_null(strstr(ctx.message, "pixel_um"));
+    assert_non_null(strstr(ctx.message, "pixel_pitch_um"));
 }
 
 static void stray_light_by_hand(void **state) {
@@ -472,10 +472,10 @@ static void stray_light_on_the_detector(void **state) {
     double v0 = 0, efficiency = 0;
     for (int table = 0; table < 2; table++) {
         bst_world *world = test_world(
-            table
-                ? SKY_WORLD("64", DARK ", \"pixel_um\": 12, \"pst\": [{\"angle_deg\": 0, \"pst\": "
-                                       "1e-3}, {\"angle_deg\": 60, \"pst\": 1e-9}]")
-                : SKY_WORLD("64", DARK));
+            table ? SKY_WORLD("64", DARK
+                              ", \"pixel_pitch_um\": 12, \"pst\": [{\"angle_deg\": 0, \"pst\": "
+                              "1e-3}, {\"angle_deg\": 60, \"pst\": 1e-9}]")
+                  : SKY_WORLD("64", DARK));
         bst_skylight *s;
         const bst_skylight_map *map = make(world, &around, (bst_window){0, 0, 64, 64}, &s);
         value[table] = bst_skylight_at(map, 31, 40);

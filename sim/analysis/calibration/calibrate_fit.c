@@ -54,6 +54,7 @@ static double best_gain(const bst_calibration_fitter *c, int node, double slope,
     return 0.5 * (low + high);
 }
 
+/* Fits the gains of the detection probability per streak length. */
 static void fit_detection(const bst_calibration_fitter *c, bst_obsgen_calibration *out) {
     long count[BST_OBSGEN_LENGTHS] = {0};
     for (long i = 0; i < c->trial_count; i++) {
@@ -113,6 +114,7 @@ static double untruncated_sigma(double square) {
     return 0.5 * (low + high);
 }
 
+/* Fits the ratio of centroid error to bound at each SNR. */
 static void fit_places(const calibrate_mean *seen, double *factors) {
     double before = 1.0;
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
@@ -131,12 +133,13 @@ bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *c,
                                        .false_alarms = c->alarm_count};
     bst_obsgen_calibration_theory(out);
     if (c->trial_count < LEAST_SOURCES || c->alarm_count < LEAST_ALARMS) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "%ld stars near the detection limit and %ld false alarms are too few for a "
-                        "calibration (needed: %d and %d); give --seeds more, or scenarios with "
-                        "world/faint_stars = \"statistical\" and a scenegen/v_limit beyond the "
-                        "limit of detection",
-                        c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
+        return bst_fail(
+            ctx, BST_ERR_STATE,
+            "%ld stars near the detection limit and %ld false alarms are too few for a "
+            "calibration (needed: %d and %d); give --seeds more, or scenarios with "
+            "world/faint_stars = \"statistical\" and a scenegen/star_limit_v_mag beyond the "
+            "limit of detection",
+            c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
     }
     fit_detection(c, out);
     fit_places(c->across, out->across_factor);
@@ -155,7 +158,7 @@ bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *c,
     flat = (c->ny - crowding * c->nq) / c->nn;
     out->crowding = crowding;
     if (c->light_square > 1e-6 * (double)c->frames) {
-        out->background_share = fmin(fmax(c->light_bias / c->light_square, 0.0), 2.0);
+        out->background_fraction = fmin(fmax(c->light_bias / c->light_square, 0.0), 2.0);
     }
     out->noise_factor = sqrt(fmax(flat, 0.01));
     out->false_alarm_factor = (double)c->alarm_count / c->alarms_expected;
@@ -163,12 +166,12 @@ bst_status bst_calibration_fitter_fit(bst_ctx *ctx, bst_calibration_fitter *c,
     for (long i = 0; i < c->alarm_count; i++) {
         energy += fmin(c->alarm_energy[i], 10.0);
     }
-    out->false_alarm_tail = fmin((double)c->alarm_count / fmax(energy, 1e-3), 10.0);
+    out->false_alarm_steepness = fmin((double)c->alarm_count / fmax(energy, 1e-3), 10.0);
     if (c->identifiable >= LEAST_PLACES) {
         out->star_id_probability = (double)c->identified / (double)c->identifiable;
     }
     if (c->hits >= LEAST_SOURCES) {
-        out->hit_told_probability = (double)c->hits_told / (double)c->hits;
+        out->cosmic_ray_flag_probability = (double)c->hits_told / (double)c->hits;
     }
     return BST_OK;
 }

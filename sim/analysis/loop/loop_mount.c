@@ -4,12 +4,14 @@
 #include "gimbal/mount/axis.h"
 #include "sim/analysis/loop/loop_model.h"
 
+/* Open-loop response of a mount axis: compensator times plant. */
 static double complex servo_open(const void *user, double omega) {
     const bst_loop_servo *servo = user;
     return bst_compensator_response(&servo->mount.compensator, omega) *
            bst_mount_linear_encoder(&servo->mount.linear, omega);
 }
 
+/* Builds the servo loop model of mount axis k. */
 static bst_status build_servo(bst_ctx *ctx, int type, const bst_mount_config *config, int k,
                               double dt_s, bst_loop_servo *servo) {
     double angle[BST_CHAIN_MOST] = {0.0};
@@ -19,7 +21,7 @@ static bst_status build_servo(bst_ctx *ctx, int type, const bst_mount_config *co
     BST_TRY(bst_mount_axis_model_init(ctx, type, config, angle, dt_s, k, &servo->mount));
     servo->there = true;
     double mode = config->flexible.frequency_hz[k];
-    double share = config->flexible.inertia_share[k];
+    double share = config->flexible.inertia_fraction[k];
     /* flexible mode with locked and free joint */
     servo->hint_hz[0] = mode;
     servo->hint_hz[1] = mode / sqrt(1.0 - share);
@@ -49,7 +51,7 @@ static double step_axis(axis_run *run, int n, double target_rad, double target_r
     shaper->reference_rad += dt * rate;
     shaper->reference_radps += dt * accel;
     run->reference[(n + linear->delay_steps + 1) % 32] = shaper->reference_rad;
-    double sight = run->state[0] + linear->line_of_sight_share * run->state[2];
+    double sight = run->state[0] + linear->line_of_sight_fraction * run->state[2];
     double error = run->reference[n % 32] - run->state[0];
     /* torque from this measurement: acts delay_steps later for one step */
     double asked = bst_compensator_step(&run->compensator, error, accel) +
@@ -91,6 +93,7 @@ static int mount_response(const bst_mount_axis_model *model, const bst_axis_spec
     return n;
 }
 
+/* Computes step response and ramp lag of a mount axis at the control rate. */
 static bst_status respond(bst_ctx *ctx, const bst_mount_config *config,
                           const bst_mount_axis_model *model, int k, double dt_s,
                           bst_control_servo_response *out) {

@@ -17,21 +17,21 @@ enum { BST_PD_POINTS = 200, BST_PD_PHASES = 10 };
 typedef struct bst_pd_options {
     double low, high, step; /* SNR; V magnitude if by_magnitude */
     bool by_magnitude;
-    int64_t trials;        /* per point */
-    int64_t empty_frames;  /* frames without targets; 0: for 400 false alarms, 50 to 400 frames */
-    double streak_px;      /* 0: targets at rest in the frame */
-    bool known_rate;       /* the camera rotates, and image processing gets its rate */
-    double false_alarms;   /* per frame; <= 0: from the scenario */
-    double background_e;   /* sky per pixel and exposure; < 0: from the scenario */
-    double jitter_px;      /* blur per axis; < 0: as configured for image processing */
-    double apart_px;       /* minimum distance between targets, beyond their length */
-    double cell_px;        /* cell size of the target grid; 0: apart_px + length + 40 */
-    bool stars;            /* with the stars and sky of the scenario */
-    int64_t stack;         /* frames that are searched together; 0: single frames */
-    double rates_px;       /* per frame: maximum motion of a stack's targets in x and y */
-    double star_streak_px; /* the camera follows the targets: stars are streaks */
-    bool by_module;        /* step the scenario's module also if a function is available */
-    const char *sensor;    /* "observer/sensor"; NULL: the first */
+    int64_t trials;       /* per point */
+    int64_t empty_frames; /* frames without targets; 0: for 400 false alarms, 50 to 400 frames */
+    double streak_px;     /* 0: targets at rest in the frame */
+    bool known_rate;      /* the camera rotates, and image processing gets its rate */
+    double false_alarms;  /* per frame; <= 0: from the scenario */
+    double background_e;  /* sky per pixel and exposure; < 0: from the scenario */
+    double jitter_px;     /* blur per axis; < 0: as configured for image processing */
+    double min_separation_px; /* minimum distance between targets, beyond their length */
+    double cell_px;           /* cell size of the target grid; 0: min_separation_px + length + 40 */
+    bool stars;               /* with the stars and sky of the scenario */
+    int64_t stack;            /* frames that are searched together; 0: single frames */
+    double rates_px;          /* per frame: maximum motion of a stack's targets in x and y */
+    double star_streak_px;    /* the camera follows the targets: stars are streaks */
+    bool by_module;           /* step the scenario's module also if a function is available */
+    const char *sensor;       /* "observer/sensor"; NULL: the first */
     const char *device;
     int threads;
     bst_device *opened; /* an open device to use; the caller closes it; NULL: none */
@@ -82,7 +82,7 @@ typedef struct bst_pd_scene {
     bst_pd_image *image;  /* image model of targets; NULL: the PSF is Gaussian */
     struct bst_psf *seen; /* PSF of the image model */
     double *sharpness;    /* sum p^2 of a streak by its angle from an axis; NULL: point targets */
-    double cell_px, apart_px;
+    double cell_px, min_separation_px;
     int columns, rows;
     int points;
     double snr[BST_PD_POINTS];    /* at the boresight */

@@ -215,14 +215,14 @@ static bst_status set_own_light(bst_ctx *ctx, bst_pd_scene *s) {
 
 static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_pd_options *o = &s->options;
-    s->apart_px = o->apart_px + o->streak_px;
-    s->apart_px += o->stack > 0 ? o->rates_px * (double)(o->stack - 1) : 0.0;
-    s->cell_px = o->cell_px > 0.0 ? o->cell_px : s->apart_px + 40.0;
-    if (s->cell_px < s->apart_px + 2.0) {
+    s->min_separation_px = o->min_separation_px + o->streak_px;
+    s->min_separation_px += o->stack > 0 ? o->rates_px * (double)(o->stack - 1) : 0.0;
+    s->cell_px = o->cell_px > 0.0 ? o->cell_px : s->min_separation_px + 40.0;
+    if (s->cell_px < s->min_separation_px + 2.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--cell %g: at least %g px, the distance that is kept between targets and "
                         "two pixels to place them in",
-                        o->cell_px, s->apart_px + 2.0);
+                        o->cell_px, s->min_separation_px + 2.0);
     }
     s->columns = (int)((double)s->camera.width_px / s->cell_px);
     s->rows = (int)((double)s->camera.height_px / s->cell_px);
@@ -420,7 +420,7 @@ static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_r
     int64_t shift = room % s->points == 0 ? number : 0;
     double origin_x = 0.5 * ((double)s->camera.width_px - s->columns * s->cell_px) - 0.5;
     double origin_y = 0.5 * ((double)s->camera.height_px - s->rows * s->cell_px) - 0.5;
-    double span = s->cell_px - s->apart_px;
+    double span = s->cell_px - s->min_separation_px;
     f->count = 0;
     for (int i = 0; i < room && (first + i < last || first >= last); i++) {
         uint64_t draw = 3 * (uint64_t)i;
@@ -434,12 +434,13 @@ static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_r
                 bst_rng_uniform(key, (uint64_t)number, 3 * (uint64_t)room + 2 * (uint64_t)i + k);
             moved[k] = s->options.rates_px * (2.0 * rate - 1.0) * from_middle;
         }
-        add_target(
-            s, f,
-            origin_x + (i % s->columns) * s->cell_px + 0.5 * s->apart_px + u[0] * span + moved[0],
-            origin_y + (i / s->columns) * s->cell_px + 0.5 * s->apart_px + u[1] * span + moved[1],
-            (int)((first + i + shift) % s->points),
-            s->options.known_rate ? heading : 2.0 * BST_PI * u[2]);
+        add_target(s, f,
+                   origin_x + (i % s->columns) * s->cell_px + 0.5 * s->min_separation_px +
+                       u[0] * span + moved[0],
+                   origin_y + (i / s->columns) * s->cell_px + 0.5 * s->min_separation_px +
+                       u[1] * span + moved[1],
+                   (int)((first + i + shift) % s->points),
+                   s->options.known_rate ? heading : 2.0 * BST_PI * u[2]);
     }
 }
 

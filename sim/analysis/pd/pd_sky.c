@@ -24,7 +24,7 @@ struct bst_pd_sky {
     int room;
 };
 
-/* Reads "v_limit" of the sensor's rendering module. */
+/* Reads "star_limit_v_mag" of the sensor's rendering module. */
 static double v_limit_of(const bst_pd_scene *s) {
     for (int m = 0; m < s->scenario->module_count; m++) {
         const bst_scenario_module_config *module = &s->scenario->modules[m];
@@ -33,7 +33,7 @@ static double v_limit_of(const bst_pd_scene *s) {
             continue;
         }
         for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
-            if (d->type == BST_CONFIG_REAL && strcmp(d->key, "v_limit") == 0) {
+            if (d->type == BST_CONFIG_REAL && strcmp(d->key, "star_limit_v_mag") == 0) {
                 double value;
                 memcpy(&value, (const char *)module->config + d->offset, sizeof value);
                 return value;

@@ -54,8 +54,9 @@ const bst_config_desc bst_record_config_table[] = {
     BST_BOOL(
         bst_recorder_config, sightings, "true",
         "Who saw what: the objects' passes through the fields, and their sums, against truth."),
-    BST_REAL(bst_recorder_config, custody_s, "s", 0, 1e9, "21600",
+    BST_REAL(bst_recorder_config, custody_timeout_s, "s", 0, 1e9, "21600",
              "sightings: an object counts as in custody for this long after each detection."),
+    BST_FORMER("custody_s", "custody_timeout_s"),
     BST_REAL(bst_recorder_config, telemetry_hz, "Hz", 0.0, 1e6, "1",
              "Rate at which telemetry, control status and the true line of sight are kept; 0: "
              "not at all."),
@@ -156,6 +157,7 @@ static void frames_file(const bst_recorder *recorder, const bst_recorder_state *
     }
 }
 
+/* Sets up the state of each recorded sensor and the tables. */
 static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_info *info) {
     BST_TRY(copy_name(ctx, recorder->program, sizeof recorder->program, info->program));
     for (int i = 0; i < info->sensor_count; i++) {

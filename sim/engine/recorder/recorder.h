@@ -35,7 +35,7 @@ typedef struct bst_recorder_config {
     bool commands;
     bool events;
     bool sightings; /* table `sightings`, written by the caller */
-    double custody_s;
+    double custody_timeout_s;
     double telemetry_hz;
 } bst_recorder_config;
 

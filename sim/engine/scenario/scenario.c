@@ -8,6 +8,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/former_names.h"
 #include "sim/core/text.h"
 #include "sim/engine/scenario/scenario_internal.h"
 #include "sim/link/endpoint.h"
@@ -93,7 +94,7 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
 static bst_status resolve_state(bst_ctx *ctx, const bst_scenario *s, const char *list, int index,
                                 bst_orbit_config *orbit) {
     bool keplerian =
-        orbit->source == BST_ORBIT_NUMERICAL && orbit->state.from == BST_STATE_KEPLERIAN;
+        orbit->source == BST_ORBIT_NUMERICAL && orbit->state.source == BST_STATE_KEPLERIAN;
     if (keplerian && bst_keplerian_resolve(ctx, &orbit->state) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/%d/orbit/state", s->file, list, index);
     }
@@ -193,10 +194,23 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json,
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json,
                              const bst_scenario_registry *registry, bst_scenario *out) {
     assert(json && registry && out);
-    bst_status status = read_scenario(ctx, json, registry, out);
+    const bst_document_tables tables = {bst_scenario_table, bst_scenario_tables_inside, registry};
+    bst_json *described = NULL;
+    bst_status status = BST_OK;
+    *out = (bst_scenario){.format = 0};
+    if (!bst_json_is_described(json)) {
+        BST_TRY(bst_json_copy(ctx, json, &described));
+        /* the file of a run that is over is not the user's to change */
+        bool warn = registry->policy != BST_PLUGINS_SKIP;
+        status = bst_json_describe(ctx, described, &tables, warn);
+    }
+    if (status == BST_OK) {
+        status = read_scenario(ctx, described ? described : json, registry, out);
+    }
     if (status != BST_OK) {
         bst_json_name_file(ctx, json);
     }
+    bst_json_free(described);
     return status;
 }
 

@@ -74,8 +74,19 @@ typedef struct bst_scenario {
 
 extern const bst_config_desc bst_scenario_table[];
 
-/* Reads and checks a scenario; it reads no other file than the JSON (bst_json_load_extended) and
- * plug-ins.
+/* Tables of the modules of a scenario: function `inside` of a bst_document_tables whose root is
+ * bst_scenario_table.
+ *
+ * Given:     registry   bst_scenario_registry
+ *            the others as bst_document_tables
+ * Returned:  common table and those of all modules of the role, or of the module that node's "type"
+ *            names; NULL after the last one */
+const bst_config_desc *bst_scenario_tables_inside(const void *registry, const char *raw,
+                                                  const char *key, const struct cJSON *node,
+                                                  int index);
+
+/* Reads and checks a scenario; it reads no other file than the JSON (bst_json_load_extended, or
+ * bst_json_load_described to accept former names in "set" and overrides) and plug-ins.
  * Notes:     Paths of existing files become absolute. A file in a module's table must exist
  *            (BST_CONFIG_PATH, outside of lists). Plug-ins are loaded: see bst_plugin_open.
  * Ownership: free with bst_scenario_free, also after an error */

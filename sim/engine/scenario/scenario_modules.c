@@ -29,6 +29,7 @@ const bst_config_desc bst_module_common_table[] = {
     BST_CONFIG_END,
 };
 
+/* True if the key is one that every module block has. */
 static bool is_common(const char *key) {
     for (const bst_config_desc *d = bst_module_common_table; d->key; d++) {
         if (strcmp(d->key, key) == 0) {
@@ -59,6 +60,26 @@ static const bst_module_desc *find_module(const bst_scenario_registry *registry,
         }
     }
     return NULL;
+}
+
+const bst_config_desc *bst_scenario_tables_inside(const void *user, const char *raw,
+                                                  const char *key, const cJSON *node, int index) {
+    const bst_scenario_registry *registry = user;
+    bool tasking = strcmp(raw, "tasking") == 0;
+    const char *role = tasking && !key ? raw : !tasking && key ? key : NULL;
+    const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(node, "type"));
+    if (!role || !(tasking || strcmp(raw, "modules") == 0)) {
+        return NULL;
+    }
+    for (int i = 0; i < registry->count; i++) {
+        const bst_module_desc *m = registry->modules[i];
+        if (m->config && strcmp(m->role, role) == 0 &&
+            (!type || strcmp(m->type, type) == 0 || (m->also && strcmp(m->also, type) == 0)) &&
+            index-- == 0) {
+            return m->config;
+        }
+    }
+    return index == 0 ? bst_module_common_table : NULL;
 }
 
 /* Lists the types of a role for error messages: "a", "b", "c"; role NULL: all roles. */
@@ -129,6 +150,7 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
     return BST_OK;
 }
 
+/* True if the module type matches the place of its block: sensor or all sensors. */
 static bool fits(const bst_module_desc *desc, const bst_scenario_module_config *module) {
     return (desc->flags & BST_MODULE_MULTI_SENSOR) ==
            (module->observer < 0 ? BST_MODULE_MULTI_SENSOR : 0);

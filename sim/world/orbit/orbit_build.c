@@ -127,7 +127,7 @@ static bst_status state_of_other(const bst_world_builder *b, const bst_orbit_con
                                  int *norad) {
     const bst_initial_state_config *s = &config->state;
     bst_orbit_config other = *config;
-    other.source = s->from == BST_STATE_ELEMENT_SET ? BST_ORBIT_SGP4 : BST_ORBIT_RELATIVE;
+    other.source = s->source == BST_STATE_ELEMENT_SET ? BST_ORBIT_SGP4 : BST_ORBIT_RELATIVE;
     other.at_s = s->at_s;
     const bst_config_list no_burns = {NULL, 0};
     bst_world_orbit orbit = {0};
@@ -144,7 +144,7 @@ static bst_status build_numerical(const bst_world_builder *b, const bst_orbit_co
                                   const bst_config_list *burns, const char *path, const char *name,
                                   bst_world_orbit *orbit, int *norad) {
     bst_world_state other = {.position_m = {.x = 0.0}};
-    int32_t from = config->state.from;
+    int32_t from = config->state.source;
     BST_TRY(bst_world_orbit_make_gravity(b, &config->forces, path, &orbit->gravity));
     if (from != BST_STATE_CARTESIAN && from != BST_STATE_KEPLERIAN) {
         BST_TRY(state_of_other(b, config, path, name, &other, norad));

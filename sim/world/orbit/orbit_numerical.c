@@ -8,10 +8,11 @@ static const char *const state_kinds[] = {"cartesian", "keplerian", "element_set
                                           NULL};
 
 const bst_config_desc bst_initial_state_table[] = {
-    BST_ENUM(bst_initial_state_config, from, state_kinds, "\"cartesian\"",
+    BST_ENUM(bst_initial_state_config, source, state_kinds, "\"cartesian\"",
              "cartesian: position and velocity below. keplerian: the elements below. element_set: "
              "what the orbit's element set gives at that time by SGP4. relative: the "
              "orbit's reference, offset_rtn_m and rate_rtn_mps at that time."),
+    BST_FORMER("from", "source"),
     BST_REAL(bst_initial_state_config, at_s, "s", -1e9, 1e9, "0", "Time of the state."),
     BST_REALS(bst_initial_state_config, position_gcrf_m, "m", -1e10, 1e10, "[0, 0, 0]",
               "cartesian: geocentric position."),
@@ -97,7 +98,7 @@ static bst_status initial_state(const bst_world_builder *b, const bst_orbit_conf
                                 const bst_world_state *other, const char *path, double gm,
                                 bst_world_state *out) {
     const bst_initial_state_config *s = &config->state;
-    switch (s->from) {
+    switch (s->source) {
         case BST_STATE_CARTESIAN:
             *out = (bst_world_state){bst_vec3_from_array(s->position_gcrf_m),
                                      bst_vec3_from_array(s->velocity_gcrf_mps)};

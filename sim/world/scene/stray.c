@@ -12,6 +12,7 @@ struct bst_scene_pst {
     bst_optics_pst_point points[];
 };
 
+/* Loads a table of point source transmittance. */
 static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst_curve *curve) {
     static const char *const angle[] = {"angle_deg", NULL};
     static const char *const value[] = {"pst", NULL};
@@ -24,11 +25,13 @@ static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst
     return status == BST_OK ? status : bst_fail_prefix(ctx, BST_ERR_CONFIG, "pst_file");
 }
 
+/* Checks the pixel pitch and the angles of a point source transmittance. */
 static bst_status check(bst_ctx *ctx, const bst_scene_pst *pst) {
     if (!(pst->pixel_m > 0.0)) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "pixel_um: stray light by a table needs the pixel pitch; give it here or "
-                        "in the block optics");
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "pixel_pitch_um: stray light by a table needs the pixel pitch; give it here or "
+            "in the block optics");
     }
     for (int i = 1; i < pst->count; i++) {
         if (!(pst->points[i].angle_deg > pst->points[i - 1].angle_deg)) {
@@ -63,7 +66,7 @@ bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *confi
     }
     const bst_optics_pst_point *given = config->pst.items;
     pst->count = count;
-    pst->pixel_m = 1e-6 * (config->pixel_um > 0.0 ? config->pixel_um : optics_pixel_um);
+    pst->pixel_m = 1e-6 * (config->pixel_pitch_um > 0.0 ? config->pixel_pitch_um : optics_pixel_um);
     for (int i = 0; i < count; i++) {
         pst->points[i] =
             *config->pst_file ? (bst_optics_pst_point){curve.x[i], curve.y[i]} : given[i];

@@ -14,8 +14,8 @@ typedef struct bst_scene_pst bst_scene_pst;
 
 /* Reads the table of point source transmittance of a camera; *out NULL if there is none.
  * `base_dir`: base of relative paths. BST_ERR_CONFIG with the key below `background`, when the
- * angles do not ascend, both tables are given, or there is no pixel pitch (pixel_um, the optics'
- * one). */
+ * angles do not ascend, both tables are given, or there is no pixel pitch (pixel_pitch_um, the
+ * optics' one). */
 bst_status bst_scene_pst_create(bst_ctx *ctx, const bst_background_config *config,
                                 double optics_pixel_um, const char *base_dir,
                                 bst_scene_pst **out) BST_MUST_CHECK;
