@@ -1,6 +1,6 @@
 #include "control/control.h"
 
-/* in the order of the enums in control.h and search_pattern.h */
+/* order of the enums in control.h and search_pattern.h */
 static const char *const strategies[] = {"track", "stare", "rate", "fixed", "scan", NULL};
 static const char *const patterns[] = {"nearest_first", "raster", "spiral", "belt", NULL};
 static const char *const dwell_rates[] = {"belt", "sidereal", NULL};

@@ -1,15 +1,17 @@
 #include "control/control_internal.h"
 
-/* Half the interval over which a command's rate is taken: long against rounding, short against
- * the change of a line of sight's rate. */
+/* Half the interval of the differences that give a command's rate: long against rounding, short
+ * against changes of the line-of-sight rate. */
 #define RATE_HALF_S 0.25
 #define BODY_RATE_SMOOTH_S 2.0
 
+/* Direction of the aim for guidance (callback). */
 static bst_status guidance_aim(void *user, bst_ctx *ctx, int64_t tick, bool *valid,
                                bst_vec3 *direction) {
     return bst_control_boresight_at(ctx, user, tick, valid, direction);
 }
 
+/* Range of the aim for guidance, m (callback). */
 static bst_status guidance_range(void *user, bst_ctx *ctx, int64_t tick, double *range_m) {
     const bst_control *c = user;
     *range_m = 0.0;
@@ -18,6 +20,7 @@ static bst_status guidance_range(void *user, bst_ctx *ctx, int64_t tick, double 
                : BST_OK;
 }
 
+/* True if a compensator on the image error corrects the pointing, not the observer. */
 static bool on_image_error(const bst_control *c) {
     return c->config.compensate_attitude &&
            (c->config.compensator.plug.desc || c->config.compensator.type != BST_CONTROL_OBSERVER);
@@ -95,8 +98,9 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
     return start_compensator(ctx, control);
 }
 
-/* The body's attitude, and its rate smoothed against the noise of the attitude's estimate. */
-static void take_body(bst_control *c, int64_t tick, bst_quat q) {
+/* Updates the body attitude and its rate, low-pass filtered against noise of the attitude estimate.
+ */
+static void update_body_attitude(bst_control *c, int64_t tick, bst_quat q) {
     if (c->config.fixed_frame != BST_CONTROL_FIXED_BODY) {
         return;
     }
@@ -117,7 +121,7 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
                            const bst_nav_telemetry *nav) {
     if (pointing && pointing->written > 0) {
         c->pointing = pointing->items[(pointing->written - 1) % pointing->capacity];
-        take_body(c, c->pointing.tick, pointing->q_body_from_gcrf);
+        update_body_attitude(c, c->pointing.tick, pointing->q_body_from_gcrf);
         c->pointing_valid = true;
         c->settled = pointing->settled;
         bst_model_error_telemetry(&c->model_error, pointing);
@@ -132,7 +136,8 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
 
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
                                const bst_tracks *tracks) {
-    bst_control_forget_aims(c); /* a new fix, and what is held may change */
+    /* a new attitude fix changes the aim, and the held track may change */
+    bst_control_forget_aims(c);
     if (on_image_error(c)) {
         bst_image_loop_update(&c->image_loop, &c->pointing_error, tick, &tracks->attitude);
     } else if (c->config.compensate_attitude) {
@@ -164,9 +169,9 @@ void bst_control_retarget(bst_control *c, int64_t tick, const bst_region *region
     bst_control_enter(c, BST_MODE_IDLE, tick, "a new task");
 }
 
-/* Whether the servo has come to rest on the present aim, not on one that a command on its way will
- * replace. Also gives where the aim is from the believed true boresight, px. */
-static bst_status look(bst_ctx *ctx, bst_control *c, bool *arrived, double off_px[2]) {
+/* Tests whether the servo has settled on the current aim, with no command pending that will replace
+ * it. Also gives the offset of the aim from the estimated boresight, px. */
+static bst_status check_arrival(bst_ctx *ctx, bst_control *c, bool *arrived, double off_px[2]) {
     off_px[0] = off_px[1] = 0.0;
     *arrived = false;
     if (!c->pointing_valid || !c->nav_valid) {
@@ -192,7 +197,7 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
         BST_TRY(bst_control_start(ctx, c, tick));
     }
     bool arrived;
-    BST_TRY(look(ctx, c, &arrived, status->aim_error_px));
+    BST_TRY(check_arrival(ctx, c, &arrived, status->aim_error_px));
     BST_TRY(bst_control_advance(ctx, c, tick, arrived));
     status->tick = tick;
     status->mode = c->mode;
@@ -229,7 +234,7 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
         bst_control_forget_aims(c);
     }
     bst_vec3 boresight = {0.0, 0.0, 0.0};
-    if (!c->guidance.commanded && c->pointing_valid) { /* where the first slew starts */
+    if (!c->guidance.commanded && c->pointing_valid) { /* start of the first slew */
         boresight =
             bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
     }

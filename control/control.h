@@ -1,5 +1,5 @@
-/* The standard controller: brings the target into view, keeps the boresight on it, and finds it
- * again. */
+/* The standard controller: acquires the target, keeps the boresight on it, and reacquires it after
+ * a loss. */
 #ifndef BST_CONTROL_CONTROL_H
 #define BST_CONTROL_CONTROL_H
 
@@ -14,14 +14,14 @@
 #include "sim/onboard/knowledge.h"
 
 typedef enum bst_control_strategy {
-    BST_CONTROL_TRACK = 0, /* closed loop */
-    BST_CONTROL_STARE,     /* where the cue is at stare_time_s, inertially */
-    BST_CONTROL_RATE,      /* along the cue */
-    BST_CONTROL_FIXED,     /* a fixed direction, in inertial space or in the body */
-    BST_CONTROL_SCAN,      /* along the middle of the cue's region at a constant rate */
+    BST_CONTROL_TRACK = 0, /* closed loop on the tracked target */
+    BST_CONTROL_STARE,     /* inertially fixed at the cue's direction at stare_time_s */
+    BST_CONTROL_RATE,      /* open loop along the cue */
+    BST_CONTROL_FIXED,     /* fixed direction, inertial or in body axes */
+    BST_CONTROL_SCAN,      /* along the centre line of the cue's region at a constant rate */
 } bst_control_strategy;
 
-/* Motion of the boresight while it dwells on a point of a region. */
+/* Motion of the boresight while it dwells on a tile of a region. */
 typedef enum bst_control_dwell_rate {
     BST_CONTROL_RATE_BELT = 0,
     BST_CONTROL_RATE_SIDEREAL,
@@ -41,7 +41,7 @@ typedef struct bst_control_config {
     double exposure_s, period_s;
     double command_latency_s;
     bool compensate_attitude;
-    bst_compensator_config compensator; /* of type BST_CONTROL_OBSERVER: pointing_error's own */
+    bst_compensator_config compensator; /* for BST_CONTROL_OBSERVER: pointing_error's own */
     double servo_lag_s;
     bool robust_observer;
     double disturbance_px_rms, disturbance_cutoff_hz;
@@ -62,10 +62,10 @@ typedef struct bst_control_config {
 
 extern const bst_config_desc bst_control_config_table[];
 
-/* The cue `seconds` after the epoch. */
+/* Cue at `seconds` after the epoch. */
 typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double seconds,
                                          bst_onboard_cue *out);
-/* The direction of the cue alone. */
+/* Direction of the cue only. */
 typedef bst_status (*bst_control_cue_direction_fn)(void *user, bst_ctx *ctx, double seconds,
                                                    bool *valid, bst_vec3 *direction);
 
@@ -85,13 +85,14 @@ typedef bst_status (*bst_control_belt_eye_fn)(void *user, bst_ctx *ctx, double s
 typedef struct bst_control_env {
     double tick_rate_hz;
     double pixel_rad;
-    double rotation_rad; /* of the image's axes about the boresight, from camera +x towards +y */
-    int width_px, height_px;                                  /* of the field, undistorted */
+    /* rotation of the image axes about the boresight, from camera +x towards +y */
+    double rotation_rad;
+    int width_px, height_px;                                  /* field of view, undistorted */
     double frame_exposure_s, frame_period_s, frame_latency_s; /* as in bst_module_env */
     bst_control_cue_fn cue_at;
     bst_control_cue_direction_fn cue_direction_at;
-    bst_control_cue_range_fn cue_range_at; /* NULL: no range is known */
-    bst_region region; /* kind BST_REGION_NONE: none, and the next two may be NULL */
+    bst_control_cue_range_fn cue_range_at; /* NULL: range unknown */
+    bst_region region; /* kind BST_REGION_NONE: no region, and the next two may be NULL */
     bst_control_region_fn region_at;
     bst_control_belt_eye_fn belt_eye_at;
     void *cue_user;
@@ -102,23 +103,23 @@ typedef struct bst_control_transition {
     const char *reason;
 } bst_control_transition;
 
-/* A track as of its latest message. */
+/* A track as of its latest message, held as the aim. */
 typedef struct bst_control_held {
     int64_t id, tick;
     bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
-    bst_onboard_cue cue;                      /* at that time */
+    bst_onboard_cue cue;                      /* cue at that time */
 } bst_control_held;
 
-/* The latest cues, to detect its end and jumps. */
+/* Latest cues, to detect the end and jumps of the cue. */
 typedef struct bst_control_watch {
-    int count; /* of the directions below, the newest first: 0 to 2 */
+    int count; /* number of directions below, newest first: 0 to 2 */
     int64_t tick, tick_before;
     bst_vec3 direction, direction_before;
-    bool ended;        /* it was valid and is no longer */
+    bool ended;        /* the cue was valid and is no longer */
     int64_t jump_tick; /* tick of its latest jump */
 } bst_control_watch;
 
-#define BST_CONTROL_TRANSITIONS 4 /* greatest number in one observe and one update */
+#define BST_CONTROL_TRANSITIONS 4 /* most transitions in one observe and one update */
 
 /* A cached aim: each tick is needed several times, for a command and for the differences that give
  * its rate. */
@@ -131,10 +132,10 @@ typedef struct bst_control_aimed {
 
 #define BST_CONTROL_AIMED 128
 
-/* Path of the boresight over rate_half_ticks: the quintic through six aims with this spacing. */
+/* Path of the boresight over rate_half_ticks: quintic through six aims at this spacing. */
 typedef struct bst_control_piece {
     bool made, smooth;
-    int64_t index; /* it begins at this times rate_half_ticks */
+    int64_t index; /* start, in units of rate_half_ticks */
     int64_t nav_tick;
     bst_vec3 way[BST_QUINTIC_POINTS];
 } bst_control_piece;
@@ -149,82 +150,87 @@ typedef struct bst_control {
     bst_image_loop image_loop;   /* sets pointing_error, unless the compensator is the observer */
     bst_model_error model_error; /* of the observer */
     int mode;
-    int64_t mode_tick; /* since when */
+    int64_t mode_tick; /* start of the mode */
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;
-    bst_light_aberration aberration; /* by nav, once that is valid */
+    bst_light_aberration aberration; /* by nav, once it is valid */
     bool nav_valid;
-    bst_control_held held; /* the track that the aim is on */
-    bst_control_held lost; /* the target that BST_MODE_REACQUIRE looks for */
-    int64_t lost_tick;     /* since when */
+    bst_control_held held; /* track that defines the aim */
+    bst_control_held lost; /* target sought by BST_MODE_REACQUIRE */
+    int64_t lost_tick;     /* time of the loss */
     bst_control_watch watch;
-    int64_t search_since_tick; /* when the present search began, failed candidates included */
+    int64_t search_since_tick; /* start of the current search, including failed candidates */
     bool gave_up;
-    int64_t target_id;                        /* 0: the tracker names none */
-    int64_t rejected_id;                      /* candidates up to this one have been given up */
-    int64_t newest_id;                        /* greatest identity of a track so far */
-    int64_t frame_tick, frame_interval_ticks; /* mid of the newest frame; shortest seen, 0: none */
-    /* search, about the cue or about what is lost */
+    int64_t target_id;   /* 0: the tracker reports no target */
+    int64_t rejected_id; /* candidates up to this identity were rejected */
+    int64_t newest_id;   /* largest track identity so far */
+    /* mid-exposure of the newest frame; shortest interval, 0: none */
+    int64_t frame_tick, frame_interval_ticks;
+    /* search about the cue or the lost target */
     bst_search search;
     int32_t search_step;
-    int search_mode; /* BST_MODE_SEARCH or BST_MODE_REACQUIRE: where a failed acquisition goes */
+    int search_mode; /* BST_MODE_SEARCH or BST_MODE_REACQUIRE: mode after a failed acquisition */
     bool search_in_region; /* tiles are angles of the cue's region */
-    /* a place of the region that the boresight does not follow: where it was at tile_tick */
+    /* tile of the region that the boresight does not follow: direction at tile_tick, and rate */
     bst_vec3 tile_gcrf, tile_rate_radps;
-    bst_vec3 search_x_gcrf; /* image x axis at the start of the search */
-    int64_t tile_tick;      /* when the tile was commanded */
-    int64_t arrival_tick;   /* when the boresight came to rest on it; < 0: not yet */
-    int64_t frames;         /* seen since */
+    bst_vec3 search_x_gcrf; /* image x axis in GCRF at the start of the search */
+    int64_t tile_tick;      /* time of the tile's command */
+    int64_t arrival_tick;   /* time at which the boresight settled on it; < 0: not yet */
+    int64_t frames;         /* frames since then */
     /* newest telemetry */
     bst_pointing_sample pointing;
     bool pointing_valid, settled;
-    /* body attitude of the newest telemetry, and its smoothed rate, body axes */
+    /* newest body attitude, and its smoothed rate, body axes */
     bst_quat q_body_from_gcrf;
     int64_t body_tick;
     bst_vec3 body_rate_radps;
     bst_vec3 stare_gcrf;
     bool stare_valid;
     bst_guidance guidance;
-    /* as long as nothing that they rest on changes */
+    /* caches, valid until one of their inputs changes */
     bst_control_aimed aimed[BST_CONTROL_AIMED];
     bst_control_piece pieces[BST_CONTROL_PIECES]; /* by index modulo their number */
 } bst_control;
 
-/* The density of disturbance (rad^2/s^3) that the observer's gains are made for: that of the
- * configuration, or with robust_observer what bst_observer_design leaves of it. `timing` as the
- * loop's: command and servo delays are the configuration's. BST_ERR_CONFIG of
- * a gain_scale of 0, and errors of bst_observer_design. */
+/* Disturbance density (rad^2/s^3) for the observer's gains: the configured one, or with
+ * robust_observer the one that bst_observer_design permits.
+ *
+ * Given:     timing  of the loop; command and servo delays are the configuration's
+ * Errors:    BST_ERR_CONFIG for a gain_scale of 0; those of bst_observer_design */
 bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *config,
                                         const bst_image_loop_env *timing, double pixel_rad,
                                         double *density) BST_MUST_CHECK;
 
-/* Copies config and env; does not move afterwards. BST_ERR_CONFIG for settings that do not fit
- * together. */
+/* Initialises a controller; config and env are copied. The struct must not be moved afterwards.
+ * Errors: BST_ERR_CONFIG for inconsistent settings. */
 bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
                             const bst_control_env *env) BST_MUST_CHECK;
 
-/* Takes in telemetry (either may be NULL: nothing new). */
+/* Updates the controller with telemetry; NULL: no new message. */
 void bst_control_telemetry(bst_control *control, const bst_pointing_telemetry *pointing,
                            const bst_nav_telemetry *nav);
 
-/* Takes in the tracker's message about one frame: attitude fix, target, candidates. `tick` is now.
- */
+/* Processes the tracker's message about a frame: attitude fix, target, candidates.
+ *
+ * Given:     tick  now */
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *control, int64_t tick,
                                const bst_tracks *tracks) BST_MUST_CHECK;
 
-/* The cue is another one from now on (env.cue_at and so on give it already), with this region, or
- * none: what was held, searched or given up is forgotten, and the tracks so far are no candidates.
- */
+/* Switches to a new cue (env.cue_at and so on already give it) with a new region or none. Held
+ * tracks, the search and rejections are cleared; existing tracks are no candidates. */
 void bst_control_retarget(bst_control *control, int64_t tick, const bst_region *region);
 
-/* Runs the mode logic at `tick` and fills the command and the status. *commanded is false (and
- * *command untouched) while there is nothing to aim at or no navigation telemetry yet. */
+/* Runs the mode logic at `tick` and computes the pointing command and status.
+ *
+ * Returned:  *commanded  false, with *command unchanged, if there is no aim or no navigation
+ *                        telemetry yet */
 bst_status bst_control_update(bst_ctx *ctx, bst_control *control, int64_t tick, bool *commanded,
                               bst_los_command *command, bst_control_status *status) BST_MUST_CHECK;
 
-/* The geometric direction (unit, GCRF) that the boresight is to be on at a tick; *valid false when
- * there is none. */
+/* Geometric direction (unit, GCRF) of the aim at a tick.
+ *
+ * Returned:  *valid  false: there is no aim */
 bst_status bst_control_aim(bst_ctx *ctx, const bst_control *control, int64_t tick, bool *valid,
                            bst_vec3 *direction) BST_MUST_CHECK;
 

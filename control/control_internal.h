@@ -1,18 +1,20 @@
-/* Shared by the files of the standard controller. */
+/* Declarations shared by the files of the standard controller. */
 #ifndef BST_CONTROL_CONTROL_INTERNAL_H
 #define BST_CONTROL_CONTROL_INTERNAL_H
 
 #include "control/control.h"
 
+/* Seconds since the epoch of a tick. */
 static inline double bst_control_seconds(const bst_control *c, int64_t tick) {
     return (double)tick / c->env.tick_rate_hz;
 }
 
+/* Ticks in a time interval. */
 static inline int64_t bst_control_ticks(const bst_control *c, double seconds) {
     return (int64_t)llround(seconds * c->env.tick_rate_hz);
 }
 
-/* Rotation from a direction among the stars to the boresight of the telemetry that points there. */
+/* Rotation from a true direction to the telemetry boresight that points there. */
 static inline bst_quat bst_control_correction_at(const bst_control *c, int64_t tick) {
     return bst_model_error_correction(&c->model_error, &c->pointing_error, tick,
                                       c->env.tick_rate_hz);

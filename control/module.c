@@ -102,7 +102,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     }
     const bst_control_config *c = config;
     if (c->strategy != BST_CONTROL_TRACK && !c->compensate_attitude) {
-        bst_env_ignore(env, PORT_TRACKS); /* the loop is open */
+        bst_env_ignore(env, PORT_TRACKS); /* open loop */
     }
     if (status != BST_OK) {
         destroy(m);

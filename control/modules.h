@@ -1,4 +1,4 @@
-/* The controllers that a scenario can name. */
+/* Controller modules that a scenario can name. */
 #ifndef BST_CONTROL_MODULES_H
 #define BST_CONTROL_MODULES_H
 

@@ -1,5 +1,5 @@
-/* A line of sight that a peer of the link moves: an attitude simulator, or a payload processor that
- * says where it looks, how it exposes and what there is to see, and gets the frames. */
+/* Line of sight driven by an external process over the link: an attitude simulator, or a payload
+ * processor that commands pointing and exposure, reports target states, and receives the frames. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,12 +8,12 @@
 #include "sim/link/external.h"
 
 enum {
-    PORT_SENSOR = BST_GIMBAL_MOUNT, /* no mount, and so none of its status */
+    PORT_SENSOR = BST_GIMBAL_MOUNT, /* no mount, and so no mount status */
     PORT_COMMAND,
     PORT_FRAME,
     PORT_TRUTH,
     PORT_COUNT,
-    MOST_FRAMES = 8, /* of a step; more are lost for the peer */
+    MOST_FRAMES = 8, /* most frames sent per step; more are not delivered to the peer */
     MOST_ATTITUDES = 65536,
     MOST_STATES = 4096,
 };
@@ -66,7 +66,7 @@ typedef struct module {
     int64_t command_seen;
     bool commands_sensor, told_of_gap;
     bst_link_output outputs[OUTPUTS];
-    /* the pointing: the last attitude before the latest message, then those of it */
+    /* pointing samples: the last one before the latest message, then the message's */
     bst_los_sample *samples;
     int count, at;
 } module;
@@ -131,8 +131,8 @@ static bst_status create_external(const bst_module_env *env, const void *config_
     return bst_gimbal_create(env, sizeof(module), prepare_external, destroy, config_in, self);
 }
 
-/* The attitude at a tick: on the shortest way between two that were given; before the first and
- * after the last, these. */
+/* Camera attitude at a tick: slerp between two samples, constant before the first and after the
+ * last. */
 static bst_quat attitude_at(module *m, int64_t tick) {
     if (m->count == 0) {
         return m->platform.q_nominal_from_gcrf;
@@ -148,8 +148,8 @@ static bst_quat attitude_at(module *m, int64_t tick) {
                           (double)(tick - a->tick) / (double)(a[1].tick - a->tick));
 }
 
-/* What came of the pointing goes on from where the line of sight is now. */
-static void take_pointing(module *m, struct bst_step *s, const bst_link_pointing *pointing) {
+/* Takes a pointing message; it continues from the current line of sight. */
+static void apply_pointing(module *m, struct bst_step *s, const bst_link_pointing *pointing) {
     int64_t tick = bst_step_tick(s);
     bst_los_sample now = {tick, attitude_at(m, tick)};
     bool began = m->count > 0;
@@ -163,7 +163,7 @@ static void take_pointing(module *m, struct bst_step *s, const bst_link_pointing
             bst_step_count(s, "pointing_disorder");
             continue;
         }
-        if (sample->tick <= tick) { /* the newest of those is where it is now */
+        if (sample->tick <= tick) { /* the newest of these samples is the current attitude */
             m->count = 0;
             now = *sample;
             now.tick = tick;
@@ -174,6 +174,7 @@ static void take_pointing(module *m, struct bst_step *s, const bst_link_pointing
     }
 }
 
+/* Passes the target states of a message to the world. */
 static void take_states(module *m, struct bst_step *s, const bst_link_target_states *states) {
     for (int i = 0; i < states->count; i++) {
         const bst_link_target_state *item = &states->items[i];
@@ -189,9 +190,10 @@ static void take_states(module *m, struct bst_step *s, const bst_link_target_sta
     }
 }
 
+/* Publishes the sensor command and other parts of the peer's answer. */
 static void publish_answer(module *m, struct bst_step *s) {
     if (m->outputs[OUT_POINTING].given) {
-        take_pointing(m, s, m->outputs[OUT_POINTING].payload);
+        apply_pointing(m, s, m->outputs[OUT_POINTING].payload);
     }
     if (m->outputs[OUT_STATES].given) {
         take_states(m, s, m->outputs[OUT_STATES].payload);
@@ -200,11 +202,11 @@ static void publish_answer(module *m, struct bst_step *s) {
         memcpy(bst_step_write(s, PORT_SENSOR, NULL), m->outputs[OUT_SENSOR].payload,
                sizeof(bst_sensor_command));
     } else if (m->outputs[OUT_SENSOR].given) {
-        bst_step_count(s, "sensor_command_ignored"); /* there is a control module that gives it */
+        bst_step_count(s, "sensor_command_ignored"); /* a control module commands the sensor */
     }
 }
 
-/* The answers to earlier steps that have come meanwhile. */
+/* Publishes answers to earlier steps that have arrived meanwhile. */
 static bst_status publish_more(module *m, struct bst_step *s) {
     for (;;) {
         bool more;
@@ -217,7 +219,7 @@ static bst_status publish_more(module *m, struct bst_step *s) {
     }
 }
 
-/* One step of the peer, with the frames since the last one. */
+/* Exchanges one step with the peer, with the frames since the last one. */
 static bst_status exchange(module *m, struct bst_step *s) {
     bst_ctx *ctx = bst_step_ctx(s);
     int64_t tick = bst_step_tick(s);

@@ -1,5 +1,5 @@
-/* Apparent direction of an ideally pointed line of sight: nodes on a fine time grid, interpolated.
- */
+/* Ideal line of sight: apparent direction of a target, interpolated between nodes on a fine time
+ * grid. */
 #ifndef BST_GIMBAL_IDEAL_H
 #define BST_GIMBAL_IDEAL_H
 
@@ -9,19 +9,19 @@
 #include "boresight/vec.h"
 #include "gimbal/platform.h"
 
-/* What the module "ideal" keeps the boresight on. */
+/* Target of the module "ideal". */
 enum { BST_IDEAL_OBJECT, BST_IDEAL_DIRECTION, BST_IDEAL_STAR };
 typedef struct bst_ideal_config {
     int32_t target;         /* BST_IDEAL_... */
-    char object[64];        /* its name in the scenario */
+    char object[64];        /* name of the object in the scenario */
     double ra_deg, dec_deg; /* ICRS */
     double star_tyc[3];     /* Tycho-2 identity */
     bst_platform_config platform;
 } bst_ideal_config;
 extern const bst_config_desc bst_ideal_config_table[];
 
-/* Nodes per second. The cubic through four nodes is off by at most 9/384 h^4 |d4 u/dt4|; a pass at
- * 0.03 rad/s (500 km range, 15 km/s) has about 2e-5 rad/s^4: below 1e-10 rad. */
+/* Nodes per second. The error of the cubic through four nodes is at most 9/384 h^4 |d4 u/dt4|; a
+ * pass at 0.03 rad/s (500 km range, 15 km/s) has about 2e-5 rad/s^4: below 1e-10 rad. */
 #define BST_IDEAL_NODES_PER_S 10
 
 /* Apparent direction (unit, GCRF axes) `seconds` after the epoch. */
@@ -30,13 +30,13 @@ typedef bst_status (*bst_ideal_fn)(void *user, bst_ctx *ctx, double seconds, bst
 typedef struct bst_ideal {
     bst_ideal_fn direction_at;
     void *user;
-    int64_t first; /* number of node[0]; node k is at k / BST_IDEAL_NODES_PER_S */
+    int64_t first; /* index of node[0]; node k is at k / BST_IDEAL_NODES_PER_S */
     int filled;    /* 0 or 4 */
     bst_vec3 node[4];
 } bst_ideal;
 
-/* Direction at `seconds`; nodes are never before time 0 when seconds >= 0, and at most two grid
- * steps later than asked. Passes on what direction_at fails with. */
+/* Interpolated direction at `seconds`. For seconds >= 0 no node is before time 0, and nodes are at
+ * most two grid steps later than `seconds`. Errors: those of direction_at. */
 bst_status bst_ideal_at(bst_ideal *ideal, bst_ctx *ctx, double seconds,
                         bst_vec3 *direction) BST_MUST_CHECK;
 

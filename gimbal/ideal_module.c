@@ -27,7 +27,7 @@ typedef struct module {
     bst_ideal ideal;
     int target, object;
     bst_vec3 icrs;
-    bst_vec3 x_hint_gcrf; /* body x: the camera's x stays as near to it as can be */
+    bst_vec3 x_hint_gcrf; /* body x in GCRF: the camera's x is kept as close to it as possible */
     int64_t steps;
 } module;
 
@@ -50,6 +50,7 @@ static bst_status apparent(void *user, bst_ctx *ctx, double seconds, bst_vec3 *d
     return BST_OK;
 }
 
+/* Resolves the target of the configuration: object, direction or star. */
 static bst_status find_target(const bst_module_env *env, const config *c, module *m) {
     m->target = c->target;
     if (c->target == BST_IDEAL_OBJECT) {
@@ -100,11 +101,11 @@ static bst_status step(void *self, struct bst_step *s) {
     double seconds = bst_step_seconds(s);
     bst_vec3 direction;
     BST_TRY(bst_ideal_at(&m->ideal, bst_step_ctx(s), seconds, &direction));
-    /* the ideal mount as seen from the nominal body, so that drift and jitter act as on a real one
+    /* ideal pointing relative to the nominal body, so that drift and jitter act as on a real mount
      */
     bst_quat ideal = bst_quat_look(direction, m->x_hint_gcrf);
     bst_quat body = m->platform.q_nominal_from_gcrf;
-    if (m->platform.spacecraft) { /* follows what is believed of the body */
+    if (m->platform.spacecraft) { /* uses the estimated body attitude */
         BST_TRY(bst_platform_step(s, &m->platform, n, (bst_vec3){0, 0, 0}, NULL));
         body = m->platform.q_believed_from_gcrf;
     }

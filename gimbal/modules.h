@@ -1,4 +1,4 @@
-/* The gimbal types that a scenario can name. */
+/* Gimbal module types that a scenario can name. */
 #ifndef BST_GIMBAL_MODULES_H
 #define BST_GIMBAL_MODULES_H
 

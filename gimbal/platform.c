@@ -40,12 +40,11 @@ static bst_vec3 arcsec_vector(const double v[3]) {
     return bst_vec3_scale((bst_vec3){v[0], v[1], v[2]}, BST_ARCSEC_RAD);
 }
 
-/* The camera turned by small angles about its own x and y axes, its quaternion's length brought
- * back to one. */
-static bst_quat shaken(bst_quat q, const double shake_rad[2]) {
+/* Camera attitude rotated by small angles about its own x and y axes, renormalised. */
+static bst_quat with_jitter(bst_quat q, const double shake_rad[2]) {
     double x = shake_rad[0], y = shake_rad[1], half2 = 0.25 * (x * x + y * y);
     if (half2 < 1e-6) {
-        /* by the series, exact to rounding: the quaternion {-s x, -s y, 0, c} times q */
+        /* series exact to rounding: the quaternion {-s x, -s y, 0, c} times q */
         double s = 0.5 - half2 * (1.0 / 12.0), c = 1.0 - half2 * (0.5 - half2 * (1.0 / 24.0));
         x *= -s;
         y *= -s;
@@ -99,14 +98,14 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
     platform->wheels_saturated = platform->trackers_blind = false;
     bst_jitter_spec followed = bst_jitter_resolved(&spectrum.flat, dt_s);
     bst_jitter_init(&platform->jitter, &followed, dt_s, setup->jitter_key);
-    bst_rng_key more_key = setup->jitter_key; /* a stream apart */
+    bst_rng_key more_key = setup->jitter_key; /* independent random stream */
     more_key.k[0] ^= 0x7F4A7C15u;
     bst_status status = bst_jitter_add(ctx, &platform->jitter, &spectrum, more_key);
     bst_jitter_spectrum_free(&spectrum);
     return status;
 }
 
-/* An inertial body. */
+/* Attitude of an inertial body after its drift. */
 static bst_quat drifted(const bst_platform *platform, double seconds) {
     bst_vec3 drift = platform->drift_radps;
     bst_quat body = platform->q_nominal_from_gcrf;
@@ -139,7 +138,7 @@ bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seco
     bst_jitter_at(&platform->jitter, n, shake);
     bst_quat body =
         platform->spacecraft ? platform->body.q_body_from_gcrf : drifted(platform, seconds);
-    return shaken(bst_quat_mul(q_cam_from_body, body), shake);
+    return with_jitter(bst_quat_mul(q_cam_from_body, body), shake);
 }
 
 bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
@@ -153,7 +152,7 @@ bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, dou
     }
     bst_quat body =
         platform->spacecraft ? platform->body.q_body_from_gcrf : drifted(platform, seconds);
-    return shaken(bst_quat_mul(q_cam_from_body, body), shake);
+    return with_jitter(bst_quat_mul(q_cam_from_body, body), shake);
 }
 
 bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n) {

@@ -4,10 +4,10 @@
 #include "sim/onboard/knowledge.h"
 #include "sim/world/world.h"
 
-/* What a spacecraft sees of the world, and knows of it. */
+/* World and onboard knowledge of a spacecraft. */
 typedef struct bst_platform_sky {
     bst_world_view *view;
-    bst_knowledge_view *knowledge; /* NULL: the law needs no target */
+    bst_knowledge_view *knowledge; /* NULL: the pointing law needs no target */
     int observer, sensor;
 } bst_platform_sky;
 

@@ -43,7 +43,7 @@ double bst_gimbal_pixel_rad(const bst_module_env *env) {
     return bst_camera_scale_rad(bst_world_camera(env->world, env->observer, env->sensor));
 }
 
-/* Samples in a ring that covers history_s at rate_hz, both ends included. */
+/* Samples of a ring that covers history_s at rate_hz, both ends included. */
 static int ring(double history_s, double rate_hz) {
     double samples = ceil(history_s * rate_hz) + 1.0;
     return samples < 2.0 ? 2 : samples > 1e8 ? 100000000 : (int)samples;
@@ -59,7 +59,7 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
                                  &base->nav_steps));
     BST_TRY(bst_world_view_create(env->ctx, env->world, &base->view));
     bst_env_set_capacity(env, BST_GIMBAL_HISTORY, ring(config->history_s, rate_hz) + history_more);
-    /* the tracker asks for the attitude in the middle of a frame that comes late */
+    /* the tracker needs the attitude at mid-exposure of a late frame */
     double late_s = exposure_s + env->frame_latency_s + 2.0 / config->telemetry_rate_hz;
     bst_env_set_capacity(
         env, BST_GIMBAL_POINTING,

@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Two attitudes this close are one. */
+/* Attitudes closer than this are equal. */
 #define SAME_RAD 1e-9
-/* Attitudes this close in time are at one instant. */
+/* Attitudes closer in time than this are simultaneous. */
 #define SAME_TICK 1e-3
 
 typedef struct node {
@@ -15,9 +15,9 @@ typedef struct node {
 } node;
 
 struct bst_scripted {
-    node *nodes; /* ticks ascend; signs agree along the way */
+    node *nodes; /* ascending ticks; consecutive quaternions have matching signs */
     int64_t count, capacity;
-    int64_t last; /* node before what was last asked */
+    int64_t last; /* node before the last requested tick */
 };
 
 static bst_status add(bst_ctx *ctx, bst_scripted *s, double tick, bst_quat q, const char *where) {
@@ -55,7 +55,7 @@ static bst_status fill(bst_ctx *ctx, const bst_frame_updates *updates, bst_frame
                        bst_scripted_missing missing, bst_scripted *s) {
     const char *file = bst_frame_updates_name(updates);
     int64_t last = -1, given = -1;
-    double ended = 0.0; /* tick at which the frame before this one ended */
+    double ended = 0.0; /* end tick of the previous frame */
     char where[700];
     for (int i = 0; i < bst_frame_updates_count(updates); i++) {
         const bst_frame_update *u = bst_frame_updates_item(updates, i);

@@ -5,7 +5,7 @@
 #include "gimbal/platform_step.h"
 #include "gimbal/scripted.h"
 
-enum { PORT_COUNT = BST_GIMBAL_MOUNT }; /* no mount, and so none of its status */
+enum { PORT_COUNT = BST_GIMBAL_MOUNT }; /* no mount, and so no mount status */
 static const bst_port ports[PORT_COUNT] = {BST_GIMBAL_PORTS_SEEN};
 
 static const char *const missing_names[] = {"error", "hold", NULL};
@@ -27,9 +27,9 @@ typedef struct module {
     bst_gimbal_base base;
     bst_platform platform;
     bst_scripted *scripted;
-    bst_frame_cursor frame; /* the first that has not ended */
+    bst_frame_cursor frame; /* first frame that has not ended */
     int64_t period_ticks;
-    int64_t origin_tick; /* of the first step; -1: it is to come */
+    int64_t origin_tick; /* of the first step; -1: not started */
 } module;
 
 static void destroy(void *self) {
@@ -70,8 +70,7 @@ static bst_status prepare_scripted(const bst_module_env *env, const void *config
     BST_TRY(bst_scripted_create(env->ctx, updates, camera, exposure, env->tick_rate_hz,
                                 (bst_scripted_missing)c->missing_frames, &m->scripted));
     m->frame = bst_frame_cursor_begin(updates, camera, exposure, m->base.tick_rate_hz);
-    /* besides the plant's steps there are two samples for each frame, and up to two for each
-     * attitude of the file */
+    /* besides the plant steps: two samples per frame, and up to two per attitude of the file */
     int crowd = bst_scripted_crowd(m->scripted, platform->history_s * m->base.tick_rate_hz);
     double frames = 2.0 * platform->history_s / cycle_s + 4.0;
     return bst_gimbal_base_init(env, platform, longest_s, 2 * crowd + (int)fmin(frames, 1e7),
@@ -94,8 +93,8 @@ static bst_status step(void *self, struct bst_step *s) {
         s, &m->platform,
         bst_platform_true_camera_between(&m->platform, n, (double)past / (double)m->period_ticks,
                                          bst_step_seconds(s), q_cam_from_body));
-    /* a sample of its own where the rate changes and at the ends of each exposure, so that the way
-     * between samples is the file's */
+    /* an additional sample at rate changes and at the ends of each exposure, so that interpolation
+     * between samples reproduces the file */
     int64_t next = bst_scripted_next(m->scripted, tick);
     while (m->frame.start_tick + m->frame.exposure_ticks <= tick) {
         bst_frame_cursor_next(&m->frame);

@@ -1,7 +1,7 @@
-/* Image processing: from one raw frame to located, measured and identified detections. Onboard
- * side: sees frames, telemetry and the onboard knowledge, never the truth.
+/* Image processing: from a raw frame to located, measured and identified detections. It is onboard
+ * software: it reads frames, telemetry and onboard knowledge, never the truth.
  *
- * Pixel coordinates are full-sensor coordinates at every public boundary; electrons are detected
+ * Pixel coordinates at public interfaces are full-sensor coordinates. "Electrons" are detected
  * electrons above the background. */
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
@@ -21,23 +21,24 @@ typedef struct bst_imgproc_bad_pixel {
 
 typedef struct bst_imgproc_config {
     int64_t capacity;              /* detections per frame */
-    int64_t max_fits;              /* of them, the brightest, located by fits; 0: all */
+    int64_t max_fits;              /* number of brightest detections located by a fit; 0: all */
     int64_t mesh_px;               /* side of a background mesh */
-    double false_alarms_per_frame; /* on noise alone */
-    double jitter_px;              /* RMS per axis by which the PSF is expected to be widened */
+    double false_alarms_per_frame; /* expected from noise alone */
+    double jitter_px;              /* RMS jitter per axis by which the PSF is broadened */
     double streak_min_px, streak_max_px;
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
-    bool track_windows; /* look only at windows while a target is followed */
+    bool track_windows; /* search only windows while a target is tracked */
     int64_t window_px, window_stars, full_frame_period, full_frame_count;
     bst_stack_config stack;
     bst_pixel_learner_config bad_pixel_learning;
     int column_correction;      /* see sim/optics/column_level.h */
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_imgproc_bad_pixel */
-    /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
+    /* FITS files of the calibration maps; "": none. The caller loads them (calibration.h). */
     char dark_file[512], flat_file[512], bad_pixel_file[512];
-    bst_stage_use detector; /* a plug-in's in place of bst_imgproc_detect; left to the caller too */
+    /* plug-in detector in place of bst_imgproc_detect; created by the caller */
+    bst_stage_use detector;
 } bst_imgproc_config;
 
 extern const bst_config_desc bst_imgproc_config_table[];
@@ -46,122 +47,128 @@ struct bst_pixel_map;
 struct bst_pixel_shows;
 struct bst_psf;
 
-/* What is known of the sensor beside the camera's numbers. Maps on the full sensor, row-major
- * [height_px][width_px]; any may be NULL: uniform dark, uniform flat, no bad pixels, the PSF the
- * Gaussian of the camera's psf_fwhm_px. They must outlive the bst_imgproc that uses them. */
+/* Sensor calibration: maps on the full sensor, row-major [height_px][width_px], and the PSF. NULL
+ * means: uniform dark, uniform flat, no bad pixels, Gaussian PSF of the camera's psf_fwhm_px. All
+ * must outlive the bst_imgproc that uses them. */
 typedef struct bst_imgproc_maps {
-    const float *dark_e_per_s; /* dark signal's departure from its mean; taken off */
-    const float *flat;         /* relative response, > 0; divided by */
-    const uint8_t *bad;        /* non-zero: pixel is left out */
+    const float *dark_e_per_s; /* dark signal's deviation from its mean; subtracted */
+    const float *flat;         /* relative response, > 0; the pixel is divided by it */
+    const uint8_t *bad;        /* non-zero: pixel is masked */
     const struct bst_psf *psf; /* see sim/optics/psf.h */
-    struct bst_psf *own_psf;   /* bst_calibration_psf: what bst_calibration_free frees of it */
+    struct bst_psf *own_psf;   /* owned PSF, freed by bst_calibration_free */
 } bst_imgproc_maps;
 
-/* One frame as it was read out. */
+/* A raw frame. */
 typedef struct bst_imgproc_frame {
     const uint16_t *pixels; /* [window.height / binning][window.width / binning], DN */
     bst_window window;      /* full-sensor pixels */
     int binning;            /* sensor pixels summed per side of a pixel, >= 1 */
     int bits;
     double exposure_s;
-    /* another frame is processed meanwhile: leave half of the threads to it */
+    /* another frame is processed concurrently: use half of the threads */
     bool beside_another;
 } bst_imgproc_frame;
 
-/* Work space for one camera. */
+/* Detector of one camera: configuration and work space. */
 typedef struct bst_imgproc bst_imgproc;
 
-/* Makes the work space: all memory that bst_imgproc_detect needs. `camera` is copied;
- * electrons_per_s_v0 is bst_camera_electrons_per_s(camera, 0). BST_ERR_CONFIG for a bad pixel
- * outside the sensor, BST_ERR_ARGUMENT for a camera out of range, BST_ERR_MEMORY. */
+/* Creates a detector; allocates all memory that bst_imgproc_detect needs.
+ *
+ * Given:     camera              copied
+ *            electrons_per_s_v0  bst_camera_electrons_per_s(camera, 0)
+ * Errors:    BST_ERR_CONFIG for a bad pixel outside the sensor, BST_ERR_ARGUMENT for a camera out
+ *            of range, BST_ERR_MEMORY */
 bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
                               const bst_imgproc_config *config, const bst_imgproc_maps *maps,
                               bst_imgproc **out) BST_MUST_CHECK;
 /* Frees an image processor; NULL is allowed. */
 void bst_imgproc_free(bst_imgproc *ip);
 
-/* Finds and measures the sources of one frame.
+/* Detects and measures the sources of a frame.
  *
- * Steps: artefact correction; electrons; background and noise by mesh (clipped mean and standard
- * deviation); two matched filters, for points and for the streak that stars draw when the camera
- * moves by `motion` (NULL: at rest), both normalised to unit noise; maxima of the greater of the
- * two, looked for between the pixels, against a threshold that counts with the noise's tail; in a
- * crowded frame all that again with background and noise of what lies between the maxima;
- * of maxima that no saddle parts the highest; weighted least-squares fit of the pixel-integrated
- * Gaussian or streak, close neighbours together (none when bst_imgproc_smeared). The greater of two
- * matched-filter outputs is the generalised likelihood ratio test between both shapes (Kay,
- * Fundamentals of Statistical Signal Processing II, 1998, ch. 7). The passes run on
- * config->threads threads; the result does not depend on them.
+ * Steps:
+ * 1. calibration to electrons; background and noise by mesh (sigma-clipped);
+ * 2. two matched filters of unit output noise: for points, and for the streak of stars while the
+ *    camera moves by `motion` (NULL: at rest). The larger of both outputs is the generalised
+ *    likelihood ratio test between the shapes (Kay, Fundamentals of Statistical Signal Processing
+ *    II, 1998, ch. 7);
+ * 3. maxima of the larger output, interpolated between pixels, against a detection threshold that
+ *    includes the noise's skewness; in a crowded frame steps 1 to 3 are repeated with the found
+ *    stars masked;
+ * 4. of maxima without a saddle between them, the highest;
+ * 5. weighted least-squares fit of the pixel-integrated PSF or streak, neighbours jointly (not if
+ *    bst_imgproc_smeared).
+ * The loops run on config->threads threads; the result does not depend on their number.
  *
- * With config.streak_search_px, a frame in which stars are points is also searched for streaks of
- * any direction and length up to that (streak_locate.h); points and streaks then have half of the
- * false alarms each, and threshold_snr is that of points.
+ * With config.streak_search_px, a frame with point-like stars is also searched for streaks of any
+ * direction up to that length (streak_locate.h). Points and streaks then share the false alarms
+ * equally; threshold_snr is that of points.
  *
- * With config.max_fits, of more detections the fainter ones stand where the matched filter's
- * output is the greatest, between the pixels; their covariance is that of the filter for a source
- * alone.
+ * With config.max_fits, fainter detections beyond that number are located at the interpolated peak
+ * of the matched filter. Their covariance is that of the filter for an isolated source.
  *
- * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
- * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest
- * stay. The covariance is the inverse of the Fisher matrix, without background uncertainty, plus
- * what a motion that was not uniform may add; snr is sqrt(sum s^2 / sigma^2) with the background's
- * noise only; length_px and width_px are the full widths at half maximum of the Gaussian with the
- * source's second moments. No output is NaN. BST_ERR_ARGUMENT for a window or binning that does not
- * fit the sensor. */
+ * Returned:  *out  background_e, noise_e, threshold_snr, count, lost and items, sorted by y, then
+ *                  x; label UNKNOWN or ARTEFACT, star_id 0. Beyond `capacity` the faintest are
+ *                  lost. No value is NaN
+ * Errors:    BST_ERR_ARGUMENT for a window or binning that does not fit the sensor
+ * Notes:     The covariance is the inverse Fisher matrix without background uncertainty, plus an
+ *            allowance for non-uniform motion. snr is sqrt(sum s^2 / sigma^2) with background noise
+ *            only. length_px and width_px are FWHM of the Gaussian with the source's second
+ *            moments. */
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_camera_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
 
-/* Parts of a frame: apart from each other, inside the frame's own window and along its binned
- * pixels, none smaller than a mesh is good for (about 24 pixels a side). */
+/* Windows of a frame: disjoint, inside the frame's own window, aligned with its binned pixels, and
+ * at least about 24 pixels a side for the background estimate. */
 typedef struct bst_imgproc_windows {
     const bst_window *items;
     int count;
 } bst_imgproc_windows;
 
-/* The same in windows of the frame only. Thresholds are those of the whole frame; background and
- * noise are each window's own, and what is reported of them is the mean over the windows. No
- * streaks of unknown rate are searched for. The time that it takes follows the windows' area. */
+/* Detects sources in windows of a frame only, as bst_imgproc_detect. The threshold is that of the
+ * whole frame. Background and noise are estimated per window; their mean over the windows is
+ * reported. Streaks of unknown rate are not searched. The computing time is proportional to the
+ * windows' area. */
 bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                                       const bst_imgproc_windows *windows,
                                       const bst_camera_motion *motion, bst_detections *out,
                                       int capacity) BST_MUST_CHECK;
 
-/* Has the following frames collect evidence of defective pixels, up to `capacity` pixels of a
- * frame. BST_ERR_MEMORY. */
+/* Enables the collection of bad-pixel evidence, up to `capacity` pixels per frame. Errors:
+ * BST_ERR_MEMORY. */
 bst_status bst_imgproc_collect_shows(bst_ctx *ctx, bst_imgproc *ip, int capacity) BST_MUST_CHECK;
-/* The pixels of `map` (lent; NULL: none) are left out of the following frames. */
+/* Sets the map of learned bad pixels to be masked in the following frames (lent; NULL: none). */
 void bst_imgproc_use_map(bst_imgproc *ip, const struct bst_pixel_map *map);
-/* The evidence of the latest frame, in order of pixel. Lent until the next frame. */
+/* Bad-pixel evidence of the latest frame, in order of pixel; valid until the next frame. */
 const struct bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip);
 
-/* Fits detection `index` of the latest bst_imgproc_detect if the matched filter placed it (see
- * max_fits), and sets all of it but label, label_probability and star_id; the magnitude is put on
- * zero_point. In windows all are fitted.
- */
+/* Fits detection `index` of the latest bst_imgproc_detect if only the matched filter located it
+ * (see max_fits). All its fields but label, label_probability and star_id are updated; the
+ * magnitude uses zero_point. Detections in windows are always fitted. */
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
                         const bst_optics_zero_point *zero_point);
 
-/* V magnitude of the faintest star that the latest frame could show at `snr`, with the shape
- * (point or streak) that stars had in it. */
+/* V magnitude of the faintest star detectable in the latest frame at `snr`, with the stars' shape
+ * (point or streak) in it. */
 double bst_imgproc_v_limit(const bst_imgproc *ip, double snr);
-/* Background and its noise at a place of the sensor, per pixel of the latest frame; not in windows.
- */
+/* Background level and noise at a position of the sensor, e- per pixel of the latest frame. Not
+ * available after bst_imgproc_detect_windows. */
 void bst_imgproc_ground(const bst_imgproc *ip, double x_px, double y_px, double *level_e,
                         double *noise_e);
 /* Length of the star streak that the latest frame was filtered for, px; 0: points only. */
 double bst_imgproc_streak_px(const bst_imgproc *ip);
-/* Whether stars moved further in the latest frame than is modelled (streak_max_px): what was found
- * then is parts of streaks, and no place of it is to be trusted. */
+/* True if stars moved further in the latest frame than is modelled (streak_max_px). Its detections
+ * are then fragments of streaks, and their positions are unreliable. */
 bool bst_imgproc_smeared(const bst_imgproc *ip);
 
-/* The latest frame for a stack (stack.h); its signal is lent until the next frame. q_cam_from_gcrf
- * and time_s are of the middle of the exposure. */
+/* The latest frame as input of a stack (stack.h). Its signal is valid until the next frame.
+ * q_cam_from_gcrf and time_s are mid-exposure. */
 bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
                                         bst_quat q_cam_from_gcrf);
-/* Appends what a stack shows to the detections of its last frame (room for `capacity`), with the
- * flag BST_DETECTION_STACK, labelled STAR where at rest and else OBJECT; not what lies within
- * reach_px, or three of its standard deviations, of a detection that is there. */
+/* Appends detections of a stack to those of its last frame (room for `capacity`), with flag
+ * BST_DETECTION_STACK, label STAR if at rest and OBJECT otherwise. Those within reach_px, or three
+ * of their standard deviations, of an existing detection are omitted. */
 void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
                               double reach_px, bst_detections *out, int capacity);
 

@@ -27,19 +27,20 @@ static const bst_port ports[PORT_COUNT] = {
 
 enum { CATALOGUE_CAPACITY = 16384 };
 
-/* Stars this much fainter than the limit of detection may still show, brightened by noise. */
+/* Expected stars include those down to this share of the detection threshold, which noise may lift
+ * above it. */
 static const double SNR_SHARE_EXPECTED = 0.7;
-/* Once the tracker knows the pointing error, stars are looked for this close first. */
+/* Search radius for stars once the tracker has estimated the pointing error. */
 static const double LOCKED_RADIUS_PX = 10.0;
-/* Shift beyond which a distorted field is matched twice. */
+/* Shift above which a distorted field is matched twice. */
 static const double RESHIFT_PX = 2.0;
 
-/* Work space for the frame of one step, and what was found in it ahead of the step. */
+/* Detector and results of one concurrent step. */
 typedef struct lane {
-    bst_imgproc *ip;      /* NULL: not made yet */
-    bst_detections *made; /* room for config->capacity; NULL in lane 0 until it is made ahead */
-    bool ready;           /* made is of the frame below */
-    int map;              /* slot of the learned bad pixels that the present step uses */
+    bst_imgproc *ip;      /* NULL: not created yet */
+    bst_detections *made; /* detections computed ahead; NULL in lane 0 until needed */
+    bool ready;           /* `made` holds the detections of the frame below */
+    int map;              /* slot of the learned bad-pixel map used in the current step */
     int64_t exposure_id;
 } lane;
 
@@ -52,13 +53,13 @@ typedef struct imgproc_module {
     bst_starid *starid;
     bst_imgproc_discriminator *discriminator;
     bst_predicted_stars sky;
-    bst_region_of_interest windows; /* of the present frame; none: all of it */
-    bst_stack *stack;               /* NULL: no stacks */
+    bst_region_of_interest windows; /* of the current frame; none: the whole frame */
+    bst_stack *stack;               /* NULL: no stacking */
     bst_optics_photometer photometer;
-    bst_pixel_learner *pixels;   /* NULL: no bad pixels are learned */
-    int64_t steps;               /* that were made */
-    bst_psf_wings *wings;        /* NULL: the PSF has none */
-    bst_plugin_detector *plugin; /* NULL: detection is this module's own */
+    bst_pixel_learner *pixels;   /* NULL: bad pixels are not learned */
+    int64_t steps;               /* number of steps so far */
+    bst_psf_wings *wings;        /* NULL: the PSF has no wings */
+    bst_plugin_detector *plugin; /* NULL: built-in detector */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -82,6 +83,7 @@ static void destroy(void *self) {
     free(m);
 }
 
+/* Creates the detector of a lane. */
 static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
     if (l->ip || m->plugin) {
         return BST_OK;
@@ -93,7 +95,8 @@ static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
                : BST_OK;
 }
 
-static bst_status open_plugged(const bst_module_env *env, imgproc_module *m) {
+/* Creates the plug-in detector. */
+static bst_status open_plugin(const bst_module_env *env, imgproc_module *m) {
     if (!m->config->detector.desc) {
         return BST_OK;
     }
@@ -108,6 +111,7 @@ static bst_status open_plugged(const bst_module_env *env, imgproc_module *m) {
                                       (int)m->config->capacity, &m->plugin);
 }
 
+/* Creates all parts of the module from the configuration. */
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
     m->camera = *bst_knowledge_camera(env->knowledge);
     m->tick_rate_hz = env->tick_rate_hz;
@@ -118,7 +122,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                                "/observers/%d/sensors/%d/knowledge/camera/psf_file", env->observer,
                                env->sensor);
     }
-    BST_TRY(open_plugged(env, m));
+    BST_TRY(open_plugin(env, m));
     if (m->config->bad_pixel_learning.enabled && !m->plugin) {
         BST_TRY(bst_pixel_learner_create(env->ctx, &m->camera, &m->config->bad_pixel_learning,
                                          &m->pixels));
@@ -165,21 +169,22 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     return BST_OK;
 }
 
-/* The tracker's estimate of the telemetry's error, carried to the middle of the exposure. */
-static bst_quat correction(const imgproc_module *m, const bst_predictions *predictions,
-                           double mid_tick) {
+/* Tracker's estimate of the attitude error of the telemetry, propagated to mid-exposure. */
+static bst_quat attitude_correction(const imgproc_module *m, const bst_predictions *predictions,
+                                    double mid_tick) {
     double dt = (mid_tick - (double)predictions->tick) / (double)m->tick_rate_hz;
     return bst_quat_from_rotvec(bst_vec3_axpy(predictions->attitude_error_cam_rad, dt,
                                               predictions->attitude_error_rate_cam_radps));
 }
 
+/* Length of the star field's shift, px. */
 static double shift_px(const bst_starid_result *r) {
     return hypot(r->shift_x_px, r->shift_y_px);
 }
 
-/* The attitude that the stars' common shift and turn tell. */
-static bst_quat attitude_of(const imgproc_module *m, const bst_starid_options *o,
-                            const bst_starid_result *r, bst_quat q) {
+/* Attitude corrected by the shift and roll of the identified stars. */
+static bst_quat attitude_from_stars(const imgproc_module *m, const bst_starid_options *o,
+                                    const bst_starid_result *r, bst_quat q) {
     bst_vec3 seen = bst_camera_unproject(&m->camera, o->centre_x_px + r->shift_x_px,
                                          o->centre_y_px + r->shift_y_px);
     bst_vec3 meant = bst_camera_unproject(&m->camera, o->centre_x_px, o->centre_y_px);
@@ -187,16 +192,16 @@ static bst_quat attitude_of(const imgproc_module *m, const bst_starid_options *o
     return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(turn), q));
 }
 
-/* A frame and what is known of its exposure. */
+/* A frame and the onboard knowledge of its exposure. */
 typedef struct exposure {
     const bst_frame_message *message;
-    const bst_camera_motion *motion; /* NULL: not known */
+    const bst_camera_motion *motion; /* NULL: unknown */
     bst_light light;
     const bst_predictions *predictions; /* NULL: none */
-    bool locked;                        /* they tell the pointing error */
+    bool locked;                        /* the tracker has estimated the pointing error */
 } exposure;
 
-/* Sets the windows to look at while a target is followed; none: the whole frame. */
+/* Plans the windows to search while a target is tracked; none: the whole frame. */
 static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
                                bst_quat q_cam_from_gcrf) {
     const bst_frame_message *message = e->message;
@@ -221,8 +226,8 @@ static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const lane *l, c
     return BST_OK;
 }
 
-/* Leaves only those expected stars that may be seen in the windows. */
-static int in_windows(imgproc_module *m, int expected) {
+/* Keeps only the expected stars that can lie in the windows; returns their number. */
+static int keep_stars_in_windows(imgproc_module *m, int expected) {
     int kept = 0;
     for (int i = 0; i < expected; i++) {
         const bst_imgproc_expected_star *e = &m->sky.expected[i];
@@ -233,10 +238,12 @@ static int in_windows(imgproc_module *m, int expected) {
     return kept;
 }
 
-/* *q_cam_from_gcrf: in, the attitude that is believed; out, that of the stars, when any are
- * identified. */
-static bst_status identify(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
-                           bst_detections *out, bst_quat *q_cam_from_gcrf) {
+/* Identifies the catalogue stars among the detections.
+ *
+ * Given:     *q_cam_from_gcrf  predicted attitude
+ * Returned:  *q_cam_from_gcrf  attitude from the identified stars, if any */
+static bst_status identify_stars(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
+                                 bst_detections *out, bst_quat *q_cam_from_gcrf) {
     const bst_window window = e->message->window;
     double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
     double v_limit =
@@ -245,7 +252,7 @@ static bst_status identify(bst_ctx *ctx, imgproc_module *m, const lane *l, const
     bst_predicted_stars_query query = {out->q_cam_from_gcrf, &e->light, window,
                                        m->config->search_radius_px, v_limit};
     BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
-    expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
+    expected = m->windows.count > 0 ? keep_stars_in_windows(m, expected) : expected;
     bst_starid_options options = {m->config->search_radius_px,
                                   m->config->match_tolerance_px,
                                   bst_camera_centre_x(&m->camera),
@@ -264,8 +271,9 @@ static bst_status identify(bst_ctx *ctx, imgproc_module *m, const lane *l, const
                          &result);
     }
     if (m->camera.geometry.general && result.matched > 0 && shift_px(&result) > RESHIFT_PX) {
-        /* distortion makes a shift uneven over the field: look again from where the stars were */
-        *q_cam_from_gcrf = attitude_of(m, &options, &result, out->q_cam_from_gcrf);
+        /* distortion makes the shift uneven over the field: match again with the corrected attitude
+         */
+        *q_cam_from_gcrf = attitude_from_stars(m, &options, &result, out->q_cam_from_gcrf);
         for (int i = 0; i < out->count; i++) {
             if (out->items[i].label == BST_LABEL_STAR) {
                 out->items[i].label = BST_LABEL_UNKNOWN;
@@ -275,13 +283,13 @@ static bst_status identify(bst_ctx *ctx, imgproc_module *m, const lane *l, const
         }
         query.q_cam_from_gcrf = *q_cam_from_gcrf;
         BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
-        expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
+        expected = m->windows.count > 0 ? keep_stars_in_windows(m, expected) : expected;
         options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
                          &result);
     }
     if (result.matched > 0) {
-        *q_cam_from_gcrf = attitude_of(m, &options, &result, *q_cam_from_gcrf);
+        *q_cam_from_gcrf = attitude_from_stars(m, &options, &result, *q_cam_from_gcrf);
     }
     out->stars_identified = result.matched;
     for (int i = 0; i < out->count; i++) {
@@ -293,12 +301,13 @@ static bst_status identify(bst_ctx *ctx, imgproc_module *m, const lane *l, const
     return BST_OK;
 }
 
+/* Background and noise at a position, for bst_psf_wings_label. */
 static void ground_at(const void *user, double x_px, double y_px, bst_psf_wings_ground *out) {
     bst_imgproc_ground(user, x_px, y_px, &out->level_e, &out->noise_e);
 }
 
-/* Labels what the wings of bright stars pretend to be: catalogued ones, also beside the frame,
- * where the attitude is that of stars, and what saturates. */
+/* Labels artefacts in the PSF wings of bright stars: catalogue stars, including those beside the
+ * frame if the attitude is from stars, and saturated sources. */
 static bst_status label_wings(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
                               const bst_imgproc_frame_knowledge *known, bst_detections *out) {
     const bst_frame_message *message = e->message;
@@ -335,7 +344,7 @@ static bst_status label_wings(bst_ctx *ctx, imgproc_module *m, const lane *l, co
     return BST_OK;
 }
 
-/* The camera's motion as telemetry tells it; false: not known. */
+/* Camera motion during the exposure from telemetry; false: unknown. */
 static bool motion_of(struct bst_step *step, const bst_frame_message *message,
                       bst_camera_motion *motion) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
@@ -345,9 +354,11 @@ static bool motion_of(struct bst_step *step, const bst_frame_message *message,
                                             message->end_tick, motion);
 }
 
-/* What is in a frame. It depends on how the camera turned, not on where it looked. */
-static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l, const exposure *e,
-                         bool beside_another, bst_detections *out, int capacity) {
+/* Detects the sources of a frame. The result depends on the camera's rotation during the exposure,
+ * not on its pointing. */
+static bst_status detect_sources(bst_ctx *ctx, const imgproc_module *m, const lane *l,
+                                 const exposure *e, bool beside_another, bst_detections *out,
+                                 int capacity) {
     const bst_frame_message *message = e->message;
     const bst_camera_motion *motion = e->motion;
     const bst_imgproc_windows windows = {m->windows.items, m->windows.count};
@@ -373,13 +384,14 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l, c
     return status;
 }
 
-static bst_status ahead(void *self, struct bst_step *step) {
+/* Detects the sources of the next frame ahead of its step. */
+static bst_status detect_ahead(void *self, struct bst_step *step) {
     imgproc_module *m = self;
     lane *l = &m->lanes[bst_step_lane(step)];
     bst_ctx *ctx = bst_step_ctx(step);
     l->ready = false;
     bst_sample sample = bst_step_next(step, PORT_FRAME);
-    /* where the windows are is known in the step */
+    /* the windows are known only in the step itself */
     if (!sample.payload || m->config->track_windows || m->plugin) { /* frame by frame */
         return BST_OK;
     }
@@ -396,20 +408,20 @@ static bst_status ahead(void *self, struct bst_step *step) {
     bst_camera_motion motion;
     bool oriented = motion_of(step, message, &motion);
     const exposure e = {.message = message, .motion = oriented ? &motion : NULL};
-    BST_TRY(detect(ctx, m, l, &e, true, l->made, capacity));
+    BST_TRY(detect_sources(ctx, m, l, &e, true, l->made, capacity));
     l->exposure_id = message->exposure_id;
     l->ready = true;
     return BST_OK;
 }
 
-/* What was made ahead for this frame, or else made now. */
+/* Detections of a frame: computed ahead or now. */
 static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l, const exposure *e,
                                 bst_detections *out, int capacity) {
     bool made = l->ready && l->exposure_id == e->message->exposure_id;
     l->ready = false;
     if (!made) {
         BST_TRY(open_lane(ctx, m, l));
-        return detect(ctx, m, l, e, false, out, capacity);
+        return detect_sources(ctx, m, l, e, false, out, capacity);
     }
     out->background_e = l->made->background_e;
     out->noise_e = l->made->noise_e;
@@ -421,7 +433,7 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l, const 
     return BST_OK;
 }
 
-/* Each full stack adds what it shows to the detections of its last frame. */
+/* Adds the frame to the stack; a full stack appends its detections to those of its last frame. */
 static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
                          bst_quat q_cam_from_gcrf, const bst_optics_zero_point *zero_point,
                          bst_detections *out, int capacity) {
@@ -437,6 +449,7 @@ static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
     }
 }
 
+/* Updates the bad-pixel learner with the frame. */
 static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l,
                          const bst_frame_message *message, const bst_imgproc_frame_knowledge *known,
                          bst_detections *out) {
@@ -454,13 +467,14 @@ static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l
     }
 }
 
-/* Of the middle of an exposure: navigation may be later by the read-out. */
-static bst_light light_at(const imgproc_module *m, const bst_nav_telemetry *nav,
-                          double middle_tick) {
+/* Observer's position and velocity at mid-exposure; the navigation telemetry may be later by the
+ * read-out time. */
+static bst_light observer_at(const imgproc_module *m, const bst_nav_telemetry *nav,
+                             double middle_tick) {
     return bst_nav_light_after(nav, (middle_tick - (double)nav->tick) / (double)m->tick_rate_hz);
 }
 
-/* Labels what is no star, and fits what may be an object. */
+/* Labels detections that are no stars, and refines the fit of possible objects. */
 static void label_objects(imgproc_module *m, const lane *l,
                           const bst_imgproc_frame_knowledge *known,
                           const bst_optics_zero_point *zero_point, bst_detections *out) {
@@ -472,8 +486,9 @@ static void label_objects(imgproc_module *m, const lane *l,
     }
 }
 
-static bst_status process(imgproc_module *m, struct bst_step *step,
-                          const bst_frame_message *message) {
+/* Processes a frame message into detections. */
+static bst_status process_frame(imgproc_module *m, struct bst_step *step,
+                                const bst_frame_message *message) {
     bst_ctx *ctx = bst_step_ctx(step);
     lane *l = &m->lanes[bst_step_lane(step)];
     bst_camera_motion motion;
@@ -492,15 +507,15 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     e.locked = oriented && predictions && predictions->attitude_valid;
     double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
     if (e.locked) {
-        out->q_cam_from_gcrf =
-            bst_quat_unit(bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
+        out->q_cam_from_gcrf = bst_quat_unit(
+            bst_quat_mul(attitude_correction(m, predictions, middle), motion.q_cam_from_gcrf));
     }
 
     m->windows.count = 0;
     out->windows = 0;
     bool navigated = nav.payload && !nav.stale;
     if (navigated) {
-        e.light = light_at(m, nav.payload, middle);
+        e.light = observer_at(m, nav.payload, middle);
     }
     if (m->config->track_windows && e.locked && navigated) {
         BST_TRY(plan_windows(ctx, m, l, &e, out->q_cam_from_gcrf));
@@ -516,7 +531,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
                                                           : bst_imgproc_streak_px(l->ip),
                                          .predictions = predictions};
     if (oriented && navigated && !smeared) {
-        BST_TRY(identify(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
+        BST_TRY(identify_stars(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
         known.light = e.light;
         known.oriented = out->stars_identified > 0;
     }
@@ -552,11 +567,11 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
 static bst_status step_module(void *self, struct bst_step *step) {
     imgproc_module *m = self;
     bst_sample sample;
-    /* lanes take turns by steps; a map is as old in steps that nobody looked ahead of */
+    /* Lanes alternate by step; without look-ahead the bad-pixel map is equally old. */
     int slot = (int)(m->steps % BST_STEP_LANES);
     m->lanes[bst_step_lane(step)].map = slot;
     while ((sample = bst_step_next(step, PORT_FRAME)).payload) {
-        BST_TRY(process(self, step, sample.payload));
+        BST_TRY(process_frame(self, step, sample.payload));
     }
     if (m->pixels) {
         bst_pixel_learner_publish(m->pixels, slot, m->steps);
@@ -578,5 +593,5 @@ const bst_module_desc bst_imgproc_module = {
     .create = create,
     .step = step_module,
     .destroy = destroy,
-    .ahead = ahead,
+    .ahead = detect_ahead,
 };

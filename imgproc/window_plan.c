@@ -4,14 +4,15 @@
 
 #include "boresight/vec.h"
 
-/* Windows that cover more of the frame than this save nothing. */
+/* Windows that cover a larger share of the frame than this save nothing. */
 static const double WINDOWS_SHARE = 0.5;
-/* Stars that show with less are no help beside bright ones. */
+/* Least expected SNR of a star that gets a window. */
 static const double WINDOW_STAR_SNR = 12.0;
 
-/* Windows for the brightest of `count` stars expected, which are put in front, brightest first. */
-static void add_stars(const bst_window_plan_input *in, bst_predicted_stars *sky,
-                      bst_region_of_interest *windows, int count) {
+/* Adds windows for the brightest of `count` expected stars; these are moved to the front, brightest
+ * first. */
+static void add_star_windows(const bst_window_plan_input *in, bst_predicted_stars *sky,
+                             bst_region_of_interest *windows, int count) {
     double half = 0.5 * (double)in->config->window_px;
     int chosen = 0;
     for (; chosen < count && chosen < in->config->window_stars; chosen++) {
@@ -59,7 +60,7 @@ bst_status bst_window_plan_make(bst_ctx *ctx, const bst_window_plan_input *in,
     const bst_predicted_stars_query query = {in->q_cam_from_gcrf, in->light, *frame, 0.0,
                                              bst_imgproc_v_limit(in->ip, WINDOW_STAR_SNR)};
     BST_TRY(bst_predicted_stars_expect(ctx, sky, &query, &expected));
-    add_stars(in, sky, windows, expected);
+    add_star_windows(in, sky, windows, expected);
     *use = bst_region_of_interest_settle(windows, frame, in->message->binning, WINDOWS_SHARE);
     return BST_OK;
 }

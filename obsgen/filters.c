@@ -1,4 +1,4 @@
-/* The filters of a frame: their answer to its images, their threshold, the noise at their output.
+/* Matched filters of a generated frame: response to its images, detection threshold, output noise.
  */
 #include <math.h>
 
@@ -7,18 +7,19 @@
 #include "sim/core/threshold_statistics.h"
 #include "sim/optics/column_level.h"
 
-/* Shot noise of a source through its own filter, times the noise of a pixel, over sqrt(sum p^2):
- * the sum of k^2 p for a Gaussian at rest, and for a long line of it. */
+/* Shot noise of a source in its own matched filter, relative to pixel noise / sqrt(sum p^2): the
+ * sum of k^2 p for a Gaussian at rest, and for a long line. */
 static const double POINT_SHOT = 4.0 / 3.0, LINE_SHOT = 1.1547005383792515;
 
-/* Mean squares, per axis, of what the true path is off the paths that image processing draws. */
+/* Mean square deviation, per axis, of the true path from the path models of image processing. */
 typedef struct path_residual {
-    double filter_px2; /* off the straight and uniform path; of a filter for streaks, across it */
-    double fit_px2;    /* off what is fitted: a streak has the bend that telemetry knows */
+    double filter_px2; /* from the straight uniform path; for a streak filter, across it */
+    /* from the fitted path: a streak model includes the bend known from telemetry */
+    double fit_px2;
 } path_residual;
 
-/* Sets the straight and uniform path nearest to the true one. */
-static path_residual straighten(bst_generator *g) {
+/* Sets the straight uniform path nearest to the true one. */
+static path_residual fit_straight_path(bst_generator *g) {
     path_residual out = {0.0, 0.0};
     g->straight_path = g->whole_path;
     if (g->smeared || g->path.count < 3) {
@@ -40,7 +41,7 @@ static path_residual straighten(bst_generator *g) {
         double u = (double)k / last - 0.5, weight = k == 0 || k == last ? 0.5 : 1.0;
         double dx = g->path_x[k] - u * g->straight_path.dx;
         double dy = g->path_y[k] - u * g->straight_path.dy, across = dy * c - dx * s;
-        double bent = drawn ? 6.0 * u * u - 0.5 : 0.0; /* as imgproc's fit draws it */
+        double bent = drawn ? 6.0 * u * u - 0.5 : 0.0; /* as imgproc's fit models it */
         double ex = dx - bent * g->bend_x, ey = dy - bent * g->bend_y;
         out.filter_px2 += weight * (drawn ? across * across : 0.5 * (dx * dx + dy * dy)) / last;
         out.fit_px2 += weight * 0.5 * (ex * ex + ey * ey) / last;
@@ -48,6 +49,7 @@ static path_residual straighten(bst_generator *g) {
     return out;
 }
 
+/* Geometric mean width of an image, px. */
 static double mean_width(const bst_obsgen_image_width *w) {
     return sqrt(w->across_px * w->along_px);
 }
@@ -61,7 +63,7 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
         const bst_response_side filter = {NULL, fmax(g->onboard_sigma_px, 0.2 * g->binning)};
         bst_response_set(&response, &source, &filter, g->binning, 0.0, 0.0);
     }
-    path_residual residual = straighten(g);
+    path_residual residual = fit_straight_path(g);
     g->response = bst_response_widened(&response, residual.filter_px2);
     bst_response fitted = bst_response_widened(&response, residual.fit_px2);
     g->widening = mean_width(&fitted.source) / mean_width(&response.source);
@@ -69,7 +71,7 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     g->cross_sigma = mean_width(&g->response.both);
     g->bias_sigma = mean_width(&response.both);
     g->filter_sigma = mean_width(&g->response.filter);
-    /* a place is known by the image's gradient */
+    /* the position is determined by the image's gradient */
     double ratio = g->response.maxima_sigma_px / g->filter_sigma;
     g->image_bound = f->image_bound;
     g->onboard_bound = f->onboard_bound;
@@ -85,8 +87,8 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     }
 }
 
-/* The threshold, kept by streak length. Streaks count in steps of half a pixel, as the filters do.
- */
+/* Sets the detection threshold, cached by streak length. Streaks are counted in steps of half a
+ * pixel, as the filters do. */
 static void set_threshold(bst_generator *g) {
     struct generator_thresholds *t = &g->thresholds;
     double sigma = g->response.maxima_sigma_px;
@@ -102,36 +104,36 @@ static void set_threshold(bst_generator *g) {
     }
     double threshold = t->threshold[step];
     g->streak_share = t->streak_share[step];
-    if (g->open_share < 1.0) { /* noise makes detections only there */
+    if (g->open_share < 1.0) { /* noise causes detections only on open sky */
         threshold = bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
                                           g->open_share * g->width * g->height, &g->streak_share);
     }
     g->threshold = fmax(threshold + g->calibration.threshold_offset, 1.0);
 }
 
-/* Sum over an axis of the squares of the sums across it of a filter of unit norm, drawn along a
- * path that moves by `moved` on that axis: what offsets of its rows or columns become. */
-static double summed_up(const bst_generator *g, double moved, double square) {
+/* Sum over an axis of the squared cross sums of a unit-norm filter smeared by `moved` px on that
+ * axis: its response to offsets of rows or columns. */
+static double offset_response(const bst_generator *g, double moved, double square) {
     const bst_obsgen_path_px shadow = {moved, 0.0};
     double width = g->filter_sigma;
-    /* of a Gaussian the integral across is the product's over 1 / (2 sqrt(pi) width) */
+    /* the integral across a Gaussian is that of the product over 1 / (2 sqrt(pi) width) */
     return bst_matched_product(shadow, shadow, width) * 2.0 * sqrt(BST_PI) * width / square;
 }
 
-/* Variance of a filter's output over that of white noise of the frame's variance, of which the
- * offsets of columns and rows are these shares. */
+/* Variance of a filter's output relative to white noise of equal pixel variance, if `columns` and
+ * `rows` are the shares of column and row offsets. */
 static double output_variance(const bst_generator *g, const bst_obsgen_path_px *path,
                               double columns, double rows) {
     if (columns == 0.0 && rows == 0.0) {
         return 1.0;
     }
     double square = bst_response_product(&g->response.filter, *path, *path);
-    return g->white_share + columns * summed_up(g, path->dx, square) +
-           rows * summed_up(g, path->dy, square);
+    return g->white_share + columns * offset_response(g, path->dx, square) +
+           rows * offset_response(g, path->dy, square);
 }
 
-/* Sums of powers of the values of a filter of unit norm: a Gaussian across, even along the streak.
- */
+/* Sums of powers of a unit-norm filter for the threshold statistics: Gaussian across, uniform along
+ * the streak. */
 static void set_weights(const bst_generator *g, double length, bst_threshold_weights *out) {
     double s = g->filter_sigma, even = sqrt(length * length + BST_PI * s * s);
     double top = 1.0 / sqrt(sqrt(BST_PI) * s * even), power = top * top;
@@ -143,7 +145,7 @@ static void set_weights(const bst_generator *g, double length, bst_threshold_wei
     }
 }
 
-/* What image processing takes for counted electrons: its noise less that of reading. */
+/* Shot-noise part of the noise as image processing assumes it: total minus read noise. */
 static bst_threshold_noise noise_law(const bst_generator *g) {
     const bst_camera *c = g->camera;
     double gain = c->gain_e_per_dn, variance = g->noise_e * g->noise_e;
@@ -155,7 +157,7 @@ static bst_threshold_noise noise_law(const bst_generator *g) {
     return (bst_threshold_noise){g->noise_e, counted, gain};
 }
 
-/* A column has a level of its own in the frame as it is processed. */
+/* True if image processing subtracts a level per column in this frame. */
 static bool has_levels(const bst_generator *g) {
     return g->levels_columns && g->height >= BST_COLUMN_LEVEL_LEAST_ROWS;
 }
@@ -165,15 +167,15 @@ double bst_generator_column_variance(const bst_generator *g) {
     return has_levels(g) ? 0.0 : offset_e * offset_e;
 }
 
-/* Share of a pixel's variance that a column has in common. The mean of its rows, which is taken off
- * as its level, takes their noise with it: the share of one row is missing. */
+/* Share of a pixel's variance that is common to its column. The level subtracted is the mean of its
+ * rows and removes their noise too: one row's share is missing. */
 static double column_share(const bst_generator *g, double variance) {
     int rows = g->height < BST_COLUMN_LEVEL_MOST_ROWS ? g->height : BST_COLUMN_LEVEL_MOST_ROWS;
     return has_levels(g) ? -1.0 / rows : bst_generator_column_variance(g) / variance;
 }
 
 void bst_generator_set_filters(bst_generator *g) {
-    /* a Gaussian's top over its sqrt(sum p^2) */
+    /* peak of a Gaussian over its sqrt(sum p^2) */
     g->fit_light = 1.0 / (sqrt(BST_PI) * g->cross_sigma * g->noise_e * g->noise_e);
     set_threshold(g);
     const bst_obsgen_path_px paths[2] = {{0.0, 0.0}, g->star_path};
@@ -189,7 +191,7 @@ void bst_generator_set_filters(bst_generator *g) {
         bst_generator_filter *filter = &g->filters[k];
         bst_threshold_weights weights;
         set_weights(g, lengths[k], &weights);
-        /* of smeared frames no maximum is looked at twice */
+        /* maxima of smeared frames are not interpolated */
         filter->threshold =
             g->smeared ? g->threshold
                        : fmax(bst_threshold_quantile(g->threshold, &weights, &law), g->threshold);
@@ -203,8 +205,9 @@ void bst_generator_set_filters(bst_generator *g) {
     }
 }
 
-/* A frame with more than a maximum in so many pixels is crowded: what image processing takes for
- * background and noise then, it takes from the pixels that are this far from outputs of stars. */
+/* A frame with more than one maximum per CROWDED_PX pixels is crowded. Image processing then
+ * estimates background and noise from pixels at least SPARED_PX away from star outputs above
+ * STAR_SNR. */
 static const double CROWDED_PX = 400.0, STAR_SNR = 3.0, LEAST_OPEN = 0.02;
 enum { SPARED_PX = 2 };
 
@@ -214,7 +217,8 @@ double bst_generator_open_share(const bst_generator *g) {
         const generator_source *s = &g->sources[i];
         maxima += s->amplitude > bst_generator_looks_from(g);
         if (s->amplitude > STAR_SNR) {
-            /* within the output's outline, a circle, and a square about each pixel of it */
+            /* area: the circle where the output exceeds STAR_SNR, extended by SPARED_PX, along the
+             * streak */
             double r = 2.0 * g->cross_sigma * sqrt(log(s->amplitude / STAR_SNR)), h = SPARED_PX;
             covered += BST_PI * r * r + 8.0 * h * r + 4.0 * h * h + 2.0 * (r + h) * s->length;
         }

@@ -11,13 +11,13 @@
 #include "sim/optics/column_level.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
-/* In a smeared frame, sources that move less are seen as one. */
+/* In a smeared frame, sources that move less than this are seen as one maximum. */
 static const double ROUGH_PX = 8.0;
-/* Where image processing clips the pixels that it takes background and noise from. */
+/* Clip level of image processing for background and noise, sigma. */
 static const double CLIP_SIGMA = 3.0;
-/* Sources of which less is on the frame are not seen. */
+/* Sources with a smaller share of their image on the frame are not generated. */
 static const double LEAST_VISIBLE = 0.01;
-/* Beyond so many sigmas of a Gaussian the error function is 1 in double precision: 6 sqrt(2). */
+/* Sigmas of a Gaussian beyond which the error function is 1 in double precision: 6 sqrt(2). */
 static const double ALL_SIGMAS = 8.5;
 
 bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
@@ -80,12 +80,13 @@ double bst_generator_peak_e(double sigma_px, const bst_truth_item *item) {
     return item->electrons * across * along;
 }
 
-/* Share of the light of a Gaussian at `at` that falls between two edges. */
+/* Share of a Gaussian's light at `at` between two edges. */
 static double between_edges(double at, double low, double high, double sigma) {
     double s = sigma * sqrt(2.0);
     return 0.5 * (erf((high - at) / s) - erf((low - at) / s));
 }
 
+/* Share of a Gaussian's light inside the frame. */
 static inline double inside(const bst_generator *g, double x, double y, double sigma) {
     double all = ALL_SIGMAS * sigma - 0.5;
     if (x > all && y > all && x < g->width - 1 - all && y < g->height - 1 - all) {
@@ -103,10 +104,10 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
     return inside(g, x, y, sigma);
 }
 
-/* SNR of a source of the truth over that of its light with the PSF alone on the frame's mean
- * background: jitter and bends of its path widen it, and the background may differ at its place. */
-static double sharpness(const bst_generator *g, const bst_generator_frame *f,
-                        const bst_truth_item *item, double length) {
+/* SNR of a true source relative to one with the PSF alone on the mean background. Jitter and path
+ * bend widen the image, and the local background may differ. */
+static double snr_factor(const bst_generator *g, const bst_generator_frame *f,
+                         const bst_truth_item *item, double length) {
     double v = (double)g->binning * g->binning * (f->truth->background_e + f->truth->dark_e) +
                g->camera->read_noise_e * g->camera->read_noise_e;
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
@@ -115,19 +116,19 @@ static double sharpness(const bst_generator *g, const bst_generator_frame *f,
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
 
-/* Takes from *first and *end steps along an axis that are not between two places; at: of step 0. */
+/* Limits a range of steps along an axis to those between low and high; at: coordinate of step 0. */
 static void limit_steps(double at, double step, double low, double high, int *first, int *end) {
     double a = (low - at) / step, b = (high - at) / step;
-    if (isfinite(a) && isfinite(b)) { /* a step more, for rounding */
+    if (isfinite(a) && isfinite(b)) { /* one more step, for rounding */
         double from = fmin(a, b) - 1.0, to = fmax(a, b) + 2.0;
         *first = from > *first ? (int)fmin(from, *end) : *first;
         *end = to < *end ? (int)fmax(to, *first) : *end;
     }
 }
 
-/* How much of a source's image is on the frame. The squares of its light count: they are narrower
- * than the light. */
-static void see(const bst_generator *g, generator_source *s) {
+/* Sets the visible share of a source's image. The squared light counts, because the image's square
+ * is narrower than the image. */
+static void set_visible_share(const bst_generator *g, generator_source *s) {
     double margin_x = 4.0 * g->sigma + 0.5 * fabs(s->path.dx);
     double margin_y = 4.0 * g->sigma + 0.5 * fabs(s->path.dy);
     if (s->x > margin_x && s->y > margin_y && s->x < g->width - 1 - margin_x &&
@@ -156,9 +157,9 @@ static void see(const bst_generator *g, generator_source *s) {
                      inside(g, s->x + 0.5 * s->path.dx, s->y + 0.5 * s->path.dy, narrow));
 }
 
-/* Where a source is on the frame; false when nothing of it is. */
-static bool place_source(const bst_generator *g, const bst_generator_frame *f,
-                         const bst_truth_item *item, generator_source *s) {
+/* Position of a true source in frame pixels; false if nothing of it is on the frame. */
+static bool position_source(const bst_generator *g, const bst_generator_frame *f,
+                            const bst_truth_item *item, generator_source *s) {
     double b = g->binning;
     if (!(item->electrons > 0.0) || (item->flags & BST_TRUTH_OCCULTED) ||
         !isfinite(item->x_centroid_px) || !isfinite(item->x_start_px) ||
@@ -170,25 +171,25 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
     s->path.dy = (item->y_end_px - item->y_start_px) / b;
     s->x = (item->x_centroid_px - x0) / b;
     s->y = (item->y_centroid_px - y0) / b;
-    if (!g->smeared) { /* ends that tremble are no path */
+    if (!g->smeared) { /* ends displaced by jitter only are no path */
         s->path.dx += g->straight_path.dx - g->whole_path.dx;
         s->path.dy += g->straight_path.dy - g->whole_path.dy;
     }
     s->length = hypot(s->path.dx, s->path.dy);
     s->flux_e = item->electrons;
-    s->sharp = sharpness(g, f, item, s->length);
+    s->sharp = snr_factor(g, f, item, s->length);
     s->visible = s->ends = 1.0;
     s->seen_x = s->x;
     s->seen_y = s->y;
     if (g->smeared && s->length > ROUGH_PX) {
-        s->broken = true; /* its way is laid out later */
+        s->broken = true; /* its path is laid out later */
     }
-    see(g, s);
+    set_visible_share(g, s);
     return s->broken || s->visible > LEAST_VISIBLE;
 }
 
-/* Amplitude of a source at the filter's output without noise, and which filter gives it. */
-static void respond(const bst_generator *g, generator_source *s) {
+/* Noise-free amplitude of a source in the matched-filter output, and the filter that gives it. */
+static void set_amplitude(const bst_generator *g, generator_source *s) {
     const bst_obsgen_path_px point = {0.0, 0.0};
     double gain = bst_obsgen_between(bst_obsgen_lengths_px, g->calibration.gain, BST_OBSGEN_LENGTHS,
                                      s->length);
@@ -217,13 +218,13 @@ static void respond(const bst_generator *g, generator_source *s) {
     } else if (g->response.source.across_px != g->response.source.along_px) {
         ideal *= bst_response_norm_ratio(&g->response, s->length);
     }
-    /* noise lifts the greatest output near a source the more, the flatter the image makes its top
-     */
+    /* noise raises the maximum near a source, the more, the flatter the image's peak is */
     double flatness = g->cross_sigma / g->filter_sigma;
     gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness * flatness;
     s->amplitude = gain * efficiency * ideal;
 }
 
+/* Grows the arrays of sources. */
 static bst_status reserve(bst_ctx *ctx, bst_generator *g, int count) {
     if (count < g->source_capacity) {
         return BST_OK;
@@ -248,7 +249,7 @@ static int by_row(const void *a, const void *b) {
     return p->x != q->x ? (p->x < q->x ? -1 : 1) : (p->item > q->item) - (p->item < q->item);
 }
 
-/* Noise of the frame as image processing measures it: the faint sources' light is part of it. */
+/* Sets the pixel noise as image processing measures it, including the light of faint sources. */
 static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     const bst_camera *c = g->camera;
     const bst_detector_config *d = &c->detector;
@@ -265,10 +266,10 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
 }
 
-/* Light and square of it per source that a clipped mean of the frame's pixels holds: of a Gaussian
- * image or a line what lies below the clip. */
-static void left_in(const bst_generator *g, const generator_source *s, double clip_e, double *light,
-                    double *square) {
+/* Light and squared light of a source that survives the sigma clip of the background: the part of a
+ * Gaussian image or a line below the clip. */
+static void unclipped_light(const bst_generator *g, const generator_source *s, double clip_e,
+                            double *light, double *square) {
     double area = 2.0 * BST_PI * g->total_sigma * g->total_sigma;
     double peak = s->flux_e / (area * sqrt(1.0 + s->length * s->length / area));
     double below = fmin(clip_e / peak, 1.0); /* of the peak */
@@ -282,14 +283,14 @@ static void left_in(const bst_generator *g, const generator_source *s, double cl
     }
 }
 
-/* Sources are part of what image processing takes for background and noise. */
+/* Adds the sources' unclipped light to background and noise. */
 static void add_crowding(bst_generator *g) {
     double pixels = (double)g->width * g->height, before = g->noise_e;
     g->dark_noise_e = before;
     g->faint_light_e = g->faint_square_e2 = 0.0;
     for (int i = 0; i < g->source_count; i++) {
         double light, square;
-        left_in(g, &g->sources[i], CLIP_SIGMA * before, &light, &square);
+        unclipped_light(g, &g->sources[i], CLIP_SIGMA * before, &light, &square);
         g->faint_light_e += light / pixels;
         g->faint_square_e2 += square / pixels;
     }
@@ -298,7 +299,8 @@ static void add_crowding(bst_generator *g) {
     g->noise_e = sqrt(before * before + g->calibration.crowding * g->faint_square_e2);
     for (int i = 0; i < g->source_count; i++) {
         generator_source *s = &g->sources[i];
-        if (!s->broken) { /* the filter's sum over its norm times what is too much */
+        if (!s->broken) { /* bias of the output: the filter's sum over its norm times the background
+                             excess */
             s->amplitude *= before / g->noise_e;
             double length = s->as_streak ? g->streak : 0.0;
             s->amplitude -=
@@ -307,9 +309,9 @@ static void add_crowding(bst_generator *g) {
     }
 }
 
-/* In a crowded frame image processing looks a second time, with background and noise of the open
- * sky between the stars that it found first: their light is in neither then. */
-static void look_again(bst_generator *g) {
+/* In a crowded frame image processing estimates background and noise again on the open sky between
+ * stars: removes their light from both. */
+static void set_open_sky(bst_generator *g) {
     g->open_share = bst_generator_open_share(g);
     if (!(g->open_share < 1.0)) {
         return;
@@ -327,6 +329,7 @@ static void look_again(bst_generator *g) {
     bst_generator_set_filters(g);
 }
 
+/* Grows the arrays of the stars' path. */
 static bst_status reserve_path(bst_ctx *ctx, bst_generator *g, int count) {
     if (count <= g->path_room) {
         return BST_OK;
@@ -343,7 +346,7 @@ static bst_status reserve_path(bst_ctx *ctx, bst_generator *g, int count) {
     return BST_OK;
 }
 
-/* The stars' true path, and what follows from it for all of them. */
+/* Sets the stars' true path and the quantities derived from it. */
 static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
     double b = g->binning;
     bool known = f->path_count >= 2;
@@ -385,7 +388,7 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
     return BST_OK;
 }
 
-/* The stars' bias as streaks, and for each of the lights as points. */
+/* Centroid bias of the stars' images: as streaks, and as points for each light level. */
 static void set_star_bias(bst_generator *g) {
     if (g->smeared || g->path.count < 3) {
         return;
@@ -404,6 +407,7 @@ static void set_star_bias(bst_generator *g) {
     }
 }
 
+/* Sets up all frame quantities: geometry, path, noise, filters. */
 static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
     g->binning = f->binning > 1 ? f->binning : 1;
     g->width = f->window.width / g->binning;
@@ -428,11 +432,12 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     g->path.count = 0;
     bst_generator_set_response(g, f);
     BST_TRY(set_path(ctx, g, f));
-    bst_generator_set_response(g, f); /* with the path */
+    bst_generator_set_response(g, f); /* after the path is set */
     set_star_bias(g);
     return BST_OK;
 }
 
+/* Collects the truth sources of the frame and their filter amplitudes. */
 static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
     const bst_truth *t = f->truth;
     BST_TRY(reserve(ctx, g, t->count));
@@ -440,18 +445,18 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
     for (int i = 0; i < t->count; i++) {
         generator_source *s = &g->sources[g->source_count];
         *s = (generator_source){.item = i, .star = t->items[i].kind == BST_SOURCE_STAR, .head = -1};
-        if (!place_source(g, f, &t->items[i], s)) {
+        if (!position_source(g, f, &t->items[i], s)) {
             continue;
         }
         s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 1) << 32;
-        respond(g, s);
+        set_amplitude(g, s);
         g->source_count++;
     }
     add_crowding(g);
     g->open_share = 1.0;
     bst_generator_set_filters(g);
     if (!g->smeared) {
-        look_again(g);
+        set_open_sky(g);
     }
     qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
     return BST_OK;
@@ -467,7 +472,7 @@ void bst_generator_keep(bst_generator *g, const bst_obsgen_generated *item) {
         g->items[g->count++] = *item;
         return;
     }
-    /* the brightest stay */
+    /* the brightest are kept */
     g->lost++;
     int faintest = 0;
     for (int i = 1; i < g->count; i++) {
@@ -493,8 +498,8 @@ void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, 
     bst_generator_keep(g, &out);
 }
 
-/* A source that hardly moved in a frame that nothing is fitted in: its brightest pixel shows it,
- * and the outputs about that say where its top is. */
+/* Keeps a source that hardly moved in a smeared frame: its brightest pixel, with the peak
+ * interpolated from the outputs about it. */
 static void keep_whole_rough(bst_generator *g, int i) {
     const generator_source *s = &g->sources[i];
     generator_blend b = bst_generator_blend_of(g, i);
@@ -505,7 +510,7 @@ static void keep_whole_rough(bst_generator *g, int i) {
     if (!(value > g->threshold) || x < 0 || y < 0 || x >= g->width || y >= g->height) {
         return;
     }
-    /* the top of noise and light: gradient of the one over curvature of the other */
+    /* peak of noise plus light: gradient of the noise over curvature of the light */
     double off[2], both = g->cross_sigma * g->cross_sigma;
     double sigma = sqrt(2.0) * both / (g->filter_sigma * fmax(peak, g->threshold));
     bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * GENERATOR_DRAWS + GENERATOR_PLACE,

@@ -1,4 +1,4 @@
-/* Detections from the truth of an exposure, without an image. */
+/* Observation generator: detections from the truth of an exposure, without rendering an image. */
 #ifndef BST_OBSGEN_GENERATOR_H
 #define BST_OBSGEN_GENERATOR_H
 
@@ -10,28 +10,32 @@
 #include "obsgen/model/matched_filter_theory.h"
 #include "obsgen/model/response.h"
 
-/* Settings of the image path that the generator follows. */
+/* Settings of the image path that the generator reproduces. */
 typedef struct bst_generator_settings {
     int capacity;
     double false_alarms_per_frame;
-    double jitter_px;                    /* RMS per axis, sensor px: widens the onboard PSF */
-    double streak_min_px, streak_max_px; /* star streaks that are filtered for */
-    int mesh_px;                         /* side of the meshes of background and noise; 0: 64 */
+    double jitter_px; /* RMS jitter per axis, sensor px, that widens the onboard PSF */
+    double streak_min_px, streak_max_px; /* star streaks for which a streak filter is used */
+    int mesh_px;                         /* side of a mesh of background and noise, px; 0: 64 */
     int column_correction;               /* see sim/optics/column_level.h */
 } bst_generator_settings;
 
-/* A detection with where it comes from. */
+/* A generated detection and its origin. */
 typedef struct bst_obsgen_generated {
     bst_detection detection;
-    int32_t item; /* of the truth, the brightest that is in it; -1: none */
-    bool hit;     /* a radiation hit */
-    bool drawn;   /* fitted with the stars' path, its bend too */
+    int32_t item; /* brightest truth item in it; -1: none */
+    bool hit;     /* cosmic-ray hit */
+    bool drawn;   /* fitted with the stars' path including its bend */
 } bst_obsgen_generated;
 
 typedef struct bst_generator bst_generator;
 
-/* camera: the true one, borrowed; knowledge: the onboard one, whose PSF and settings->jitter_px the
- * filters are made for. */
+/* Creates a generator.
+ *
+ * Given:     camera     true camera, lent
+ *            knowledge  onboard camera: its PSF and settings->jitter_px define the filters
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free with bst_generator_free */
 bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
                                 const bst_generator_settings *settings,
                                 const bst_obsgen_calibration *calibration, bst_rng_key key,
@@ -39,64 +43,65 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
 /* Frees a generator; NULL is allowed. */
 void bst_generator_free(bst_generator *generator);
 
-/* Takes the memory that frames with long streaks need up to this many pixels that are read; without
- * it, the first such frame does. BST_ERR_MEMORY. */
+/* Allocates the memory for long streaks in frames of up to width x height read-out pixels. Without
+ * it, the first such frame does. Errors: BST_ERR_MEMORY. */
 bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *generator, int width,
                                          int height) BST_MUST_CHECK;
-/* What was exposed. */
+/* Truth and settings of an exposure. */
 typedef struct bst_generator_frame {
     const bst_truth *truth;
     bst_window window;
     int binning;
     double exposure_s;
-    double sigma_px; /* of the Gaussian of the true PSF's noise-equivalent area, without the pixel's
-                        width; sensor px */
-    const bst_response *response; /* of the filter to that PSF; NULL: both are Gaussians */
-    /* of images at rest with that PSF, and with the onboard one with its jitter, where `response`
-     * is given; NULL: of Gaussians with the width of its gradient */
+    /* Gaussian with the true PSF's noise-equivalent area, without the pixel width; sensor px */
+    double sigma_px;
+    const bst_response *response; /* response of the filter to that PSF; NULL: both are Gaussian */
+    /* Cramer-Rao bounds of images at rest with the true PSF and with the onboard one including
+     * jitter, if `response` is given; NULL: of Gaussians */
     const bst_crlb_table *image_bound, *onboard_bound;
-    /* path of the stars in the middle of the window and its bend (bst_camera_motion_bend) as image
-     * processing takes them from telemetry, sensor px */
+    /* star streak at the window's centre and its bend (bst_camera_motion_bend) as image processing
+     * takes them from telemetry, sensor px */
     double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;
-    /* the true path of a star there at path_count equal steps of the exposure, less its mean,
-     * sensor px; fewer than 2: straight and uniform */
+    /* true path of a star there at path_count equal steps of the exposure, minus its mean, sensor
+     * px; fewer than 2: straight and uniform */
     const double *path_x_px, *path_y_px;
     int path_count;
 } bst_generator_frame;
 
-/* What image processing asks of a filter's output, and what noise does to it. */
+/* Detection threshold and noise of a matched filter's output. */
 typedef struct bst_generator_filter {
-    double threshold; /* that the output of such noise exceeds as rarely as a normal one the frame's
-                         threshold, SNR */
-    double variance;  /* of the output, whose pixels share the offsets of rows and columns; 1: of
-                         independent pixels */
-    double shot;      /* variance that a source of SNR 1 adds by its own photons */
-    double efficiency; /* SNR for a star over that of the filter for its real image */
+    /* threshold in this filter's noise, SNR: equally improbable as the frame's threshold in normal
+     * noise */
+    double threshold;
+    /* output variance relative to independent pixels; above 1 with offsets of rows and columns */
+    double variance;
+    double shot;       /* variance added by a source of SNR 1 through its shot noise */
+    double efficiency; /* SNR of a star relative to the filter matched to its real image */
 } bst_generator_filter;
 
 typedef struct bst_generator_result {
-    const bst_obsgen_generated *items; /* by row, then column; held until the next call */
+    const bst_obsgen_generated *items; /* by row, then column; valid until the next call */
     int count, lost;
     double background_e, noise_e, threshold_snr;
-    bst_generator_filter filter; /* of the stars */
-    /* per pixel, of sources below the clip of background and noise: mean light, mean of its square
-     */
+    bst_generator_filter filter; /* for stars */
+    /* per pixel, of sources below the clip of background and noise: mean light and mean squared
+     * light */
     double faint_light_e, faint_square_e2;
-    double streak_px; /* of the stars, as far as they are filtered for; sensor px */
+    double streak_px; /* streak length of the star filter; sensor px */
     bool smeared;     /* stars moved further than is filtered for */
 } bst_generator_result;
 
-/* Makes the detections of a frame: draws depend on the key, the exposure's number and the sources'
- * identities alone. BST_ERR_MEMORY. */
+/* Generates the detections of a frame. Random draws depend only on key, exposure number and source
+ * identities. Errors: BST_ERR_MEMORY. */
 bst_status bst_generator_run(bst_ctx *ctx, bst_generator *generator,
                              const bst_generator_frame *frame,
                              bst_generator_result *out) BST_MUST_CHECK;
 
-/* V of the faintest star that the latest frame could show at `snr`. */
+/* V magnitude of the faintest star detectable in the latest frame at `snr`. */
 double bst_generator_v_limit(const bst_generator *generator, double snr);
 
-/* Expected electrons of a source of the truth in its brightest sensor pixel: a Gaussian on the
- * middle of a pixel, drawn along its path. */
+/* Expected electrons of a true source in its brightest sensor pixel: a Gaussian centred on a pixel,
+ * smeared along its path. */
 double bst_generator_peak_e(double sigma_px, const bst_truth_item *item);
 
 #endif

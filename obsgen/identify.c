@@ -4,21 +4,23 @@
 
 #include "sim/optics/photometry.h"
 
-/* Image processing's: brightest of each kind that vote, side of a cell of votes, chance allowed,
- * radius that is tried first when the error is known. */
+/* Parameters of image processing's star identification: voters of each kind, vote cell, chance
+ * probability, search radius for a known pointing error. */
 enum { VOTERS = 150 };
 static const double CELL_PX = 2.0, CHANCE = 0.01, LOCKED_RADIUS_PX = 10.0;
-/* Share of pairs of a star and a detection that agree in magnitude by chance. */
+/* Share of star-detection pairs consistent in magnitude by chance. */
 static const double CONSISTENT_SHARE = 0.4;
-/* Draws beyond those of the generator. */
+/* Streams of random draws, beyond those of the generator. */
 static const uint64_t IDENTIFY = (uint64_t)1 << 42;
 
+/* True if the magnitudes of a detection and a star are consistent. */
 static bool consistent(const bst_detection *d, double v_mag) {
     double limit = 1.0 + 3.0 * fmin(bst_photometry_noise_mag(d), 1.0), excess = d->v_mag - v_mag;
     bool cut = (d->flags & (BST_DETECTION_SATURATED | BST_DETECTION_EDGE)) != 0;
     return excess > -limit && excess < (cut ? limit + 2.5 : limit);
 }
 
+/* Probability that a Poisson variable is k or more. */
 static double poisson_tail(double mean, int k) {
     double term = exp(-mean), below = 0.0;
     for (int i = 0; i < k; i++) {
@@ -33,10 +35,11 @@ static double poisson_tail(double mean, int k) {
     return k <= 0 ? 1.0 : fmin(fmax(sum, 0.0), 1.0 - (below > 1.0 ? 1.0 : 0.0));
 }
 
-/* Distance of the onboard catalogue's place of a star from the true one, px; INFINITY where it is
- * not in it. */
-static bst_status off_px(bst_ctx *ctx, const bst_identify_options *o, const bst_truth *truth,
-                         const bst_truth_item *item, double *off) {
+/* Distance between a star's positions in the onboard and true catalogue, px; INFINITY if it is not
+ * in the onboard one. */
+static bst_status catalogue_offset_px(bst_ctx *ctx, const bst_identify_options *o,
+                                      const bst_truth *truth, const bst_truth_item *item,
+                                      double *off) {
     *off = INFINITY;
     if (item->kind != BST_SOURCE_STAR || (item->id & UINT32_C(0x80000000)) ||
         item->v_mag > o->v_limit) {
@@ -58,8 +61,9 @@ static bst_status off_px(bst_ctx *ctx, const bst_identify_options *o, const bst_
     return BST_OK;
 }
 
-static bool enough(const bst_identify_options *o, const bst_generator_frame *f, double radius_px,
-                   int agreeing, int count) {
+/* True if enough stars match within the radius for a significant identification. */
+static bool is_significant(const bst_identify_options *o, const bst_generator_frame *f,
+                           double radius_px, int agreeing, int count) {
     if (o->shift_px > radius_px) {
         return false;
     }
@@ -73,9 +77,10 @@ static bool enough(const bst_identify_options *o, const bst_generator_frame *f, 
     return votes > 0 && trials * poisson_tail(mean, votes) < CHANCE;
 }
 
-/* Something else that lies on a star of its brightness. */
-static bst_status mistake(bst_ctx *ctx, const bst_identify_options *o, const bst_generator_frame *f,
-                          const bst_obsgen_generated *generated, int count, bst_detection *d) {
+/* False identification: another source on an undetected star of its brightness. */
+static bst_status misidentify(bst_ctx *ctx, const bst_identify_options *o,
+                              const bst_generator_frame *f, const bst_obsgen_generated *generated,
+                              int count, bst_detection *d) {
     double tolerance = fmin(o->match_tolerance_px, 4.0 * sqrt(d->cov_xx + d->cov_yy + 0.0625)),
            nearest = tolerance;
     const bst_truth *t = f->truth;
@@ -89,7 +94,7 @@ static bst_status mistake(bst_ctx *ctx, const bst_identify_options *o, const bst
         for (int k = 0; k < count && !seen; k++) {
             seen = generated[k].item == i;
         }
-        BST_TRY(off_px(ctx, o, t, item, &off));
+        BST_TRY(catalogue_offset_px(ctx, o, t, item, &off));
         if (!seen && distance + off < nearest) {
             nearest = distance;
             d->star_id = item->id;
@@ -109,7 +114,7 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
         bst_detection *d = &items[i];
         double off = INFINITY;
         if (generated[i].item >= 0) {
-            BST_TRY(off_px(ctx, o, t, &t->items[generated[i].item], &off));
+            BST_TRY(catalogue_offset_px(ctx, o, t, &t->items[generated[i].item], &off));
         }
         double tolerance = fmin(o->match_tolerance_px, 4.0 * sqrt(d->cov_xx + d->cov_yy + 0.0625));
         if (off < tolerance && d->label == BST_LABEL_UNKNOWN &&
@@ -119,8 +124,8 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
             found++;
         }
     }
-    bool known = (o->locked && enough(o, f, LOCKED_RADIUS_PX, found, count)) ||
-                 enough(o, f, o->search_radius_px, found, count);
+    bool known = (o->locked && is_significant(o, f, LOCKED_RADIUS_PX, found, count)) ||
+                 is_significant(o, f, o->search_radius_px, found, count);
     for (int i = 0; i < count; i++) {
         bst_detection *d = &items[i];
         if (d->label == BST_LABEL_STAR) {
@@ -130,7 +135,7 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
             d->label = kept ? BST_LABEL_STAR : BST_LABEL_UNKNOWN;
             d->star_id = kept ? d->star_id : 0;
         } else if (known && d->label == BST_LABEL_UNKNOWN && generated[i].item < 0) {
-            BST_TRY(mistake(ctx, o, f, generated, count, d));
+            BST_TRY(misidentify(ctx, o, f, generated, count, d));
         }
         *identified += d->label == BST_LABEL_STAR;
     }

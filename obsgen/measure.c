@@ -3,13 +3,13 @@
 #include "obsgen/generator_internal.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
-/* From here on extents and a source's own streak are measured. */
+/* SNR above which size and own streak of a source are measured. */
 static const double MOMENTS_SNR = 10.0;
-/* Errors do not grow further with what of a source is off the frame. */
+/* Lower limit of the visible share used for errors. */
 static const double LEAST_SEEN = 0.02;
 
-/* Where fits land in the mean: stars share what the camera's motion does to them, and an object
- * that moved otherwise has its own. */
+/* Mean centroid bias of a fit: stars share the bias by the camera motion; an object in different
+ * motion has its own. */
 static void shared_bias(const bst_generator *g, const generator_source *s, bool as_streak,
                         double light, double bias[2]) {
     bool shared = s->star || s->broken || g->path.count < 3;
@@ -44,23 +44,23 @@ static void shared_bias(const bst_generator *g, const generator_source *s, bool 
     }
 }
 
-/* Deviation of a place along an axis that is fitted with the gradient of another width than the
- * image's, over that with its own: sum (q')^2 sum (p')^2 over (sum p' q')^2, of Gaussians at rest
- * with these variances along the axis and across it. The width that image processing measures is in
- * the model, but not in its gradient. */
-static double misfit(const double image[2], const double model[2]) {
+/* Centroid standard deviation along an axis for a fit with another width, relative to the matched
+ * one: sum (q')^2 sum (p')^2 over (sum p' q')^2, for Gaussians at rest with these variances along
+ * the axis and across. The width measured by image processing is in the model but not in its
+ * gradient. */
+static double mismatch_factor(const double image[2], const double model[2]) {
     double along = 0.25 * (image[0] + model[0]) * (image[0] + model[0]) / (image[0] * model[0]);
     double across = 0.25 * (image[1] + model[1]) * (image[1] + model[1]) / (image[1] * model[1]);
     return sqrt(along * sqrt(along * across));
 }
 
-/* Bound of an image that is wider by what the camera's true path is off the path that is fitted. */
+/* Cramer-Rao bound of an image widened by the path's deviation from the fitted path. */
 static bst_crlb_table_at bound_of_image(const bst_generator *g, double flux_e, double length) {
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
     return bst_crlb_table_wider(bound, flux_e, g->noise_e, length, g->widening);
 }
 
-/* Bound of the image that is fitted. */
+/* Cramer-Rao bound of the fitted image. */
 static bst_crlb_table_at bound_of_model(const bst_generator *g, double flux_e, double length) {
     return g->onboard_bound
                ? bst_crlb_table_of(g->onboard_bound, flux_e, g->noise_e, length)
@@ -79,15 +79,16 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
                          bst_response_product(w, g->star_path, g->star_path));
     double point = bst_response_efficiency(&g->response, s->path, rest);
     double streak = bst_response_efficiency(&g->response, s->path, g->star_path);
-    /* a fit's square is less by the square of its filter's output; the outputs share noise */
+    /* A fit lowers chi-square by the squared filter output; the two outputs have correlated noise.
+     */
     double better = s->amplitude / streak * (streak - point) / sqrt(2.0 * fmax(1.0 - common, 1e-6));
     return better < -bst_generator_draw(g, s, GENERATOR_SHAPE);
 }
 
-/* Place with error and covariance, along and across the path. */
+/* Position with error and covariance, along and across the path. */
 static void measure_place(const bst_generator *g, const generator_source *s,
                           const generator_blend *b, const bst_crlb_table_at *truth,
-                          const bst_crlb_table_at *told, double snr, double length,
+                          const bst_crlb_table_at *crlb, double snr, double length,
                           bst_detection *d) {
     const bst_obsgen_calibration *cal = &g->calibration;
     double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr);
@@ -97,26 +98,27 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double error[2];
     bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * GENERATOR_DRAWS + GENERATOR_PLACE,
                     error);
-    /* what of the image is off the frame says nothing; the place along a streak is in its ends */
+    /* light off the frame carries no information; the position along a streak comes from its ends
+     */
     double widen_along =
         b->widen * g->place_ratio2 / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen * g->place_ratio2 / fmax(s->visible, LEAST_SEEN);
-    /* what of `sharp` is not the wider image, which `truth` is for: the background's place */
+    /* the part of `sharp` beyond image width (which `truth` covers): the local background */
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
     double sharp = s->sharp * bst_crlb_table_norm(bound, s->length) / truth->norm;
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
     double open = b->drawn ? 0.0 : worse;
-    /* a point that is fitted to a short streak */
+    /* a point model fitted to a short streak */
     double streak = length > 0.0 ? 0.0 : s->length * s->length / 12.0;
     const double model = g->response.filter.across_px * g->response.filter.along_px;
     const double image = g->response.source.across_px * g->response.source.along_px;
     const double images[2] = {image + streak, image}, turned[2] = {image, image + streak};
     const double models[2] = {model, model};
-    /* a streak's place comes from its ends and flanks, whatever bends it */
+    /* the position along a streak comes from its ends and flanks, whatever its bend */
     bool at_rest = length <= 1.0;
-    error[0] *= along * open * (at_rest ? misfit(images, models) : 1.0) * b->flat *
+    error[0] *= along * open * (at_rest ? mismatch_factor(images, models) : 1.0) * b->flat *
                 sqrt(truth->var_along_px2 * widen_along);
-    error[1] *= across * open * (at_rest ? misfit(turned, models) : 1.0) *
+    error[1] *= across * open * (at_rest ? mismatch_factor(turned, models) : 1.0) *
                 sqrt(truth->var_across_px2 * widen_across);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
@@ -125,8 +127,8 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     shared_bias(g, s, s->as_streak && !b->point, b->flux_e * truth->norm * g->fit_light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
-    double scale = g->binning, a2 = told->var_along_px2 * widen_along * scale * scale,
-           b2 = told->var_across_px2 * widen_across * scale * scale;
+    double scale = g->binning, a2 = crlb->var_along_px2 * widen_along * scale * scale,
+           b2 = crlb->var_across_px2 * widen_across * scale * scale;
     d->x_px = g->origin_x + scale * x;
     d->y_px = g->origin_y + scale * y;
     d->cov_xx = c * c * a2 + n * n * b2;
@@ -134,12 +136,13 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     d->cov_yy = n * n * a2 + c * c * b2;
 }
 
-/* Whether image processing would find an image of this length longer than a point. */
+/* True if image processing would measure an image of this length as longer than a point. */
 static bool is_drawn_out(const bst_generator *g, const generator_source *s) {
     double across2 = g->sigma * g->sigma, along2 = across2 + s->length * s->length / 12.0;
     return FWHM_PER_SIGMA * sqrt(along2) > 1.5 * fmax(FWHM_PER_SIGMA * sqrt(across2), 1.0);
 }
 
+/* Sets length, width and angle of a detection. */
 static void set_extent(const bst_generator *g, const generator_source *s, bool as_streak,
                        bst_detection *d) {
     double modelled = as_streak ? g->streak : 0.0, b = g->binning;
@@ -159,8 +162,9 @@ static void set_extent(const bst_generator *g, const generator_source *s, bool a
     }
 }
 
-/* Of a source whose middle is off the frame, image processing takes what it sees for a point. */
-static void see_part(const bst_generator *g, const generator_source *s, bst_detection *d) {
+/* Detection of a source centred off the frame: image processing fits the visible part as a point.
+ */
+static void fit_visible_part(const bst_generator *g, const generator_source *s, bst_detection *d) {
     double off_x = g->binning * (s->seen_x - s->x), off_y = g->binning * (s->seen_y - s->y);
     d->x_px += off_x;
     d->y_px += off_y;
@@ -176,7 +180,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
                                     const generator_blend *b) {
     bst_detection d = {0};
     double seen = fmax(s->visible, LEAST_SEEN);
-    /* a point filter's flux of a streak too faint to be fitted as one is what it caught */
+    /* the point filter's flux of a streak too faint to be fitted as one */
     bool own = !b->point && (s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5);
     double length = own && (s->as_streak || is_drawn_out(g, s)) ? s->length : 0.0;
     double caught = own ? 1.0
@@ -184,10 +188,10 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
                               bst_matched_product((bst_obsgen_path_px){0, 0},
                                                   (bst_obsgen_path_px){0, 0}, g->total_sigma);
     double flux = b->flux_e * caught;
-    /* errors are those of the image; what is said of them, those of the PSF that is known */
+    /* errors follow the image's bound; the stated covariance follows that of the onboard PSF */
     bst_crlb_table_at truth = bound_of_image(g, b->flux_e, s->length);
     bst_crlb_table_at fitted = bound_of_model(g, flux, length);
-    /* flux goes with the peak that was detected: nearly the same filter on the same noise */
+    /* flux is correlated with the detected peak: nearly the same filter on the same noise */
     const double together = 0.95;
     double noise = together * s->noise +
                    sqrt(1.0 - together * together) * bst_generator_draw(g, s, GENERATOR_FLUX);
@@ -196,12 +200,12 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     if (b->drawn) {
         d.flux_e = b->snr * g->noise_e / fitted.norm;
     }
-    bst_crlb_table_at told = bound_of_model(g, d.flux_e, length);
-    d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
+    bst_crlb_table_at crlb = bound_of_model(g, d.flux_e, length);
+    d.flux_sigma_e = sqrt(crlb.flux_variance * b->widen / seen);
     double norm = bst_crlb_table_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
     d.snr = d.flux_e * (g->onboard_bound ? bst_crlb_table_norm(g->onboard_bound, length) : norm) /
             g->noise_e;
-    measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
+    measure_place(g, s, b, &truth, &crlb, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);
     d.flags |= b->near ? BST_DETECTION_BLEND : 0u;
@@ -213,7 +217,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
         d.flags |= BST_DETECTION_EDGE;
     }
     if (s->x < -0.5 || s->y < -0.5 || s->x > g->width - 0.5 || s->y > g->height - 0.5) {
-        see_part(g, s, &d);
+        fit_visible_part(g, s, &d);
     }
     return d;
 }

@@ -18,7 +18,7 @@
 
 typedef struct obsgen_config {
     char calibration_file[512];
-    /* those of scenegen and imgproc where the sensor has them */
+    /* defaults from scenegen and imgproc if the sensor has them */
     double star_limit_v_mag, margin_px;
     int64_t truth_capacity, capacity, mesh_px;
     double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
@@ -62,7 +62,7 @@ static const bst_config_desc config_table[] = {
     BST_CONFIG_END,
 };
 
-/* Both read the exposures: at once for the truth, later (delay_s) for what would have been seen. */
+/* Both ports read the exposures: immediately for the truth, after delay_s for the detections. */
 enum {
     PORT_EXPOSED,
     PORT_PROCESSED,
@@ -87,22 +87,22 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
 };
 
-/* All sources of one exposure, until it is processed. */
+/* Truth of an exposure until it is processed. */
 typedef struct pending {
     int64_t exposure_id; /* -1: none */
     bst_truth *truth;
     int room;
     double sigma_px;
-    bst_response response; /* where `own_response` */
+    bst_response response; /* valid if `own_response` */
     bst_crlb_table image_bound, onboard_bound;
-    bool own_response;             /* one of the PSFs is no Gaussian */
-    double *path_x_px, *path_y_px; /* of a star in the middle, less its mean */
+    bool own_response;             /* one of the PSFs is not Gaussian */
+    double *path_x_px, *path_y_px; /* of a star at the window's centre, minus its mean */
     int path_count, path_room;
 } pending;
 
-/* Exposures that wait at once, and steps of a path that are kept. */
+/* Largest number of pending exposures and of stored path steps. */
 enum { PENDING = 16, MOST_STEPS = 1024 };
-/* A PSF's width may change by this share before its bound is tabulated anew. */
+/* Relative change of the PSF width above which its bound is tabulated anew. */
 static const double SAME_WIDTH = 0.005;
 
 typedef struct obsgen {
@@ -116,11 +116,11 @@ typedef struct obsgen {
     bst_field *field;
     bst_truth_list list;
     bst_generator *generator;
-    bst_camera camera;            /* at the pixel scale and jitter of the latest exposure */
-    bst_psf *psf;                 /* of it, if it is wider than the world's */
-    double jitter_rad2, sigma_px; /* sigma: of the Gaussian that the PSF is or stands for */
-    bst_response response; /* of the onboard filter to it, at response_binning (0: not made) */
-    bst_crlb_table image_bound, onboard_bound; /* at bound_binning (0: not made) */
+    bst_camera camera;            /* at the plate scale and jitter of the latest exposure */
+    bst_psf *psf;                 /* PSF of `camera`, if wider than the world's */
+    double jitter_rad2, sigma_px; /* sigma_px: Gaussian that is the PSF or is equivalent to it */
+    bst_response response; /* onboard filter to `psf`, at response_binning (0: not computed) */
+    bst_crlb_table image_bound, onboard_bound; /* at bound_binning (0: not computed) */
     int bound_binning;
     int response_binning;
     bst_optics_photometer photometer;
@@ -145,8 +145,8 @@ static void destroy(void *self) {
     free(o);
 }
 
-/* Of a PSF that is no Gaussian, the one with the same noise-equivalent area in the field's middle.
- */
+/* Sigma of the Gaussian with the noise-equivalent area of the camera's PSF at the field's centre,
+ * px. */
 static double gaussian_px(const bst_camera *c) {
     double sigma_px;
     if (!c->psf || bst_psf_gaussian(c->psf, &sigma_px)) {
@@ -208,7 +208,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     return BST_OK;
 }
 
-/* The world's camera at the exposure's pixel scale, its PSF widened by the jitter. */
+/* Sets the true camera to the exposure's plate scale, its PSF widened by the jitter. */
 static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, double jitter_rad2) {
     if (scale_arcsec <= 0.0) {
         scale_arcsec = o->camera.pixel_scale_arcsec;
@@ -230,13 +230,13 @@ static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, doubl
     return BST_OK;
 }
 
-/* Of the Gaussian with an image's noise-equivalent area, without the pixel's own width, px. */
+/* Sigma of the Gaussian with an image's noise-equivalent area, without the pixel width, px. */
 static double own_sigma(const bst_obsgen_image_width *w) {
     return sqrt(fmax(w->across_px * w->along_px - 1.0 / 12.0, 0.04));
 }
 
-/* Sets the response of the onboard filter to the exposure's PSF where one of them is no Gaussian:
- * the generator has it else. */
+/* Sets the response of the onboard filter to the exposure's PSF if one of them is not Gaussian;
+ * otherwise the generator computes it. */
 static bst_status set_response(bst_ctx *ctx, obsgen *o, int binning, pending *p) {
     const bst_camera *known = bst_knowledge_camera(o->knowledge);
     double sigma_px;
@@ -272,6 +272,7 @@ static bst_status set_response(bst_ctx *ctx, obsgen *o, int binning, pending *p)
     return BST_OK;
 }
 
+/* Expected brightest-pixel electrons of a truth item (callback). */
 static double peak_e(const void *user, int index, const bst_truth_item *item) {
     (void)index;
     return bst_generator_peak_e(*(const double *)user, item);
@@ -292,8 +293,7 @@ static bst_status reserve_path(bst_ctx *ctx, pending *p, int count) {
     return BST_OK;
 }
 
-/* Path of a star in the middle of the window, at even steps: those of the plant between the two
- * ends. */
+/* Path of a star at the window's centre at even steps: the plant's steps within the exposure. */
 static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *track,
                             double lead_s, bst_window window, pending *p) {
     double x = window.x0 + 0.5 * (window.width - 1), y = window.y0 + 0.5 * (window.height - 1);
@@ -342,9 +342,9 @@ static bst_status reserve(bst_ctx *ctx, pending *p, int count) {
     return BST_OK;
 }
 
-/* The truth of an exposure, published, and kept with all its sources until it is processed. */
-static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e,
-                         const bst_los_history *history) {
+/* Publishes the truth of an exposure and stores all its sources until it is processed. */
+static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exposure *e,
+                                 const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
     BST_TRY(set_camera(ctx, o, e->pixel_scale_arcsec, history->jitter_rad2));
     bst_los_track track;
@@ -398,6 +398,7 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
     return bst_truth_list_fill(ctx, &o->list, &request, p->truth, p->room, NULL);
 }
 
+/* Sets the onboard attitude of an exposure from telemetry. */
 static void set_attitude(const obsgen *o, struct bst_step *step, const bst_exposure *e,
                          bool *oriented, bool *locked, bst_camera_motion *known,
                          bst_detections *out) {
@@ -420,14 +421,14 @@ static void set_attitude(const obsgen *o, struct bst_step *step, const bst_expos
     }
 }
 
-/* How far the stars are from where the onboard attitude has them. */
+/* Distance of the stars from their positions by the onboard attitude, px. */
 static double shift_px(const obsgen *o, const bst_truth *t, bst_quat q_onboard) {
     bst_vec3 e =
         bst_quat_to_rotvec(bst_quat_mul(q_onboard, bst_quat_conj(t->q_cam_from_gcrf_mean)));
     return hypot(e.x, e.y) / bst_camera_scale_rad(&o->camera);
 }
 
-/* The stars that were identified rightly, for the zero point. */
+/* Adds correctly identified stars to the photometric zero point. */
 static void add_stars(obsgen *o, const bst_generator_frame *frame,
                       const bst_obsgen_generated *generated, const bst_detections *detections) {
     for (int i = 0; i < detections->count; i++) {
@@ -441,10 +442,11 @@ static void add_stars(obsgen *o, const bst_generator_frame *frame,
     }
 }
 
-static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *e) {
+/* Generates and publishes the detections of a stored exposure. */
+static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_exposure *e) {
     pending *p = &o->waiting[e->id % PENDING];
     if (p->exposure_id != e->id) {
-        return BST_OK; /* dropped */
+        return BST_OK; /* exposure was dropped */
     }
     p->exposure_id = -1;
     bst_ctx *ctx = bst_step_ctx(step);
@@ -527,10 +529,10 @@ static bst_status step_module(void *self, struct bst_step *step) {
             return bst_fail(bst_step_ctx(step), BST_ERR_STATE,
                             "an exposure ended before any line of sight was published");
         }
-        BST_TRY(expose(self, step, exposure.payload, history.payload));
+        BST_TRY(store_exposure(self, step, exposure.payload, history.payload));
     }
     while ((exposure = bst_step_next(step, PORT_PROCESSED)).payload) {
-        BST_TRY(process(self, step, exposure.payload));
+        BST_TRY(process_exposure(self, step, exposure.payload));
     }
     return BST_OK;
 }

@@ -1,4 +1,4 @@
-/* The observation generator: detections from the truth, in place of rendering and image
+/* Observation generator module: detections from the truth, in place of rendering and image
  * processing. */
 #ifndef BST_OBSGEN_OBSGEN_H
 #define BST_OBSGEN_OBSGEN_H

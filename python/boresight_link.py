@@ -1,6 +1,6 @@
-"""A peer of Boresight's packet link, and a reader of run folders; NumPy and PyZMQ are all it needs.
+"""A peer of Boresight's packet link, and a reader of run folders; it requires NumPy and PyZMQ.
 
-A part of a simulation (image processing, tracker or control) is played by this program::
+A peer program replaces a part of a simulation (image processing, tracker or control)::
 
     import boresight_link
 
@@ -10,15 +10,15 @@ A part of a simulation (image processing, tracker or control) is played by this 
             y, x = bright.nonzero()
             step.send_detections(x_px=x, y_px=y, flux_e=1000.0, snr=10.0)
 
-while the simulation runs elsewhere, in any order::
+while the simulation runs in another process, started before or after::
 
     boresight run SCENARIO.json --link tcp://127.0.0.1:5555 --external imgproc
 
-`Link.steps` waits for each step of the part and tells the simulation that it is done when the next one
-is asked for; simulated time stands still in between. What messages hold is in docs/reference/icd.md: here each
-is a NumPy record with the names from there. `read_run` opens the folder of a run.
+`Link.steps` waits for each step of the part. It ends the step when the next one is requested; the simulation waits
+in between. docs/reference/icd.md defines the messages: here each is a NumPy record with the names from there.
+`read_run` opens the folder of a run.
 
-The simulation checks every message and refuses what is wrong with it, which raises `LinkError` here.
+The simulation checks every message. If it rejects one, `LinkError` is raised here.
 """
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ _TABLES = {
 
 
 def _dtype(members: str) -> np.dtype:
-    """Packed, little-endian, filled up to a multiple of 8 bytes."""
+    """Packed, little-endian, padded to a multiple of 8 bytes."""
     names, formats, offsets, end = [], [], [], 0
     for member in members.split():
         name, kind = member.split(":")
@@ -173,11 +173,11 @@ MODES = {name: number for number, name in enumerate(
 
 
 class LinkError(Exception):
-    """The simulation has refused a message, or what came is not what the document says."""
+    """The simulation has rejected a message, or a received message is invalid."""
 
 
 class LinkTimeout(LinkError):
-    """Nothing has come in time."""
+    """Time-out: no message was received."""
 
 
 # ---------------------------------------------------------------------------- CRC-32C
@@ -196,7 +196,7 @@ _WORD = (_BYTE[(_BYTE[np.arange(65536) & 255] ^ (np.arange(65536) >> 8)) & 255] 
 
 
 def _multiply(a: int, b: int) -> int:
-    """Product of two polynomials modulo the checksum's; bit 31 is the coefficient of x^0."""
+    """Product of two polynomials modulo the CRC polynomial; bit 31 is the coefficient of x^0."""
     product = 0
     for bit in range(31, -1, -1):
         if a >> bit & 1:
@@ -206,7 +206,7 @@ def _multiply(a: int, b: int) -> int:
 
 
 def _zeros(count: int) -> int:
-    """What so many zero bytes do to the register: x^(8 count)."""
+    """Effect of `count` zero bytes on the CRC register: x^(8 count)."""
     power, square = 0x80000000, 0x00800000
     while count:
         if count & 1:
@@ -221,7 +221,7 @@ def crc32c(data: Any) -> int:
     data = np.frombuffer(data, np.uint8)
     crc, start = 0xFFFFFFFF, 0
     if data.size >= 2048:
-        # lanes side by side, each with its own register, then put together two by two
+        # parallel lanes with one register each, then combined pairwise
         lanes = 1 << max(4, (data.size.bit_length() - 1) // 2)
         length = data.size // lanes // 2 * 2
         start = lanes * length
@@ -248,7 +248,7 @@ def crc32c(data: Any) -> int:
 
 @dataclass
 class Message:
-    """A message as it came. `record` and `items` look into its bytes and cannot be written."""
+    """A received message. `record` and `items` are read-only views of its bytes."""
     header: dict
     record: np.void
     items: Optional[np.ndarray] = None
@@ -264,18 +264,18 @@ class Message:
 
 
 def new_record(kind: str) -> np.ndarray:
-    """A record of zeros (an array without dimensions), to be filled: r["tick"] = 5."""
+    """A zeroed record (an array without dimensions), to be filled: r["tick"] = 5."""
     return np.zeros((), RECORDS[kind])
 
 
 def new_items(kind: str, count: int) -> np.ndarray:
-    """`count` items of zeros, to be filled: items["x_px"] = ..."""
+    """`count` zeroed items, to be filled: items["x_px"] = ..."""
     return np.zeros(count, ITEMS[kind])
 
 
 def encode(kind: str, sequence: int, record: np.ndarray, items: Optional[np.ndarray] = None,
            **members: Any) -> list[bytes]:
-    """The parts of a message; `members` are more of the header: tick, step, instance."""
+    """The parts of a message; `members`: further header members: tick, step, instance."""
     if items is not None:
         record = record.copy()
         record["count"] = len(items)
@@ -287,18 +287,18 @@ def encode(kind: str, sequence: int, record: np.ndarray, items: Optional[np.ndar
 
 
 def decode(parts: list[Any], check: bool = True) -> Message:
-    """A message from its parts (buffers). Raises LinkError when they are no message."""
+    """Decodes a message from its parts (buffers). Raises LinkError for an invalid message."""
     head = bytes(parts[0])
     try:
         header = json.loads(head)
-        told, kind = int(header["crc32c"], 16), header["type"]
+        declared, kind = int(header["crc32c"], 16), header["type"]
         record_type, item_type = RECORDS[kind], ITEMS.get(kind)
         lengths, crcs = header["lengths"], header["crcs"]
     except (ValueError, KeyError, TypeError) as error:
-        raise LinkError(f"a header that is none: {head[:200]!r}") from error
+        raise LinkError(f"invalid header: {head[:200]!r}") from error
     if header.get("version") != VERSION:
         raise LinkError(f"version {header.get('version')} of the protocol, this is {VERSION}")
-    if crc32c(head[:-20]) != told:
+    if crc32c(head[:-20]) != declared:
         raise LinkError("the checksum of a header is wrong")
     shared = "slot" in header
     if len(parts) != 1 + len(lengths) - shared or len(crcs) != len(parts) - 1:
@@ -322,7 +322,7 @@ def decode(parts: list[Any], check: bool = True) -> Message:
 
 
 class _SharedFrames:
-    """The ring in /dev/shm that frames lie in, for reading."""
+    """The ring of frames in /dev/shm, for reading."""
 
     def __init__(self, name: str, slots: int, slot_bytes: int):
         if "/" in name[1:] or not name.startswith("/boresight-"):
@@ -334,7 +334,7 @@ class _SharedFrames:
             raise LinkError("the shared memory is shorter than the simulation says")
 
     def pixels(self, number: int, height: int, width: int) -> np.ndarray:
-        """Those of message `number`; they stay until the step has been answered."""
+        """Pixels of message `number`, valid until the step is answered."""
         at = number % self._slots * self._slot_bytes
         lies, length = np.frombuffer(self._memory, "<i8", 2, at)
         if lies != number or length != 2 * height * width:
@@ -347,13 +347,13 @@ class _SharedFrames:
 
 @dataclass
 class Part:
-    """A part that this peer plays, and its sensor as it is known on board."""
+    """A part that this peer plays, with the onboard knowledge of its sensor."""
     instance: str
     role: str
     record: np.void
 
     def __getitem__(self, name: str) -> Any:
-        """What `welcome` says of it: width_px, pixel_scale_rad, gain_e_per_dn, ..."""
+        """A member of `welcome`: width_px, pixel_scale_rad, gain_e_per_dn, ..."""
         return self.record[name]
 
 
@@ -373,7 +373,7 @@ class Step:
 
     @property
     def seconds(self) -> float:
-        """Since the start of the run."""
+        """Time since the start of the run, s."""
         return self.tick / self.link.tick_rate_hz
 
     def get(self, kind: str) -> Optional[Message]:
@@ -393,7 +393,7 @@ class Step:
     def send_detections(self, x_px: Any, y_px: Any, **columns: Any) -> None:
         """Detections in the frame of this step: full-sensor pixels, and any other member of an item
         by name (flux_e, snr, cov_xx, label, ...), each a number or an array. cov_xx and cov_yy are
-        0.01 px^2 where they are not given."""
+        0.01 px^2 by default."""
         frame = self.frame
         if frame is None:
             raise LinkError("there is no frame in this step")
@@ -410,8 +410,8 @@ class Step:
 
     def send_command(self, direction_gcrf: Any, rate_gcrf_radps: Any = (0.0, 0.0, 0.0),
                      tick: Optional[int] = None) -> None:
-        """Where the boresight shall be (apparent direction, made a unit vector) at a tick, by default
-        this step's, and how it shall go on."""
+        """Commands the boresight: apparent direction (normalised) at a tick, by default this step's,
+        with rate and acceleration."""
         direction = np.asarray(direction_gcrf, float)
         record = new_record("los_command")
         record["tick"] = self.tick if tick is None else tick
@@ -420,7 +420,7 @@ class Step:
         self.send("los_command", record)
 
     def send_status(self, mode: str, target_id: int = 0) -> None:
-        """The mode of control, for the record and the summary: one of MODES."""
+        """Sends the mode of control, for recording and summary: one of MODES."""
         record = new_record("control_status")
         record["tick"], record["mode"], record["target_id"] = self.tick, MODES[mode], target_id
         self.send("control_status", record)
@@ -428,8 +428,8 @@ class Step:
     def send_sensor(self, exposure_s: float = 0.0, period_s: float = 0.0,
                     window: tuple[int, int, int, int] = (0, 0, 0, 0), binning: int = 0,
                     pixel_scale_arcsec: float = 0.0) -> None:
-        """How the sensor is to be exposed from the next exposure on; 0 keeps what is. `window`: x0, y0,
-        width, height in full-sensor pixels, zeros for all of it."""
+        """Commands exposure settings from the next exposure on; 0: unchanged. `window`: x0, y0, width,
+        height in full-sensor pixels; zeros: full sensor."""
         record = new_record("sensor_command")
         record["exposure_s"], record["period_s"], record["binning"] = exposure_s, period_s, binning
         record["pixel_scale_arcsec"] = pixel_scale_arcsec
@@ -438,16 +438,16 @@ class Step:
         self.send("sensor_command", record)
 
     def send_pointing(self, ticks: Any, q_cam_from_gcrf: Any) -> None:
-        """Of a gimbal: true attitudes (x, y, z, w), from GCRF to camera axes, at ascending ticks that
-        reach the next step, `period_ticks` from now; two for start and end, or a history."""
+        """Answer of a gimbal: true attitudes (x, y, z, w), from GCRF to camera axes, at ascending ticks up to
+        the next step, `period_ticks` from now; start and end, or a history."""
         ticks = np.atleast_1d(np.asarray(ticks))
         items = new_items("pointing", len(ticks))
         items["tick"], items["q_cam_from_gcrf"] = ticks, q_cam_from_gcrf
         self.send("pointing", new_record("pointing"), items)
 
     def send_states(self, states: Any) -> None:
-        """Of a gimbal: where steered objects are: (name, tick, position m, velocity m/s) of each, in
-        GCRF; from the tick on it moves by two-body motion, until its next state."""
+        """Answer of a gimbal: states of commanded objects: (name, tick, position m, velocity m/s), GCRF.
+        Two-body motion continues each state until the next one."""
         states = list(states)
         items = new_items("target_states", len(states))
         for item, (name, tick, position, velocity) in zip(items, states):
@@ -456,7 +456,7 @@ class Step:
         self.send("target_states", new_record("target_states"), items)
 
     def done(self) -> None:
-        """Ends the step. `Link.steps` does it when the next step is asked for."""
+        """Ends the step. `Link.steps` does this when the next step is requested."""
         if not self._done:
             self._done = True
             self.link._answer(self)
@@ -478,8 +478,8 @@ def read_keys(path: str) -> dict[str, bytes]:
 
 
 class Link:
-    """A connection to a simulation, which need not be there yet. `serves`: parts as in `hello`;
-    `keys_file`: made by `boresight link-keys`, where the run asks for keys."""
+    """A connection to a simulation, which may start later. `serves`: parts as in `hello`;
+    `keys_file`: made by `boresight link-keys`, if the run requires keys."""
 
     def __init__(self, address: str, serves: str = "*", name: str = "python",
                  shared_memory: bool = False, timeout_s: float = 60.0, check_pixels: bool = True,
@@ -513,7 +513,7 @@ class Link:
         self.close()
 
     def close(self, why: str = "the peer has ended") -> None:
-        """Leaves; the simulation waits for another peer, for as long as it is told to."""
+        """Disconnects; the simulation waits for another peer up to its time-out."""
         if not self._socket.closed:
             if self.end is None:
                 record = new_record("end")
@@ -522,18 +522,18 @@ class Link:
             self._socket.close()
 
     def health(self, state: int = 0, text: str = "") -> None:
-        """Tells that a long step is still worked on (0), is going badly (1), or has failed (2)."""
+        """Reports the health of a long step: 0 good, 1 degraded, 2 failed."""
         record = new_record("health")
         record["state"], record["text"] = state, text
         self._send("health", record)
 
     def latest(self, part: Part, kind: str) -> Optional[Message]:
-        """The newest message of a type that has come for a part, in this step or an earlier one."""
+        """The newest received message of a type for a part, of this step or an earlier one."""
         return self._latest.get((part.instance, kind))
 
     def attitude_at(self, part: Part, tick: float) -> np.ndarray:
-        """The measured attitude (x, y, z, w), from GCRF to camera axes, interpolated in the telemetry
-        that has come for a part; zeros when there is none."""
+        """The measured attitude (x, y, z, w), from GCRF to camera axes, interpolated in the received
+        telemetry of a part; zeros if there is none."""
         ticks, q = self._telemetry.get(part.instance, (np.zeros(0), np.zeros((0, 4))))
         if len(ticks) == 0:
             return np.zeros(4)
@@ -557,7 +557,7 @@ class Link:
             last = self._last
             if last and (last.header["instance"], last.header["step"]) == (
                     header["instance"], header["step"]):
-                # the connection broke: the same step again has the same answer
+                # the connection was lost: repeat the answer to the repeated step
                 last.header = header
                 self._answer(last)
                 continue
@@ -582,7 +582,7 @@ class Link:
         self._send("done", done, **about)
 
     def _receive(self) -> Message:
-        """The next message that `steps` has to know of; the others are kept or answered here."""
+        """The next message for `steps`; others are stored or answered here."""
         end = time.monotonic() + self.timeout_s
         while True:
             left = end - time.monotonic()
@@ -611,7 +611,7 @@ class Link:
 
     def _error(self, message: Message) -> None:
         fault, text = message["fault"].decode(), message["text"].decode()
-        if fault == "stranger":  # the connection broke, or an answer came too late
+        if fault == "stranger":  # the connection was lost, or an answer was too late
             self._send("hello", self._hello)
         elif fault not in ("late", "duplicate"):
             raise LinkError(f"the simulation has refused a message: {fault}: {text}")
@@ -637,7 +637,7 @@ class Link:
 # ---------------------------------------------------------------------------- run folders
 
 class Run:
-    """The folder of a run: its manifest and scenario as they are, tables and frames as arrays."""
+    """The folder of a run: manifest, scenario, and tables and frames as arrays."""
 
     def __init__(self, folder: str):
         self.folder = folder
@@ -654,13 +654,13 @@ class Run:
 
     @property
     def tables(self) -> list[str]:
-        """Names of the tables; what their columns mean is in the table "columns"."""
+        """Names of the tables; the table "columns" describes their columns."""
         with self._open() as store:
             return [row[0] for row in store.execute(
                 "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")]
 
     def table(self, name: str) -> dict[str, np.ndarray]:
-        """A table as columns. Numbers that are missing are NaN, texts ''."""
+        """A table by columns. Missing numbers are NaN, missing texts ''."""
         with self._open() as store:
             if name not in self.tables:
                 raise KeyError(f"{self.folder} has no table {name}; there are {self.tables}")
@@ -678,7 +678,7 @@ class Run:
         return columns
 
     def frames(self) -> Iterator[np.ndarray]:
-        """The images of frames.fits in their order, uint16 [height, width]; of a cube, its planes."""
+        """The images of frames.fits in order, uint16 [height, width]; planes of a cube."""
         with open(os.path.join(self.folder, "frames.fits"), "rb") as file:
             while True:
                 cards = _fits_header(file)
@@ -725,7 +725,7 @@ def _rice_decode(heap: bytes, starts: np.ndarray, sizes: np.ndarray, width: int,
     end = bit + 8 * sizes
 
     def window(bit: np.ndarray) -> np.ndarray:
-        """The next 57 bits of each row or more, at the top."""
+        """At least 57 next bits of each row, left-aligned."""
         at = np.minimum(bit, end) >> 3
         return words[at].astype(np.uint64) << (bit & 7).astype(np.uint64)
 
@@ -753,7 +753,7 @@ def _rice_decode(heap: bytes, starts: np.ndarray, sizes: np.ndarray, width: int,
             going = going & (top == 0) & (bit < end)
         mapped = (high << low_bits) + leading(bit, low_bits)
         bit = bit + low_bits
-        # 0, 1, 2, 3, ... stand for 0, -1, 1, -2, ...
+        # 0, 1, 2, 3, ... encode 0, -1, 1, -2, ...
         last = last + np.where(mapped & 1, ~(mapped >> 1), mapped >> 1)
         image[:, column] = last & 0xFFFF
     if np.any(bit > end):
@@ -779,5 +779,5 @@ def _fits_header(file: Any) -> Optional[dict[str, str]]:
 
 
 def read_run(folder: str) -> Run:
-    """Opens the folder of a run (of one that was cut off too, FOLDER.partial)."""
+    """Opens the folder of a run (also of an interrupted one, FOLDER.partial)."""
     return Run(folder)

@@ -1,4 +1,4 @@
-/* A device buffer that grows. */
+/* Growing device buffer. */
 #ifndef BST_SCENEGEN_DEVICE_ARRAY_H
 #define BST_SCENEGEN_DEVICE_ARRAY_H
 
@@ -14,8 +14,10 @@ typedef struct bst_device_array {
     size_t bytes;
 } bst_device_array;
 
-/* Makes room for `bytes`; the content is lost when the buffer grows. most_bytes: of one buffer, by
- * the device. BST_ERR_DEVICE. */
+/* Ensures room for `bytes`; the content is lost if the buffer grows.
+ *
+ * Given:     most_bytes  largest buffer of the device
+ * Errors:    BST_ERR_DEVICE */
 bst_status bst_device_array_reserve(bst_ctx *ctx, cl_context context, uint64_t most_bytes,
                                     bst_device_array *array, size_t bytes) BST_MUST_CHECK;
 

@@ -9,17 +9,17 @@ typedef struct pooled_frame {
     bst_frame_pool *pool;
     cl_mem buffer;
     void *mapped;
-    cl_event ready; /* of the mapping; NULL: it is there */
+    cl_event ready; /* of the mapping; NULL: already mapped */
     bool lent;
 } pooled_frame;
 
 struct bst_frame_pool {
     cl_command_queue queue;
     int count;
-    pthread_mutex_t waiting; /* over the frames' ready */
-    pthread_mutex_t lock;    /* over lent and closed */
+    pthread_mutex_t waiting; /* protects the frames' `ready` */
+    pthread_mutex_t lock;    /* protects lent and closed */
     int lent;
-    bool closed; /* by its maker: goes with the last frame */
+    bool closed; /* freed by its creator: destroyed with the last frame */
     pooled_frame frames[];
 };
 
@@ -57,7 +57,7 @@ static bst_status map(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
         clRetainEvent(ready);
     }
     pthread_mutex_unlock(&f->pool->waiting);
-    if (ready) { /* others may map frames that are done */
+    if (ready) { /* other threads may map finished frames meanwhile */
         code = clWaitForEvents(1, &ready);
         pthread_mutex_lock(&f->pool->waiting);
         if (f->ready) {
@@ -77,7 +77,7 @@ bst_status bst_frame_pool_pixels(bst_ctx *ctx, bst_frame *frame, uint16_t **out)
     cl_int code;
     size_t bytes = (size_t)frame->width * (size_t)frame->height * sizeof(uint16_t);
     BST_TRY(map(f, ctx, &pixels));
-    /* what is mapped for reading must not be written */
+    /* a buffer mapped for reading must not be written */
     clEnqueueUnmapMemObject(f->pool->queue, f->buffer, f->mapped, 0, NULL, NULL);
     f->mapped = clEnqueueMapBuffer(f->pool->queue, f->buffer, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE,
                                    0, bytes, 0, NULL, NULL, &code);
@@ -85,7 +85,7 @@ bst_status bst_frame_pool_pixels(bst_ctx *ctx, bst_frame *frame, uint16_t **out)
     return bst_device_check(ctx, code, "mapping a frame for writing");
 }
 
-/* The mapping stays for the next reader. */
+/* The mapping is kept for the next reader. */
 static void unmap(void *owner) {
     (void)owner;
 }

@@ -1,5 +1,5 @@
-/* A fixed number of frames on the device, lent and taken back without allocation. Frames may be
- * read and released by another thread than the one that renders. */
+/* Fixed pool of frames on the device, reused without allocation. Frames may be read and released by
+ * a thread other than the renderer's. */
 #ifndef BST_SCENEGEN_FRAME_POOL_H
 #define BST_SCENEGEN_FRAME_POOL_H
 
@@ -8,23 +8,23 @@
 
 typedef struct bst_frame_pool bst_frame_pool;
 
-/* `count` frames of at most width x height pixels each. */
+/* Creates a pool of `count` frames of at most width x height pixels each. */
 bst_status bst_frame_pool_create(bst_ctx *ctx, bst_device *device, int width, int height, int count,
                                  bst_frame_pool **out) BST_MUST_CHECK;
-/* Frames still lent stay valid; the memory goes with the last of them. */
+/* Frees a pool. Lent frames stay valid; the memory is released with the last one. */
 void bst_frame_pool_free(bst_frame_pool *pool);
 
-/* Lends a frame of width x height with one reference, and the buffer to render into.
- * BST_ERR_STATE when all are lent. */
+/* Lends a frame of width x height with one reference, and its buffer to render into. Errors:
+ * BST_ERR_STATE if all are lent. */
 bst_status bst_frame_pool_take(bst_ctx *ctx, bst_frame_pool *pool, int width, int height,
                                bst_frame **out, cl_mem *buffer) BST_MUST_CHECK;
 
-/* What renders into the frame has been put on the queue: mapping the frame waits for that alone,
- * not for what is put on the queue later. */
+/* Marks the end of a frame's commands on the queue: mapping the frame waits for these commands
+ * only, not for later ones. */
 bst_status bst_frame_pool_enqueued(bst_ctx *ctx, bst_frame *frame) BST_MUST_CHECK;
 
-/* Waits for the frame and gives its pixels [height][width] to be changed, before it is handed on.
- * All readers get what was changed; the device does when the frame is given back. */
+/* Waits for a frame and returns its pixels [height][width] for modification before it is published.
+ * All readers see the changes; the device does once the frame is returned. */
 bst_status bst_frame_pool_pixels(bst_ctx *ctx, bst_frame *frame, uint16_t **out) BST_MUST_CHECK;
 
 #endif

@@ -98,23 +98,24 @@ static const bst_port ports[PORT_COUNT] = {
 
 typedef struct scenegen {
     const bst_camera *camera, *world_camera;
-    bst_camera changed; /* the camera at the pixel scale and jitter of the latest exposure */
-    bst_psf *psf;       /* of it, if it is wider than the world's */
+    bst_camera changed; /* at the plate scale and jitter of the latest exposure */
+    bst_psf *psf;       /* PSF of `changed`, if wider than the world's */
     double jitter_rad2;
     struct bst_device *device;
     bst_renderer_options renderer_options;
-    double margin_px; /* that the scenario asks for */
+    double margin_px; /* requested by the scenario */
     bst_field_options options;
     int64_t tick_rate_hz;
     bst_rng_key key;
     bst_field *field;
     bst_renderer *renderer;
     bst_truth_list list;
-    long long saturated_told, saturated_before; /* frames; those of earlier renderers */
-    bst_plane_maker *planes;                    /* NULL: not asked for */
-    int *item_source; /* source of each item of the truth, for the planes */
+    /* frames reported so far; frames of earlier renderers */
+    long long saturated_told, saturated_before;
+    bst_plane_maker *planes; /* NULL: not requested */
+    int *item_source;        /* source of each truth item, for the planes */
     const bst_stage_use *stage_use;
-    void *stage; /* NULL: none */
+    void *stage; /* plug-in stage; NULL: none */
 } scenegen;
 
 static void destroy(void *self) {
@@ -168,7 +169,8 @@ static bst_status change_frame(bst_ctx *ctx, const scenegen *s, const bst_frame_
                             : bst_fail_prefix(ctx, status, "plug-in %s", s->stage_use->plugin);
 }
 
-/* The patterns of this sensor: its name is the instance's without the module's. */
+/* Random key of this sensor's fixed patterns; the sensor's name is the instance's without the
+ * module's. */
 static bst_rng_key pattern_key(const bst_module_env *env, const bst_camera *camera) {
     char name[256];
     snprintf(name, sizeof name, "%s", env->instance);
@@ -232,13 +234,14 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     return BST_OK;
 }
 
+/* Expected brightest-pixel electrons of a truth item (callback). */
 static double peak_e(const void *user, int index, const bst_truth_item *item) {
     (void)item;
     return bst_renderer_peak_e(user, index);
 }
 
-/* Counts the saturated frames among those that are done. */
-static void tell_saturated(scenegen *s, struct bst_step *step) {
+/* Adds the saturated frames among the finished ones to the summary. */
+static void report_saturated(scenegen *s, struct bst_step *step) {
     long long frames = s->saturated_before + bst_renderer_saturated_frames(s->renderer);
     for (; s->saturated_told < frames; s->saturated_told++) {
         bst_step_count(step, "saturated");
@@ -249,12 +252,12 @@ static bst_status finish(void *self, struct bst_step *step) {
     scenegen *s = self;
     long long pixels;
     BST_TRY(bst_renderer_saturated(bst_step_ctx(step), s->renderer, &pixels));
-    tell_saturated(s, step);
+    report_saturated(s, step);
     return BST_OK;
 }
 
-/* Goes on with another pixel scale or jitter: everything that depends on the camera is made again.
- * Frames that were rendered before stay as they are. */
+/* Switches to another plate scale or jitter: recreates everything that depends on the camera.
+ * Frames rendered before are unchanged. */
 static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
                                 double jitter_rad2) {
     bst_camera camera;
@@ -283,9 +286,9 @@ static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
     return counted;
 }
 
-/* Renders the frame and publishes it; a frame that is lost on its way is only planned. */
-static bst_status draw(scenegen *s, struct bst_step *step, const bst_exposure *e,
-                       const bst_render_request *request) {
+/* Renders and publishes the frame; a frame to be dropped is only planned. */
+static bst_status render_frame(scenegen *s, struct bst_step *step, const bst_exposure *e,
+                               const bst_render_request *request) {
     bst_ctx *ctx = bst_step_ctx(step);
     if (e->dropped) {
         return bst_renderer_plan(ctx, s->renderer, request);
@@ -303,7 +306,7 @@ static bst_status draw(scenegen *s, struct bst_step *step, const bst_exposure *e
     return s->stage ? change_frame(ctx, s, message) : BST_OK;
 }
 
-/* What the truth says of the image: cosmic rays, predicted error, number of nodes. */
+/* Adds image properties to the truth: cosmic rays, predicted error, number of nodes. */
 static void describe_image(scenegen *s, struct bst_step *step, const bst_exposure *e,
                            bst_truth *truth) {
     bst_render_stats stats;
@@ -321,8 +324,9 @@ static void describe_image(scenegen *s, struct bst_step *step, const bst_exposur
     truth->one_track = stats.single_kernel;
 }
 
-static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
-                         const bst_los_history *history) {
+/* Renders an exposure and publishes its truth. */
+static bst_status process_exposure(scenegen *s, struct bst_step *step, const bst_exposure *e,
+                                   const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
     double scale_arcsec =
         e->pixel_scale_arcsec > 0.0 ? e->pixel_scale_arcsec : s->camera->pixel_scale_arcsec;
@@ -362,7 +366,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         .binning = e->binning,
         .key = s->key,
         .exposure_id = e->id};
-    BST_TRY(draw(s, step, e, &request));
+    BST_TRY(render_frame(s, step, e, &request));
     describe_image(s, step, e, truth);
     /* while the device renders */
     const bst_truth_request items = {.field = s->field,
@@ -383,7 +387,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         BST_TRY(bst_plane_maker_render(ctx, s->planes, s->renderer, s->camera, &request,
                                        s->item_source, truth->count, planes));
     }
-    tell_saturated(s, step);
+    report_saturated(s, step);
     return BST_OK;
 }
 
@@ -395,7 +399,7 @@ static bst_status step_module(void *self, struct bst_step *step) {
             return bst_fail(bst_step_ctx(step), BST_ERR_STATE,
                             "an exposure ended before any line of sight was published");
         }
-        BST_TRY(expose(self, step, exposure.payload, history.payload));
+        BST_TRY(process_exposure(self, step, exposure.payload, history.payload));
     }
     return BST_OK;
 }

@@ -7,15 +7,15 @@
 #include "sim/world/scene/skylight.h"
 
 enum {
-    CELL_PX = 16, /* boxes are kept apart on a grid this coarse */
-    LAYERS = 64,  /* in one round: the bits of a cell */
+    CELL_PX = 16, /* resolution of the grid on which boxes are separated */
+    LAYERS = 64,  /* layers per round: the bits of a cell */
 };
 
-/* A source on its way into the mask. */
+/* A source of the segmentation mask. */
 typedef struct shape {
     int item, source;
-    int x0, y0, x1, y1; /* box in the frame, x1 and y1 beyond it; empty: nothing there */
-    int margin;         /* of it, beyond the source's track */
+    int x0, y0, x1, y1; /* box in the frame, x1 and y1 exclusive; empty: not in the frame */
+    int margin;         /* of the box beyond the source's track */
     int layer;          /* -1: none in this round */
     bool done;
 } shape;
@@ -24,15 +24,15 @@ struct bst_plane_maker {
     uint32_t planes;
     double threshold_sigma;
     double read_noise_e;
-    float level;   /* of the mask, electrons: of all pixels, or of the darkest */
-    bool uneven;   /* the background differs from pixel to pixel, and the level with it */
-    size_t pixels; /* room, of a whole sensor */
+    float level;   /* threshold of the mask, electrons: for all pixels, or for the darkest */
+    bool uneven;   /* the background, and so the threshold, differs between pixels */
+    size_t pixels; /* capacity: a whole sensor */
     int width, height, binning; /* of the frame */
     float *electrons[BST_PLANE_SEGMENTATION];
-    float *image;  /* of some sources */
-    float *sensor; /* what the renderer gives, before binning; NULL: not needed so far */
+    float *image;  /* light of some sources */
+    float *sensor; /* renderer output before binning; NULL: not needed so far */
     uint8_t *saturation;
-    float *best; /* light of the source that a pixel belongs to */
+    float *best; /* light of the source that owns a pixel */
     int32_t *mask;
     uint64_t *cells;
     int cells_x;
@@ -57,7 +57,7 @@ bst_status bst_plane_maker_create(bst_ctx *ctx, uint32_t planes, int width, int 
     m->pixels = (size_t)width * (size_t)height;
     m->cells_x = width / CELL_PX + 1;
     bool enough = (m->image = malloc(m->pixels * sizeof *m->image)) != NULL;
-    /* the background is taken off the others */
+    /* the background is subtracted from the other planes */
     for (int k = 0; k < BST_PLANE_SEGMENTATION && enough; k++) {
         if (wants(m, (bst_plane)k) || k == BST_PLANE_BACKGROUND) {
             enough = (m->electrons[k] = malloc(m->pixels * sizeof(float))) != NULL;
@@ -98,7 +98,7 @@ void bst_plane_maker_free(bst_plane_maker *m) {
     }
 }
 
-/* Expected electrons in the frame's own pixels. */
+/* Expected electrons in the frame's (binned) pixels. */
 static bst_status render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                          const bst_render_request *request, float *out) {
     int b = m->binning, width = request->window.width;
@@ -122,14 +122,14 @@ static bst_status render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *rendere
     return BST_OK;
 }
 
-/* Expected electrons of some sources alone. */
+/* Expected electrons of some sources only. */
 static bst_status render_sources(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                                  const bst_render_request *request, const bst_scene_source *sources,
                                  int count, float *out) {
     bst_render_request part = *request;
     part.sources = sources;
     part.count = count;
-    /* with the background, so that the renderer takes the same care as in the frame */
+    /* rendered with the background, for the same tolerance as in the frame */
     BST_TRY(render(ctx, m, renderer, &part, out));
     const float *background = m->electrons[BST_PLANE_BACKGROUND];
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -139,9 +139,9 @@ static bst_status render_sources(bst_ctx *ctx, bst_plane_maker *m, bst_renderer 
     return BST_OK;
 }
 
-/* ------------------------------------------------------------------ the mask */
+/* ------------------------------------------------------------------ Segmentation mask */
 
-/* Pixels around the track within which a Gaussian of this peak is above `level`; at least 2. */
+/* Pixels around the track within which a Gaussian of this peak exceeds `level`; at least 2. */
 static int gaussian_margin(const bst_camera *camera, int binning, double peak, double level) {
     double sigma = hypot(bst_camera_psf_sigma_px(camera), 0.3 * binning) / binning;
     double ratio = fmax(peak / level, 1.0);
@@ -152,7 +152,7 @@ static int clip(double value, int limit) {
     return value < 0.0 ? 0 : value > limit ? limit : (int)value;
 }
 
-/* The box of a source's track in the frame, with its margin. */
+/* Box of a source's track in the frame, with its margin. */
 static void make_box(const bst_plane_maker *m, const bst_camera *camera,
                      const bst_render_request *q, shape *s) {
     const bst_los_track *track = q->track;
@@ -182,7 +182,7 @@ static bool is_empty(const shape *s) {
     return s->x1 <= s->x0 || s->y1 <= s->y0;
 }
 
-/* Gives a source the first layer in which its box is free; -1 when there is none. */
+/* Assigns a source the first layer in which its box is free; -1 if there is none. */
 static void choose_layer(bst_plane_maker *m, shape *s) {
     uint64_t taken = 0;
     int cx0 = s->x0 / CELL_PX, cy0 = s->y0 / CELL_PX;
@@ -207,7 +207,7 @@ static void choose_layer(bst_plane_maker *m, shape *s) {
     }
 }
 
-/* Whether the image is above the mask's level in a pixel. */
+/* True if the image exceeds the mask's threshold in a pixel. */
 static bool above(const bst_plane_maker *m, size_t pixel) {
     if (!m->uneven) {
         return m->image[pixel] > m->level;
@@ -217,7 +217,8 @@ static bool above(const bst_plane_maker *m, size_t pixel) {
     return (double)m->image[pixel] > m->threshold_sigma * sqrt(variance);
 }
 
-/* Whether a source's light is above the level at the border of its box, where the frame goes on. */
+/* True if a source's light exceeds the threshold at its box's border inside the frame: the box is
+ * too small. */
 static bool is_cut(const bst_plane_maker *m, const shape *s) {
     for (int y = s->y0; y < s->y1; y++) {
         size_t row = (size_t)y * (size_t)m->width;
@@ -235,6 +236,7 @@ static bool is_cut(const bst_plane_maker *m, const shape *s) {
     return false;
 }
 
+/* Assigns the pixels of a source's box in which it is the brightest. */
 static void paint(bst_plane_maker *m, const shape *s) {
     for (int y = s->y0; y < s->y1; y++) {
         size_t row = (size_t)y * (size_t)m->width;
@@ -248,8 +250,8 @@ static void paint(bst_plane_maker *m, const shape *s) {
     }
 }
 
-/* Renders the sources of one layer and paints them; those whose box is too small get a larger one
- * and come again. */
+/* Renders the sources of one layer and paints them; sources with too small a box get a larger one
+ * and are repeated. */
 static bst_status paint_layer(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                               const bst_camera *camera, const bst_render_request *q, int count,
                               int layer, int *left) {
@@ -280,7 +282,7 @@ static bst_status paint_layer(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *re
     return BST_OK;
 }
 
-/* The sources that may be seen above the level, with their boxes. */
+/* Lists the sources that may exceed the threshold, with their boxes. */
 static bst_status list_shapes(bst_ctx *ctx, bst_plane_maker *m, const bst_renderer *renderer,
                               const bst_camera *camera, const bst_render_request *q,
                               const int *item_source, int item_count, double level, int *count) {
@@ -301,7 +303,7 @@ static bst_status list_shapes(bst_ctx *ctx, bst_plane_maker *m, const bst_render
         *s = (shape){.item = i,
                      .source = item_source[i],
                      .margin = gaussian_margin(camera, m->binning, peak, level)};
-        if (peak > 0.5 * level) { /* it is an estimate */
+        if (peak > 0.5 * level) { /* margin: the peak is an estimate */
             make_box(m, camera, q, s);
             *count += !is_empty(s);
         }
@@ -348,7 +350,9 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
     m->uneven = request->background != NULL;
     m->level = (float)(m->threshold_sigma * sqrt(least_e + m->read_noise_e * m->read_noise_e));
     int shapes = 0, stars = 0;
-    if (wants(m, BST_PLANE_SEGMENTATION)) { /* first: it asks for the peaks of the whole request */
+    if (wants(
+            m,
+            BST_PLANE_SEGMENTATION)) { /* first, because it needs the peaks of the whole request */
         BST_TRY(list_shapes(ctx, m, renderer, camera, request, item_source, item_count,
                             (double)m->level, &shapes));
     }

@@ -6,7 +6,7 @@
 
 #include "sim/world/scene/disc.h"
 
-/* Beyond this many standard deviations a Gaussian's tail is under 1e-21. */
+/* Sigmas beyond which a Gaussian's tail is below 1e-21. */
 #define REACH_SIGMAS 9.5
 
 /* Four-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4). */
@@ -18,7 +18,7 @@ static const double gauss_weight[4] = {0.17392742256872693, 0.32607257743127307,
 double bst_reference_pixel_share(double x, double sigma_px, int n) {
     double scale = 1.0 / (sigma_px * sqrt(2.0));
     double a = (n - 0.5 - x) * scale, b = (n + 0.5 - x) * scale;
-    /* erfc on the side away from the centre keeps the wings' relative precision */
+    /* erfc on the side away from the centre keeps the relative precision of the wings */
     if (a > 0.0) {
         return 0.5 * (erfc(a) - erfc(b));
     }
@@ -32,7 +32,7 @@ static int clamp_int(double v, int low, int high) {
     return v <= low ? low : v >= high ? high : (int)v;
 }
 
-/* Adds the PSF at x, y (full-sensor px) with `electrons`; line: room for a row of shares. */
+/* Adds a Gaussian PSF at x, y (full-sensor px) with `electrons`; line: work space for one row. */
 static void add_psf(bst_window w, double sigma, double x, double y, double electrons, double *line,
                     double *image) {
     double reach = REACH_SIGMAS * sigma + 1.0;
@@ -65,7 +65,7 @@ bool bst_reference_place(const bst_camera *camera, const bst_los_track *track,
     return true;
 }
 
-/* One source with every stretch between LOS samples in `parts` parts. */
+/* Renders one source with each interval between LOS samples in `parts` parts. */
 static void render_source(const bst_camera *camera, double sigma, bst_window w,
                           const bst_los_track *track, const bst_scene_source *s, int parts,
                           double *line, double *image) {
@@ -114,7 +114,7 @@ static bst_status render_gaussian(bst_ctx *ctx, const bst_camera *camera, double
             memset(fine, 0, pixels * sizeof *fine);
             render_source(camera, sigma, window, track, &sources[i], parts, line, fine);
             change = 0.0;
-            /* a source that only grazes the window need not be right to 1e-9 of its faint tail */
+            /* a source that only touches the window needs no 1e-9 accuracy of its faint tail */
             peak = 1e-9 * sources[i].electrons_per_s * track->time_s[track->count - 1];
             for (size_t p = 0; p < pixels; p++) {
                 change = fmax(change, fabs(fine[p] - coarse[p]));
@@ -132,8 +132,8 @@ exit:
     return status;
 }
 
-/* Makes a point source of every point of the discs among the sources. *out and *paths are the
- * caller's to free. */
+/* Replaces extended sources by point sources at the points of their discs. The caller frees *out
+ * and *paths. */
 static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera,
                               const bst_scene_source *sources, int count, bst_scene_source **out,
                               bst_scene_source_path **paths, int *made) {

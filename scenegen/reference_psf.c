@@ -5,17 +5,17 @@
 
 #include "scenegen/reference_internal.h"
 
-/* The image is the transform of OTF times the spectrum S(f) = sum w_j exp(-2 pi i f . x_j) of the
- * places x_j in time. S is wanted on a grid of frequencies: the places are spread over a grid 1.5
- * times finer with exp(b (sqrt(1 - z^2) - 1)), transformed, and divided by the spreading function's
- * transform (Barnett, Magland and af Klinteberg 2019, SIAM J. Sci. Comput. 41, C479): with 16
- * points the error is exp(-pi 16 sqrt(1 - 1 / 1.5)), 3e-13 of the light. Frequencies beyond half a
- * cycle per pixel come in by multiplying the weights with exp(-2 pi i a . x_j) for whole a, as
- * sampling at pixel centres folds them. */
+/* The image is the inverse transform of the OTF times the spectrum S(f) = sum w_j exp(-2 pi i f .
+ * x_j) of the positions x_j in time. S is computed on a frequency grid by a non-uniform FFT. The
+ * positions are spread over a grid 1.5 times finer with exp(b (sqrt(1 - z^2) - 1)), transformed,
+ * and divided by the spreading function's transform (Barnett, Magland and af Klinteberg 2019, SIAM
+ * J. Sci. Comput. 41, C479). With 16 points the error is exp(-pi 16 sqrt(1 - 1 / 1.5)), 3e-13 of
+ * the light. Frequencies beyond half a cycle per pixel are reached by multiplying the weights by
+ * exp(-2 pi i a . x_j) for integer a, as sampling at pixel centres aliases them. */
 enum { SPREAD = 16 };
 
-/* Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): few points for the short stretches
- * of a finely sampled track, more for the parts of one that is not. */
+/* Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): few points for short intervals of a
+ * finely sampled track, more for coarse ones. */
 enum { POINTS = 8 };
 typedef struct time_rule {
     int count;
@@ -32,10 +32,10 @@ static const time_rule rules[2] = {
       0.18134189168918100, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813}},
 };
 
-/* Directions of the frequencies at which the rule in time is tried. */
+/* Number of frequency directions at which the time quadrature is tested. */
 enum { TRIALS = 6 };
 
-/* Halvings of a stretch between two samples. */
+/* Most halvings of an interval between two samples. */
 enum { DEEPEST = 50 };
 
 typedef struct spectrum {
@@ -44,16 +44,16 @@ typedef struct spectrum {
     bst_window window;
     const bst_los_track *track;
     double tolerance, cutoff;
-    int margin; /* px around the window */
-    int side;   /* of the image's period, px; odd */
-    int fine;   /* of the grid that places are spread on */
+    int margin; /* margin around the window, px */
+    int side;   /* period of the image, px; odd */
+    int fine;   /* size of the spreading grid */
     double beta;
     fftw_complex *spread; /* [fine][fine] */
     fftw_complex *sum;    /* [side][side], frequencies as FFTW orders them */
-    double *shape;        /* [side / 2 + 1] transform of the spreading function */
+    double *shape;        /* [side / 2 + 1]: transform of the spreading function */
     fftw_plan forward, back;
-    int node;     /* of the PSF, at work */
-    int shift[2]; /* of the frequencies, cycles/px */
+    int node;     /* current PSF node */
+    int shift[2]; /* current frequency shift, cycles/px */
 } spectrum;
 
 static int quick_size(int least, int step) {
@@ -70,14 +70,14 @@ static int quick_size(int least, int step) {
     }
 }
 
-/* exp(b (sqrt(1 - z^2) - 1)) at |z| < 1. */
+/* Spreading function exp(b (sqrt(1 - z^2) - 1)) at |z| < 1. */
 static double bump(double beta, double z) {
     double r = 1.0 - z * z;
     return r > 0.0 ? exp(beta * (sqrt(r) - 1.0)) : 0.0;
 }
 
-/* Transform of the bump at frequency index k: the substitution z = sin t makes the rule of
- * equidistant points converge geometrically. */
+/* Transform of the spreading function at frequency index k; with z = sin t the equidistant rule
+ * converges geometrically. */
 static double bump_transform(const spectrum *s, int k) {
     enum { STEPS = 400 };
     double sum = 0.0, turn = BST_PI * SPREAD * k / s->fine;
@@ -128,13 +128,13 @@ static bst_status spectrum_create(bst_ctx *ctx, spectrum *s) {
     return BST_OK;
 }
 
-/* Where the source is at one point of the rule, and its share of the stretch's light. */
+/* Position of the source at a quadrature point, and its share of the interval's light. */
 typedef struct instant {
     double x, y, light;
     bool there;
 } instant;
 
-/* Adds a point of light. Places further from the window than the margin are left out. */
+/* Spreads a point of light on the grid; points beyond the margin are skipped. */
 static void spread_point(spectrum *s, const instant *p, double light) {
     double x = p->x - s->window.x0, y = p->y - s->window.y0, share = 0.0, weight[4];
     int node[4], n = s->fine, nodes = bst_psf_weights(s->psf, p->x, p->y, node, weight);
@@ -180,7 +180,8 @@ static void place_rule(const spectrum *s, const time_rule *rule, const bst_scene
     }
 }
 
-/* Which sides of the margin (bits) all of these lie beyond; those behind the camera on any. */
+/* Sides of the margin (bits) beyond which all points lie; points behind the camera count for any.
+ */
 static unsigned sides_of(const spectrum *s, const instant *p, int count) {
     const bst_window *w = &s->window;
     unsigned sides = 15U;
@@ -195,7 +196,7 @@ static unsigned sides_of(const spectrum *s, const instant *p, int count) {
     return sides;
 }
 
-/* Adds the rule's sum at trial frequency `trial`. */
+/* Adds the quadrature sum at trial frequency `trial`. */
 static void try_rule(const spectrum *s, const instant *p, int count, int trial, double sign,
                      double sum[2]) {
     double angle = BST_PI * trial / TRIALS, c = s->cutoff * cos(angle), d = s->cutoff * sin(angle);
@@ -206,9 +207,9 @@ static void try_rule(const spectrum *s, const instant *p, int count, int trial, 
     }
 }
 
-/* Adds the part [u0, u1] of a stretch with `light` electrons at mean brightness. It is halved until
- * two halves change nothing, or no more than a thousandth of that of the stretch: brightness may
- * have kinks. */
+/* Adds the part [u0, u1] of an interval with `light` electrons at mean brightness. It is halved
+ * until the two halves change nothing, or no more than a thousandth of the interval's part:
+ * brightness may have kinks. */
 static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_scene_source *source, int k,
                            double u0, double u1, double light, int depth) {
     const time_rule *rule = &rules[depth > 0];
@@ -231,7 +232,7 @@ static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_scene_source *so
         try_rule(s, half[1], n, trial, -1.0, sum);
         worst = fmax(worst, hypot(sum[0], sum[1]));
     }
-    /* places come from unit vectors and are no better than their rounding */
+    /* positions come from unit vectors and are limited by their rounding */
     double rounding = 32.0 * 2.2e-16 * BST_PI * s->cutoff / bst_camera_scale_rad(s->camera);
     if (worst <= fmax(s->tolerance, rounding) * fmax(all, 1e-3)) {
         for (int i = 0; i < n; i++) {
@@ -263,7 +264,8 @@ static bst_status add_sources(bst_ctx *ctx, spectrum *s, const bst_scene_source 
     return BST_OK;
 }
 
-/* Adds the spread places' spectrum times the OTF; `times` counts the mirrored frequencies too. */
+/* Adds the spectrum of the spread points times the OTF; `times` also counts mirrored frequencies.
+ */
 static void add_spectrum(spectrum *s, double times) {
     int reach = s->side / 2, n = s->fine;
     for (int ky = -reach; ky <= reach; ky++) {
@@ -288,7 +290,7 @@ static void add_spectrum(spectrum *s, double times) {
 static bst_status add_all(bst_ctx *ctx, spectrum *s, const bst_scene_source *sources, int count) {
     int most = (int)ceil(s->cutoff - 0.5);
     for (s->node = 0; s->node < bst_psf_nodes(s->psf); s->node++) {
-        /* half of the whole shifts; the others are the mirror image of these */
+        /* half of the integer shifts; the others are their mirror images */
         for (int ay = 0; ay <= most; ay++) {
             for (int ax = ay > 0 ? -most : 0; ax <= most; ax++) {
                 double nearest = hypot(fmax(abs(ax) - 0.5, 0.0), fmax(ay - 0.5, 0.0));

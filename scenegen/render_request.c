@@ -23,8 +23,8 @@ bst_status bst_render_camera_check(bst_ctx *ctx, const bst_camera *c) {
     return BST_OK;
 }
 
-/* The pixels whose light a frame of a window takes. */
-static bst_window columns_of(const bst_camera *camera, bst_window w) {
+/* Pixels whose light a frame of a window needs. */
+static bst_window light_window(const bst_camera *camera, bst_window w) {
     if (bst_detector_config_whole_columns(&camera->detector)) {
         w.y0 = 0;
         w.height = (int)camera->height_px;
@@ -71,7 +71,7 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
                         "a request has a map of the background, but the camera's background is the "
                         "same all over the sensor (bst_skylight_may_vary)");
     }
-    if (q->background && !covers(q->background, columns_of(camera, w))) {
+    if (q->background && !covers(q->background, light_window(camera, w))) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a request's map of the background does not cover its window, or that "
                         "window's whole columns where charge runs along them");
@@ -79,7 +79,7 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
     return BST_OK;
 }
 
-/* What a request without a map adds where the kernels expect one. */
+/* A zero background map, for requests without one. */
 static const float nothing[4];
 static const bst_skylight_map no_background = {1 << 16, 0, 0, 2, 2, nothing, 0.0};
 

@@ -36,26 +36,26 @@ struct bst_renderer {
     cl_program program;
     cl_kernel nodes_kernel, frame_kernel, expected_kernel;
     bst_psf *psf;
-    bst_fourier_render *fourier; /* NULL: the PSF is a Gaussian, light comes from stamps */
+    bst_fourier_render *fourier; /* NULL: Gaussian PSF, light from stamps */
     bst_smear *smear;
     bst_error_budget *budget;
     bst_detector *detector;
     bst_readout *readout;
-    bst_rolling *rolling; /* NULL: all rows are exposed at once */
+    bst_rolling *rolling; /* NULL: all rows are exposed simultaneously */
     bst_frame_pool *pool;
-    cl_mem law; /* of the stamps' profiles */
+    cl_mem law; /* profile law of the stamps */
     bst_upload_ring *stage;
-    cl_mem sources, shares, table; /* of the present frame; borrowed */
+    cl_mem sources, shares, table; /* of the current frame; lent */
     bst_device_array block_box, source_box, group_box, expected;
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
     double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
     int rolled_capacity, set;
-    int tiles[BST_STAGE_SETS]; /* whose saturated pixels are not counted yet */
-    bool rolled;               /* the latest request */
-    bool map;                  /* the background differs from pixel to pixel */
+    int tiles[BST_STAGE_SETS]; /* tiles whose saturated pixels are not counted yet */
+    bool rolled;               /* the latest request had a rolling shutter */
+    bool map;                  /* the background differs between pixels */
     long long saturated_pixels, saturated_frames;
-    uint64_t most_bytes;    /* of one buffer on the device */
-    double tolerance_sigma; /* without the part that a rolling shutter's bands take */
+    uint64_t most_bytes;    /* largest buffer of the device */
+    double tolerance_sigma; /* without the share of the rolling shutter's bands */
     bst_render_stats stats;
 };
 
@@ -63,7 +63,7 @@ bst_renderer_options bst_renderer_default_options(void) {
     return (bst_renderer_options){.tolerance_sigma = 0.05, .pool_frames = 4};
 }
 
-/* Stamps up to 8 standard deviations on each side: beyond, less than 1e-15 of the light is left. */
+/* Taps for stamps up to 8 sigma on each side: less than 1e-15 of the light is beyond. */
 static int taps_for(double sigma_px) {
     int taps = 16 * (int)ceil((2.0 * 8.0 * sigma_px + 2.0) / 16.0);
     return taps > MAX_TAPS ? MAX_TAPS : taps;
@@ -97,7 +97,7 @@ static bst_status grow(bst_ctx *ctx, bst_renderer *r, bst_device_array *g, size_
     return bst_device_array_reserve(ctx, r->context, r->most_bytes, g, bytes);
 }
 
-/* The PSF, and the Fourier path where it is no Gaussian. */
+/* Creates the PSF and, if it is not Gaussian, the Fourier render path. */
 static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
                            bst_smear_options *smear) {
     double sigma_px;
@@ -105,7 +105,7 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     if (bst_psf_gaussian(r->psf, &sigma_px)) {
         return BST_OK;
     }
-    /* a point that fills the well, next to dark pixels */
+    /* worst case: a point that fills the well next to dark pixels */
     bst_fourier_render_options light = bst_fourier_render_default_options();
     double dark = fmax(r->camera.read_noise_e, 3.0);
     light.tolerance = 10.0 * r->options.tolerance_sigma * dark / fmax(r->camera.full_well_e, 1.0);
@@ -141,7 +141,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bool rolling = camera->detector.row_time_s != 0.0;
-    /* half of it is for a rolling shutter's bands */
+    /* half of the tolerance is for the rolling shutter's bands */
     bst_smear_options smear = {
         .tolerance_sigma = r->options.tolerance_sigma * (rolling ? 0.5 : 1.0),
         .taps = r->taps,
@@ -237,17 +237,17 @@ void bst_renderer_free(bst_renderer *r) {
     free(r);
 }
 
-/* Whether the errors of what was asked for can be predicted. */
-static bool foreseen(const bst_renderer *r) {
+/* True if the errors of the chosen options can be predicted. */
+static bool is_error_predictable(const bst_renderer *r) {
     const bst_renderer_options *o = &r->options;
     return o->temporal_oversample <= 0 && o->spatial_oversample <= 0 &&
            !(r->fourier && o->fft_taps == 4);
 }
 
-/* Chooses nodes and stamps of all sources: fills plan and stats. */
+/* Chooses nodes and stamps of all sources: sets plan and stats. */
 static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
     const bst_scene_plan_limits limits = {
-        .tolerance_sigma = foreseen(r) ? r->tolerance_sigma : INFINITY,
+        .tolerance_sigma = is_error_predictable(r) ? r->tolerance_sigma : INFINITY,
         .margin_px = bst_renderer_margin_px(r),
         .bytes = r->most_bytes,
         .nodes = r->options.max_nodes};
@@ -302,7 +302,7 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_kernel_
         "placing the scene's nodes");
 }
 
-/* Counts the saturated pixels of the frame that used a set, once. Waits for it. */
+/* Counts the saturated pixels of the frame that used a set, once. Waits for that frame. */
 static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
     int tiles = r->tiles[set];
     const void *counts;
@@ -319,18 +319,18 @@ static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
     return BST_OK;
 }
 
-/* Room for the frame's counts. */
+/* Buffer for the frame's saturation counts. */
 static bst_status saturated_room(bst_ctx *ctx, bst_renderer *r, size_t tiles, cl_mem *out) {
     return bst_upload_ring_room(ctx, r->stage, BST_STAGE_SATURATED, tiles * sizeof(cl_int), out);
 }
 
-/* Takes the next set of what goes with a frame; another frame may be under way. */
+/* Starts the next upload set; another frame may be in progress. */
 static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
     r->set = bst_upload_ring_begin(r->stage);
     return count_saturated(ctx, r, r->set);
 }
 
-/* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
+/* Renders the light image for the tile kernel if the PSF is not Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_kernel_frame_params *p, cl_mem *light) {
     bst_fourier_render_nodes nodes = {r->sources,           r->table,  r->block_box.buffer,
@@ -344,16 +344,16 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return BST_OK;
 }
 
-/* Where an image goes. */
+/* Destination of an image. */
 typedef struct target {
     cl_kernel kernel;          /* NULL: sources are only planned */
-    cl_mem out, saturated;     /* the second NULL: of an image of expected electrons */
-    int stride;                /* floats between the rows of `out`, 0: no gaps */
+    cl_mem out, saturated;     /* saturated NULL: image of expected electrons */
+    int stride;                /* floats between rows of `out`, 0: contiguous */
     bool light_only;           /* without background */
     int first_row, first_tile; /* of a band */
 } target;
 
-/* The common way of all kinds of image: the kernels' first eight arguments are the same. */
+/* Enqueues the tile kernel for any kind of image; the kernels share their first eight arguments. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 const target *to) {
     BST_TRY(make_plan(ctx, r, q));
@@ -409,7 +409,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
         "rendering a frame");
 }
 
-/* All rows at once, or band by band. */
+/* Enqueues an image at once, or band by band for a rolling shutter. */
 static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 target to) {
     r->rolled = q->row_time_s != 0.0;
@@ -463,7 +463,7 @@ bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return enqueue_image(ctx, r, request, (target){.kernel = NULL});
 }
 
-/* Light first, then what columns and binned pixels make of it. */
+/* Renders the light first, then the staged read-out for column effects and binning. */
 static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                    int binning, cl_mem frame) {
     bst_render_request light = *q;
@@ -564,7 +564,7 @@ void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
     if (!r->rolled) {
         out->predicted_sigma = bst_error_budget_error_sigma(r->budget);
     }
-    out->predicted_sigma = foreseen(r) ? out->predicted_sigma : NAN;
+    out->predicted_sigma = is_error_predictable(r) ? out->predicted_sigma : NAN;
     out->tolerance_missed = out->predicted_sigma > r->options.tolerance_sigma;
 }
 

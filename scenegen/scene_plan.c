@@ -33,8 +33,8 @@ static bst_status reserve(bst_ctx *ctx, bst_scene_plan *p, int count, bool colou
     return BST_OK;
 }
 
-/* Puts the drawn sources in order and counts up their blocks and boxes. Until here, first_box is
- * the source's index in the request. */
+/* Sorts the rendered sources and counts their blocks and boxes. Before this, first_box is the
+ * source's index in the request. */
 static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_scene_source *all) {
     bst_source_order(camera, p->list, p->count, p->sources);
     p->blocks = p->boxes = 0;
@@ -49,28 +49,28 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_
     }
 }
 
-/* What one planning of the sources is given. */
+/* Input and error sums of one planning run. */
 typedef struct planning {
     bst_smear *smear;
     bst_error_budget *budget;
     const bst_fourier_render *fourier;
     const bst_render_request *request;
     double dark_e2;
-    double beyond; /* light that a pixel gets of a source beyond the margin, s */
-    int blocks;    /* at most */
+    double beyond; /* light per pixel from a source beyond the margin, s */
+    int blocks;    /* largest number */
     int64_t max_nodes;
-    bool fine;         /* with the finer grid */
-    double grid_sigma; /* largest error by the grid */
+    bool fine;         /* use the finer grid */
+    double grid_sigma; /* largest grid error */
 } planning;
 
-/* Adds a drawn source's error to those of the frame. */
+/* Adds a rendered source's error to the frame's budget. */
 static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *source) {
-    /* Of two errors of either sign whose greatest values lie on different pixels, the part of the
-     * lesser that meets the greater: as of two sources in error_budget.c. Tried by
-     * tests/scenegen/test_tolerance_sweep.c (slow). */
+    /* Share of the lesser of two errors, with maxima on different pixels, that adds to the greater;
+     * as for two sources in error_budget.c. Validated by tests/scenegen/test_tolerance_sweep.c
+     * (slow). */
     static const double REST = 0.4;
     bst_error_budget_source error = *bst_smear_last_error(m->smear);
-    if (m->fourier) { /* of its grid, on dark pixels too */
+    if (m->fourier) { /* grid error, on dark pixels too */
         double peak_e = bst_smear_last_read_e(m->smear),
                presence = bst_smear_last_presence(m->smear);
         double grid = bst_fourier_render_error_sigma(m->fourier, m->fine, presence < 1.0,
@@ -88,8 +88,8 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
     return bst_error_budget_add(ctx, m->budget, &error);
 }
 
-/* Chooses nodes and stamps of all sources. *fits: false when they need more blocks than there may
- * be; the plan is then good for nothing. */
+/* Chooses nodes and stamps of all sources. *fits: false if they need more blocks than allowed; the
+ * plan is then unusable. */
 static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, bool *fits) {
     const bst_render_request *q = m->request;
     bst_error_budget_motion motion = bst_smear_motion(m->smear);
@@ -120,23 +120,23 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
     return BST_OK;
 }
 
-/* Blocks of so many nodes and one more per source, as far as there is room. */
+/* Blocks for a number of nodes plus one per source, within the limit. */
 static int blocks_of(int64_t nodes, int sources, int most_blocks) {
     int64_t blocks = nodes / BST_BLOCK + sources;
     return (int)(blocks < most_blocks ? blocks : most_blocks);
 }
 
-/* Plans until the predicted error is within the tolerance: each time at a smaller part of it, as
- * far as that helps; or, where there are too many nodes, at a larger one. */
+/* Repeats the planning until the predicted error is within the tolerance: with a smaller share of
+ * it each time, or, if there are too many nodes, a larger one. */
 static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m, double tolerance,
                                     int most_blocks) {
     enum { ROUNDS = 8, CROWD = 500, TOO_MANY = 20000 };
-    /* So many stars have some so near each other that their errors add up: at half the tolerance
-     * they need not be planned twice. */
+    /* In crowded frames errors of neighbouring stars add up; starting at about half the tolerance
+     * avoids a second planning. */
     static const double CROWD_AIM = 0.45;
-    /* LESS: below the part that the prediction asks for; GAIN: what a round or the next must bring,
-     * as levels of detail go by halves; GRID_SHARE: of the tolerance, beyond which the grid is
-     * worth its refinement */
+    /* LESS: factor below the predicted share. GAIN: improvement that a round must bring, because
+     * levels of detail go by factors of two. GRID_SHARE: share of the tolerance above which a finer
+     * grid pays. */
     static const double LESS = 0.97, GAIN = 0.98, MOST_STEP = 0.2, LEAST_STEP = 0.85,
                         GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
     p->bounded = false;
@@ -145,7 +145,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
     bool fits, coarse = false;
     bst_smear_restart(m->smear, aim);
     BST_TRY(plan_sources(ctx, p, m, &fits));
-    if (!fits) { /* crowds along the paths of a slew, which no tolerance makes shorter */
+    if (!fits) { /* crowds along the paths of a slew, which no tolerance shortens */
         coarse = p->bounded = true;
         m->blocks = blocks_of(BST_SCENE_SLEW * m->max_nodes, m->request->count, most_blocks);
         bst_smear_restart(m->smear, aim);
@@ -165,8 +165,8 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
             p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks,
             1e-6 * BST_BLOCK * m->blocks);
     }
-    /* the errors of very many sources take as long to add up as the frame to draw: at CROWD_AIM the
-     * prediction, made when it is asked for, says what came of it */
+    /* the error budget of very many sources takes as long as rendering; it is then computed only on
+     * request */
     coarse = coarse || m->request->count > TOO_MANY;
     for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
         double error = bst_error_budget_error_sigma(m->budget), last = aim;
@@ -182,7 +182,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
         }
         bst_smear_restart(m->smear, aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
-        if (!fits) { /* as it was before */
+        if (!fits) { /* restore the previous plan */
             p->bounded = true;
             bst_smear_restart(m->smear, last);
             return plan_sources(ctx, p, m, &fits);
@@ -220,9 +220,10 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                   .beyond = fourier ? bst_fourier_render_band(fourier)->beyond * binning * binning *
                                           q->track->time_s[q->track->count - 1]
                                     : 0.0};
-    const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
+    /* limit of the kernels' int indices */
+    const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float);
     uint64_t most = limits->bytes < counted ? limits->bytes : counted;
-    /* two blocks have a whole group of boxes */
+    /* two blocks occupy a whole group of boxes */
     int most_blocks = (int)(most / (BST_BLOCK / 2 * BST_BOX_BYTES));
     BST_TRY(plan_to_tolerance(ctx, p, &m, limits->tolerance_sigma, most_blocks));
     p->fine = m.fine;

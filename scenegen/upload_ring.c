@@ -8,14 +8,14 @@ typedef struct staged {
     cl_mem buffer;
     size_t bytes;
     bool result;    /* filled by the device */
-    void *mapped;   /* NULL: the device's */
-    cl_event ready; /* of the mapping; NULL: it is there */
+    void *mapped;   /* NULL: owned by the device */
+    cl_event ready; /* of the mapping; NULL: already mapped */
 } staged;
 
 struct bst_upload_ring {
     cl_context context;
     cl_command_queue queue;
-    cl_ulong most_bytes; /* of one buffer */
+    cl_ulong most_bytes; /* largest buffer */
     int present;
     staged parts[BST_STAGE_SETS][BST_STAGE_PARTS];
 };
@@ -35,7 +35,7 @@ bst_status bst_upload_ring_create(bst_ctx *ctx, bst_device *device, bst_upload_r
     return bst_device_check(ctx, code, "asking for the device's largest buffer");
 }
 
-/* Waits until the part is the host's. */
+/* Waits until the part is mapped for the host. */
 static bst_status await(bst_ctx *ctx, staged *p) {
     cl_int code = CL_SUCCESS;
     if (p->ready) {
@@ -46,7 +46,7 @@ static bst_status await(bst_ctx *ctx, staged *p) {
     return bst_device_check(ctx, code, "waiting for a frame");
 }
 
-/* Gives the part to the device. */
+/* Unmaps the part for the device. */
 static bst_status hand_over(bst_ctx *ctx, bst_upload_ring *s, staged *p) {
     if (!p->mapped) {
         return BST_OK;
@@ -94,7 +94,7 @@ int bst_upload_ring_begin(bst_upload_ring *s) {
     return s->present;
 }
 
-/* Makes room for `bytes`; the content is lost when the buffer grows. */
+/* Ensures room for `bytes`; the content is lost if the buffer grows. */
 static bst_status grow(bst_ctx *ctx, bst_upload_ring *s, staged *p, size_t bytes) {
     if (p->buffer && p->bytes >= bytes) {
         return BST_OK;

@@ -2,7 +2,7 @@
 
 #define C bst_tracker_config
 
-/* in the order of bst_mtt_association */
+/* order of bst_mtt_association */
 static const char *const motions[] = {"constant_rate", "orbit", NULL};
 static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
 

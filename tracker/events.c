@@ -1,12 +1,13 @@
-/* Manoeuvres and changes of brightness, told from the innovations of a track. */
+/* Detection of manoeuvres and brightness changes from the innovations of a track. */
 #include "tracker/mtt/multitarget_internal.h"
 
-static bool is_told(const bst_mtt_params *params) {
+/* True if event detection is enabled. */
+static bool is_enabled(const bst_mtt_params *params) {
     return params->event_window > 0 && params->false_events_per_hour > 0.0;
 }
 
 double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s) {
-    if (!is_told(params)) {
+    if (!is_enabled(params)) {
         return 0.0;
     }
     int tests = 0;
@@ -18,11 +19,11 @@ double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s) {
 
 bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
                              const bst_sky_innovation *innovation, double dt_s, double *statistic) {
-    if (!is_told(params)) {
+    if (!is_enabled(params)) {
         return false;
     }
     int window = params->event_window, count = ++track->innovation_count;
-    /* whitened by the Cholesky factor of S */
+    /* innovation whitened by the Cholesky factor of S */
     double l11 = sqrt(innovation->s[0]), l21 = innovation->s[1] / l11;
     double l22 = sqrt(innovation->s[2] - l21 * l21);
     double *slot = track->innovations[(count - 1) % window];
@@ -38,7 +39,7 @@ bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
         }
         test *= 2;
         *statistic = (sum[0] * sum[0] + sum[1] * sum[1]) / n;
-        /* exp(-x/2) is the tail of chi-square with 2 degrees of freedom */
+        /* exp(-x/2) is the tail probability of chi-square with 2 degrees of freedom */
         if (exp(-0.5 * *statistic) < allowed) {
             track->innovation_count = 0;
             return true;
@@ -49,7 +50,7 @@ bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
 
 bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track, double z,
                              double dt_s, double *statistic) {
-    if (!is_told(params)) {
+    if (!is_enabled(params)) {
         return false;
     }
     int window = params->event_window, count = ++track->brightness_count;

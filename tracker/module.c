@@ -34,12 +34,12 @@ typedef struct tracker_module {
     bool orbits;
 } tracker_module;
 
-/* Brightness, of companions relative to a star, that moves its image. */
+/* Largest magnitude difference of a companion that affects a star's photocentre. */
 static const double COMPANION_MAG = 6.0;
 enum { MAX_COMPANIONS = 16 };
 
-/* Where the light of a star and of the catalogue's stars within one FWHM of it has its centroid:
- * they are one image. */
+/* Photocentre of a catalogue star and its catalogue neighbours within one FWHM, which form one
+ * image. */
 static bst_vec3 photocentre(const tracker_module *m, bst_ctx *ctx, const bst_star *star) {
     bst_star near[MAX_COMPANIONS];
     int count = 0;
@@ -51,6 +51,7 @@ static bst_vec3 photocentre(const tracker_module *m, bst_ctx *ctx, const bst_sta
     return bst_photocentre(star, near, count, m->blend_rad);
 }
 
+/* Looks up the photocentre of a catalogue star (a bst_tracker_star_fn). */
 static bool find_star(void *user, uint32_t star_id, bst_vec3 *icrs) {
     const tracker_module *m = user;
     bst_ctx quiet = {0}; /* an unknown identity is no failure of the run */
@@ -114,7 +115,8 @@ static bst_status create_imm(const bst_module_env *env, const void *config, void
     return create(env, config, BST_FILTER_IMM, self);
 }
 
-static void report(struct bst_step *step, const bst_tracker *tracker) {
+/* Publishes the tracker's events of the frame. */
+static void publish_events(struct bst_step *step, const bst_tracker *tracker) {
     static const char *const kinds[] = {[BST_TRACKER_TRACK_CONFIRMED] = "track_confirmed",
                                         [BST_TRACKER_TRACK_LOST] = "track_lost",
                                         [BST_TRACKER_TARGET_SELECTED] = "target_selected",
@@ -146,7 +148,9 @@ static void report(struct bst_step *step, const bst_tracker *tracker) {
     }
 }
 
-static bst_status take(tracker_module *m, struct bst_step *step, const bst_detections *detections) {
+/* Processes a detections message: tracker step, tracks and predictions. */
+static bst_status process_detections(tracker_module *m, struct bst_step *step,
+                                     const bst_detections *detections) {
     if (bst_tracker_check(m->tracker, detections) != BST_TRACKER_USED) {
         bst_step_count(step, "tracker_frame_ignored");
         return BST_OK;
@@ -195,7 +199,7 @@ static bst_status take(tracker_module *m, struct bst_step *step, const bst_detec
     if (tracks->lost > 0) {
         bst_step_count(step, "tracker_overflow");
     }
-    report(step, m->tracker);
+    publish_events(step, m->tracker);
     return BST_OK;
 }
 
@@ -205,7 +209,7 @@ static bst_status step_module(void *self, struct bst_step *step) {
         if (!sample.payload) {
             return BST_OK;
         }
-        BST_TRY(take(self, step, sample.payload));
+        BST_TRY(process_detections(self, step, sample.payload));
     }
 }
 

@@ -1,5 +1,5 @@
-/* The tracker as a module of a scenario: role "tracker", type "ekf", "ukf" or "imm" by
- * the filter of its tracks. */
+/* Tracker module of a scenario: role "tracker", type "ekf", "ukf" or "imm" by the filter of its
+ * tracks. */
 #ifndef BST_TRACKER_MODULE_H
 #define BST_TRACKER_MODULE_H
 

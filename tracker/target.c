@@ -1,6 +1,7 @@
 #include "tracker/target.h"
 
-/* Adds x^T P^-1 x and ln det P of a 2-vector; INFINITY for a bad P or a misfit beyond `limit`. */
+/* Adds x^T P^-1 x and ln det P of a 2-vector to a target misfit; INFINITY for an invalid P or a
+ * misfit beyond `limit`. */
 static void add2(bst_target_fit *fit, const double x[2], double p11, double p12, double p22,
                  double limit) {
     double det = p11 * p22 - p12 * p12;
@@ -24,13 +25,14 @@ bst_vec3 bst_target_expected_rate(const bst_target_cue *cue, bst_vec3 direction)
                              bst_tangent_project(cue->direction, cue->rate_radps));
 }
 
-/* Rate of the track less that of the cue. */
-static bst_vec3 departure_of(const bst_target_cue *cue, const bst_mtt_track *track) {
+/* Rate of the track minus that of the cue, rad/s. */
+static bst_vec3 rate_departure(const bst_target_cue *cue, const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
     return bst_vec3_sub(s->rate_radps, bst_target_expected_rate(cue, s->direction));
 }
 
-/* A rate, and its covariance (11, 12, 22) with `more` variance, in the track's axes. */
+/* Components of a rate in the track's tangent axes, and its covariance (11, 12, 22) increased by
+ * `more`. */
 static void in_axes(const bst_mtt_track *track, bst_vec3 rate, double more, double x[2],
                     double p[3]) {
     const bst_sky_state *s = &track->state;
@@ -42,26 +44,27 @@ static void in_axes(const bst_mtt_track *track, bst_vec3 rate, double more, doub
     p[2] = s->covariance[3][3] + more;
 }
 
-/* Variance per axis of the cue's rate. */
+/* Variance per axis of the cue's rate, (rad/s)^2. */
 static double cue_variance(const bst_target_params *params, const bst_target_cue *cue) {
     return cue->rate_sigma_radps * cue->rate_sigma_radps +
            params->rate_floor_radps * params->rate_floor_radps;
 }
 
-static double chi2_of(const bst_mtt_track *track, bst_vec3 rate, double more) {
+/* Chi-square of a track's rate against a given rate. */
+static double rate_chi2(const bst_mtt_track *track, bst_vec3 rate, double more) {
     double x[2], p[3];
     in_axes(track, rate, more, x, p);
     double det = p[0] * p[2] - p[1] * p[1];
     return (p[2] * x[0] * x[0] - 2.0 * p[1] * x[0] * x[1] + p[0] * x[1] * x[1]) / det;
 }
 
-/* Misfit of any track to a valid cue. */
+/* Misfit of a track to a valid cue. */
 static bst_target_fit misfit(const bst_target_params *params, const bst_target_cue *cue,
                              const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
     bst_target_fit fit = {.chi2 = 0.0};
     double x[2], p[3];
-    in_axes(track, departure_of(cue, track), cue_variance(params, cue), x, p);
+    in_axes(track, rate_departure(cue, track), cue_variance(params, cue), x, p);
     add2(&fit, x, p[0], p[1], p[2], params->rate_chi2);
     bst_tangent axes = bst_tangent_at(s->direction);
     bst_vec3 to = bst_tangent_log(s->direction, cue->direction);
@@ -78,6 +81,7 @@ static bst_target_fit misfit(const bst_target_params *params, const bst_target_c
     return fit;
 }
 
+/* True if a track's rate is accurate enough to compare it with the cue. */
 static bool rate_is_known(const bst_target_params *params, const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
     double limit2 = params->max_rate_sigma_radps * params->max_rate_sigma_radps;
@@ -103,25 +107,25 @@ static const bst_mtt_track *find(const bst_mtt_track *tracks, int count, int64_t
     return NULL;
 }
 
-/* A kept target is let go only when its rate has become that of something else: of a star, or, over
- * frames in which it was not seen alone, of another object. */
+/* True if the target is released: its rate has become that of a star, or that of another object
+ * over frames in which it was not resolved. */
 static bool is_released(const bst_target *target, const bst_target_params *params,
                         const bst_target_cue *cue, const bst_mtt_track *track) {
     if (!cue->valid) {
         return false;
     }
-    bst_vec3 departure = departure_of(cue, track);
+    bst_vec3 departure = rate_departure(cue, track);
     double variance = cue_variance(params, cue);
-    if (chi2_of(track, departure, variance) <= params->release_chi2) {
+    if (rate_chi2(track, departure, variance) <= params->release_chi2) {
         return false;
     }
     double floor = params->rate_floor_radps * params->rate_floor_radps;
     if (!target->departed ||
         (rate_is_known(params, track) &&
-         chi2_of(track, track->state.rate_radps, floor) <= params->rate_chi2)) {
+         rate_chi2(track, track->state.rate_radps, floor) <= params->rate_chi2)) {
         return true;
     }
-    return chi2_of(track, bst_vec3_sub(departure, target->departure_radps), variance) >
+    return rate_chi2(track, bst_vec3_sub(departure, target->departure_radps), variance) >
            params->release_chi2;
 }
 
@@ -134,13 +138,14 @@ bool bst_target_is_expected(const bst_target_params *params, const bst_target_cu
                   : misfit(params, cue, track).chi2 < INFINITY;
 }
 
-static void keep(bst_target *target, const bst_target_cue *cue, double seconds,
-                 const bst_mtt_track *track) {
+/* Stores the target's state for a later re-selection. */
+static void store_target(bst_target *target, const bst_target_cue *cue, double seconds,
+                         const bst_mtt_track *track) {
     target->memory = track->state;
     target->memory_seconds = seconds;
     if (cue->valid && track->misses_in_row == 0 && track->merged_in_row == 0) {
         target->departed = true;
-        target->departure_radps = departure_of(cue, track);
+        target->departure_radps = rate_departure(cue, track);
     }
 }
 
@@ -149,10 +154,10 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
     if (target->id != 0) {
         const bst_mtt_track *kept = find(tracks, count, target->id);
         if (kept && !kept->at_rest && !is_released(target, params, cue, kept)) {
-            keep(target, cue, seconds, kept);
+            store_target(target, cue, seconds, kept);
             return;
         }
-        /* what let itself be mistaken for the target says nothing about where the target is */
+        /* a track mistaken for the target gives no prediction of where the target is */
         target->remembered = kept == NULL;
         target->lost_seconds = seconds;
         target->id = 0;
@@ -187,6 +192,6 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
         target->id = best->id;
         target->remembered = false;
         target->departed = false;
-        keep(target, cue, seconds, best);
+        store_target(target, cue, seconds, best);
     }
 }

@@ -6,33 +6,36 @@
 #include "tracker/mtt/multitarget.h"
 
 typedef struct bst_target_params {
-    double direction_chi2;   /* largest misfit of the cue's direction, 2 degrees of freedom */
-    double rate_chi2;        /* of the rate, 2 */
-    double magnitude_chi2;   /* of the brightness, 1 */
-    double release_chi2;     /* a target is released if its rate misfits the cue by more and is a
-                                star's, or has changed by more since it was last resolved */
-    double rate_floor_radps; /* 1 sigma per axis added to the rate error of any cue */
-    double max_rate_sigma_radps; /* a track is compared once its rate is known to this */
-    double max_chi2; /* a track whose mean innovation (per degree of freedom) exceeds this is
-                        not taken */
-    /* least hits of a track; one more is required for every 2 of its chi-square, so that a poor
-     * candidate waits for a better one */
+    double direction_chi2; /* largest misfit of the direction to the cue's, 2 degrees of freedom */
+    double rate_chi2;      /* largest misfit of the rate, 2 */
+    double magnitude_chi2; /* largest misfit of the brightness, 1 */
+    double release_chi2;   /* a target is released if its rate misfits the cue by more and is a
+                              star's, or has changed by more since it was last resolved */
+    double rate_floor_radps;     /* 1 sigma per axis added to the rate error of any cue */
+    double max_rate_sigma_radps; /* a track is compared once its rate is known to this, 1 sigma */
+    /* a track whose mean innovation chi-square per degree of freedom exceeds this is not selected
+     */
+    double max_chi2;
+    /* least hits of a track, plus one for every 2 of its chi-square, so that a poor candidate waits
+     * for a better one */
     int min_hits;
-    double margin;   /* log-likelihood by which the best must lead the second ... */
+    double margin;   /* log-likelihood margin of the best candidate over the second ... */
     int margin_hits; /* ... unless it has this many hits */
     double
         max_dormant_s; /* time for which a lost target's prediction restricts the next choice, s */
     double dormant_gate_chi2;    /* its largest misfit, 4 degrees of freedom */
-    double memory_noise_rad2ps3; /* acceleration that a lost target may have */
+    double memory_noise_rad2ps3; /* power spectral density of the acceleration of a lost target */
 } bst_target_params;
 
-/* The onboard cue. */
+/* The onboard cue: predicted direction, rate and brightness of the target. */
 typedef struct bst_target_cue {
     bool valid;
     bst_vec3 direction, rate_radps;
     double sigma_rad, rate_sigma_radps;
     double v_mag, v_mag_sigma;
-    bool in_region; /* the rate is that of the belt at the track's place, seen from: */
+    /* the cue is a region: its rate is that of the belt at the track's direction, seen from
+     * belt_eye */
+    bool in_region;
     bst_belt_eye belt_eye;
 } bst_target_cue;
 
@@ -42,20 +45,23 @@ bst_vec3 bst_target_expected_rate(const bst_target_cue *cue, bst_vec3 direction)
 typedef struct bst_target {
     int64_t id; /* 0: none */
     bool remembered;
-    bst_sky_state memory; /* of the present or last target, at memory_seconds */
+    bst_sky_state memory; /* state of the current or last target, at memory_seconds */
     double memory_seconds;
-    double lost_seconds; /* when the last target was lost */
-    /* rate minus the cue's when the target was last resolved: a manoeuvre adds to it */
+    double lost_seconds; /* time at which the last target was lost */
+    /* rate minus the cue's rate when the target was last resolved: the contribution of manoeuvres
+     */
     bool departed;
     bst_vec3 departure_radps;
 } bst_target;
 
 /* Result of bst_target_misfit. */
 typedef struct bst_target_fit {
-    double chi2;    /* sum of the parts; INFINITY when any is beyond its limit, the track is not
-                       confirmed, or its rate is not known well enough yet */
-    double log_det; /* sum of the logarithms of their covariances' determinants: chi2 + log_det is
-                       twice the negative log-likelihood but for a constant */
+    /* sum of the terms; INFINITY if one exceeds its limit, the track is not confirmed, or its rate
+     * is not accurate enough */
+    double chi2;
+    /* sum of the log determinants of their covariances: chi2 + log_det is twice the negative
+     * log-likelihood up to a constant */
+    double log_det;
 } bst_target_fit;
 
 /* Misfit of a track to the cue over direction, rate and brightness.

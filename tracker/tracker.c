@@ -6,7 +6,8 @@
 #include "sim/onboard/nav_motion.h"
 #include "tracker/attitude/sky_of_detection.h"
 
-/* Least SNR of a source, share of the threshold that its maximum passed: 2.5 sigma below, at 5. */
+/* Least SNR of a detection used by the tracker, share of the detector's threshold: 2.5 at a
+ * threshold of 5. */
 static const double LEAST_SNR_SHARE = 0.5;
 
 static double arcsec(double v) {
@@ -17,6 +18,7 @@ static double square(double v) {
     return v * v;
 }
 
+/* Converts the configuration to the parameters of the multi-target tracker. */
 static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_params *mtt) {
     double scale = bst_camera_scale_rad(&t->camera);
     t->attitude_params = (bst_attitude_params){.floor_px = c->star_systematic_px,
@@ -43,7 +45,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .margin_hits = (int)c->target_margin_hits,
         .max_dormant_s = c->target_dormant_s,
         .dormant_gate_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
-        /* what was lost may have manoeuvred: ten times the usual acceleration */
+        /* a lost target may have manoeuvred: ten times the usual acceleration */
         .memory_noise_rad2ps3 = square(10.0 * arcsec(c->process_noise_arcsec_per_s15))};
     t->orbits = c->motion == 1;
     t->assumed_range_m = 1e3 * c->assumed_range_km;
@@ -123,7 +125,7 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     t->cache = calloc(STAR_CACHE, sizeof *t->cache);
     t->stars = calloc(MAX_STARS, sizeof *t->stars);
     t->detections = calloc((size_t)t->max_detections, sizeof *t->detections);
-    /* each track may be confirmed, lost, and change in two ways; four more for the target */
+    /* per track: confirmed, lost, and two kinds of change; four more for the target */
     t->event_capacity = 4 * ((size_t)mtt.max_tracks + (size_t)mtt.max_stationary_tracks + 1) + 4;
     t->events = calloc(t->event_capacity, sizeof *t->events);
     bst_status status = t->cache && t->stars && t->detections && t->events
@@ -154,6 +156,7 @@ const bst_tracker_event *bst_tracker_events(const bst_tracker *t, int *count) {
     return t->events;
 }
 
+/* Direction of a catalogue star, from the cache or the catalogue. */
 static bool find_star(bst_tracker *t, uint32_t id, bst_vec3 *icrs) {
     cached_star *slot = &t->cache[(id * 2654435761u >> 16) & (STAR_CACHE - 1)];
     if (slot->id != id) {
@@ -167,16 +170,17 @@ static bool find_star(bst_tracker *t, uint32_t id, bst_vec3 *icrs) {
     return true;
 }
 
-/* The attitude of one frame and how well it is known. */
+/* Attitude of a frame and its accuracy. */
 typedef struct frame_attitude {
     bst_attitude_fix fix;
     bst_quat q_cam_from_gcrf;
     double covariance_cam[3][3];
-    double rate_sigma_radps; /* of the attitude's own drift that no star of this frame shows */
+    /* 1 sigma of the attitude's drift rate that no star of this frame shows */
+    double rate_sigma_radps;
     bool usable;
 } frame_attitude;
 
-/* Returns the number of t->stars that were looked at. */
+/* Solves the attitude from the identified stars. Returns the number of t->stars considered. */
 static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
                           bst_attitude_solution *out) {
     int count = 0;
@@ -197,7 +201,7 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
                                 .cov_xy = item->cov_xy,
                                 .cov_yy = item->cov_yy};
     }
-    /* the stars were identified with this attitude: it is near */
+    /* the stars were identified with this attitude: it is close */
     bst_quat q = d->q_cam_from_gcrf;
     bool given = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w > 0.5;
     bst_attitude_solve(&t->camera, &t->attitude_params, given ? q : d->q_telemetry_from_gcrf,
@@ -205,6 +209,7 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     return count;
 }
 
+/* Determines the frame's attitude: from stars, else predicted by the telemetry error filter. */
 static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
                           int64_t tick, double dt_s, frame_attitude *out) {
     memset(out, 0, sizeof *out);
@@ -221,9 +226,9 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         memcpy(out->covariance_cam, solution.covariance, sizeof out->covariance_cam);
         out->fix.error_cam_rad =
             bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
-        /* Stars that contradict the telemetry's history were seen from a camera that turned
-         * unevenly in the exposure: their attitude is not that of its middle, and nobody may steer
-         * by it. */
+        /* Stars that contradict the telemetry's history come from a camera that turned unevenly
+         * during the exposure. Their attitude is not the mid-exposure one and must not be used for
+         * pointing. */
         out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
                                                 out->fix.error_cam_rad, solution.covariance);
         out->fix.valid = out->usable;
@@ -249,8 +254,9 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
                   fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
 }
 
-static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *item,
-                                  const frame_attitude *attitude, const bst_light *light) {
+/* Direction of a detection with its covariance. */
+static bst_sky_measurement direction_of(const bst_tracker *t, const bst_detection *item,
+                                        const frame_attitude *attitude, const bst_light *light) {
     double extra = t->floor_variance_px2;
     if (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) {
         extra += t->blend_variance_px2;
@@ -259,6 +265,7 @@ static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *ite
                                 attitude->covariance_cam, light);
 }
 
+/* Collects the detections that may be objects, as directions. Returns their number. */
 static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
                            const bst_light *light, int *lost) {
     double scale = bst_camera_scale_rad(&t->camera);
@@ -268,12 +275,12 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
         const bst_detection *item = &d->items[i];
         bool positive =
             item->cov_xx > 0.0 && item->cov_xx * item->cov_yy > item->cov_xy * item->cov_xy;
-        /* places as uncertain as an attitude that is not used would only feed false tracks */
+        /* positions less accurate than an unusable attitude would only cause false tracks */
         bool sharp = item->cov_xx <= t->max_variance_px2 && item->cov_yy <= t->max_variance_px2;
-        /* a star that no catalogue has is told from a slow object by its track */
+        /* an uncatalogued star is distinguished from a slow object by its track */
         bool may_move = item->label == BST_LABEL_OBJECT || item->label == BST_LABEL_UNKNOWN ||
                         (item->label == BST_LABEL_STAR && item->star_id == 0);
-        /* of charge that was taken off a bad pixel the filter's maximum is left */
+        /* residue of a masked bad pixel: the matched filter's maximum without a source */
         bool empty = d->bad_pixels > 0 && item->snr < LEAST_SNR_SHARE * d->threshold_snr;
         if (empty || !may_move || !positive || !sharp || !isfinite(item->x_px) ||
             !isfinite(item->y_px)) {
@@ -285,7 +292,7 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
         }
         bool bright = isfinite(item->v_mag) && isfinite(item->v_mag_sigma);
         t->detections[count++] =
-            (bst_mtt_detection){.sky = to_sky(t, item, attitude, light),
+            (bst_mtt_detection){.sky = direction_of(t, item, attitude, light),
                                 .x_px = item->x_px,
                                 .y_px = item->y_px,
                                 .v_mag = bright ? item->v_mag : 0.0,
@@ -297,7 +304,8 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
     return count;
 }
 
-static int charged_of(const bst_detections *d) {
+/* Number of detections labelled as charge. */
+static int count_charge(const bst_detections *d) {
     int count = 0;
     for (int i = 0; i < d->count; i++) {
         count += d->items[i].label == BST_LABEL_HOT_PIXEL || d->items[i].label == BST_LABEL_HIT;
@@ -305,6 +313,7 @@ static int charged_of(const bst_detections *d) {
     return count;
 }
 
+/* Appends an event of the tracker. */
 static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt_track *track) {
     if ((size_t)t->event_count == t->event_capacity) {
         return;
@@ -319,6 +328,7 @@ static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt
     }
 }
 
+/* Selects the target of interest and records its changes. */
 static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seconds) {
     int count;
     const bst_mtt_event *events = bst_mtt_events(t->mtt, &count);
@@ -344,6 +354,7 @@ static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seco
     }
 }
 
+/* Writes a track to the output message. */
 static void write_track(const bst_tracker *t, const bst_target_cue *cue, const bst_mtt_track *track,
                         bst_track *out) {
     bool is_target = track->id == t->target.id;
@@ -371,14 +382,15 @@ static void write_track(const bst_tracker *t, const bst_target_cue *cue, const b
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
-/* 0 target, 1 confirmed, 2 tentative, 3 not told */
-static int rank(const bst_mtt_track *track, int64_t target_id) {
+/* Output order: 0 target, 1 confirmed, 2 tentative, 3 not reported. */
+static int output_rank(const bst_mtt_track *track, int64_t target_id) {
     if (track->at_rest) {
         return 3;
     }
     return track->id == target_id ? 0 : track->status == BST_TRACK_TENTATIVE ? 2 : 1;
 }
 
+/* Writes the tracks message. */
 static void write_tracks(const bst_tracker *t, const bst_detections *d, const bst_attitude_fix *fix,
                          const bst_target_cue *cue, int detections_lost, bst_tracks *out,
                          int capacity) {
@@ -394,7 +406,7 @@ static void write_tracks(const bst_tracker *t, const bst_detections *d, const bs
     }
     for (int r = 0; r < 3; r++) {
         for (int i = 0; i < count; i++) {
-            if (rank(&all[i], t->target.id) != r) {
+            if (output_rank(&all[i], t->target.id) != r) {
                 continue;
             }
             if (out->count < capacity) {
@@ -406,7 +418,9 @@ static void write_tracks(const bst_tracker *t, const bst_detections *d, const bs
     }
 }
 
-/* q_cam_from_gcrf: by telemetry, now. */
+/* Writes the predictions message: predicted tracks and attitude error.
+ *
+ * Given:     q_cam_from_gcrf  camera attitude by telemetry, now */
 static void write_predictions(const bst_tracker *t, int64_t tick, bst_quat q_cam_from_gcrf,
                               bst_predictions *out, int capacity) {
     int count;
@@ -417,9 +431,9 @@ static void write_predictions(const bst_tracker *t, int64_t tick, bst_quat q_cam
                            &out->attitude_error_cam_rad, &out->attitude_error_rate_cam_radps, p);
     out->attitude_valid =
         t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
-    for (int r = 0; r < 2; r++) { /* no tentative tracks */
+    for (int r = 0; r < 2; r++) { /* tentative tracks are omitted */
         for (int i = 0; i < count; i++) {
-            if (rank(&all[i], t->target.id) != r) {
+            if (output_rank(&all[i], t->target.id) != r) {
                 continue;
             }
             if (out->count < capacity) {
@@ -494,7 +508,7 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                            .detections = t->detections,
                            .partial = d->windows > 0,
                            .bad_pixels = d->bad_pixels,
-                           .charged = charged_of(d),
+                           .charged = count_charge(d),
                            .in_field = bst_tracker_frame_in_field,
                            .expected = bst_tracker_frame_is_expected,
                            .range = bst_tracker_frame_range_of,
@@ -539,5 +553,5 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
 
 void bst_tracker_retarget(bst_tracker *t) {
     t->target = (bst_target){.id = 0};
-    t->cue_before.valid = false; /* what has changed since is not any track's motion */
+    t->cue_before.valid = false; /* the change of the cue is no motion of a track */
 }

@@ -1,8 +1,8 @@
-/* The tracker: one frame's detections in, tracks and predictions out.
+/* The tracker: detections of a frame in, tracks and predictions out.
  *
- * Attitude from identified stars, the other detections as inertial directions, multi-target
- * tracking, the target of interest. It sees detections, telemetry, the onboard catalogue and the
- * cue; never the truth. */
+ * Steps: attitude from identified stars, other detections as inertial directions, multi-target
+ * tracking, selection of the target of interest. It uses detections, telemetry, the onboard
+ * catalogue and the cue; never the truth. */
 #ifndef BST_TRACKER_TRACKER_H
 #define BST_TRACKER_TRACKER_H
 
@@ -12,9 +12,9 @@
 #include "sim/astro/belt.h"
 #include "tracker/mtt/filter.h"
 
-/* Values of a scenario's tracker block; the table says what each is. */
+/* Values of a scenario's tracker block; bst_tracker_config_table describes each. */
 typedef struct bst_tracker_config {
-    bst_filter_kind filter; /* not in the table, which leaves BST_FILTER_EKF: set by the caller */
+    bst_filter_kind filter; /* not in the table, which sets BST_FILTER_EKF; the caller sets it */
     double star_systematic_px, star_reject_chi2, max_attitude_sigma_px, max_roll_sigma_arcsec;
     double drift_sigma_arcsec_per_s, drift_noise_arcsec_per_s15, jitter_px, telemetry_sigma_arcsec;
     double process_noise_arcsec_per_s15, gate_chi2, detection_probability, false_alarms_per_frame;
@@ -45,19 +45,20 @@ typedef struct bst_tracker_config {
 
 extern const bst_config_desc bst_tracker_config_table[];
 
-/* Looks up a catalogue star: unit direction, ICRS, proper motion applied. False when unknown. */
+/* Looks up a catalogue star: unit direction, ICRS, proper motion applied. Returns false if it is
+ * unknown. */
 typedef bool (*bst_tracker_star_fn)(void *user, uint32_t star_id, bst_vec3 *icrs);
 
-/* The cue at one time, as bst_onboard_cue of sim/world has it. */
+/* The cue at one time, as bst_onboard_cue of sim/world. */
 typedef struct bst_tracker_cue {
     bool valid;
     bst_vec3 direction_gcrf, rate_gcrf_radps;
     double sigma_rad, rate_sigma_radps;
     double v_mag, v_mag_sigma;
-    /* of the cue's object; range 0: not known, or not wanted (bst_tracker_may_start_orbit) */
+    /* of the cue's object; range 0: unknown or not requested (bst_tracker_may_start_orbit) */
     double range_m, range_rate_mps;
-    /* the cue is a region: direction is its middle, and what is looked for moves as the belt does
-     * wherever it is */
+    /* the cue is a region: direction is its centre, and objects move as the belt does at their
+     * position */
     bool in_region;
     bst_belt_eye belt_eye;
 } bst_tracker_cue;
@@ -65,10 +66,10 @@ typedef struct bst_tracker_cue {
 typedef struct bst_tracker_input {
     const bst_detections *detections;
     const bst_nav_telemetry *nav; /* required */
-    /* attitude telemetry now, for the axes of the predicted attitude error; NULL: that of the
+    /* current attitude telemetry, for the axes of the predicted attitude error; NULL: that of the
      * detections' exposure */
     const bst_quat *q_telemetry_now;
-    /* the cue at the middle of the exposure */
+    /* cue at mid-exposure */
     bst_tracker_cue cue;
 } bst_tracker_input;
 
@@ -77,31 +78,35 @@ typedef enum bst_tracker_event_kind {
     BST_TRACKER_TRACK_LOST,
     BST_TRACKER_TARGET_SELECTED,
     BST_TRACKER_TARGET_LOST,
-    BST_TRACKER_ATTITUDE_LOST, /* no attitude good enough to measure directions with */
-    BST_TRACKER_TRACK_RESUMED, /* confirmed again after it had been lost: the same identity */
+    BST_TRACKER_ATTITUDE_LOST, /* no attitude accurate enough to measure directions */
+    BST_TRACKER_TRACK_RESUMED, /* a lost track is confirmed again under its identity */
     BST_TRACKER_MANOEUVRE,
     BST_TRACKER_BRIGHTNESS_CHANGE,
 } bst_tracker_event_kind;
 
 typedef struct bst_tracker_event {
     bst_tracker_event_kind kind;
-    int64_t track_id; /* 0 where none is meant */
+    int64_t track_id; /* 0: not related to a track */
     bst_vec3 direction_gcrf, rate_gcrf_radps;
     double v_mag;
-    double statistic; /* chi-square of a manoeuvre (2 degrees of freedom), of a change (1) */
+    /* chi-square of a manoeuvre (2 degrees of freedom) or of a brightness change (1) */
+    double statistic;
 } bst_tracker_event;
 
-/* What became of a frame. */
+/* Outcome of a frame. */
 typedef enum bst_tracker_outcome {
     BST_TRACKER_USED = 0,
     BST_TRACKER_NO_ATTITUDE, /* outputs written, tracks only predicted */
-    BST_TRACKER_DUPLICATE,   /* this exposure was seen before: nothing done */
-    BST_TRACKER_BACKWARDS,   /* not later than the frame before: nothing done */
+    BST_TRACKER_DUPLICATE,   /* exposure already processed: nothing done */
+    BST_TRACKER_BACKWARDS,   /* not later than the previous frame: nothing done */
 } bst_tracker_outcome;
 
 typedef struct bst_tracker bst_tracker;
 
-/* `camera` and `star_user` outlive the tracker. The caller frees it. All memory is taken here. */
+/* Creates a tracker; allocates all memory.
+ *
+ * Errors:    BST_ERR_ARGUMENT, BST_ERR_MEMORY
+ * Ownership: `camera` and `star_user` must outlive it; free with bst_tracker_free */
 bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
                               const bst_camera *camera, int64_t tick_rate_hz,
                               bst_tracker_star_fn star, void *star_user,
@@ -109,25 +114,27 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
 /* Frees a tracker; NULL is allowed. */
 void bst_tracker_free(bst_tracker *tracker);
 
-/* What bst_tracker_step would answer before it looks at the content: BST_TRACKER_USED, or why the
- * frame is refused. */
+/* Checks whether bst_tracker_step will accept a frame: BST_TRACKER_USED, or the reason for refusal.
+ * The content is not examined. */
 bst_tracker_outcome bst_tracker_check(const bst_tracker *tracker, const bst_detections *detections);
 
-/* Whether the next step may begin an orbit, for which it wants the range of the cue's object. */
+/* True if the next step may start an orbit, for which it needs the range of the cue's object. */
 bool bst_tracker_may_start_orbit(const bst_tracker *tracker);
 
-/* Takes one frame and, unless it is a duplicate or late, fills `tracks` (room for track_capacity
- * items) and `predictions`. The target of interest comes first, then confirmed tracks, then
- * tentative ones, each by identity; what finds no room is counted in their `lost`. What is at rest
- * among the stars and not what the cue expects is only counted (`at_rest`). */
+/* Processes one frame and, unless it is a duplicate or late, fills `tracks` (room for
+ * track_capacity items) and `predictions`.
+ *
+ * Returned:  tracks  the target of interest, then confirmed, then tentative tracks, each by
+ *                    identity; those beyond the capacity are counted in `lost`. Stationary tracks
+ *                    that the cue does not expect are only counted (`at_rest`) */
 bst_tracker_outcome bst_tracker_step(bst_tracker *tracker, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity);
 
-/* The cue is another one from the next frame on: no track is the target before it fits that. */
+/* Announces a new cue from the next frame on: no track is the target until it fits the new cue. */
 void bst_tracker_retarget(bst_tracker *tracker);
 
-/* Events of the latest frame that was used; lent until the next step. */
+/* Events of the latest processed frame; valid until the next step. */
 const bst_tracker_event *bst_tracker_events(const bst_tracker *tracker, int *count);
 
 #endif

@@ -1,4 +1,4 @@
-/* Shared by the files of the tracker. */
+/* Declarations shared by the files of the tracker. */
 #ifndef BST_TRACKER_TRACKER_INTERNAL_H
 #define BST_TRACKER_TRACKER_INTERNAL_H
 
@@ -9,11 +9,11 @@
 #include "tracker/target.h"
 #include "tracker/tracker.h"
 
-/* Places in the cache of catalogue directions; a power of two. */
+/* Size of the cache of catalogue directions; a power of two. */
 #define STAR_CACHE 4096
-/* Stars of one frame that the attitude looks at. */
+/* Most stars of a frame used for the attitude. */
 #define MAX_STARS 16384
-/* Taken for the detector's when it does not say. */
+/* Detection threshold assumed if the detector does not report one. */
 #define USUAL_THRESHOLD_SNR 5.0
 
 typedef struct cached_star {
@@ -49,13 +49,13 @@ struct bst_tracker {
     int64_t last_exposure_id, last_tick;
 };
 
-/* What is asked of one frame. */
+/* Context of the multi-target tracker's queries for one frame. */
 typedef struct bst_tracker_frame_view {
     const bst_tracker *tracker;
     bst_quat q_cam_from_gcrf;
     bst_light light;
     bst_target_cue cue;
-    double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
+    double range_m, range_rate_mps; /* of the cue's object; range 0: unknown */
     bst_od_observer observer;
     double threshold_snr;
 } bst_tracker_frame_view;
@@ -75,8 +75,8 @@ bool bst_tracker_frame_range_of(const void *user, const bst_mtt_track *track, bs
 bst_mtt_sight bst_tracker_frame_sight_of(const void *user, const bst_mtt_track *track,
                                          bst_mtt_light *light);
 
-/* The observer in mid-exposure, from navigation telemetry of about that time; false when that is
- * not there. One that is on no orbit is carried on in a straight line. */
+/* Observer's state at mid-exposure from navigation telemetry; false if it is not available. A state
+ * on no orbit is extrapolated in a straight line. */
 bool bst_tracker_frame_observer(const bst_tracker *tracker, const bst_nav_telemetry *nav,
                                 double seconds, bst_od_observer *out);
 

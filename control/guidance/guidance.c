@@ -1,18 +1,18 @@
 #include "control/guidance/guidance.h"
 
-/* Cones are widened for planning by this: aberration, and what mounts overshoot by. */
+/* Margin added to keep-out cones for planning: aberration, and overshoot of mounts. */
 #define WIDER_RAD (0.05 * BST_DEG_RAD)
-/* Half the interval over which a slew's rate and acceleration are taken. */
+/* Half the interval of the differences that give a slew's rate and acceleration. */
 #define DIFFERENCE_S 0.01
-/* Places along a motion of the axes that are looked at for cones, and a path's nodes. */
+/* Samples along an axis motion that are checked against keep-out cones, and nodes of a path. */
 #define SAMPLES 96
 #define PATH_NODES 385
-/* Of limit_fraction, along paths: their nodes hold the limits, what lies between to a few percent.
- */
+/* Share of limit_fraction used along paths: limits hold at the nodes, and between them to a few
+ * percent. */
 #define PATH_SHARE 0.9
-/* Angles that tell which way and turn is meant are worked out anew this far on. */
+/* Angular distance after which the mount angles that select the solution are recomputed. */
 #define NEAR_RAD 1e-4
-/* Directions to come that a turn is chosen by. */
+/* Number of future directions by which a mount solution is chosen. */
 #define COMING 256
 
 void bst_guidance_init(bst_guidance *g, const bst_guidance_config *config,
@@ -28,26 +28,29 @@ void bst_guidance_telemetry(bst_guidance *g, const bst_mount_status *mount) {
     }
 }
 
-static void tell(bst_guidance *g, bst_guidance_event event) {
+/* Appends a guidance event. */
+static void add_event(bst_guidance *g, bst_guidance_event event) {
     if (g->event_count < BST_GUIDANCE_EVENTS) {
         g->events[g->event_count++] = event;
     }
 }
 
-/* Whether two unit vectors are farther apart than an angle of up to 1 rad; the chord tells most. */
+/* True if two unit vectors are farther apart than an angle of up to 1 rad; the chord decides most
+ * cases. */
 static bool is_beyond(bst_vec3 a, bst_vec3 b, double angle_rad) {
     bst_vec3 chord = bst_vec3_sub(a, b);
     return !(bst_vec3_dot(chord, chord) < 0.9 * angle_rad * angle_rad) &&
            bst_vec3_angle(a, b) > angle_rad;
 }
 
+/* Direction after `seconds` at a constant rate. */
 static bst_vec3 unit_after(bst_vec3 d, bst_vec3 rate, double seconds) {
     return bst_vec3_unit(bst_vec3_axpy(d, seconds, rate));
 }
 
-/* ---- slews ---- */
+/* ---- Slews ---- */
 
-/* Direction of the slew under way, `seconds` after its start. */
+/* Commanded direction of the current slew, `seconds` after its start. */
 static bst_vec3 slew_at(const bst_guidance *g, double seconds, double near_rad[BST_MOUNT_AXES]) {
     const bst_guidance_slew *slew = &g->slew;
     double s, rate, accel, angle[BST_MOUNT_AXES] = {0.0};
@@ -67,7 +70,8 @@ static bst_vec3 slew_at(const bst_guidance *g, double seconds, double near_rad[B
                            bst_mount_boresight(&g->mount, angle));
 }
 
-/* The angles to end a slew at: of the turn that serves what is to come, where that is looked at. */
+/* End angles of a slew: the solution and whole turn that serve the coming directions, if look-ahead
+ * is on. */
 static bst_status target_angles(bst_ctx *ctx, const bst_guidance *g, int64_t tick,
                                 bst_vec3 direction, const double present[],
                                 double angle[BST_MOUNT_AXES], bool *found) {
@@ -95,13 +99,13 @@ static bst_status target_angles(bst_ctx *ctx, const bst_guidance *g, int64_t tic
     return BST_OK;
 }
 
-/* A direction to arrive at, and how fast it moves there. */
+/* Aim at the end of a slew, and its rate. */
 typedef struct aim {
     bool valid;
     bst_vec3 direction, rate_radps;
 } aim;
 
-/* Where the aim will be at a tick, out of the cones. */
+/* Aim at a tick, moved out of keep-out cones. */
 static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick, bst_vec3 towards,
                          aim *out) {
     int64_t half = (int64_t)llround(0.1 * g->env.tick_rate_hz);
@@ -126,7 +130,7 @@ static bst_status aim_at(bst_ctx *ctx, const bst_guidance *g, int64_t tick, bst_
     return BST_OK;
 }
 
-/* Angles and rates of the axes as the slew under way or, without one, the encoders have them. */
+/* Angles and rates of the axes from the current slew or, without one, the encoders. */
 static void present_axes(const bst_guidance *g, int64_t tick, double angle[], double rate[]) {
     double since = (double)(tick - g->slew.start_tick) / g->env.tick_rate_hz;
     double dt = (double)(tick - g->mount.tick) / g->env.tick_rate_hz, accel;
@@ -141,8 +145,8 @@ static void present_axes(const bst_guidance *g, int64_t tick, double angle[], do
     }
 }
 
-/* The fastest motion of the axes onto the moving aim; *made false when it cannot be or would cross
- * a cone. */
+/* Plans the fastest axis motion onto the moving aim. *made: false if it is impossible or would
+ * cross a keep-out cone. */
 static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec3 from,
                             bool *made) {
     *made = false;
@@ -172,7 +176,7 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec
         for (int i = 0; i < g->mount.axes; i++) {
             const bst_mount_axis *axis = &g->mount.axis[i];
             double share = g->config.limit_fraction, limit = share * axis->rate_limit_radps;
-            /* near the pole the aim may be faster than the axis: then it is met at rest */
+            /* near the pole the aim may be faster than the axis; the axis then ends at rest */
             double moving = (ways[0][i] - to[i]) / 0.1;
             moving = limit > 0.0 && fabs(moving) > 0.9 * limit ? 0.0 : moving;
             if (!bst_slew_axis_plan(angle[i], rate[i], to[i] - moving * slew.duration_s, moving,
@@ -197,7 +201,7 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec
     return BST_OK;
 }
 
-/* The axis angles along a path; for a mount whose axes are not known, the way itself. */
+/* Axis angles along a path; for a mount with unknown axes, the path itself. */
 static void path_nodes(const bst_guidance *g, const bst_keep_out_route *path, int64_t tick,
                        bst_slew_nodes *nodes, bst_slew_limits *limits) {
     bool steers = g->mount_known && bst_mount_steers(&g->mount);
@@ -216,8 +220,8 @@ static void path_nodes(const bst_guidance *g, const bst_keep_out_route *path, in
     }
     for (int j = 0; j < PATH_NODES; j++) {
         bst_vec3 d = bst_keep_out_route_at(path, j * nodes->step, &tangent, &bend);
-        /* within a step an arc turns by no more than its own curvature makes it; beside an end,
-         * which is passed slowly anyway, the angles' second differences are enough */
+        /* An arc turns within a step only by its own curvature; near the ends, which are slow
+         * anyway, the second differences of the angles suffice. */
         nodes->corner[j] = j > 2 && j < PATH_NODES - 3 && !nodes->corner[j - 1] &&
                            bst_vec3_dot(tangent, before) < 0.9;
         before = tangent;
@@ -233,7 +237,7 @@ static void path_nodes(const bst_guidance *g, const bst_keep_out_route *path, in
     }
 }
 
-/* The shortest way round the cones, as fast as the axes allow. */
+/* Plans the shortest path around the keep-out cones, as fast as the axes allow. */
 static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec3 from,
                             bst_vec3 from_rate, bool *made) {
     bst_guidance_slew *slew = &g->slew;
@@ -271,15 +275,15 @@ static bst_status plan_path(bst_ctx *ctx, bst_guidance *g, int64_t tick, bst_vec
     }
     *made = true;
     if (slew->path.count > 1) {
-        tell(g, (bst_guidance_event){.kind = BST_GUIDANCE_DETOUR,
-                                     .from_s = (double)tick / g->env.tick_rate_hz,
-                                     .until_s = (double)tick / g->env.tick_rate_hz + duration,
-                                     .length_rad = slew->path.length_rad});
+        add_event(g, (bst_guidance_event){.kind = BST_GUIDANCE_DETOUR,
+                                          .from_s = (double)tick / g->env.tick_rate_hz,
+                                          .until_s = (double)tick / g->env.tick_rate_hz + duration,
+                                          .length_rad = slew->path.length_rad});
     }
     return BST_OK;
 }
 
-/* The slew's command at a tick. */
+/* Command of the current slew at a tick. */
 static void command_slew(const bst_guidance *g, int64_t tick, bst_los_command *command) {
     double t = (double)(tick - g->slew.start_tick) / g->env.tick_rate_hz, h = DIFFERENCE_S;
     double late[BST_MOUNT_AXES] = {0.0};
@@ -296,15 +300,15 @@ static void command_slew(const bst_guidance *g, int64_t tick, bst_los_command *c
     }
 }
 
-/* Keeps to the way and turn that a slew has chosen. */
-static void keep_turn(bst_guidance *g, bst_los_command *command) {
+/* Keeps the mount solution and whole turns that a slew has chosen. */
+static void keep_mount_solution(bst_guidance *g, bst_los_command *command) {
     if (!g->near_known) {
         return;
     }
     double ways[2][BST_MOUNT_AXES];
     bst_vec3 body = bst_quat_rotate(bst_guidance_body(g, command->tick), command->direction_gcrf);
     bst_vec3 moved = bst_vec3_sub(body, g->near_body);
-    /* which way and turn is meant does not depend on the last digits; a redundant axis does */
+    /* the solution is insensitive to small changes, except for a redundant axis */
     if (g->mount.axes > 2 || bst_vec3_dot(moved, moved) > NEAR_RAD * NEAR_RAD) {
         if (bst_mount_angles(&g->mount, body, g->near_rad, ways) == 0) {
             return;
@@ -320,7 +324,7 @@ static void keep_turn(bst_guidance *g, bst_los_command *command) {
     }
 }
 
-/* Whether the slew under way still ends on the aim. */
+/* True if the current slew still ends on the aim. */
 static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, bst_vec3 from, bool *out) {
     int64_t arrival =
         g->slew.start_tick + (int64_t)llround(g->slew.duration_s * g->env.tick_rate_hz);
@@ -331,8 +335,8 @@ static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, bst_vec3 fro
     return BST_OK;
 }
 
-/* Whether there is a choice among turns to be made. */
-static bool turns_matter(const bst_guidance *g) {
+/* True if there are several mount solutions or turns to choose from. */
+static bool has_turn_choice(const bst_guidance *g) {
     bool matter = false;
     for (int i = 0; g->config.prediction_horizon_s > 0.0 && g->mount_known && i < g->mount.axes;
          i++) {
@@ -341,9 +345,10 @@ static bool turns_matter(const bst_guidance *g) {
     return matter;
 }
 
-static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
-                        bst_los_command *command, bool *give) {
-    if (g->zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
+/* Replaces the command by a slew's command if a slew is needed. */
+static bst_status shape_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
+                                bst_los_command *command, bool *give) {
+    if (g->zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !has_turn_choice(g)) {
         return BST_OK;
     }
     int64_t tick = command->tick;
@@ -388,8 +393,8 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight
         blocked = !made && g->zone_count > 0;
     }
     if (blocked && !g->no_way) {
-        tell(g, (bst_guidance_event){.kind = BST_GUIDANCE_NO_WAY,
-                                     .from_s = (double)tick / g->env.tick_rate_hz});
+        add_event(g, (bst_guidance_event){.kind = BST_GUIDANCE_NO_WAY,
+                                          .from_s = (double)tick / g->env.tick_rate_hz});
     }
     g->no_way = blocked;
     if (made) {
@@ -399,7 +404,7 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight
         g->slew.active = false;
     } else {
         g->slew.active = false;
-        keep_turn(g, command);
+        keep_mount_solution(g, command);
     }
     return BST_OK;
 }
@@ -426,7 +431,7 @@ bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *b
             command->tick + (int64_t)llround(g->config.prediction_interval_s * g->env.tick_rate_hz);
         BST_TRY(bst_guidance_look_ahead(ctx, g, command->tick));
     }
-    BST_TRY(shape(ctx, g, boresight, command, give));
+    BST_TRY(shape_command(ctx, g, boresight, command, give));
     if (*give) {
         command->roll_given = g->roll_given;
         command->roll_rad = g->roll_rad;

@@ -1,5 +1,4 @@
-/* Guidance: slews of the boresight to its aim, and prediction of whether the aim stays reachable.
- */
+/* Guidance: slews of the boresight to its aim, and prediction of the aim's reachability. */
 #ifndef BST_CONTROL_GUIDANCE_GUIDANCE_H
 #define BST_CONTROL_GUIDANCE_GUIDANCE_H
 
@@ -10,7 +9,7 @@
 #include "control/guidance/slew.h"
 
 typedef enum bst_guidance_slews {
-    BST_SLEWS_MOUNT = 0, /* left to the mount's servo */
+    BST_SLEWS_MOUNT = 0, /* performed by the mount's servo */
     BST_SLEWS_PLANNED,
 } bst_guidance_slews;
 
@@ -55,17 +54,17 @@ typedef struct bst_guidance_event {
     int kind;
     int reason;             /* bst_pointing_feasibility */
     double from_s, until_s; /* seconds since the epoch; INFINITY: not within prediction_horizon_s */
-    double length_rad;      /* of a detour, a roll */
+    double length_rad;      /* of a detour or a roll */
 } bst_guidance_event;
 
-#define BST_GUIDANCE_EVENTS 4 /* greatest number in one command */
+#define BST_GUIDANCE_EVENTS 4 /* most events of one command */
 
 /* A slew in progress. */
 typedef struct bst_guidance_slew {
-    bool active, along_path; /* else by axis */
+    bool active, along_path; /* along_path: on a path, else axis by axis */
     int64_t start_tick;
     double duration_s;
-    bst_vec3 arrival; /* where it ends */
+    bst_vec3 arrival; /* final direction */
     bst_slew_axis axis[BST_MOUNT_AXES];
     bst_keep_out_route path;
     bst_slew_path speed;
@@ -77,23 +76,23 @@ typedef struct bst_guidance {
     bst_mount_status mount;
     bool mount_known;
     bst_nav_telemetry nav;                   /* in the frame of the attitude telemetry */
-    bst_keep_out_zone zones[BST_ZONE_KINDS]; /* of nav, WIDER_RAD wider */
+    bst_keep_out_zone zones[BST_ZONE_KINDS]; /* keep-out cones of nav, widened by WIDER_RAD */
     int zone_count;
     bool nav_known;
     bool commanded;
     bst_los_command last;
     bst_guidance_slew slew;
     bst_slew_nodes nodes; /* work space of planning */
-    /* the solution and whole turns that were chosen */
+    /* chosen mount solution and whole turns */
     bool near_known;
     double near_rad[BST_MOUNT_AXES];
-    bst_vec3 near_body; /* direction in body axes that near_rad was worked out for; zero: none */
-    int reach;          /* bst_pointing_feasibility, as last reported */
+    bst_vec3 near_body; /* body-axes direction for which near_rad was computed; zero: none */
+    int reach;          /* bst_pointing_feasibility as last reported */
     bool no_way;        /* reported: keep-out zones block the way to the target */
     int64_t ahead_tick; /* of the next prediction */
-    bool roll_given;    /* the body has been asked for */
-    double roll_rad;    /* this roll */
-    double told_from_s, told_until_s; /* predicted loss that was reported; INFINITY: none */
+    bool roll_given;    /* a roll of the body is commanded */
+    double roll_rad;    /* commanded roll */
+    double told_from_s, told_until_s; /* predicted loss as last reported; INFINITY: none */
     bst_guidance_event events[BST_GUIDANCE_EVENTS];
     int event_count;
 } bst_guidance;

@@ -1,23 +1,24 @@
-/* What guidance sees coming. */
+/* Look-ahead of guidance: predicts loss of the aim by limits, keep-out cones and occultation. */
 #include <stdio.h>
 
 #include "control/guidance/guidance.h"
 #include "sim/astro/bodies.h"
 #include "sim/astro/kepler.h"
 
-/* Steps of the look: a thousandth of it within these. */
+/* Limits of the look-ahead step, which is a thousandth of the interval. */
 #define LEAST_STEP_S 1.0
 #define MOST_STEP_S 10.0
-/* The chase starts so long before the limits are met, when the mount is still on its target. */
+/* Run-up of the simulated pursuit before a limit is met, when the mount is still on its target. */
 #define RUN_UP_S 5.0
-/* A predicted loss that moves by more than this share of its length is told again. */
+/* A predicted loss is reported again if it moves by more than this share of its length. */
 #define CHANGED 0.1
 
 typedef struct looking {
     bst_guidance *g;
-    int64_t tick; /* of now: seconds count from it */
+    int64_t tick; /* now; seconds count from it */
 } looking;
 
+/* Prediction of aim, observer and body for the feasibility test (callback). */
 static bst_status look(void *user, bst_ctx *ctx, double seconds,
                        bst_pointing_feasibility_look *out) {
     const looking *l = user;
@@ -45,25 +46,27 @@ static bst_status look(void *user, bst_ctx *ctx, double seconds,
     return BST_OK;
 }
 
-static void tell(bst_guidance *g, int kind, int reason, double from_s, double until_s) {
+/* Appends a look-ahead event. */
+static void add_event(bst_guidance *g, int kind, int reason, double from_s, double until_s) {
     if (g->event_count < BST_GUIDANCE_EVENTS) {
         g->events[g->event_count++] = (bst_guidance_event){
             .kind = kind, .reason = reason, .from_s = from_s, .until_s = until_s};
     }
 }
 
+/* True if a predicted time has changed by more than CHANGED of the loss's length. */
 static bool moved(double a, double b, double span) {
     return isinf(a) != isinf(b) || (isfinite(a) && fabs(a - b) > CHANGED * span);
 }
 
-/* Tells what comes at `from` (seconds from now) unless that has been told. */
-static void tell_ahead(bst_guidance *g, double now_s, int kind, int reason, double from,
-                       double until) {
+/* Reports a predicted loss at `from` (seconds from now) unless it is already reported. */
+static void report_loss(bst_guidance *g, double now_s, int kind, int reason, double from,
+                        double until) {
     double span = isfinite(until) ? until - from : 10.0;
     if (moved(now_s + from, g->told_from_s, span) || moved(now_s + until, g->told_until_s, span)) {
         g->told_from_s = now_s + from;
         g->told_until_s = now_s + until;
-        tell(g, kind, reason, g->told_from_s, g->told_until_s);
+        add_event(g, kind, reason, g->told_from_s, g->told_until_s);
     }
 }
 
@@ -83,14 +86,14 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
     if (reach != BST_REACH_OK) {
         if ((int)reach != g->reach) {
             BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &reached, &back));
-            tell(g, BST_GUIDANCE_UNREACHABLE, reach, now_s,
-                 back.found ? now_s + back.when_s : INFINITY);
+            add_event(g, BST_GUIDANCE_UNREACHABLE, reach, now_s,
+                      back.found ? now_s + back.when_s : INFINITY);
         }
         g->reach = reach;
         return BST_OK;
     }
     if (g->reach != BST_REACH_OK) {
-        tell(g, BST_GUIDANCE_REACHABLE, g->reach, now_s, now_s);
+        add_event(g, BST_GUIDANCE_REACHABLE, g->reach, now_s, now_s);
     }
     g->reach = BST_REACH_OK;
     BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &unreached, &lost));
@@ -113,13 +116,14 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
             g->events[g->event_count++] = (bst_guidance_event){
                 .kind = BST_GUIDANCE_ROLL, .reason = why, .length_rad = g->roll_rad - before};
         } else if (losses > 0) {
-            tell_ahead(g, now_s, BST_GUIDANCE_LOSS, why, loss.from_s, loss.until_s);
+            report_loss(g, now_s, BST_GUIDANCE_LOSS, why, loss.from_s, loss.until_s);
         }
         return BST_OK;
     }
     const bst_pointing_feasibility_search again = {lost.when_s, horizon, step, true};
     BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &again, &back));
-    tell_ahead(g, now_s, BST_GUIDANCE_AHEAD, why, lost.when_s, back.found ? back.when_s : INFINITY);
+    report_loss(g, now_s, BST_GUIDANCE_AHEAD, why, lost.when_s,
+                back.found ? back.when_s : INFINITY);
     return BST_OK;
 }
 

@@ -1,9 +1,9 @@
-/* The body rolled out of the way of the mount's pole. */
+/* Rolls the body to keep the aim away from the mount's pole (keyhole). */
 #include "control/guidance/guidance.h"
 
-/* Of the mount's limits, for the choice, so that what is chosen holds with errors and lags. */
+/* Share of the mount's limits used for the choice, as a margin for errors and lags. */
 #define SHARE 0.8
-/* Of the body's own limits, in the prediction. */
+/* Share of the body's limits used in the prediction. */
 #define BODY_SHARE 0.9
 #define STEP_RAD (5.0 * BST_DEG_RAD)
 enum { MOST_STEPS = 18 };
@@ -17,7 +17,7 @@ bst_quat bst_guidance_rolled(const bst_guidance *g, double seconds, double roll_
                            BODY_SHARE * roll->accel_limit_radps2, &slew)) {
         bst_slew_axis_at(&slew, seconds, &angle, &rate, &accel);
     }
-    /* what it does without rolling, then the rest of the roll */
+    /* motion without the roll, then the remaining roll */
     bst_vec3 base = bst_vec3_axpy(g->mount.rate_body_radps, -roll->rate_radps, roll->axis_body);
     bst_quat q = bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(base, -seconds)),
                               g->mount.q_body_from_gcrf);

@@ -1,4 +1,4 @@
-/* Attitude of the body and keep-out cones, from the telemetry that guidance receives. */
+/* Body attitude and keep-out cones from guidance's latest inputs. */
 #include "control/guidance/guidance.h"
 
 int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,

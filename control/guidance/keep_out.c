@@ -2,7 +2,7 @@
 
 #include "sim/astro/bodies.h"
 
-/* Directions this far inside a cone's edge count as outside: paths run along edges. */
+/* Depth inside a cone's edge that still counts as outside, because paths run along edges. */
 #define EDGE_RAD 1e-9
 
 int bst_keep_out_zones(const bst_keep_out *exclusion, bst_vec3 position_m, bst_vec3 to_sun,
@@ -33,7 +33,7 @@ int bst_keep_out_inside(const bst_keep_out_zone *zones, int count, bst_vec3 dire
     int deepest = -1;
     *depth_rad = EDGE_RAD;
     for (int i = 0; i < count; i++) {
-        /* cos x >= 1 - x^2 / 2: far outside is told without the angle */
+        /* cos x >= 1 - x^2 / 2: far outside is decided without the angle */
         double half = zones[i].half_angle_rad;
         if (bst_vec3_dot(zones[i].axis, direction) < 0.999999 - 0.5 * half * half) {
             continue;
@@ -48,12 +48,13 @@ int bst_keep_out_inside(const bst_keep_out_zone *zones, int count, bst_vec3 dire
     return deepest;
 }
 
+/* True if a direction is outside all keep-out cones. */
 static bool outside(const bst_keep_out_zone *zones, int count, bst_vec3 direction) {
     double depth;
     return bst_keep_out_inside(zones, count, direction, &depth) < 0;
 }
 
-/* v turned by angle about the unit axis, both unit (Rodrigues). */
+/* Rotates unit vector v by an angle about a unit axis (Rodrigues). */
 static bst_vec3 turned(bst_vec3 axis, double angle, bst_vec3 v) {
     bst_vec3 along = bst_vec3_scale(axis, bst_vec3_dot(axis, v));
     bst_vec3 across = bst_vec3_sub(v, along);
@@ -61,7 +62,7 @@ static bst_vec3 turned(bst_vec3 axis, double angle, bst_vec3 v) {
     return bst_vec3_unit(bst_vec3_axpy(out, sin(angle), bst_vec3_cross(axis, across)));
 }
 
-/* The point of a cone's edge on the side of `towards`. */
+/* Point of a cone's edge on the side of `towards`. */
 static bst_vec3 edge_point(const bst_keep_out_zone *zone, bst_vec3 towards) {
     bst_vec3 side = bst_vec3_axpy(towards, -bst_vec3_dot(towards, zone->axis), zone->axis);
     side = bst_vec3_norm(side) > 1e-12 ? bst_vec3_unit(side) : bst_vec3_perpendicular(zone->axis);
@@ -69,7 +70,7 @@ static bst_vec3 edge_point(const bst_keep_out_zone *zone, bst_vec3 towards) {
                                        sin(zone->half_angle_rad), side));
 }
 
-/* The two unit vectors n with n . a = p and n . b = q; their number is 0 or 2. */
+/* The two unit vectors n with n . a = p and n . b = q; returns their number, 0 or 2. */
 static int with_products(bst_vec3 a, double p, bst_vec3 b, double q, bst_vec3 out[2]) {
     double c = bst_vec3_dot(a, b);
     bst_vec3 across = bst_vec3_cross(a, b);
@@ -105,7 +106,7 @@ bool bst_keep_out_nearest(const bst_keep_out_zone *zones, int count, bst_vec3 di
         }
         for (int j = 0; j <= i; j++) {
             int points = 1;
-            if (j < i) { /* where two edges cross */
+            if (j < i) { /* intersections of two edges */
                 points = with_products(zones[i].axis, cos(zones[i].half_angle_rad), zones[j].axis,
                                        cos(zones[j].half_angle_rad), point + 1);
             }
@@ -122,20 +123,20 @@ bool bst_keep_out_nearest(const bst_keep_out_zone *zones, int count, bst_vec3 di
     return isfinite(best);
 }
 
-/* ---- the graph ---- */
+/* ---- Visibility graph ---- */
 
 #define HALVES 16
-/* both ends, their tangents and edges, tangents between zones, ways between antipodes */
+/* both ends, their tangents and edge points, tangents between cones, paths between antipodes */
 #define NODES (2 + 6 * BST_ZONES + 4 * BST_ZONES * (BST_ZONES - 1) + HALVES)
 
 typedef struct node {
     bst_vec3 place;
-    int zone;     /* whose edge it is on, -1: none */
-    int partner;  /* node that a tangent leads to, -1: none */
-    double angle; /* along the edge */
+    int zone;     /* cone on whose edge it lies, -1: none */
+    int partner;  /* node at the other end of a tangent, -1: none */
+    double angle; /* angle along the edge */
     double cost;
-    int before;           /* -1: none */
-    bst_keep_out_arc arc; /* from there */
+    int before;           /* predecessor on the shortest path, -1: none */
+    bst_keep_out_arc arc; /* arc from the predecessor */
     bool done;
 } node;
 
@@ -143,11 +144,11 @@ typedef struct graph {
     const bst_keep_out_zone *zones;
     int zone_count, count;
     node nodes[NODES];
-    bst_vec3 x[BST_ZONES], y[BST_ZONES]; /* axes that angles along an edge are counted from */
+    bst_vec3 x[BST_ZONES], y[BST_ZONES]; /* reference axes of the angles along each edge */
 } graph;
 
-/* Greatest closeness of an arc to a zone's axis: p . axis over the arc. */
-static double closest(const bst_keep_out_arc *arc, bst_vec3 axis) {
+/* Largest p . axis over an arc: its closest approach to a cone's axis. */
+static double closest_approach(const bst_keep_out_arc *arc, bst_vec3 axis) {
     bst_vec3 across = bst_vec3_axpy(arc->from, -bst_vec3_dot(arc->from, arc->axis), arc->axis);
     double level = bst_vec3_dot(arc->axis, arc->from) * bst_vec3_dot(arc->axis, axis);
     double a = bst_vec3_dot(across, axis);
@@ -163,23 +164,25 @@ static double closest(const bst_keep_out_arc *arc, bst_vec3 axis) {
     return level + fmax(a, end);
 }
 
+/* True if an arc crosses no keep-out cone but `except`. */
 static bool is_free(const graph *g, const bst_keep_out_arc *arc, int except) {
     for (int i = 0; i < g->zone_count; i++) {
         double half = g->zones[i].half_angle_rad;
-        /* from the cosine: d cos = sin d angle */
+        /* margin in the cosine: d cos = sin d angle */
         if (i != except &&
-            closest(arc, g->zones[i].axis) > cos(half) + EDGE_RAD * sin(half) + 4e-16) {
+            closest_approach(arc, g->zones[i].axis) > cos(half) + EDGE_RAD * sin(half) + 4e-16) {
             return false;
         }
     }
     return true;
 }
 
-static bst_keep_out_arc straight(bst_vec3 a, bst_vec3 b) {
+/* Great-circle arc between two directions. */
+static bst_keep_out_arc great_circle(bst_vec3 a, bst_vec3 b) {
     bst_vec3 n = bst_vec3_cross(a, b);
     bst_keep_out_arc arc = {.from = a, .turn_rad = bst_vec3_angle(a, b)};
     arc.axis = bst_vec3_norm(n) > 0.0 ? bst_vec3_unit(n) : bst_vec3_perpendicular(a);
-    /* rounding of nearly parallel vectors */
+    /* corrects rounding for nearly parallel vectors */
     arc.axis = bst_vec3_unit(bst_vec3_axpy(arc.axis, -bst_vec3_dot(arc.axis, a), a));
     arc.length_rad = arc.turn_rad;
     return arc;
@@ -194,11 +197,12 @@ static int add_node(graph *g, bst_vec3 place, int zone, int partner) {
     return g->count++;
 }
 
-/* Where the great circle with normal n is nearest to a zone's axis. */
+/* Point of the great circle with normal n nearest to a cone's axis. */
 static bst_vec3 foot(const bst_keep_out_zone *zone, bst_vec3 n) {
     return bst_vec3_unit(bst_vec3_axpy(zone->axis, -bst_vec3_dot(zone->axis, n), n));
 }
 
+/* Adds the tangents between ends and cones, and between cones. */
 static void add_tangents(graph *g) {
     bst_vec3 n[2];
     for (int i = 0; i < g->zone_count; i++) {
@@ -223,6 +227,7 @@ static void add_tangents(graph *g) {
     }
 }
 
+/* Dijkstra relaxation of a node by an arc. */
 static void relax(graph *g, int from, int to, const bst_keep_out_arc *arc) {
     double cost = g->nodes[from].cost + arc->length_rad;
     if (cost < g->nodes[to].cost) {
@@ -232,7 +237,7 @@ static void relax(graph *g, int from, int to, const bst_keep_out_arc *arc) {
     }
 }
 
-/* Both ways along a zone's edge. */
+/* Relaxes both directions along a cone's edge. */
 static void relax_edges(graph *g, int from) {
     const node *a = &g->nodes[from];
     const bst_keep_out_zone *zone = &g->zones[a->zone];
@@ -255,14 +260,14 @@ static void relax_edges(graph *g, int from) {
 }
 
 static void relax_straight(graph *g, int from, int to) {
-    bst_keep_out_arc arc = straight(g->nodes[from].place, g->nodes[to].place);
+    bst_keep_out_arc arc = great_circle(g->nodes[from].place, g->nodes[to].place);
     if (is_free(g, &arc, -1)) {
         relax(g, from, to, &arc);
     }
 }
 
-/* Dijkstra from node 0 to node 1. */
-static bool search(graph *g) {
+/* Dijkstra's algorithm from node 0 to node 1. */
+static bool dijkstra(graph *g) {
     g->nodes[0].cost = 0.0;
     for (;;) {
         int at = -1;
@@ -292,7 +297,7 @@ static bool search(graph *g) {
     }
 }
 
-/* Antipodal ends: every great circle through one meets the other. */
+/* Antipodal ends: adds great circles through both in several directions. */
 static void add_halves(graph *g) {
     bst_vec3 from = g->nodes[0].place, side = bst_vec3_perpendicular(from);
     for (int i = 0; i < HALVES; i++) {
@@ -327,7 +332,7 @@ bool bst_keep_out_path(const bst_keep_out_zone *zones, int count, bst_vec3 from,
         return false;
     }
     if (out->left_zone >= 0) {
-        bst_keep_out_arc leave = straight(from, start);
+        bst_keep_out_arc leave = great_circle(from, start);
         (void)append(out, &leave);
     }
     graph g = {.zones = zones, .zone_count = count};
@@ -340,13 +345,13 @@ bool bst_keep_out_path(const bst_keep_out_zone *zones, int count, bst_vec3 from,
     if (bst_vec3_angle(start, end) > BST_PI - 1e-9) {
         add_halves(&g);
     } else {
-        bst_keep_out_arc direct = straight(start, end);
+        bst_keep_out_arc direct = great_circle(start, end);
         if (is_free(&g, &direct, -1)) {
             return append(out, &direct);
         }
     }
     add_tangents(&g);
-    /* ends that lie on an edge can be left along it */
+    /* ends on an edge can be left along it */
     for (int e = 0; e < 2; e++) {
         for (int i = 0; i < count; i++) {
             double off = bst_vec3_angle(g.nodes[e].place, zones[i].axis) - zones[i].half_angle_rad;
@@ -355,7 +360,7 @@ bool bst_keep_out_path(const bst_keep_out_zone *zones, int count, bst_vec3 from,
             }
         }
     }
-    if (!search(&g)) {
+    if (!dijkstra(&g)) {
         *out = (bst_keep_out_route){
             .left_zone = out->left_zone, .target_zone = out->target_zone, .arcs = {{.from = from}}};
         return false;

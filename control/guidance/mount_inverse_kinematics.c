@@ -2,7 +2,7 @@
 
 static const double turn_rad = 2.0 * BST_PI;
 
-/* Sine of the angle to the outer axis below which any outer angle points alike. */
+/* Sine of the angle to the outer axis below which the outer angle is arbitrary. */
 #define POLE 1e-9
 
 bool bst_mount_steers(const bst_mount_status *mount) {
@@ -13,6 +13,7 @@ bool bst_mount_steers(const bst_mount_status *mount) {
     return needed == 2;
 }
 
+/* Rotates v about a unit axis. */
 static bst_vec3 about(bst_vec3 axis, double angle, bst_vec3 v) {
     double along = bst_vec3_dot(axis, v);
     bst_vec3 flat = bst_vec3_axpy(v, -along, axis);
@@ -33,14 +34,15 @@ bst_vec3 bst_mount_boresight(const bst_mount_status *mount,
     return b;
 }
 
+/* Angle in the whole turn nearest to `near`. */
 static double beside(double angle, double near) {
     return angle - turn_rad * round((angle - near) / turn_rad);
 }
 
-/* The two axes that steer, as they stand with a redundant one at its angle. */
+/* The two steering axes, with a redundant axis fixed at its angle. */
 typedef struct pair {
     int outer, inner;
-    bst_vec3 u, v, b0, b; /* axes, boresight at zero, wanted */
+    bst_vec3 u, v, b0, b; /* axes, boresight at zero angles, wanted direction */
 } pair;
 
 static pair pair_of(const bst_mount_status *mount, bst_vec3 direction, const double near[]) {
@@ -109,6 +111,7 @@ int bst_mount_angles(const bst_mount_status *mount, bst_vec3 direction_body,
     return off > 0.0 ? 2 : 1;
 }
 
+/* True if an axis has unlimited travel. */
 static bool endless(const bst_mount_axis *axis) {
     return axis->min_rad == 0.0 && axis->max_rad == 0.0;
 }
@@ -127,7 +130,7 @@ static bool all_within(const bst_mount_status *mount, const double angle[]) {
     return within;
 }
 
-/* Brings an angle into travel by the fewest turns; false when no turn does. */
+/* Brings an angle into travel by the fewest whole turns; false if none does. */
 static bool bring_within(const bst_mount_axis *axis, double *angle) {
     if (!endless(axis) && *angle < axis->min_rad) {
         *angle += turn_rad * ceil((axis->min_rad - *angle) / turn_rad - 1e-12);
@@ -158,9 +161,9 @@ bool bst_mount_nearest(const bst_mount_status *mount, bst_vec3 direction_body,
     return isfinite(best);
 }
 
-/* How many of the directions can be followed on from some angles. */
-static int served(const bst_mount_status *mount, const bst_vec3 *directions, int count,
-                  const double start[]) {
+/* Number of directions that can be followed in order from given angles. */
+static int count_followed(const bst_mount_status *mount, const bst_vec3 *directions, int count,
+                          const double start[]) {
     double at[BST_MOUNT_AXES], ways[2][BST_MOUNT_AXES];
     for (int i = 0; i < BST_MOUNT_AXES; i++) {
         at[i] = start[i];
@@ -209,7 +212,7 @@ bool bst_mount_choose_turn(const bst_mount_status *mount, const bst_vec3 *direct
                 double rate = axis->rate_limit_radps;
                 choice.slew_s = fmax(choice.slew_s, rate > 0.0 ? way / rate : 0.0);
             }
-            choice.serves = served(mount, directions_body, count, choice.angle_rad);
+            choice.serves = count_followed(mount, directions_body, count, choice.angle_rad);
             if (choice.serves > out->serves ||
                 (choice.serves == out->serves && choice.slew_s < out->slew_s)) {
                 *out = choice;

@@ -2,7 +2,7 @@
 
 #include "sim/astro/bodies.h"
 
-/* Half the interval over which rates are taken. */
+/* Half the interval of the differences that give axis rates. */
 #define HALF_S 0.05
 #define FOUND_TO_S 0.01
 
@@ -21,6 +21,7 @@ const char *bst_pointing_feasibility_reason(int reach) {
     return reach >= 0 && reach < BST_REACH_COUNT ? reasons[reach] : "unknown";
 }
 
+/* True if the Earth hides the target. */
 static bool behind_earth(const bst_pointing_feasibility_look *look) {
     double r2 = bst_vec3_dot(look->position_m, look->position_m);
     double towards = -bst_vec3_dot(look->position_m, look->direction_gcrf);
@@ -39,6 +40,7 @@ static bst_vec3 in_body(const bst_pointing_feasibility_look *look) {
     return bst_quat_rotate(look->q_body_from_gcrf, look->direction_gcrf);
 }
 
+/* True if the mount has a redundant axis. */
 static bool has_redundant(const bst_mount_status *mount) {
     bool has = false;
     for (int i = 0; i < mount->axes; i++) {
@@ -47,9 +49,9 @@ static bool has_redundant(const bst_mount_status *mount) {
     return has;
 }
 
-/* Whether the axes can follow three directions HALF_S apart. */
-static bst_pointing_feasibility follows(const bst_pointing_feasibility_problem *problem,
-                                        const bst_vec3 body[3]) {
+/* Checks axis rates and accelerations over three directions HALF_S apart. */
+static bst_pointing_feasibility check_axis_limits(const bst_pointing_feasibility_problem *problem,
+                                                  const bst_vec3 body[3]) {
     const bst_mount_status *mount = problem->mount;
     double present[BST_MOUNT_AXES], angle[3][BST_MOUNT_AXES], ways[2][BST_MOUNT_AXES];
     for (int i = 0; i < BST_MOUNT_AXES; i++) {
@@ -77,12 +79,12 @@ static bst_pointing_feasibility follows(const bst_pointing_feasibility_problem *
             if (sky > limit) {
                 return BST_REACH_RATE;
             }
-            /* a redundant axis takes over beside the pole */
+            /* near the pole a redundant axis takes over */
             worst = has_redundant(mount) ? worst : BST_REACH_KEYHOLE;
             continue;
         }
         if (hard > 0.0 && accel > hard) {
-            /* an axis that turns much faster than the line of sight does so beside the pole */
+            /* an axis much faster than the line of sight is near its pole */
             bool pole = rate > 2.0 * sky;
             if (worst == BST_REACH_OK && !(pole && has_redundant(mount))) {
                 worst = pole ? BST_REACH_KEYHOLE : BST_REACH_ACCEL;
@@ -120,7 +122,7 @@ bst_status bst_pointing_feasibility_at(bst_ctx *ctx,
         BST_TRY(problem->look(problem->user, ctx, seconds + (k - 1) * HALF_S, &beside));
         body[k] = in_body(beside.valid ? &beside : &look);
     }
-    *out = follows(problem, body);
+    *out = check_axis_limits(problem, body);
     return BST_OK;
 }
 
@@ -158,10 +160,10 @@ bst_status bst_pointing_feasibility_next(bst_ctx *ctx,
     }
 }
 
-/* ---- the chase ---- */
+/* ---- Simulated pursuit ---- */
 
 #define CHASE_STEP_S 0.01
-#define CHASE_EVERY 5 /* steps between two looks, the angles going straight between */
+#define CHASE_EVERY 5 /* steps between two predictions; angles are linear in between */
 
 typedef struct follower {
     double angle, rate;
@@ -171,9 +173,9 @@ static double clamped(double x, double limit) {
     return fmax(fmin(x, limit), -limit);
 }
 
-/* One step towards a target that is at `to` and moves at `to_rate` at the step's end. */
-static void follow(follower *f, const bst_mount_axis *axis, double share, double to,
-                   double to_rate) {
+/* One step of an axis towards a target at `to` with rate `to_rate` at the step's end. */
+static void step_axis(follower *f, const bst_mount_axis *axis, double share, double to,
+                      double to_rate) {
     const double gain = 10.0, h = CHASE_STEP_S; /* 1/s, near the target */
     double hard = axis->accel_limit_radps2 > 0.0 ? share * axis->accel_limit_radps2 : INFINITY;
     double limit = axis->rate_limit_radps > 0.0 ? share * axis->rate_limit_radps : INFINITY;
@@ -191,10 +193,10 @@ static void follow(follower *f, const bst_mount_axis *axis, double share, double
     f->rate += accel * h;
 }
 
-/* Angles and rates that the axes head for at a time. */
-static bst_status heading(bst_ctx *ctx, const bst_pointing_feasibility_problem *problem,
-                          double seconds, const follower *now, double to[], bst_vec3 *body,
-                          bool *valid) {
+/* Target angles and rates of the axes at a time. */
+static bst_status target_angles(bst_ctx *ctx, const bst_pointing_feasibility_problem *problem,
+                                double seconds, const follower *now, double to[], bst_vec3 *body,
+                                bool *valid) {
     bst_pointing_feasibility_look look;
     double near[BST_MOUNT_AXES];
     BST_TRY(problem->look(problem->user, ctx, seconds, &look));
@@ -225,12 +227,12 @@ bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
     bst_vec3 body, body_next;
     bool valid, valid_next, lost = false, started = false;
     const double look_s = CHASE_STEP_S * CHASE_EVERY;
-    BST_TRY(heading(ctx, problem, from_s, axes, to, &body, &valid));
+    BST_TRY(target_angles(ctx, problem, from_s, axes, to, &body, &valid));
     for (int64_t n = 0; from_s + (double)n * look_s < span->until_s; n++) {
         double at = from_s + (double)n * look_s;
-        BST_TRY(heading(ctx, problem, at + look_s, axes, next, &body_next, &valid_next));
+        BST_TRY(target_angles(ctx, problem, at + look_s, axes, next, &body_next, &valid_next));
         for (int i = 0; i < mount->axes && valid && valid_next; i++) {
-            /* `to` and `next` by the same turn */
+            /* `to` and `next` in the same turn */
             to[i] -= 2.0 * BST_PI * round((to[i] - next[i]) / (2.0 * BST_PI));
         }
         for (int k = 1; k <= CHASE_EVERY && valid && valid_next; k++) {
@@ -242,7 +244,7 @@ bst_status bst_pointing_feasibility_chase(bst_ctx *ctx,
                 if (!started) {
                     axes[i] = (follower){to[i] + share * (next[i] - to[i]), rate};
                 } else {
-                    follow(&axes[i], &mount->axis[i], problem->limit_fraction, goal, rate);
+                    step_axis(&axes[i], &mount->axis[i], problem->limit_fraction, goal, rate);
                 }
                 angle[i] = axes[i].angle;
             }

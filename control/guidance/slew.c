@@ -12,10 +12,10 @@ bool bst_slew_axis_plan(double from_rad, double from_radps, double to_rad, doubl
     }
     *out = (bst_slew_axis){
         .from_rad = from_rad, .from_radps = from_radps, .to_rad = to_rad, .to_radps = to_radps};
-    /* where braking at once would end decides the way that the motion goes */
+    /* the end of immediate braking decides the direction of motion */
     double rest = d + 0.5 * w * fabs(w) / a;
     double way = rest > 0.0 ? -1.0 : 1.0;
-    double distance = -way * d, start = way * w; /* to go, and the rate along it */
+    double distance = -way * d, start = way * w; /* remaining distance, and rate along it */
     double most = limit - way * to_radps;
     double peak = sqrt(fmax(a * distance + 0.5 * start * start, 0.0));
     peak = fmin(peak, most);
@@ -51,7 +51,7 @@ void bst_slew_axis_at(const bst_slew_axis *slew, double seconds, double *angle_r
     *rate_radps = v;
 }
 
-/* Slopes of the path at a node: q' and q''. */
+/* Path derivatives at a node: q' and q''. */
 typedef struct slopes {
     double first[BST_SLEW_AXES], second[BST_SLEW_AXES];
 } slopes;
@@ -59,7 +59,7 @@ typedef struct slopes {
 static slopes slopes_at(const bst_slew_nodes *nodes, int axes, int j) {
     slopes out = {{0.0}, {0.0}};
     double h = nodes->step;
-    /* one-sided at the ends and beside a corner, where the path has no slope of its own */
+    /* one-sided at the ends and next to a corner, where the path has no derivative */
     int low = j > 0 && !(nodes->corner[j] && j < nodes->count - 1) ? j - 1 : j;
     int high = j < nodes->count - 1 ? j + 1 : j;
     for (int i = 0; i < axes; i++) {
@@ -73,8 +73,8 @@ static slopes slopes_at(const bst_slew_nodes *nodes, int axes, int j) {
     return out;
 }
 
-/* Greatest z by the rate limits. */
-static double fastest(const slopes *p, const bst_slew_limits *limits) {
+/* Largest z permitted by the rate limits. */
+static double largest_speed(const slopes *p, const bst_slew_limits *limits) {
     double z = INFINITY;
     for (int i = 0; i < limits->axes; i++) {
         double v = limits->rate_radps[i], q = fabs(p->first[i]), bend = fabs(p->second[i]);
@@ -88,7 +88,7 @@ static double fastest(const slopes *p, const bst_slew_limits *limits) {
     return z;
 }
 
-/* The accelerations u that the limits allow at z; false when there are none. */
+/* Range of accelerations u permitted by the limits at z; false if it is empty. */
 static bool range_of(const slopes *p, const bst_slew_limits *limits, double z, double *least,
                      double *most) {
     *least = -INFINITY;
@@ -105,7 +105,7 @@ static bool range_of(const slopes *p, const bst_slew_limits *limits, double z, d
     return *least <= *most;
 }
 
-/* Whether from z at a node the next one can be met between low and high. */
+/* True if the next node can be reached with z between low and high. */
 static bool leads(const slopes *p, const bst_slew_limits *limits, double h, double z, double low,
                   double high) {
     double least, most;
@@ -113,6 +113,7 @@ static bool leads(const slopes *p, const bst_slew_limits *limits, double h, doub
            z + 2.0 * h * least <= high;
 }
 
+/* Checks number of nodes, step, limits and angles. */
 static bool well_formed(const bst_slew_nodes *nodes, const bst_slew_limits *limits) {
     bool good = nodes->count >= 2 && nodes->count <= BST_SLEW_NODES && nodes->step > 0.0 &&
                 limits->axes >= 1 && limits->axes <= BST_SLEW_AXES;
@@ -132,10 +133,10 @@ bool bst_slew_path_plan(const bst_slew_nodes *nodes, const bst_slew_limits *limi
     }
     int last = nodes->count - 1;
     double h = nodes->step;
-    double *most = out->square; /* first the greatest z from which the rest can be gone */
+    double *most = out->square; /* first the largest z from which the remaining path is feasible */
     for (int j = last; j >= 0; j--) {
         slopes p = slopes_at(nodes, limits->axes, j);
-        double top = fastest(&p, limits);
+        double top = largest_speed(&p, limits);
         if (nodes->corner[j] && j > 0 && j < last) {
             most[j] = 0.0;
             continue;
@@ -144,7 +145,7 @@ bool bst_slew_path_plan(const bst_slew_nodes *nodes, const bst_slew_limits *limi
             most[j] = fmin(end_rate * end_rate, top);
             continue;
         }
-        /* what can be reached from rest bounds what is worth trying where no axis has a limit */
+        /* bounds the search if no axis has a limit */
         top = fmin(top, 1e12);
         double low = 0.0, high = top;
         if (leads(&p, limits, h, top, 0.0, most[j + 1])) {
@@ -175,7 +176,7 @@ bool bst_slew_path_plan(const bst_slew_nodes *nodes, const bst_slew_limits *limi
         double next = fmin(fmax(z + 2.0 * h * up, 0.0), most[j + 1]);
         double sum = sqrt(z) + sqrt(next);
         if (!(sum > 0.0)) {
-            return false; /* two corners side by side */
+            return false; /* two adjacent corners */
         }
         time += 2.0 * h / sum;
         z = next;

@@ -8,10 +8,10 @@ static int64_t ticks_of(const bst_image_loop *loop, double seconds) {
     return (int64_t)llround(seconds * loop->env.tick_rate_hz);
 }
 
-/* Frame periods without a frame after which the latest error is no longer acted on. */
+/* Frame periods without a frame after which the latest image error is discarded. */
 #define PATIENCE 1.5
 
-/* From the middle of an exposure until then. */
+/* The same, from mid-exposure, s. */
 static double longest_wait_s(const bst_image_loop_env *env) {
     return env->frame_latency_s + 0.5 * env->frame_exposure_s + PATIENCE * env->frame_period_s;
 }
@@ -44,8 +44,9 @@ bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
     return BST_OK;
 }
 
-static void turn_at(bst_image_loop *loop, bst_pointing_error *correction, int64_t effect_tick,
-                    const double u[3]) {
+/* Sets error and rate of the correction at a tick. */
+static void set_correction(bst_image_loop *loop, bst_pointing_error *correction,
+                           int64_t effect_tick, const double u[3]) {
     correction->error =
         bst_quat_unit(bst_pointing_error_at(correction, effect_tick, loop->env.tick_rate_hz));
     correction->started = true;
@@ -53,14 +54,14 @@ static void turn_at(bst_image_loop *loop, bst_pointing_error *correction, int64_
     correction->rate_gcrf_radps = (bst_vec3){u[0], u[1], u[2]};
 }
 
-/* The rate that an error of zero would give. */
+/* Sets the rate that an image error of zero would give (integrators only). */
 static void coast(bst_image_loop *loop, bst_pointing_error *correction, int64_t effect_tick) {
     double u[3];
     for (int a = 0; a < 3; a++) {
         bst_compensator c = loop->axis[a];
         u[a] = bst_compensator_step(&c, 0.0, 0.0);
     }
-    turn_at(loop, correction, effect_tick, u);
+    set_correction(loop, correction, effect_tick, u);
     loop->coasting = true;
 }
 
@@ -106,7 +107,7 @@ bool bst_image_loop_update(bst_image_loop *loop, bst_pointing_error *correction,
     }
     loop->frame_tick = fix->tick;
     bst_vec3 boresight = bst_quat_rotate(bst_quat_conj(fix->q_cam_from_gcrf), (bst_vec3){0, 0, 1});
-    /* the rotation that takes the boresight to the aim, across both */
+    /* rotation from the boresight to the aim, about an axis perpendicular to both */
     bst_vec3 across = bst_vec3_cross(boresight, aim);
     double sine = bst_vec3_norm(across), angle = bst_vec3_angle(boresight, aim);
     bst_vec3 error = sine > 0.0 ? bst_vec3_scale(across, angle / sine) : across;
@@ -115,7 +116,7 @@ bool bst_image_loop_update(bst_image_loop *loop, bst_pointing_error *correction,
     for (int a = 0; a < 3; a++) {
         u[a] = bst_compensator_step(&loop->axis[a], e[a], 0.0);
     }
-    turn_at(loop, correction, tick + ticks_of(loop, loop->env.command_latency_s), u);
+    set_correction(loop, correction, tick + ticks_of(loop, loop->env.command_latency_s), u);
     loop->coasting = false;
     return true;
 }

@@ -1,5 +1,5 @@
-/* Pointing corrected by a compensator on the image error: how far, in the frame, the true boresight
- * was from where the command wanted it. */
+/* Image-error loop: a compensator corrects the pointing by the measured offset of the true
+ * boresight from the commanded direction in the frame. */
 #ifndef BST_CONTROL_LOOP_IMAGE_LOOP_H
 #define BST_CONTROL_LOOP_IMAGE_LOOP_H
 
@@ -7,38 +7,38 @@
 #include "control/loop/pointing_error.h"
 #include "control/modes/aim_history.h"
 
-/* In front of the names of bst_compensator_type stand those; after them: */
+/* Compensator names: those of bst_compensator_type, followed by: */
 enum { BST_CONTROL_OBSERVER = BST_COMPENSATOR_TYPE_COUNT };
 
 extern const char *const bst_control_compensators[];
 
-/* What the loop needs to know of its surroundings. */
+/* Timing of the loop. */
 typedef struct bst_image_loop_env {
     double tick_rate_hz;
     double frame_period_s, frame_exposure_s, frame_latency_s;
-    double command_latency_s; /* from a command's publication to its effect */
-    double servo_lag_s;       /* how late the mount follows a change of the command */
-    double jump_rad;          /* an aim that moves by more between two commands starts a slew */
+    double command_latency_s; /* from publication of a command to its effect */
+    double servo_lag_s;       /* lag of the mount behind a change of the command */
+    double jump_rad;          /* a larger change of the aim between two commands starts a slew */
 } bst_image_loop_env;
 
-/* One loop per axis of GCRF, all alike, so that the two across the boresight are the image's: the
- * compensator's output is the rate at which the correction turns, so that a compensator without an
- * integrator leaves no constant error and one with leaves none of a constant drift. The correction
- * is kept as error and rate of a bst_pointing_error, valid at any time. Frames without an attitude,
- * and frames exposed while the mount slews to a new aim, leave the integrators as they are. */
+/* One equal loop per GCRF axis, so that the two axes across the boresight are the image's. The
+ * compensator's output is the rate of the correction. Without an integrator it leaves no constant
+ * error, with one no error for a constant drift. The correction is stored as error and rate of a
+ * bst_pointing_error, valid at any time. Frames without attitude, and frames exposed during a slew,
+ * leave the integrators unchanged. */
 typedef struct bst_image_loop {
     bst_image_loop_env env;
     bst_compensator axis[3];
-    bst_aim_history aims; /* uncorrected */
-    int64_t slew_tick;    /* the latest jump of the aim */
-    bool slewing;         /* the mount has not been seen to arrive since */
-    int64_t rest_tick;    /* frames that began before do not count */
-    int64_t frame_tick;   /* of the latest that was used */
-    bool coasting;        /* the rate is the integrators' alone */
+    bst_aim_history aims; /* uncorrected aims */
+    int64_t slew_tick;    /* latest jump of the aim */
+    bool slewing;         /* the mount has not settled since */
+    int64_t rest_tick;    /* frames that started before are ignored */
+    int64_t frame_tick;   /* latest used frame */
+    bool coasting;        /* the rate comes from the integrators only */
 } bst_image_loop;
 
-/* BST_ERR_CONFIG as bst_compensator_init: a specification is designed against the delays of the
- * frames and the mount's lag. */
+/* Initialises the loop. A specification is designed against the frame delays and the mount's lag.
+ * Errors: BST_ERR_CONFIG as bst_compensator_init. */
 bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
                                const bst_compensator_config *config,
                                const bst_image_loop_env *env) BST_MUST_CHECK;

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* Frames until the Kalman filter's gains are those at rest; before, they are higher. */
+/* Frames until the Kalman gains are steady; before, they are higher. */
 enum { SETTLING_FRAMES = 30 };
 
 static int64_t ticks_of(const bst_model_error *error, double seconds) {
@@ -87,7 +87,7 @@ void bst_model_error_telemetry(bst_model_error *error, const bst_pointing_teleme
     }
 }
 
-/* The integral of what samples a and b, joined by a straight line, give between from and to. */
+/* Integral over [from, to] of the line through samples a and b. */
 static bst_vec3 part(const bst_model_error_sample *a, const bst_model_error_sample *b, double from,
                      double to) {
     double width = (double)(b->tick - a->tick), middle = 0.5 * (from + to);
@@ -96,7 +96,8 @@ static bst_vec3 part(const bst_model_error_sample *a, const bst_model_error_samp
     return bst_vec3_scale(there, to - from);
 }
 
-/* The mean of `turned` over an exposure. False: telemetry does not cover it, or in a slew. */
+/* Mean of `turned` over an exposure. Returns false if telemetry does not cover it, or during a
+ * slew. */
 static bool mean_turn(const bst_model_error *error, double middle_tick, bst_vec3 *out) {
     double half = fmax(0.5 * error->exposure_s * error->tick_rate_hz, 0.5);
     double from = middle_tick - half, to = middle_tick + half, covered = 0.0;

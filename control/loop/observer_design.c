@@ -4,15 +4,16 @@
 
 #include "control/control.h"
 
-/* What bst_loop_verdict wants, and a reserve for a mount and a step of the plant that the design
- * does not know. */
+/* Required margins: those of bst_loop_verdict plus a reserve for mount dynamics and plant step,
+ * which the design does not model. */
 #define GAIN_MARGIN_DB 6.2
 #define PHASE_MARGIN_DEG 31.0
 #define SENSITIVITY_PEAK 1.95
 
-/* Powers of ten down to which a density is looked for, and halvings of the last one. */
+/* Decades down to which a density is searched, and bisections of the last decade. */
 enum { DECADES = 40, HALVINGS = 7 };
 
+/* Checks the loop's margins at a density. */
 static bst_status is_robust(bst_ctx *ctx, const bst_observer_request *r, double density,
                             bool *out) {
     const bst_control_servo_response servo = {.delay_s = r->servo_lag_s};
@@ -22,7 +23,7 @@ static bst_status is_robust(bst_ctx *ctx, const bst_observer_request *r, double 
     bst_tracking_loop *tracking;
     BST_TRY(bst_tracking_loop_create(ctx, &r->timing, &servo, NULL, &observer, &tracking));
     bst_loop loop = bst_tracking_as_loop(tracking);
-    loop.open_later = NULL; /* the delay margin is of no use here */
+    loop.open_later = NULL; /* the delay margin is not needed here */
     bst_loop_margins m;
     bst_status status = bst_loop_analyse(ctx, &loop, &m);
     bst_tracking_loop_free(tracking);

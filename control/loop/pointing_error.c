@@ -36,8 +36,8 @@ bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fi
     if (!fix->valid || (e->started && fix->tick < e->tick)) {
         return false;
     }
-    /* q_stars = from_rotvec(e_cam) q_telemetry = q_telemetry from_rotvec(e_gcrf), and e_cam is the
-     * same in the star and the telemetry camera frame */
+    /* q_stars = from_rotvec(e_cam) q_telemetry = q_telemetry from_rotvec(e_gcrf); e_cam is equal in
+     * the star and telemetry camera frames */
     bst_quat measured = bst_quat_from_rotvec(
         bst_quat_rotate(bst_quat_conj(fix->q_cam_from_gcrf), fix->error_cam_rad));
     double sigma =
@@ -54,7 +54,7 @@ bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fi
     double p_er = e->p_er + dt * e->p_rr + e->density * dt * dt / 2.0;
     double p_rr = e->p_rr + e->density * dt;
     bst_vec3 innovation = bst_quat_to_rotvec(bst_quat_mul(measured, bst_quat_conj(prior)));
-    /* across the boresight only: the stars tell the roll about it much less well */
+    /* across the boresight only: stars determine the roll much less accurately */
     bst_vec3 boresight = bst_quat_rotate(bst_quat_conj(fix->q_cam_from_gcrf), (bst_vec3){0, 0, 1});
     double across = bst_vec3_norm(bst_vec3_cross(innovation, boresight));
     double s = p_ee + r;

@@ -1,5 +1,4 @@
-/* The onboard estimate of what is wrong with the telemetry's attitude: the rotation that the stars
- * show, and how fast it grows. */
+/* Observer of the attitude telemetry error: the rotation measured by the stars, and its rate. */
 #ifndef BST_CONTROL_LOOP_POINTING_ERROR_H
 #define BST_CONTROL_LOOP_POINTING_ERROR_H
 
@@ -35,31 +34,36 @@ typedef struct bst_pointing_error {
     double sigma_floor_rad;
     double initial_sigma_rad, initial_rate_sigma_radps;
     bool started;
-    int64_t tick; /* of validity */
+    int64_t tick; /* time of validity */
     bst_quat error;
     bst_vec3 rate_gcrf_radps;
     double p_ee, p_er, p_rr;
     int32_t taken;    /* fixes since the start */
-    int32_t rejected; /* fixes in a row */
+    int32_t rejected; /* rejected fixes in a row */
 } bst_pointing_error;
 
-/* disturbance_rms_rad is radial (two axes). */
+/* Initialises the observer; disturbance_rms_rad is radial (two axes). */
 void bst_pointing_error_init(bst_pointing_error *e, double disturbance_rms_rad,
                              double disturbance_cutoff_hz, double sigma_floor_rad,
                              double initial_sigma_rad, double initial_rate_sigma_radps);
 
-/* Takes a fix in; invalid ones and ones older than the state change nothing. A fix that is off by
- * more than 8 sigma is left out, but not more than three in a row (fewer after fewer than five
- * fixes, none after two, which only define error and rate): then the filter starts afresh from it.
- * Returns whether the fix was used. */
+/* Updates the observer with an attitude fix. Invalid fixes and fixes older than the state are
+ * ignored. A fix off by more than 8 sigma is rejected, but not more than three in a row; then the
+ * filter restarts from it. The limit is lower after fewer than five fixes, and zero after two,
+ * which only define error and rate.
+ *
+ * Returned:  true if the fix was used */
 bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fix,
                                double tick_rate_hz);
 
-/* The error predicted to a tick (any, before or after the last fix). */
+/* Error predicted to a tick, before or after the last fix. */
 bst_quat bst_pointing_error_at(const bst_pointing_error *e, int64_t tick, double tick_rate_hz);
 
-/* Takes corrections off commanded directions: [0] of a tick, [1] and [2] half_s seconds later
- * and earlier. Gives the direction without its correction and its rate, rad/s. */
+/* Removes corrections from commanded directions: [0] at a tick, [1] and [2] half_s seconds later
+ * and earlier.
+ *
+ * Returned:  *direction   without its correction
+ *            *rate_radps  its rate, rad/s */
 void bst_pointing_error_uncorrect(const bst_quat correction[3], const bst_vec3 corrected[3],
                                   double half_s, bst_vec3 *direction, bst_vec3 *rate_radps);
 

@@ -11,8 +11,9 @@ static const double two_pi = 2.0 * BST_PI;
     1e-5 /* of half the rate: 1 - z^-1 of a double pole keeps five digits there \
           */
 #define GRID_RATIO 1.01
-#define TURN_MAX 0.2 /* rad that 1 + L may turn, or relative change of |L|, between points */
-#define DEEPEST 30   /* halvings between two points of the grid */
+/* largest change of arg(1 + L), rad, or relative change of |L|, between points */
+#define TURN_MAX 0.2
+#define DEEPEST 30 /* most bisections of a grid interval */
 #define BISECTIONS 60
 
 typedef struct point {
@@ -20,13 +21,13 @@ typedef struct point {
     double complex l;
 } point;
 
-/* What is gathered as the curve is followed upwards. */
+/* State while the Nyquist curve is followed towards higher frequencies. */
 typedef struct walk {
     const bst_loop *loop;
     bool finite;
-    double turned;                                 /* arg(1 + L) so far */
+    double turned;                                 /* arg(1 + L) accumulated */
     double up, down, up_hz, worst_up, worst_up_hz; /* gain factors; see finish */
-    double phase_margin, delay_margin;             /* least */
+    double phase_margin, delay_margin;             /* smallest so far */
     double crossover_hz;
     double peak, peak_hz;
 } walk;
@@ -35,6 +36,7 @@ static double complex open_at(const bst_loop *loop, double omega) {
     return loop->open(loop->user, omega);
 }
 
+/* |L| - 1: zero at a gain crossover. */
 static double over_one(double complex l) {
     return cabs(l) - 1.0;
 }
@@ -43,7 +45,7 @@ static double complementary_over_3db(double complex l) {
     return cabs(l) - sqrt(0.5) * cabs(1.0 + l);
 }
 
-/* Where `of` changes sign between two frequencies. */
+/* Frequency between low and high at which `of` changes sign. */
 static double crossing(const bst_loop *loop, double low, double high,
                        double (*of)(double complex)) {
     bool low_sign = of(open_at(loop, low)) > 0.0;
@@ -58,7 +60,7 @@ static double crossing(const bst_loop *loop, double low, double high,
     return 0.5 * (low + high);
 }
 
-/* A passage through the negative real axis. */
+/* Records a crossing of the negative real axis. */
 static void phase_crossing(walk *w, double omega) {
     double gain = 1.0 / cabs(open_at(w->loop, omega)), hz = omega / two_pi;
     if (gain > 1.0 && gain < w->up) {
@@ -74,6 +76,7 @@ static void phase_crossing(walk *w, double omega) {
     }
 }
 
+/* Records a crossing of |L| = 1. */
 static void gain_crossing(walk *w, double omega, bool falling) {
     double margin = bst_wrap_angle(carg(open_at(w->loop, omega)) + BST_PI);
     w->phase_margin = fmin(w->phase_margin, fabs(margin));
@@ -121,7 +124,7 @@ static int by_value(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* The next frequency of the walk: the grid's, or round a hint before it. */
+/* Next frequency: of the grid, or a hint before it. */
 static double next_omega(const bst_loop *loop, const double *stops, int stop_count, int *stop,
                          double omega, double end) {
     double next = fmin(omega * GRID_RATIO, end);
@@ -134,7 +137,7 @@ static double next_omega(const bst_loop *loop, const double *stops, int stop_cou
     return *stop < stop_count && stops[*stop] < next ? stops[*stop] : next;
 }
 
-/* Poles at z = 1, by the slope at the start of the curve. */
+/* Number of poles at z = 1, from the slope of |L| at the lowest frequency. */
 static int poles_at_one(const point *low, const point *next) {
     double slope = log(cabs(low->l) / cabs(next->l)) / log(next->omega / low->omega);
     return slope > 0.5 ? (int)lround(slope) : 0;
@@ -188,7 +191,7 @@ static void finish(const walk *w, bst_loop_margins *out) {
     out->gain_margin_db = isfinite(up) ? 20.0 * log10(up) : INFINITY;
     out->phase_crossover_hz = isfinite(up) ? (stable ? w->up_hz : w->worst_up_hz) : 0.0;
     if (!stable && !isfinite(up)) {
-        out->gain_margin_db = -INFINITY; /* at any gain */
+        out->gain_margin_db = -INFINITY; /* unstable at any gain */
     }
     out->phase_margin_deg = stable ? w->phase_margin / BST_DEG_RAD : -w->phase_margin / BST_DEG_RAD;
     out->delay_margin_s = stable ? w->delay_margin : 0.0;
@@ -203,7 +206,8 @@ static double complex numerator_and_denominator(const void *user, double omega) 
     return loop->denominator(loop->user, omega) * (1.0 + open_at(loop, omega));
 }
 
-/* Poles outside the unit circle of the open and of the closed loop, by the turns of 1 + L. */
+/* Poles outside the unit circle of the open and the closed loop, from the winding number of 1 + L.
+ */
 static bst_status count_poles(bst_ctx *ctx, const bst_loop *loop, int turns, int *open_poles,
                               int *closed) {
     *open_poles = loop->unstable_poles;
@@ -261,7 +265,7 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins
             if (start) {
                 w.peak = 1.0 / cabs(1.0 + a.l);
                 w.peak_hz = a.omega / two_pi;
-                /* from -omega to omega past z = 1: half a turn back for each pole there */
+                /* from -omega to omega past z = 1: minus half a turn per pole there */
                 double there = -BST_PI * poles_at_one(&a, &b);
                 closing = there + bst_wrap_angle(2.0 * carg(1.0 + first.l) - there);
             }
@@ -269,7 +273,7 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins
         }
         a = b;
     }
-    /* at half the rate the curve of a sampled loop meets its mirror image on the real axis */
+    /* at the Nyquist frequency a sampled loop's curve meets its mirror image on the real axis */
     if (creal(a.l) < 0.0 && fabs(cimag(a.l)) < 1e-6 * fabs(creal(a.l))) {
         phase_crossing(&w, end);
     }

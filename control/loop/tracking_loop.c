@@ -7,8 +7,8 @@
 
 static const double two_pi = 2.0 * BST_PI;
 
-/* What is missing of the mount's motion since a change of the command, by time since: its values
- * at multiples of dt_s and their integrals. */
+/* Lag of the mount behind a change of the command, by time since: values at multiples of dt_s and
+ * their integrals. */
 typedef struct deficit {
     double *value, *integral;
 } deficit;
@@ -81,7 +81,7 @@ void bst_tracking_loop_free(bst_tracking_loop *loop) {
     }
 }
 
-/* Linear between samples; 0 before the change and when the mount has come to rest. */
+/* Linear interpolation between samples; 0 before the change and after the mount has settled. */
 static double value_of(const bst_tracking_loop *loop, const deficit *d, double x) {
     if (loop->count == 0) {
         return d == &loop->step && x >= 0.0 && x < loop->delay_s ? 1.0 : 0.0;
@@ -94,7 +94,7 @@ static double value_of(const bst_tracking_loop *loop, const deficit *d, double x
     return d->value[(int)i] + part * (d->value[(int)i + 1] - d->value[(int)i]);
 }
 
-/* From the change to x. */
+/* Integral from the change to x. */
 static double integral_of(const bst_tracking_loop *loop, const deficit *d, double x) {
     if (x <= 0.0) {
         return 0.0;
@@ -115,14 +115,14 @@ static double mean_of(const bst_tracking_loop *loop, const deficit *d, double fr
                      : value_of(loop, d, from);
 }
 
-/* The mount's angle, averaged from `from` to `to` after the middle of frame 0's exposure, when the
- * correction that frame k brings is (c + r t) exp(j w k T), t from its time of effect on. */
+/* Mount angle averaged from `from` to `to` after mid-exposure of frame 0, if frame k's correction
+ * is (c + r t) exp(j w k T), t from its time of effect. */
 static double complex angle_mean(const bst_tracking_loop *loop, double w, double complex c,
                                  double complex r, double from, double to) {
     const bst_tracking_timing *t = &loop->timing;
     double period = t->period_s, sw = t->switch_s;
     double complex back = cexp(-I * w * period), sum = 0.0;
-    /* the correction of frame -n holds from sw - n T to sw - (n - 1) T */
+    /* the correction of frame -n is active from sw - n T to sw - (n - 1) T */
     double first = ceil((sw - to) / period - 1e-9), last = ceil((sw - from) / period - 1e-9);
     for (double n = first; n <= last; n++) {
         double a = n < last ? sw - n * period : from;
@@ -131,7 +131,7 @@ static double complex angle_mean(const bst_tracking_loop *loop, double w, double
         sum += share * cexp(-I * w * period * n) *
                (c + r * (0.5 * (a + b) + n * period - t->effect_s));
     }
-    /* at each change the mount falls behind by the jump of the angle and of the rate */
+    /* at each change the mount lags by the jumps of angle and rate */
     double late = sw - t->effect_s;
     double complex jump = c + r * late - back * (c + r * (period + late)), kink = r * (1.0 - back);
     double rest = loop->count > 0 ? loop->count * loop->dt_s : loop->delay_s;
@@ -153,10 +153,9 @@ double complex bst_tracking_plant(const void *user, double w) {
     return plant_later(user, w, 0.0);
 }
 
-/* What a measurement gives the observer: the correction's angle at its time of effect, and its
- * rate. */
-static void observed(const bst_tracking_loop *loop, double w, double complex *c,
-                     double complex *r) {
+/* Observer's output for a measurement: correction angle at the time of effect, and rate. */
+static void observer_output(const bst_tracking_loop *loop, double w, double complex *c,
+                            double complex *r) {
     double period = loop->timing.period_s, alpha = loop->observer.alpha, beta = loop->observer.beta;
     double complex back = cexp(-I * w * period);
     double complex predicted = back * (alpha + beta / (1.0 - back)) / (1.0 - back);
@@ -165,17 +164,17 @@ static void observed(const bst_tracking_loop *loop, double w, double complex *c,
     *c = (predicted + alpha) * innovation + *r * loop->timing.effect_s;
 }
 
-/* H: the motion in the frames, late_s late, over the observer's measurement. */
-static double complex shown(const bst_tracking_loop *loop, double w, double late_s) {
+/* H: motion in the frames, late_s late, relative to the observer's measurement. */
+static double complex motion_in_frames(const bst_tracking_loop *loop, double w, double late_s) {
     double half = 0.5 * loop->timing.exposure_s;
     double complex c, r;
-    observed(loop, w, &c, &r);
+    observer_output(loop, w, &c, &r);
     return angle_mean(loop, w, c, r, -half - late_s, half - late_s);
 }
 
 double complex bst_tracking_denominator(const void *user, double w) {
     const bst_tracking_loop *loop = user;
-    return loop->observes ? 1.0 - shown(loop, w, 0.0) : 1.0;
+    return loop->observes ? 1.0 - motion_in_frames(loop, w, 0.0) : 1.0;
 }
 
 double complex bst_tracking_open_later(const void *user, double w, double later_s) {
@@ -184,7 +183,7 @@ double complex bst_tracking_open_later(const void *user, double w, double later_
         return bst_compensator_response(&loop->compensator, w) * plant_later(loop, w, later_s);
     }
     const bst_tracking_observer *o = &loop->observer;
-    return o->motion_gain * shown(loop, w, o->motion_late_s + later_s) /
+    return o->motion_gain * motion_in_frames(loop, w, o->motion_late_s + later_s) /
            bst_tracking_denominator(loop, w);
 }
 
@@ -202,16 +201,16 @@ bst_loop bst_tracking_as_loop(const bst_tracking_loop *tracking) {
                       .open_later = tracking->observes ? bst_tracking_open_later : NULL};
 }
 
-/* What a frame's measurement without the mount's own part gives: the correction's angle at its
- * time of effect, and its rate. */
-static void corrected_by(const bst_tracking_loop *loop, double w, double complex *c,
-                         double complex *r) {
+/* Correction from a frame's measurement without the mount's own contribution: angle at its time of
+ * effect, and rate. */
+static void correction_of(const bst_tracking_loop *loop, double w, double complex *c,
+                          double complex *r) {
     if (loop->observes) {
         const bst_tracking_observer *o = &loop->observer;
-        observed(loop, w, c, r);
+        observer_output(loop, w, c, r);
         if (o->motion_gain != 1.0 || o->motion_late_s != 0.0) {
-            double complex wrong =
-                o->motion_gain * shown(loop, w, o->motion_late_s) - shown(loop, w, 0.0);
+            double complex wrong = o->motion_gain * motion_in_frames(loop, w, o->motion_late_s) -
+                                   motion_in_frames(loop, w, 0.0);
             *c /= 1.0 + wrong;
             *r /= 1.0 + wrong;
         }
@@ -223,10 +222,11 @@ static void corrected_by(const bst_tracking_loop *loop, double w, double complex
     *c = *r * period * back / (1.0 - back);
 }
 
-/* The mount's angle at an offset over what the frames measure without the mount's own part. */
+/* Mount angle at an offset relative to the frames' measurement without the mount's own
+ * contribution. */
 static double complex correction(const bst_tracking_loop *loop, double w, double offset_s) {
     double complex c, r;
-    corrected_by(loop, w, &c, &r);
+    correction_of(loop, w, &c, &r);
     return angle_mean(loop, w, c, r, offset_s, offset_s);
 }
 
@@ -240,8 +240,7 @@ double complex bst_tracking_noise(const bst_tracking_loop *loop, double w, doubl
     return -correction(loop, w, offset_s);
 }
 
-/* Midpoints of the integral over a band: enough for each frame rate in it, so that its folded
- * parts are met. */
+/* Midpoints of the integral over a band: enough per frame rate to cover its aliased parts. */
 enum { BAND_POINTS = 400, BAND_POINTS_MAX = 20000, NOISE_POINTS = 2000 };
 
 double bst_tracking_variance(const bst_tracking_loop *loop, const bst_tracking_band *bands,
@@ -271,7 +270,7 @@ double bst_tracking_noise_gain(const bst_tracking_loop *loop) {
 }
 
 double bst_tracking_lag(const bst_tracking_loop *loop) {
-    /* the rejection goes as j w lag towards zero frequency */
+    /* rejection is j w lag towards zero frequency */
     double w = 1e-5 * BST_PI / loop->timing.period_s;
     return cabs(bst_tracking_rejection(loop, w, 0.0)) / w;
 }

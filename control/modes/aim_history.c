@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
-/* Room for jumps, of which each takes a sample more. */
+/* Spare samples for jumps, each of which needs one. */
 enum { SPARE = 32 };
 
 void bst_aim_history_init(bst_aim_history *history, double tick_rate_hz, double reach_s) {
@@ -41,7 +41,7 @@ void bst_aim_history_add(bst_aim_history *history, int64_t tick, bst_vec3 direct
     bool left_out = newest && history->last.tick > newest->tick;
     if (!newest) {
         keep(history, sample, false);
-    } else if (again && !left_out) { /* in place of the one that was kept */
+    } else if (again && !left_out) { /* replaces the stored sample of the same tick */
         history->kept--;
         keep(history, sample, newest->joined && !jumped);
     } else {
@@ -57,7 +57,7 @@ void bst_aim_history_add(bst_aim_history *history, int64_t tick, bst_vec3 direct
     history->last = sample;
 }
 
-/* Cubic by the values and rates at both ends. */
+/* Cubic Hermite interpolation of directions from values and rates at both ends. */
 static bst_vec3 between(const bst_aim_history *history, const bst_aim_sample *a,
                         const bst_aim_sample *b, int64_t tick) {
     double dt = (double)(b->tick - a->tick) / history->tick_rate_hz;

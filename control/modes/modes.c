@@ -1,11 +1,12 @@
-/* The mode logic: what brings one mode after another. */
+/* Mode logic of the controller: transitions between search, acquisition and tracking. */
 #include "control/control_internal.h"
 
-/* Greatest angular acceleration of a cue: a pass at 100 km and 15 km/s has 1.5e-2 rad/s^2. */
+/* Largest angular acceleration of a cue: a pass at 100 km and 15 km/s has 1.5e-2 rad/s^2. */
 #define CUE_ACCEL_RADPS2 2e-2
-/* The cue is looked at for jumps no more often than this. */
+/* Least interval between tests for jumps of the cue. */
 #define WATCH_S 0.05
 
+/* Holds a track as the aim. */
 static bst_status hold(bst_ctx *ctx, bst_control *c, const bst_track *track, int64_t tick) {
     c->held.id = track->id;
     c->held.tick = tick;
@@ -23,8 +24,8 @@ static const bst_track *find_track(const bst_tracks *tracks, int64_t id) {
     return NULL;
 }
 
-/* Distance of a track's place from the true boresight of its frame, px; when the frame gave no
- * attitude, of its place now from where the boresight is believed to be now. */
+/* Distance of a track from the true boresight of its frame, px; without a frame attitude, of its
+ * current position from the estimated boresight. */
 static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
                                const bst_track *track) {
     bst_quat q;
@@ -43,18 +44,18 @@ static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
     return bst_vec3_angle(v, (bst_vec3){0, 0, 1}) / c->env.pixel_rad;
 }
 
+/* Records the loss of the held target. */
 static void lose(bst_control *c, int64_t tick) {
     c->lost = c->held;
     c->lost_tick = tick;
 }
 
-/* A target that its orbit hides, or that has not been seen since: the prediction is all there is.
- */
+/* Handles a target that is occulted or undetected: only its prediction is available. */
 static bst_status observe_hidden(bst_ctx *ctx, bst_control *c, int64_t tick,
                                  const bst_tracks *tracks, const bst_track *target) {
     BST_TRY(hold(ctx, c, target, tracks->tick));
     if (target->hidden == BST_HIDDEN_AWAITED) {
-        /* what is searched about moves on with the prediction */
+        /* the search centre follows the prediction */
         lose(c, c->mode == BST_MODE_REACQUIRE ? c->lost_tick : tick);
         bst_control_forget_aims(c);
         if (c->mode != BST_MODE_REACQUIRE) {
@@ -73,7 +74,7 @@ static bst_status observe_hidden(bst_ctx *ctx, bst_control *c, int64_t tick,
     return BST_OK;
 }
 
-/* A frame while nothing is held: take the target, or a candidate, or count the frame. */
+/* Handles a frame while no track is held: takes the target or a candidate, or counts the frame. */
 static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
                                     const bst_tracks *tracks, const bst_track *target) {
     if (target) {
@@ -132,7 +133,7 @@ bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
     }
     switch (c->mode) {
         case BST_MODE_IDLE:
-            /* without a cue only a target that the tracker names by itself can be followed */
+            /* without a cue only a target reported by the tracker can be followed */
             if (c->config.strategy == BST_CONTROL_TRACK && target) {
                 return observe_searching(ctx, c, tick, tracks, target);
             }
@@ -150,7 +151,7 @@ bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
     }
 }
 
-/* Open-loop strategies begin as soon as there is something to aim at. */
+/* Starts an open-loop strategy as soon as there is an aim. */
 static bst_status start_open_loop(bst_ctx *ctx, bst_control *c, int64_t tick) {
     bst_onboard_cue cue;
     switch (c->config.strategy) {
@@ -186,7 +187,7 @@ bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) {
     }
     if (c->env.region.kind != BST_REGION_NONE) {
         if (!c->pointing_valid) {
-            return BST_OK; /* how the field lies to the region is not known yet */
+            return BST_OK; /* the region's orientation in the field is not known yet */
         }
         c->search_since_tick = tick;
         return bst_control_start_search(ctx, c, BST_MODE_SEARCH, tick,
@@ -201,12 +202,12 @@ bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) {
     return BST_OK;
 }
 
-/* Modes in which nothing is held. */
+/* True for modes in which no track is held. */
 static bool is_looking(int mode) {
     return mode == BST_MODE_SLEW || mode == BST_MODE_SEARCH || mode == BST_MODE_REACQUIRE;
 }
 
-/* The search's end when it has lasted too long. */
+/* Ends a search that has reached its timeout. */
 static bool give_up(bst_control *c, int64_t tick) {
     if (!is_looking(c->mode)) {
         c->search_since_tick = tick;
@@ -221,7 +222,7 @@ static bool give_up(bst_control *c, int64_t tick) {
     return true;
 }
 
-/* A cue that is suddenly elsewhere, or is there again. */
+/* Detects a jump or the return of the cue. */
 static bst_status watch_cue(bst_ctx *ctx, bst_control *c, int64_t tick) {
     bool valid;
     bst_vec3 now;

@@ -1,12 +1,13 @@
-/* Where the boresight is to be. */
+/* Pointing reference: direction of the aim over time. */
 #include "control/control_internal.h"
 
-/* An aim is kept for so many times the interval over which rates are taken: 1 s. */
+/* Lifetime of a cached aim, in half intervals of rate differences: 1 s. */
 #define KEPT_OVER_HALF 4
-/* So far from its telemetry the observer's motion is taken to change evenly. */
+/* Interval about the navigation telemetry in which the observer's acceleration is taken as
+ * constant. */
 #define FALL_S 2.0
-/* Fifth difference up to which aims are interpolated: what that misses of smooth motion is 200
- * times less, and aims worked out with different telemetry differ by 1e-10. */
+/* Largest fifth difference at which aims are interpolated: the error for smooth motion is 200 times
+ * less, and aims computed with different telemetry differ by 1e-10. */
 #define SMOOTH_RAD 1e-9
 
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,
@@ -19,7 +20,7 @@ static bst_status cue_direction_at(bst_ctx *ctx, const bst_control *c, int64_t t
     return c->env.cue_direction_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), valid, out);
 }
 
-/* A held track at a tick. Its rate changes along the arc as the cue's does. */
+/* Direction of a held track at a tick; its rate changes along the arc as the cue's does. */
 static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_held *held,
                           int64_t tick, bst_vec3 *direction) {
     double dt = (double)(tick - held->tick) / c->env.tick_rate_hz;
@@ -28,7 +29,7 @@ static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_
     bool valid;
     bst_vec3 now;
     BST_TRY(cue_direction_at(ctx, c, tick, &valid, &now));
-    /* an arc across a jump of the cue is not the target's */
+    /* an arc across a jump of the cue is not the target's motion */
     if (then->valid && valid && held->tick > c->watch.jump_tick) {
         bst_vec3 straight = bst_vec3_axpy(then->direction_gcrf, dt, then->rate_gcrf_radps);
         d = bst_vec3_add(d, bst_vec3_sub(now, straight));
@@ -37,6 +38,7 @@ static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_
     return BST_OK;
 }
 
+/* Direction at a search tile's offset. */
 static bst_vec3 offset_by(bst_vec3 d, bst_vec3 x_axis, bst_search_tile tile) {
     bst_vec3 e1 = bst_vec3_axpy(x_axis, -bst_vec3_dot(x_axis, d), d);
     e1 = bst_vec3_norm(e1) > 1e-6 ? bst_vec3_unit(e1) : bst_vec3_perpendicular(d);
@@ -65,7 +67,7 @@ bst_status bst_control_expected_rate(bst_ctx *ctx, const bst_control *c, int64_t
     return BST_OK;
 }
 
-/* The present place of a search in the region. */
+/* Direction of the current search tile of a region. */
 static bst_status tile_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_vec3 *direction) {
     bst_search_tile tile = c->search.tile[c->search_step];
     if (bst_control_moves_with_region(c)) {
@@ -77,7 +79,7 @@ static bst_status tile_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_
     return BST_OK;
 }
 
-/* Angle along the region's middle of a scan that goes to and fro at a constant rate. */
+/* Angle along the region's centre line of a scan to and fro at a constant rate. */
 static double scanned_rad(const bst_control *c, int64_t tick) {
     double rate = c->config.scan_rate_arcsec_per_s * BST_ARCSEC_RAD;
     double length = 2.0 * c->env.region.half_length_rad;
@@ -166,7 +168,7 @@ static bool held_in_body(const bst_control *c) {
     return c->mode == BST_MODE_FIXED && c->config.fixed_frame == BST_CONTROL_FIXED_BODY;
 }
 
-/* What aberrates a direction at a tick that navigation's telemetry is not of: the observer falls.
+/* Aberration at a tick other than that of the navigation telemetry: the observer is in free fall.
  */
 static bst_light_aberration aberration_at(const bst_control *c, int64_t tick) {
     const bst_nav_telemetry *nav = &c->nav;
@@ -178,9 +180,9 @@ static bst_light_aberration aberration_at(const bst_control *c, int64_t tick) {
         .sun_m = nav->sun_m});
 }
 
-/* Where the aim of a tick is kept, if it is known. */
+/* Cache slot of the aim at a tick. */
 static bst_control_aimed *aimed_at(bst_control *c, int64_t tick) {
-    /* commands come at a fixed period, of which Fibonacci hashing spreads the multiples evenly */
+    /* commands have a fixed period; Fibonacci hashing spreads its multiples evenly */
     uint64_t spread = (uint64_t)tick * UINT64_C(0x9E3779B97F4A7C15);
     bst_control_aimed *aimed = &c->aimed[spread >> 57];
     _Static_assert(BST_CONTROL_AIMED == 1 << (64 - 57), "the hash's greatest value");
@@ -202,7 +204,7 @@ static bst_status work_out(bst_ctx *ctx, const bst_control *c, int64_t tick,
     bool valid;
     bst_vec3 d = {0.0, 0.0, 0.0};
     BST_TRY(bst_control_aim(ctx, c, tick, &valid, &d));
-    if (valid && !held_in_body(c)) { /* else, where the stars are does not matter */
+    if (valid && !held_in_body(c)) { /* otherwise the star directions do not matter */
         bst_light_aberration aberration = aberration_at(c, tick);
         bst_quat error = bst_control_correction_at(c, tick);
         d = bst_quat_rotate(error, bst_light_aberration_apply(&aberration, d));
@@ -211,7 +213,7 @@ static bst_status work_out(bst_ctx *ctx, const bst_control *c, int64_t tick,
     return BST_OK;
 }
 
-/* Whether the aim goes on as it goes until it is forgotten, and will be asked for here again. */
+/* True if the aim is smooth until the cache is cleared, and will be requested again nearby. */
 static bool goes_smoothly(const bst_control *c, int64_t tick) {
     int64_t ahead = tick - c->nav.tick, near = KEPT_OVER_HALF * c->rate_half_ticks;
     if (ahead > near || ahead < -near) {
@@ -232,7 +234,7 @@ static bool goes_smoothly(const bst_control *c, int64_t tick) {
     }
 }
 
-/* The piece of the way that a tick is in; NULL where the way is no quintic. */
+/* Quintic piece that contains a tick; NULL if the path is not smooth there. */
 static bst_status piece_at(bst_ctx *ctx, bst_control *c, int64_t tick,
                            const bst_control_piece **out) {
     int64_t step = c->rate_half_ticks;

@@ -1,11 +1,11 @@
-/* The search: what is searched, which place comes next, and which track is worth a look. */
+/* Search mode: planning of the search, next tile, and choice of a candidate track. */
 #include "control/control_internal.h"
 
-/* How finely a region's size on the sky is looked at: places along and across it, times. */
+/* Sampling of a region's angular size on the sky: positions along and across it, times. */
 enum { ALONG = 5, ACROSS = 3, TIMES = 41 };
 /* Step of the differences that measure it. */
 #define STRETCH_STEP_RAD 1e-3
-/* Time that a place costs besides its frames, taken for how far ahead to look. */
+/* Assumed overhead of a tile besides its frames, for the look-ahead. */
 #define OVERHEAD_S 5.0
 
 void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reason) {
@@ -18,8 +18,8 @@ void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reaso
     bst_control_forget_aims(c);
 }
 
-/* Where a place of the region was when it was commanded, and how the boresight moves on from there,
- * when that is not with the region itself. */
+/* Stores the direction of a region's tile at its command, and the boresight's rate from there, if
+ * it does not follow the region. */
 static bst_status freeze_tile(bst_ctx *ctx, bst_control *c, int64_t tick) {
     if (!c->search_in_region || bst_control_moves_with_region(c)) {
         return BST_OK;
@@ -50,8 +50,8 @@ static double frame_period_s(const bst_control *c) {
                                          : 1.0;
 }
 
-/* Greatest size on the sky of a radian along and across the region, from now until it has been
- * searched; and the directions of both in its middle now. */
+/* Largest angular size on the sky of a radian along and across the region until the search ends,
+ * and the current directions of both at its centre. */
 static void measure_region(bst_control *c, int64_t tick, double ahead_s, double stretch[2],
                            bst_vec3 axes[2]) {
     bst_ctx quiet = {0}; /* beyond the end of an orbit there is no region to measure */
@@ -79,7 +79,7 @@ static void measure_region(bst_control *c, int64_t tick, double ahead_s, double 
     }
 }
 
-/* The grid of places in the region's two angles. */
+/* Plans the grid of tiles in the region's two angles. */
 static bst_status plan_region(bst_ctx *ctx, bst_control *c, int64_t tick, bst_search_area *area) {
     double width = area->field_x_rad, height = area->field_y_rad;
     double dwell_s = (double)c->config.dwell_frames * frame_period_s(c);
@@ -93,7 +93,7 @@ static bst_status plan_region(bst_ctx *ctx, bst_control *c, int64_t tick, bst_se
     if (!(stretch[0] > 0.0 && stretch[1] > 0.0)) {
         return bst_fail(ctx, BST_ERR_NUMERIC, "control: the cue's region cannot be seen from here");
     }
-    /* what shares neither the region's motion nor the boresight's drifts across the field */
+    /* objects that move neither with the region nor with the boresight drift across the field */
     if (!bst_control_moves_with_region(c)) {
         bool known;
         bst_vec3 middle, rate = {0, 0, 0};
@@ -157,7 +157,7 @@ bst_status bst_control_resume_search(bst_ctx *ctx, bst_control *c, int64_t tick,
 }
 
 bst_status bst_control_next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) {
-    /* the predicted place is the best one for as long as the prediction is good */
+    /* the predicted position is the best tile while the prediction is accurate */
     if (c->mode == BST_MODE_REACQUIRE && c->search_step == 0 &&
         tick - c->lost_tick < bst_control_ticks(c, c->config.reacquire_coast_s)) {
         return BST_OK;
@@ -170,8 +170,8 @@ bst_status bst_control_next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) {
                                                                : "not near its predicted place");
 }
 
-/* Whether a track's brightness may be the cue's. */
-static bool is_bright_enough(const bst_onboard_cue *cue, const bst_track *track) {
+/* True if a track's brightness is consistent with the cue. */
+static bool is_brightness_consistent(const bst_onboard_cue *cue, const bst_track *track) {
     return !isfinite(cue->v_mag_sigma) ||
            fabs(track->v_mag - cue->v_mag) <= 4.0 * hypot(cue->v_mag_sigma, 0.3);
 }
@@ -197,7 +197,7 @@ bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const 
             bool known;
             BST_TRY(
                 bst_control_expected_rate(ctx, c, tracks->tick, t->direction_gcrf, &known, &rate));
-            if (!known || t->uncorrelated || !is_bright_enough(&cue, t)) {
+            if (!known || t->uncorrelated || !is_brightness_consistent(&cue, t)) {
                 continue;
             }
         }
@@ -205,11 +205,12 @@ bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const 
         double off = bst_vec3_norm(bst_vec3_sub(t->rate_gcrf_radps, rate));
         double variance = rate_sigma * rate_sigma + fmax(t->covariance[2][2], t->covariance[3][3]);
         double gate = c->config.candidate_rate_sigmas * sqrt(variance);
-        /* a rate so uncertain that the track might as well stand still says nothing */
+        /* a rate compatible with zero carries no information */
         if (off > gate || gate > widest) {
             continue;
         }
-        double score = t->hits + 1.0 - off / gate; /* more hits first, then the nearer rate */
+        /* more hits first, then the smaller rate difference */
+        double score = t->hits + 1.0 - off / gate;
         if (score > best) {
             best = score;
             *out = t;
@@ -218,8 +219,8 @@ bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const 
     return BST_OK;
 }
 
-/* Whether a frame with this mid-exposure was exposed wholly after the arrival. An exposure of
- * unknown length is taken to fill its frame period. */
+/* True if a frame was exposed entirely after the arrival. An exposure of unknown length is assumed
+ * to fill its frame period. */
 static bool at_rest(const bst_control *c, int64_t mid_tick) {
     int64_t half = c->config.exposure_s > 0.0 ? bst_control_ticks(c, 0.5 * c->config.exposure_s)
                                               : c->frame_interval_ticks / 2;
@@ -228,7 +229,7 @@ static bool at_rest(const bst_control *c, int64_t mid_tick) {
 
 bst_status bst_control_count_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
                                    const bst_tracks *tracks) {
-    /* stars that give no valid attitude: the frame could show nothing */
+    /* stars without a valid attitude: the frame is unusable */
     bool wasted = tracks->attitude.stars > 0 && !tracks->attitude.valid;
     if (!wasted && at_rest(c, tracks->tick) && ++c->frames >= c->config.dwell_frames) {
         return bst_control_next_tile(ctx, c, tick);

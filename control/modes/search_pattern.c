@@ -4,12 +4,13 @@
 
 #include "boresight/vec.h"
 
-/* Fields on each side of the middle. */
+/* Number of fields on each side of the centre. */
 static int reach(double extent, double field, double step) {
     double need = ceil((extent - 0.5 * field) / (step * field) - 1e-9);
     return (int)fmin(fmax(need, 0.0), 0.5 * (BST_SEARCH_MAX_TILES - 1));
 }
 
+/* Position angle of a tile, from +x towards +y. */
 static double angle_of(const bst_search_tile *t) {
     double a = atan2(t->y_rad, t->x_rad);
     return a < -1e-12 ? a + 2.0 * BST_PI : a;
@@ -23,7 +24,7 @@ static bool before(const bst_search_tile *a, const bst_search_tile *b) {
     return angle_of(a) < angle_of(b);
 }
 
-/* Puts a tile in its place by distance. */
+/* Inserts a tile in order of distance. */
 static void insert(bst_search *search, bst_search_tile tile) {
     int k = search->count++;
     for (; k > 0 && before(&tile, &search->tile[k - 1]); k--) {
@@ -32,7 +33,7 @@ static void insert(bst_search *search, bst_search_tile tile) {
     search->tile[k] = tile;
 }
 
-/* Columns -nx to nx and rows -ny to ny, the first index running faster, there and back. */
+/* Lays rows (or columns) -ny to ny alternately forwards and backwards. */
 static void lay_rows(bst_search *search, int nx, int ny, double dx, double dy, bool by_column) {
     int outer = by_column ? nx : ny, inner = by_column ? ny : nx;
     for (int j = -outer; j <= outer; j++) {
@@ -44,6 +45,7 @@ static void lay_rows(bst_search *search, int nx, int ny, double dx, double dy, b
     }
 }
 
+/* Lays tiles in a spiral about the centre. */
 static void lay_spiral(bst_search *search, int nx, int ny, double dx, double dy) {
     static const int step[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
     int total = (2 * nx + 1) * (2 * ny + 1), x = 0, y = 0;

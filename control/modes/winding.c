@@ -1,4 +1,4 @@
-/* Zeros outside the unit circle, by the turns of a function about zero. */
+/* Winding numbers and delay margin: zeros outside the unit circle by the argument principle. */
 #include <math.h>
 
 #include "boresight/vec.h"
@@ -8,21 +8,23 @@ static const double two_pi = 2.0 * BST_PI;
 
 #define LOWEST_SHARE 1e-5 /* as in stability.c */
 #define GRID_RATIO 1.05
-#define TURN_MAX 0.2 /* rad, or relative change of the size, between two points */
-#define DEEPEST 30   /* halvings between two points of the grid */
+#define TURN_MAX 0.2 /* rad, or relative change of magnitude, between two points */
+#define DEEPEST 30   /* most bisections of a grid interval */
 
 typedef struct curve {
     bst_dynamics_response_fn of;
     const void *user;
 } curve;
 
+/* Angle from a to b in (-pi, pi]. */
 static double angle_between(double complex a, double complex b) {
     double angle = carg(b) - carg(a);
     return angle - two_pi * ceil(angle / two_pi - 0.5);
 }
 
-static double turned(const curve *c, double low, double complex a, double high, double complex b,
-                     int depth) {
+/* Phase turned along a curve between two frequencies, with bisection. */
+static double phase_change(const curve *c, double low, double complex a, double high,
+                           double complex b, int depth) {
     double turn = angle_between(a, b);
     bool bends = fabs(turn) > TURN_MAX || fabs(log(cabs(b) / cabs(a))) > TURN_MAX;
     if (depth == DEEPEST || !bends || high - low <= 1e-12 * high) {
@@ -30,7 +32,8 @@ static double turned(const curve *c, double low, double complex a, double high, 
     }
     double middle = 0.5 * (low + high);
     double complex m = c->of(c->user, middle);
-    return turned(c, low, a, middle, m, depth + 1) + turned(c, middle, m, high, b, depth + 1);
+    return phase_change(c, low, a, middle, m, depth + 1) +
+           phase_change(c, middle, m, high, b, depth + 1);
 }
 
 bst_status bst_loop_turns(bst_ctx *ctx, bst_dynamics_response_fn of, const void *user, double dt_s,
@@ -48,10 +51,10 @@ bst_status bst_loop_turns(bst_ctx *ctx, bst_dynamics_response_fn of, const void 
                             "the loop's response is not finite, or zero, near %g Hz",
                             next / two_pi);
         }
-        if (first) { /* zeros (or, negative, poles) at z = 1, passed by on the outside */
+        if (first) { /* zeros (or, negative, poles) at z = 1, passed on the outside */
             at_one = BST_PI * round(log(cabs(b) / cabs(a)) / log(next / omega));
         }
-        sum += turned(&c, omega, a, next, b, 0);
+        sum += phase_change(&c, omega, a, next, b, 0);
         omega = next;
         a = b;
     }
@@ -73,7 +76,7 @@ bst_status bst_loop_zeros_outside(bst_ctx *ctx, bst_dynamics_response_fn of, con
                                  turns);
 }
 
-/* 1 + L with a delay more. */
+/* 1 + L with an additional delay. */
 typedef struct delayed_loop {
     const bst_loop *loop;
     double later_s;
@@ -93,9 +96,8 @@ static bst_status is_unstable(bst_ctx *ctx, const bst_loop *loop, int unstable_p
     return BST_OK;
 }
 
-/* Steps in which delays are tried: an eighth of a first estimate, then this share of the sampling
- * interval, finer than the intervals of delay in which a loop is unstable; and halvings of the
- * last one. */
+/* Delay steps: an eighth of the first estimate, then this share of the sampling interval, finer
+ * than the delay intervals in which a loop is unstable; and bisections of the last step. */
 #define STEP_SHARE 0.15
 enum { STEPS_TO_ESTIMATE = 8, STEPS_MAX = 400, HALVINGS = 14 };
 
@@ -114,7 +116,7 @@ bst_status bst_loop_delay_margin(bst_ctx *ctx, const bst_loop *loop, int unstabl
             low = next;
         }
     }
-    if (isinf(high)) { /* so long a delay that its estimate by the phase serves */
+    if (isinf(high)) { /* so long a delay that the phase estimate suffices */
         *out = estimate_s > low ? estimate_s : INFINITY;
     }
     for (int i = 0; i < HALVINGS && isfinite(high); i++) {

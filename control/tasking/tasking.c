@@ -4,21 +4,23 @@
 
 #include "control/tasking/tasking_internal.h"
 
-/* How much longer than wished counts. */
+/* Largest urgency: time since the last observation over the wanted revisit time. */
 #define URGENCY_MOST 4.0
-/* Looks at single objects in one plan: what is not found by then is left to the next. */
+/* Most visibility computations per plan; remaining objects are left to the next plan. */
 enum { TRIES = 200 };
-/* An object that is hidden, too fast or out of reach is tried again after this time. */
+/* Retry time of an object that is hidden, too fast or out of reach. */
 #define HIDDEN_RETRY_S 120.0
 
 static double seconds_of(const bst_tasking *t, int64_t tick) {
     return (double)tick / t->tick_rate_hz;
 }
 
+/* Target-list line of an object. */
 static const bst_tasking_line *line_of(const bst_tasking *t, int object) {
     return (const bst_tasking_line *)t->config.targets.items + t->line[object];
 }
 
+/* True if an object's apsides are within a line's bounds. */
 static bool fits(const bst_tasking_line *line, double perigee_km, double apogee_km) {
     return !*line->object && perigee_km >= line->perigee_km[0] &&
            perigee_km <= line->perigee_km[1] && apogee_km >= line->apogee_km[0] &&
@@ -38,7 +40,7 @@ static bst_status list_targets(bst_ctx *ctx, bst_tasking *t) {
             t->line[i] = (int16_t)(fits(&lines[k], low, high) ? k : -1);
         }
     }
-    /* a line of its own goes before those by orbit that come after it */
+    /* a line for a named object takes precedence over later lines by orbit */
     for (int k = t->config.targets.count - 1; k >= 0; k--) {
         if (!*lines[k].object) {
             continue;
@@ -138,7 +140,7 @@ static float *not_before(bst_tasking *t, int sensor, int object) {
     return &t->not_before[(size_t)sensor * (size_t)t->object_count + (size_t)object];
 }
 
-/* How the sensor's task has ended, BST_TASK_NONE: not yet. */
+/* End reason of the sensor's task, BST_TASK_NONE: it continues. */
 static bst_task_end ending(const bst_tasking *t, const bst_tasking_sensor *s, double now_s) {
     if (s->frames >= s->frames_wanted) {
         return BST_TASK_DONE;
@@ -149,7 +151,7 @@ static bst_task_end ending(const bst_tasking *t, const bst_tasking_sensor *s, do
     return now_s > s->arrival_s + t->config.find_timeout_s ? BST_TASK_NOT_FOUND : BST_TASK_NONE;
 }
 
-/* Greatest value first, then the order of the catalogue. */
+/* qsort order: largest value first, then catalogue order. */
 static int compare_choices(const void *a, const void *b) {
     const bst_tasking_choice *x = a, *y = b;
     if (x->value != y->value) {
@@ -158,7 +160,7 @@ static int compare_choices(const void *a, const void *b) {
     return (x->object > y->object) - (x->object < y->object);
 }
 
-/* Lists what is due, free, and at first sight visible. */
+/* Lists the targets that are due, unassigned, and visible by a quick check. */
 static int list_choices(bst_tasking *t, int sensor, double now_s) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const bst_tasking_config *c = &t->config;
@@ -169,7 +171,7 @@ static int list_choices(bst_tasking *t, int sensor, double now_s) {
             continue;
         }
         const bst_tasking_line *line = line_of(t, i);
-        /* one that was never seen is due from the start, and the more so the longer it lasts */
+        /* a target never observed is due from the start, with growing urgency */
         double since = t->seen_s[i] < 0.0 ? now_s + line->revisit_s : now_s - t->seen_s[i];
         if (since < line->revisit_s) {
             continue;
@@ -192,8 +194,8 @@ static int list_choices(bst_tasking *t, int sensor, double now_s) {
     return count;
 }
 
-/* Whether the sensor sees an object from its arrival to the last frame wanted: the sight is that of
- * the arrival, the SNR the lesser. */
+/* Visibility of an object from arrival to the last wanted frame: geometry at arrival, the smaller
+ * SNR. */
 static bst_status sees(bst_ctx *ctx, const bst_tasking *t, int sensor,
                        const bst_tasking_choice *choice, double now_s,
                        bst_tasking_visibility *out) {
@@ -210,8 +212,9 @@ static bst_status sees(bst_ctx *ctx, const bst_tasking *t, int sensor,
     return BST_OK;
 }
 
-static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
-                 const bst_tasking_choice *choice, const bst_tasking_visibility *seen) {
+/* Assigns a task to a sensor. */
+static void assign_task(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
+                        const bst_tasking_choice *choice, const bst_tasking_visibility *seen) {
     const bst_tasking_config *c = &t->config;
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick);
@@ -234,9 +237,9 @@ static void give(bst_tasking *t, int sensor, int64_t tick, bst_task_end before,
     }
 }
 
-/* The best that the sensor can see, -1: none. */
-static bst_status choose(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s, int *chosen,
-                         bst_tasking_visibility *seen) {
+/* Best target that the sensor can see, -1: none. */
+static bst_status choose_target(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s, int *chosen,
+                                bst_tasking_visibility *seen) {
     int count = list_choices(t, sensor, now_s);
     *chosen = -1;
     for (int i = 0; i < count && i < TRIES && *chosen < 0; i++) {
@@ -253,8 +256,8 @@ static bst_status choose(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s,
     return BST_OK;
 }
 
-/* Until when it is certain that the sensor's task goes on: the frames that it still wants take
- * their time, a search may last until its timeout. */
+/* Time until which the sensor's task certainly continues: its remaining frames take time, a search
+ * may last until its timeout. */
 static double certain_until_s(const bst_tasking *t, const bst_tasking_sensor *s, double now_s) {
     if (s->task.object < 0) {
         return s->next_plan_s;
@@ -268,7 +271,7 @@ int64_t bst_tasking_quiet_until(const bst_tasking *t, int sensor) {
     return t->sensors[sensor].quiet_until;
 }
 
-/* Ends the task when that is due, and chooses the next. */
+/* Ends a task that is due to end and assigns the next one. */
 static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick);
@@ -285,14 +288,14 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
             *not_before(t, sensor, s->task.object) = (float)(now_s + t->config.retry_s);
         }
     }
-    BST_TRY(choose(ctx, t, sensor, now_s, &chosen, &seen));
+    BST_TRY(choose_target(ctx, t, sensor, now_s, &chosen, &seen));
     if (chosen >= 0) {
-        give(t, sensor, tick, before, &t->choices[chosen], &seen);
+        assign_task(t, sensor, tick, before, &t->choices[chosen], &seen);
         *given = true;
     } else {
         *given = s->task.object >= 0;
         if (*given) {
-            give(t, sensor, tick, before, NULL, NULL);
+            assign_task(t, sensor, tick, before, NULL, NULL);
         }
         s->next_plan_s = now_s + t->config.replan_interval_s;
     }

@@ -1,11 +1,11 @@
-/* Which sensor looks for which object: a rule of priority, visibility and keep-out angles.
+/* Sensor tasking: assigns objects to sensors by priority, visibility and keep-out angles.
  *
- * Its inputs are those known on board: the catalogue, the spacecraft's estimated positions, their
- * mounts, and their tracks. A target is due when the revisit time of its line of the list has
- * passed since it was last seen. A free sensor takes, of all due targets that no other sensor has,
- * the one with the greatest
+ * Inputs are the onboard catalogue, the spacecraft's estimated positions, their mounts, and their
+ * tracks. A target is due once the revisit time of its list line has passed since its last
+ * observation. A free sensor takes, of all due targets that no other sensor has, the one with the
+ * largest
  *
- *   priority * min(time since seen / revisit time, 4) / (slew + settling + frames to be taken)
+ *   priority * min(time since observation / revisit time, 4) / (slew + settling + frame time)
  *
  * that it can see from its arrival until the frames are taken. */
 #ifndef BST_CONTROL_TASKING_TASKING_H
@@ -16,7 +16,7 @@
 #include "control/guidance/keep_out.h"
 #include "sim/onboard/knowledge.h"
 
-/* A line of the list of targets: an object, or all whose apsides lie within bounds. */
+/* A line of the target list: a named object, or all objects with apsides within bounds. */
 typedef struct bst_tasking_line {
     char object[64];                    /* "": by orbit */
     double perigee_km[2], apogee_km[2]; /* altitudes over the equatorial radius */
@@ -26,7 +26,7 @@ typedef struct bst_tasking_line {
 } bst_tasking_line;
 
 typedef struct bst_tasking_config {
-    bst_config_list targets; /* bst_tasking_line; the first that fits an object counts */
+    bst_config_list targets; /* bst_tasking_line; the first match applies to an object */
     double sun_keep_out_deg, moon_keep_out_deg, earth_limb_keep_out_deg, earth_limb_altitude_km;
     double min_snr, max_rate_arcsec_per_s;
     double slew_rate_deg_per_s, settle_s;
@@ -37,44 +37,45 @@ typedef struct bst_tasking_config {
 
 extern const bst_config_desc bst_tasking_config_table[];
 
-/* Why an object is not looked at, the first reason in this order. */
+/* Reason why an object cannot be observed; the first in this order. */
 typedef enum bst_tasking_why {
-    BST_WHY_NOT = 0, /* it can be seen */
+    BST_WHY_NOT = 0, /* it can be observed */
     BST_WHY_NO_ORBIT,
     BST_WHY_ITSELF,
-    BST_WHY_EARTH, /* behind the Earth, or too near its limb */
+    BST_WHY_EARTH, /* occulted by the Earth, or too near its limb */
     BST_WHY_SUN,
     BST_WHY_MOON,
     BST_WHY_SHADOW,
     BST_WHY_FAINT,
-    BST_WHY_RATE,  /* it moves too fast */
-    BST_WHY_MOUNT, /* the mount does not follow it there */
+    BST_WHY_RATE,  /* apparent rate too high */
+    BST_WHY_MOUNT, /* the mount cannot follow it there */
     BST_WHY_COUNT
 } bst_tasking_why;
 
-/* "behind the Earth or near its limb" for BST_WHY_EARTH, and so on. */
+/* Reason in words: "behind the Earth or near its limb" for BST_WHY_EARTH, and so on. */
 const char *bst_tasking_reason(int why);
 
-/* What the rule knows of a sensor. */
+/* State of a sensor in the tasking. */
 typedef struct bst_tasking_sensor {
     const bst_knowledge *knowledge;
     bst_knowledge_view *view;
     double exposure_s, period_s;
-    double noise_e, pixels; /* of a pixel; squared inverse of sum s^2, what a point's light fills */
+    /* noise_e: of a pixel; pixels: noise-equivalent area of a point source, px */
+    double noise_e, pixels;
     bool nav_known, mount_known;
     bst_nav_telemetry nav;
     bst_mount_status mount;
-    bst_keep_out_zone zones[BST_ZONE_KINDS]; /* at the last nav */
+    bst_keep_out_zone zones[BST_ZONE_KINDS]; /* at the latest navigation message */
     double zone_cosines[BST_ZONE_KINDS];
     int zone_count;
-    /* the task */
+    /* current task */
     bst_task task; /* as published; object -1: the sensor's own cue */
     bool pointed;
-    bst_vec3 direction;            /* of the last target, when it was given */
-    double given_s, arrival_s;     /* when it was given; when the sensor should be there */
-    int64_t frames, frames_wanted; /* in which it was seen */
+    bst_vec3 direction;            /* of the last target, at its assignment */
+    double given_s, arrival_s;     /* time of assignment; predicted time of arrival */
+    int64_t frames, frames_wanted; /* frames with a detection */
     double last_seen_s, next_plan_s;
-    int64_t quiet_until; /* a tick before which the task does not change */
+    int64_t quiet_until; /* lookahead: tick before which the task does not change */
 } bst_tasking_sensor;
 
 typedef struct bst_tasking_choice {
@@ -99,12 +100,16 @@ typedef struct bst_tasking {
 
 /* Number of targets that sensors can see, and the reasons for the others. */
 typedef struct bst_tasking_report {
-    int targets, seen, visible; /* of the list; seen so far; those that some sensor can see now */
-    int why[BST_WHY_COUNT];     /* of the others, the least of the sensors' reasons' order */
+    int targets, seen, visible; /* in the list; observed so far; currently visible to some sensor */
+    /* of the others: number by reason, of the sensor nearest to visibility */
+    int why[BST_WHY_COUNT];
 } bst_tasking_report;
 
-/* `members`: as in bst_module_env; outlive the rule. Free in any case. BST_ERR_CONFIG: a line names
- * no object. */
+/* Initialises the tasking.
+ *
+ * Given:     members  as in bst_module_env; must outlive the tasking
+ * Errors:    BST_ERR_CONFIG for a line that matches no object
+ * Ownership: call bst_tasking_free in any case */
 bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *tasking, const bst_tasking_config *config,
                             const bst_fleet_member *members, int member_count,
                             double tick_rate_hz) BST_MUST_CHECK;
@@ -114,7 +119,7 @@ void bst_tasking_free(bst_tasking *tasking);
 /* Updates navigation and mount of a sensor; NULL: no new message. */
 void bst_tasking_telemetry(bst_tasking *tasking, int sensor, const bst_nav_telemetry *nav,
                            const bst_mount_status *mount);
-/* Updates what a sensor has seen, from the tracks of a frame. */
+/* Updates a sensor's observations from the tracks of a frame. */
 void bst_tasking_tracks(bst_tasking *tasking, int sensor, const bst_tracks *tracks);
 
 /* Ends the task of a sensor if it is due, and gives it the next one.

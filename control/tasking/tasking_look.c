@@ -1,4 +1,4 @@
-/* Who can see what: the catalogue from where a spacecraft believes to be. */
+/* Visibility of catalogue objects from a spacecraft's estimated position. */
 #include "control/guidance/pointing_feasibility.h"
 #include "control/tasking/tasking_internal.h"
 #include "sim/optics/streak_image.h"
@@ -78,13 +78,14 @@ bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *s, bst_vec3 place_m
     return why;
 }
 
-/* For bst_pointing_feasibility_at. */
+/* Context of the callback of bst_pointing_feasibility_at. */
 typedef struct reach_user {
     const bst_tasking *tasking;
     const bst_tasking_sensor *sensor;
     int object;
 } reach_user;
 
+/* Geometry of an object for bst_pointing_feasibility_at (callback). */
 static bst_status reach_look(void *user, bst_ctx *ctx, double seconds,
                              bst_pointing_feasibility_look *out) {
     const reach_user *r = user;
@@ -121,7 +122,7 @@ static bst_status mount_reaches(bst_ctx *ctx, const bst_tasking *t, const bst_ta
 bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
                             double seconds, bst_tasking_visibility *out) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
-    const double step_s = 1.0; /* over which the rate is taken */
+    const double step_s = 1.0; /* interval of the rate difference */
     bst_ctx quiet = {0};       /* an orbit that has ended is no error here */
     bst_world_sight now, later;
     bst_world_state eye;
@@ -187,7 +188,7 @@ bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
         for (int s = 0; s < t->sensor_count && best != BST_WHY_NOT; s++) {
             bst_tasking_visibility seen;
             BST_TRY(bst_tasking_look(ctx, t, s, i, seconds, &seen));
-            /* the nearest to being seen */
+            /* the reason nearest to visibility */
             best = seen.why == BST_WHY_NOT || best == BST_WHY_COUNT || seen.why > best ? seen.why
                                                                                        : best;
         }

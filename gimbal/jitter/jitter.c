@@ -6,10 +6,10 @@
 #include "gimbal/jitter/jitter_more.h"
 #include "sim/core/simd.h"
 
-/* Rotation steps between two evaluations of the exact phase: rounding grows to about 1e-14. */
+/* Rotation steps between evaluations of the exact phase: rounding errors grow to about 1e-14. */
 #define RESYNC_STEPS 256
 
-/* A flat band, and its lines in a bst_jitter_axis. */
+/* A flat band and its lines in a bst_jitter_axis. */
 typedef struct flat_band {
     int first, lines;
     double rms_axis_rad, min_hz, max_hz;
@@ -51,9 +51,9 @@ bst_jitter_spec bst_jitter_resolved(const bst_jitter_spec *spec, double dt_s) {
     return out;
 }
 
-/* Share of a flat band that straight lines lack: (1 - cos(2 pi f dt)) / 3, in the mean, up to the
- * highest resolved frequency, all beyond. */
-static double lacking(double min_hz, double max_hz, double dt_s) {
+/* Share of a flat band's variance missing from linear interpolation at steps dt: (1 - cos(2 pi f
+ * dt)) / 3 on average up to the highest resolved frequency, all beyond. */
+static double unresolved_share(double min_hz, double max_hz, double dt_s) {
     double top_hz = fmin(fmax(BST_JITTER_RESOLVED / dt_s, min_hz), max_hz);
     double w = 2.0 * BST_PI * dt_s, width = top_hz - min_hz, mean = 0.5 * (top_hz + min_hz);
     /* mean of the cosine: cos(w mean) sin(w width / 2) / (w width / 2) */
@@ -64,10 +64,11 @@ static double lacking(double min_hz, double max_hz, double dt_s) {
 double bst_jitter_unresolved_rad2(const bst_jitter_spec *s, double dt_s) {
     double sum = 0.0;
     if (has_band(s->low_rms_rad, 0.0, s->low_cutoff_hz)) {
-        sum += s->low_rms_rad * s->low_rms_rad * lacking(0.0, s->low_cutoff_hz, dt_s);
+        sum += s->low_rms_rad * s->low_rms_rad * unresolved_share(0.0, s->low_cutoff_hz, dt_s);
     }
     if (has_band(s->high_rms_rad, s->high_min_hz, s->high_max_hz)) {
-        sum += s->high_rms_rad * s->high_rms_rad * lacking(s->high_min_hz, s->high_max_hz, dt_s);
+        sum += s->high_rms_rad * s->high_rms_rad *
+               unresolved_share(s->high_min_hz, s->high_max_hz, dt_s);
     }
     return 0.5 * sum;
 }

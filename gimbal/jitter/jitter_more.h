@@ -1,4 +1,4 @@
-/* What tables and harmonic lines add to the jitter of flat bands. */
+/* Jitter from tables and harmonic lines, in addition to the flat bands. */
 #ifndef BST_GIMBAL_JITTER_JITTER_MORE_H
 #define BST_GIMBAL_JITTER_JITTER_MORE_H
 
@@ -10,13 +10,13 @@ typedef struct bst_jitter_more {
     bst_jitter_noise noise[2]; /* low, high */
     double y_factor;
     int lines;
-    int64_t index; /* of the step that the phasors stand at; -1: none */
+    int64_t index; /* step of the phasors; -1: none */
     bst_jitter_line line[BST_JITTER_SPECTRUM_LINES];
     double re[BST_JITTER_SPECTRUM_LINES], im[BST_JITTER_SPECTRUM_LINES];
     double turn_re[BST_JITTER_SPECTRUM_LINES], turn_im[BST_JITTER_SPECTRUM_LINES];
 } bst_jitter_more;
 
-/* Adds the values at step n to out. */
+/* Adds the jitter of tables and lines at step n to out. */
 void bst_jitter_more_at(bst_jitter_more *more, int64_t n, double dt_s, double out[2]);
 
 #endif

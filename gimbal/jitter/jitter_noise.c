@@ -24,7 +24,7 @@ void bst_jitter_noise_init(bst_jitter_noise *noise, const bst_jitter_density *de
     for (int k = 0; k < HALF; k++) {
         double low = fmax(0.0, (k - 0.5) * bin_hz), high = fmin(top_hz, (k + 0.5) * bin_hz);
         double share = high > low ? bst_jitter_density_integral(density, low, high) : 0.0;
-        /* bin 0 is one bin of both signs */
+        /* bin 0 is shared by both signs */
         noise->gain[k] = sqrt(k == 0 ? 2.0 * share : share) * sqrt(0.5);
         noise->lines = share > 0.0 ? k : noise->lines;
     }
@@ -47,7 +47,8 @@ static unsigned reversed(unsigned i) {
     return r;
 }
 
-/* Sum of x[k] exp(2 pi i j k / N), input in bit-reversed order (Cooley and Tukey, radix 2). */
+/* Inverse FFT: sum of x[k] exp(2 pi i j k / N), input in bit-reversed order (Cooley and Tukey,
+ * radix 2). */
 static void transform(const bst_jitter_noise *noise, double *re, double *im) {
     for (int span = 1; span < N; span *= 2) {
         int skip = HALF / span;
@@ -85,9 +86,9 @@ static void make_block(bst_jitter_noise *noise, int64_t block) {
     noise->block[slot] = block;
 }
 
-/* The sequence at a node; block b begins at node b * HALF. Nodes before the first are in block 0
- * alone; they are never asked for at its beginning (bst_jitter_noise_at). */
-static void node(bst_jitter_noise *noise, int64_t at, double out[2]) {
+/* Noise at a node; block b starts at node b * HALF. The first half block is never requested
+ * (bst_jitter_noise_at), because it has no overlap. */
+static void noise_at_node(bst_jitter_noise *noise, int64_t at, double out[2]) {
     int64_t block = at / HALF;
     int i = (int)(at % HALF);
     out[0] = out[1] = 0.0;
@@ -104,20 +105,20 @@ static void node(bst_jitter_noise *noise, int64_t at, double out[2]) {
 }
 
 void bst_jitter_noise_at(bst_jitter_noise *noise, int64_t n, double out[2]) {
-    /* from the second block on, so that each node lies in two, and nodes before it exist */
+    /* starts at the second block, so that every node lies in two blocks and has predecessors */
     int64_t first = HALF + 2;
     if (noise->stride == 1) {
-        node(noise, first + n, out);
+        noise_at_node(noise, first + n, out);
         return;
     }
     int64_t interval = n / noise->stride;
     if (interval != noise->interval) {
         double p[4][2];
         for (int i = 0; i < 4; i++) {
-            node(noise, first + interval - 1 + i, p[i]);
+            noise_at_node(noise, first + interval - 1 + i, p[i]);
         }
         for (int a = 0; a < 2; a++) {
-            /* Lagrange's cubic through -1, 0, 1, 2 */
+            /* cubic Lagrange interpolation through -1, 0, 1, 2 */
             double d1 = p[1][a], second = p[2][a] - 2.0 * p[1][a] + p[0][a];
             double third = p[3][a] - 3.0 * p[2][a] + 3.0 * p[1][a] - p[0][a];
             noise->cubic[a][0] = d1;

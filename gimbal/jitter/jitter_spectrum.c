@@ -8,8 +8,8 @@
 #include "boresight/vec.h"
 #include "gimbal/jitter/jitter_more.h"
 
-/* One band's table: inline or of a file, scaled; owned by *out. */
-static bst_status take_table(bst_ctx *ctx, const char *key, const bst_config_list *list,
+/* Loads one band's table, inline or from a file, scaled; owned by *out. */
+static bst_status load_table(bst_ctx *ctx, const char *key, const bst_config_list *list,
                              const char *file, double scale, bst_jitter_density *out) {
     *out = (bst_jitter_density){NULL, 0};
     bst_jitter_density_point *points = NULL;
@@ -52,9 +52,9 @@ bst_status bst_jitter_spectrum_create(bst_ctx *ctx, const bst_jitter_spec *flat,
     memset(out, 0, sizeof *out);
     out->flat = *flat;
     out->y_scale = config->y_scale;
-    BST_TRY(take_table(ctx, "low", &config->low, config->low_file, unit * unit, &out->low));
+    BST_TRY(load_table(ctx, "low", &config->low, config->low_file, unit * unit, &out->low));
     bst_status status =
-        take_table(ctx, "high", &config->high, config->high_file, unit * unit, &out->high);
+        load_table(ctx, "high", &config->high, config->high_file, unit * unit, &out->high);
     if (status != BST_OK) {
         bst_jitter_spectrum_free(out);
         return status;
@@ -86,7 +86,7 @@ bool bst_jitter_spectrum_is_more(const bst_jitter_spectrum *s) {
     return s->low.count > 0 || s->high.count > 0 || s->line_count > 0;
 }
 
-/* Integral of a flat band of a radial RMS, one axis. */
+/* Variance of a flat band of given radial RMS between low and high, one axis. */
 static double flat_integral(double rms, double min_hz, double max_hz, double low, double high) {
     double width = fmin(high, max_hz) - fmax(low, min_hz);
     return max_hz > min_hz && width > 0.0 ? 0.5 * rms * rms * width / (max_hz - min_hz) : 0.0;
@@ -124,9 +124,9 @@ double bst_jitter_spectrum_variance(const bst_jitter_spectrum *s, int axis, doub
     return sum;
 }
 
-/* Of a table about x: share (1 - cos(2 pi f dt)) / 3 up to the highest resolved frequency, all
- * beyond; in narrow strips, a density's integral times the share at the middle. */
-static double lacking(const bst_jitter_density *density, double dt_s) {
+/* Unresolved variance of a table about x: share (1 - cos(2 pi f dt)) / 3 up to the highest resolved
+ * frequency, all beyond; integrated in narrow strips. */
+static double unresolved_variance(const bst_jitter_density *density, double dt_s) {
     enum { STRIPS = 4096 };
     double top = fmin(BST_JITTER_RESOLVED / dt_s, bst_jitter_density_top_hz(density)), sum = 0.0;
     for (int i = 0; i < STRIPS; i++) {
@@ -138,7 +138,8 @@ static double lacking(const bst_jitter_density *density, double dt_s) {
 }
 
 double bst_jitter_spectrum_unresolved_rad2(const bst_jitter_spectrum *s, double dt_s) {
-    double sum = (1.0 + s->y_scale) * (lacking(&s->low, dt_s) + lacking(&s->high, dt_s));
+    double sum = (1.0 + s->y_scale) *
+                 (unresolved_variance(&s->low, dt_s) + unresolved_variance(&s->high, dt_s));
     for (int i = 0; i < s->line_count; i++) {
         double f = s->line[i].frequency_hz, a = s->line[i].amplitude_rad;
         double share =
@@ -161,7 +162,7 @@ bst_status bst_jitter_add(bst_ctx *ctx, bst_jitter *jitter, const bst_jitter_spe
     const bst_jitter_density *tables[2] = {&spectrum->low, &spectrum->high};
     for (int t = 0; t < 2; t++) {
         more->has_noise[t] = tables[t]->count > 0;
-        /* two streams from one key: words of the same counter under another key */
+        /* independent streams from one key: the same counters under another key */
         bst_rng_key own = {{key.k[0] ^ (0x9E3779B9u * (uint32_t)(t + 1)), key.k[1]}};
         bst_jitter_noise_init(&more->noise[t], tables[t], top, dt_s, own);
     }
@@ -188,7 +189,7 @@ void bst_jitter_free(bst_jitter *jitter) {
     jitter->more = NULL;
 }
 
-/* Turns between two evaluations of the exact phase. */
+/* Rotation steps between evaluations of the exact phase. */
 #define RESYNC_STEPS 256
 
 static void lines_at(bst_jitter_more *m, int64_t n, double dt_s, double out[2]) {

@@ -43,7 +43,7 @@ const bst_config_desc bst_jitter_psd_config_table[] = {
     BST_CONFIG_END};
 #undef P
 
-/* The segment from point i to the next at a frequency in it. */
+/* Density at a frequency within the segment from a point to the next. */
 static double segment_at(const bst_jitter_density_point *p, double f) {
     double f1 = p[0].frequency_hz, f2 = p[1].frequency_hz, s1 = p[0].psd, s2 = p[1].psd;
     if (s1 > 0.0 && s2 > 0.0 && f1 > 0.0) {
@@ -111,8 +111,7 @@ bst_status bst_jitter_density_check(bst_ctx *ctx, const char *what, const bst_ji
     return BST_OK;
 }
 
-/* Two numbers of a line up to its end or a #; 0 when there are none, -1 when there is anything
- * else. */
+/* Parses two numbers of a line up to its end or a #; 0: none, -1: anything else. */
 static int parse_line(char *line, double out[2]) {
     line[strcspn(line, "#\r\n")] = '\0';
     char *at = line;

@@ -4,8 +4,8 @@
 
 #include "boresight/vec.h"
 
-#define SHAPED_SHARE 0.95    /* of the limits, for the reference */
-#define BRAKE_SHARE 0.8      /* of the shaped acceleration, for the braking curve */
+#define SHAPED_SHARE 0.95    /* share of the axis limits for the shaped reference */
+#define BRAKE_SHARE 0.8      /* share of the shaped acceleration for the braking curve */
 #define SHAPER_GAIN_MAX 40.0 /* 1/s: settles in about 0.15 s */
 #define SHAPER_GAIN_STEP 0.2 /* largest gain * dt */
 
@@ -17,8 +17,8 @@ void bst_axis_init(bst_axis *axis, const bst_axis_spec *spec) {
     *axis = (bst_axis){.spec = *spec};
     double h = spec->dt_s, wn = spec->natural_frequency_radps;
     axis->shaper_gain_per_s = fmin(SHAPER_GAIN_MAX, SHAPER_GAIN_STEP / h);
-    /* x'' + 2 s x' + wn^2 x = 0 with s = d wn: c = cos(wd h), g = sin(wd h) / wd, continued to
-     * cosh and sinh above critical damping, by the series at it. */
+    /* x'' + 2 s x' + wn^2 x = 0 with s = d wn: c = cos(wd h), g = sin(wd h) / wd; cosh and sinh
+     * above critical damping, by series near it */
     double s = spec->damping * wn;
     double wd2 = wn * wn - s * s;
     double x = wd2 * h * h, c, g;
@@ -45,7 +45,7 @@ double bst_axis_shape(bst_axis *axis, double target_rad, double target_radps) {
     double h = axis->spec.dt_s;
     double accel_limit = SHAPED_SHARE * axis->spec.accel_limit_radps2;
     double rate_limit = SHAPED_SHARE * axis->spec.rate_limit_radps;
-    /* relative to where the target was at the step's start */
+    /* relative to the target at the step's start */
     double d = axis->reference_rad - (target_rad - target_radps * h);
     double brake = BRAKE_SHARE * accel_limit;
     double k = axis->shaper_gain_per_s;
@@ -81,7 +81,7 @@ void bst_axis_step(bst_axis *axis, double target_rad, double target_radps, doubl
     double change = clamp(allowed - axis->rate_radps, spec->accel_limit_radps2 * h);
     allowed = axis->rate_radps + change;
     if (allowed != rate) {
-        /* `allowed` may differ from `rate` in the last digit only: that is no limit */
+        /* a difference in the last digit is rounding, not a limit */
         if (fabs(allowed - rate) > 1e-12 * spec->rate_limit_radps) {
             angle = axis->angle_rad + 0.5 * (axis->rate_radps + allowed) * h;
             axis->limited = true;

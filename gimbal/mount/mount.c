@@ -2,12 +2,14 @@
 
 #include <string.h>
 
-#define ACCEL_SHARE 0.7 /* of what the motor can give, where the limit is left to the mount */
-#define RATE_MARGIN 0.1 /* of the rate limit: over it the motor's torque falls to zero */
-#define POLE_SHARE 0.8  /* of the shaped outer rate, on the way past the pole */
+/* share of the motor's capability, if the acceleration limit is left to the mount */
+#define ACCEL_SHARE 0.7
+#define RATE_MARGIN 0.1 /* share of the rate limit over which the motor torque falls to zero */
+#define POLE_SHARE 0.8  /* share of the shaped outer rate while passing the pole */
 #define RATE_WINDOW_S 0.01
 #define STUCK_AFTER_S 0.25
-#define SETTLE_PER_S 50.0 /* of the settling tolerance: rate that is no arrival */
+/* rate, in settling tolerances per second, above which an axis has not settled */
+#define SETTLE_PER_S 50.0
 
 enum { M = BST_MOUNT_MOST };
 
@@ -83,14 +85,13 @@ bst_status bst_mount_init(bst_ctx *ctx, bst_mount *m, int type, const bst_mount_
     return BST_OK;
 }
 
-/* What is asked of the axes at one time. */
+/* Requested angles and rates of the axes at one time. */
 typedef struct request {
     double angle_rad[M], rate_radps[M];
     bool out_of_travel;
 } request;
 
-/* Of an angle's turns, the one nearest to `near` within the travel; without any, the nearer stop.
- */
+/* The whole turn of an angle nearest to `near` within travel; otherwise the nearer stop. */
 static double best_turn(double angle, double near, double least, double most, bool *outside) {
     double best = near + bst_wrap_angle(angle - near);
     if (best > most) {
@@ -100,16 +101,16 @@ static double best_turn(double angle, double near, double least, double most, bo
     }
     if (best > most || best < least) {
         *outside = true;
-        /* the stop that is less far from any of its turns */
+        /* the stop nearest to any turn of the angle */
         best = fabs(bst_wrap_angle(angle - most)) <= fabs(bst_wrap_angle(angle - least)) ? most
                                                                                          : least;
     }
     return best;
 }
 
-/* The way to point that takes the axes least long, of the two that there are. */
-static void choose_way(const bst_mount *m, const bst_mount_pose *pose, const double near[M],
-                       request *out) {
+/* Chooses the faster of the two mount solutions. */
+static void choose_solution(const bst_mount *m, const bst_mount_pose *pose, const double near[M],
+                            request *out) {
     double best = INFINITY;
     for (int way = 0; way < 2; way++) {
         double outer = pose->angle_rad[0], inner = pose->angle_rad[1], sense = 1.0;
@@ -124,7 +125,7 @@ static void choose_way(const bst_mount *m, const bst_mount_pose *pose, const dou
         double time = fmax(fabs(outer - near[0]) / m->servo[0].rate_limit_radps,
                            fabs(inner - near[1]) / m->servo[1].rate_limit_radps);
         if (outside) {
-            time += 1e6; /* only where there is no other */
+            time += 1e6; /* only if there is no other */
         }
         if (time < best) {
             best = time;
@@ -137,10 +138,10 @@ static void choose_way(const bst_mount *m, const bst_mount_pose *pose, const dou
     }
 }
 
-/* The third axis takes what the outer one cannot. */
-static void with_third(const bst_mount *m, bst_vec3 direction, bst_vec3 rate,
-                       const bst_los_command *command, double age_s, const bst_mount_pose *pose,
-                       request *out) {
+/* Uses the third axis for motion beyond the outer axis' limits. */
+static void add_third_axis(const bst_mount *m, bst_vec3 direction, bst_vec3 rate,
+                           const bst_los_command *command, double age_s, const bst_mount_pose *pose,
+                           request *out) {
     const bst_axis *outer = &m->servo[0].shaper;
     double angle = pose->angle_rad[0], speed = pose->rate_radps[0];
     bool outside = false;
@@ -165,7 +166,7 @@ static void with_third(const bst_mount *m, bst_vec3 direction, bst_vec3 rate,
     }
     out->angle_rad[0] = angle;
     out->rate_radps[0] = outside ? 0.0 : speed;
-    /* from where the outer axis is to be by its limits */
+    /* from the outer axis' next reference within its limits */
     bst_axis next = *outer;
     double accel = bst_axis_shape(&next, out->angle_rad[0], out->rate_radps[0]);
     double next_radps = outer->reference_radps + m->dt_s * accel;
@@ -180,7 +181,7 @@ static void with_third(const bst_mount *m, bst_vec3 direction, bst_vec3 rate,
     out->out_of_travel = outside;
 }
 
-/* Direction asked for and its rate, body axes, `ahead_s` after now, with the believed attitude. */
+/* Commanded direction and rate, body axes, `ahead_s` from now, by the estimated attitude. */
 static void direction_at(const bst_mount_body *body, const bst_los_command *command, double age_s,
                          double ahead_s, bst_vec3 *direction, bst_vec3 *rate) {
     double t = age_s + ahead_s;
@@ -193,7 +194,7 @@ static void direction_at(const bst_mount_body *body, const bst_los_command *comm
     r = bst_vec3_axpy(r, -bst_vec3_dot(r, d), d);
     d = bst_quat_rotate(body->q_believed_from_gcrf, d);
     r = bst_quat_rotate(body->q_believed_from_gcrf, r);
-    /* the body turns on meanwhile */
+    /* the body keeps rotating meanwhile */
     r = bst_vec3_sub(r, bst_vec3_cross(body->believed_rate_radps, d));
     if (ahead_s > 0.0) {
         d = bst_vec3_unit(bst_vec3_axpy(d, -ahead_s, bst_vec3_cross(body->believed_rate_radps, d)));
@@ -202,7 +203,7 @@ static void direction_at(const bst_mount_body *body, const bst_los_command *comm
     *rate = r;
 }
 
-/* What the motor gives of a torque at a rate. */
+/* Motor torque at a rate, limited by the motor. */
 static double motor_torque(const bst_mount_servo *servo, double wanted_nm, double rate) {
     double most = servo->torque_limit_nm, least = -most;
     if (fabs(rate) <= servo->rate_limit_radps) {
@@ -215,7 +216,7 @@ static double motor_torque(const bst_mount_servo *servo, double wanted_nm, doubl
     return clamp(wanted_nm, least, most);
 }
 
-/* Brings the joints to this step; base frame. */
+/* Integrates the joints to this step; base frame. */
 static void integrate(bst_mount *m, const double torque_nm[M], bst_vec3 rate_body) {
     bst_vec3 rate = bst_mount_swap(m->type, rate_body), before = m->base_rate_radps;
     if (m->stuck_axis >= 0 && m->steps >= m->stuck_from_step &&
@@ -230,12 +231,12 @@ static void integrate(bst_mount *m, const double torque_nm[M], bst_vec3 rate_bod
         }
         bst_mount_joints_step(&m->joints, m->dt_s, torque_nm, before, rate);
         if (m->want_reaction) {
-            /* the mount gains what the body loses: dH/dt in inertial space */
+            /* momentum exchange: dH/dt of the mount in inertial space */
             bst_vec3 after = bst_mount_chain_momentum(&m->joints.chain, &m->joints.state, rate);
             bst_vec3 gain = bst_vec3_scale(bst_vec3_sub(after, momentum), 1.0 / m->dt_s);
             gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(before, momentum));
             gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(rate, after));
-            /* as the body's axes will have turned when it acts */
+            /* in the body axes of the step in which it acts */
             gain = bst_vec3_axpy(gain, -m->dt_s, bst_vec3_cross(rate, gain));
             m->reaction_nm = bst_mount_swap(m->type, bst_vec3_scale(gain, -1.0));
         }
@@ -277,8 +278,8 @@ static void read_encoders(bst_mount *m, int64_t n) {
     }
 }
 
-/* An axis that is pushed and does not turn. */
-static void watch(bst_mount *m, bst_mount_servo *servo, double error_rad) {
+/* Detects an axis that is driven but does not turn (stuck). */
+static void detect_stuck(bst_mount *m, bst_mount_servo *servo, double error_rad) {
     double moved = fabs(servo->unwrapped_rad - servo->watched_rad);
     double blind = 4.0 * m->encoder_noise_rad + 2.0 * m->encoder_step_rad;
     if (moved > blind || fabs(error_rad) <= m->settle_tolerance_rad + blind) {
@@ -291,8 +292,8 @@ static void watch(bst_mount *m, bst_mount_servo *servo, double error_rad) {
     }
 }
 
-/* The references go on by a step, and torques for the step after the delay follow from them and
- * from the encoders. */
+/* Servo step: advances the references and computes the torques for the step after the delay, from
+ * references and encoders. */
 static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_body, int64_t n) {
     double asked[M] = {0.0}, s[M], c[M];
     bst_mount_chain_state at = {{0.0}, {0.0}, {0.0}, {0.0}};
@@ -303,7 +304,7 @@ static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_
         bst_axis *shaper = &m->servo[k].shaper;
         shaper->limited = false;
         accel[k] = bst_axis_shape(shaper, wanted->angle_rad[k], wanted->rate_radps[k]);
-        /* middle of the step that the torque acts in */
+        /* middle of the step in which the torque acts */
         at.rate_radps[k] = shaper->reference_radps + 0.5 * m->dt_s * accel[k];
         at.angle_rad[k] = shaper->reference_rad + 0.5 * m->dt_s * at.rate_radps[k];
         s[k] = sin(at.angle_rad[k]);
@@ -324,7 +325,7 @@ static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_
         servo->compensator.limit =
             fmin(servo->output_limit_radps2, servo->torque_limit_nm / eq.mass[k][k]);
         asked[k] = bst_compensator_step(&servo->compensator, error, accel[k]);
-        watch(m, servo, error);
+        detect_stuck(m, servo, error);
     }
     for (int k = 0; k < m->axes; k++) {
         bst_mount_servo *servo = &m->servo[k];
@@ -371,13 +372,13 @@ void bst_mount_step(bst_mount *m, const bst_mount_body *body, const bst_los_comm
         const bst_axis *outer = &m->servo[0].shaper;
         bst_mount_pose pose = bst_mount_solve(m->type, direction, rate, outer->reference_rad);
         if (m->axes > 2) {
-            with_third(m, direction, rate, command, command_age_s + ahead_s, &pose, &wanted);
+            add_third_axis(m, direction, rate, command, command_age_s + ahead_s, &pose, &wanted);
         } else {
             double near[M] = {outer->reference_rad, m->servo[1].shaper.reference_rad, 0.0};
             for (int k = 0; command->near_given && k < 2; k++) {
                 near[k] = command->near_rad[k] + (command_age_s + ahead_s) * command->near_radps[k];
             }
-            choose_way(m, &pose, near, &wanted);
+            choose_solution(m, &pose, near, &wanted);
         }
     } else {
         for (int k = 0; k < m->axes; k++) {

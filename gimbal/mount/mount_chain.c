@@ -2,13 +2,13 @@
 
 enum { XX, YY, ZZ, XY, XZ, YZ };
 
-/* Turns a vector by an angle about the axis of stage k: frame k to frame k - 1. */
+/* Rotates a vector by an angle about the axis of stage k: from frame k to frame k - 1. */
 static inline bst_vec3 outward(int k, bst_vec3 v, double s, double c) {
     return k == 1 ? (bst_vec3){c * v.x + s * v.z, v.y, c * v.z - s * v.x}
                   : (bst_vec3){v.x, c * v.y - s * v.z, s * v.y + c * v.z};
 }
 
-/* Back: frame k - 1 to frame k. */
+/* Inverse rotation: from frame k - 1 to frame k. */
 static inline bst_vec3 inward(int k, bst_vec3 v, double s, double c) {
     return outward(k, v, -s, c);
 }
@@ -17,7 +17,7 @@ static inline double along(int k, bst_vec3 v) {
     return k == 1 ? v.y : v.x;
 }
 
-/* A vector of length a along the axis of stage k. */
+/* Vector of length a along the axis of stage k. */
 static inline bst_vec3 on_axis(int k, double a) {
     return k == 1 ? (bst_vec3){0.0, a, 0.0} : (bst_vec3){a, 0.0, 0.0};
 }
@@ -28,17 +28,17 @@ static inline bst_vec3 times(const double j[6], bst_vec3 v) {
                       j[XZ] * v.x + j[YZ] * v.y + j[ZZ] * v.z};
 }
 
-/* Adds a tensor of frame k, turned into frame k - 1. */
+/* Adds an inertia tensor of frame k, rotated to frame k - 1. */
 static inline void add_outward(int k, double to[6], const double j[6], double s, double c) {
     double s2 = s * s, c2 = c * c, sc = s * c;
-    if (k == 1) { /* z, x turn */
+    if (k == 1) { /* z, x rotate */
         to[YY] += j[YY];
         to[ZZ] += c2 * j[ZZ] - 2.0 * sc * j[XZ] + s2 * j[XX];
         to[XX] += s2 * j[ZZ] + 2.0 * sc * j[XZ] + c2 * j[XX];
         to[XZ] += sc * (j[ZZ] - j[XX]) + (c2 - s2) * j[XZ];
         to[XY] += c * j[XY] + s * j[YZ];
         to[YZ] += c * j[YZ] - s * j[XY];
-    } else { /* y, z turn */
+    } else { /* y, z rotate */
         to[XX] += j[XX];
         to[YY] += c2 * j[YY] - 2.0 * sc * j[YZ] + s2 * j[ZZ];
         to[ZZ] += s2 * j[YY] + 2.0 * sc * j[YZ] + c2 * j[ZZ];
@@ -55,7 +55,7 @@ void bst_mount_chain_equations_at(const bst_mount_chain *chain, const bst_mount_
                                   bst_mount_chain_equations *out) {
     int n = chain->stages;
     bst_vec3 rate = base->rate_radps, accel = base->accel_radps2, force[BST_CHAIN_MOST];
-    double stiff[BST_CHAIN_MOST][6]; /* composite, without what hangs on the springs */
+    double stiff[BST_CHAIN_MOST][6]; /* composite inertia without the masses on the springs */
     for (int k = 0; k < n; k++) {
         double s = sine[k], c = cosine[k], v = state->rate_radps[k];
         const double *inertia = chain->inertia[k];

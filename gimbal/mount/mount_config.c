@@ -1,6 +1,6 @@
 #include "gimbal/mount/mount_config.h"
 
-#define STEPS_PER_PERIOD 10.0 /* of the fastest mode */
+#define STEPS_PER_PERIOD 10.0 /* plant steps per period of the fastest mode */
 
 static const char *const axis_names[] = {"outer", "inner", "third"};
 
@@ -121,7 +121,7 @@ const bst_config_desc bst_mount_config_table[] = {
     BST_CONFIG_END};
 #undef G
 
-/* A tensor in body axes to the base frame (bst_mount_swap). */
+/* Converts a tensor from body axes to the base frame (bst_mount_swap). */
 static void to_base(int type, const double body[6], double out[6]) {
     bool swap = type != BST_MOUNT_AZIMUTH_ELEVATION;
     out[0] = body[swap ? 1 : 0];
@@ -132,8 +132,9 @@ static void to_base(int type, const double body[6], double out[6]) {
     out[5] = swap ? -body[4] : body[5];
 }
 
-/* A body's inertia tensor is positive and no principal moment exceeds the sum of the others: then
- * half the trace times 1 minus the tensor, the second moments of the mass, is positive too. */
+/* True for a physical inertia tensor: positive definite, and no principal moment above the sum of
+ * the others. Then half the trace times 1 minus the tensor, the second moments of mass, is positive
+ * too. */
 static bool is_inertia(const double j[6]) {
     double half = 0.5 * (j[0] + j[1] + j[2]), slack = 1e-9 * half;
     double x = half - j[0] + slack, y = half - j[1] + slack, z = half - j[2] + slack;
@@ -180,11 +181,11 @@ static bst_status put_flexible(bst_ctx *ctx, const bst_mount_flexible_config *f,
     return BST_OK;
 }
 
-/* What else makes the axes faster than the step: viscous friction and cables. */
+/* Checks the plant step against viscous friction and cables, which also make an axis fast. */
 static bst_status check_step(bst_ctx *ctx, const bst_mount_joints *joints, double dt_s) {
     for (int k = 0; k < joints->chain.stages; k++) {
         const bst_mount_joint *joint = &joints->joint[k];
-        /* the least inertia that the axis can have to itself */
+        /* smallest effective inertia of the axis */
         double inertia = joints->chain.inertia[k][k == 1 ? 1 : 0] - joints->chain.flex_inertia[k];
         double longest_s = joint->viscous_nms > 0.0 ? 0.5 * inertia / joint->viscous_nms : INFINITY;
         if (dt_s > longest_s) {

@@ -1,4 +1,4 @@
-/* Keys of the full gimbal types azimuth_elevation and cross_elevation. */
+/* Configuration of the full gimbal types azimuth_elevation and cross_elevation. */
 #ifndef BST_GIMBAL_MOUNT_MOUNT_CONFIG_H
 #define BST_GIMBAL_MOUNT_MOUNT_CONFIG_H
 
@@ -7,7 +7,7 @@
 #include "gimbal/mount/mount_joints.h"
 #include "gimbal/platform.h"
 
-/* Triples are of the outer, the inner and the third axis. */
+/* Arrays of three are for the outer, inner and third axis. */
 typedef struct bst_mount_friction_config {
     double coulomb_nm[3], breakaway_nm[3], stribeck_degps[3], viscous_nms_per_rad[3];
 } bst_mount_friction_config;
@@ -54,10 +54,11 @@ typedef struct bst_mount_config {
 
 extern const bst_config_desc bst_mount_config_table[];
 
-/* The joints at the start angles, without faults. BST_ERR_CONFIG, with the key, for inertias that
- * no body has, a breakaway below the Coulomb torque, empty travel, a start outside of it, a mode
- * whose share leaves no inertia, and for a step of dt_s in which a mode's free oscillation has less
- * than a tenth of its period: the message says the largest step allowed. */
+/* Creates the joints at the start angles, without faults.
+ *
+ * Errors:    BST_ERR_CONFIG, with the key, for an unphysical inertia, breakaway below Coulomb
+ *            torque, empty travel, a start outside it, or a mode that leaves no inertia. Also for a
+ *            step dt_s above a tenth of a mode's period; the message states the largest step */
 bst_status bst_mount_config_joints(bst_ctx *ctx, int type, const bst_mount_config *config,
                                    double dt_s, bst_mount_joints *joints) BST_MUST_CHECK;
 

@@ -1,11 +1,11 @@
 #include "gimbal/mount/mount_geometry.h"
 
-/* Below this distance from the pole (rad) the outer angle is not defined well enough to follow. */
+/* Distance from the pole, rad, below which the outer angle is too ill-defined to follow. */
 #define POLE_RAD 1e-9
 
-/* With the base frame (1, 2, 3) the boresight at zero angles is +3 (azimuth_elevation) or -3
- * (cross_elevation); `base` has it at +3. */
-static bst_vec3 base(int type, bst_vec3 body) {
+/* Body vector in the base frame (1, 2, 3) with the boresight at +3 for zero angles; bst_mount_swap
+ * has it at +3 (azimuth_elevation) or -3 (cross_elevation). */
+static bst_vec3 to_base_frame(int type, bst_vec3 body) {
     bst_vec3 v = bst_mount_swap(type, body);
     return type == BST_MOUNT_AZIMUTH_ELEVATION ? v : bst_vec3_scale(v, -1.0);
 }
@@ -17,7 +17,7 @@ bst_vec3 bst_mount_axis_body(int type, int axis) {
 bst_quat bst_mount_attitude(int type, const double angle_rad[BST_MOUNT_MOST]) {
     double s1 = sin(0.5 * angle_rad[0]), c1 = cos(0.5 * angle_rad[0]);
     double s2 = sin(0.5 * angle_rad[1]), c2 = cos(0.5 * angle_rad[1]);
-    /* turns about 1, then the turned 2: (s1 c2, c1 s2, s1 s2, c1 c2) */
+    /* rotation about 1, then about the rotated 2: (s1 c2, c1 s2, s1 s2, c1 c2) */
     bst_quat q = {s1 * c2, c1 * s2, s1 * s2, c1 * c2};
     if (angle_rad[2] != 0.0) {
         double s3 = sin(0.5 * angle_rad[2]), c3 = cos(0.5 * angle_rad[2]);
@@ -30,7 +30,7 @@ bst_quat bst_mount_attitude(int type, const double angle_rad[BST_MOUNT_MOST]) {
 
 bst_mount_pose bst_mount_solve(int type, bst_vec3 direction, bst_vec3 rate,
                                double outer_at_pole_rad) {
-    bst_vec3 b = base(type, direction), r = base(type, rate);
+    bst_vec3 b = to_base_frame(type, direction), r = to_base_frame(type, rate);
     double h2 = b.y * b.y + b.z * b.z, h = sqrt(h2);
     bst_mount_pose pose = {{outer_at_pole_rad, atan2(b.x, h), 0.0}, {0.0, 0.0, 0.0}};
     if (h >= POLE_RAD) {
@@ -43,9 +43,9 @@ bst_mount_pose bst_mount_solve(int type, bst_vec3 direction, bst_vec3 rate,
 
 bst_mount_pose bst_mount_solve_rest(int type, bst_vec3 direction, bst_vec3 rate, double outer_rad,
                                     double outer_radps) {
-    bst_vec3 b = base(type, direction), r = base(type, rate);
+    bst_vec3 b = to_base_frame(type, direction), r = to_base_frame(type, rate);
     double s = sin(outer_rad), c = cos(outer_rad);
-    /* in the outer stage's frame, which turns about 1 */
+    /* in the outer stage's frame, which rotates about 1 */
     b = (bst_vec3){b.x, c * b.y + s * b.z, c * b.z - s * b.y};
     r = (bst_vec3){r.x, c * r.y + s * r.z + outer_radps * b.z,
                    c * r.z - s * r.y - outer_radps * b.y};
@@ -61,7 +61,7 @@ bst_mount_pose bst_mount_solve_rest(int type, bst_vec3 direction, bst_vec3 rate,
 
 void bst_mount_pass_pole(int type, bst_vec3 direction, bst_vec3 rate, double rate_limit_radps,
                          const bst_mount_pose *pose, double *outer_rad, double *outer_radps) {
-    bst_vec3 b = base(type, direction), r = base(type, rate);
+    bst_vec3 b = to_base_frame(type, direction), r = to_base_frame(type, rate);
     *outer_rad = pose->angle_rad[0];
     *outer_radps = pose->rate_radps[0];
     double w = bst_vec3_norm(r);
@@ -71,7 +71,8 @@ void bst_mount_pass_pole(int type, bst_vec3 direction, bst_vec3 rate, double rat
     }
     double cos_r = sqrt(1.0 - sin_r * sin_r);
     double phase = atan2(-copysign(1.0, b.x) * r.x / (w * cos_r), fabs(b.x) / cos_r);
-    double azimuth = atan2(sin(phase), cos(phase) * sin_r); /* from that of the closest approach */
+    /* relative to the azimuth of closest approach */
+    double azimuth = atan2(sin(phase), cos(phase) * sin_r);
     double reach = rate_limit_radps * fabs(phase) / w;
     if (reach < fabs(azimuth)) {
         double sense = pose->rate_radps[0] < 0.0 ? -1.0 : 1.0;

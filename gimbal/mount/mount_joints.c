@@ -6,13 +6,13 @@
 
 enum { N = BST_CHAIN_MOST };
 
-/* So told, the compiler knows that there are two or three. */
+/* A constant 2 or 3 helps the compiler to unroll. */
 static inline int stages_of(const bst_mount_joints *j) {
     return j->chain.stages == 2 ? 2 : N;
 }
 
 /* Sine and cosine of angle + more, given those of angle. */
-static inline void turn_on(double s, double c, double more, double *s_out, double *c_out) {
+static inline void rotate_sincos(double s, double c, double more, double *s_out, double *c_out) {
     double d2 = more * more, ds, dc;
     if (d2 < 1e-4) { /* next terms: d^7 / 5040, d^6 / 720 < 2e-15 */
         ds = more * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0));
@@ -43,25 +43,26 @@ void bst_mount_joints_init(bst_mount_joints *j, const double angle_rad[N]) {
     refresh(j);
 }
 
-/* Friction without its viscous part, at a rate against its direction. */
+/* Friction torque without its viscous part, opposing a rate. */
 static inline double sliding_nm(const bst_mount_joint *joint, double rate) {
     double x = rate / joint->stribeck_radps;
     return joint->coulomb_nm + (joint->breakaway_nm - joint->coulomb_nm) / (1.0 + x * x);
 }
 
-/* What moves during a part of a step. */
+/* Constant torques and base motion during a part of a step. */
 typedef struct motion {
     const double *torque_nm;
-    bst_vec3 rate, slope; /* of the base, at the part's start */
+    bst_vec3 rate, slope; /* of the base at the start of the part */
     bool held[N];
 } motion;
 
-/* Derivatives of rates. */
+/* Accelerations of joints and modes. */
 typedef struct slopes {
     double accel[N], flex_accel[N];
 } slopes;
 
-/* Solves mass x = right for the joints that are not held; the others get zero. */
+/* Solves mass x = right for the joints that are not held by friction or stop; the others get zero.
+ */
 static inline void solve_free(int n, double mass[N][N], const bool held[N], double right[N],
                               double x[N]) {
     for (int k = 0; k < n; k++) {
@@ -73,7 +74,7 @@ static inline void solve_free(int n, double mass[N][N], const bool held[N], doub
             right[k] = 0.0;
         }
     }
-    /* positive definite: no pivots needed */
+    /* positive definite: no pivoting needed */
     double l10 = mass[1][0] / mass[0][0];
     double d1 = mass[1][1] - l10 * mass[0][1];
     double y1 = right[1] - l10 * right[0];
@@ -91,7 +92,7 @@ static inline void solve_free(int n, double mass[N][N], const bool held[N], doub
     x[0] = (right[0] - mass[0][1] * x[1] - mass[0][2] * x[2]) / mass[0][0];
 }
 
-/* Torques about the axes besides the motor's, but for friction of joints at rest. */
+/* Passive torques about the axes (cable, friction) except static friction. */
 static inline double passive_nm(const bst_mount_joint *joint, double angle, double rate,
                                 int slide) {
     double friction = slide ? -(double)slide * sliding_nm(joint, rate) : 0.0;
@@ -99,7 +100,7 @@ static inline double passive_nm(const bst_mount_joint *joint, double angle, doub
            joint->spring_nm * (angle - joint->spring_zero_rad);
 }
 
-/* The chain's state a time after a part's start, with sines and cosines of its angles. */
+/* State of the chain during a part, with sines and cosines of its angles. */
 typedef struct instant {
     const bst_mount_chain_state *state;
     const double *sine, *cosine; /* [N] */
@@ -136,7 +137,7 @@ static inline void evaluate(const bst_mount_joints *j, instant at, const motion 
     }
 }
 
-/* from + h * (rates of `at`, slopes) */
+/* from + h * (rates of `at`, accelerations) */
 static inline void displace(int n, const bst_mount_chain_state *from, double h,
                             const bst_mount_chain_state *at, const slopes *slope,
                             bst_mount_chain_state *out) {
@@ -151,8 +152,8 @@ static inline void displace(int n, const bst_mount_chain_state *from, double h,
 static inline void turned(const bst_mount_joints *j, const bst_mount_chain_state *state,
                           double s[N], double c[N]) {
     for (int k = 0; k < stages_of(j); k++) {
-        turn_on(j->sine[k], j->cosine[k], state->angle_rad[k] - j->state.angle_rad[k], &s[k],
-                &c[k]);
+        rotate_sincos(j->sine[k], j->cosine[k], state->angle_rad[k] - j->state.angle_rad[k], &s[k],
+                      &c[k]);
     }
 }
 
@@ -191,8 +192,8 @@ static void runge_kutta(const bst_mount_joints *j, const motion *m, double h,
     }
 }
 
-/* Drift, kick, drift; forces that depend on rates are those at the mean of the rates before and
- * after the kick, which a first kick foretells. */
+/* Leapfrog step (drift, kick, drift). Rate-dependent torques are evaluated at the mean of the rates
+ * before and after the kick, predicted by a first kick. */
 static void leapfrog(const bst_mount_joints *j, const motion *m, double h,
                      bst_mount_chain_state *out, double accel[N]) {
     int n = stages_of(j);
@@ -219,7 +220,7 @@ static void leapfrog(const bst_mount_joints *j, const motion *m, double h,
     }
 }
 
-/* Torque that friction and stop can give a joint at rest. */
+/* Torque range that friction and stop can exert on a joint at rest. */
 static void holding(const bst_mount_joints *j, int k, double *least, double *most) {
     const bst_mount_joint *joint = &j->joint[k];
     *most =
@@ -228,9 +229,9 @@ static void holding(const bst_mount_joints *j, int k, double *least, double *mos
         joint->stuck || j->state.angle_rad[k] >= joint->max_rad ? -INFINITY : -joint->breakaway_nm;
 }
 
-/* Which joints at rest stay so: all are held; of those that hold more than they can, the one that
- * is most beyond starts to slide, until none is. */
-static void settle(bst_mount_joints *j, motion *m) {
+/* Stick-slip decision for joints at rest: all are held first. The joint that exceeds its holding
+ * torque most is released, until none does. */
+static void resolve_stiction(bst_mount_joints *j, motion *m) {
     int n = stages_of(j);
     bool rest = false;
     for (int k = 0; k < n; k++) {
@@ -270,7 +271,7 @@ static void settle(bst_mount_joints *j, motion *m) {
         if (worst < 0) {
             return;
         }
-        /* what would be needed to hold it pushes one way, so it goes the other */
+        /* it slides opposite to the holding torque that would be needed */
         m->held[worst] = false;
         j->at_stop[worst] = false;
         j->slide[worst] = beyond > 0.0 ? -1 : 1;
@@ -279,23 +280,23 @@ static void settle(bst_mount_joints *j, motion *m) {
     }
 }
 
-/* Time from the start of a part of length h at which a coordinate that goes from x (below the
- * limit, or on it) at the rate v to `end` beyond the limit passes it, by the parabola through them.
- * All as seen from the limit, outwards. */
+/* Time within a part of length h at which a coordinate passes a limit, by a parabola. It starts at
+ * x (at or below the limit) with rate v and ends at `end` beyond it, all relative to the limit,
+ * outwards positive. */
 static double time_of_passing(double x, double v, double end, double h) {
     double a = (end - x - v * h) / (h * h);
     if (x >= 0.0 && v >= 0.0) {
         return 0.0;
     }
     double root = sqrt(fmax(v * v - 4.0 * a * x, 0.0));
-    /* the way out: the root with a positive rate 2 a t + v */
+    /* outward passage: the root with positive rate 2 a t + v */
     double t = v > 0.0 ? -2.0 * x / (v + root) : a != 0.0 ? (root - v) / (2.0 * a) : h;
     return t >= 0.0 && t <= h ? t : h;
 }
 
 enum event_kind { EVENT_NONE, EVENT_REST, EVENT_STOP };
 
-/* The first event on the way from the present state to `end`; its time and joint. */
+/* First event between the present state and `end`: its kind, time and joint. */
 static enum event_kind first_event(const bst_mount_joints *j, const motion *m,
                                    const bst_mount_chain_state *end, double h, double *time,
                                    int *which) {
@@ -331,7 +332,7 @@ static enum event_kind first_event(const bst_mount_joints *j, const motion *m,
     return kind;
 }
 
-/* Joint k meets its stop: an impulse about its axis turns its rate back; held joints stay. */
+/* Impact of joint k on its stop: an impulse about its axis reverses its rate; held joints stay. */
 static void bounce(bst_mount_joints *j, const motion *m, int k) {
     const bst_mount_joint *joint = &j->joint[k];
     int n = stages_of(j);
@@ -346,12 +347,12 @@ static void bounce(bst_mount_joints *j, const motion *m, int k) {
     bst_mount_chain_equations eq;
     bst_mount_chain_base still = {{0, 0, 0}, {0, 0, 0}};
     bst_mount_chain_equations_at(&j->chain, &j->state, j->sine, j->cosine, &still, &eq);
-    /* unit impulse on k, what hangs on springs not yet moved */
+    /* unit impulse on k; masses on springs are not moved yet */
     double right[N] = {0.0}, jump[N];
     right[k] = 1.0;
     solve_free(n, eq.mass, m->held, right, jump);
     double impulse = (back - v) / jump[k];
-    /* what hangs on a spring keeps its inertial rate */
+    /* a mass on a spring keeps its inertial rate */
     for (int i = 0; i < n; i++) {
         double change = 0.0;
         for (int b = 0; b <= i; b++) {
@@ -372,8 +373,8 @@ static void bounce(bst_mount_joints *j, const motion *m, int k) {
     j->state.rate_radps[k] = back;
 }
 
-/* The state after h; returns how soon a sliding joint would come to rest by its deceleration at the
- * start, h at the latest. */
+/* Integrates to time h. Returns the earliest time at which a sliding joint would come to rest at
+ * its initial deceleration, at most h. */
 static double advance(const bst_mount_joints *j, const motion *m, double h,
                       bst_mount_chain_state *end) {
     double accel[N], soonest = h;
@@ -419,13 +420,13 @@ void bst_mount_joints_step(bst_mount_joints *j, double dt_s, const double torque
                 .slope = bst_vec3_scale(bst_vec3_sub(rate_after, rate_before), 1.0 / dt_s)};
     double left = dt_s;
     bst_mount_chain_state end = {{0.0}, {0.0}, {0.0}, {0.0}};
-    settle(j, &m);
+    resolve_stiction(j, &m);
     for (int part = 0; left > 0.0; part++) {
         if (nothing_moves(j, &m)) {
             break;
         }
-        /* a joint that rests long before the part ends would be driven far beyond: first up to
-         * there, and a little further so that the reversal is seen */
+        /* a joint that comes to rest early would be driven far backwards: first integrate slightly
+         * beyond that time, so that the reversal is detected */
         double span = left, soonest = advance(j, &m, span, &end);
         if (soonest < 0.25 * span && part < PARTS) {
             span = 2.0 * soonest;
@@ -444,7 +445,7 @@ void bst_mount_joints_step(bst_mount_joints *j, double dt_s, const double torque
             m.held[which] = true;
             j->state.rate_radps[which] = 0.0;
             j->slide[which] = 0;
-            continue; /* at most as often as there are joints */
+            continue; /* at most once per joint */
         }
         if (time > 1e-12 * dt_s) {
             if (time < span) {
@@ -460,7 +461,7 @@ void bst_mount_joints_step(bst_mount_joints *j, double dt_s, const double torque
         } else {
             bounce(j, &m, which);
         }
-        settle(j, &m);
+        resolve_stiction(j, &m);
     }
     refresh(j);
 }

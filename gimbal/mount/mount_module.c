@@ -15,7 +15,7 @@ typedef struct module {
     bst_gimbal_base base;
     bst_mount mount;
     bst_platform platform;
-    bool stuck[BST_MOUNT_MOST]; /* as told */
+    bool stuck[BST_MOUNT_MOST]; /* as last reported */
 } module;
 
 static bst_status prepare(const bst_module_env *env, int type, const bst_mount_config *c,
@@ -47,7 +47,8 @@ static bst_status create_cross(const bst_module_env *env, const void *config, vo
     return bst_gimbal_create(env, sizeof(module), prepare_cross, bst_gimbal_destroy, config, self);
 }
 
-static void tell_stuck(module *m, struct bst_step *s) {
+/* Reports axes that have become stuck, or free again. */
+static void report_stuck(module *m, struct bst_step *s) {
     static const char *const names[] = {"outer", "inner", "third"};
     for (int k = 0; k < BST_MOUNT_MOST; k++) {
         bool stuck = m->mount.servo[k].stuck;
@@ -78,7 +79,7 @@ static bst_status step(void *self, struct bst_step *s) {
                            .q_believed_from_gcrf = m->platform.q_believed_from_gcrf,
                            .believed_rate_radps = m->platform.rate_believed_radps};
     bst_mount_step(mount, &body, command, age, measure);
-    tell_stuck(m, s);
+    report_stuck(m, s);
     bst_gimbal_publish_sight(s, &m->platform,
                              bst_platform_true_camera(&m->platform, n, (double)n * m->base.dt_s,
                                                       mount->q_cam_from_body));

@@ -16,7 +16,7 @@ static void multiply(double a[5][5], double b[5][5], double out[5][5]) {
     }
 }
 
-/* exp(a): Taylor series of a / 2^s, squared s times. */
+/* Matrix exponential: Taylor series of a / 2^s, squared s times. */
 static void exponential(double a[5][5], double out[5][5]) {
     double norm = 0.0, scaled[5][5], term[5][5], next[5][5];
     for (int i = 0; i < 5; i++) {
@@ -62,7 +62,7 @@ void bst_mount_linearise(const bst_mount_joints *joints, int axis,
     bst_mount_chain_equations eq;
     bst_mount_chain_equations_at(chain, &still, s, c, &base, &eq);
     double flex = chain->flex_inertia[axis];
-    double own = eq.mass[axis][axis]; /* without what swings on its springs */
+    double own = eq.mass[axis][axis]; /* without the masses on its springs */
     double all = own + flex;
     *out = (bst_mount_linear){.inertia_kgm2 = all,
                               .dt_s = dt_s,
@@ -97,7 +97,7 @@ void bst_mount_linearise(const bst_mount_joints *joints, int axis,
     }
 }
 
-/* The state that an input of one at omega drives, without the delay: (z - step)^-1 drive. */
+/* State response to a unit input at omega, without the delay: (z - step)^-1 drive. */
 static void driven(const bst_mount_linear *linear, double omega_radps, double complex x[4]) {
     double complex z = cexp(I * omega_radps * linear->dt_s), a[4][5];
     for (int i = 0; i < 4; i++) {
@@ -132,6 +132,7 @@ static void driven(const bst_mount_linear *linear, double omega_radps, double co
     }
 }
 
+/* Phase factor of the delay at omega. */
 static double complex late(const bst_mount_linear *linear, double omega_radps) {
     return cexp(-I * omega_radps * linear->dt_s * linear->delay_steps);
 }
@@ -195,8 +196,8 @@ void bst_mount_axis_response(const bst_mount_axis_model *model, double frequency
     out->compensator = c * inertia;
     out->disturbance = sight * ahead / inertia * closed;
     out->encoder_noise = -sight * c * closed;
-    /* The reference r has a constant acceleration over a step; the one of the step that the torque
-     * acts in is fed forward, and its rate and angle against viscous friction and cable. */
+    /* The reference r has constant acceleration over a step. That of the step in which the torque
+     * acts is fed forward, and its rate and angle against viscous friction and cable. */
     double complex rate = (z - 1.0) * 2.0 / (dt * (z + 1.0)), accel = (z - 1.0) / dt * rate;
     double complex fed =
         model->reference_feed_forward * accel +

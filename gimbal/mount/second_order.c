@@ -2,11 +2,11 @@
 
 static const double two_pi = 2.0 * BST_PI;
 
-/* Sines and cosines are worked out anew where the axis is so far from where they are known. Targets
- * that are near the axis stay within reach of the arc tangent's series. */
+/* Angle from the cached values after which sines and cosines are recomputed. Targets near the axis
+ * stay within the range of the arctangent series. */
 #define NEAR_RAD 0.005
 
-/* Below this distance from the pole (rad) the outer angle is not defined well enough to follow. */
+/* Distance from the pole, rad, below which the outer angle is too ill-defined to follow. */
 #define POLE_RAD 1e-9
 
 #define C bst_mount_two_axis_config
@@ -67,7 +67,7 @@ void bst_mount_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_ra
     rate_radps[1] = -rate.y / h;
 }
 
-/* Sines and cosines of half the axes' angles. */
+/* Sines and cosines of half the axis angles. */
 typedef struct halves {
     double sin[2], cos[2];
 } halves;
@@ -77,7 +77,7 @@ static halves halves_of(const double angle_rad[2]) {
                     {cos(0.5 * angle_rad[0]), cos(0.5 * angle_rad[1])}};
 }
 
-/* Of an angle that is more_rad further: up to 0.02 rad by series, which are exact to rounding. */
+/* Sine and cosine of half an angle more_rad further, up to 0.02 rad by series exact to rounding. */
 static void beside(double sin_half, double cos_half, double more_rad, double *sin_out,
                    double *cos_out) {
     double d = 0.5 * more_rad, s, c;
@@ -93,7 +93,7 @@ static void beside(double sin_half, double cos_half, double more_rad, double *si
     *cos_out = cos_half * c - sin_half * s;
 }
 
-/* The same a little further. */
+/* Half-angle sines and cosines slightly further. */
 static halves halves_beside(const halves *h, const double more_rad[2]) {
     halves out;
     for (int a = 0; a < 2; a++) {
@@ -102,7 +102,7 @@ static halves halves_beside(const halves *h, const double more_rad[2]) {
     return out;
 }
 
-/* Of the axes' present angles. */
+/* Half-angle sines and cosines of the current axis angles. */
 static halves halves_now(bst_mount_two_axis *plant) {
     halves out;
     for (int a = 0; a < 2; a++) {
@@ -116,7 +116,7 @@ static halves halves_now(bst_mount_two_axis *plant) {
     return out;
 }
 
-/* After a whole turn of the outer axis. */
+/* Half-angle values after a whole turn of the outer axis. */
 static void turn_half(halves *h) {
     h->sin[0] = -h->sin[0];
     h->cos[0] = -h->cos[0];
@@ -137,8 +137,8 @@ static double wrap(double angle) {
     return fabs(angle) < BST_PI ? angle : bst_wrap_angle(angle);
 }
 
-/* The angle of (x, y) where that is no further from a known one than the arc tangent's series
- * reaches. */
+/* Angle of (x, y) if it is within the arctangent series' range of a known angle; otherwise false.
+ */
 static bool angle_near(const bst_mount_two_axis_half *near, double x, double y, double *angle_rad) {
     double c = near->cos * near->cos - near->sin * near->sin, s = 2.0 * near->sin * near->cos;
     double along = x * c + y * s, across = y * c - x * s;
@@ -149,7 +149,7 @@ static bool angle_near(const bst_mount_two_axis_half *near, double x, double y, 
     return true;
 }
 
-/* bst_mount_two_axis_solve for the way round that is nearer to the present angle. */
+/* bst_mount_two_axis_solve, in the turn nearest to the current angle. */
 static void solve(const bst_mount_two_axis *plant, bst_vec3 b, bst_vec3 rate, double angle_rad[2],
                   double rate_radps[2]) {
     double h2 = b.x * b.x + b.z * b.z, h = sqrt(h2), now = plant->axis[0].reference_rad;
@@ -163,9 +163,9 @@ static void solve(const bst_mount_two_axis *plant, bst_vec3 b, bst_vec3 rate, do
     angle_rad[0] = now + wrap(angle_rad[0] - now);
 }
 
-/* Where the axes shall be at this step. */
-static void target(const bst_mount_two_axis *plant, const bst_los_command *command, double age_s,
-                   double angle_rad[2], double rate_radps[2], bool *at_stop) {
+/* Commanded angles and rates of the axes at this step. */
+static void command_angles(const bst_mount_two_axis *plant, const bst_los_command *command,
+                           double age_s, double angle_rad[2], double rate_radps[2], bool *at_stop) {
     bst_vec3 rate = bst_vec3_axpy(command->rate_gcrf_radps, age_s, command->accel_gcrf_radps2);
     bst_vec3 v = bst_vec3_axpy(command->direction_gcrf, age_s, command->rate_gcrf_radps);
     v = bst_vec3_axpy(v, 0.5 * age_s * age_s, command->accel_gcrf_radps2);
@@ -176,7 +176,7 @@ static void target(const bst_mount_two_axis *plant, const bst_los_command *comma
     bst_quat body = plant->platform.q_believed_from_gcrf;
     bst_vec3 d_body = bst_quat_rotate(body, d), r_body = bst_quat_rotate(body, r);
     if (plant->platform.spacecraft) {
-        /* the body turns away from under the mount */
+        /* the body rotates under the mount */
         r_body = bst_vec3_sub(r_body, bst_vec3_cross(plant->platform.rate_believed_radps, d_body));
     }
     solve(plant, d_body, r_body, angle_rad, rate_radps);
@@ -227,7 +227,7 @@ void bst_mount_two_axis_step(bst_mount_two_axis *plant, const bst_los_command *c
     double angle[2], rate[2];
     bool at_stop = false;
     if (command) {
-        target(plant, command, command_age_s, angle, rate, &at_stop);
+        command_angles(plant, command, command_age_s, angle, rate, &at_stop);
     } else {
         for (int a = 0; a < 2; a++) {
             angle[a] = plant->axis[a].reference_rad;

@@ -41,7 +41,7 @@ static bst_status step(void *self, struct bst_step *s) {
     double age;
     const bst_los_command *command = bst_gimbal_command(s, PORT_COMMAND, &m->base, &age);
     bool measure = n % m->base.telemetry_steps == 0;
-    if (plant->platform.spacecraft) { /* without reaction: a mount of this type has no inertia */
+    if (plant->platform.spacecraft) { /* without reaction torque: this mount type has no inertia */
         BST_TRY(bst_platform_step(s, &plant->platform, n, (bst_vec3){0, 0, 0}, command));
     }
     bst_mount_two_axis_step(plant, command, age, measure);

@@ -59,7 +59,7 @@ void bst_attitude_filter_propagate(bst_attitude_filter *filter, bst_vec3 sample_
     }
 }
 
-/* P = (1 - K H) P (1 - K H)' + K R K', H = [1, age]. */
+/* Joseph form of the covariance update: P = (1 - K H) P (1 - K H)' + K R K', H = [1, age]. */
 static void joseph(double p[6][6], const double k[6][3], double age_s, const bst_mat3 *r) {
     double left[6][6], half[6][6];
     for (int i = 0; i < 6; i++) {
@@ -96,7 +96,7 @@ void bst_attitude_filter_update(bst_attitude_filter *filter, bst_vec3 error, dou
                                 bst_quat q_now_from_then, const bst_mat3 *noise,
                                 bst_vec3 correction[2]) {
     double(*p)[6] = filter->covariance;
-    /* in the axes of now, where e then = e now + age b */
+    /* in current axes, where e then = e now + age b */
     const bst_mat3 c = bst_quat_to_mat3(q_now_from_then), back = bst_mat3_transpose(&c);
     const bst_mat3 half = bst_mat3_mul(&c, noise), r = bst_mat3_mul(&half, &back);
     bst_vec3 e = bst_mat3_mul_vec(&c, error);
@@ -112,7 +112,7 @@ void bst_attitude_filter_update(bst_attitude_filter *filter, bst_vec3 error, dou
         }
     }
     if (!bst_symmetric_invert(3, s, inverse)) {
-        return; /* a measurement without noise of what is known without error has nothing to say */
+        return; /* a noise-free measurement of an exactly known state carries no information */
     }
     for (int i = 0; i < 6; i++) {
         for (int j = 0; j < 3; j++) {

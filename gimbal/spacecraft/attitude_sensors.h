@@ -1,4 +1,4 @@
-/* Star trackers and the gyro of a spacecraft: what they measure of its attitude. */
+/* Attitude sensors of a spacecraft: star trackers and gyro. */
 #ifndef BST_GIMBAL_SPACECRAFT_ATTITUDE_SENSORS_H
 #define BST_GIMBAL_SPACECRAFT_ATTITUDE_SENSORS_H
 
@@ -34,10 +34,10 @@ extern const bst_config_desc bst_star_tracker_config_table[];
 extern const bst_config_desc bst_gyro_config_table[];
 
 typedef struct bst_spacecraft_star_tracker {
-    bst_vec3 axis;       /* unit, body axes: its boresight */
-    bst_vec3 across;     /* unit, perpendicular to it */
-    double sigma_rad[2]; /* across the axis, about it */
-    bst_quat alignment;  /* body as the tracker believes it to lie, from body */
+    bst_vec3 axis;       /* boresight, unit, body axes */
+    bst_vec3 across;     /* unit, perpendicular to the boresight */
+    double sigma_rad[2]; /* across the boresight, about it */
+    bst_quat alignment;  /* misaligned body axes as assumed by the tracker, from body */
     double sun_exclusion_rad, earth_exclusion_rad, rate_limit_radps;
     double outage_s[2];
     bst_rng_key key;
@@ -50,40 +50,46 @@ void bst_spacecraft_star_tracker_init(bst_spacecraft_star_tracker *tracker,
                                       const bst_spacecraft_star_tracker_config *config,
                                       bst_rng_key key);
 
-/* Whether it sees stars: not turning faster than its limit, its axis away from the Sun and from the
- * Earth's limb (a sphere of the equatorial radius) by the exclusion angles, and not within its
- * outage. position_m geocentric, sun_m from the spacecraft, both GCRF. */
+/* True if a star tracker sees stars: the body rate is below its limit, the boresight is farther
+ * than the exclusion angles from the Sun and the Earth's limb (sphere of equatorial radius), and
+ * there is no outage.
+ *
+ * Given:     position_m  geocentric, GCRF
+ *            sun_m       from the spacecraft, GCRF */
 bool bst_spacecraft_star_tracker_sees(const bst_spacecraft_star_tracker *tracker, double seconds,
                                       bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
                                       bst_vec3 position_m, bst_vec3 sun_m);
 
-/* Measurement number `sample`: the true attitude turned by noise and alignment error. */
+/* Star-tracker measurement number `sample`: the true attitude with noise and alignment error. */
 bst_quat bst_spacecraft_star_tracker_measure(const bst_spacecraft_star_tracker *tracker,
                                              int64_t sample, bst_quat q_body_from_gcrf);
 
-/* Covariance (rad^2, body axes) of the noise. */
+/* Noise covariance of a star tracker, rad^2, body axes. */
 bst_mat3 bst_spacecraft_star_tracker_covariance(const bst_spacecraft_star_tracker *tracker);
 
-/* A rate-integrating gyro: each sample is the angle turned since the one before. Farrenkopf, J.
+/* Rate-integrating gyro: each sample is the rotation since the previous one. Farrenkopf, J.
  * Guidance and Control 1 (1978) 282; discrete form after Crassidis and Junkins, Optimal Estimation
  * of Dynamic Systems (2nd edition), section 7.2.2. */
 typedef struct bst_spacecraft_gyro {
     double angle_walk;   /* rad / sqrt(s) */
     double rate_walk;    /* rad / s^1.5 */
     bst_mat3 response;   /* scale factor and alignment: sensed angle from body angle */
-    bst_vec3 bias_radps; /* now */
+    bst_vec3 bias_radps; /* current */
     double dt_s;
     bst_rng_key key;
     int64_t samples;
 } bst_spacecraft_gyro;
 
-/* dt_s: time between samples. The first bias: bias_degph plus a draw of bias_sigma_degph about each
- * axis. */
+/* Initialises a gyro. The initial bias is bias_degph plus a draw of bias_sigma_degph about each
+ * axis.
+ *
+ * Given:     dt_s  time between samples */
 void bst_spacecraft_gyro_init(bst_spacecraft_gyro *gyro, const bst_spacecraft_gyro_config *config,
                               double dt_s, bst_rng_key key);
 
-/* The next sample, rad, body axes, of a true turn (rotation vector of the body since the sample
- * before); the bias walks on. */
+/* Next gyro sample, rad, body axes; the bias continues its random walk.
+ *
+ * Given:     turn_rad  true rotation vector of the body since the previous sample */
 bst_vec3 bst_spacecraft_gyro_measure(bst_spacecraft_gyro *gyro, bst_vec3 turn_rad);
 
 #endif

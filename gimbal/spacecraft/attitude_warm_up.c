@@ -23,12 +23,12 @@ void bst_attitude_warm_up(const bst_attitude_past *past, bst_attitude_filter *fi
         tracker[i] = *past->tracker[i];
         tracker[i].sigma_rad[0] /= averaged;
         tracker[i].sigma_rad[1] /= averaged;
-        tracker[i].key.k[0] ^= past->key.k[0]; /* other noise than what is to come */
+        tracker[i].key.k[0] ^= past->key.k[0]; /* independent of the noise after the epoch */
         noise[i] = bst_spacecraft_star_tracker_covariance(&tracker[i]);
     }
 
     bst_vec3 turn = bst_vec3_scale(past->rate_radps, dt);
-    bst_quat q = past->q_body_from_gcrf; /* where it was does not matter, only where it is seen */
+    bst_quat q = past->q_body_from_gcrf; /* only relative attitudes matter */
     for (int64_t n = 1; n <= steps; n++) {
         q = bst_quat_unit(bst_quat_turn_frame(q, turn));
         bst_attitude_filter_propagate(filter, bst_spacecraft_gyro_measure(&gyro, turn), dt);
@@ -41,7 +41,7 @@ void bst_attitude_warm_up(const bst_attitude_past *past, bst_attitude_filter *fi
             }
         }
     }
-    /* back to the attitude of the epoch, and to the bias that the gyro has then */
+    /* convert to attitude and gyro bias at the epoch */
     bst_vec3 error = bst_attitude_filter_error(q, filter->q_body_from_gcrf);
     filter->q_body_from_gcrf =
         bst_quat_unit(bst_quat_turn_frame(past->q_body_from_gcrf, bst_vec3_scale(error, -1.0)));

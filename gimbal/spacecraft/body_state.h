@@ -1,4 +1,4 @@
-/* How the spacecraft's body moves: what its dynamics hand to the mount at each plant step. */
+/* Motion of the spacecraft's body: interface from its dynamics to the mount at each plant step. */
 #ifndef BST_GIMBAL_SPACECRAFT_BODY_STATE_H
 #define BST_GIMBAL_SPACECRAFT_BODY_STATE_H
 
@@ -7,8 +7,8 @@
 /* The true state of the body at one plant step. */
 typedef struct bst_body_state {
     bst_quat q_body_from_gcrf; /* unit */
-    bst_vec3 rate_radps;       /* of the body against GCRF, body axes */
-    bst_vec3 accel_radps2;     /* change of rate_radps over the step before, by its length */
+    bst_vec3 rate_radps;       /* relative to GCRF, body axes */
+    bst_vec3 accel_radps2;     /* mean acceleration over the previous step */
 } bst_body_state;
 
 #endif

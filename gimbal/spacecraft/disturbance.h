@@ -1,4 +1,4 @@
-/* Torques of the surroundings on a spacecraft. All torques in N m, body axes. */
+/* Environmental disturbance torques on a spacecraft, N m, body axes. */
 #ifndef BST_GIMBAL_SPACECRAFT_DISTURBANCE_H
 #define BST_GIMBAL_SPACECRAFT_DISTURBANCE_H
 
@@ -17,28 +17,32 @@ typedef struct bst_disturbance_config {
 
 extern const bst_config_desc bst_disturbance_config_table[];
 
-/* Of a point mass Earth: 3 mu / r^3 (u x I u), u the unit vector to the Earth's centre. Markley and
- * Crassidis, Fundamentals of Spacecraft Attitude Determination and Control (2014), eq. 3.155. */
+/* Gravity-gradient torque of a point-mass Earth: 3 mu / r^3 (u x I u), u the unit vector to the
+ * Earth's centre. Markley and Crassidis, Fundamentals of Spacecraft Attitude Determination and
+ * Control (2014), eq. 3.155. */
 bst_vec3 bst_spacecraft_gravity_gradient_torque(const bst_mat3 *inertia_kgm2,
                                                 bst_quat q_body_from_gcrf, bst_vec3 position_m);
 
-/* Of sunlight: the force P (1 au / d)^2 A C away from the Sun at `lever` from the centre of mass.
- * sun_m: spacecraft to Sun, GCRF; sunlit: fraction of the Sun's disc in sight. */
+/* Solar radiation torque: force P (1 au / d)^2 A C away from the Sun, at `lever` from the centre of
+ * mass.
+ *
+ * Given:     sun_m   spacecraft to Sun, GCRF
+ *            sunlit  visible fraction of the Sun's disc */
 bst_vec3 bst_spacecraft_solar_torque(const bst_disturbance_config *config,
                                      bst_quat q_body_from_gcrf, bst_vec3 sun_m, double sunlit);
 
-/* The Earth's field (T, GCRF) at a geocentric place: the axial dipole alone, along GCRF z (IGRF-13,
+/* Earth's magnetic field (T, GCRF) at a geocentric position: axial dipole along GCRF z (IGRF-13,
  * g(1,0) = -29404.8 nT at 6371.2 km, 2020). */
 bst_vec3 bst_spacecraft_dipole_field_t(bst_vec3 position_m);
 
-/* The dipole (A m^2, body axes) with which magnetic torquers of at most limit_am2 about each axis
- * take momentum_nms (body axes) off the wheels in about BST_UNLOAD_S: (h x B) / (t |B|^2), each
- * component clipped; the torque m x B = -(h across B) / t. */
+/* Magnetic torquer dipole (A m^2, body axes, at most limit_am2 per axis) that unloads momentum_nms
+ * (body axes) from the wheels in about BST_UNLOAD_S: (h x B) / (t |B|^2), clipped; its torque is m
+ * x B = -(h across B) / t. */
 bst_vec3 bst_spacecraft_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, double limit_am2);
 
 #define BST_UNLOAD_S 600.0
 
-/* All that the configuration has, unloading included. */
+/* Sum of all configured disturbance torques, wheel unloading included. */
 bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_mat3 *inertia_kgm2,
                                 bst_quat q_body_from_gcrf, bst_vec3 position_m, bst_vec3 sun_m,
                                 double sunlit, bst_vec3 wheel_momentum_nms);

@@ -7,7 +7,7 @@ const char *const bst_law_names[] = {"inertial", "nadir", "sun", "target", "free
 bst_quat bst_pointing_law_attitude(const bst_pointing_law *law,
                                    const bst_spacecraft_law_inputs *inputs) {
     bst_vec3 towards = {0, 0, 0};
-    /* where the nominal attitude has the second axis */
+    /* second axis in the nominal attitude */
     bst_vec3 second = bst_quat_rotate(bst_quat_conj(law->q_nominal), law->second_axis);
     switch (law->law) {
         case BST_LAW_NADIR:
@@ -47,7 +47,7 @@ bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_at(const bst
         int nearest = (int)fmin(3.0, fmax(0.0, floor(place + 0.5)));
         return (bst_spacecraft_attitude_reference){.q_body_from_gcrf = node[nearest]};
     }
-    /* Lagrange's polynomials of the nodes 0 to 3, and their first two derivatives */
+    /* Lagrange polynomials of the nodes 0 to 3, and their first two derivatives */
     double a = place, b = place - 1.0, c = place - 2.0, d = place - 3.0;
     const double w[4] = {-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0};
     const double w1[4] = {-(b * c + b * d + c * d) / 6.0, (a * c + a * d + c * d) / 2.0,
@@ -59,7 +59,7 @@ bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_at(const bst
         rate = bst_vec3_axpy(rate, w1[k] / step_s, r[k]);
         accel = bst_vec3_axpy(accel, w2[k] / (step_s * step_s), r[k]);
     }
-    /* w = r' - r x r' / 2 + ..., in the turned axes */
+    /* w = r' - r x r' / 2 + ..., in the rotated axes */
     rate = bst_vec3_axpy(rate, -0.5, bst_vec3_cross(turn, rate));
     accel = bst_vec3_axpy(accel, -0.5, bst_vec3_cross(turn, accel));
     return (bst_spacecraft_attitude_reference){bst_quat_unit(bst_quat_turn_frame(node[1], turn)),
@@ -75,7 +75,7 @@ bst_spacecraft_attitude_reference bst_spacecraft_attitude_reference_rolled(
     bst_spacecraft_attitude_reference out;
     out.q_body_from_gcrf = bst_quat_unit(bst_quat_mul(step, reference->q_body_from_gcrf));
     out.rate_radps = bst_vec3_add(carried, spin);
-    /* the carried rate turns backwards in axes that roll */
+    /* the transported rate rotates backwards in rolling axes */
     out.accel_radps2 =
         bst_vec3_sub(bst_quat_rotate(step, reference->accel_radps2), bst_vec3_cross(spin, carried));
     return out;

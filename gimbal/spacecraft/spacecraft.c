@@ -7,11 +7,11 @@
 #include "gimbal/mount/axis.h"
 #include "gimbal/spacecraft/attitude_warm_up.h"
 
-/* A measurement on its way from a star tracker. */
+/* A delayed star-tracker measurement. */
 typedef struct pending {
     int64_t sampled, due; /* plant steps */
     int tracker;
-    bst_quat measured, estimate; /* estimate: of the instant of the measurement, as known now */
+    bst_quat measured, estimate; /* estimate: current estimate of the attitude at the measurement */
 } pending;
 
 struct bst_spacecraft {
@@ -24,7 +24,7 @@ struct bst_spacecraft {
     bst_vec3 disturbance_nm; /* held */
     bst_spacecraft_gyro gyro;
     bst_quat q_at_gyro;          /* true, at the latest sample */
-    bst_vec3 turn_since_control; /* sum of the gyro's samples since the controller's step */
+    bst_vec3 turn_since_control; /* sum of gyro samples since the last controller step */
     int samples_since_control;
     bst_vec3 rate_control_radps; /* their mean rate */
     int64_t gyro_steps, control_steps;
@@ -38,7 +38,7 @@ struct bst_spacecraft {
     int64_t filter_step; /* plant step of the filter's estimate */
     bst_spacecraft_attitude_control control;
     bst_pointing_law law;
-    bst_axis roll; /* its shaper */
+    bst_axis roll; /* command shaper of the roll */
     double roll_target_rad;
     bst_spacecraft_sky_grid grid;
     bst_spacecraft_sky sky;
@@ -76,7 +76,7 @@ static bst_rng_key stream(const bst_spacecraft_setup *setup, const char *name) {
     return bst_rng_make_key(setup->seed, setup->run, setup->instance, name);
 }
 
-/* Plant steps between two of something at wanted_hz. */
+/* Plant steps per period of wanted_hz. */
 static bst_status whole_steps(bst_ctx *ctx, const char *key, double plant_hz, double wanted_hz,
                               int64_t *out) {
     double ratio = plant_hz / wanted_hz, steps = round(ratio);
@@ -137,7 +137,7 @@ static bst_status set_body(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacec
     return BST_OK;
 }
 
-/* Wheels that work must turn the body about every axis, unless nothing is controlled. */
+/* Checks that the working wheels span three axes, unless the attitude is uncontrolled. */
 static bst_status check_wheels(bst_ctx *ctx, const bst_spacecraft *craft) {
     double speed[BST_WHEELS_MOST] = {0}, motor[BST_WHEELS_MOST];
     if (craft->law.law != BST_LAW_FREE &&
@@ -193,7 +193,7 @@ static bst_vec3 normal3(bst_rng_key key) {
     return (bst_vec3){a[0], a[1], b[0]};
 }
 
-/* The filter as it is at the epoch. */
+/* Sets the attitude filter's state at the epoch. */
 static void set_filter(bst_spacecraft *craft, const bst_spacecraft_config *config,
                        const bst_spacecraft_setup *setup, bst_quat q, bst_vec3 rate) {
     double sigma = config->initial_knowledge_arcsec * BST_ARCSEC_RAD;
@@ -281,7 +281,7 @@ bst_status bst_spacecraft_create(bst_ctx *ctx, const bst_spacecraft_config *conf
     return BST_OK;
 }
 
-/* Fastest imbalance that steps follow, rad/s. */
+/* Highest resolved wheel imbalance frequency, rad/s. */
 static double followed_radps(const bst_spacecraft *craft) {
     return 2.0 * BST_PI * BST_JITTER_RESOLVED / craft->dt_s;
 }
@@ -361,8 +361,8 @@ static void read_trackers(bst_spacecraft *craft, int64_t n, double seconds) {
     craft->now.tracked = asked ? seen : craft->now.tracked;
 }
 
-/* What a correction of now says of the estimate of an earlier instant: e then = e now + age b, in
- * the axes of then. */
+/* Applies a current correction to the estimate of an earlier time: e then = e now + age b, in the
+ * axes of then. */
 static void correct_past(bst_quat *estimate, bst_quat q_now, double age_s,
                          const bst_vec3 correction[2]) {
     bst_quat q_then_from_now = bst_quat_mul(*estimate, bst_quat_conj(q_now));
@@ -370,7 +370,8 @@ static void correct_past(bst_quat *estimate, bst_quat q_now, double age_s,
     *estimate = bst_quat_unit(bst_quat_turn_frame(*estimate, bst_quat_rotate(q_then_from_now, e)));
 }
 
-static void take_in(bst_spacecraft *craft, int64_t n) {
+/* Updates the filter with the star-tracker measurements that have arrived. */
+static void process_measurements(bst_spacecraft *craft, int64_t n) {
     int kept = 0;
     for (int k = 0; k < craft->pendings; k++) {
         pending p = craft->pending[k];
@@ -397,8 +398,8 @@ static void take_in(bst_spacecraft *craft, int64_t n) {
     craft->pendings = kept;
 }
 
-/* What the imbalance of wheels adds that the steps do not show: all of the fast ones, and of the
- * others what straight lines between the steps lack. */
+/* Variance of wheel imbalance missing from the steps: all above the resolved frequency, and below
+ * it what linear interpolation lacks. */
 static double unresolved(const bst_spacecraft *craft) {
     double sum = 0.0, top = followed_radps(craft);
     const bst_mat3 *inertia = &craft->body.inertia;
@@ -416,7 +417,7 @@ static double unresolved(const bst_spacecraft *craft) {
     return sum;
 }
 
-/* Brings the commanded roll a step of the controller on. */
+/* Advances the commanded roll by a controller step. */
 static void roll(bst_spacecraft *craft) {
     bst_axis *axis = &craft->roll;
     bst_body_roll *now = &craft->now.roll;
@@ -453,12 +454,12 @@ static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double
         return BST_OK;
     }
     roll(craft);
-    /* the estimate stands at the newest gyro sample */
+    /* the estimate is at the newest gyro sample */
     double age = (double)(n - craft->filter_step) * craft->dt_s;
     bst_quat q = bst_quat_unit(bst_quat_turn_frame(
         craft->filter.q_body_from_gcrf, bst_vec3_scale(craft->now.rate_believed_radps, age)));
     if (craft->samples_since_control > 0) {
-        /* of all samples, lest their noise be counted twice */
+        /* over all samples, to avoid counting their noise twice */
         craft->rate_control_radps =
             bst_vec3_axpy(bst_vec3_scale(craft->turn_since_control,
                                          1.0 / (craft->samples_since_control * craft->gyro.dt_s)),
@@ -484,7 +485,7 @@ bst_status bst_spacecraft_step(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, d
         read_gyro(craft, n);
         read_trackers(craft, n, seconds);
         if (craft->pendings > 0) {
-            take_in(craft, n);
+            process_measurements(craft, n);
         }
     }
     if (n % craft->control_steps == 0) {

@@ -18,7 +18,7 @@ static void take_away(bst_mat3 *m, double scale, bst_vec3 v) {
     }
 }
 
-/* Principal moments (ascending) must be those of a body. */
+/* Checks that the principal moments (ascending) are physical. */
 static bst_status check_inertia(bst_ctx *ctx, const bst_mat3 *inertia) {
     double moment[3];
     bst_dynamics_symmetric_eigen(3, &inertia->m[0][0], moment, NULL);
@@ -28,7 +28,7 @@ static bst_status check_inertia(bst_ctx *ctx, const bst_mat3 *inertia) {
                         "%g kg m^2); no body has it",
                         moment[0], moment[1], moment[2]);
     }
-    /* a flat body has equality, up to the rounding of what the scenario writes */
+    /* a flat body has equality, up to rounding in the scenario */
     if (moment[2] > (moment[0] + moment[1]) * (1.0 + 1e-9)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "inertia_kgm2: the principal moments are %g, %g and %g kg m^2, and the "
@@ -38,7 +38,7 @@ static bst_status check_inertia(bst_ctx *ctx, const bst_mat3 *inertia) {
     return BST_OK;
 }
 
-/* The principal axes and moments of what remains when wheels and appendages turn freely. */
+/* Sets principal axes and moments of the inertia left when wheels and appendages rotate freely. */
 static bst_status set_axes(bst_ctx *ctx, bst_spacecraft_body *body) {
     const bst_spacecraft_spec *spec = &body->spec;
     bst_mat3 hub = body->inertia;
@@ -81,7 +81,7 @@ static bst_vec3 by_moments(const bst_spacecraft_body *body, bst_vec3 v) {
     return (bst_vec3){m[0] * v.x, m[1] * v.y, m[2] * v.z};
 }
 
-/* d_j . M d_k + (j == k): how p drives n. */
+/* d_j . M d_k + (j == k): coupling of p to n. */
 static double mobility(const bst_spacecraft_body *body, int j, int k) {
     return (j == k ? 1.0 : 0.0) +
            bst_vec3_dot(body->coupling[j], by_moments(body, body->coupling[k]));
@@ -136,7 +136,7 @@ static bst_status set_modes(bst_ctx *ctx, bst_spacecraft_body *body) {
     return BST_OK;
 }
 
-/* Momentum of the wheels, and that of the modes, in principal axes. */
+/* Momentum of the wheels, and below of the modes, in principal axes. */
 static bst_vec3 wheels_momentum(const bst_spacecraft_body *body, const double *wheel_momentum) {
     bst_vec3 sum = {0, 0, 0};
     for (int i = 0; i < body->spec.wheels; i++) {
@@ -184,7 +184,7 @@ bst_status bst_spacecraft_body_init(bst_ctx *ctx, bst_spacecraft_body *body,
     return BST_OK;
 }
 
-/* The modes over half a step, the body's momentum held. */
+/* Steps the modes over half a step with the body's momentum held. */
 static void step_modes(bst_spacecraft_body *body, bst_vec3 pi_without_wheels) {
     int m = body->spec.modes;
     if (m == 0) {
@@ -210,7 +210,7 @@ static void step_modes(bst_spacecraft_body *body, bst_vec3 pi_without_wheels) {
     }
 }
 
-/* One Newton step brings the norm, which rounding moves by 1e-16 a step, back to 1. */
+/* One Newton step for the norm, which rounding changes by 1e-16 per step. */
 static bst_quat renormalised(bst_quat q) {
     double f = 1.5 - 0.5 * (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
     return (bst_quat){q.x * f, q.y * f, q.z * f, q.w * f};
@@ -248,7 +248,7 @@ static void step_split(bst_spacecraft_body *body, bst_vec3 torque, const double 
     }
 }
 
-/* rk4: variables are q, momentum in GCRF, wheels, modes' places, modes' momenta. */
+/* RK4 state: q, momentum in GCRF, wheels, mode coordinates, mode momenta. */
 typedef struct held {
     const bst_spacecraft_body *body;
     bst_vec3 torque;

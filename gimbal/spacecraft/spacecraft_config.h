@@ -1,4 +1,4 @@
-/* The "spacecraft" block of a platform. */
+/* "spacecraft" block of a platform. */
 #ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_CONFIG_H
 #define BST_GIMBAL_SPACECRAFT_SPACECRAFT_CONFIG_H
 
@@ -53,7 +53,7 @@ const bst_wheel_config *bst_spacecraft_wheels(const bst_spacecraft_config *confi
 const bst_spacecraft_star_tracker_config *bst_spacecraft_trackers(
     const bst_spacecraft_config *config, int *count);
 
-/* The controller of a configuration. */
+/* Attitude controller parameters of a configuration. */
 bst_spacecraft_attitude_control_spec bst_spacecraft_attitude_control_of(
     const bst_spacecraft_config *config);
 

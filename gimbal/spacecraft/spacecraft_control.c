@@ -2,11 +2,10 @@
 
 #include "gimbal/spacecraft/attitude_filter.h"
 
-/* Share of the acceleration limit that a slew's braking curve uses, the rest being the feedback's.
- */
+/* Share of the acceleration limit used by a slew's braking curve; the remainder is for feedback. */
 #define BRAKE_SHARE 0.7
-/* Of the range in which the law is linear, the part near the end in which the integral moves: what
- * a slew's end would add to it takes long to go. */
+/* Share of the linear range, near the end of a slew, in which the integral is active; integrating
+ * during the slew would decay slowly. */
 #define INTEGRAL_SHARE 0.05
 
 void bst_spacecraft_attitude_control_init(bst_spacecraft_attitude_control *control,
@@ -14,7 +13,7 @@ void bst_spacecraft_attitude_control_init(bst_spacecraft_attitude_control *contr
     *control = (bst_spacecraft_attitude_control){.spec = *spec};
 }
 
-/* Turn from the wanted attitude, the way round that was taken last where both are about as far. */
+/* Rotation from the wanted attitude, in the direction taken last if both are similarly long. */
 static bst_vec3 error_of(bst_spacecraft_attitude_control *control, bst_quat q, bst_quat wanted) {
     bst_vec3 e = bst_attitude_filter_error(q, wanted);
     double angle = bst_vec3_norm(e);
@@ -46,7 +45,7 @@ bst_vec3 bst_spacecraft_attitude_control_step(bst_spacecraft_attitude_control *c
     double linear = fmin(brake / (slope * slope), spec->rate_limit_radps / slope);
     double speed = slope * angle, feed = 0.0;
     if (angle > linear) {
-        /* joins the straight part in value and slope where that ends at the braking curve */
+        /* continues the linear part in value and slope where it meets the braking curve */
         double curve = sqrt(slope * slope * linear * linear + 2.0 * brake * (angle - linear));
         speed = fmin(curve, spec->rate_limit_radps);
         feed = curve < spec->rate_limit_radps ? brake : 0.0;

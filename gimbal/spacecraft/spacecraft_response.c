@@ -50,14 +50,13 @@ static cplx plant_at(const bst_spacecraft_config *config, int axis, double w) {
     return minor / determinant / (s * s);
 }
 
-/* (1 - exp(-s t)) / (s t) */
+/* Mean of a delay over a hold: (1 - exp(-s t)) / (s t). */
 static cplx mean_over(cplx s, double t) {
     cplx x = s * t;
     return cabs(x) < 1e-6 ? 1.0 - 0.5 * x : (1.0 - cexp(-x)) / x;
 }
 
-/* What the controller makes of an error of the attitude, and of one of the rate: N m per rad, and
- * per rad/s. */
+/* Controller response to an attitude error, N m per rad, and to a rate error, N m per rad/s. */
 typedef struct law {
     cplx attitude, rate;
 } law;
@@ -69,7 +68,8 @@ static law law_at(const bst_spacecraft_config *config, int axis, double w) {
     bst_spacecraft_attitude_control_spec spec = bst_spacecraft_attitude_control_of(config);
     cplx s = I * w, z = cexp(s * spec.dt_s);
     double wn = spec.natural_radps;
-    cplx integral = spec.integral_radps * spec.dt_s * z / (z - 1.0); /* the newest error counts */
+    /* the newest error is included */
+    cplx integral = spec.integral_radps * spec.dt_s * z / (z - 1.0);
     double rate_s = fmax(spec.dt_s, 1.0 / config->gyro.rate_hz);
     cplx held = spec.inertia_kgm2.m[axis][axis] * mean_over(s, spec.dt_s);
     return (law){held * wn * wn * (1.0 + integral),

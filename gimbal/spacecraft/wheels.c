@@ -56,11 +56,11 @@ bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_wheel_con
     return BST_OK;
 }
 
-/* Share of a direction below which the wheels are taken not to reach it. */
+/* Share of a direction below which the wheels count as not spanning it. */
 #define REACH 1e-6
 
-/* Solves sum a a' x = torque over the wheels in use; what they do not reach is left out. True when
- * they reach all. */
+/* Solves sum a a' x = torque over the wheels in use; components outside their span are omitted.
+ * Returns true if they span all axes. */
 static bool solve(const bst_wheels *wheels, const bool *used, bst_vec3 torque, bst_vec3 *x) {
     double g[9] = {0};
     for (int i = 0; i < wheels->count; i++) {
@@ -134,7 +134,7 @@ double bst_wheel_torque(const bst_wheel *wheel, double speed_radps, double motor
     }
     double torque = motor_nm - wheel->viscous_nms * speed_radps;
     if (wheel->coulomb_nm > 0.0) {
-        /* what would bring the wheel to rest within the step, if friction can do that */
+        /* torque that stops the wheel within the step, if friction suffices */
         double stop = torque + speed_radps * load_kgm2 / dt_s;
         torque -= fmax(-wheel->coulomb_nm, fmin(wheel->coulomb_nm, stop));
     }

@@ -39,8 +39,8 @@ void bst_bad_rows_end(bst_bad_rows *rows) {
     }
 }
 
-/* The first entry of row y from column x on. */
-static int first_from(const bst_bad_rows *rows, int y, int x) {
+/* Index of the first bad column >= x of sensor row y (binary search). */
+static int first_bad_from_column(const bst_bad_rows *rows, int y, int x) {
     int lo = rows->first[y], hi = rows->first[y + 1];
     while (lo < hi) {
         int mid = lo + (hi - lo) / 2;
@@ -54,7 +54,7 @@ static int first_from(const bst_bad_rows *rows, int y, int x) {
 }
 
 bool bst_bad_rows_hold(const bst_bad_rows *rows, int32_t pixel) {
-    int y = pixel / rows->width, x = pixel % rows->width, i = first_from(rows, y, x);
+    int y = pixel / rows->width, x = pixel % rows->width, i = first_bad_from_column(rows, y, x);
     return i < rows->first[y + 1] && rows->column[i] == x;
 }
 
@@ -64,8 +64,8 @@ void bst_bad_rows_mask(const bst_bad_rows *rows, const bst_bad_rows_run *run, fl
     int top = run->window->y0 + run->y * binning, left = run->window->x0 + run->x * binning;
     int right = left + run->count * binning;
     for (int v = top; v < top + binning; v++) {
-        for (int i = first_from(rows, v, left); i < rows->first[v + 1] && rows->column[i] < right;
-             i++) {
+        for (int i = first_bad_from_column(rows, v, left);
+             i < rows->first[v + 1] && rows->column[i] < right; i++) {
             out[(rows->column[i] - left) / binning] = value;
         }
     }

@@ -2,8 +2,10 @@
 
 #include "imgproc/detect/background.h"
 
-/* Dark, flat and bad pixels of part of a binned row, from the full-sensor maps. */
-static void correct(const bst_calibrate_pixels *e, int y, int first, int count, float *out) {
+/* Dark subtraction, flat-field correction and bad-pixel masking of part of a binned row, from the
+ * full-sensor calibration maps. */
+static void apply_calibration_maps(const bst_calibrate_pixels *e, int y, int first, int count,
+                                   float *out) {
     const bst_imgproc_frame *frame = e->frame;
     int b = frame->binning;
     size_t stride = (size_t)e->camera->width_px;
@@ -41,7 +43,7 @@ void bst_calibrate_pixels_read(const void *electrons, int y, int x, int count, f
         out[i] -= e->columns->level_e[e->first_column + x + i];
     }
     if (e->maps->dark_e_per_s || e->maps->flat || e->bad) {
-        correct(e, y, x, count, out);
+        apply_calibration_maps(e, y, x, count, out);
     }
     if (e->learned && e->learned->count > 0) {
         const bst_bad_rows_run run = {&e->frame->window, e->frame->binning, y, x, count};

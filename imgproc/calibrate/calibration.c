@@ -6,6 +6,7 @@
 #include "sim/io/fits_image.h"
 #include "sim/io/psf_fits.h"
 
+/* Reads a calibration image of the sensor's size from a FITS file. */
 static bst_status read_map(bst_ctx *ctx, const char *key, const char *path,
                            const bst_camera *camera, float **map) {
     int width, height;
@@ -24,13 +25,14 @@ static bst_status read_map(bst_ctx *ctx, const char *key, const char *path,
     return BST_OK;
 }
 
-/* A map's file, and what its good pixels must be. */
+/* File of a calibration map and the range allowed for its good pixels. */
 typedef struct map_file {
     const char *key, *path;
     float above;
     const char *allowed;
 } map_file;
 
+/* Checks that every good pixel of a dark or flat map is finite and in range. */
 static bst_status check_map(bst_ctx *ctx, const map_file *file, const float *map,
                             const uint8_t *bad, const bst_camera *camera) {
     for (int64_t y = 0, k = 0; y < camera->height_px; y++) {
@@ -47,6 +49,7 @@ static bst_status check_map(bst_ctx *ctx, const map_file *file, const float *map
     return BST_OK;
 }
 
+/* Reads the bad-pixel map: any pixel that is not zero is bad. */
 static bst_status read_bad(bst_ctx *ctx, const char *path, const bst_camera *camera,
                            const uint8_t **out) {
     float *map;
@@ -54,7 +57,7 @@ static bst_status read_bad(bst_ctx *ctx, const char *path, const bst_camera *cam
     size_t count = (size_t)camera->width_px * (size_t)camera->height_px;
     uint8_t *bad = malloc(count);
     for (size_t k = 0; bad && k < count; k++) {
-        bad[k] = map[k] != 0.0f; /* NAN too */
+        bad[k] = map[k] != 0.0f; /* blank pixels (NAN) are bad too */
     }
     free(map);
     *out = bad;

@@ -13,7 +13,7 @@ enum {
 };
 
 static const double CLIP_SIGMAS = 3.0;
-/* Share of the full well beyond which a column holds overflow instead of smear. */
+/* Share of the full well above which blooming, not smear, dominates the median of a column. */
 static const double FULL_SHARE = 0.5;
 
 bst_status bst_columns_create(bst_ctx *ctx, int width, bst_columns *out) {
@@ -35,6 +35,7 @@ void bst_columns_free(bst_columns *columns) {
     *columns = (bst_columns){0};
 }
 
+/* qsort order of pixel values, ascending. */
 static int by_value(const void *a, const void *b) {
     float p = *(const float *)a, q = *(const float *)b;
     return (p > q) - (p < q);
@@ -52,12 +53,13 @@ typedef struct measuring {
     int width, height;
 } measuring;
 
+/* Electrons of a binned pixel above the camera's offset. */
 static double electrons(const measuring *m, double dn) {
     return (dn - m->camera->offset_dn) * m->camera->gain_e_per_dn;
 }
 
-/* Median of a few rows of each column of a block, in digital numbers. */
-static void start_block(const measuring *m, int x0, int count, float *level) {
+/* Start value of each column's level: the median of FIRST_ROWS rows, DN. */
+static void median_column_levels(const measuring *m, int x0, int count, float *level) {
     for (int i = 0; i < count; i++) {
         float few[FIRST_ROWS];
         for (int k = 0; k < FIRST_ROWS; k++) {
@@ -68,15 +70,15 @@ static void start_block(const measuring *m, int x0, int count, float *level) {
     }
 }
 
-/* Mean of the rows within the clip about `level`, which it becomes. */
-static void clip_block(const measuring *m, int x0, int count, float *level) {
+/* Sigma-clips the rows of each column about `level`, DN, and replaces `level` by their mean. */
+static void clip_column_levels(const measuring *m, int x0, int count, float *level) {
     const bst_camera *c = m->camera;
     float limit[BLOCK], sum[BLOCK] = {0}, kept[BLOCK] = {0};
     for (int i = 0; i < count; i++) {
         double variance = c->read_noise_e * c->read_noise_e +
                           fmax(electrons(m, (double)level[i]), 0.0) +
                           c->gain_e_per_dn * c->gain_e_per_dn / 12.0;
-        /* a step of the converter on either side, so that the clip holds some number */
+        /* one ADC step wider on either side, so that at least one digital value lies inside */
         limit[i] = (float)(CLIP_SIGMAS * sqrt(variance) / c->gain_e_per_dn + 1.0);
     }
     int rows = m->height < MOST_ROWS ? m->height : MOST_ROWS;
@@ -94,14 +96,15 @@ static void clip_block(const measuring *m, int x0, int count, float *level) {
     }
 }
 
-static void measure_blocks(void *user, int begin, int end) {
+/* Column levels of blocks begin to end - 1, e- (loop body of bst_parallel_for). */
+static void measure_column_blocks(void *user, int begin, int end) {
     const measuring *m = user;
     for (int b = begin; b < end; b++) {
         float level[BLOCK];
         int x0 = b * BLOCK, count = m->width - x0 < BLOCK ? m->width - x0 : BLOCK;
-        start_block(m, x0, count, level);
-        clip_block(m, x0, count, level);
-        clip_block(m, x0, count, level);
+        median_column_levels(m, x0, count, level);
+        clip_column_levels(m, x0, count, level);
+        clip_column_levels(m, x0, count, level);
         for (int i = 0; i < count; i++) {
             m->columns->level_e[x0 + i] = (float)electrons(m, (double)level[i]);
         }
@@ -116,7 +119,7 @@ void bst_columns_measure(bst_columns *columns, bst_parallel *pool, const bst_cam
     columns->count = m.width;
     memset(columns->level_e, 0, (size_t)m.width * sizeof(float));
     if (m.height >= FIRST_ROWS) {
-        bst_parallel_for(pool, (m.width + BLOCK - 1) / BLOCK, 1, measure_blocks, &m);
+        bst_parallel_for(pool, (m.width + BLOCK - 1) / BLOCK, 1, measure_column_blocks, &m);
     }
     memcpy(columns->ordered, columns->level_e, (size_t)m.width * sizeof(float));
     columns->median_e = median_of(columns->ordered, m.width);

@@ -1,5 +1,5 @@
-/* The level of each column of a frame over that of the others: the smear of a frame transfer under
- * light, and offsets of columns. */
+/* Level of each detector column above the median column: frame-transfer smear and column offsets.
+ */
 #ifndef BST_IMGPROC_CALIBRATE_COLUMNS_H
 #define BST_IMGPROC_CALIBRATE_COLUMNS_H
 
@@ -8,22 +8,24 @@
 
 typedef struct bst_columns {
     int capacity, count;
-    float *level_e; /* [count]: over the median of all columns, electrons of a binned pixel */
-    float *noise;   /* [count]: noise of a pixel over that of a column without the level, >= 1 */
+    float *level_e; /* [count]: column level above the median of all columns, e- per binned pixel */
+    /* [count]: pixel noise of a column relative to a column without excess level, >= 1 */
+    float *noise;
     float *ordered; /* work space */
-    float median_e; /* level over the camera's offset that the columns are compared with */
+    float median_e; /* median column level above the camera's offset, e- */
 } bst_columns;
 
-/* Room for a frame of `width` columns. BST_ERR_MEMORY. */
+/* Allocates column levels for frames of up to `width` columns. Errors: BST_ERR_MEMORY. */
 bst_status bst_columns_create(bst_ctx *ctx, int width, bst_columns *out) BST_MUST_CHECK;
 /* Frees the memory of the columns' levels and clears the struct, which belongs to the caller. */
 void bst_columns_free(bst_columns *columns);
 
-/* Measures the columns of a whole frame: the median of 31 rows, then twice the mean of up to 1024
- * rows within three standard deviations of it, that of the read noise and of the level's counted
- * electrons. A column of which half is near the full well, or with fewer than 31 rows, has the
- * median level. Only a frame transfer's smear is counted light, which adds noise; offsets of
- * columns are electronic. */
+/* Measures the column levels of a whole frame.
+ *
+ * A column starts from the median of 31 rows. Two sigma clips at 3 sigma follow, over at most 1024
+ * rows; sigma combines read noise, shot noise of the level and quantisation. A column near the full
+ * well, or a frame of fewer than 31 rows, gets the median level. Only frame-transfer smear carries
+ * shot noise; electronic column offsets do not. */
 void bst_columns_measure(bst_columns *columns, bst_parallel *pool, const bst_camera *camera,
                          const bst_imgproc_frame *frame);
 

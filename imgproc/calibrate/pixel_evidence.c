@@ -21,13 +21,17 @@ void bst_pixel_shows_free(bst_pixel_shows *shows) {
     *shows = (bst_pixel_shows){0};
 }
 
-/* A maximum from this SNR on is taken for light by the quick test alone, where that can tell. */
+/* Above this SNR the quick test alone clears a maximum of being a defective pixel, where it has the
+ * power to. */
 static const float CLEAR_SNR = 20.0f;
 
-enum { CLUSTER_PX = 2 }; /* about a pixel with charge */
+/* half width of the neighbourhood of a defective pixel searched for others, px */
+enum { CLUSTER_PX = 2 };
 
-/* The highest of the pixels about a maximum: the filter's maximum may lie beside a hot pixel. */
-static void find_highest(const bst_sharpness *s, const bst_locate_frame *f, int *x, int *y) {
+/* Moves (x, y) to the brightest of the 3 x 3 pixels: the matched filter's maximum may lie beside a
+ * hot pixel. */
+static void move_to_brightest_pixel(const bst_sharpness *s, const bst_locate_frame *f, int *x,
+                                    int *y) {
     int x0 = *x, y0 = *y;
     double highest = -INFINITY;
     for (int v = y0 - 1; v <= y0 + 1; v++) {
@@ -47,15 +51,16 @@ static void find_highest(const bst_sharpness *s, const bst_locate_frame *f, int 
     }
 }
 
-/* What adding the maxima of a frame needs. */
+/* Context for adding the maxima of a frame to the bad-pixel evidence. */
 typedef struct adder {
     bst_pixel_shows *shows;
     const bst_imgproc_locator *l;
     const bst_locate_frame *f;
-    double noise_e; /* at the maximum */
+    double noise_e; /* of a pixel at the maximum, e- */
 } adder;
 
-static void add(const adder *a, int x, int y, const bst_sharpness_test *sharp) {
+/* Records a maximum at frame pixel (x, y) as evidence, in full-sensor coordinates. */
+static void add_evidence(const adder *a, int x, int y, const bst_sharpness_test *sharp) {
     const bst_locate_frame *f = a->f;
     double to_corner = 0.5 * (f->binning - 1.0);
     int64_t u = llround(f->origin_x_px - to_corner + f->binning * x);
@@ -66,26 +71,28 @@ static void add(const adder *a, int x, int y, const bst_sharpness_test *sharp) {
     }
 }
 
+/* True if the pixel's neighbours are too faint for the PSF: a single-pixel defect or cosmic ray. */
 static bool is_open(const adder *a, int x, int y) {
     return bst_sharpness_is_open(&a->l->sharpness, a->f->signal, a->f->width, a->f->height,
                                  (float)a->noise_e, x, y);
 }
 
+/* Compares the 3 x 3 pixels at (x, y) with the PSF. */
 static bst_sharpness_test compare(const adder *a, int x, int y) {
     return bst_sharpness_compare(&a->l->sharpness, a->f->signal, a->f->width, a->f->height,
                                  a->noise_e, x, y);
 }
 
-/* The other pixels about one that holds charge that hold charge too: what the filter shows as one
- * maximum may be several defects. */
-static void add_cluster(const adder *a, int x, int y) {
+/* Adds sharp pixels near a defective one: one maximum of the matched filter may hide a cluster of
+ * defects. */
+static void add_defect_cluster(const adder *a, int x, int y) {
     for (int v = y - CLUSTER_PX; v <= y + CLUSTER_PX; v++) {
         for (int u = x - CLUSTER_PX; u <= x + CLUSTER_PX; u++) {
             bool inside = u >= 0 && v >= 0 && u < a->f->width && v < a->f->height;
             if (inside && (u != x || v != y) && is_open(a, u, v)) {
                 bst_sharpness_test sharp = compare(a, u, v);
                 if ((double)sharp.worst > BST_SHARP_DEVIATION) {
-                    add(a, u, v, &sharp);
+                    add_evidence(a, u, v, &sharp);
                 }
             }
         }
@@ -99,16 +106,16 @@ void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_imgproc_locator *l,
     for (int i = 0; i < candidates->count; i++) {
         int x = candidates->items[i].x, y = candidates->items[i].y;
         a.noise_e = bst_locate_noise_at(f, x, y);
-        find_highest(&l->sharpness, f, &x, &y);
+        move_to_brightest_pixel(&l->sharpness, f, &x, &y);
         float signal = f->signal[(size_t)y * (size_t)f->width + (size_t)x];
         if (candidates->items[i].snr > CLEAR_SNR && !is_open(&a, x, y) &&
             bst_sharpness_is_telling(&l->sharpness, signal, (float)a.noise_e)) {
             continue;
         }
         bst_sharpness_test sharp = compare(&a, x, y);
-        add(&a, x, y, &sharp);
+        add_evidence(&a, x, y, &sharp);
         if ((double)sharp.worst > BST_SHARP_DEVIATION) {
-            add_cluster(&a, x, y);
+            add_defect_cluster(&a, x, y);
         }
     }
 }

@@ -7,29 +7,30 @@
 #include "boresight/vec.h"
 
 enum {
-    MEMORY_LOOKS = 64, /* older looks count half */
-    CHECK_EVERY = 4    /* a bad pixel is looked at again in one frame of so many */
+    MEMORY_LOOKS = 64, /* number of looks after which older ones are halved in weight */
+    CHECK_EVERY = 4    /* a masked pixel is re-checked in one of so many frames */
 };
 
-/* Turn of the sky beyond which the light of a star has left a pixel, px and FWHM. */
+/* Motion of the sky beyond which a star's light has left the pixel: px, or FWHM. */
 static const double MOVED_PX = 3.0, MOVED_FWHM = 1.5;
-/* A boresight that is off its steady motion by more, px and share of that motion, has slewed. */
+/* An offset from the boresight's steady motion above this, px or share of that motion, is a slew.
+ */
 static const double JUMP_PX = 10.0, JUMP_SHARE = 0.25;
-/* Below these sums a pixel is no more suspected. */
+/* A pixel whose smallest log-likelihood sum falls below this is no longer suspected. */
 static const double DISMISSED = -6.0;
-/* Share of light that is sharper than light before any star is identified: 1 of a thousand. */
+/* Prior: one star in this number appears sharper than the PSF before any star is identified. */
 static const double SHARP_PRIOR = 1000.0;
-/* Greatest weight of one frame's shape: frames share what the PSF is not known for. */
+/* Largest shape term of one frame: frames are correlated through errors of the PSF model. */
 static const double SHAPE_MOST = 5.0;
-/* Excess in standard deviations by which a bad pixel is still bad, and the chance, noise and
- * sources of a crowded field taken together, that a good one has it. */
+/* Excess, in sigma, above which a masked pixel still counts as bad; probability that a good pixel
+ * exceeds it by noise or by sources of a crowded field. */
 static const double STILL_SIGMAS = 3.0, STILL_CHANCE = 0.02;
 
-/* Greatest sum of the looks at a bad pixel, over the sum that made it one: a pixel that recovers is
- * used again after some twelve looks. */
+/* Largest sum of a masked pixel, relative to the threshold: a recovered pixel is unmasked after
+ * about twelve re-checks. */
 static const double SURE = 1.25;
-/* Least chance that a bad pixel is found bad again: one that is bad in fewer than a quarter of the
- * looks is used again in between. */
+/* Least assumed probability that a masked pixel shows its defect again: one bad in under a quarter
+ * of the re-checks is unmasked at times. */
 static const double STILL_LEAST = 0.7;
 
 typedef struct suspect {
@@ -39,15 +40,17 @@ typedef struct suspect {
     uint16_t shown, looks;
     float sky, hit,
         at_rest;        /* log-likelihood ratios against each; bad: at_rest is that of `still` */
-    float direction[3]; /* of the pixel on the sky, at the latest return that counted */
-    float offset[2];    /* of the boresight, at the latest return that counted against rest */
+    float direction[3]; /* pixel's direction in GCRF at the latest return that counted */
+    /* boresight offset, rad, at the latest return that counted against light at rest in the frame
+     */
+    float offset[2];
 } suspect;
 
 struct bst_pixel_learner {
     bst_camera camera;
     double bad_from, moved_rad;
     int capacity;
-    suspect *items, *merged; /* [capacity], by pixel */
+    suspect *items, *merged; /* [capacity], ascending in pixel */
     int count, bad_count;
     int64_t lost;
     bool waits, changed[BST_STEP_LANES];
@@ -57,8 +60,8 @@ struct bst_pixel_learner {
     bst_quat q[2];
     double time_s[2];
     int frames;
-    /* Where the boresight would be had it always gone on steadily; its turn in GCRF in the latest
-     * frames of steady motion, rad/s; and how far the boresight is off it, rad along x and y. */
+    /* Boresight under steady motion since the first frame; its rate in GCRF, rad/s, from the latest
+     * steady frames; and the boresight's offset from it along x and y, rad. */
     bst_quat q_steady;
     bst_vec3 steady_radps;
     double offset[2], offset_limit;
@@ -123,27 +126,33 @@ void bst_pixel_learner_note_star(bst_pixel_learner *l, bool sharp) {
     l->sharp_stars += sharp ? 1.0 : 0.0;
 }
 
-/* ---- evidence ---- */
+/* ---- Likelihood ratios ---- */
 
-/* p(deviation | the pixel's charge alone) / p(deviation | light). `tries`: of how many deviations
- * it is the greatest; `any`: share of light that has any deviation. */
-static double sharp_ratio(double deviation, double alone, double tries, double any) {
+/* p(deviation | defective pixel) / p(deviation | light), normal densities.
+ *
+ * Given:     deviation  largest deviation of the pixel's shape from the PSF, sigma
+ *            alone      deviation expected of charge in one pixel, sigma
+ *            tries      number of deviations of which this is the largest
+ *            any        share of light with an arbitrary deviation */
+static double sharpness_likelihood_ratio(double deviation, double alone, double tries, double any) {
     double d = fmax(deviation, 0.0), off = deviation - alone;
     double light = (1.0 - any) * fmin(1.0, tries * exp(-0.5 * d * d)) + any;
     return ((1.0 - any) * exp(-0.5 * off * off) + any) / light;
 }
 
-/* Log-likelihood ratio of a maximum's shape: half of the defects stand alone among their
- * neighbours, of half a pair of neighbours is enough to tell. */
-static double shape_ratio(const bst_pixel_learner *l, const bst_pixel_show *show) {
+/* Log-likelihood ratio, defective pixel to light, of a maximum's shape. Half of the defects are
+ * assumed isolated; for the others one deviating pair of neighbours suffices. */
+static double shape_log_likelihood(const bst_pixel_learner *l, const bst_pixel_show *show) {
     const bst_sharpness_test *t = &show->sharp;
     double any = (l->sharp_stars + 1.0) / (l->stars + SHARP_PRIOR);
     double ratio =
-        0.5 * sharp_ratio((double)t->all, (double)t->all_alone, 1.0, any) +
-        0.5 * sharp_ratio((double)t->worst, (double)t->worst_alone, (double)BST_SHARP_GROUPS, any);
+        0.5 * sharpness_likelihood_ratio((double)t->all, (double)t->all_alone, 1.0, any) +
+        0.5 * sharpness_likelihood_ratio((double)t->worst, (double)t->worst_alone,
+                                         (double)BST_SHARP_GROUPS, any);
     return fmin(fmax(log(ratio), -SHAPE_MOST), SHAPE_MOST);
 }
 
+/* Direction of a sensor pixel in GCRF. */
 static bst_vec3 direction_at(const bst_pixel_learner *l, const bst_pixel_frame *f, int32_t pixel) {
     double half = 0.5 * (f->binning - 1.0);
     bst_vec3 v = bst_camera_unproject(&l->camera, (double)(pixel % l->camera.width_px) + half,
@@ -151,6 +160,7 @@ static bst_vec3 direction_at(const bst_pixel_learner *l, const bst_pixel_frame *
     return bst_quat_rotate(bst_quat_conj(f->q_cam_from_gcrf), v);
 }
 
+/* True if a predicted track covers the pixel. */
 static bool is_predicted(const bst_pixel_learner *l, const bst_pixel_frame *f, int32_t pixel) {
     double x = (double)(pixel % l->camera.width_px), y = (double)(pixel / l->camera.width_px);
     for (int i = 0; i < f->predicted_count; i++) {
@@ -161,7 +171,7 @@ static bool is_predicted(const bst_pixel_learner *l, const bst_pixel_frame *f, i
     return false;
 }
 
-/* Whether the frame looked at a pixel. */
+/* True if the frame's windows cover the pixel. */
 static bool is_covered(const bst_pixel_learner *l, const bst_pixel_frame *f, int32_t pixel) {
     int64_t x = pixel % l->camera.width_px, y = pixel / l->camera.width_px;
     int count = f->window_count;
@@ -174,11 +184,12 @@ static bool is_covered(const bst_pixel_learner *l, const bst_pixel_frame *f, int
     return false;
 }
 
-/* P of a return, from what the pixel showed so far. */
-static double return_chance(const suspect *s) {
+/* Probability that a defective pixel shows again: (shown + 1) / (looks + 2). */
+static double return_probability(const suspect *s) {
     return (s->shown + 1.0) / (s->looks + 2.0);
 }
 
+/* Counts one look at a suspected pixel; older looks are halved once there are MEMORY_LOOKS. */
 static void note_look(suspect *s, bool shown) {
     if (s->looks >= MEMORY_LOOKS) {
         s->looks /= 2;
@@ -192,15 +203,16 @@ static void add_to(float *sum, double by) {
     *sum = (float)((double)*sum + by);
 }
 
-/* A maximum at a suspected pixel. Returns whether the sky had moved, so that it counts. */
-static bool take_return(const bst_pixel_learner *l, const bst_pixel_frame *f, double q,
-                        const bst_pixel_show *show, suspect *s) {
+/* Updates the sums of a suspected pixel that showed a maximum. Returns true if the sky had moved,
+ * so that the return counts. */
+static bool update_on_return(const bst_pixel_learner *l, const bst_pixel_frame *f, double q,
+                             const bst_pixel_show *show, suspect *s) {
     bst_vec3 now = direction_at(l, f, s->pixel);
     bst_vec3 before = {(double)s->direction[0], (double)s->direction[1], (double)s->direction[2]};
     if (bst_vec3_norm(bst_vec3_sub(now, before)) < l->moved_rad) {
         return false;
     }
-    double ratio = log(return_chance(s) / q), shape = shape_ratio(l, show);
+    double ratio = log(return_probability(s) / q), shape = shape_log_likelihood(l, show);
     bool elsewhere = hypot(l->offset[0] - (double)s->offset[0],
                            l->offset[1] - (double)s->offset[1]) > l->offset_limit;
     bool jumped = elsewhere && !is_predicted(l, f, s->pixel);
@@ -218,22 +230,25 @@ static bool take_return(const bst_pixel_learner *l, const bst_pixel_frame *f, do
     return true;
 }
 
-static void take_miss(double q, suspect *s) {
-    double ratio = log((1.0 - return_chance(s)) / (1.0 - q));
-    /* light at rest that may fade below the threshold misses as often as a defect does */
+/* Updates the sums of a suspected pixel without a maximum. */
+static void update_on_miss(double q, suspect *s) {
+    double ratio = log((1.0 - return_probability(s)) / (1.0 - q));
+    /* light at rest in the frame that may fade below the threshold misses as often as a defect */
     add_to(&s->hit, ratio);
     add_to(&s->sky, ratio);
     note_look(s, false);
 }
 
-static float least_sum(const suspect *s) {
+/* Smallest of the three log-likelihood sums of a suspected pixel. */
+static float smallest_sum(const suspect *s) {
     return fminf(s->hit, fminf(s->sky, s->at_rest));
 }
 
-/* A look at a bad pixel, whose sum is kept in at_rest. Returns whether it is still bad. */
-static bool take_check(const bst_pixel_learner *l, const bst_pixel_check *check, suspect *s) {
+/* Re-check of a masked pixel, whose sum is stored in at_rest. Returns true if it is still bad. */
+static bool update_on_recheck(const bst_pixel_learner *l, const bst_pixel_check *check,
+                              suspect *s) {
     bool still = (double)check->excess > STILL_SIGMAS;
-    double p = fmax(return_chance(s), STILL_LEAST);
+    double p = fmax(return_probability(s), STILL_LEAST);
     add_to(&s->at_rest, still ? log(p / STILL_CHANCE) : log((1.0 - p) / (1.0 - STILL_CHANCE)));
     s->at_rest = fminf(s->at_rest, (float)(SURE * l->bad_from));
     note_look(s, still);
@@ -253,11 +268,11 @@ static suspect new_suspect(const bst_pixel_learner *l, const bst_pixel_frame *f,
                      .offset = {(float)l->offset[0], (float)l->offset[1]}};
 }
 
-/* ---- frames ---- */
+/* ---- Frames ---- */
 
-/* Follows how far the boresight is from where steady motion would have brought it. Light at rest in
- * the frame comes back to a pixel when the boresight comes back to the same offset. */
-static void follow_boresight(bst_pixel_learner *l, const bst_pixel_frame *f) {
+/* Tracks the boresight's offset from steady motion. Light at rest in the frame returns to a pixel
+ * when the boresight returns to the same offset. */
+static void track_boresight_offset(bst_pixel_learner *l, const bst_pixel_frame *f) {
     bst_quat q = f->q_cam_from_gcrf;
     double scale = bst_camera_scale_rad(&l->camera), dt = f->time_s - l->time_s[1];
     double before = l->time_s[1] - l->time_s[0];
@@ -294,31 +309,32 @@ static void follow_boresight(bst_pixel_learner *l, const bst_pixel_frame *f) {
     l->frames++;
 }
 
+/* Marks the published bad-pixel maps as out of date. */
 static void mark_changed(bst_pixel_learner *l) {
     for (int i = 0; i < BST_STEP_LANES; i++) {
         l->changed[i] = true;
     }
 }
 
-/* What becomes of a pixel that is known already. False: it is forgotten. */
-static bool judge(bst_pixel_learner *l, const bst_pixel_frame *f, double q,
-                  const bst_pixel_show *show, const bst_pixel_check *check, suspect *s) {
+/* Updates a known pixel, suspected or bad, with a frame. Returns false if it is dropped. */
+static bool update_pixel(bst_pixel_learner *l, const bst_pixel_frame *f, double q,
+                         const bst_pixel_show *show, const bst_pixel_check *check, suspect *s) {
     if (s->bad) {
-        return !check || take_check(l, check, s);
+        return !check || update_on_recheck(l, check, s);
     }
     if (s->binning != f->binning || !is_covered(l, f, s->pixel)) {
         return true;
     }
     if (!show) {
-        take_miss(q, s);
-    } else if (!take_return(l, f, q, show, s)) {
-        l->waits = l->waits || shape_ratio(l, show) > 0.0;
+        update_on_miss(q, s);
+    } else if (!update_on_return(l, f, q, show, s)) {
+        l->waits = l->waits || shape_log_likelihood(l, show) > 0.0;
     }
-    if ((double)least_sum(s) >= l->bad_from) {
+    if ((double)smallest_sum(s) >= l->bad_from) {
         s->bad = true;
         s->at_rest = (float)(SURE * l->bad_from);
     }
-    return s->bad || (double)least_sum(s) > DISMISSED;
+    return s->bad || (double)smallest_sum(s) > DISMISSED;
 }
 
 static int by_pixel(const void *a, const void *b) {
@@ -327,8 +343,7 @@ static int by_pixel(const void *a, const void *b) {
     return order ? order : (int)q->bad - (int)p->bad;
 }
 
-/* A bad pixel of binned frames becomes the sensor's pixels that it is made of: frames without
- * binning show which of them are good. */
+/* Replaces a bad binned pixel by its sensor pixels; unbinned frames then identify the good ones. */
 static void split_binned(bst_pixel_learner *l) {
     int before = l->count, kept = 0;
     for (int i = 0; i < before; i++) {
@@ -360,6 +375,7 @@ static void split_binned(bst_pixel_learner *l) {
     l->count = kept;
 }
 
+/* Keeps a pixel in the merged list; counts it as lost if the list is full. */
 static void keep(bst_pixel_learner *l, const suspect *s, int *count) {
     if (*count < l->capacity) {
         l->merged[(*count)++] = *s;
@@ -368,7 +384,7 @@ static void keep(bst_pixel_learner *l, const suspect *s, int *count) {
     }
 }
 
-/* The checks are by pixel, as the map is. */
+/* Re-check of a pixel; checks and pixels are both ascending, so *next only advances. */
 static const bst_pixel_check *check_of(const bst_pixel_shows *shows, int32_t pixel, int *next) {
     while (*next < shows->check_count && shows->checks[*next].pixel < pixel) {
         (*next)++;
@@ -379,9 +395,9 @@ static const bst_pixel_check *check_of(const bst_pixel_shows *shows, int32_t pix
 
 void bst_pixel_learner_update(bst_pixel_learner *l, const bst_pixel_frame *f,
                               const bst_pixel_shows *shows) {
-    follow_boresight(l, f);
+    track_boresight_offset(l, f);
     l->waits = false;
-    /* at least one maximum of noise in ten million pixels; at most one in ten */
+    /* share of pixels with a maximum, between 1e-7 and 0.1 */
     double q = fmin(fmax(shows->maxima / fmax(shows->pixels, 1.0), 1e-7), 0.1);
     int a = 0, b = 0, next = 0, count = 0;
     bool changed = false, binned = false;
@@ -391,7 +407,7 @@ void bst_pixel_learner_update(bst_pixel_learner *l, const bst_pixel_frame *f,
         const bst_pixel_show *show = now <= old ? &shows->items[b] : NULL;
         b += show != NULL;
         if (old > now) {
-            double shape = shape_ratio(l, show);
+            double shape = shape_log_likelihood(l, show);
             suspect s = new_suspect(l, f, show, shape);
             if (shape > 0.3 * DISMISSED) {
                 keep(l, &s, &count);
@@ -399,7 +415,8 @@ void bst_pixel_learner_update(bst_pixel_learner *l, const bst_pixel_frame *f,
             continue;
         }
         suspect s = l->items[a++];
-        bool before = s.bad, kept = judge(l, f, q, show, check_of(shows, s.pixel, &next), &s);
+        bool before = s.bad,
+             kept = update_pixel(l, f, q, show, check_of(shows, s.pixel, &next), &s);
         changed = changed || s.bad != before || !kept;
         binned = binned || (s.bad && s.binning > 1);
         if (kept) {
@@ -453,12 +470,12 @@ double bst_pixel_learner_suspicion(const bst_pixel_learner *l, const bst_pixel_m
         return 0.0;
     }
     if (!l->items[lo].bad) {
-        return fmax((double)least_sum(&l->items[lo]), 0.0);
+        return fmax((double)smallest_sum(&l->items[lo]), 0.0);
     }
     return bst_bad_rows_hold(&used->rows, pixel) ? 0.0 : l->bad_from;
 }
 
-/* ---- the map ---- */
+/* ---- Published bad-pixel map ---- */
 
 const bst_pixel_map *bst_pixel_learner_map(const bst_pixel_learner *l, int slot) {
     return &l->maps[slot];

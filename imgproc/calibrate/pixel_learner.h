@@ -1,26 +1,28 @@
-/* Bad-pixel map learned on board: pixels that show a maximum again and again while the sky moves.
+/* Learns bad pixels on board: pixels that show a maximum repeatedly while the sky moves across
+ * them.
  *
- * A defective pixel is distinguished from three other causes of a maximum by sequential likelihood
- * ratios, one against each: light of the sky, which leaves the pixel when the camera turns; a
- * radiation hit, which does not return; and light at rest in the frame, as of a target that the
- * camera follows, whose image is a PSF. The sum over frames of log p1 / p0 has two kinds of terms:
+ * Sequential likelihood ratios compare a defective pixel with three other causes of a maximum. The
+ * first is light of the sky, which leaves the pixel when the camera turns. The second is a
+ * cosmic-ray hit, which does not return. The third is light at rest in the frame, such as a
+ * followed target, whose image has the PSF's shape. The sum over frames of log p1 / p0 has two
+ * kinds of terms:
  *
- * - Return. A pixel that showed k maxima in n looks shows another with P = (k + 1) / (n + 2), a
- * good one with the share of the frame's pixels that hold a maximum, q: log(P / q), or log((1 - P)
- * / (1 - q)) without one. A return counts only after the sky has moved by three pixels; against
- * light at rest only where the boresight is off its steady motion by another offset than at the
- * return before (a slew, a step of a search, but not the way back), and not where a track is
- * predicted.
- * - Shape. The deviation from light is normal about 0 for light, about its value for the pixel's
- *   charge alone for a defect; a share of light, measured on identified stars, has any.
+ * - Return. A pixel with k maxima in n looks shows another with P = (k + 1) / (n + 2). A good one
+ *   shows one with q, the share of the frame's pixels with a maximum. The term is log(P / q), or
+ *   log((1 - P) / (1 - q)) without a maximum. A return counts only after the sky has moved by three
+ *   pixels. Against light at rest it counts only at a new boresight offset from steady motion (a
+ *   slew or a step of a search, but not the way back). It does not count where a track is
+ *   predicted.
+ * - Shape. The deviation from the PSF is normal about 0 for light, and about the value of charge in
+ *   one pixel for a defect. A share of the light, measured on identified stars, has any deviation.
  *
- * The pixel is bad when the least of the three sums reaches log(1 / false_alarm_probability).
- * Because each sum is the logarithm of a likelihood ratio whose mean is 1 for its cause, the chance
- * that a good pixel ever gets there is at most false_alarm_probability (Ville 1939; Wald,
- * Sequential Analysis, 1947, eq. 3:12). A bad pixel is looked at again while it is left out; it is
- * good again when the sum of those looks falls to 0.
+ * A pixel is bad when the smallest of the three sums reaches log(1 / false_alarm_probability). Each
+ * sum is the logarithm of a likelihood ratio with mean 1 under its cause. Hence the probability
+ * that a good pixel ever reaches it is at most false_alarm_probability (Ville 1939; Wald,
+ * Sequential Analysis, 1947, eq. 3:12). A masked pixel is re-checked; it is good again when the sum
+ * of its re-checks falls to 0.
  *
- * While the sky is at rest nothing is learned. */
+ * Nothing is learned while the sky is at rest in the frame. */
 #ifndef BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_H
 #define BST_IMGPROC_CALIBRATE_PIXEL_LEARNER_H
 
@@ -28,7 +30,7 @@
 #include "imgproc/calibrate/pixel_evidence.h"
 #include "imgproc/calibrate/pixel_learner_config.h"
 
-/* Properties of a frame that its pixels' evidence depends on. */
+/* Geometry and coverage of a frame whose evidence updates the learner. */
 typedef struct bst_pixel_frame {
     bst_quat q_cam_from_gcrf; /* mid-exposure */
     double time_s;
@@ -68,32 +70,38 @@ void bst_pixel_learner_update(bst_pixel_learner *learner, const bst_pixel_frame 
 int bst_pixel_learner_bad_count(const bst_pixel_learner *learner);
 /* Number of pixels that are suspected but not yet declared bad. */
 int bst_pixel_learner_suspects(const bst_pixel_learner *learner);
-/* Number of pixels so far that were dropped for lack of room. */
+/* Number of pixels dropped so far because the capacity was reached. */
 int64_t bst_pixel_learner_lost(const bst_pixel_learner *learner);
-/* True if pixels of the latest frame showed charge again while the sky had not moved. */
+/* True if pixels of the latest frame showed charge again but the sky had not moved enough to count.
+ */
 bool bst_pixel_learner_waits(const bst_pixel_learner *learner);
 
-/* The map in `slot`, 0 to BST_STEP_LANES - 1; its `turn` picks the pixels that are looked at again.
- * Lent. */
+/* A published bad-pixel map. */
 typedef struct bst_pixel_map {
     bst_bad_rows rows;
+    /* selects the masked pixels that are re-checked */
     int64_t turn;
 } bst_pixel_map;
 
-/* Map of bad pixels in one of the slots; it belongs to the learner.
+/* Published bad-pixel map in a slot; it belongs to the learner.
  *
  * Given:     slot  0 to BST_STEP_LANES - 1 */
 const bst_pixel_map *bst_pixel_learner_map(const bst_pixel_learner *learner, int slot);
-/* The least of a pixel's sums, at least 0: the logarithm of the odds, against any other cause that
- * is as likely beforehand, that a maximum there is a defect's. 0 where `used`, the map that the
- * frame was searched with, leaves the pixel out: its charge made no maximum then. */
+/* Log odds that a maximum at the pixel is a defect, against any other cause of equal prior: the
+ * smallest of the pixel's sums, at least 0.
+ *
+ * Given:     used   bad-pixel map that the frame was searched with
+ *            pixel  y * width + x on the sensor
+ * Returned:  0 if `used` masks the pixel: its charge cannot have caused a maximum */
 double bst_pixel_learner_suspicion(const bst_pixel_learner *learner, const bst_pixel_map *used,
                                    int32_t pixel);
-/* Brings the map in `slot` up to date. */
+/* Updates the published bad-pixel map in `slot`. */
 void bst_pixel_learner_publish(bst_pixel_learner *learner, int slot, int64_t turn);
 
-/* Adds to `shows` the signals of a share of the pixels of the map that a frame covers; `read` gives
- * electrons without the map (background.h). */
+/* Adds re-checks of a share of the map's masked pixels to the evidence of a frame.
+ *
+ * Given:     read  unmasked pixels of the frame, e- (background.h)
+ *            user  passed to read */
 void bst_pixel_map_check(const bst_pixel_map *map, const bst_locate_frame *frame,
                          const bst_window *window, bst_imgproc_pixel_fn read, const void *user,
                          bst_pixel_shows *shows);

@@ -6,13 +6,13 @@
 
 enum { MOST_PREDICTED = 256 };
 
-/* Pixels about a predicted place that its light may fill, px: a PSF besides the place's own error.
- */
+/* Radius about a predicted track that its light may cover: px for the PSF, plus this many standard
+ * deviations of the prediction. */
 static const double PREDICTED_PX = 3.0, PREDICTED_SIGMAS = 5.0;
 
-/* How often light is as sharp as charge. */
-static void note_stars(bst_pixel_learner *learner, const bst_camera *camera,
-                       const bst_pixel_shows *shows, const bst_detections *out) {
+/* Counts the identified stars that appear sharper than the PSF. */
+static void count_sharp_stars(bst_pixel_learner *learner, const bst_camera *camera,
+                              const bst_pixel_shows *shows, const bst_detections *out) {
     for (int i = 0; i < out->count; i++) {
         const bst_detection *d = &out->items[i];
         if (d->label != BST_LABEL_STAR || (d->flags & BST_DETECTION_SATURATED)) {
@@ -25,8 +25,10 @@ static void note_stars(bst_pixel_learner *learner, const bst_camera *camera,
     }
 }
 
-static int predict(const bst_camera *camera, const bst_imgproc_frame_knowledge *known,
-                   double out[MOST_PREDICTED][3]) {
+/* Position and radius, px, of the predicted tracks in the frame. Returns their number. */
+static int predict_track_positions(const bst_camera *camera,
+                                   const bst_imgproc_frame_knowledge *known,
+                                   double out[MOST_PREDICTED][3]) {
     int count = 0, given = known->predictions ? known->predictions->count : 0;
     for (int i = 0; i < given && count < MOST_PREDICTED; i++) {
         const bst_prediction *p = &known->predictions->items[i];
@@ -50,14 +52,15 @@ void bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
         return;
     }
     double predicted[MOST_PREDICTED][3];
-    note_stars(learner, camera, input->shows, input->detections);
-    bst_pixel_frame frame = {.q_cam_from_gcrf = input->detections->q_cam_from_gcrf,
-                             .time_s = input->time_s,
-                             .window = input->known->window,
-                             .binning = input->binning,
-                             .windows = input->windows->items,
-                             .window_count = input->windows->count,
-                             .predicted = (const double(*)[3])predicted,
-                             .predicted_count = predict(camera, input->known, predicted)};
+    count_sharp_stars(learner, camera, input->shows, input->detections);
+    bst_pixel_frame frame = {
+        .q_cam_from_gcrf = input->detections->q_cam_from_gcrf,
+        .time_s = input->time_s,
+        .window = input->known->window,
+        .binning = input->binning,
+        .windows = input->windows->items,
+        .window_count = input->windows->count,
+        .predicted = (const double(*)[3])predicted,
+        .predicted_count = predict_track_positions(camera, input->known, predicted)};
     bst_pixel_learner_update(learner, &frame, input->shows);
 }

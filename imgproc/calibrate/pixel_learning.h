@@ -1,4 +1,4 @@
-/* A frame's evidence of defective pixels, from what image processing knows of the frame. */
+/* Passes a frame's evidence of defective pixels to the learner of the bad-pixel map. */
 #ifndef BST_IMGPROC_CALIBRATE_PIXEL_LEARNING_H
 #define BST_IMGPROC_CALIBRATE_PIXEL_LEARNING_H
 
@@ -6,20 +6,19 @@
 #include "imgproc/detect/region_of_interest.h"
 #include "imgproc/measure/discriminate.h"
 
-/* A frame whose stars were identified. */
+/* Input of bst_pixel_step: a frame whose stars have been identified. */
 typedef struct bst_pixel_step_input {
     const bst_imgproc_frame_knowledge *known;
-    const bst_region_of_interest *windows; /* that were looked at; none: all of it */
+    const bst_region_of_interest *windows; /* windows searched; NULL or none: the whole frame */
     int binning;
-    double time_s; /* of the exposure's middle */
+    double time_s; /* mid-exposure */
     const bst_pixel_shows *shows;
-    /* with the attitude from telemetry and the tracker, not that of this frame's stars, which a
-     * frame without any lacks */
+    /* identified stars; attitude and tracks come from `known`, because a frame may have no stars */
     const bst_detections *detections;
 } bst_pixel_step_input;
 
-/* Gives a frame's maxima to the learner, after stars were identified and before objects are.
- * Nothing is done with maxima of no use (shows->usable). */
+/* Updates the bad-pixel learner with a frame. Call it after the star identification and before
+ * objects are classified. Frames whose evidence is not usable are skipped. */
 void bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
                     const bst_pixel_step_input *input);
 

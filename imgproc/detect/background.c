@@ -8,26 +8,26 @@
 #include "imgproc/detect/simd_layout.h"
 #include "imgproc/detect/truncated_moments.h"
 
-/* no pixel is better known than its step: 1 / sqrt(12) */
+/* least pixel noise, in ADC steps: the quantisation noise 1 / sqrt(12) */
 static const float QUANTISATION = 0.28867513f;
 
 enum {
     SAMPLE = 96,
     LEFT_SHARE = 16,
     CLIP_PASSES = 4,
-    MANY_PX = 4096 /* a mesh of so many pixels is known well enough from half of its rows */
+    MANY_PX = 4096 /* a mesh of at least so many pixels is estimated from half of its rows */
 };
 
-/* a noise of fewer steps, and of more counted electrons over the cube of its deviation, is far from
- * normal */
+/* The noise is far from normal below this many ADC steps, or above this skewness (counted electrons
+ * over sigma cubed). */
 static const float FEW_STEPS = 1.2f;
 static const double MUCH_SKEW = 0.4;
 
-/* agreement asked of opposite neighbours, standard errors */
+/* Opposite neighbour meshes are averaged in if they agree to so many standard errors. */
 static const float AGREEMENT = 4.0f;
 
-/* Floats from one row of a band to the next: no power of two, so that rows do not share a few lines
- * of the cache. */
+/* Floats between rows of a band of meshes. It is no power of two, so that rows do not share cache
+ * lines. */
 static size_t band_stride(int width) {
     return (size_t)((width + BST_LANES - 1) / BST_LANES * BST_LANES + BST_LANES);
 }
@@ -44,7 +44,7 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     out->left = calloc(meshes, sizeof(int));
     out->read = calloc(meshes, sizeof(int));
     out->scratch = calloc(2 * meshes, sizeof(float));
-    /* a mesh at the end may be half as long again */
+    /* the last mesh of an axis may be half as long again */
     size_t height = (size_t)(mesh_px + mesh_px / 2 + 1);
     height = height < (size_t)max_height ? height : (size_t)max_height;
     out->band = band_stride(max_width) * height;
@@ -71,7 +71,7 @@ void bst_background_free(bst_background *b) {
     *b = (bst_background){0};
 }
 
-/* The k-th smallest of values, which are reordered (Hoare's quickselect, median of three). */
+/* The k-th smallest of `values`, which are reordered (Hoare's quickselect, median of three). */
 static float select_kth(float *values, int count, int k) {
     int lo = 0, hi = count - 1;
     while (lo < hi) {
@@ -102,19 +102,20 @@ static float select_kth(float *values, int count, int k) {
     return values[k];
 }
 
-/* The pixels of a mesh. */
+/* The pixels of one mesh of the background. */
 typedef struct mesh_pixels {
     const float *pixels;
     size_t stride;
     int width, height;
 } mesh_pixels;
 
-/* First guess from at most SAMPLE pixels spread over the mesh. False when none is usable. */
-static bool first_guess(const mesh_pixels *m, float step_e, float *level, float *noise) {
+/* First estimate of a mesh's level and noise, e-, from at most SAMPLE pixels (median and MAD).
+ * Returns false if no pixel is usable. */
+static bool median_estimate(const mesh_pixels *m, float step_e, float *level, float *noise) {
     float sample[SAMPLE];
     int total = m->width * m->height;
     int step = (total + SAMPLE - 1) / SAMPLE;
-    /* a step that shares a factor with the width would sample a few columns only */
+    /* a step that shares a factor with the width would sample only a few columns */
     while (step > 1 && m->width % step == 0) {
         step++;
     }
@@ -138,7 +139,7 @@ static bool first_guess(const mesh_pixels *m, float step_e, float *level, float 
         sample[i] = fabsf(sample[i] - median);
     }
     *level = median;
-    /* coarse steps make the median deviation anything from 0 up: leave room for a step */
+    /* coarse quantisation can make the MAD 0: the noise is at least one step */
     *noise = fmaxf(1.4826f * bst_row_median(sample, count), step_e);
     return true;
 }
@@ -149,15 +150,15 @@ typedef struct reading {
     bst_imgproc_pixel_fn pixels;
     const void *user;
     float step_e;
-    double origin_e; /* a digital value */
-    bool again;      /* a mesh may stay as it is */
+    double origin_e; /* electrons of digital value 0 */
+    bool again;      /* second reading: a mesh with few usable pixels keeps its estimate */
 } reading;
 
 typedef struct moments {
     double count, mean, variance;
 } moments;
 
-/* Of the pixels from low to high in `rows` rows; false for less than two. */
+/* Moments of the pixels between low and high in `rows` rows of a mesh; false if fewer than two. */
 static bool inner_moments(const mesh_pixels *m, int first, int rows, float low, float high,
                           moments *out) {
     bst_row_sums sums = {0};
@@ -179,15 +180,15 @@ static bool inner_moments(const mesh_pixels *m, int first, int rows, float low, 
     return true;
 }
 
-/* Midway between two digital values. */
+/* Edge midway between two digital values, nearest to `value`, e-. */
 static float between_steps(const reading *r, float value) {
     double step = (double)r->step_e;
     return (float)((floor(((double)value - r->origin_e) / step) + 0.5) * step + r->origin_e);
 }
 
-/* Edges about the level, further out where the series of the noise's law converges slowly: where it
- * has few steps or counts few electrons. */
-static void last_edges(const reading *r, float level, float noise, float *low, float *high) {
+/* Clip edges about the level, e-. They are wider where the noise has few ADC steps or a large
+ * skewness, because the Edgeworth series converges slowly there. */
+static void final_clip_edges(const reading *r, float level, float noise, float *low, float *high) {
     double variance = (double)noise * (double)noise;
     double counted = fmax(variance - r->read_variance, 0.0);
     bool few = noise<FEW_STEPS * r->step_e, skew = counted> MUCH_SKEW * variance * (double)noise;
@@ -196,11 +197,12 @@ static void last_edges(const reading *r, float level, float noise, float *low, f
     *high = between_steps(r, level + limit);
 }
 
+/* Level and noise, e-, of one mesh by iterated sigma clipping. */
 static bool estimate_mesh(const reading *r, const mesh_pixels *m, float *level, float *noise,
                           float *error) {
     float step_e = r->step_e;
     *error = 1.0f;
-    if (!first_guess(m, step_e, level, noise)) {
+    if (!median_estimate(m, step_e, level, noise)) {
         return false;
     }
     for (int pass = 0; pass < CLIP_PASSES; pass++) {
@@ -208,9 +210,9 @@ static bool estimate_mesh(const reading *r, const mesh_pixels *m, float *level, 
         float limit = fmaxf(3.0f * *noise, 1.5f * step_e);
         float low = *level - limit, high = *level + limit;
         if (last) {
-            last_edges(r, *level, *noise, &low, &high);
+            final_clip_edges(r, *level, *noise, &low, &high);
         }
-        /* the first passes need not be exact */
+        /* half of the rows suffice in the first passes */
         int half = (m->height + 1) / 2, first = pass == 1 ? m->height - half : 0;
         int rows = pass + 2 < CLIP_PASSES ? half : m->height;
         double deviation = (double)*noise, centre = (double)*level;
@@ -235,8 +237,8 @@ static bool estimate_mesh(const reading *r, const mesh_pixels *m, float *level, 
     return true;
 }
 
-/* Pixels of a mesh that are measurements. */
-static int count_left(const mesh_pixels *m) {
+/* Number of usable pixels of a mesh. */
+static int count_usable(const mesh_pixels *m) {
     int left = 0;
     for (int y = 0; y < m->height; y++) {
         left += bst_row_good(m->pixels + (size_t)y * m->stride, m->width);
@@ -244,8 +246,8 @@ static int count_left(const mesh_pixels *m) {
     return left;
 }
 
-/* Meshes of rows begin to end. */
-static void read_rows(void *user, int begin, int end) {
+/* Estimates the rows of meshes begin to end - 1 (loop body of bst_parallel_for). */
+static void estimate_mesh_rows(void *user, int begin, int end) {
     const reading *r = user;
     bst_background *b = r->b;
     int taken = bst_scratch_pool_take(b->lent);
@@ -253,8 +255,7 @@ static void read_rows(void *user, int begin, int end) {
     size_t stride = band_stride(b->width);
     for (int j = begin; j < end; j++) {
         int y0 = j * b->mesh_px, y1 = j + 1 == b->rows ? b->height : y0 + b->mesh_px;
-        /* whole rows: memory is read in the order in which it lies; of half of them as many even as
-         * odd ones */
+        /* rows are read whole, in memory order; a half takes as many even as odd rows */
         bool all = b->mesh_px * b->mesh_px < MANY_PX;
         int rows = 0;
         for (int y = y0; y < y1; y++) {
@@ -267,7 +268,7 @@ static void read_rows(void *user, int begin, int end) {
             int k = j * b->columns + i;
             mesh_pixels m = {band + x0, stride, x1 - x0, rows};
             if (r->again) {
-                b->left[k] = count_left(&m);
+                b->left[k] = count_usable(&m);
                 b->read[k] = m.width * m.height;
                 if (b->left[k] * LEFT_SHARE < b->read[k]) {
                     continue;
@@ -281,8 +282,9 @@ static void read_rows(void *user, int begin, int end) {
     bst_scratch_pool_give(b->lent, taken);
 }
 
-/* Mean of `values` with the opposite neighbours that agree; error(k) is the standard error. */
-static void smooth(bst_background *b, float *values, bool of_noise) {
+/* Smooths a map over the meshes: each mesh is averaged with the pairs of opposite neighbours that
+ * agree. */
+static void smooth_meshes(bst_background *b, float *values, bool of_noise) {
     static const int across[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
     float *copy = b->scratch;
     memcpy(copy, values, (size_t)(b->columns * b->rows) * sizeof *copy);
@@ -290,7 +292,7 @@ static void smooth(bst_background *b, float *values, bool of_noise) {
         for (int i = 0; i < b->columns; i++) {
             int k = j * b->columns + i;
             float sum = copy[k], weight = 1.0f;
-            /* a standard deviation is known to sqrt(1/2) of the error of a mean */
+            /* the standard error of a standard deviation is sqrt(1/2) of that of the mean */
             float error = b->error[k] * b->noise[k] * (of_noise ? 0.70710678f : 1.0f);
             for (int d = 0; d < 4; d++) {
                 int u = across[d][0], v = across[d][1];
@@ -308,21 +310,23 @@ static void smooth(bst_background *b, float *values, bool of_noise) {
     }
 }
 
+/* Median of a map over all meshes. */
 static float median_of(bst_background *b, const float *values, int count) {
     memcpy(b->scratch, values, (size_t)count * sizeof(float));
     return select_kth(b->scratch, count, count / 2);
 }
 
-/* Change of level over a mesh along one axis: the smaller of both sides' where they agree in sign.
- */
+/* Slope of the level along one axis, e- per mesh: the smaller one-sided difference, 0 if the signs
+ * differ. */
 static float slope_at(const float *level, int stride, bool before, bool after) {
     float a = before ? level[0] - level[-stride] : after ? level[stride] - level[0] : 0.0f;
     float c = after ? level[stride] - level[0] : a;
     return a * c <= 0.0f ? 0.0f : fabsf(a) < fabsf(c) ? a : c;
 }
 
-/* A slope of the level over a mesh adds a twelfth of its square to the variance there. */
-static void take_slope_off(bst_background *b) {
+/* Removes the level's slope from the noise: a slope adds a twelfth of its square to the mesh's
+ * variance. */
+static void remove_slope_variance(bst_background *b) {
     for (int j = 0; j < b->rows; j++) {
         for (int i = 0; i < b->columns; i++) {
             int k = j * b->columns + i;
@@ -339,11 +343,11 @@ static void fill_gaps(bst_background *b, float step_e);
 static void read_meshes(bst_background *b, bst_parallel *pool, const reading *r) {
     /* a small frame is done before another thread wakes */
     int grain = 65536 / (b->width * b->mesh_px) + 1;
-    bst_parallel_for(pool, b->rows, grain, read_rows, (void *)r);
+    bst_parallel_for(pool, b->rows, grain, estimate_mesh_rows, (void *)r);
     fill_gaps(b, r->step_e);
-    smooth(b, b->level, false);
-    take_slope_off(b);
-    smooth(b, b->noise, true);
+    smooth_meshes(b, b->level, false);
+    remove_slope_variance(b);
+    smooth_meshes(b, b->noise, true);
 }
 
 static reading reading_of(bst_background *b, const bst_background_input *input, bool again) {
@@ -356,7 +360,7 @@ void bst_background_read(bst_background *b, bst_parallel *pool, const bst_backgr
                          int width, int height) {
     b->width = width;
     b->height = height;
-    /* a rest narrower than half a mesh joins its neighbour */
+    /* a remainder narrower than half a mesh joins its neighbour */
     int half = b->mesh_px / 2;
     b->columns = (width + half) / b->mesh_px > 0 ? (width + half) / b->mesh_px : 1;
     b->rows = (height + half) / b->mesh_px > 0 ? (height + half) / b->mesh_px : 1;
@@ -393,7 +397,7 @@ void bst_background_estimate(bst_background *b, const float *image, int width, i
     bst_background_read(b, NULL, &input, width, height);
 }
 
-/* Medians of the frame, which also stand for meshes without usable pixels. */
+/* Gives meshes without usable pixels the frame's median level and noise. */
 static void fill_gaps(bst_background *b, float step_e) {
     int good = 0;
     for (int k = 0; k < b->columns * b->rows; k++) {
@@ -431,7 +435,8 @@ static void fill_gaps(bst_background *b, float step_e) {
     }
 }
 
-/* Mesh index and fraction for a coordinate; centres at (i + 1/2) mesh - 1/2. */
+/* Mesh index and interpolation fraction of a pixel coordinate; mesh centres at (i + 1/2) mesh -
+ * 1/2. */
 static int mesh_position(double p, int mesh, int count, float *fraction) {
     double u = (p + 0.5) / mesh - 0.5;
     if (!(u > 0.0) || count < 2) {
@@ -447,14 +452,14 @@ static int mesh_position(double p, int mesh, int count, float *fraction) {
     return i;
 }
 
-/* The two rows of meshes about an image row, and its way from one to the other. */
-typedef struct between {
-    size_t first, second; /* of the meshes of each */
-    float level, noise;   /* the level goes on beyond the last centres */
-} between;
+/* The two rows of meshes about an image row and the interpolation fractions between them. */
+typedef struct mesh_rows {
+    size_t first, second; /* index of the first mesh of each row of meshes */
+    float level, noise;   /* fractions; the level is extrapolated beyond the outermost centres */
+} mesh_rows;
 
-static between rows_about(const bst_background *b, int y) {
-    between out;
+static mesh_rows rows_about(const bst_background *b, int y) {
+    mesh_rows out;
     int j = mesh_position(y, b->mesh_px, b->rows, &out.noise);
     out.level = b->rows > 1 ? ((float)y + 0.5f) / (float)b->mesh_px - 0.5f - (float)j : 0.0f;
     out.first = (size_t)j * (size_t)b->columns;
@@ -462,25 +467,27 @@ static between rows_about(const bst_background *b, int y) {
     return out;
 }
 
-static float level_node(const bst_background *b, const between *r, int i) {
+/* Background level, e-, of an image row at the centre of mesh column i. */
+static float level_node(const bst_background *b, const mesh_rows *r, int i) {
     const float *v = b->level + i;
     return v[r->first] + r->level * (v[r->second] - v[r->first]);
 }
 
-static float inverse_node(const bst_background *b, const between *r, int i) {
+/* 1 / noise of an image row at the centre of mesh column i. */
+static float inverse_node(const bst_background *b, const mesh_rows *r, int i) {
     const float *v = b->noise + i;
     return 1.0f / (v[r->first] + r->noise * (v[r->second] - v[r->first]));
 }
 
-/* The parts of an image row from left to right. */
-typedef struct part_walk {
-    between rows;
+/* Iterates over the linear segments of an image row's background, left to right. */
+typedef struct segment_walk {
+    mesh_rows rows;
     int next;                   /* part */
-    float level[2], inverse[2]; /* at the two nodes that the latest line goes through */
-} part_walk;
+    float level[2], inverse[2]; /* level and 1 / noise at the segment's two nodes */
+} segment_walk;
 
-static part_walk walk_parts(const bst_background *b, int y) {
-    part_walk w = {.rows = rows_about(b, y)};
+static segment_walk walk_segments(const bst_background *b, int y) {
+    segment_walk w = {.rows = rows_about(b, y)};
     int right = b->columns > 1 ? 1 : 0;
     for (int k = 0; k < 2; k++) {
         w.level[k] = level_node(b, &w.rows, k * right);
@@ -489,8 +496,8 @@ static part_walk walk_parts(const bst_background *b, int y) {
     return w;
 }
 
-/* Part i, from the centre of column i - 1 to that of column i, ends at the last at the latest. */
-BST_SIMD_INLINE bst_row_part next_part(const bst_background *b, part_walk *w) {
+/* Next segment: from the centre of mesh column i - 1 to that of column i, clipped to the row. */
+BST_SIMD_INLINE bst_row_part next_segment(const bst_background *b, segment_walk *w) {
     float step = 1.0f / (float)b->mesh_px, centre = 0.5f * (float)(b->mesh_px - 1);
     int i = w->next++, last = b->columns - 1;
     if (i >= 2 && i <= last) {
@@ -501,7 +508,7 @@ BST_SIMD_INLINE bst_row_part next_part(const bst_background *b, part_walk *w) {
     }
     int end = i <= last ? b->mesh_px / 2 + i * b->mesh_px : b->width;
     bst_row_part out = {.end = end < b->width ? end : b->width};
-    /* the first of the two nodes */
+    /* first of the segment's two nodes */
     int node = i < 2 ? 0 : i <= last ? i - 1 : last - 1;
     node = node > 0 ? node : 0;
     float at = centre + (float)(node * b->mesh_px);
@@ -517,10 +524,10 @@ BST_SIMD_INLINE bst_row_part next_part(const bst_background *b, part_walk *w) {
 }
 
 int bst_background_parts(const bst_background *b, int y, bst_row_part *parts) {
-    part_walk w = walk_parts(b, y);
+    segment_walk w = walk_segments(b, y);
     int count = 0, begin = 0;
     for (int i = 0; i <= b->columns; i++) {
-        bst_row_part part = next_part(b, &w);
+        bst_row_part part = next_segment(b, &w);
         if (part.end > begin) {
             begin = part.end;
             parts[count++] = part;
@@ -530,9 +537,9 @@ int bst_background_parts(const bst_background *b, int y, bst_row_part *parts) {
 }
 
 void bst_background_row(const bst_background *b, int y, float *level, float *inverse_noise) {
-    part_walk w = walk_parts(b, y);
+    segment_walk w = walk_segments(b, y);
     for (int i = 0, x = 0; i <= b->columns; i++) {
-        bst_row_part part = next_part(b, &w);
+        bst_row_part part = next_segment(b, &w);
         if (part.end > x) {
             bst_row_line(level + x, part.end - x, part.level, part.level_slope, (float)x);
             bst_row_line(inverse_noise + x, part.end - x, part.inverse, part.inverse_slope,
@@ -542,7 +549,7 @@ void bst_background_row(const bst_background *b, int y, float *level, float *inv
     }
 }
 
-/* Bilinear between mesh centres. */
+/* Bilinear interpolation of a map between mesh centres. */
 static double value_at(const bst_background *b, const float *values, double x_px, double y_px) {
     float fx, fy;
     int i = mesh_position(x_px, b->mesh_px, b->columns, &fx);

@@ -1,4 +1,4 @@
-/* Background level and noise of a frame, by mesh. */
+/* Estimation of a frame's background level and noise on a mesh. */
 #ifndef BST_IMGPROC_DETECT_BACKGROUND_H
 #define BST_IMGPROC_DETECT_BACKGROUND_H
 
@@ -9,67 +9,78 @@
 #include "imgproc/detect/scratch_pool.h"
 #include "sim/core/parallel.h"
 
-/* Values of pixels that hold no measurement. Anything below BST_PIXEL_NONE is one of them. */
+/* Pixel values that are not measurements. Every value below BST_PIXEL_NONE is one of them. */
 #define BST_PIXEL_BAD (-2e30f)
 #define BST_PIXEL_SATURATED (-1e30f)
 #define BST_PIXEL_NONE (-1e29f)
 
 typedef struct bst_background {
     int mesh_px, max_columns, max_rows;
-    int width, height, columns, rows; /* of the latest frame */
-    float *level, *noise;             /* [rows][columns], electrons */
-    float *error;                     /* [rows][columns]: standard error of level over noise */
-    int *left, *read; /* [rows][columns], of the latest read_again: pixels left, and all of them */
-    float *scratch;   /* all meshes, for medians and smoothing */
-    float *bands;     /* one for each thread: the pixels of a row of meshes */
-    size_t band;      /* floats of a band */
-    bst_scratch_pool *lent; /* of bands */
+    int width, height, columns, rows; /* of the latest frame; columns, rows: of meshes */
+    float *level, *noise;             /* [rows][columns], e- and e- RMS of a pixel */
+    float *error; /* [rows][columns]: standard error of level, relative to noise */
+    /* [rows][columns], of the latest bst_background_read_again: usable pixels, and all pixels */
+    int *left, *read;
+    float *scratch;         /* work space for medians and smoothing, all meshes */
+    float *bands;           /* one per thread: the pixels of a row of meshes */
+    size_t band;            /* floats per band */
+    bst_scratch_pool *lent; /* pool of bands */
     float median_level, median_noise;
 } bst_background;
 
-/* Writes `count` pixels of row y from column x on, electrons or BST_PIXEL_... values. Called from
+/* Reads `count` pixels of row y from column x on, e- or BST_PIXEL_... values. It is called by
  * several threads at a time. */
 typedef void (*bst_imgproc_pixel_fn)(const void *user, int y, int x, int count, float *out);
 
-/* For loops on up to `threads` threads. */
+/* Allocates a background for frames of up to max_width x max_height pixels and loops of up to
+ * `threads` threads.
+ *
+ * Given:     mesh_px  side of a mesh, px
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free with bst_background_free */
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  int threads, bst_background *out) BST_MUST_CHECK;
 /* Frees the memory of a background and clears the struct, which belongs to the caller. */
 void bst_background_free(bst_background *background);
 
-/* The pixels of a frame and what their noise is made of. */
+/* The pixels of a frame and its noise model. */
 typedef struct bst_background_input {
     bst_imgproc_pixel_fn read;
     const void *user;
-    double step_e, origin_e; /* the digital values, in electrons: origin_e + step_e n, step_e > 0 */
-    double read_variance_e2; /* of the noise that is not counted electrons */
+    double step_e, origin_e; /* digital value n is origin_e + step_e n electrons, step_e > 0 */
+    double read_variance_e2; /* noise variance without shot noise, e-^2 */
 } bst_background_input;
 
-/* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a
- * sample, then mean and standard deviation within 3 sigma, four times, from half of the rows where
- * a mesh has 4096 pixels and more. The last time is cut midway between digital values, and both are
- * corrected for it as the noise of a normal part of read_variance_e2 and counted electrons asks
- * (truncated_moments.h); the deviation also for the slope of the level. No pixel is better known
- * than its step, step_e / sqrt(12). A mesh without usable pixels takes the frame's medians.
- * Then each mesh takes the mean with those pairs of opposite neighbours whose mean agrees with it
- * to four standard errors: a slope stays what it is, and where the sky is even the error falls to a
- * third.
- */
+/* Estimates background level and noise in each mesh of a frame.
+ *
+ * The start values are median and MAD of a sample. Four passes of 3 sigma clipping follow; meshes
+ * of 4096 pixels or more use half of the rows at first. The last clip cuts midway between digital
+ * values. Mean and deviation are then corrected for the clip (truncated_moments.h), and the
+ * deviation for the slope of the level. The noise is at least the quantisation noise step_e /
+ * sqrt(12). A mesh without usable pixels takes the frame's medians. Finally each mesh is averaged
+ * with the pairs of opposite neighbours that agree with it to four standard errors. This keeps a
+ * slope and reduces the error to a third where the sky is even. */
 void bst_background_read(bst_background *background, bst_parallel *pool,
                          const bst_background_input *input, int width, int height);
-/* The same again of the same frame with pixels left out; returns the share of pixels that were not.
- * A mesh of which less than a sixteenth is left stays as it is. */
+/* Estimates the background of the same frame again with pixels masked (detected sources). A mesh
+ * with less than a sixteenth of its pixels usable keeps its estimate.
+ *
+ * Returned:  share of the frame's pixels that were usable */
 double bst_background_read_again(bst_background *background, bst_parallel *pool,
                                  const bst_background_input *input);
-/* The same of image [height][width] whose noise is normal. */
+/* Estimates the background of image [height][width] with normal noise.
+ *
+ * Given:     step_e  quantisation step, e- */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
                              float step_e);
 
-/* Level and 1 / noise of image row y, as bst_background_row, by parts [columns + 1]; returns how
- * many. */
+/* Background of image row y as linear segments.
+ *
+ * Returned:  number of segments
+ *            parts  [columns + 1] level and 1 / noise of each segment */
 int bst_background_parts(const bst_background *background, int y, bst_row_part *parts);
-/* Level and 1 / noise for every pixel of image row y, bilinear between mesh centres; outside them
- * the level goes on as it did, the noise stays. */
+/* Background level, e-, and 1 / noise of every pixel of image row y. Both are bilinear between mesh
+ * centres. Beyond the outermost centres the level is extrapolated and the noise is constant. */
 void bst_background_row(const bst_background *background, int y, float *level,
                         float *inverse_noise);
 

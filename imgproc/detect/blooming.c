@@ -6,53 +6,57 @@
 
 enum { MOST_COLUMNS = 96, MOST_SETS = 256 };
 
-/* The full well of the pixels is known to this share. */
+/* Relative uncertainty of the pixels' full well. */
 static const double WELL_SHARE = 0.02;
-/* A fit whose mean square deviation is greater has not found the wings. */
+/* Largest mean square deviation, sigma^2, of an accepted fit to the PSF wings. */
 static const double MOST_MISFIT = 25.0;
-/* Weight of the deviation beyond noise in the covariance: neighbouring pixels share the PSF's error
- * (tests/imgproc/test_blooming.c). */
+/* Weight of the misfit in the covariance: residuals of neighbouring pixels are correlated through
+ * PSF errors (tests/imgproc/test_blooming.c). */
 static const double MISFIT_WEIGHT = 3.0;
-/* Standard deviation of a place by the wings of a PSF that is 8 % wider than believed, of the
- * saturated columns' width (tests/imgproc/test_blooming.c). */
+/* Standard error of a position fitted to the wings, relative to the bleed width, for a PSF 8 %
+ * wider than assumed (tests/imgproc/test_blooming.c). */
 static const double FLOOR_SHARE = 0.004;
-/* Standard deviation of a place that no fit determines, of the saturated columns' width, and its
- * least, px: three times the greatest error of start_beside in tests/imgproc/test_blooming.c. */
+/* Standard error of a position without a fit: relative to the bleed width, and its least value, px.
+ * It is three times the largest error of start_position in tests/imgproc/test_blooming.c. */
 static const double UNFITTED_SHARE = 0.03, UNFITTED_PX = 0.1;
 
-/* Saturated pixels that touch: in each of the columns from x0 on, rows top to bottom. */
+/* Connected saturated pixels of a blooming source: for each column from x0 on, the first and last
+ * row. */
 typedef struct bleed_set {
     int x0, columns;
     int top[MOST_COLUMNS], bottom[MOST_COLUMNS];
-    int first, last; /* rows of them all */
+    int first, last; /* extreme rows of all columns */
 } bleed_set;
 
-static float *at(const bst_locate_frame *f, int x, int y) {
+/* Signal of a pixel, e- above the background. */
+static float *signal_at(const bst_locate_frame *f, int x, int y) {
     return &f->signal[(size_t)y * (size_t)f->width + (size_t)x];
 }
 
-static bool is_full(const bst_locate_frame *f, int x, int y) {
-    return x >= 0 && y >= 0 && x < f->width && y < f->height && *at(f, x, y) == BST_PIXEL_SATURATED;
+/* True if a pixel is saturated. */
+static bool is_saturated(const bst_locate_frame *f, int x, int y) {
+    return x >= 0 && y >= 0 && x < f->width && y < f->height &&
+           *signal_at(f, x, y) == BST_PIXEL_SATURATED;
 }
 
-/* Light above the background at a pixel; 0 where none was measured. */
-static double light(const bst_locate_frame *f, int x, int y) {
+/* Signal above the background at a pixel, e-; 0 outside the frame or without a measurement. */
+static double signal_or_zero(const bst_locate_frame *f, int x, int y) {
     bool inside = x >= 0 && y >= 0 && x < f->width && y < f->height;
-    return inside && *at(f, x, y) > BST_PIXEL_NONE ? (double)*at(f, x, y) : 0.0;
+    return inside && *signal_at(f, x, y) > BST_PIXEL_NONE ? (double)*signal_at(f, x, y) : 0.0;
 }
 
-/* The longest run of full pixels in column x that touches rows from to end. */
+/* Longest run of saturated pixels in column x that touches rows `from` to `end`. */
 static bool find_run(const bst_locate_frame *f, int x, int from, int end, int *top, int *bottom) {
     bool found = false;
     for (int y = from; y <= end; y++) {
-        if (!is_full(f, x, y)) {
+        if (!is_saturated(f, x, y)) {
             continue;
         }
         int t = y, b = y;
-        while (is_full(f, x, t - 1)) {
+        while (is_saturated(f, x, t - 1)) {
             t--;
         }
-        while (is_full(f, x, b + 1)) {
+        while (is_saturated(f, x, b + 1)) {
             b++;
         }
         if (!found || b - t > *bottom - *top) {
@@ -65,8 +69,9 @@ static bool find_run(const bst_locate_frame *f, int x, int from, int end, int *t
     return found;
 }
 
-/* The set about a full pixel, columns to the left of it first. */
-static void gather(const bst_locate_frame *f, int x, int y, bleed_set *out) {
+/* Collects the saturated columns connected to a saturated pixel, first to the left, then to the
+ * right. */
+static void collect_bleed_columns(const bst_locate_frame *f, int x, int y, bleed_set *out) {
     int top, bottom, left = x;
     (void)find_run(f, x, y, y, &top, &bottom);
     int t = top, b = bottom;
@@ -97,8 +102,8 @@ static void gather(const bst_locate_frame *f, int x, int y, bleed_set *out) {
     }
 }
 
-/* Whether a candidate is one of a set's: on it, beside it, or at an end of one of its columns. */
-static bool belongs(const bleed_set *set, const bst_imgproc_found *found) {
+/* True if a candidate lies on a bleed set, beside it, or at the end of one of its columns. */
+static bool is_part_of_bleed(const bleed_set *set, const bst_imgproc_found *found) {
     int k = found->peak_x - set->x0;
     if (k < -1 || k > set->columns) {
         return false;
@@ -107,25 +112,28 @@ static bool belongs(const bleed_set *set, const bst_imgproc_found *found) {
     return found->peak_y >= set->top[k] - 2 && found->peak_y <= set->bottom[k] + 2;
 }
 
+/* Signal of the two pixels left and right of a bleed set in row y, e-. */
 static double beside(const bst_locate_frame *f, const bleed_set *set, int y) {
-    return light(f, set->x0 - 1, y) + light(f, set->x0 + set->columns, y);
+    return signal_or_zero(f, set->x0 - 1, y) + signal_or_zero(f, set->x0 + set->columns, y);
 }
 
-/* Charge of a set and of the light about it. */
-static double charge_of(const bst_locate_frame *f, const bleed_set *set, int reach) {
+/* Charge of a bleed set and of the light within `reach` px of it, e-. */
+static double bleed_charge(const bst_locate_frame *f, const bleed_set *set, int reach) {
     double well = f->camera->full_well_e * f->binning * f->binning, sum = 0.0;
     for (int y = set->first - reach; y <= set->last + reach; y++) {
         for (int x = set->x0 - reach; x < set->x0 + set->columns + reach; x++) {
-            sum += is_full(f, x, y) ? well - bst_background_level_at(f->background, x, y)
-                                    : light(f, x, y);
+            sum += is_saturated(f, x, y) ? well - bst_background_level_at(f->background, x, y)
+                                         : signal_or_zero(f, x, y);
         }
     }
     return sum;
 }
 
-/* Puts a source where its light beside the full columns is the highest. In a row, of a Gaussian's
- * values L and R at places l and r: ln(L / R) = ((r - x)^2 - (l - x)^2) / (2 sigma^2). */
-static void start_beside(const bst_locate_frame *f, const bleed_set *set, bst_imgproc_found *out) {
+/* Start position of a saturated source: the row where the light beside the saturated columns peaks.
+ * In that row, for a Gaussian with values L, R at columns l, r: ln(L / R) = ((r - x)^2 - (l - x)^2)
+ * / (2 sigma^2). */
+static void start_position(const bst_locate_frame *f, const bleed_set *set,
+                           bst_imgproc_found *out) {
     int best = set->first;
     for (int y = set->first; y <= set->last; y++) {
         best = beside(f, set, y) > beside(f, set, best) ? y : best;
@@ -136,8 +144,8 @@ static void start_beside(const bst_locate_frame *f, const bleed_set *set, bst_im
         double s = fmax(beside(f, set, y), 0.0);
         sum += s;
         moment += s * y;
-        left += light(f, set->x0 - 1, y);
-        right += light(f, set->x0 + set->columns, y);
+        left += signal_or_zero(f, set->x0 - 1, y);
+        right += signal_or_zero(f, set->x0 + set->columns, y);
     }
     double l = set->x0 - 1, r = set->x0 + set->columns, x = 0.5 * (l + r);
     if (left > 0.0 && right > 0.0) {
@@ -148,40 +156,43 @@ static void start_beside(const bst_locate_frame *f, const bleed_set *set, bst_im
     out->top_y_px = sum > 0.0 ? moment / sum : 0.5 * (set->first + set->last);
 }
 
-/* Overflow fills the pixel beyond each end of a column in part. */
-static void cut_ends(const bst_locate_frame *f, const bleed_set *set) {
+/* Masks the pixel beyond each end of a saturated column, which overflow fills in part. */
+static void mask_bleed_ends(const bst_locate_frame *f, const bleed_set *set) {
     for (int k = 0; k < set->columns; k++) {
         if (set->top[k] > 0) {
-            *at(f, set->x0 + k, set->top[k] - 1) = BST_PIXEL_BAD;
+            *signal_at(f, set->x0 + k, set->top[k] - 1) = BST_PIXEL_BAD;
         }
         if (set->bottom[k] + 1 < f->height) {
-            *at(f, set->x0 + k, set->bottom[k] + 1) = BST_PIXEL_BAD;
+            *signal_at(f, set->x0 + k, set->bottom[k] + 1) = BST_PIXEL_BAD;
         }
     }
 }
 
-/* A full pixel among the nine about a candidate's maximum. */
-static bool find_full(const bst_locate_frame *f, const bst_imgproc_found *found, int *x, int *y) {
+/* Finds a saturated pixel among the 3 x 3 about a candidate's maximum. */
+static bool find_saturated(const bst_locate_frame *f, const bst_imgproc_found *found, int *x,
+                           int *y) {
     for (int k = 0; k < 9; k++) {
         /* the maximum itself first */
         *x = found->peak_x + (k + 1) % 3 - 1;
         *y = found->peak_y + (k / 3 + 1) % 3 - 1;
-        if (is_full(f, *x, *y)) {
+        if (is_saturated(f, *x, *y)) {
             return true;
         }
     }
     return false;
 }
 
-static void begin_source(const bst_locate_frame *f, const bleed_set *set, bst_imgproc_found *out) {
+/* Initial source of a bleed set: position, flux and shape before the fit. */
+static void initial_bleed_source(const bst_locate_frame *f, const bleed_set *set,
+                                 bst_imgproc_found *out) {
     int reach = (int)bst_deblend_reach(f);
-    out->bleed_e = charge_of(f, set, reach);
+    out->bleed_e = bleed_charge(f, set, reach);
     bool drawn = f->filter->streak && set->columns > 2 * reach + 1;
     if (!drawn) {
         out->bleed = true;
         out->bleed_px = set->columns;
         out->streak = false;
-        start_beside(f, set, out);
+        start_position(f, set, out);
         out->source.flux_e = out->bleed_e;
         out->source.shape = (bst_imgproc_shape){
             .x_px = out->top_x_px, .y_px = out->top_y_px, .sigma_px = f->sigma_px};
@@ -196,15 +207,15 @@ void bst_blooming_join(bst_imgproc_locator *l, const bst_locate_frame *f) {
     int sets = 0;
     for (int i = 0; i < l->count && sets < MOST_SETS; i++) {
         int x, y;
-        if (l->found[i].dropped || !find_full(f, &l->found[i], &x, &y)) {
+        if (l->found[i].dropped || !find_saturated(f, &l->found[i], &x, &y)) {
             continue;
         }
-        gather(f, x, y, &set);
-        begin_source(f, &set, &l->found[i]);
-        cut_ends(f, &set);
+        collect_bleed_columns(f, x, y, &set);
+        initial_bleed_source(f, &set, &l->found[i]);
+        mask_bleed_ends(f, &set);
         sets++;
         for (int k = i + 1; k < l->count; k++) {
-            l->found[k].dropped = l->found[k].dropped || belongs(&set, &l->found[k]);
+            l->found[k].dropped = l->found[k].dropped || is_part_of_bleed(&set, &l->found[k]);
         }
     }
 }

@@ -6,13 +6,13 @@
 
 enum {
     CELL_PX = 16,
-    SOON = 8 /* rows */
+    SOON = 8 /* rows read ahead */
 };
 
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bst_candidates *out) {
-    /* maxima of an 8-connected neighbourhood cannot be denser than one in four */
+    /* local maxima of an 8-neighbourhood cannot be denser than one in four pixels */
     *out = (bst_candidates){.capacity = ((max_width + 1) / 2) * ((max_height + 1) / 2)};
     size_t n = (size_t)out->capacity;
     out->items = calloc(n, sizeof *out->items);
@@ -50,21 +50,21 @@ void bst_candidates_free(bst_candidates *c) {
 typedef struct search {
     bst_candidates *c;
     const bst_filter *f;
-    const float *map; /* the greater output of pixel 0, 0; NULL: made where it is asked for */
-    int reach, rows;  /* rows of squares */
+    const float *map; /* SNR map at pixel (0, 0); NULL: computed on demand */
+    int reach, rows;  /* reach: px; rows: of cells */
     float floor, certain;
     bst_candidate_fn accept;
     const void *user;
 } search;
 
-/* Whether the SNR stays above `least` on the pixels nearest to the straight way between two. */
+/* True if the SNR stays above `least` on the pixels nearest to the line between two maxima. */
 static bool is_ridge(const search *s, const bst_candidate *a, const bst_candidate *b, float least) {
     int dx = b->x - a->x, dy = b->y - a->y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     float slope_x = (float)dx / (float)steps, slope_y = (float)dy / (float)steps;
     const float *map = s->map ? s->map + (long)a->y * s->f->stride + a->x : NULL;
     for (int i = 1; i < steps; i++) {
-        /* rounded; what is added keeps it positive */
+        /* rounds; the added constant keeps the value positive */
         int x = (int)((float)i * slope_x + 4096.5f) - 4096;
         int y = (int)((float)i * slope_y + 4096.5f) - 4096;
         float snr =
@@ -76,15 +76,17 @@ static bool is_ridge(const search *s, const bst_candidate *a, const bst_candidat
     return true;
 }
 
-/* Whether a maximum is the lesser of the two, of equals the later, and they are near. Without
- * branches, which nobody could foretell. */
-static bool is_lesser(const search *s, const bst_candidate *m, const bst_candidate *other) {
+/* True if `other` is near and higher than `m`, or equal and earlier in row-major order.
+ * Branch-free: branches would be unpredictable here. */
+static bool has_higher_neighbour(const search *s, const bst_candidate *m,
+                                 const bst_candidate *other) {
     bool before = (other->y < m->y) | ((other->y == m->y) & (other->x < m->x));
     bool higher = (other->snr > m->snr) | ((other->snr == m->snr) & before);
     return higher & (abs(other->x - m->x) <= s->reach) & (abs(other->y - m->y) <= s->reach);
 }
 
-static bool stands_alone(const search *s, const bst_candidate *m) {
+/* True if no ridge connects a maximum to a higher one within reach: it is a source of its own. */
+static bool is_separate_source(const search *s, const bst_candidate *m) {
     enum { A_TIME = 32 };
     const bst_candidates *c = s->c;
     float least = fmaxf(m->snr - fmaxf(SADDLE_SIGMA, SADDLE_SHARE * m->snr), s->floor);
@@ -98,7 +100,7 @@ static bool stands_alone(const search *s, const bst_candidate *m) {
             int some = end - next < A_TIME ? end : next + A_TIME, count = 0, near[A_TIME];
             for (; next < some; next++) {
                 near[count] = next;
-                count += is_lesser(s, m, &c->by_cell[next]);
+                count += has_higher_neighbour(s, m, &c->by_cell[next]);
             }
             for (int k = 0; k < count; k++) {
                 if (is_ridge(s, m, &c->by_cell[near[k]], least)) {
@@ -110,9 +112,9 @@ static bool stands_alone(const search *s, const bst_candidate *m) {
     return true;
 }
 
-/* Brings rows `from` to `last` of the map into the cache, in the order in which they lie: in a
- * crowd ways lead everywhere. Reads, since the processor foresees how they go on, as it does not
- * for prefetches. Returns the next row. */
+/* Reads rows `from` to `last` of the SNR map into the cache in memory order, because the lines
+ * between maxima of a crowded frame go everywhere. Plain reads let the processor's own prefetcher
+ * help. Returns the next row. */
 static int read_ahead(const search *s, int from, int last) {
     enum { LINE = 16 };
     int y = from;
@@ -125,7 +127,8 @@ static int read_ahead(const search *s, int from, int last) {
     return y;
 }
 
-static void decide(void *user, int begin, int end) {
+/* Decides which maxima are candidates (loop body of bst_parallel_for). */
+static void select_candidates(void *user, int begin, int end) {
     const search *s = user;
     int read = 0;
     for (int i = begin; i < end; i++) {
@@ -135,12 +138,12 @@ static void decide(void *user, int begin, int end) {
             read = read_ahead(s, read > first ? read : first, m->y + s->reach);
         }
         s->c->stands[i] =
-            stands_alone(s, m) && (m->snr > s->certain || s->accept(s->user, m)) ? 1 : 0;
+            is_separate_source(s, m) && (m->snr > s->certain || s->accept(s->user, m)) ? 1 : 0;
     }
 }
 
-/* order: by falling SNR, of equals as they are: of many by a stable radix sort. The bits of
- * positive floats sort as the floats do. */
+/* Sorts candidates by falling SNR, stable; many by radix sort. The bits of positive floats sort
+ * like the floats. */
 static void sort_items(bst_candidates *c) {
     enum { BITS = 11, BINS = 1 << BITS, PASSES = 3, FEW = 64 };
     if (c->count < FEW) {
@@ -183,7 +186,7 @@ static void sort_items(bst_candidates *c) {
     }
 }
 
-/* by_cell: the maxima of each square together, by counting. */
+/* Groups the maxima by cell of the frame (counting sort). */
 static void sort_by_cell(bst_candidates *c, int maxima, int cells) {
     memset(c->cell, 0, ((size_t)cells + 1) * sizeof *c->cell);
     for (int i = 0; i < maxima; i++) {
@@ -192,7 +195,7 @@ static void sort_by_cell(bst_candidates *c, int maxima, int cells) {
     for (int k = 0; k < cells; k++) {
         c->cell[k + 1] += c->cell[k];
     }
-    /* filled from the back, each square's first moves to where it belongs */
+    /* filled from the back: each cell's first index ends at its place */
     for (int i = maxima - 1; i >= 0; i--) {
         int k = c->maxima[i].y / CELL_PX * c->columns + c->maxima[i].x / CELL_PX;
         c->by_cell[--c->cell[k + 1]] = c->maxima[i];
@@ -207,7 +210,7 @@ void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter
     c->columns = (f->width + CELL_PX - 1) / CELL_PX;
     for (int y = 0; y < f->height; y++) {
         size_t at = (size_t)y * (size_t)f->max_width;
-        if (y + SOON < f->height) { /* a row's maxima lie far from the next one's */
+        if (y + SOON < f->height) { /* the maxima of successive rows lie far apart in memory */
             __builtin_prefetch(f->maximum_x + at + (size_t)(SOON * f->max_width));
             __builtin_prefetch(f->maximum_snr + at + (size_t)(SOON * f->max_width));
         }
@@ -228,8 +231,8 @@ void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter
                 criteria->certain,
                 criteria->accept,
                 criteria->user};
-    /* long parts where each reads the rows about it */
-    bst_parallel_for(pool, maxima, f->crowded ? 1024 : 256, decide, &s);
+    /* long parts if each reads the rows about it */
+    bst_parallel_for(pool, maxima, f->crowded ? 1024 : 256, select_candidates, &s);
     c->count = 0;
     for (int i = 0; i < maxima; i++) {
         if (c->stands[i]) {

@@ -1,22 +1,24 @@
-/* From the SNR map to candidate sources: its maxima, but of those that no saddle parts only the
- * brightest. */
+/* Candidate sources: maxima of the SNR map, separated from brighter ones by a saddle. */
 #ifndef BST_IMGPROC_DETECT_CANDIDATES_H
 #define BST_IMGPROC_DETECT_CANDIDATES_H
 
 #include "imgproc/detect/filter.h"
 
 typedef struct bst_candidate {
-    int x, y; /* the maximum's pixel */
+    int x, y; /* pixel of the maximum */
+    /* output of the matched filter, sigma */
     float snr;
 } bst_candidate;
 
 typedef struct bst_candidates {
     bst_candidate *items;
-    int *order; /* of items: SNR falling, then y, then x */
+    int *order; /* indices of items: falling SNR, then y, then x */
     int count, capacity;
-    bst_candidate *maxima, *by_cell; /* all, by row, and by square of the frame */
-    int *cell;                       /* the first of each square, by row of squares */
-    int columns;                     /* of squares of the latest frame */
+    /* all maxima: in row order, and grouped by cell of the frame */
+    bst_candidate *maxima, *by_cell;
+    int *cell;   /* index of the first maximum of each cell */
+    int columns; /* cells per row of the latest frame */
+    /* [maxima]: 1: it is a candidate */
     uint8_t *stands;
     int *order_swap;
     uint32_t *key, *key_swap;
@@ -31,22 +33,26 @@ bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height,
 /* Frees the memory of the candidates and clears the struct, which belongs to the caller. */
 void bst_candidates_free(bst_candidates *candidates);
 
-/* Asked of maxima that a noise peak might have made: whether one at this pixel counts. Called from
+/* Significance test of a maximum that may be a noise peak; true: it is accepted. It is called by
  * several threads at a time. */
 typedef bool (*bst_candidate_fn)(const void *user, const bst_candidate *candidate);
 
-/* What makes a maximum a candidate: `accept` is asked of those below `certain`. */
+/* Criteria of a candidate: `accept` tests maxima below `certain`. */
 typedef struct bst_candidates_criteria {
+    /* largest distance, px along x or y, at which a higher maximum can absorb one */
     int reach_px;
+    /* SNR; no saddle is deeper than floor */
     float floor, certain;
     bst_candidate_fn accept;
     const void *user;
 } bst_candidates_criteria;
 
-/* Finds the candidates among the filter's latest maxima. One stands alone when on the straight way
- * to each higher one within reach_px the SNR falls more than max(3, 0.15 maximum) below it, or
- * below `floor`: three standard deviations of the map's noise, and the share by which a streak's
- * own brightness may ripple. Of those below `certain` only those stay that `accept` accepts. */
+/* Finds the candidate sources among the matched filter's latest maxima.
+ *
+ * A maximum is separate if the SNR on the line to each higher maximum within reach_px falls more
+ * than max(3, 0.15 maximum) below it, or below `floor`. The 3 is three standard deviations of the
+ * map's noise; 0.15 allows for brightness ripple along a streak. Below `certain` only maxima that
+ * `accept` accepts are kept. */
 void bst_candidates_find(bst_candidates *candidates, bst_parallel *pool, const bst_filter *filter,
                          const bst_candidates_criteria *criteria);
 

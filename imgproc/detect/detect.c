@@ -14,19 +14,19 @@
 #include "sim/core/threshold_statistics.h"
 #include "sim/optics/column_level.h"
 
-/* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
+/* Least share of the detection threshold from which maxima are interpolated between pixels. */
 static const double LOOK_SHARE = 0.65;
-/* Bend of the stars' path that jitter of 1 px RMS has: that of noise that is flat from 2.5 to 100
- * cycles an exposure. */
+/* RMS bend, px, of the stars' path per px RMS of jitter whose spectrum is flat from 2.5 to 100
+ * cycles per exposure. */
 static const double JITTER_BEND = 0.075;
-/* What telemetry may not know of the camera's motion: drift, in px an exposure. */
+/* Drift of the camera unknown to the telemetry, px per exposure. */
 static const double DRIFT_PX = 1.0;
-/* In a crowd light is what the filter says so much of; what it says is little there, since noise is
- * told too high. */
+/* SNR above which pixels of a crowded frame are masked as stars. It is low because a crowd raises
+ * the noise estimate. */
 static const float STAR_SNR = 3.0f;
-/* Share of a crowded frame that is taken for open sky at the least. */
+/* Least share of a crowded frame that counts as free of stars. */
 static const double LEAST_OPEN = 0.02;
-/* Above the threshold by this no skewness of noise matters. */
+/* Margin above the threshold, sigma, beyond which the skewness correction is negligible. */
 static const double CERTAIN_ABOVE = 1.5;
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
@@ -123,22 +123,23 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip);
 }
 
-typedef struct sparing_reader {
+/* Pixel reader that masks the stars found by the matched filter. */
+typedef struct star_masking_reader {
     bst_calibrate_pixels read;
     const bst_filter *filter;
-} sparing_reader;
+} star_masking_reader;
 
-/* Without the stars that the filter found. */
-static void read_between_stars(const void *user, int y, int x, int count, float *out) {
-    const sparing_reader *r = user;
+/* Reads calibrated pixels with the filter's stars masked. */
+static void read_star_masked(const void *user, int y, int x, int count, float *out) {
+    const star_masking_reader *r = user;
     bst_calibrate_pixels_read(&r->read, y, x, count, out);
     bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
 }
 
-/* The noise of a row's columns, and its learned bad pixels where bst_calibrate_pixels_read did not
- * read it.
- */
-static void correct_row(const void *user, int y, int width, float *signal, float *normalised) {
+/* Scales a row by its columns' noise, and masks learned bad pixels if bst_calibrate_pixels_read did
+ * not. */
+static void correct_column_noise(const void *user, int y, int width, float *signal,
+                                 float *normalised) {
     const bst_calibrate_pixels *e = user;
     for (int x = 0; e->columns && x < width; x++) {
         normalised[x] /= e->columns->noise[e->first_column + x];
@@ -151,30 +152,31 @@ static void correct_row(const void *user, int y, int width, float *signal, float
     bst_bad_rows_mask(e->learned, &run, 0.0f, normalised);
 }
 
-/* What tells noise from a source. */
-typedef struct judge {
+/* Context of the significance test of a maximum. */
+typedef struct significance_test {
     const bst_imgproc *ip;
-    const float *column_noise; /* see bst_locate_frame */
+    const float *column_noise; /* noise of each column, see bst_locate_frame */
     double threshold;
-    double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
-} judge;
+    double normal_variance; /* variance of a pixel without shot noise, e-^2 */
+} significance_test;
 
-static bool exceeds(double peak, const judge *g, const bst_threshold_weights *weights,
+/* True if a peak of the filter output is significant in noise of the given skewness. */
+static bool exceeds(double peak, const significance_test *g, const bst_threshold_weights *weights,
                     const bst_threshold_noise *noise) {
     return peak > g->threshold && peak > bst_threshold_quantile(g->threshold, weights, noise);
 }
 
-/* A maximum counts when the output between the pixels exceeds what the noise there exceeds as
- * rarely as normal noise the threshold. */
-static bool stands_out(const void *user, const bst_candidate *c) {
-    const judge *g = user;
+/* Significance test of a maximum: its interpolated peak must be as improbable in the local, skewed
+ * noise as the threshold is in normal noise. */
+static bool is_significant(const void *user, const bst_candidate *c) {
+    const significance_test *g = user;
     const bst_filter *f = &g->ip->filter;
     double noise_e = bst_background_noise_at(&g->ip->background, c->x, c->y);
     noise_e *= g->column_noise ? (double)g->column_noise[c->x] : 1.0;
     double level_e = bst_background_level_at(&g->ip->background, c->x, c->y);
     double variance = noise_e * noise_e, counted = fmax(variance - g->normal_variance, 0.0);
     if (g->normal_variance < 1.0) {
-        /* steps wider than the noise of reading add none: what is counted is the level then */
+        /* an ADC step wider than the read noise: the shot noise is then that of the level */
         counted = fmax(counted, fmin(level_e, variance));
     }
     bst_threshold_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
@@ -186,8 +188,7 @@ static bool stands_out(const void *user, const bst_candidate *c) {
                                 &f->streak_weights, &noise);
 }
 
-/* The digital number from which a pixel no longer measures: the converter's end or the full well.
- */
+/* Digital number at which a pixel saturates: end of the ADC range or full well. */
 static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) {
     double top = ldexp(1.0, frame->bits) - 1.0;
     double well = ip->camera.full_well_e * frame->binning * frame->binning;
@@ -195,7 +196,7 @@ static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) 
     return (int)fmin(top, fmax(full, 1.0));
 }
 
-/* Least signal of a pixel of that number, above the background of the frame. */
+/* Least signal above the frame's background of a saturated pixel, e-. */
 static double saturation_e(const bst_imgproc *ip, int saturated_dn) {
     const bst_camera *c = &ip->camera;
     double level = (saturated_dn - c->offset_dn) * c->gain_e_per_dn;
@@ -203,11 +204,11 @@ static double saturation_e(const bst_imgproc *ip, int saturated_dn) {
     return overflows ? 0.0 : fmax(level - (double)ip->background.median_level, 0.0);
 }
 
-/* The path of stars on the window's middle, on a grid of half a pixel: small changes of the
- * telemetry leave the filter as it is. 0, 0 when too short or, with its bend, too long to filter
- * for. */
-static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame,
-                        const bst_camera_motion *motion, double *dx, double *dy) {
+/* Star streak at the window's centre for the matched filter, binned px, rounded to half a pixel so
+ * that the filter need not be rebuilt for small changes of telemetry. It is (0, 0) if the streak is
+ * too short, or with its bend too long, to filter for. */
+static void filter_streak_vector(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                 const bst_camera_motion *motion, double *dx, double *dy) {
     *dx = *dy = 0.0;
     ip->smeared = false;
     if (!motion) {
@@ -229,6 +230,7 @@ static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame,
     *dy = 0.5 * round(2.0 * *dy / frame->binning);
 }
 
+/* Checks window, binning and bit depth of a frame. */
 static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_imgproc_frame *f) {
     const bst_window *w = &f->window;
     if (f->binning < 1 || w->x0 < 0 || w->y0 < 0 || w->width < f->binning ||
@@ -247,8 +249,9 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f,
-                          const bst_imgproc_shape *shape, bst_detection *d) {
+/* Adds the uncertainty of the path's bend to a streak's covariance. */
+static void add_bend_covariance(const bst_imgproc *ip, const bst_locate_frame *f,
+                                const bst_imgproc_shape *shape, bst_detection *d) {
     if (f->motion) {
         double x, y;
         bst_camera_motion_bend(f->motion, &ip->camera, &x, &y);
@@ -257,6 +260,7 @@ static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f,
     }
 }
 
+/* Detection in full-sensor pixels from a located source. */
 static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
                             const bst_imgproc_found *found) {
     const bst_imgproc_source *s = &found->source;
@@ -276,27 +280,28 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     double rate = s->flux_e / fmax(ip->exposure_s, 1e-9);
     d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
     d.flags = found->flags;
-    widen_by_bend(ip, f, &s->shape, &d);
+    add_bend_covariance(ip, f, &s->shape, &d);
     d.label = found->label;
     d.label_probability = found->label_probability;
     return d;
 }
 
-/* The output from which maxima are looked at in between the pixels. */
-static double look_from(const bst_imgproc *ip, double threshold) {
+/* Filter output from which maxima are interpolated between pixels. */
+static double interpolation_threshold(const bst_imgproc *ip, double threshold) {
     return ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
 }
 
-/* How a frame, or a window of one, was searched. */
+/* Detection threshold and false alarms with which a frame, or a window of it, was searched. */
 typedef struct part {
     double threshold, false_alarms;
+    /* also searched for object streaks */
     bool search;
 } part;
 
-/* What the locator and stacks see of a frame that was searched. */
-static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
-                     const bst_camera_motion *motion, double sigma, const float *column_noise,
-                     bst_parallel *pool) {
+/* Sets the frame view for the locator and for stacking. */
+static void set_frame_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                           const bst_camera_motion *motion, double sigma, const float *column_noise,
+                           bst_parallel *pool) {
     if (motion) {
         ip->motion = *motion;
     }
@@ -323,10 +328,11 @@ static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
                                  .binning = frame->binning};
 }
 
-/* Finds the candidates of `frame` and sets ip->view. `whole` is the frame of which it is a window,
- * itself else: the density of false alarms and the filter are the whole frame's. */
-static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
-                 const bst_camera_motion *motion, bst_parallel *pool, part *out) {
+/* Runs background, matched filter and candidate search on `frame` and sets ip->view. If `frame` is
+ * a window, `whole` is its frame, which sets the density of false alarms and the filter. */
+static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                            const bst_imgproc_frame *whole, const bst_camera_motion *motion,
+                            bst_parallel *pool, part *out) {
     int width = frame->window.width / frame->binning;
     int height = frame->window.height / frame->binning;
     double sigma = ip->known ? ip->known->sigma_px
@@ -338,11 +344,11 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     const bst_bad_rows *learned = ip->map && ip->map->rows.count > 0 ? &ip->map->rows : NULL;
     const bst_columns *columns = ip->columns.count > 0 ? &ip->columns : NULL;
     int first_column = (frame->window.x0 - whole->window.x0) / frame->binning;
-    sparing_reader sparing = {
+    star_masking_reader masking = {
         {&ip->camera, &ip->maps, ip->bad, frame, learned, columns, first_column}, &ip->filter};
-    ip->filter.correct_row = learned || columns ? correct_row : NULL;
-    ip->filter.correct_user = &sparing.read;
-    const bst_calibrate_pixels *read = &sparing.read;
+    ip->filter.correct_row = learned || columns ? correct_column_noise : NULL;
+    ip->filter.correct_user = &masking.read;
+    const bst_calibrate_pixels *read = &masking.read;
     bst_row_gain by_gain;
     const bst_row_gain *plain = bst_calibrate_pixels_plain(read, &by_gain) ? &by_gain : NULL;
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
@@ -351,10 +357,10 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                                    -ip->camera.offset_dn * gain, read_noise * read_noise};
     bst_background_read(&ip->background, pool, &ground, width, height);
     double dx, dy;
-    filter_path(ip, whole, motion, &dx, &dy);
+    filter_streak_vector(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
     bst_filter_set(&ip->filter, sigma, frame->binning, dx, dy);
-    /* stars are points: what else there is may be a streak */
+    /* search for object streaks only if the stars are points */
     bool search =
         ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared && frame == whole;
     double pixels = (double)(whole->window.width / whole->binning) *
@@ -371,29 +377,29 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                                     .width = width,
                                     .height = height,
                                     .saturated_dn = saturated_dn};
-    bst_filter_run(&ip->filter, pool, &input, (float)look_from(ip, threshold));
+    bst_filter_run(&ip->filter, pool, &input, (float)interpolation_threshold(ip, threshold));
     if (ip->filter.crowded && !ip->smeared) {
-        ground.read = read_between_stars;
-        ground.user = &sparing;
+        ground.read = read_star_masked;
+        ground.user = &masking;
         double share = bst_background_read_again(&ip->background, pool, &ground);
-        /* where there are stars noise makes no detections of its own */
+        /* no false alarms are expected on masked stars */
         pixels *= fmax(share, LEAST_OPEN);
         threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
-        bst_filter_run(&ip->filter, pool, &input, (float)look_from(ip, threshold));
+        bst_filter_run(&ip->filter, pool, &input, (float)interpolation_threshold(ip, threshold));
     }
-    double look = look_from(ip, threshold);
+    double look = interpolation_threshold(ip, threshold);
     const float *column_noise = columns ? columns->noise + first_column : NULL;
-    judge noise = {ip, column_noise, threshold, read_variance};
+    significance_test noise = {ip, column_noise, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
     const bst_candidates_criteria criteria = {(int)ceil(6.0 * sigma + hypot(dx, dy)) + 2,
-                                              (float)look, (float)certain, stands_out, &noise};
+                                              (float)look, (float)certain, is_significant, &noise};
     bst_candidates_find(&ip->candidates, pool, &ip->filter, &criteria);
-    set_view(ip, frame, motion, sigma, column_noise, pool);
+    set_frame_view(ip, frame, motion, sigma, column_noise, pool);
     ip->view.full_e = saturation_e(ip, saturated_dn);
     *out = (part){threshold, false_alarms, search};
 }
 
-/* Corrects a motion by the streaks that were added to ip->streak_motion. */
+/* Corrects the camera motion by the star streaks added to ip->streak_motion. */
 static void correct_motion(bst_imgproc *ip, double binning, bst_camera_motion *motion) {
     double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
                            motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
@@ -401,8 +407,8 @@ static void correct_motion(bst_imgproc *ip, double binning, bst_camera_motion *m
                                   &ip->camera, DRIFT_PX / binning, bend_px / binning, motion);
 }
 
-/* Locates the candidates of a part and adds them to `out`. */
-static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capacity) {
+/* Locates a part's candidates and appends the detections to `out`. */
+static void locate_candidates(bst_imgproc *ip, const part *p, bst_detections *out, int capacity) {
     if (ip->smeared) {
         bst_locate_roughly(&ip->locator, &ip->view, &ip->candidates);
     } else {
@@ -448,13 +454,13 @@ static void empty(bst_detections *out) {
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_camera_motion *motion, bst_detections *out, int capacity) {
     BST_TRY(check_frame(ctx, ip, frame));
-    /* a pool that has to wait for processors is slower than one thread that has one */
+    /* a pool that waits for processors is slower than one thread with a processor */
     bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
     part whole;
     empty(out);
     measure_columns(ip, alone ? NULL : ip->pool, frame);
     ip->windowed = false;
-    find(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
+    find_candidates(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
     if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view)) {
         bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
         correct_motion(ip, frame->binning, &ip->motion);
@@ -462,13 +468,14 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     bst_imgproc_begin_shows(ip);
     bst_imgproc_add_shows(ip, frame, frame);
     bst_pixel_shows_sort(&ip->shows);
-    take(ip, &whole, out, capacity);
+    locate_candidates(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
     return BST_OK;
 }
 
-/* Whether the windows' streaks are to tell the motion: looks for them in all windows. */
+/* Adds the star streaks of all windows to the measurement of the camera motion. Returns false if
+ * the motion cannot be measured. */
 static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
                                const bst_imgproc_windows *windows,
                                const bst_camera_motion *motion) {
@@ -476,7 +483,7 @@ static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
         part p;
         bst_imgproc_frame window =
             bst_region_of_interest_crop(frame, &windows->items[i], ip->cropped);
-        find(ip, &window, frame, motion, NULL, &p);
+        find_candidates(ip, &window, frame, motion, NULL, &p);
         if (i == 0 && (ip->smeared || !bst_streak_motion_begin(&ip->streak_motion, &ip->view))) {
             return false;
         }
@@ -506,9 +513,9 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
         part p;
         const bst_window *w = &windows->items[i];
         bst_imgproc_frame window = bst_region_of_interest_crop(frame, w, ip->cropped);
-        find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
+        find_candidates(ip, &window, frame, motion ? &used : NULL, NULL, &p);
         bst_imgproc_add_shows(ip, &window, frame);
-        take(ip, &p, out, capacity);
+        locate_candidates(ip, &p, out, capacity);
         double n = (double)w->width * (double)w->height;
         pixels += n;
         out->background_e += n * (double)ip->background.median_level;

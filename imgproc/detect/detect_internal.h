@@ -1,4 +1,4 @@
-/* What the parts of bst_imgproc share. */
+/* State of the detector (bst_imgproc), shared by its source files. */
 #ifndef BST_IMGPROC_DETECT_DETECT_INTERNAL_H
 #define BST_IMGPROC_DETECT_DETECT_INTERNAL_H
 
@@ -13,9 +13,10 @@ struct bst_imgproc {
     bst_camera camera;
     bst_imgproc_config config;
     bst_imgproc_maps maps;
-    uint8_t *bad; /* [height_px][width_px]: the maps' and the list's bad pixels; NULL: none */
+    uint8_t *bad; /* [height_px][width_px]: bad pixels of map and list; NULL: none */
     double electrons_per_s_v0;
-    float *electrons; /* [height][width] of the frame; signal once filtered */
+    /* [height][width]: signal above the background after the filter has run, e- */
+    float *electrons;
     bst_background background;
     bst_filter filter;
     bst_candidates candidates;
@@ -24,22 +25,22 @@ struct bst_imgproc {
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
     int *order, *order_swap, *row;
-    uint16_t *cropped; /* a window's pixels */
+    uint16_t *cropped; /* pixels of a cropped window */
     /* of the latest frame */
     bst_locate_frame view;
     bst_camera_motion motion;
     double exposure_s, binning, streak_px;
     bool smeared, windowed;
     bst_stack_frame left;
-    bst_known_psf *known;     /* NULL: the PSF is a Gaussian */
-    const bst_pixel_map *map; /* learned; NULL: none */
-    bst_columns columns;      /* of the latest frame; capacity 0: not wanted, count 0 */
-    bst_pixel_shows shows;    /* of the latest frame; capacity 0: not wanted */
+    bst_known_psf *known;     /* NULL: Gaussian PSF */
+    const bst_pixel_map *map; /* learned bad pixels; NULL: none */
+    bst_columns columns;      /* column levels of the latest frame; capacity 0: not measured */
+    bst_pixel_shows shows; /* bad-pixel evidence of the latest frame; capacity 0: not collected */
 };
 
-/* Empties ip->shows before a frame. */
+/* Clears the bad-pixel evidence (ip->shows) before a frame. */
 void bst_imgproc_begin_shows(bst_imgproc *ip);
-/* Adds the evidence of defective pixels in a frame, or a window of one, that was searched. */
+/* Adds the bad-pixel evidence of a searched frame, or of a window of it. */
 void bst_imgproc_add_shows(bst_imgproc *ip, const bst_imgproc_frame *frame,
                            const bst_imgproc_frame *whole);
 

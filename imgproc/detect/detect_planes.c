@@ -1,4 +1,4 @@
-/* The evidence of defective pixels that bst_imgproc collects. */
+/* Collection of bad-pixel evidence by the detector. */
 #include "imgproc/detect/detect_internal.h"
 
 bst_status bst_imgproc_collect_shows(bst_ctx *ctx, bst_imgproc *ip, int capacity) {

@@ -1,4 +1,4 @@
-/* What bst_imgproc gives to stacks of frames, and takes from them. */
+/* Interface of the detector to frame stacking. */
 #include <math.h>
 
 #include "imgproc/detect/detect_internal.h"
@@ -31,7 +31,7 @@ void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *foun
         }
         bst_detection *d = &out->items[out->count++];
         double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
-        /* a stack's filter is the Gaussian that is like the PSF */
+        /* the stack is filtered with the Gaussian nearest to the PSF */
         double like = ip->known ? ip->known->like_flux : 1.0;
         *d = (bst_detection){.x_px = f->x_px,
                              .y_px = f->y_px,

@@ -8,13 +8,14 @@
 #include "sim/core/pages.h"
 
 enum {
-    PART_PX = 131072, /* pixels of a part of a pass */
-    GROUP = 4,        /* rows that are made at a time */
-    LATEST = 3,       /* of the streak map that are kept beside it */
+    PART_PX = 131072, /* pixels per part of a parallel pass */
+    GROUP = 4,        /* rows filtered together */
+    LATEST = 3,       /* latest rows of the streak map, kept in a ring */
     CACHED_PX = 1 << 20,
-    FEW_TAPS = 24,  /* of a streak whose output is quickly made where it is asked for */
-    CROWD_PX = 400, /* to a maximum: where they are as dense as that it is asked for often */
-    SOON_PX = 512   /* that are read ahead at a time: as many lines as are on their way at once */
+    FEW_TAPS = 24, /* a streak of at most so many taps is computed on demand */
+    /* pixels per maximum below which a frame is crowded, and a map of the larger output is kept */
+    CROWD_PX = 400,
+    SOON_PX = 512 /* pixels prefetched at a time */
 };
 
 static bool has_known(const bst_filter *f) {
@@ -24,16 +25,16 @@ static bool has_known(const bst_filter *f) {
 bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_width,
                              int max_height, double streak_max_px, int threads, bst_filter *out) {
     int pad = (int)ceil(0.5 * streak_max_px) + 2;
-    /* what looks for maxima reads beyond a row */
+    /* the search for maxima reads beyond a row */
     pad = pad > 2 * BST_ROW_LANES ? pad : 2 * BST_ROW_LANES;
-    /* rows begin where lines of the cache do, as far as the frame's width allows */
+    /* rows start on cache lines if the frame's width allows it */
     pad = (pad + BST_ROW_LANES - 1) / BST_ROW_LANES * BST_ROW_LANES;
     *out = (bst_filter){
         .known = known, .max_width = max_width, .max_height = max_height, .pad = pad, .rank = 1};
     size_t pixels = (size_t)max_width * (size_t)max_height;
     size_t line = (size_t)(max_width + 2 * pad);
-    /* three rows, the latest, the parts of a row (two for each four pixels at the most, of five
-     * numbers), and a ring of rows */
+    /* per thread: three rows, the ring of the streak map, the row's background segments, and the
+     * ring of horizontally filtered rows */
     size_t ring = (2 * BST_FILTER_MAX_RADIUS + GROUP) * (known ? BST_FILTER_RANK : 1);
     out->line_floats = line * (3 + LATEST + 3 + ring);
     size_t map = line * (size_t)(max_height + 2 * pad) * sizeof(float);
@@ -77,7 +78,8 @@ void bst_filter_free(bst_filter *f) {
     *f = (bst_filter){0};
 }
 
-/* 1 / norm of the part of the kernel that lies on pixels 0..count-1, for each centre. */
+/* Edge correction along one axis: 1 / norm of the part of the kernel on pixels 0 to count - 1, per
+ * pixel. */
 static void edge_factors(const bst_filter *f, const double *square_at, int count, float *out) {
     for (int x = 0; x < count; x++) {
         out[x] = 1.0f;
@@ -92,26 +94,28 @@ static void edge_factors(const bst_filter *f, const double *square_at, int count
     }
 }
 
-/* What a pass over the frame needs. */
+/* Context of a filter pass over a frame. */
 typedef struct pass {
     bst_filter *f;
     const bst_background *background;
     bst_imgproc_pixel_fn read;
     const void *user;
     const uint16_t *raw;
-    const bst_row_gain *gain; /* NULL: electrons as read gives them */
+    const bst_row_gain *gain; /* NULL: electrons are read by `read` */
     float *signal;
     int saturated_dn, part_rows;
-    int reach;       /* rows above and below that a row of the streak map needs */
-    bool past_cache; /* the frame is larger than that */
-    bool apart;      /* rows of the streak map are kept no longer than maxima need them */
+    int reach;       /* half height of the streak's taps, rows */
+    bool past_cache; /* frame larger than the cache */
+    bool apart;      /* streak-map rows are discarded once their maxima are found */
     float threshold;
 } pass;
 
+/* Row y of a padded map, at column 0. */
 static float *map_row(const bst_filter *f, float *map, int y) {
     return map + (long)(y + f->pad) * (long)f->stride + f->pad;
 }
 
+/* Stores the local maxima of row y of the SNR map. */
 static void note_maxima(bst_filter *f, int y, const float *above, const float *row,
                         const float *below, float threshold) {
     size_t at = (size_t)y * (size_t)f->max_width;
@@ -119,14 +123,15 @@ static void note_maxima(bst_filter *f, int y, const float *above, const float *r
                                   f->maximum_snr + at);
 }
 
-/* Needs the rows above and below; those beyond the frame are 0. */
+/* Finds the maxima of row y. The rows above and below must be complete; rows outside the frame are
+ * 0. */
 static void find_maxima(bst_filter *f, int y, float threshold) {
     const float *row = map_row(f, f->streak ? f->best : f->point, y);
     note_maxima(f, y, row - f->stride, row, row + f->stride, threshold);
 }
 
-/* A row of the streak map, and its copy, NULL: none. Needs the rows of the point map that the taps
- * reach. */
+/* One row of the streak map; `copy` (NULL: none) gets the same values. The rows of the point map
+ * that the taps use must be complete. */
 static void filter_streak(const bst_filter *f, int y, float *row, float *copy) {
     const float *in[BST_FILTER_MAX_TAPS], *point = map_row(f, f->point, y);
     for (int t = 0; t < f->taps; t++) {
@@ -135,8 +140,8 @@ static void filter_streak(const bst_filter *f, int y, float *row, float *copy) {
     bst_row_streak(row, copy, f->width, in, f->tap_weight, f->taps, point);
 }
 
-/* The kernel's cut at the frame's edges. */
-static void mend_edges(const bst_filter *f, int y, float *row) {
+/* Normalises a row for the part of the kernel cut off at the frame's edges. */
+static void normalise_edges(const bst_filter *f, int y, float *row) {
     int r = f->radius < f->width ? f->radius : f->width, last = f->width - r;
     if (f->edge_y[y] != 1.0f || last < r) {
         bst_row_scale(row, f->edge_x, f->edge_y[y], f->width);
@@ -146,8 +151,8 @@ static void mend_edges(const bst_filter *f, int y, float *row) {
     }
 }
 
-/* One row of the kernel's horizontal part; own: with its row of signal. */
-static void filter_across(const pass *p, int y, bool own, float *lines, float *out) {
+/* Filters one row horizontally; own: also stores its signal. */
+static void filter_horizontal(const pass *p, int y, bool own, float *lines, float *out) {
     const bst_filter *f = p->f;
     int width = f->width, r = f->radius;
     size_t row = (size_t)y * (size_t)width, line = (size_t)f->stride;
@@ -187,9 +192,9 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
     }
 }
 
-/* A row of the point map for a known PSF. */
-static void filter_down_known(const bst_filter *f, int y, const float *ring, int ring_rows,
-                              float *out) {
+/* Filters vertically: one row of the point map for a known PSF. */
+static void filter_vertical_known(const bst_filter *f, int y, const float *ring, int ring_rows,
+                                  float *out) {
     const float *in[BST_FILTER_RANK * (2 * BST_FILTER_MAX_RADIUS + 1)];
     size_t line = (size_t)f->stride;
     int r = f->radius, taps = 2 * r + 1;
@@ -202,8 +207,9 @@ static void filter_down_known(const bst_filter *f, int y, const float *ring, int
     bst_row_combine(out, f->width, in, f->down, f->rank * taps);
 }
 
-/* `count` (1 or GROUP) rows of the point map from the ring of horizontal parts. */
-static void filter_down(bst_filter *f, int y, int count, const float *ring, int ring_rows) {
+/* Filters vertically: `count` (1 or GROUP) rows of the point map from the ring of horizontal
+ * results. */
+static void filter_vertical(bst_filter *f, int y, int count, const float *ring, int ring_rows) {
     const float *in[2 * BST_FILTER_MAX_RADIUS + GROUP];
     size_t line = (size_t)f->stride;
     int r = f->radius;
@@ -212,22 +218,22 @@ static void filter_down(bst_filter *f, int y, int count, const float *ring, int 
         in[t] = ring + line * (size_t)((y - r + t + ring_rows) % ring_rows);
     }
     for (int k = 0; f->known && k < count; k++) {
-        filter_down_known(f, y + k, ring, ring_rows, out + (size_t)k * line);
+        filter_vertical_known(f, y + k, ring, ring_rows, out + (size_t)k * line);
     }
     if (f->known) {
-        /* done */
+        /* done above */
     } else if (count == GROUP) {
         bst_row_even_4(out, line, f->width, in + r, f->kernel + r, r);
     } else {
         bst_row_even(out, f->width, in + r, f->kernel + r, r);
     }
     for (int k = 0; k < count; k++) {
-        mend_edges(f, y + k, out + (size_t)k * line);
+        normalise_edges(f, y + k, out + (size_t)k * line);
     }
 }
 
-/* Rows begin to end of the point map, with the rows of signal that are theirs; of the streak map
- * and of maxima, those that need no other rows. */
+/* Filters rows begin to end - 1: signal and point map, and those rows of streak map and maxima that
+ * need no row of another part. */
 static void filter_rows(void *user, int begin, int end) {
     const pass *p = user;
     bst_filter *f = p->f;
@@ -235,19 +241,19 @@ static void filter_rows(void *user, int begin, int end) {
     size_t line = (size_t)f->stride;
     int taken = bst_scratch_pool_take(f->lent);
     float *lines = f->lines + f->line_floats * (size_t)taken, *ring = lines + 6 * line;
-    /* the latest rows of the streak map: maxima are looked for while they are near */
+    /* ring of the latest streak-map rows: maxima are found while they are in the cache */
     size_t ring_lines = (size_t)(ring_rows * f->rank);
     float *latest = ring + line * ring_lines + f->pad;
     bool ring_of_streaks = f->streak && p->past_cache;
     memset(lines, 0, line * sizeof(float));
     memset(latest - f->pad, 0, LATEST * line * sizeof(float));
     for (int y = begin - r, next = begin; y < end + r; y++) {
-        filter_across(p, y, y >= begin && y < end, lines,
-                      ring + line * (size_t)((y + ring_rows) % ring_rows * f->rank));
-        int last = y - r; /* the last row that can be made */
+        filter_horizontal(p, y, y >= begin && y < end, lines,
+                          ring + line * (size_t)((y + ring_rows) % ring_rows * f->rank));
+        int last = y - r; /* last row that can be filtered */
         int count = last - next + 1 == GROUP ? GROUP : last + 1 == end ? 1 : 0;
         for (; count > 0 && next <= last; next += count) {
-            filter_down(f, next, count, ring, ring_rows);
+            filter_vertical(f, next, count, ring, ring_rows);
             for (int k = next; k < next + count; k++) {
                 int ready = k - p->reach;
                 if (f->streak && ready >= begin + p->reach) {
@@ -272,13 +278,14 @@ static void filter_rows(void *user, int begin, int end) {
     bst_scratch_pool_give(f->lent, taken);
 }
 
-/* Whether a row depends on rows of other parts, `reach` away. */
+/* True if row y needs rows of another part, up to `reach` rows away. */
 static bool is_border(const pass *p, int y, int reach) {
     int begin = y / p->part_rows * p->part_rows, end = begin + p->part_rows;
     end = end < p->f->height ? end : p->f->height;
     return y < begin + reach || y >= end - reach;
 }
 
+/* Streak-map rows at the borders of parts. */
 static void finish_streaks(void *user, int begin, int end) {
     const pass *p = user;
     for (int y = begin; y < end; y++) {
@@ -288,6 +295,7 @@ static void finish_streaks(void *user, int begin, int end) {
     }
 }
 
+/* The whole streak map. */
 static void keep_streaks(void *user, int begin, int end) {
     const pass *p = user;
     for (int y = begin; y < end; y++) {
@@ -295,6 +303,7 @@ static void keep_streaks(void *user, int begin, int end) {
     }
 }
 
+/* Maxima in rows at the borders of parts. */
 static void finish_maxima(void *user, int begin, int end) {
     const pass *p = user;
     for (int y = begin; y < end; y++) {
@@ -304,8 +313,8 @@ static void finish_maxima(void *user, int begin, int end) {
     }
 }
 
-/* The same where there is no map of the streak's output. */
-static void finish_apart(void *user, int begin, int end) {
+/* Maxima in rows at the borders of parts if the streak map is not stored. */
+static void finish_maxima_transient(void *user, int begin, int end) {
     const pass *p = user;
     bst_filter *f = p->f;
     size_t line = (size_t)f->stride;
@@ -332,7 +341,7 @@ static void finish_apart(void *user, int begin, int end) {
     bst_scratch_pool_give(f->lent, taken);
 }
 
-/* Whether the greater output will be asked for at so many places that a map of it is quicker. */
+/* True if the maxima are so dense that a map of the larger output pays. */
 static bool is_crowded(const bst_filter *f) {
     long maxima = 0;
     for (int y = 0; y < f->height; y++) {
@@ -354,7 +363,7 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *i
     }
     edge_factors(f, f->square_x, width, f->edge_x);
     edge_factors(f, f->square_y, height, f->edge_y);
-    /* large parts: each reads 2 radius rows of its neighbours again */
+    /* large parts: each filters 2 radius rows of its neighbours again */
     int rows = PART_PX / width > 0 ? PART_PX / width : 1, reach = 0;
     for (int t = 0; t < f->taps; t++) {
         reach = abs(f->tap_y[t]) > reach ? abs(f->tap_y[t]) : reach;
@@ -378,7 +387,7 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *i
     if (f->kept) {
         bst_parallel_for(pool, height, rows, finish_streaks, &p);
     }
-    bst_parallel_for(pool, height, rows, p.apart ? finish_apart : finish_maxima, &p);
+    bst_parallel_for(pool, height, rows, p.apart ? finish_maxima_transient : finish_maxima, &p);
     f->crowded = is_crowded(f);
     if (p.apart && f->crowded) {
         bst_parallel_for(pool, height, rows, keep_streaks, &p);

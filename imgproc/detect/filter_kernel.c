@@ -1,4 +1,4 @@
-/* The kernels of the matched filters, and what noise does to their outputs. */
+/* Kernels of the matched filters, and noise statistics of their outputs. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -8,9 +8,9 @@
 
 enum { SIZE = 2 * BST_FILTER_MAX_RADIUS + 3, PLANE = SIZE * SIZE };
 
-/* Of the square of a known PSF that its kernel may leave out: by its radius, by its rank. */
+/* Share of a known PSF's energy that truncation may lose: by the kernel's radius, by its rank. */
 static const double RADIUS_SHARE = 1e-3, RANK_SHARE = 1e-3;
-/* Shift for derivatives, px. */
+/* Step of the numerical derivatives, px. */
 static const double STEP_PX = 1e-3;
 
 /* Autocorrelation of the one-axis kernel (unit norm) at integer lags. */
@@ -24,11 +24,12 @@ static void correlate(bst_filter *f) {
     }
 }
 
+/* Autocorrelation of the one-axis kernel at a lag of either sign; 0 beyond its length. */
 static double axis_correlation(const bst_filter *f, int lag) {
     return abs(lag) <= 2 * f->radius ? f->correlation[abs(lag)] : 0.0;
 }
 
-/* Covariance of the point output at places a lag apart. */
+/* Covariance of the point filter's output between pixels a lag apart. */
 static double point_covariance(const bst_filter *f, int lag_x, int lag_y) {
     if (!f->known) {
         return axis_correlation(f, lag_x) * axis_correlation(f, lag_y);
@@ -39,7 +40,7 @@ static double point_covariance(const bst_filter *f, int lag_x, int lag_y) {
                : 0.0;
 }
 
-/* The point kernel's value (unit norm) at a pixel. */
+/* Point kernel (unit norm) at a pixel offset. */
 static double kernel_at(const bst_filter *f, int x, int y) {
     if (abs(x) > f->radius || abs(y) > f->radius) {
         return 0.0;
@@ -55,7 +56,8 @@ static double kernel_at(const bst_filter *f, int x, int y) {
     return sum;
 }
 
-/* Covariance of the streak output at places a lag apart, with the weights as they are. */
+/* Covariance of the streak filter's output between pixels a lag apart, before its weights are
+ * normalised. */
 static double streak_covariance(const bst_filter *f, int lag_x, int lag_y) {
     double sum = 0.0;
     for (int a = 0; a < f->taps; a++) {
@@ -70,6 +72,7 @@ static double streak_covariance(const bst_filter *f, int lag_x, int lag_y) {
     return sum;
 }
 
+/* Adds a tap of the streak kernel; weights at the same pixel add up. */
 static void add_tap(bst_filter *f, int x, int y, double weight) {
     if (weight > 0.0 && f->taps < BST_FILTER_MAX_TAPS - 4) {
         f->tap_x[f->taps] = x;
@@ -78,15 +81,16 @@ static void add_tap(bst_filter *f, int x, int y, double weight) {
     }
 }
 
-/* The Gaussian's share of each pixel of one axis about a centre `shift` px off the middle one, for
- * -radius - 1 .. radius + 1. */
-static void axis_shares(double sigma_px, double shift, int radius, double *out) {
+/* Pixel-integrated Gaussian along one axis, centred `shift` px off the middle pixel, for pixels
+ * -radius - 1 to radius + 1. */
+static void pixel_integrated_gaussian(double sigma_px, double shift, int radius, double *out) {
     double root = sigma_px * sqrt(2.0);
     for (int i = -radius - 1; i <= radius + 1; i++) {
         out[i + radius + 1] = 0.5 * (erf((i + 0.5 - shift) / root) - erf((i - 0.5 - shift) / root));
     }
 }
 
+/* Adds the powers of a kernel value for the threshold statistics. */
 static void add_powers(double k, double *powers) {
     double power = k * k;
     for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
@@ -95,17 +99,17 @@ static void add_powers(double k, double *powers) {
     }
 }
 
-/* Density of maxima and sums of powers for the point, and the shifted kernels. The gradient's
- * covariance is that of unit-norm kernels by shift, averaged over the phases. */
-static void describe_point(bst_filter *f, double sigma_px) {
+/* Sets the point filter's shifted kernels, density of maxima and sums of powers. The gradient's
+ * covariance is that of unit-norm kernels by shift, averaged over the sub-pixel phases. */
+static void set_point_statistics(bst_filter *f, double sigma_px) {
     int n = 2 * f->radius + 3;
     double roughness = 0.0, powers[BST_THRESHOLD_POWERS] = {0.0};
     for (int p = 0; p < BST_FILTER_PHASES; p++) {
         double here[SIZE], before[SIZE], after[SIZE], h = 1e-3, squares[3] = {0}, metric = 0.0;
         double shift = -0.5 + (double)p / (BST_FILTER_PHASES - 1);
-        axis_shares(sigma_px, shift, f->radius, here);
-        axis_shares(sigma_px, shift - h, f->radius, before);
-        axis_shares(sigma_px, shift + h, f->radius, after);
+        pixel_integrated_gaussian(sigma_px, shift, f->radius, here);
+        pixel_integrated_gaussian(sigma_px, shift - h, f->radius, before);
+        pixel_integrated_gaussian(sigma_px, shift + h, f->radius, after);
         for (int i = 0; i < n; i++) {
             squares[0] += before[i] * before[i];
             squares[1] += here[i] * here[i];
@@ -118,7 +122,7 @@ static void describe_point(bst_filter *f, double sigma_px) {
             add_powers(k, powers);
             f->phase[i][p] = (float)k;
         }
-        /* the two ends are one phase */
+        /* the two end phases are the same, half a weight each */
         double weight = p == 0 || p == BST_FILTER_PHASES - 1 ? 0.5 : 1.0;
         roughness += weight * metric / (BST_FILTER_PHASES - 1);
     }
@@ -127,16 +131,16 @@ static void describe_point(bst_filter *f, double sigma_px) {
         half += (double)f->phase[i][BST_FILTER_PHASES / 2] * (double)f->phase[i][0];
     }
     f->corner = half * half;
-    f->point_density = roughness; /* sqrt of the product over both axes, which are alike */
+    f->point_density = roughness; /* sqrt of the product over both axes, which are equal */
     for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
         double one_axis = powers[i] / BST_FILTER_PHASES;
         f->point_weights.power[i] = one_axis * one_axis;
     }
 }
 
-/* The same for the streak: the gradient's covariance from its correlations at lags of a pixel,
- * whose logarithm is quadratic near 0, sums of powers from its kernel's values. */
-static void describe_streak(bst_filter *f) {
+/* Sets the streak filter's density of maxima and sums of powers. The gradient's covariance follows
+ * from correlations at lags of one pixel, whose logarithm is quadratic near 0. */
+static void set_streak_statistics(bst_filter *f) {
     double r[3][3];
     for (int j = -1; j <= 1; j++) {
         for (int i = -1; i <= 1; i++) {
@@ -146,7 +150,7 @@ static void describe_streak(bst_filter *f) {
     double lxx = -2.0 * log(fmax(r[1][2], 1e-6)), lyy = -2.0 * log(fmax(r[2][1], 1e-6));
     double lxy = -0.5 * (log(fmax(r[2][2], 1e-6)) - log(fmax(r[2][0], 1e-6)));
     f->streak_density = sqrt(fmax(lxx * lyy - lxy * lxy, 1e-8));
-    /* the kernel's values at whole pixels */
+    /* kernel values at whole pixels */
     int reach_x = 0, reach_y = 0;
     for (int t = 0; t < f->taps; t++) {
         reach_x = abs(f->tap_x[t]) > reach_x ? abs(f->tap_x[t]) : reach_x;
@@ -164,10 +168,10 @@ static void describe_streak(bst_filter *f) {
     }
 }
 
-/* Samples one pixel apart along the longer axis; between the two nearest pixels of the other axis
- * by linear interpolation, which broadens the kernel by at most 1/4 px^2 and costs 0.3 % of the SNR
- * at FWHM 2. */
-static void set_streak(bst_filter *f, double dx, double dy) {
+/* Sets the taps of the streak kernel: one sample per pixel along the longer axis, linearly
+ * interpolated across. The interpolation broadens the kernel by at most 1/4 px^2 and costs 0.3 % of
+ * the SNR at FWHM 2. */
+static void set_streak_kernel(bst_filter *f, double dx, double dy) {
     bool along_x = fabs(dx) >= fabs(dy);
     double major = along_x ? dx : dy, minor = along_x ? dy : dx;
     double slope = minor / major, half = 0.5 * fabs(major);
@@ -193,14 +197,16 @@ static void set_streak(bst_filter *f, double dx, double dy) {
         shared += (double)f->tap_weight[t] * point_covariance(f, f->tap_x[t], f->tap_y[t]);
     }
     f->overlap = fmin(shared, 1.0);
-    /* norm of the drawn kernel at unit flux: the point kernel's over total weight times scale */
+    /* norm of the streak kernel at unit flux: the point kernel's norm over total weight times scale
+     */
     f->streak_norm = f->kernel_norm / (scale * total);
-    describe_streak(f);
+    set_streak_statistics(f);
 }
 
-/* The known PSF's shares of the pixels about a source (x, y) off the middle one, `count` a side. */
-static void known_shares(const bst_filter *f, int binning, double x, double y, int count,
-                         double *out) {
+/* Shares of light of the known PSF in `count` x `count` pixels about a source offset by (x, y) from
+ * the middle one. */
+static void known_pixel_shares(const bst_filter *f, int binning, double x, double y, int count,
+                               double *out) {
     for (int j = 0; j < count; j++) {
         for (int i = 0; i < count; i++) {
             out[j * count + i] = bst_known_psf_share(f->known, f->known->nodes, binning,
@@ -209,6 +215,7 @@ static void known_shares(const bst_filter *f, int binning, double x, double y, i
     }
 }
 
+/* Scales values to unit norm; returns the norm before. */
 static double scale_to_unit(double *values, int count) {
     double square = 0.0;
     for (int i = 0; i < count; i++) {
@@ -220,27 +227,28 @@ static double scale_to_unit(double *values, int count) {
     return sqrt(square);
 }
 
-/* As describe_point for the known PSF; the gradient's covariance has no axes of its own. */
-static void describe_known(bst_filter *f, int binning, double *work) {
+/* As set_point_statistics for the known PSF, whose gradient covariance is a full 2 x 2 matrix. */
+static void set_known_statistics(bst_filter *f, int binning, double *work) {
     int n = 2 * f->radius + 3, count = n * n, last = BST_FILTER_PHASES - 1;
     double *here = work,
            *side[4] = {work + PLANE, work + 2 * PLANE, work + 3 * PLANE, work + 4 * PLANE};
     double *middle = work + 5 * PLANE, metric[3] = {0.0}, norm2 = 0.0;
     f->phase_stride = (n + BST_ROW_LANES - 1) / BST_ROW_LANES * BST_ROW_LANES;
     f->point_weights = (bst_threshold_weights){{0.0}};
-    known_shares(f, binning, 0.0, 0.0, n, middle);
+    known_pixel_shares(f, binning, 0.0, 0.0, n, middle);
     (void)scale_to_unit(middle, count);
     for (int p = 0; p < BST_FILTER_PHASES * BST_FILTER_PHASES; p++) {
         int px = p % BST_FILTER_PHASES, py = p / BST_FILTER_PHASES;
         double x = -0.5 + (double)px / last, y = -0.5 + (double)py / last;
-        known_shares(f, binning, x, y, n, here);
+        known_pixel_shares(f, binning, x, y, n, here);
         double norm = scale_to_unit(here, count);
         for (int k = 0; k < 4; k++) {
             double h = k % 2 ? STEP_PX : -STEP_PX;
-            known_shares(f, binning, x + (k < 2 ? h : 0.0), y + (k < 2 ? 0.0 : h), n, side[k]);
+            known_pixel_shares(f, binning, x + (k < 2 ? h : 0.0), y + (k < 2 ? 0.0 : h), n,
+                               side[k]);
             (void)scale_to_unit(side[k], count);
         }
-        /* the two ends are one phase */
+        /* the two end phases are the same, half a weight each */
         double weight = (px % last ? 1.0 : 0.5) * (py % last ? 1.0 : 0.5) / (last * last);
         double powers[BST_THRESHOLD_POWERS] = {0.0}, with_middle = 0.0;
         for (int i = 0; i < count; i++) {
@@ -264,6 +272,7 @@ static void describe_known(bst_filter *f, int binning, double *work) {
     f->point_density = sqrt(fmax(metric[0] * metric[2] - metric[1] * metric[1], 1e-12));
 }
 
+/* Autocorrelation of the known PSF's kernel at all lags. */
 static void set_lags(bst_filter *f) {
     int most = 2 * f->radius;
     for (int v = -most; v <= most; v++) {
@@ -279,25 +288,25 @@ static void set_lags(bst_filter *f) {
     }
 }
 
-/* The known PSF's kernel as products of rows and columns. */
+/* Sets the known PSF's kernel as a low-rank sum of separable terms. */
 static void set_known(bst_filter *f, int binning) {
     double *work = f->work, *shares = work, *across = work + PLANE, *down = work + 2 * PLANE;
     int most = (f->known->reach_px + binning - 1) / binning;
     most = most < BST_FILTER_MAX_RADIUS ? most : BST_FILTER_MAX_RADIUS;
     double all = 0.0, inside = 0.0;
     for (f->radius = most; f->radius > 1; f->radius--) {
-        int n = 2 * f->radius - 1; /* of the next smaller one */
-        known_shares(f, binning, 0.0, 0.0, 2 * f->radius + 1, shares);
+        int n = 2 * f->radius - 1; /* side of the next smaller kernel */
+        known_pixel_shares(f, binning, 0.0, 0.0, 2 * f->radius + 1, shares);
         inside = scale_to_unit(shares, (2 * f->radius + 1) * (2 * f->radius + 1));
         all = f->radius == most ? inside : all;
-        known_shares(f, binning, 0.0, 0.0, n, shares);
+        known_pixel_shares(f, binning, 0.0, 0.0, n, shares);
         inside = scale_to_unit(shares, n * n);
         if (inside * inside < (1.0 - RADIUS_SHARE) * all * all) {
             break;
         }
     }
     int n = 2 * f->radius + 1;
-    known_shares(f, binning, 0.0, 0.0, n, shares);
+    known_pixel_shares(f, binning, 0.0, 0.0, n, shares);
     const bst_low_rank_images kernel = {shares, 1, n};
     f->rank = bst_low_rank(&kernel, BST_FILTER_RANK, RANK_SHARE, down, across, work + 3 * PLANE);
     f->kernel_norm = scale_to_unit(across, f->rank * n);
@@ -316,9 +325,10 @@ static void set_known(bst_filter *f, int binning) {
         f->square_y[j / n] += value * value;
     }
     set_lags(f);
-    describe_known(f, binning, work);
+    set_known_statistics(f, binning, work);
 }
 
+/* Sets the separable Gaussian kernel. */
 static void set_gaussian(bst_filter *f, double sigma_px) {
     f->radius = (int)ceil(3.2 * sigma_px);
     f->radius = f->radius < 1                       ? 1
@@ -340,7 +350,7 @@ static void set_gaussian(bst_filter *f, double sigma_px) {
         f->kernel[i] = 0.0f;
     }
     correlate(f);
-    describe_point(f, sigma_px);
+    set_point_statistics(f, sigma_px);
 }
 
 void bst_filter_set(bst_filter *f, double sigma_px, int binning, double dx_px, double dy_px) {
@@ -364,14 +374,13 @@ void bst_filter_set(bst_filter *f, double sigma_px, int binning, double dx_px, d
         set_gaussian(f, sigma_px);
     }
     if (f->streak) {
-        set_streak(f, dx_px, dy_px);
+        set_streak_kernel(f, dx_px, dy_px);
     }
 }
 
-/* Share of a smooth field's maxima above a threshold that are found: measured, with boresight pd,
- * as 0.95 to 0.99 for PSFs of 1.3 to 3 px FWHM (docs/explanation/equations/image_processing.md,
- * "Threshold", has the command).
- */
+/* Share of a smooth field's maxima above the threshold that the search finds: 0.95 to 0.99 for PSFs
+ * of 1.3 to 3 px FWHM, measured with boresight pd (docs/explanation/equations/image_processing.md,
+ * "Threshold", has the command). */
 static const double SEEN = 0.97;
 
 double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {

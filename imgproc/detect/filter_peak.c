@@ -1,26 +1,28 @@
-/* The filters' outputs between the pixels. */
+/* Sub-pixel interpolation of the matched-filter output. */
 #include <math.h>
 #include <string.h>
 
 #include "imgproc/detect/filter.h"
 #include "imgproc/detect/simd_layout.h"
 
-/* A quadratic holds as far as the outputs reach that it was made from. Along a streak noise bends
- * them little: its top would be pixels away, and higher than any output there. */
+/* A quadratic is valid only within the outputs that it was fitted to. Along a streak noise curves
+ * them little, and the extrapolated peak would lie pixels away. */
 static const double QUADRATIC_REACH_PX = 1.0;
 
-/* Top of the parabola through three values one step apart, the middle one the greatest. */
-static double top(double left, double middle, double right) {
+/* Peak of the parabola through three values one step apart, the middle one the largest. */
+static double parabola_peak(double left, double middle, double right) {
     double bend = left - 2.0 * middle + right;
     return bend < 0.0 ? middle - (right - left) * (right - left) / (8.0 * bend) : middle;
 }
 
-typedef double phase_values[BST_FILTER_PHASES][BST_FILTER_PHASES]; /* by shift in y and x */
+/* filter output by sub-pixel shift in y and x */
+typedef double phase_values[BST_FILTER_PHASES][BST_FILTER_PHASES];
 
 #define BST_SIMD_KERNELS "imgproc/detect/filter_peak_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-static void known_values(const bst_filter *f, const float *corner, phase_values value) {
+/* Point-filter output at a pixel for all sub-pixel shifts of the known PSF. */
+static void known_phase_values(const bst_filter *f, const float *corner, phase_values value) {
     float lanes[BST_FILTER_PHASES * BST_FILTER_PHASES * BST_LANES] = {0.0f};
     float row[2 * BST_FILTER_MAX_RADIUS + 3 + BST_LANES];
     int n = 2 * f->radius + 3;
@@ -40,8 +42,9 @@ static void known_values(const bst_filter *f, const float *corner, phase_values 
     }
 }
 
+/* Point-filter output at a pixel for all sub-pixel shifts of the Gaussian PSF. */
 BST_CLONES_256
-static void gaussian_values(const bst_filter *f, const float *corner, phase_values value) {
+static void gaussian_phase_values(const bst_filter *f, const float *corner, phase_values value) {
     enum { LANES = BST_FILTER_PHASE_LANES };
     double all[BST_FILTER_PHASES][LANES] = {{0.0}};
     int n = 2 * f->radius + 3;
@@ -66,6 +69,7 @@ static void gaussian_values(const bst_filter *f, const float *corner, phase_valu
     }
 }
 
+/* Interpolated peak SNR of the point filter near (x, y). */
 static double point_peak(const bst_filter *f, const float *signal, double noise_e, int x, int y) {
     int r = f->radius + 1;
     if (x < r || y < r || x + r >= f->width || y + r >= f->height) {
@@ -74,9 +78,9 @@ static double point_peak(const bst_filter *f, const float *signal, double noise_
     phase_values value = {{0.0}};
     const float *corner = signal + (size_t)(y - r) * (size_t)f->width + (size_t)(x - r);
     if (f->known) {
-        known_values(f, corner, value);
+        known_phase_values(f, corner, value);
     } else {
-        gaussian_values(f, corner, value);
+        gaussian_phase_values(f, corner, value);
     }
     int bx = 0, by = 0;
     for (int py = 0; py < BST_FILTER_PHASES; py++) {
@@ -89,16 +93,16 @@ static double point_peak(const bst_filter *f, const float *signal, double noise_
     }
     double best = value[by][bx], more = 0.0;
     if (bx > 0 && bx < BST_FILTER_PHASES - 1) {
-        more += top(value[by][bx - 1], best, value[by][bx + 1]) - best;
+        more += parabola_peak(value[by][bx - 1], best, value[by][bx + 1]) - best;
     }
     if (by > 0 && by < BST_FILTER_PHASES - 1) {
-        more += top(value[by - 1][bx], best, value[by + 1][bx]) - best;
+        more += parabola_peak(value[by - 1][bx], best, value[by + 1][bx]) - best;
     }
     return (best + more) / noise_e;
 }
 
-/* Gain of the top of a quadratic through 3 x 3 logarithms over its middle, and its place. */
-static double quadratic_top(double v[3][3], double *dx, double *dy) {
+/* Peak of a quadratic through 3 x 3 logarithms: gain over the middle value, and position. */
+static double quadratic_peak(double v[3][3], double *dx, double *dy) {
     double gx = 0.5 * (v[1][2] - v[1][0]), gy = 0.5 * (v[2][1] - v[0][1]);
     double hxx = v[1][2] - 2.0 * v[1][1] + v[1][0], hyy = v[2][1] - 2.0 * v[1][1] + v[0][1];
     double hxy = 0.25 * (v[2][2] - v[2][0] - v[0][2] + v[0][0]);
@@ -113,10 +117,11 @@ static double quadratic_top(double v[3][3], double *dx, double *dy) {
         *dy = hxx < hyy ? 0.0 : -gy / hyy;
         gain = 0.5 * (gx * *dx + gy * *dy);
     }
-    /* half a pixel off on both axes costs no filter more than this */
+    /* largest loss of a filter for a source half a pixel off on both axes */
     return fmin(fmax(gain, 0.0), 0.3);
 }
 
+/* Interpolated peak SNR of the streak filter near (x, y). */
 static double streak_peak(const bst_filter *f, int x, int y) {
     double v[3][3], dx, dy;
     double here = (double)bst_filter_streak_at(f, x, y);
@@ -129,8 +134,9 @@ static double streak_peak(const bst_filter *f, int x, int y) {
             v[j][i] = log(fmax(s, 0.05 * here));
         }
     }
-    double gain = quadratic_top(v, &dx, &dy), off = fmax(fabs(dx), fabs(dy));
-    double share = fmin(1.0, QUADRATIC_REACH_PX / fmax(off, 1e-9)); /* of the way to the top */
+    double gain = quadratic_peak(v, &dx, &dy), off = fmax(fabs(dx), fabs(dy));
+    /* share of the offset to the peak */
+    double share = fmin(1.0, QUADRATIC_REACH_PX / fmax(off, 1e-9));
     return here * exp(gain * share * (2.0 - share));
 }
 
@@ -148,7 +154,7 @@ double bst_filter_top(const bst_filter *f, bool point, int x, int y, double *dx,
             v[j][i] = (double)logf(fmaxf(s, 0.05f * (float)here));
         }
     }
-    double gain = quadratic_top(v, dx, dy);
+    double gain = quadratic_peak(v, dx, dy);
     *dx = fmin(fmax(*dx, -0.7), 0.7);
     *dy = fmin(fmax(*dy, -0.7), 0.7);
     return here * exp(gain);

@@ -10,16 +10,16 @@
 enum {
     LEAST_REACH_PX = 7, /* profiles of 15 px fill sixteen lanes */
     MOST_REACH_PX = 46,
-    MARGIN_PX = 2, /* of the tables beyond the reach */
+    MARGIN_PX = 2, /* margin of the sampled profiles beyond the reach */
     LEAST_PER_PX = 3,
     MOST_PER_PX = 24,
-    FIELD = 16 /* places along the field's sides over which it is averaged */
+    FIELD = 16 /* field points per side for the field average */
 };
 
 static const double TOLERANCE = 1e-4;
 static const double REACH_FWHM = 2.2, SAMPLES_PER_CYCLE = 8.0;
 
-/* Coefficients of the polynomials that are 1 at one of the points 0, 1, ... and 0 at the others. */
+/* Lagrange polynomials: 1 at one of the points 0, 1, ... and 0 at the others. */
 static void set_lagrange(bst_known_psf *k) {
     for (int p = 0; p < BST_KNOWN_PSF_POINTS; p++) {
         double *c = k->lagrange[p], scale = 1.0;
@@ -63,6 +63,7 @@ int bst_known_psf_taps_at(const bst_known_psf *k, double d, bst_known_psf_taps o
     return first;
 }
 
+/* Interpolates a sampled profile with the given weights. */
 static double value_at(const double *samples, int first, const double *weight) {
     double sum = 0.0;
     for (int p = 0; p < BST_KNOWN_PSF_POINTS; p++) {
@@ -92,8 +93,8 @@ double bst_known_psf_share(const bst_known_psf *k, int node, int binning, double
     return sum;
 }
 
-/* The functions of x for the mean of the field. */
-static void set_mean(bst_known_psf *k, double width_px, double height_px) {
+/* Sets the x profiles of the field-averaged PSF. */
+static void set_field_mean(bst_known_psf *k, double width_px, double height_px) {
     size_t each = (size_t)k->terms * (size_t)k->side;
     double *mean = k->across + (size_t)k->nodes * each;
     memset(mean, 0, each * sizeof *mean);
@@ -111,8 +112,9 @@ static void set_mean(bst_known_psf *k, double width_px, double height_px) {
     }
 }
 
-/* The cosine of the angle between the mean PSF and a Gaussian, both on pixels about the source. */
-static double likeness(const bst_known_psf *k, double sigma_px, double *flux) {
+/* Cosine similarity between the field-averaged PSF and a Gaussian, both pixel-integrated about the
+ * source. */
+static double gaussian_similarity(const bst_known_psf *k, double sigma_px, double *flux) {
     double both = 0.0, own = 0.0, other = 0.0, root = sigma_px * sqrt(2.0);
     int reach = k->reach_px;
     for (int y = -reach; y <= reach; y++) {
@@ -129,23 +131,25 @@ static double likeness(const bst_known_psf *k, double sigma_px, double *flux) {
     return both / sqrt(own * other);
 }
 
-/* By golden section between a fifth and one and a half of the equivalent Gaussian's width. */
-static void set_like(bst_known_psf *k, double equivalent_px) {
+/* Fits the nearest Gaussian by golden-section search between 0.2 and 1.5 times the equivalent
+ * width. */
+static void fit_nearest_gaussian(bst_known_psf *k, double equivalent_px) {
     const double golden = 0.6180339887498949;
     double lo = 0.2 * equivalent_px, hi = 1.5 * equivalent_px, flux;
     while (hi - lo > 0.01 * equivalent_px) {
         double a = hi - golden * (hi - lo), b = lo + golden * (hi - lo);
-        if (likeness(k, a, &flux) > likeness(k, b, &flux)) {
+        if (gaussian_similarity(k, a, &flux) > gaussian_similarity(k, b, &flux)) {
             hi = b;
         } else {
             lo = a;
         }
     }
     k->sigma_px = 0.5 * (lo + hi);
-    (void)likeness(k, k->sigma_px, &k->like_flux);
+    (void)gaussian_similarity(k, k->sigma_px, &k->like_flux);
 }
 
-static bst_status fill_in(bst_ctx *ctx, bst_known_psf *k, double blur_px) {
+/* Decomposes the PSF at all field nodes into separable profiles. */
+static bst_status decompose_psf(bst_ctx *ctx, bst_known_psf *k, double blur_px) {
     size_t side = (size_t)k->side, plane = side * side, nodes = (size_t)k->nodes;
     k->across = calloc((nodes + 1) * BST_KNOWN_PSF_TERMS * side, sizeof *k->across);
     k->down = calloc(BST_KNOWN_PSF_TERMS * side, sizeof *k->down);
@@ -183,13 +187,13 @@ bst_status bst_known_psf_create(bst_ctx *ctx, const bst_psf *psf, double width_p
     k->per_px = (int)fmin(fmax(per_px, LEAST_PER_PX), MOST_PER_PX);
     k->side = bst_psf_image_side(k->per_px, k->reach_px + MARGIN_PX);
     set_lagrange(k);
-    bst_status status = fill_in(ctx, k, blur_px);
+    bst_status status = decompose_psf(ctx, k, blur_px);
     if (status != BST_OK) {
         bst_known_psf_free(k);
         return status;
     }
-    set_mean(k, width_px, height_px);
-    set_like(k, fwhm_px / 2.3548200450309493);
+    set_field_mean(k, width_px, height_px);
+    fit_nearest_gaussian(k, fwhm_px / 2.3548200450309493);
     *out = k;
     return BST_OK;
 }

@@ -5,7 +5,7 @@
 
 enum { ITERATIONS = 24 };
 
-/* Below this share of its length before, what is left of a vector is rounding. */
+/* A vector that orthogonalisation shrinks below this share of its length is rounding error. */
 static const double NOTHING = 1e-10;
 
 static double dot(const double *a, const double *b, int n) {
@@ -16,7 +16,7 @@ static double dot(const double *a, const double *b, int n) {
     return sum;
 }
 
-/* Makes the rows orthonormal, one after the other; those that depend on rows before become 0. */
+/* Gram-Schmidt orthonormalisation of the rows; linearly dependent rows become 0. */
 static void orthonormalise(double *v, int count, int side) {
     for (int t = 0; t < count; t++) {
         double *row = v + t * side, before = sqrt(dot(row, row, side));
@@ -36,8 +36,8 @@ static void orthonormalise(double *v, int count, int side) {
     }
 }
 
-/* out[t][i] = sum over j of v[t][j] image[j][i] */
-static void project(const double *v, int count, const double *image, int side, double *out) {
+/* Projects an image on the row functions: out[t][i] = sum over j of v[t][j] image[j][i]. */
+static void project_rows(const double *v, int count, const double *image, int side, double *out) {
     memset(out, 0, (size_t)count * (size_t)side * sizeof *out);
     for (int j = 0; j < side; j++) {
         for (int t = 0; t < count; t++) {
@@ -49,13 +49,13 @@ static void project(const double *v, int count, const double *image, int side, d
     }
 }
 
-/* v becomes the sum over images of image image^T v */
-static void iterate(const double *images, int planes, int side, int most, double *v, double *next,
-                    double *across) {
+/* One subspace iteration: v becomes the sum over images of image image^T v. */
+static void subspace_step(const double *images, int planes, int side, int most, double *v,
+                          double *next, double *across) {
     memset(next, 0, (size_t)most * (size_t)side * sizeof *next);
     for (int p = 0; p < planes; p++) {
         const double *image = images + (size_t)p * (size_t)side * (size_t)side;
-        project(v, most, image, side, across);
+        project_rows(v, most, image, side, across);
         for (int t = 0; t < most; t++) {
             for (int j = 0; j < side; j++) {
                 next[t * side + j] += dot(image + j * side, across + t * side, side);
@@ -70,7 +70,7 @@ int bst_low_rank(const bst_low_rank_images *given, int most, double tolerance, d
                  double *across, double *work) {
     const double *images = given->items;
     const int planes = given->planes, side = given->side;
-    /* any start will do that no singular vector is at right angles to */
+    /* start vectors need only a component along each singular vector */
     unsigned state = 1;
     for (int i = 0; i < most * side; i++) {
         state = state * 1664525u + 1013904223u;
@@ -78,12 +78,12 @@ int bst_low_rank(const bst_low_rank_images *given, int most, double tolerance, d
     }
     orthonormalise(down, most, side);
     for (int k = 0; k < ITERATIONS; k++) {
-        iterate(images, planes, side, most, down, work, across);
+        subspace_step(images, planes, side, most, down, work, across);
     }
     int terms = 1;
     for (int p = 0; p < planes; p++) {
         const double *image = images + (size_t)p * (size_t)side * (size_t)side;
-        project(down, most, image, side, across);
+        project_rows(down, most, image, side, across);
         double left = dot(image, image, side * side), least = tolerance * left;
         for (int t = 0; t < most; t++) {
             left -= dot(across + t * side, across + t * side, side);
@@ -93,8 +93,8 @@ int bst_low_rank(const bst_low_rank_images *given, int most, double tolerance, d
         }
     }
     for (int p = 0; p < planes; p++) {
-        project(down, terms, images + (size_t)p * (size_t)side * (size_t)side, side,
-                across + (size_t)p * (size_t)terms * (size_t)side);
+        project_rows(down, terms, images + (size_t)p * (size_t)side * (size_t)side, side,
+                     across + (size_t)p * (size_t)terms * (size_t)side);
     }
     return terms;
 }

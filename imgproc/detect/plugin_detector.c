@@ -21,7 +21,8 @@ const bst_config_desc bst_plugin_detector_table[] = {
                     "says so; the other keys are then that one's. Left out: imgproc's own."),
     BST_CONFIG_END};
 
-static bst_status told(bst_ctx *ctx, const bst_plugin_detector *p, bst_status status) {
+/* Prefixes an error of the plug-in with its name. */
+static bst_status with_plugin_name(bst_ctx *ctx, const bst_plugin_detector *p, bst_status status) {
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "plug-in %s", p->use->plugin);
 }
 
@@ -36,10 +37,11 @@ bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
     }
     *p = (bst_plugin_detector){.use = use, .stage = stage, .camera = camera};
     if (!stage->create || !stage->detect || !stage->destroy) {
-        return told(ctx, p,
-                    bst_fail(ctx, BST_ERR_CONFIG,
-                             "its detector \"%s\" lacks one of create, detect and destroy",
-                             use->desc->type));
+        return with_plugin_name(
+            ctx, p,
+            bst_fail(ctx, BST_ERR_CONFIG,
+                     "its detector \"%s\" lacks one of create, detect and destroy",
+                     use->desc->type));
     }
     const bst_detector_env env = {.camera = camera,
                                   .electrons_per_s_v0 = bst_camera_electrons_per_s(camera, 0.0),
@@ -47,7 +49,7 @@ bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
                                   .dark_e_per_s = maps->dark_e_per_s,
                                   .flat = maps->flat,
                                   .bad = maps->bad};
-    return told(ctx, p, stage->create(ctx, use->config, &env, &p->self));
+    return with_plugin_name(ctx, p, stage->create(ctx, use->config, &env, &p->self));
 }
 
 void bst_plugin_detector_free(bst_plugin_detector *p) {
@@ -57,13 +59,15 @@ void bst_plugin_detector_free(bst_plugin_detector *p) {
     free(p);
 }
 
-static int by_place(const void *a, const void *b) {
+/* qsort order of detections by position. */
+static int by_position(const void *a, const void *b) {
     const bst_detection *p = a, *q = b;
     int y = (p->y_px > q->y_px) - (p->y_px < q->y_px);
     return y ? y : (p->x_px > q->x_px) - (p->x_px < q->x_px);
 }
 
-static bool is_sound(const bst_detection *d, const bst_window *w) {
+/* True if a detection's position, size and noise are finite and it lies in the window. */
+static bool is_valid(const bst_detection *d, const bst_window *w) {
     return d->x_px >= w->x0 - 0.5 && d->x_px <= w->x0 + w->width - 0.5 && d->y_px >= w->y0 - 0.5 &&
            d->y_px <= w->y0 + w->height - 0.5 && d->cov_xx > 0.0 && d->cov_yy > 0.0 &&
            d->cov_xx * d->cov_yy > d->cov_xy * d->cov_xy &&
@@ -72,6 +76,7 @@ static bool is_sound(const bst_detection *d, const bst_window *w) {
            (d->label == BST_LABEL_UNKNOWN || d->label == BST_LABEL_ARTEFACT);
 }
 
+/* Checks the detections that the plug-in returned. */
 static bst_status check(bst_ctx *ctx, const bst_plugin_detector *p, const bst_imgproc_frame *frame,
                         bst_detections *out, int capacity) {
     if (out->count < 0 || out->count > capacity || out->lost < 0) {
@@ -88,7 +93,7 @@ static bst_status check(bst_ctx *ctx, const bst_plugin_detector *p, const bst_im
     }
     for (int i = 0; i < out->count; i++) {
         bst_detection *d = &out->items[i];
-        if (!is_sound(d, &frame->window)) {
+        if (!is_valid(d, &frame->window)) {
             return bst_fail(ctx, BST_ERR_STATE,
                             "plug-in %s gave a detection at (%g, %g) px, covariance %g, %g, %g "
                             "px^2, %g e-, SNR %g, label %d (allowed: a place on the window, a "
@@ -120,9 +125,9 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *p,
                                       .motion = motion};
     out->count = out->lost = 0;
     out->background_e = out->noise_e = out->threshold_snr = 0.0;
-    BST_TRY(told(ctx, p, p->stage->detect(p->self, ctx, &given, out)));
+    BST_TRY(with_plugin_name(ctx, p, p->stage->detect(p->self, ctx, &given, out)));
     BST_TRY(check(ctx, p, frame, out, capacity));
-    qsort(out->items, (size_t)out->count, sizeof out->items[0], by_place);
+    qsort(out->items, (size_t)out->count, sizeof out->items[0], by_position);
     if (motion) {
         bst_camera_motion_streak(motion, p->camera, bst_camera_centre_x(p->camera),
                                  bst_camera_centre_y(p->camera), &dx, &dy);
@@ -136,8 +141,8 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *p,
 }
 
 double bst_plugin_detector_v_limit(const bst_plugin_detector *p, double snr) {
-    /* a Gaussian's SNR is that of its light in 4 pi sigma^2 pixels of the noise; smeared over a
-     * length, in 2 sqrt(pi) sigma by that and the length */
+    /* the SNR of a Gaussian source is that of its light in 4 pi sigma^2 pixels of noise; with a
+     * streak of length L, in 2 sqrt(pi) sigma (2 sqrt(pi) sigma + L) */
     double sigma = p->camera->psf_fwhm_px / 2.3548, wide = 2.0 * sqrt(BST_PI) * sigma;
     double pixels = wide * (wide + p->streak_px) / (p->binning * p->binning);
     return bst_camera_v_mag(p->camera, snr * p->noise_e * sqrt(fmax(pixels, 1.0)) / p->exposure_s);

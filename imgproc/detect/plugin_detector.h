@@ -1,5 +1,6 @@
-/* A plug-in's detector in place of bst_imgproc_detect. Its detections are checked; background,
- * noise and limiting magnitude for the identification of stars follow from its results. */
+/* Detector supplied by a plug-in in place of bst_imgproc_detect. Its detections are checked.
+ * Background, noise and limiting magnitude for the star identification are derived from its
+ * results. */
 #ifndef BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 #define BST_IMGPROC_DETECT_PLUGIN_DETECTOR_H
 
@@ -9,17 +10,22 @@
 
 typedef struct bst_plugin_detector bst_plugin_detector;
 
-extern const bst_config_desc bst_plugin_detector_table[]; /* of a bst_stage_use */
+extern const bst_config_desc bst_plugin_detector_table[]; /* configuration of a bst_stage_use */
 
-/* The camera and the maps outlive it. BST_ERR_CONFIG for a plug-in without its functions. */
+/* Creates the detector of a plug-in.
+ *
+ * Errors:    BST_ERR_CONFIG if the plug-in lacks functions
+ * Ownership: camera and maps must outlive *out; free with bst_plugin_detector_free */
 bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
                                       const bst_camera *camera, const bst_imgproc_maps *maps,
                                       int capacity, bst_plugin_detector **out) BST_MUST_CHECK;
 /* Destroys the plug-in's stage and frees the detector; NULL is allowed. */
 void bst_plugin_detector_free(bst_plugin_detector *plugin);
 
-/* As bst_imgproc_detect. BST_ERR_STATE, naming the plug-in, for a place, size or noise that is not
- * finite, a place off the window, or more items than there is room for. */
+/* Detects sources with the plug-in, as bst_imgproc_detect.
+ *
+ * Errors:    BST_ERR_STATE, naming the plug-in, for a position, size or noise that is not finite, a
+ *            position outside the window, or more than `capacity` detections */
 bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *plugin,
                                       const bst_imgproc_frame *frame, int64_t exposure_id,
                                       const bst_camera_motion *motion, bst_detections *out,

@@ -6,8 +6,9 @@
 
 #include "boresight/vec.h"
 
-/* Nodes of the rule with n nodes start at n (n - 1) / 2. Roots of the Legendre polynomial by Newton
- * from the asymptotic guess (Abramowitz and Stegun 25.4.29 and 22.16.6). */
+/* Gauss-Legendre rule of n nodes, stored from index n (n - 1) / 2. The roots of the Legendre
+ * polynomial are found by Newton's method from the asymptotic estimate (Abramowitz and Stegun
+ * 25.4.29 and 22.16.6). */
 static void legendre_rule(int n, double *node, double *weight) {
     for (int i = 0; i < n; i++) {
         double x = cos(BST_PI * (i + 0.75) / (n + 0.5)), slope = 1.0;
@@ -68,8 +69,8 @@ static void normal_at(const bst_imgproc_gauss *psf, double t, double *cdf, doubl
     *pdf = g0 + b * (g1 - g0) - c * t0 * g0 - d * t1 * g1;
 }
 
-/* The 1-D pixel-integrated Gaussian about `centre` over pixels 0..side-1, and its derivatives by
- * the centre, first and second; only the pixels within reach. */
+/* One-dimensional pixel-integrated Gaussian about `centre` on pixels 0 to side - 1, with first and
+ * second derivative by the centre; only pixels within reach are set. */
 static void make_profile(const bst_imgproc_gauss *psf, double centre, double sigma, int side,
                          profile *out) {
     double reach = BST_PSF_REACH_SIGMA * sigma;
@@ -96,8 +97,9 @@ static void make_profile(const bst_imgproc_gauss *psf, double centre, double sig
     }
 }
 
+/* Number of quadrature nodes along a streak, from its length in sigma. */
 static int node_count(const bst_imgproc_shape *shape) {
-    /* path at the greatest speed, which is at an end */
+    /* path length at the largest speed, which occurs at an end */
     double length =
         (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
         shape->sigma_px;

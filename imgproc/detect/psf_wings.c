@@ -7,13 +7,13 @@
 
 enum { REACH = BST_WINGS_REACH_PX, SIDE = 2 * REACH + 1, STARS = 64, MOST_NODES = 64 };
 
-/* From here outwards light is not fitted. */
+/* Within this distance of a star its light is part of the fit; the wings begin here. */
 static const double NEAR_PX = 8.0;
-/* What the wings' light may be more than it is thought: the star's magnitude, the PSF's nodes. */
+/* Safety factor on the wings' light, for errors of star magnitude and PSF. */
 static const double DOUBT = 1.5;
-/* A detection as near to a star, with such a share of its light, is the star. */
+/* A detection this near to a star, with at least this share of its flux, is the star itself. */
 static const double OWN_PX = 4.0, OWN_SHARE = 0.2;
-/* Share of a detection's flux below which the wings' light leaves it alone. */
+/* Share of a detection's flux below which wing light is negligible. */
 static const double MATTERS = 0.25;
 
 typedef struct bright {
@@ -21,15 +21,16 @@ typedef struct bright {
 } bright;
 
 struct bst_psf_wings {
-    float *peak;      /* [SIDE][SIDE]: the greatest share of light within a pixel around */
-    double near_peak; /* the greatest of it from NEAR_PX on */
-    double area_px2;  /* 1 / sum p^2 */
+    float *peak;      /* [SIDE][SIDE]: largest share of light within one pixel of each offset */
+    double near_peak; /* largest value of it beyond NEAR_PX */
+    double area_px2;  /* noise-equivalent area, 1 / sum p^2 */
     double dx_px, dy_px;
     bright stars[STARS];
     int count;
 };
 
-static void take_peaks(const double *image, bst_psf_wings *w) {
+/* Sets w->peak: the local maximum of the PSF within one pixel of each offset. */
+static void set_local_peaks(const double *image, bst_psf_wings *w) {
     for (int y = 0; y < SIDE; y++) {
         for (int x = 0; x < SIDE; x++) {
             double most = 0.0;
@@ -46,8 +47,9 @@ static void take_peaks(const double *image, bst_psf_wings *w) {
     }
 }
 
-static bst_status fill_in(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
-                          double blur_px, bst_psf_wings *w) {
+/* Renders the field-averaged PSF and its wings. */
+static bst_status render_wings(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
+                               double blur_px, bst_psf_wings *w) {
     size_t count = (size_t)SIDE * SIDE;
     double *one = malloc(2 * count * sizeof *one), *mean = one ? one + count : NULL, square = 0.0;
     w->peak = malloc(count * sizeof *w->peak);
@@ -73,7 +75,7 @@ static bst_status fill_in(bst_ctx *ctx, const bst_psf *psf, double width_px, dou
     }
     if (status == BST_OK) {
         w->area_px2 = 1.0 / square;
-        take_peaks(mean, w);
+        set_local_peaks(mean, w);
     }
     free(one);
     return status;
@@ -86,7 +88,7 @@ bst_status bst_psf_wings_create(bst_ctx *ctx, const bst_psf *psf, double width_p
     if (!w) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the wings of stars");
     }
-    bst_status status = fill_in(ctx, psf, width_px, height_px, blur_px, w);
+    bst_status status = render_wings(ctx, psf, width_px, height_px, blur_px, w);
     if (status != BST_OK) {
         bst_psf_wings_free(w);
         return status;
@@ -127,7 +129,7 @@ bool bst_psf_wings_holds(const bst_psf_wings *w, double x_px, double y_px, doubl
     return false;
 }
 
-/* Whether a detection is one of the stars themselves. */
+/* True if a detection is one of the bright stars itself. */
 static bool is_star(const bst_psf_wings *w, const bst_detection *d) {
     for (int i = 0; i < w->count; i++) {
         const bright *s = &w->stars[i];
@@ -139,8 +141,8 @@ static bool is_star(const bst_psf_wings *w, const bst_detection *d) {
     return false;
 }
 
-/* Light of the stars in a sensor pixel. */
-static double light_at(const bst_psf_wings *w, double x_px, double y_px) {
+/* Light of the bright stars' wings in a sensor pixel, e-. */
+static double wing_light_at(const bst_psf_wings *w, double x_px, double y_px) {
     double length = hypot(w->dx_px, w->dy_px), sum = 0.0;
     int nodes = 1 + (int)fmin(length, MOST_NODES - 1);
     for (int i = 0; i < w->count; i++) {
@@ -163,7 +165,7 @@ void bst_psf_wings_label(const bst_psf_wings *w, bst_psf_wings_ground_fn ground,
     for (int i = 0; i < detections->count && w->count > 0; i++) {
         bst_detection *d = &detections->items[i];
         double light = d->label == BST_LABEL_UNKNOWN && d->snr > 0.0 && noise_e > 0.0
-                           ? binning * binning * light_at(w, d->x_px, d->y_px)
+                           ? binning * binning * wing_light_at(w, d->x_px, d->y_px)
                            : 0.0;
         if (!(light > 0.0) || is_star(w, d)) {
             continue;

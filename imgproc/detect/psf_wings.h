@@ -1,4 +1,4 @@
-/* The far light of bright stars: what spikes and rings of the PSF pretend to be sources. */
+/* Wings of the PSF about bright stars: diffraction spikes and rings that mimic sources. */
 #ifndef BST_IMGPROC_DETECT_PSF_WINGS_H
 #define BST_IMGPROC_DETECT_PSF_WINGS_H
 
@@ -8,42 +8,46 @@
 #include "boresight/status.h"
 #include "sim/optics/psf.h"
 
-/* Pixels to either side of a star over which its light is known. */
+/* Largest distance from a star, along x or y, at which its wings are modelled, px. */
 enum { BST_WINGS_REACH_PX = 256 };
 
 typedef struct bst_psf_wings bst_psf_wings;
 
-/* Of a PSF (the mean of the nodes that mix on the middle of a sensor of width_px x height_px),
- * widened by a Gaussian of blur_px. BST_ERR_MEMORY. */
+/* Creates a wing model from a PSF (field average over a sensor of width_px x height_px) widened by
+ * a Gaussian of blur_px. Errors: BST_ERR_MEMORY. */
 bst_status bst_psf_wings_create(bst_ctx *ctx, const bst_psf *psf, double width_px, double height_px,
                                 double blur_px, bst_psf_wings **out) BST_MUST_CHECK;
-/* Frees a work space; NULL is allowed. */
+/* Frees a wing model; NULL is allowed. */
 void bst_psf_wings_free(bst_psf_wings *wings);
 
-/* The flux, e-, from which the wings of a star in noise of noise_e per sensor pixel are to be
- * counted with, for detections above `threshold_snr`. */
+/* Flux, e-, above which a star's wings can cause detections above `threshold_snr`.
+ *
+ * Given:     noise_e  noise of a sensor pixel, e- */
 double bst_psf_wings_bright_e(const bst_psf_wings *wings, double noise_e, double threshold_snr);
 
-/* A new frame, in which stars move by (dx_px, dy_px) during the exposure. */
+/* Starts a new frame. Stars move by (dx_px, dy_px) during its exposure. */
 void bst_psf_wings_begin(bst_psf_wings *wings, double dx_px, double dy_px);
-/* A bright star on the sensor or beside it; the first so many count. */
+/* Adds a bright star on the sensor or near it; stars beyond the capacity are ignored. */
 void bst_psf_wings_add(bst_psf_wings *wings, double x_px, double y_px, double flux_e);
-/* Whether a star was added within radius_px. */
+/* True if a bright star was added within radius_px of (x_px, y_px). */
 bool bst_psf_wings_holds(const bst_psf_wings *wings, double x_px, double y_px, double radius_px);
 
-/* Background at a place of the sensor, per pixel of the frame. */
+/* Background level and noise at a position on the sensor, per pixel of the frame. */
 typedef struct bst_psf_wings_ground {
     double level_e, noise_e;
 } bst_psf_wings_ground;
 typedef void (*bst_psf_wings_ground_fn)(const void *user, double x_px, double y_px,
                                         bst_psf_wings_ground *out);
 
-/* Labels as ARTEFACT those UNKNOWN detections whose light could be that of the stars that were
- * added: with L the stars' light at the place (its greatest within a pixel) less what the
- * background there holds above the frame's median, A the area over which the detection gathers
- * light, what is left of its flux without 1.5 A L must exceed threshold_snr times the noise that L
- * brings. Where L matters little nothing is labelled, nor are the stars themselves. Their
- * label_probability is 0.9. `binning`: sensor pixels of a pixel's side. */
+/* Labels UNKNOWN detections as ARTEFACT if wing light of the added stars can explain them;
+ * label_probability becomes 0.9.
+ *
+ * L is the stars' wing light at the position (maximum within a pixel), less the local background's
+ * excess above the frame's median. A is the detection's noise-equivalent area. The flux less 1.5 A
+ * L must exceed threshold_snr times the noise including L. Detections where L is negligible, and
+ * the stars themselves, are not labelled.
+ *
+ * Given:     binning  side of a pixel of the frame, sensor px */
 void bst_psf_wings_label(const bst_psf_wings *wings, bst_psf_wings_ground_fn ground,
                          const void *user, int binning, bst_detections *detections);
 

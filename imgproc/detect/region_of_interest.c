@@ -17,6 +17,7 @@ bool bst_region_of_interest_add(bst_region_of_interest *windows, const bst_windo
     return true;
 }
 
+/* True if two windows overlap or touch. */
 static bool touch(const bst_window *a, const bst_window *b) {
     return a->x0 <= b->x0 + b->width && b->x0 <= a->x0 + a->width && a->y0 <= b->y0 + b->height &&
            b->y0 <= a->y0 + a->height;
@@ -30,7 +31,7 @@ static int most(int a, int b) {
     return a > b ? a : b;
 }
 
-/* Start and length along one axis, widened to whole binned pixels of the frame. */
+/* Widens start and length of a window along one axis to whole binned pixels of the frame. */
 static void align(int *start, int *length, int origin, int size, int binning) {
     int first = (*start - origin) / binning;
     int end = (*start + *length - origin + binning - 1) / binning;
@@ -64,7 +65,7 @@ bool bst_region_of_interest_settle(bst_region_of_interest *windows, const bst_wi
             a->width = x1 - a->x0;
             a->height = y1 - a->y0;
             *b = windows->items[--windows->count];
-            /* the larger one may touch others */
+            /* the merged window may touch others */
             i = -1;
             break;
         }

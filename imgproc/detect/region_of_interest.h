@@ -1,4 +1,5 @@
-/* Windows of a frame that image processing looks at: round predicted places. */
+/* Regions of interest: windows of a frame about predicted positions, in which image processing
+ * searches. */
 #ifndef BST_IMGPROC_DETECT_REGION_OF_INTEREST_H
 #define BST_IMGPROC_DETECT_REGION_OF_INTEREST_H
 
@@ -13,23 +14,23 @@ typedef struct bst_region_of_interest {
     bst_window items[BST_WINDOWS_MAX];
 } bst_region_of_interest;
 
-/* Adds a window of half_x and half_y to either side of a place, full-sensor px; what lies outside
- * `frame` is cut off. False when there is no room, or nothing of it lies inside. */
+/* Adds a window of half widths half_x_px, half_y_px about a position, full-sensor px, clipped to
+ * `frame`. Returns false if the list is full or the window lies outside. */
 bool bst_region_of_interest_add(bst_region_of_interest *windows, const bst_window *frame,
                                 double x_px, double y_px, double half_x_px, double half_y_px);
 
-/* Puts the windows along the pixels of `binning` of the frame and joins those that touch, until all
- * are apart. False when they then cover more than `share` of the frame: the whole of it costs less.
- */
+/* Aligns the windows with the frame's binned pixels and merges those that touch. Returns false if
+ * they cover more than `share` of the frame: a search of the whole frame is then cheaper. */
 bool bst_region_of_interest_settle(bst_region_of_interest *windows, const bst_window *frame,
                                    int binning, double share);
 
-/* Whether a place lies in one of them or within margin_px of it. */
+/* True if a position lies within margin_px of one of the windows. */
 bool bst_region_of_interest_hold(const bst_region_of_interest *windows, double x_px, double y_px,
                                  double margin_px);
 
-/* The pixels of one window (inside the frame, along its binned pixels) as a frame of its own,
- * copied to `pixels`, which must have room for them. */
+/* Crops a window out of a frame. The window lies inside the frame, aligned with its binned pixels.
+ *
+ * Returned:  frame whose pixels are copied to `pixels`; these need room for the window */
 bst_imgproc_frame bst_region_of_interest_crop(const bst_imgproc_frame *frame,
                                               const bst_window *window, uint16_t *pixels);
 

@@ -6,7 +6,7 @@
 #include "imgproc/detect/background.h"
 #include "imgproc/detect/simd_layout.h"
 
-/* Half of the lanes as one value, so that they stay in registers. */
+/* half of the lanes per variable, so that they stay in registers */
 enum { HALF = BST_ROW_LANES / 2, KEYS = 16, MEDIAN_PARTS = BST_ROW_MEDIAN / KEYS, MAX_RADIUS = 32 };
 typedef float lanes __attribute__((vector_size(HALF * sizeof(float))));
 typedef int16_t keys __attribute__((vector_size(KEYS * sizeof(int16_t))));
@@ -70,14 +70,14 @@ int bst_row_good(const float *pixels, int count) {
     return good;
 }
 
-/* The first half of a float as a number that is greater where the float is. */
+/* The upper half of a float as an integer that sorts like the float. */
 static inline int16_t key_of(float value) {
     int32_t bits;
     memcpy(&bits, &value, sizeof bits);
     return (int16_t)((bits ^ ((bits >> 31) & 0x7FFFFFFF)) >> 16);
 }
 
-/* The middle of the floats that have this key. */
+/* Middle of the floats with a given key. */
 static inline float value_of(int key) {
     int32_t bits = (int32_t)((uint32_t)key << 16 | 0x8000u);
     bits ^= (bits >> 31) & 0x7FFFFFFF;
@@ -86,7 +86,7 @@ static inline float value_of(int key) {
     return value;
 }
 
-/* The greatest key that no more than half of the values are below, bit by bit, without branches. */
+/* Largest key that at most half of the values lie below, bit by bit, without branches. */
 BST_CLONES_256
 float bst_row_median(const float *values, int count) {
     int16_t all[BST_ROW_MEDIAN];
@@ -104,7 +104,7 @@ float bst_row_median(const float *values, int count) {
         }
         uint64_t four[KEYS / 4];
         memcpy(four, &below, sizeof four);
-        /* sums of four numbers of 16 bits, none of which overflows */
+        /* sums of four 16-bit numbers that cannot overflow */
         uint64_t sum = (four[0] + four[1]) + (four[2] + four[3]);
         int rank = (int)((sum * 0x0001000100010001u) >> 48);
         median = rank <= count / 2 ? trial : median;
@@ -127,6 +127,7 @@ void bst_row_electrons(const uint16_t *restrict raw, int count, float offset, fl
     }
 }
 
+/* Largest digital number of a row. */
 BST_CLONES
 static uint16_t greatest(const uint16_t *raw, int count) {
     uint16_t top = 0;
@@ -136,6 +137,7 @@ static uint16_t greatest(const uint16_t *raw, int count) {
     return top;
 }
 
+/* True if `to` is aligned for non-temporal stores. */
 static bool may_stream(const float *to) {
     return (uintptr_t)to % 16 == 0;
 }

@@ -1,5 +1,5 @@
-/* Work spaces that the threads of a loop take in turn. What a work space held before must not
- * matter: which one a part of the loop gets is left to chance. */
+/* Pool of work spaces shared by the threads of a loop. Which work space a part of the loop gets is
+ * arbitrary, so its old contents must not matter. */
 #ifndef BST_IMGPROC_DETECT_SCRATCH_POOL_H
 #define BST_IMGPROC_DETECT_SCRATCH_POOL_H
 
@@ -9,7 +9,7 @@ enum { BST_BORROW_MOST = 33 };
 
 typedef struct bst_scratch_pool {
     atomic_flag taken[BST_BORROW_MOST];
-    int count; /* at least as many as threads */
+    int count; /* at least the number of threads */
 } bst_scratch_pool;
 
 static inline void bst_scratch_pool_init(bst_scratch_pool *b, int count) {
@@ -19,7 +19,7 @@ static inline void bst_scratch_pool_init(bst_scratch_pool *b, int count) {
     }
 }
 
-/* Takes a free work space; waits actively until there is one. Returns its index. */
+/* Takes a free work space, spinning until there is one. Returns its index. */
 static inline int bst_scratch_pool_take(bst_scratch_pool *b) {
     for (int i = 0;; i = i + 1 < b->count ? i + 1 : 0) {
         if (!atomic_flag_test_and_set_explicit(&b->taken[i], memory_order_acquire)) {

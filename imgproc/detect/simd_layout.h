@@ -1,14 +1,14 @@
-/* How image processing lays out and sums floats for vectors (sim/core/simd.h). */
+/* Layout and summation order of float rows for SIMD (sim/core/simd.h). */
 #ifndef BST_IMGPROC_DETECT_SIMD_LAYOUT_H
 #define BST_IMGPROC_DETECT_SIMD_LAYOUT_H
 
 #include "sim/core/simd.h"
 
-/* Rows are padded to this many floats, and sums over pixels made of as many, one for each place in
- * a group of them: the widest vectors have as many. */
+/* Rows are padded to a multiple of this many floats, the width of the widest vectors; sums over
+ * pixels have as many lanes. */
 enum { BST_LANES = 16 };
 
-/* A number of floats rounded up to whole lanes. */
+/* Rounds a number of floats up to whole lanes. */
 static inline int bst_simd_layout_round_up(int count) {
     return (count + BST_LANES - 1) / BST_LANES * BST_LANES;
 }

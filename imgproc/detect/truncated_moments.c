@@ -9,11 +9,11 @@ enum { HERMITE = 9, PASSES = 2, COUNTED_PASSES = 4, MOST_ELECTRONS = 80, MOST_ST
 
 static const double LEAST_COUNTED = 1e-3;
 
-/* A share of a change of the variance comes back as a change of its correction: a tenth at 3 sigma.
- */
+/* Convergence limit: relative change of the variance. At 3 sigma a tenth of a change returns
+ * through the correction. */
 static const double CLOSE = 0.005;
 
-/* An edge at z: the normal law and density there, and phi(z) He_n(z). */
+/* A clip edge at z: normal distribution and density there, and phi(z) He_n(z). */
 typedef struct edge {
     double below;
     double hermite[HERMITE];
@@ -29,14 +29,14 @@ static edge edge_at(double z) {
     return out;
 }
 
-/* Integral of He_n(z) phi(z) between the edges. */
+/* Integral of He_n(z) phi(z) between the clip edges. */
 static double integral(const edge *low, const edge *high, int n) {
     return n > 0 ? low->hermite[n - 1] - high->hermite[n - 1] : high->below - low->below;
 }
 
-/* Mean and variance between the edges, in deviations. */
-static void moments(const edge *low, const edge *high, double skewness, double excess, double *mean,
-                    double *variance) {
+/* Mean and variance, in sigma, of the Edgeworth distribution between the clip edges. */
+static void truncated_edgeworth_moments(const edge *low, const edge *high, double skewness,
+                                        double excess, double *mean, double *variance) {
     double m[3] = {0.0};
     const struct {
         int n;
@@ -44,7 +44,7 @@ static void moments(const edge *low, const edge *high, double skewness, double e
     } series[] = {
         {0, 1.0}, {3, skewness / 6.0}, {4, excess / 24.0}, {6, skewness * skewness / 72.0}};
     for (int i = 0; i < 4; i++) {
-        /* z He_n = He_n+1 + n He_n-1, twice */
+        /* z He_n = He_n+1 + n He_n-1, applied twice */
         int n = series[i].n;
         double here = integral(low, high, n);
         double first = integral(low, high, n + 1), second = integral(low, high, n + 2);
@@ -60,10 +60,10 @@ static void moments(const edge *low, const edge *high, double skewness, double e
     *variance = m[2] / m[0] - *mean * *mean;
 }
 
-/* Where no more is counted, and the normal part is narrower, single electrons show. */
+/* Below both limits single electrons are resolved, and the noise is not near-normal. */
 static const double FEW_ELECTRONS = 12.0, NARROW_VARIANCE_E2 = 0.8;
 
-/* Moments of what is digitised to the values between the edges, and of all. */
+/* Moments of the digitised values between the clip edges, and of all values. */
 typedef struct counted_moments {
     double inner_mean, inner_variance, mean, variance;
 } counted_moments;
@@ -76,9 +76,9 @@ static void add_value(double probability, double value, double about, double sum
     sum[2] += probability * d * d;
 }
 
-/* Probability of a value below `upto` of electrons counted with mean `counted`, the normal part
- * about them, and `shift` on top. */
-static double below(double upto, double counted, double shift, double read_e) {
+/* Probability of a value below `upto`, e-: Poisson electrons of mean `counted` plus read noise
+ * read_e plus `shift`. */
+static double poisson_normal_cdf(double upto, double counted, double shift, double read_e) {
     double sum = 0.0, share = exp(-counted);
     for (int n = 0; n < MOST_ELECTRONS; n++) {
         double z = (upto - shift - n) / read_e;
@@ -91,7 +91,8 @@ static double below(double upto, double counted, double shift, double read_e) {
     return sum;
 }
 
-/* The same for digital steps `step_e` apart, of which `low` and `high` are two. */
+/* Moments of Poisson electrons plus read noise, digitised in steps of step_e; the clip edges `low`
+ * and `high` lie on steps. */
 static void count_moments(double counted, double shift, double read_e, double step_e, double low,
                           double high, counted_moments *out) {
     double reach = 6.0 * sqrt(counted + read_e * read_e) + 3.0, about = counted + shift;
@@ -99,9 +100,9 @@ static void count_moments(double counted, double shift, double read_e, double st
     int first = (int)floor((about - reach - low) / step_e);
     int end = (int)ceil((about + 1.5 * reach - low) / step_e);
     int inside = (int)lround((high - low) / step_e);
-    double before = below(low + first * step_e, counted, shift, read_e);
+    double before = poisson_normal_cdf(low + first * step_e, counted, shift, read_e);
     for (int k = first; k < end; k++) {
-        double after = below(low + (k + 1) * step_e, counted, shift, read_e);
+        double after = poisson_normal_cdf(low + (k + 1) * step_e, counted, shift, read_e);
         double value = low + (k + 0.5) * step_e;
         add_value(after - before, value, about, all);
         if (k >= 0 && k < inside) {
@@ -115,8 +116,9 @@ static void count_moments(double counted, double shift, double read_e, double st
     out->variance = all[2] / all[0] - pow(all[1] / all[0], 2.0);
 }
 
-/* Few electrons: no series holds. The law itself is cut and digitised. */
-static bool solve_counted(const bst_truncated_moments_noise *noise, double low, double high,
+/* Solves for mean and deviation at few electrons, where the Edgeworth series fails: the
+ * Poisson-normal distribution itself is digitised and clipped. */
+static bool solve_poisson(const bst_truncated_moments_noise *noise, double low, double high,
                           double inner_mean, double inner_variance, double *mean,
                           double *deviation) {
     double read_e = sqrt(noise->read_variance_e2), step = noise->step_e;
@@ -151,10 +153,10 @@ static bool solve_counted(const bst_truncated_moments_noise *noise, double low, 
 void bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, double low, double high,
                                  double inner_mean, double inner_variance, double *mean,
                                  double *deviation) {
-    if (solve_counted(noise, low, high, inner_mean, inner_variance, mean, deviation)) {
+    if (solve_poisson(noise, low, high, inner_mean, inner_variance, mean, deviation)) {
         return;
     }
-    /* no distribution narrower than that is told from its steps */
+    /* quantisation limits the resolvable width */
     double steps = noise->step_e * noise->step_e / 12.0, least = 0.25 * steps;
     double inner = fmax(inner_variance - steps, least);
     double variance = fmax(*deviation * *deviation - steps, least);
@@ -162,9 +164,9 @@ void bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, doubl
         double sigma = sqrt(variance), counted = fmax(variance - noise->read_variance_e2, 0.0);
         edge a = edge_at((low - *mean) / sigma), b = edge_at((high - *mean) / sigma);
         double shift, share;
-        moments(&a, &b, fmin(counted / (variance * sigma), 1.0),
-                fmin(counted / (variance * variance), 1.0), &shift, &share);
-        if (!(share > 0.1)) { /* the edges are too near for a law: as they were found */
+        truncated_edgeworth_moments(&a, &b, fmin(counted / (variance * sigma), 1.0),
+                                    fmin(counted / (variance * variance), 1.0), &shift, &share);
+        if (!(share > 0.1)) { /* edges too close for a correction: keep the input values */
             return;
         }
         *mean = inner_mean - shift * sigma;

@@ -1,24 +1,28 @@
-/* Mean and deviation of noise from the moments of what lies between two edges. */
+/* Mean and standard deviation of noise from the moments of its values between two clip edges. */
 #ifndef BST_IMGPROC_DETECT_TRUNCATED_MOMENTS_H
 #define BST_IMGPROC_DETECT_TRUNCATED_MOMENTS_H
 
-/* Noise that is the sum of a normal part and of counted electrons, in digital steps. */
+/* Noise model: a normal part plus shot noise, digitised in steps. */
 typedef struct bst_truncated_moments_noise {
-    double read_variance_e2; /* of the normal part, without that of the steps; INFINITY: all is */
-    double step_e;           /* >= 0 */
+    /* variance of the normal part without quantisation; INFINITY: all noise is normal */
+    double read_variance_e2;
+    double step_e; /* >= 0 */
 } bst_truncated_moments_noise;
 
-/* Improves *mean and *deviation (of the noise as it is digitised, electrons; on entry a guess) of
- * pixels whose values from `low` to `high` have the mean `inner_mean` and the variance
- * `inner_variance`. The edges lie midway between digital values: what is left is then the noise
- * before it was digitised, cut at the edges, and step^2 / 12 (Sheppard). That noise is taken for
- * normal with the third and fourth cumulants of the electrons counted, variance beyond
- * read_variance_e2, by Edgeworth's series to the second order; its moments between two edges are
- * integrals of z^k He_n(z) phi(z), which Hermite polynomials have in closed form.
+/* Corrects mean and deviation of clipped pixel noise for the clip.
  *
- * Below 12 electrons counted, with a normal part below 0.8 e-^2 and no more than 100 steps between
- * the edges, no such series holds: the Poisson law of whole electrons, the normal part about each,
- * is digitised and cut as it is, and mean and deviation are those of all digital values. */
+ * Given:     low, high       clip edges midway between digital values, e-
+ *            inner_mean      mean of the values between the edges, e-
+ *            inner_variance  their variance, e-^2
+ *            *mean, *deviation  first estimate of the digitised noise, e-
+ * Returned:  *mean, *deviation
+ * Notes:     The quantisation adds step^2 / 12 (Sheppard). The noise is taken as normal with the
+ *            third and fourth cumulants of its shot noise, the variance beyond read_variance_e2, by
+ *            the Edgeworth series to second order. Integrals of z^k He_n(z) phi(z) between the
+ *            edges have closed forms in Hermite polynomials. Below 12 electrons of shot-noise
+ *            variance, with a normal part below 0.8 e-^2 and at most 100 steps between the edges,
+ *            the series fails. Then the Poisson-normal distribution itself is digitised and
+ *            clipped. */
 void bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, double low, double high,
                                  double inner_mean, double inner_variance, double *mean,
                                  double *deviation);

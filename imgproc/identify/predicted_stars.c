@@ -26,8 +26,8 @@ void bst_predicted_stars_free(bst_predicted_stars *sky) {
     sky->expected = NULL;
 }
 
-/* V of a Sun-like star that gives the camera as much light. */
-static double seen_mag(const bst_camera *camera, const bst_star *star) {
+/* Effective V magnitude in the camera's band: V of a Sun-like star of the same signal. */
+static double effective_v_mag(const bst_camera *camera, const bst_star *star) {
     double v_mag = (double)star->v_mag;
     if (!camera->spectrum) {
         return v_mag;
@@ -74,7 +74,7 @@ bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
         if (bst_camera_project(sky->camera, bst_quat_rotate(q_cam_from_gcrf, apparent), &x, &y) &&
             x >= x0 && x <= x1 && y >= y0 && y <= y1) {
             sky->expected[(*count)++] =
-                (bst_imgproc_expected_star){x, y, seen_mag(sky->camera, star), star->id};
+                (bst_imgproc_expected_star){x, y, effective_v_mag(sky->camera, star), star->id};
         }
     }
     return BST_OK;

@@ -1,4 +1,4 @@
-/* Where the onboard catalogue's stars should be on the focal plane. */
+/* Prediction of catalogue star positions on the focal plane. */
 #ifndef BST_IMGPROC_IDENTIFY_PREDICTED_STARS_H
 #define BST_IMGPROC_IDENTIFY_PREDICTED_STARS_H
 
@@ -12,8 +12,8 @@ typedef struct bst_predicted_stars {
     const bst_stars *stars;
     double julian_year;
     int capacity;
-    bst_star *found;                     /* [capacity] */
-    bst_imgproc_expected_star *expected; /* [capacity] */
+    bst_star *found;                     /* catalogue stars of the query */
+    bst_imgproc_expected_star *expected; /* their predicted positions */
 } bst_predicted_stars;
 
 /* Allocates the prediction of catalogue stars in a frame.
@@ -29,17 +29,21 @@ bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
 /* Frees the memory of the predicted stars and clears the struct, which belongs to the caller. */
 void bst_predicted_stars_free(bst_predicted_stars *sky);
 
-/* The stars to v_limit whose apparent places fall within margin_px of a window, for a camera at
- * q_cam_from_gcrf that sees light as `light` says. */
+/* Query: catalogue stars down to v_limit whose apparent positions lie within margin_px of a window.
+ */
 typedef struct bst_predicted_stars_query {
     bst_quat q_cam_from_gcrf;
+    /* velocity and position for aberration and parallax */
     const bst_light *light;
     bst_window window;
     double margin_px, v_limit;
 } bst_predicted_stars_query;
 
-/* Fills sky->expected with the stars that are asked for. Where there are more
- * than fit, the limit is raised by half a magnitude until they do. */
+/* Predicts catalogue star positions. If more than `capacity` stars match, v_limit is raised in
+ * brightness by steps of half a magnitude until they fit.
+ *
+ * Returned:  sky->expected  predicted stars, full-sensor px
+ *            *count         number of them */
 bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
                                       const bst_predicted_stars_query *query,
                                       int *count) BST_MUST_CHECK;

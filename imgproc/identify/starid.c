@@ -11,17 +11,18 @@ enum { VOTERS = 150, PASSES = 5 };
 
 static const double CELL_PX = 2.0;
 static const double CHANCE = 0.01;
-static const double ROLL_SIGMA_RAD = 3e-3; /* onboard knowledge of the roll, as a weak prior */
+/* 1 sigma prior of the roll error from onboard knowledge */
+static const double ROLL_SIGMA_RAD = 3e-3;
 
 struct bst_starid {
-    int max_stars, max_detections, cells; /* cells per side of the vote map */
+    int max_stars, max_detections, cells; /* cells: per side of the vote map */
     uint16_t *votes;
-    int *by_y;         /* stars in order of y */
-    int *bright;       /* brightest stars, brightest detections */
-    int *star_of;      /* [detections], -1 none */
-    int matched_of;    /* detections that star_of tells of; 0 when nothing matched */
-    int *detection_of; /* [stars], -1 none */
-    double *distance;  /* [stars] of its detection */
+    int *by_y;         /* star indices sorted by y */
+    int *bright;       /* indices of the brightest stars, brightest detections */
+    int *star_of;      /* [detections]: matched star, -1: none */
+    int matched_of;    /* number of detections in star_of; 0: no match */
+    int *detection_of; /* [stars]: matched detection, -1: none */
+    double *distance;  /* [stars]: distance to the matched detection, px */
 };
 
 bst_status bst_starid_create(bst_ctx *ctx, int max_stars, int max_detections, double max_radius_px,
@@ -62,21 +63,24 @@ void bst_starid_free(bst_starid *s) {
     free(s);
 }
 
+/* Sort order of expected stars by y. */
 static bool star_higher(const void *context, int a, int b) {
     const bst_imgproc_expected_star *stars = context;
     return stars[a].y_px != stars[b].y_px ? stars[a].y_px < stars[b].y_px : a < b;
 }
+/* Sort order of expected stars by brightness. */
 static bool star_brighter(const void *context, int a, int b) {
     const bst_imgproc_expected_star *stars = context;
     return stars[a].v_mag != stars[b].v_mag ? stars[a].v_mag < stars[b].v_mag : a < b;
 }
+/* Sort order of detections by brightness. */
 static bool detection_brighter(const void *context, int a, int b) {
     const bst_detection *items = context;
     return items[a].flux_e != items[b].flux_e ? items[a].flux_e > items[b].flux_e : a < b;
 }
 
-/* Whether a detection may be a star: saturated sources may be brighter than they seem, cut ones
- * too. */
+/* True if a detection's label and magnitude are consistent with a star. Saturated or truncated
+ * sources may be brighter than measured. */
 static bool consistent(const bst_detection *d, const bst_imgproc_expected_star *s) {
     if (d->label != BST_LABEL_UNKNOWN && d->label != BST_LABEL_STAR) {
         return false;
@@ -87,7 +91,7 @@ static bool consistent(const bst_detection *d, const bst_imgproc_expected_star *
     return excess > -limit && excess < (cut ? limit + 2.5 : limit);
 }
 
-/* P(a Poisson number of mean mu is k or more). */
+/* Probability that a Poisson variable of mean mu is k or more. */
 static double poisson_tail(double mu, int k) {
     if (k <= 0) {
         return 1.0;
@@ -104,17 +108,18 @@ static double poisson_tail(double mu, int k) {
     return fmin(sum, 1.0);
 }
 
-/* What is to be matched with what. */
-typedef struct problem {
+/* Stars and detections to be matched. */
+typedef struct match_input {
     const bst_starid_options *options;
     const bst_imgproc_expected_star *stars;
     int star_count;
     const bst_detection *items;
     int count;
-} problem;
+} match_input;
 
-/* The shift that most pairs agree on; false when none stands out from chance. */
-static bool vote(bst_starid *s, const problem *p, double *shift_x, double *shift_y) {
+/* Common shift of detections against stars, px, by voting over pairs. Returns false if no shift is
+ * significant. */
+static bool vote_for_shift(bst_starid *s, const match_input *p, double *shift_x, double *shift_y) {
     const bst_starid_options *o = p->options;
     const bst_imgproc_expected_star *stars = p->stars;
     const bst_detection *items = p->items;
@@ -170,7 +175,7 @@ static bool vote(bst_starid *s, const problem *p, double *shift_x, double *shift
     if (best == 0) {
         return false;
     }
-    /* density of differences by chance: pairs over the area that the expected stars come from */
+    /* density of chance pairs: pairs over the area from which expected stars can come */
     double search = 2.0 * o->search_radius_px;
     double area = (o->field_width_px + search) * (o->field_height_px + search);
     double mean = pairs * 4.0 * CELL_PX * CELL_PX / area;
@@ -178,13 +183,14 @@ static bool vote(bst_starid *s, const problem *p, double *shift_x, double *shift
     return trials * poisson_tail(mean, best) < CHANCE;
 }
 
+/* Predicted position of a star after the fitted shift and roll, px. */
 static void expected_place(const bst_starid_options *o, const bst_imgproc_expected_star *star,
                            const bst_starid_result *r, double *x, double *y) {
     *x = star->x_px + r->shift_x_px - r->roll_rad * (star->y_px - o->centre_y_px);
     *y = star->y_px + r->shift_y_px + r->roll_rad * (star->x_px - o->centre_x_px);
 }
 
-/* First star, in order of y, that is not below y_px. */
+/* Index in order of y of the first star with y >= y_px. */
 static int first_not_below(const bst_starid *s, const bst_imgproc_expected_star *stars, int count,
                            double y_px) {
     int lo = 0, hi = count;
@@ -199,8 +205,10 @@ static int first_not_below(const bst_starid *s, const bst_imgproc_expected_star 
     return lo;
 }
 
-/* One-to-one nearest partners within the tolerance. Returns how many. */
-static int pair_up(bst_starid *s, const problem *p, double floor_px, const bst_starid_result *r) {
+/* Matches each detection to the nearest star within the tolerance, one to one. Returns the number
+ * of matches. */
+static int match_nearest(bst_starid *s, const match_input *p, double floor_px,
+                         const bst_starid_result *r) {
     const bst_starid_options *o = p->options;
     const bst_imgproc_expected_star *stars = p->stars;
     const int star_count = p->star_count;
@@ -213,7 +221,7 @@ static int pair_up(bst_starid *s, const problem *p, double floor_px, const bst_s
         s->star_of[i] = -1;
         double sigma = sqrt(fmax(d->cov_xx + d->cov_yy, 0.0) + floor_px * floor_px);
         double tolerance = fmin(o->tolerance_px, 4.0 * sigma);
-        /* undo shift and turn of the detection to find the rows to look at */
+        /* undo the detection's shift and roll to find the rows to search */
         double y =
             d->y_px - r->shift_y_px - r->roll_rad * (d->x_px - r->shift_x_px - o->centre_x_px);
         int best = -1;
@@ -248,8 +256,9 @@ static int pair_up(bst_starid *s, const problem *p, double floor_px, const bst_s
     return matched;
 }
 
-/* Least squares for shift and turn; residuals as they are after it. */
-static void refine(const bst_starid *s, const problem *p, int matched, bst_starid_result *r) {
+/* Least-squares fit of shift and roll to the matches; RMS of the residuals after the fit. */
+static void fit_shift_and_roll(const bst_starid *s, const match_input *p, int matched,
+                               bst_starid_result *r) {
     const bst_starid_options *o = p->options;
     const bst_imgproc_expected_star *stars = p->stars;
     const bst_detection *items = p->items;
@@ -299,8 +308,9 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o,
     s->matched_of = 0;
     star_count = star_count < s->max_stars ? star_count : s->max_stars;
     count = count < s->max_detections ? count : s->max_detections;
-    const problem p = {o, stars, star_count, items, count};
-    if (star_count <= 0 || count <= 0 || !vote(s, &p, &out->shift_x_px, &out->shift_y_px)) {
+    const match_input p = {o, stars, star_count, items, count};
+    if (star_count <= 0 || count <= 0 ||
+        !vote_for_shift(s, &p, &out->shift_x_px, &out->shift_y_px)) {
         *out = (bst_starid_result){0};
         return;
     }
@@ -310,18 +320,18 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o,
     bst_heapsort_indices(s->by_y, star_count, star_higher, stars);
     double floor_px = o->tolerance_px;
     for (int pass = 0; pass < PASSES; pass++) {
-        out->matched = pair_up(s, &p, floor_px, out);
+        out->matched = match_nearest(s, &p, floor_px, out);
         if (out->matched == 0) {
             *out = (bst_starid_result){0};
             return;
         }
         if (pass + 1 < PASSES) {
-            refine(s, &p, out->matched, out);
+            fit_shift_and_roll(s, &p, out->matched, out);
             floor_px = fmax(0.25, fmin(out->rms_px, 0.5 * floor_px));
         }
     }
     s->matched_of = count;
-    double others = 0.0; /* per px^2, that are no stars of the catalogue */
+    double others = 0.0; /* density of detections that are no catalogue stars, px^-2 */
     for (int i = 0; i < count; i++) {
         others += s->star_of[i] < 0;
     }
@@ -331,7 +341,8 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o,
             continue;
         }
         bst_detection *d = &items[i];
-        /* both at one place by the errors, or by the chance density of the others */
+        /* likelihood of the same position given the errors, against the chance density of other
+         * detections */
         double distance = s->distance[s->star_of[i]];
         double variance =
             0.5 * fmax(d->cov_xx + d->cov_yy, 0.0) + fmax(out->rms_px * out->rms_px, 1e-4);

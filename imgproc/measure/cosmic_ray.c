@@ -4,9 +4,11 @@
 
 enum { MAX_CHARGE = 64 };
 
-/* The pixels that are sharper than light about a candidate's maximum, and those that they join. */
-static int find_charge(const bst_imgproc_locator *l, const bst_locate_frame *f,
-                       const bst_imgproc_found *found, int at[MAX_CHARGE], double *sharpest) {
+/* Collects the pixels sharper than the PSF about a candidate's maximum, and pixels connected to
+ * them. Returns their number. */
+static int find_charge_pixels(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                              const bst_imgproc_found *found, int at[MAX_CHARGE],
+                              double *sharpest) {
     int reach_px = 1 + (int)f->sigma_px, count = 0;
     *sharpest = 0.0;
     for (int round = -1; round < count; round++) {
@@ -35,9 +37,9 @@ static int find_charge(const bst_imgproc_locator *l, const bst_locate_frame *f,
     return count;
 }
 
-/* What a candidate is when its charge is all there is: centroid and extent of the charge. */
-static void describe_charge(const bst_sharpness *s, const bst_locate_frame *f, const int *at,
-                            int count, double sharpest, bst_imgproc_found *found) {
+/* Measures a cosmic-ray or hot-pixel candidate: centroid and moments of its charge. */
+static void measure_charge(const bst_sharpness *s, const bst_locate_frame *f, const int *at,
+                           int count, double sharpest, bst_imgproc_found *found) {
     double sum = 0.0, square = 0.0, mx = 0.0, my = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;
     for (int k = 0; k < count; k++) {
         double v = bst_sharpness_signal(s, f->signal[at[k]]), x = at[k] % f->width - found->peak_x,
@@ -73,7 +75,7 @@ typedef struct search {
     const bst_locate_frame *f;
 } search;
 
-/* charge.pixels: how many, of each. */
+/* Finds the charge pixels of candidates begin to end - 1 (loop body of bst_parallel_for). */
 static void count_charge(void *user, int begin, int end) {
     const search *s = user;
     for (int i = begin; i < end; i++) {
@@ -81,7 +83,7 @@ static void count_charge(void *user, int begin, int end) {
         double sharpest;
         bst_imgproc_found *found = &s->l->found[i];
         bool light = found->dropped || found->bleed;
-        found->charge.pixels = light ? 0 : find_charge(s->l, s->f, found, at, &sharpest);
+        found->charge.pixels = light ? 0 : find_charge_pixels(s->l, s->f, found, at, &sharpest);
     }
 }
 
@@ -96,8 +98,8 @@ void bst_cosmic_ray_remove(bst_imgproc_locator *l, const bst_locate_frame *f) {
         }
         int at[MAX_CHARGE];
         double sharpest;
-        int count = find_charge(l, f, &l->found[i], at, &sharpest);
-        describe_charge(&l->sharpness, f, at, count, sharpest, &l->found[i]);
+        int count = find_charge_pixels(l, f, &l->found[i], at, &sharpest);
+        measure_charge(&l->sharpness, f, at, count, sharpest, &l->found[i]);
         for (int k = 0; k < count && l->charged_count < l->charged_capacity; k++) {
             l->charged[l->charged_count++] = at[k];
         }
@@ -130,7 +132,7 @@ double bst_cosmic_ray_light(const bst_locate_frame *f, const bst_imgproc_found *
 void bst_cosmic_ray_take(bst_imgproc_found *found) {
     const bst_imgproc_cosmic_ray *c = &found->charge;
     found->label = c->pixels == 1 ? BST_LABEL_HOT_PIXEL : BST_LABEL_HIT;
-    /* chance of light: its tail there, against one candidate in a thousand that is charge */
+    /* odds of charge to light: normal tail of the sharpness, prior one candidate in a thousand */
     double odds = exp(fmin(0.5 * c->sharpness * c->sharpness, 300.0) - 7.0);
     found->label_probability = odds / (1.0 + odds);
     found->streak = false;

@@ -31,7 +31,8 @@ void bst_deblend_index(bst_imgproc_locator *l, const bst_locate_frame *f) {
     }
 }
 
-/* Cells, first and last, that hold all maxima within margin_px of a range of pixels. */
+/* First and last cell of the source index, along one axis, that can hold maxima within margin_px of
+ * a pixel range. */
 static void cell_range(double from, double to, double margin_px, int cells, int *first, int *last) {
     double lo = floor((from - margin_px) / BST_LOCATE_CELL_PX),
            hi = floor((to + margin_px) / BST_LOCATE_CELL_PX);
@@ -45,7 +46,7 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
     out->free[0] = own;
     out->free_count = 1;
     out->fixed_count = 0;
-    /* a fit moves a source from its maximum by its limit at most */
+    /* a fit moves a source from its maximum by at most its limit */
     double margin =
         bst_deblend_reach(f) + 1.8 * l->longest_px + bst_deblend_fit_limit(f, 0.0) + 1.0;
     int first_column, last_column, first_row, last_row;
@@ -66,7 +67,7 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
                 other.y0 >= stamp->y0 + stamp->height || stamp->y0 >= other.y0 + other.height) {
                 continue;
             }
-            /* keep the brightest, in order of number */
+            /* keep the brightest neighbours, sorted by index */
             int at = count;
             while (at > 0 && near[at - 1] > k) {
                 at--;
@@ -83,7 +84,7 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
     }
     for (int n = 0; n < count; n++) {
         const bst_imgproc_source *s = &l->found[near[n]].source;
-        /* a centre just outside still has half its light inside */
+        /* a source just outside has half of its light inside */
         bool inside = s->shape.x_px >= stamp->x0 - 1.5 && s->shape.y_px >= stamp->y0 - 1.5 &&
                       s->shape.x_px <= stamp->x0 + stamp->width + 0.5 &&
                       s->shape.y_px <= stamp->y0 + stamp->height + 0.5;
@@ -118,7 +119,7 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
         .limit_px = bst_deblend_fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px))};
     bool ok = bst_fit_run(w->fit, &request);
     if (!ok && c.free_count > 1) {
-        /* the pixels do not determine a neighbour, as at the stamp's edge: it stays as it is */
+        /* The pixels do not constrain a neighbour, e.g. at the stamp's edge: it stays fixed. */
         for (int k = 1; k < c.free_count && request.fixed_count < BST_COMPANY_MAX_FIXED; k++) {
             c.fixed[request.fixed_count++] = c.free[k];
         }
@@ -148,7 +149,7 @@ void bst_deblend_drop_doubles(bst_imgproc_locator *l, const bst_locate_frame *f,
             int cell = (y0 + c / (x1 - x0 + 1)) * l->columns + x0 + c % (x1 - x0 + 1);
             for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
                 const bst_imgproc_shape *b = &l->found[k].source.shape;
-                /* numbers are by brightness: the fainter goes */
+                /* indices are by brightness: drop the fainter one */
                 if (k < i && !l->found[k].dropped &&
                     bst_cosmic_ray_label(l->found[k].label) ==
                         bst_cosmic_ray_label(l->found[i].label) &&

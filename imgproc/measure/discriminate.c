@@ -11,42 +11,45 @@
 
 enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
 
-static const double EXPECTED_OBJECTS = 10.0; /* in a frame that nothing is known of */
-static const double PLACE_SIGMA_PX = 0.15;   /* of a place from one frame to another, besides its
-                                                covariance: attitude, distortion, pixels */
+static const double EXPECTED_OBJECTS = 10.0; /* expected in a frame without earlier ones */
+/* 1 sigma position error between frames besides the covariance: attitude, distortion, pixels */
+static const double PLACE_SIGMA_PX = 0.15;
 static const double SAME_SIGMAS = 4.0;
 static const double SAME_MAG = 0.75;
 static const double MAX_GATE_PX = 3.0;
-static const double STREAK_PX = 3.0;  /* stars that move further are told from points */
-static const double LONG_SHARE = 3.0; /* length over width that no pair of points has */
-/* Odds of 200: of light at rest in the frame at most one in two hundred is ever taken for a hot
- * pixel. */
+/* star streaks longer than this are distinguished from points */
+static const double STREAK_PX = 3.0;
+static const double LONG_SHARE = 3.0; /* length-to-width ratio that no blend of two points has */
+/* Log-odds threshold of a suspected pixel (odds 200). At most one in two hundred sources at rest in
+ * the frame is ever labelled as a hot pixel. */
 static const double SUSPICIOUS = 5.3;
-static const double FAINT_SNR = 8.0; /* below, a hot pixel may look like light */
+static const double FAINT_SNR = 8.0; /* below this SNR a hot pixel can look like light */
 static const double STAR_REDETECTED = 0.6;
 
-/* A source of earlier frames. */
-typedef struct remembered {
+/* A source of earlier frames, by its direction on the sky. */
+typedef struct earlier_source {
     bst_vec3 first, latest;       /* apparent directions */
     double first_var, latest_var; /* rad^2 per axis */
     double v_mag;
     int seen, missed; /* frames */
     bool moved;
-    bool fresh; /* new where an earlier frame had looked, and not yet judged by the next frame */
+    /* first seen in a region that an earlier frame had covered; not yet confirmed or refuted */
+    bool fresh;
     bool blend;
-    /* in the present frame */
+    /* in the current frame */
     double x_px, y_px;
     bool inside, taken;
-    int next; /* in the band of its row */
-} remembered;
+    int next; /* next in the row band's list */
+} earlier_source;
 
-/* Charge of earlier frames at a pixel. */
+/* Charge of earlier frames at a sensor pixel. */
 typedef struct charged {
     int64_t pixel;
     int seen, missed;
 } charged;
 
-/* Of new sources of one brightness: how many were judged by the next frame, how many stayed. */
+/* Statistics of new sources by brightness: how many the next frame tested, how many stayed at rest.
+ */
 typedef struct outcome {
     double judged, stayed;
 } outcome;
@@ -54,17 +57,17 @@ typedef struct outcome {
 struct bst_imgproc_discriminator {
     bst_camera camera;
     int capacity, room;
-    remembered *sources; /* [room] */
+    earlier_source *sources; /* [room] sources of earlier frames */
     int count;
-    charged *charge, *merged; /* [room], by pixel */
+    charged *charge, *merged; /* [room], ascending in pixel */
     int charge_count;
     int *keys_order;
-    int *again; /* [capacity]: number of the remembered source that a detection is, -1: none */
+    int *again; /* [capacity]: earlier source that a detection matches, -1: none */
     int64_t *keys;
     int *band;
     int bands;
-    outcome outcomes[2][MAG_BINS]; /* alone, blended */
-    /* of the latest oriented frame, and of the latest frame at all */
+    outcome outcomes[2][MAG_BINS]; /* [isolated, blended] */
+    /* of the latest frame with attitude, and of the latest frame */
     bool covered, charge_covered;
     bst_quat q_cam_from_gcrf;
     bst_window window, charge_window;
@@ -112,18 +115,21 @@ void bst_imgproc_discriminator_free(bst_imgproc_discriminator *d) {
     free(d);
 }
 
-static void say(bst_detection *d, bst_label label, double probability) {
+/* Sets a detection's label and its probability, clamped to 0 to 1. */
+static void set_label(bst_detection *d, bst_label label, double probability) {
     d->label = (int32_t)label;
     d->label_probability = fmin(fmax(probability, 0.0), 1.0);
 }
 
+/* True if a pixel position lies in a window, at least `margin` from its edges. */
 static bool in_window(const bst_window *w, double x, double y, double margin) {
     return x >= w->x0 + margin && y >= w->y0 + margin && x <= w->x0 + w->width - 1 - margin &&
            y <= w->y0 + w->height - 1 - margin;
 }
 
-/* ---- charge: the same pixel again, or not ---- */
+/* ---- Hot pixels and cosmic rays: charge at the same sensor pixel as before ---- */
 
+/* Sensor pixel of a detection. */
 static int64_t pixel_of(const bst_imgproc_discriminator *d, const bst_detection *item) {
     return (int64_t)llround(item->y_px) * d->camera.width_px + (int64_t)llround(item->x_px);
 }
@@ -133,8 +139,8 @@ static bool key_less(const void *context, int a, int b) {
     return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
 }
 
-/* In how many frames a pixel held charge. */
-static int times_charged(const bst_imgproc_discriminator *d, int64_t pixel) {
+/* Number of earlier frames in which a pixel held charge. */
+static int earlier_charge_count(const bst_imgproc_discriminator *d, int64_t pixel) {
     int lo = 0, hi = d->charge_count;
     while (lo < hi) {
         int mid = lo + (hi - lo) / 2;
@@ -147,41 +153,44 @@ static int times_charged(const bst_imgproc_discriminator *d, int64_t pixel) {
     return lo < d->charge_count && d->charge[lo].pixel == pixel ? d->charge[lo].seen : 0;
 }
 
-/* Log-odds that a maximum is that of a pixel that learning suspects. */
-static double suspicion(const bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
-                        const bst_detection *item) {
+/* Log-odds that a detection is caused by a pixel under suspicion of the bad-pixel learner. */
+static double bad_pixel_log_odds(const bst_imgproc_discriminator *d,
+                                 const bst_imgproc_frame_knowledge *f, const bst_detection *item) {
     return f->learned
                ? bst_pixel_learner_suspicion(f->learned, f->left_out, (int32_t)pixel_of(d, item))
                : 0.0;
 }
 
-static void label_charge(const bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
-                         bst_detection *item) {
+/* Labels charge as hot pixel (again at the same sensor pixel) or cosmic ray (pixel covered before
+ * without charge). */
+static void label_hot_pixel_or_cosmic_ray(const bst_imgproc_discriminator *d,
+                                          const bst_imgproc_frame_knowledge *f,
+                                          bst_detection *item) {
     int64_t pixel = pixel_of(d, item);
-    bool again = times_charged(d, pixel) > 0 || suspicion(d, f, item) >= SUSPICIOUS;
+    bool again = earlier_charge_count(d, pixel) > 0 || bad_pixel_log_odds(d, f, item) >= SUSPICIOUS;
     if (item->label == BST_LABEL_HIT && !again) {
-        /* the centroid of several pixels may round to another */
+        /* the centroid of several charged pixels may round to a neighbour */
         const int64_t row = d->camera.width_px;
-        again = times_charged(d, pixel - 1) + times_charged(d, pixel + 1) +
-                    times_charged(d, pixel - row) + times_charged(d, pixel + row) >
+        again = earlier_charge_count(d, pixel - 1) + earlier_charge_count(d, pixel + 1) +
+                    earlier_charge_count(d, pixel - row) + earlier_charge_count(d, pixel + row) >
                 0;
     }
     bool looked = d->charge_covered && in_window(&d->charge_window, item->x_px, item->y_px, 0.0);
-    double charge = item->label_probability; /* that it is no light */
+    double charge = item->label_probability; /* probability that it is charge, not light */
     if (again) {
-        say(item, BST_LABEL_HOT_PIXEL, 0.99 * charge);
+        set_label(item, BST_LABEL_HOT_PIXEL, 0.99 * charge);
     } else if (looked) {
-        say(item, BST_LABEL_HIT, 0.95 * charge);
+        set_label(item, BST_LABEL_HIT, 0.95 * charge);
     } else if (item->label == BST_LABEL_HIT) {
-        say(item, BST_LABEL_HIT, 0.8 * charge);
+        set_label(item, BST_LABEL_HIT, 0.8 * charge);
     } else {
-        say(item, BST_LABEL_HOT_PIXEL, 0.5 * charge);
+        set_label(item, BST_LABEL_HOT_PIXEL, 0.5 * charge);
     }
 }
 
-/* Merges the frame's charge into the memory; both are in order of pixel. */
-static void remember_charge(bst_imgproc_discriminator *d, const bst_window *window,
-                            const bst_detections *out) {
+/* Merges the frame's charge into the list of earlier charge; both are ascending in pixel. */
+static void store_charge(bst_imgproc_discriminator *d, const bst_window *window,
+                         const bst_detections *out) {
     int fresh = 0;
     for (int i = 0; i < out->count && fresh < d->capacity; i++) {
         if (bst_cosmic_ray_label(out->items[i].label)) {
@@ -220,20 +229,22 @@ static void remember_charge(bst_imgproc_discriminator *d, const bst_window *wind
     d->charge_window = *window;
 }
 
-/* ---- sources: the same place of the sky again, or not ---- */
+/* ---- Sources: at the same position of the sky as before ---- */
 
+/* Projects a GCRF direction to the sensor; false if it is out of view. */
 static bool project(const bst_imgproc_discriminator *d, bst_quat q, bst_vec3 direction, double *x,
                     double *y) {
     return bst_camera_project(&d->camera, bst_quat_rotate(q, direction), x, y);
 }
 
-/* Puts what is remembered on this frame. */
-static void place_memory(bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f) {
+/* Projects the earlier sources into this frame and indexes them by row bands. */
+static void project_earlier_sources(bst_imgproc_discriminator *d,
+                                    const bst_imgproc_frame_knowledge *f) {
     for (int i = 0; i < d->bands; i++) {
         d->band[i] = -1;
     }
     for (int i = d->count - 1; i >= 0; i--) {
-        remembered *r = &d->sources[i];
+        earlier_source *r = &d->sources[i];
         r->taken = false;
         r->inside = project(d, f->q_cam_from_gcrf, r->latest, &r->x_px, &r->y_px) &&
                     in_window(&f->window, r->x_px, r->y_px, 0.0);
@@ -245,26 +256,28 @@ static void place_memory(bst_imgproc_discriminator *d, const bst_imgproc_frame_k
     }
 }
 
-static double place_variance(const bst_detection *item) {
+/* Position variance of a detection between frames, px^2. */
+static double position_variance(const bst_detection *item) {
     return fmax(item->cov_xx, item->cov_yy) + PLACE_SIGMA_PX * PLACE_SIGMA_PX;
 }
 
+/* Standard error of a detection's magnitude, at most 1. */
 static double mag_sigma(const bst_detection *item) {
     return fmin(bst_photometry_noise_mag(item), 1.0);
 }
 
-/* Number of the nearest remembered source of like brightness; -1: none. */
-static int recall(bst_imgproc_discriminator *d, const bst_detection *item) {
+/* Index of the nearest earlier source of similar brightness; -1: none. */
+static int match_earlier_source(bst_imgproc_discriminator *d, const bst_detection *item) {
     double scale = bst_camera_scale_rad(&d->camera), closest = 1.0;
     int best = -1;
     int band = (int)(item->y_px / BAND);
     for (int b = band - 1; b <= band + 1; b++) {
         for (int i = b >= 0 && b < d->bands ? d->band[b] : -1; i >= 0; i = d->sources[i].next) {
-            remembered *r = &d->sources[i];
+            earlier_source *r = &d->sources[i];
             if (r->taken || fabs(r->v_mag - item->v_mag) > SAME_MAG + 3.0 * mag_sigma(item)) {
                 continue;
             }
-            double variance = place_variance(item) + r->latest_var / (scale * scale);
+            double variance = position_variance(item) + r->latest_var / (scale * scale);
             double gate = fmin(SAME_SIGMAS * sqrt(variance), MAX_GATE_PX);
             double distance = hypot(item->x_px - r->x_px, item->y_px - r->y_px) / gate;
             if (distance < closest) {
@@ -276,20 +289,22 @@ static int recall(bst_imgproc_discriminator *d, const bst_detection *item) {
     return best;
 }
 
-static outcome *outcome_of(bst_imgproc_discriminator *d, double v_mag, bool blend) {
+/* Statistics bin of new sources of a magnitude. */
+static outcome *statistics_of(bst_imgproc_discriminator *d, double v_mag, bool blend) {
     int bin = (int)floor(2.0 * (v_mag + 5.0));
     return &d->outcomes[blend][bin < 0 ? 0 : bin >= MAG_BINS ? MAG_BINS - 1 : bin];
 }
 
+/* True if a detection is light of a source: neither charge nor an artefact. */
 static bool is_source(const bst_detection *item) {
     return !bst_cosmic_ray_label(item->label) && item->label != BST_LABEL_ARTEFACT;
 }
 
-/* Notes that an earlier source was seen again. */
-static void note_again(bst_imgproc_discriminator *d, const bst_detection *item, bst_vec3 direction,
-                       remembered *r) {
+/* Updates an earlier source that was detected again; tests if it has moved. */
+static void update_earlier_source(bst_imgproc_discriminator *d, const bst_detection *item,
+                                  bst_vec3 direction, earlier_source *r) {
     double scale = bst_camera_scale_rad(&d->camera);
-    double variance = place_variance(item) * scale * scale;
+    double variance = position_variance(item) * scale * scale;
     double away = bst_vec3_angle(direction, r->first);
     r->moved = r->moved || away * away > SAME_SIGMAS * SAME_SIGMAS * (variance + r->first_var);
     r->taken = true;
@@ -299,26 +314,29 @@ static void note_again(bst_imgproc_discriminator *d, const bst_detection *item, 
     r->latest_var = variance;
 }
 
+/* GCRF direction of a detection. */
 static bst_vec3 direction_of(const bst_imgproc_discriminator *d,
                              const bst_imgproc_frame_knowledge *f, const bst_detection *item) {
     return bst_quat_rotate(bst_quat_conj(f->q_cam_from_gcrf),
                            bst_camera_unproject(&d->camera, item->x_px, item->y_px));
 }
 
-/* Finds the sources that were there before, and judges what was new in the frame before. */
-static void look_back(bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
-                      const bst_detections *out) {
+/* Matches detections to earlier sources, and updates the statistics of sources that were new in the
+ * frame before. */
+static void match_to_earlier_frames(bst_imgproc_discriminator *d,
+                                    const bst_imgproc_frame_knowledge *f,
+                                    const bst_detections *out) {
     for (int i = 0; i < out->count && i < d->capacity; i++) {
-        d->again[i] = is_source(&out->items[i]) ? recall(d, &out->items[i]) : -1;
+        d->again[i] = is_source(&out->items[i]) ? match_earlier_source(d, &out->items[i]) : -1;
         if (d->again[i] >= 0) {
-            note_again(d, &out->items[i], direction_of(d, f, &out->items[i]),
-                       &d->sources[d->again[i]]);
+            update_earlier_source(d, &out->items[i], direction_of(d, f, &out->items[i]),
+                                  &d->sources[d->again[i]]);
         }
     }
     for (int i = 0; i < d->count; i++) {
-        remembered *r = &d->sources[i];
+        earlier_source *r = &d->sources[i];
         if (r->fresh && r->inside) {
-            outcome *t = outcome_of(d, r->v_mag, r->blend);
+            outcome *t = statistics_of(d, r->v_mag, r->blend);
             t->judged += 1.0;
             t->stayed += r->taken && !r->moved ? 1.0 : 0.0;
             r->fresh = false;
@@ -326,30 +344,31 @@ static void look_back(bst_imgproc_discriminator *d, const bst_imgproc_frame_know
     }
 }
 
-static void remember(bst_imgproc_discriminator *d, const bst_detection *item, bst_vec3 direction,
-                     bool fresh) {
+/* Stores a detection as a source for later frames. */
+static void store_source(bst_imgproc_discriminator *d, const bst_detection *item,
+                         bst_vec3 direction, bool fresh) {
     if (d->count >= d->room) {
         return;
     }
     double scale = bst_camera_scale_rad(&d->camera);
-    double variance = place_variance(item) * scale * scale;
-    d->sources[d->count++] = (remembered){.first = direction,
-                                          .latest = direction,
-                                          .first_var = variance,
-                                          .latest_var = variance,
-                                          .v_mag = item->v_mag,
-                                          .seen = 1,
-                                          .fresh = fresh,
-                                          .blend = (item->flags & BST_DETECTION_BLEND) != 0,
-                                          .taken = true,
-                                          .next = -1};
+    double variance = position_variance(item) * scale * scale;
+    d->sources[d->count++] = (earlier_source){.first = direction,
+                                              .latest = direction,
+                                              .first_var = variance,
+                                              .latest_var = variance,
+                                              .v_mag = item->v_mag,
+                                              .seen = 1,
+                                              .fresh = fresh,
+                                              .blend = (item->flags & BST_DETECTION_BLEND) != 0,
+                                              .taken = true,
+                                              .next = -1};
 }
 
-/* Forgets what was not seen for long, or is far from what is looked at. */
-static void forget(bst_imgproc_discriminator *d) {
+/* Removes sources not detected for long or far from the current field of view. */
+static void remove_old_sources(bst_imgproc_discriminator *d) {
     int kept = 0;
     for (int i = 0; i < d->count; i++) {
-        remembered *r = &d->sources[i];
+        earlier_source *r = &d->sources[i];
         r->missed += !r->taken;
         if (r->missed <= KEEP_MISSED) {
             d->sources[kept++] = *r;
@@ -358,17 +377,17 @@ static void forget(bst_imgproc_discriminator *d) {
     d->count = kept;
 }
 
-/* The probability that a source which no earlier frame had there is a star all the same. */
+/* Probability that a source without an earlier match is a star. */
 static double new_star_probability(bst_imgproc_discriminator *d, const bst_detection *item) {
-    const outcome *t = outcome_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
-    /* two that moved are believed in beforehand */
+    const outcome *t = statistics_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
+    /* prior of two tested sources that moved */
     double stayed = t->stayed / (t->judged + 2.0);
     return fmin(stayed / STAR_REDETECTED, 0.98);
 }
 
-/* ---- the frame ---- */
+/* ---- Labels of a frame ---- */
 
-/* Numbers of the detections that lie where moving tracks are expected get label OBJECT. */
+/* Labels the detections at predicted positions of moving tracks as OBJECT. */
 static void label_predicted(const bst_imgproc_discriminator *d,
                             const bst_imgproc_frame_knowledge *f, bst_detections *out) {
     double scale = bst_camera_scale_rad(&d->camera);
@@ -389,23 +408,24 @@ static void label_predicted(const bst_imgproc_discriminator *d,
             }
         }
         if (best >= 0) {
-            say(&out->items[best], BST_LABEL_OBJECT, 0.98);
+            set_label(&out->items[best], BST_LABEL_OBJECT, 0.98);
         }
     }
 }
 
-/* Drawn further than stars that lie close together in a frame of points. */
+/* True if a source is longer than close pairs of stars in a frame of point-like stars. */
 static bool is_long_streak(const bst_detection *item) {
     return (item->flags & BST_DETECTION_STREAK) && !(item->flags & BST_DETECTION_BLEND) &&
            item->length_px > LONG_SHARE * item->width_px;
 }
 
+/* Labels a source by the rules in discriminate.h. */
 static void label_source(bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
                          double unlisted, int again, bst_detection *item) {
     bool open = item->label == BST_LABEL_UNKNOWN;
     double star = 0.0;
     if (again >= 0) {
-        const remembered *r = &d->sources[again];
+        const earlier_source *r = &d->sources[again];
         star = r->moved ? 0.05 : 1.0 - 0.1 / r->seen;
     } else {
         bst_vec3 direction = direction_of(d, f, item);
@@ -414,22 +434,22 @@ static void label_source(bst_imgproc_discriminator *d, const bst_imgproc_frame_k
                       in_window(&d->window, x, y, MAX_GATE_PX);
         star = looked ? new_star_probability(d, item)
                       : 1.0 - fmin(EXPECTED_OBJECTS / (EXPECTED_OBJECTS + unlisted), 0.9);
-        remember(d, item, direction, looked);
+        store_source(d, item, direction, looked);
     }
     if (!open) {
         return;
     }
     if (item->flags & BST_DETECTION_EDGE) {
-        say(item, BST_LABEL_ARTEFACT, 0.9);
+        set_label(item, BST_LABEL_ARTEFACT, 0.9);
     } else if (f->streak_px >= STREAK_PX) {
         bool drawn = (item->flags & BST_DETECTION_STREAK) != 0;
-        say(item, drawn ? BST_LABEL_STAR : BST_LABEL_OBJECT, drawn ? 0.9 : 0.95);
+        set_label(item, drawn ? BST_LABEL_STAR : BST_LABEL_OBJECT, drawn ? 0.9 : 0.95);
     } else if ((again < 0 || d->sources[again].moved) && is_long_streak(item)) {
-        say(item, BST_LABEL_OBJECT, 0.95);
+        set_label(item, BST_LABEL_OBJECT, 0.95);
     } else if (star > 0.5) {
-        say(item, BST_LABEL_STAR, star);
+        set_label(item, BST_LABEL_STAR, star);
     } else {
-        say(item, BST_LABEL_OBJECT, 1.0 - star);
+        set_label(item, BST_LABEL_OBJECT, 1.0 - star);
     }
 }
 
@@ -438,36 +458,36 @@ void bst_imgproc_discriminator_label(bst_imgproc_discriminator *d,
     double unlisted = 0.0;
     for (int i = 0; i < out->count; i++) {
         bst_detection *item = &out->items[i];
-        double odds = item->label == BST_LABEL_UNKNOWN ? suspicion(d, f, item) : 0.0;
+        double odds = item->label == BST_LABEL_UNKNOWN ? bad_pixel_log_odds(d, f, item) : 0.0;
         if (bst_cosmic_ray_label(item->label)) {
-            label_charge(d, f, item);
+            label_hot_pixel_or_cosmic_ray(d, f, item);
         } else if (odds >= SUSPICIOUS) {
-            say(item, BST_LABEL_HOT_PIXEL, 1.0 - exp(-odds));
+            set_label(item, BST_LABEL_HOT_PIXEL, 1.0 - exp(-odds));
         } else if (item->label == BST_LABEL_UNKNOWN && item->snr < FAINT_SNR &&
-                   times_charged(d, pixel_of(d, item)) > 1) {
-            say(item, BST_LABEL_HOT_PIXEL, 0.8);
+                   earlier_charge_count(d, pixel_of(d, item)) > 1) {
+            set_label(item, BST_LABEL_HOT_PIXEL, 0.8);
         }
         unlisted += item->label == BST_LABEL_UNKNOWN;
     }
-    remember_charge(d, &f->window, out);
+    store_charge(d, &f->window, out);
     for (int i = 0; i < out->count && !f->oriented; i++) {
         bst_detection *item = &out->items[i];
         if (item->label == BST_LABEL_UNKNOWN && (item->flags & BST_DETECTION_EDGE)) {
-            say(item, BST_LABEL_ARTEFACT, 0.9);
+            set_label(item, BST_LABEL_ARTEFACT, 0.9);
         }
     }
     if (!f->oriented) {
         return;
     }
     label_predicted(d, f, out);
-    place_memory(d, f);
-    look_back(d, f, out);
+    project_earlier_sources(d, f);
+    match_to_earlier_frames(d, f, out);
     for (int i = 0; i < out->count && i < d->capacity; i++) {
         if (is_source(&out->items[i])) {
             label_source(d, f, unlisted, d->again[i], &out->items[i]);
         }
     }
-    forget(d);
+    remove_old_sources(d);
     d->covered = true;
     d->q_cam_from_gcrf = f->q_cam_from_gcrf;
     d->window = f->window;

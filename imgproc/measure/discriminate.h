@@ -1,5 +1,5 @@
-/* Says what each detection is, with a probability: from its shape, from the catalogue, and from
- * what earlier frames showed at the same place of the sky and of the sensor. */
+/* Classification of detections with a probability: by shape, catalogue, and earlier frames at the
+ * same position of the sky and of the sensor. */
 #ifndef BST_IMGPROC_MEASURE_DISCRIMINATE_H
 #define BST_IMGPROC_MEASURE_DISCRIMINATE_H
 
@@ -7,23 +7,24 @@
 #include "boresight/messages.h"
 #include "sim/astro/bodies.h"
 
-/* One frame, as far as it is known. */
+/* What is known of a frame before its detections are labelled. */
 typedef struct bst_imgproc_frame_knowledge {
-    bool oriented;            /* stars are identified: attitude is theirs */
+    bool oriented;            /* stars are identified and set the attitude */
     bst_quat q_cam_from_gcrf; /* mid-exposure */
     bst_light light;
     bst_window window;
-    double streak_px;                        /* of the stars; below streak_min_px: 0 */
+    double streak_px;                        /* of the stars; 0 if below streak_min_px */
     const bst_predictions *predictions;      /* moving tracks; NULL: none */
-    double predictions_age_s;                /* from their tick to mid-exposure */
-    const struct bst_pixel_learner *learned; /* bad pixels; NULL: none */
-    const struct bst_pixel_map *left_out;    /* with `learned`: of this frame */
+    double predictions_age_s;                /* from their epoch to mid-exposure */
+    const struct bst_pixel_learner *learned; /* bad-pixel learner; NULL: none */
+    const struct bst_pixel_map *left_out; /* with `learned`: bad-pixel map that masked this frame */
 } bst_imgproc_frame_knowledge;
 
-/* Memory of earlier frames. */
+/* Classifier of detections with its sources and charge of earlier frames. */
 typedef struct bst_imgproc_discriminator bst_imgproc_discriminator;
 
-/* For frames of up to `capacity` detections; `camera` is copied. BST_ERR_MEMORY. */
+/* Creates a discriminator for frames of up to `capacity` detections; `camera` is copied. Errors:
+ * BST_ERR_MEMORY. */
 bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
                                             bst_imgproc_discriminator **out) BST_MUST_CHECK;
 /* Frees a discriminator; NULL is allowed. */

@@ -9,9 +9,9 @@
 
 enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PARAMETERS + 3) / 2 };
 
-/* steps below this share of the standard deviation, and for neighbours, whose values are not kept:
- * what is left after such a step is a small part of it */
-/* of a pivot, as a share of its diagonal element */
+/* convergence: step below this share of the standard deviation, and a larger share for neighbours,
+ * whose results are not kept */
+/* least pivot of the Cholesky factorisation, relative to its diagonal element */
 static const double LEAST_PIVOT = 1e-11;
 static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
 
@@ -58,12 +58,13 @@ static int plane_of(const bst_imgproc_stamp *stamp) {
     return bst_simd_layout_round_up(stamp->width) * stamp->height;
 }
 
+/* True if a stamp fits into the work space. */
 static bool fits_in(const bst_fit *fit, const bst_imgproc_stamp *stamp) {
     return stamp->width > 0 && stamp->height > 0 && stamp->width <= fit->max_side &&
            stamp->height <= fit->max_side;
 }
 
-/* Renders a source into slot k of the work space. */
+/* Renders source k of the fit on the stamp into the work space. */
 static float *render(const bst_fit *fit, const bst_imgproc_stamp *stamp,
                      const bst_imgproc_source *source, int k) {
     float *m = fit->model + (size_t)k * 4 * (size_t)plane_of(stamp);
@@ -71,10 +72,11 @@ static float *render(const bst_fit *fit, const bst_imgproc_stamp *stamp,
     return m;
 }
 
-/* What the normal equations are summed from. */
+/* Image planes from which the normal equations are accumulated. */
 typedef struct terms {
     const float *value, *fixed, *valid;
-    const float *model[BST_FIT_MAX_FREE]; /* by x, by y and by variance follow at n, 2 n, 3 n */
+    /* derivatives by x, by y and by variance follow at n, 2 n, 3 n */
+    const float *model[BST_FIT_MAX_FREE];
     float flux[BST_FIT_MAX_FREE], widening[BST_FIT_MAX_FREE];
     int n;
     float noise2;
@@ -83,9 +85,10 @@ typedef struct terms {
 #define BST_SIMD_KERNELS "imgproc/measure/fit_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-/* Loads pixels and the fixed sources' light; returns the number of pixels that count. */
-static int load(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
-                const bst_imgproc_source *const *fixed, int fixed_count) {
+/* Loads the stamp's pixels and the light of the fixed sources; returns the number of usable pixels.
+ */
+static int load_stamp(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
+                      const bst_imgproc_source *const *fixed, int fixed_count) {
     int n = plane_of(stamp);
     memset(fit->fixed, 0, (size_t)n * sizeof(float));
     for (int s = 0; s < fixed_count; s++) {
@@ -96,16 +99,16 @@ static int load(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp 
     return BST_SIMD_PICK(load_pixels)(fit, data, stamp);
 }
 
-/* Normal equations. Parameters: x, y, flux of each source, then the product of flux and widening of
- * the first (only when it is alone). */
+/* Normal equations of the source fit. Parameters: x, y, flux of each source, then flux times
+ * widening of the first (only if it is fitted alone). */
 typedef struct equations {
     bool free_width;
     int parameters;
-    double a[BST_FIT_MAX_PARAMETERS][BST_FIT_MAX_PARAMETERS]; /* or its Cholesky factor */
-    double g[BST_FIT_MAX_PARAMETERS];                         /* the right side, or the step */
+    double a[BST_FIT_MAX_PARAMETERS][BST_FIT_MAX_PARAMETERS]; /* matrix or its Cholesky factor */
+    double g[BST_FIT_MAX_PARAMETERS];                         /* right-hand side or step */
 } equations;
 
-/* The equations at the current sources; returns chi-square. */
+/* Accumulates the normal equations at the current sources; returns chi-square. */
 static double accumulate(bst_fit *fit, const bst_fit_request *r, equations *e) {
     const bst_imgproc_stamp *stamp = r->stamp;
     const int count = r->free_count;
@@ -136,23 +139,25 @@ static double clamp(double v, double lo, double hi) {
     return v < lo ? lo : v > hi ? hi : v;
 }
 
+/* Cholesky factorisation of the normal matrix; false if it is not positive definite. */
 static bool factor(equations *e) {
     return bst_cholesky_factor(e->a[0], BST_FIT_MAX_PARAMETERS, e->parameters, LEAST_PIVOT);
 }
 
+/* Solves the normal equations with the Cholesky factor. */
 static void solve(const equations *e, double *x) {
     bst_cholesky_solve(e->a[0], BST_FIT_MAX_PARAMETERS, e->parameters, x);
 }
 
-/* The greatest correction that the PSF's variance may need. */
-static double widest(const bst_imgproc_source *s) {
+/* Limit of the PSF widening, px^2. */
+static double most_widening(const bst_imgproc_source *s) {
     return 0.6 * s->shape.sigma_px * s->shape.sigma_px;
 }
 
-/* Moves the sources by the step in e->g, no further than limit_px from their start; whether that
- * changed none by much. */
-static bool take_step(const bst_fit_request *r, const equations *e,
-                      const bst_imgproc_source *start) {
+/* Moves the sources by the step in e->g, at most limit_px from their start. Returns true if the
+ * step is below the convergence limit. */
+static bool apply_step(const bst_fit_request *r, const equations *e,
+                       const bst_imgproc_source *start) {
     const double limit_px = r->limit_px;
     bool settled = true;
     for (int s = 0; s < r->free_count; s++) {
@@ -162,7 +167,7 @@ static bool take_step(const bst_fit_request *r, const equations *e,
                          start[s].shape.x_px + limit_px);
         double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7), start[s].shape.y_px - limit_px,
                          start[s].shape.y_px + limit_px);
-        /* of the standard deviation that the diagonal gives, at least 1e-5 px */
+        /* share of the standard deviation from the diagonal, at least 1e-5 px */
         double share = s == 0 ? SETTLED : NEIGHBOUR_SETTLED;
         double slack_x = fmax(1e-5, share / e->a[3 * s][3 * s]);
         double slack_y = fmax(1e-5, share / e->a[3 * s + 1][3 * s + 1]);
@@ -176,17 +181,18 @@ static bool take_step(const bst_fit_request *r, const equations *e,
         f->flux_e = flux;
         if (s == 0 && e->free_width) {
             product += e->g[3 * r->free_count];
-            f->widening_px2 = clamp(product / flux, -widest(f), 3.0 * widest(f));
+            f->widening_px2 = clamp(product / flux, -most_widening(f), 3.0 * most_widening(f));
         }
     }
     return settled;
 }
 
-/* Gauss-Newton steps until they change little; leaves the factor of the matrix. False when the
+/* Gauss-Newton iterations until convergence; leaves the factorised matrix. Returns false if the
  * pixels do not determine the parameters. */
-static bool iterate(bst_fit *fit, const bst_fit_request *r, equations *e,
-                    const bst_imgproc_source *start, double *chi) {
-    /* a streak's ends tell of a shift only as far as the PSF reaches: it is found step by step */
+static bool gauss_newton(bst_fit *fit, const bst_fit_request *r, equations *e,
+                         const bst_imgproc_source *start, double *chi) {
+    /* a streak's ends constrain a shift only within the PSF's width, so that long streaks need more
+     * steps */
     double path = hypot(r->free[0]->shape.dx_px, r->free[0]->shape.dy_px);
     int iterations = MAX_ITERATIONS + (int)fmin(path, BST_PSF_MAX_SIDE);
     bool settled = false;
@@ -202,18 +208,18 @@ static bool iterate(bst_fit *fit, const bst_fit_request *r, equations *e,
         for (int k = 0; k < e->parameters; k++) {
             gain += gradient[k] * e->g[k];
         }
-        settled = take_step(r, e, start) && iteration > 0;
-        *chi -= settled ? gain : 0.0; /* what so small a step still brings */
+        settled = apply_step(r, e, start) && iteration > 0;
+        *chi -= settled ? gain : 0.0; /* predicted gain of the last small step */
     }
     if (settled) {
         return true;
     }
-    /* the covariance belongs to the place where the fit ended */
+    /* the covariance is that of the final position */
     *chi = accumulate(fit, r, e);
     return factor(e);
 }
 
-/* The first source's errors, from the inverse of the matrix. */
+/* Covariance of the first source, from the inverse of the normal matrix. */
 static void set_errors(const equations *e, bst_imgproc_source *out) {
     double column[3][BST_FIT_MAX_PARAMETERS];
     for (int c = 0; c < 3; c++) {
@@ -240,7 +246,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_request *r) {
     if (!fits_in(fit, r->stamp) || r->free_count < 1 || r->free_count > BST_FIT_MAX_FREE) {
         return false;
     }
-    int pixels = load(fit, r->data, r->stamp, r->fixed, r->fixed_count);
+    int pixels = load_stamp(fit, r->data, r->stamp, r->fixed, r->fixed_count);
     if (pixels < e.parameters + 1) {
         return false;
     }
@@ -249,7 +255,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_request *r) {
         start[s] = *r->free[s];
     }
     double chi = 0.0;
-    bool good = iterate(fit, r, &e, start, &chi);
+    bool good = gauss_newton(fit, r, &e, start, &chi);
     for (int s = 0; s < r->free_count; s++) {
         const bst_imgproc_source *f = r->free[s];
         good = good && isfinite(f->shape.x_px) && isfinite(f->shape.y_px) && isfinite(f->flux_e) &&
@@ -284,7 +290,7 @@ bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_s
                      const bst_imgproc_source *source, const bst_imgproc_source *const *fixed,
                      int fixed_count, double out[3]) {
     if (!fits_in(fit, stamp) ||
-        load(fit, data, stamp, fixed, fixed_count) < stamp->width * stamp->height) {
+        load_stamp(fit, data, stamp, fixed, fixed_count) < stamp->width * stamp->height) {
         return false;
     }
     const bst_imgproc_shape *s = &source->shape;
@@ -311,7 +317,7 @@ bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_s
     if (!(mxx > 0.0 && myy > 0.0 && m > 0.0)) {
         return false;
     }
-    /* a Gaussian under a Gaussian window: inverse covariances add */
+    /* for a Gaussian under a Gaussian window, inverse covariances add */
     double cxx = myy / m - ixx, cyy = mxx / m - iyy, cxy = -mxy / m - ixy;
     double c = cxx * cyy - cxy * cxy;
     if (!(cxx > 0.0 && cyy > 0.0 && c > 1e-6)) {

@@ -1,4 +1,4 @@
-/* Weighted least-squares fit of one source, with its close neighbours, to the pixels of a stamp. */
+/* Weighted least-squares fit of a source and its neighbours to the pixels of a stamp. */
 #ifndef BST_IMGPROC_MEASURE_FIT_H
 #define BST_IMGPROC_MEASURE_FIT_H
 
@@ -9,32 +9,32 @@
 
 enum { BST_FIT_MAX_FREE = 5, BST_FIT_MAX_PARAMETERS = 3 * BST_FIT_MAX_FREE + 1 };
 
-/* A source as the fit sees it; pixels of the frame. */
+/* Model of a source and its fit results, in frame pixels. */
 typedef struct bst_imgproc_source {
-    bst_imgproc_shape shape; /* centroid, path, sigma of the PSF */
+    bst_imgproc_shape shape; /* centroid, smear path, sigma of the PSF */
     double flux_e;
     double widening_px2; /* added to the PSF's variance, to first order */
-    /* results */
+    /* fit results */
     double cov_xx, cov_xy, cov_yy, flux_variance, widening_variance;
     double chi_square;
-    int pixels; /* that it was fitted to */
+    int pixels; /* number of fitted pixels */
     bool fitted;
 } bst_imgproc_source;
 
-/* Pixels and noise to fit to. */
+/* Image data of the fit. */
 typedef struct bst_fit_data {
     const float *signal; /* [height][width], electrons above background, see background.h */
     int width, height;
     double noise_e; /* of the background, at the source */
 } bst_fit_data;
 
-/* Work space; the planes are [height][width rounded up to lanes] of a stamp. */
+/* Work space of the fit; the planes are [height][width rounded up to lanes] of a stamp. */
 typedef struct bst_fit {
     const bst_imgproc_gauss *psf;
-    const bst_source_profiles *profiles; /* made for the sources' sigma before a fit */
+    const bst_source_profiles *profiles; /* set for the sources' sigma before a fit */
     int max_side;
     float *value, *fixed, *valid;
-    float *model; /* [BST_FIT_MAX_FREE][4]: share, by x, by y, by variance */
+    float *model; /* [BST_FIT_MAX_FREE][4]: share, and its derivatives by x, y and variance */
     float *scratch;
 } bst_fit;
 
@@ -49,38 +49,40 @@ bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
 /* Frees the memory of a fit and clears the struct, which belongs to the caller. */
 void bst_fit_free(bst_fit *fit);
 
-/* The stamp that holds a source with `reach_px` around its path, cut to the frame; width or height
- * is 0 when it lies outside. */
+/* Stamp of a source: its path plus `reach_px` on every side, clipped to the frame. Width or height
+ * is 0 if it lies outside. */
 bst_imgproc_stamp bst_fit_stamp(const bst_imgproc_source *source, double reach_px, int max_side,
                                 int width, int height);
 
-/* What is to be fitted: x, y and flux of the `free` sources (the first is the one wanted, at most
- * BST_FIT_MAX_FREE) with the `fixed` ones taken off. */
+/* Request of a fit: x, y and flux of the `free` sources (the first is the result, at most
+ * BST_FIT_MAX_FREE), with the light of the `fixed` ones subtracted. */
 typedef struct bst_fit_request {
     const bst_fit_data *data;
-    const bst_imgproc_stamp *stamp; /* the first source's pixels */
+    const bst_imgproc_stamp *stamp; /* pixels of the first source */
     bst_imgproc_source *const *free;
     int free_count;
     const bst_imgproc_source *const *fixed;
     int fixed_count;
-    bool free_width; /* also the first one's widening, where it is alone */
-    double limit_px; /* by which a centre may move at most */
+    bool free_width; /* also fits the first source's widening, if it is the only free one */
+    double limit_px; /* largest shift of a centre */
 } bst_fit_request;
 
-/* Gauss-Newton on sum (d - m)^2 / (noise^2 + m), the variance from the current model
- * (quasi-likelihood, equal to maximum likelihood to first order). Centres stay within limit_px of
- * where they start. The first source's covariance is the inverse of the Fisher matrix, its
- * neighbours' uncertainty included; saturated and bad pixels are left out. False and nothing
- * changed when the pixels do not determine the parameters. */
+/* Gauss-Newton fit of sources that minimises sum (d - m)^2 / (noise^2 + m). The variance is from
+ * the current model (quasi-likelihood, equal to maximum likelihood to first order).
+ *
+ * Centres stay within limit_px of their start. Saturated and bad pixels are excluded. The first
+ * source's covariance is the inverse Fisher matrix including its neighbours' uncertainty.
+ *
+ * Returned:  false, with the sources unchanged, if the pixels do not determine the parameters */
 bool bst_fit_run(bst_fit *fit, const bst_fit_request *request);
 
-/* sqrt(sum share^2) of the first source of the latest bst_fit_run on this stamp: its SNR is flux
- * times this over the background's noise. */
+/* sqrt(sum share^2) of the first source of the latest bst_fit_run on this stamp. SNR = flux * norm
+ * / background noise. */
 double bst_fit_norm(const bst_fit *fit, const bst_imgproc_stamp *stamp);
 
-/* Second moments (variance along x, covariance, variance along y) of the source in its stamp with
- * the fixed sources taken off, from moments under a Gaussian window of twice the model's
- * covariance. False when they are not those of a peak. */
+/* Second moments of a source in its stamp, px^2: variance along x, covariance, variance along y.
+ * The fixed sources are subtracted; the moments are weighted by a Gaussian of twice the model's
+ * covariance. Returns false if the moments are not those of a peak. */
 bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
                      const bst_imgproc_source *source, const bst_imgproc_source *const *fixed,
                      int fixed_count, double out[3]);

@@ -1,12 +1,13 @@
-/* In-place sort of indices that allocates nothing, unlike the C library's qsort. */
+/* Heapsort of indices: in place and without allocation, unlike the C library's qsort. */
 #ifndef BST_IMGPROC_MEASURE_HEAPSORT_H
 #define BST_IMGPROC_MEASURE_HEAPSORT_H
 
 #include <stdbool.h>
 
-/* True when index a comes before index b; a strict total order gives one result only. */
+/* Strict order of indices: true if a sorts before b. A total order makes the result unique. */
 typedef bool (*bst_imgproc_index_before)(const void *context, int a, int b);
 
+/* Moves the root of a heap down to its place. */
 static inline void bst_heapsort_sift(int *items, int root, int count,
                                      bst_imgproc_index_before before, const void *context) {
     int moved = items[root];
@@ -22,6 +23,7 @@ static inline void bst_heapsort_sift(int *items, int root, int count,
     items[root] = moved;
 }
 
+/* Sorts `count` indices. */
 static inline void bst_heapsort_indices(int *items, int count, bst_imgproc_index_before before,
                                         const void *context) {
     for (int i = count / 2 - 1; i >= 0; i--) {

@@ -10,17 +10,20 @@
 #include "imgproc/measure/source_moments.h"
 
 enum {
-    FIRST_GROUP = 32, /* the brightest, which are fitted before the others */
-    FITS_A_TIME = 16, /* of one thread; fewer are done before another thread wakes */
+    FIRST_GROUP = 32, /* brightest sources, fitted before the others */
+    /* fits per thread at least; a smaller group is done before another thread wakes */
+    FITS_A_TIME = 16,
     STARTS_A_TIME = 512
 };
 
-/* a neighbour that moved further from its maximum's top matters */
+/* a neighbour that moved further than this from its interpolated peak requires a new fit of the
+ * blend */
 static const double MOVED_PX = 0.1;
 
-static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
-/* a streak's filter output above this share of a point's, and a point's whose square is less than a
- * streak's by no more than the other two: both shapes are tried */
+/* the PSF widening is measured on sources above this SNR */
+static const double WIDTH_FIT_SNR = 20.0;
+/* Point and streak shape are both fitted if the streak's output is above this share of the point's,
+ * or the squared point output is within these limits below the squared streak output. */
 static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 
 bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
@@ -74,6 +77,7 @@ void bst_imgproc_locator_free(bst_imgproc_locator *l) {
     *l = (bst_imgproc_locator){0};
 }
 
+/* Sets a shape's path to the star streak at its position, from the camera motion. */
 static void set_star_path(const bst_locate_frame *f, bst_imgproc_shape *s) {
     bst_camera_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * s->x_px,
                              f->origin_y_px + f->binning * s->y_px, &s->dx_px, &s->dy_px);
@@ -84,9 +88,9 @@ static void set_star_path(const bst_locate_frame *f, bst_imgproc_shape *s) {
     s->bend_y_px /= f->binning;
 }
 
-/* A found one as a point or a streak at its maximum. */
-static bst_imgproc_source as_shape(const bst_locate_frame *f, const bst_imgproc_found *found,
-                                   bool streak) {
+/* Initial source at an interpolated peak: a point, or the local star streak. */
+static bst_imgproc_source initial_source(const bst_locate_frame *f, const bst_imgproc_found *found,
+                                         bool streak) {
     bst_imgproc_source s = {.flux_e = found->top_snr * found->noise_e / bst_locate_norm(f, streak),
                             .widening_px2 = found->source.widening_px2};
     s.shape = (bst_imgproc_shape){
@@ -97,8 +101,9 @@ static bst_imgproc_source as_shape(const bst_locate_frame *f, const bst_imgproc_
     return s;
 }
 
-/* Starts a source at its candidate: at the top of the filter's output, between the pixels. */
-static void start(const bst_locate_frame *f, const bst_candidate *c, bst_imgproc_found *out) {
+/* Initialises a located source at the interpolated peak of the matched filter. */
+static void start_at_peak(const bst_locate_frame *f, const bst_candidate *c,
+                          bst_imgproc_found *out) {
     *out = (bst_imgproc_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
     out->noise_e = bst_locate_noise_at(f, c->x, c->y);
     double dx, dy;
@@ -106,19 +111,20 @@ static void start(const bst_locate_frame *f, const bst_candidate *c, bst_imgproc
     out->top_x_px = c->x + dx;
     out->top_y_px = c->y + dy;
     out->streak = f->filter->streak && c->snr > bst_filter_point_at(f->filter, c->x, c->y);
-    out->source = as_shape(f, out, out->streak);
+    out->source = initial_source(f, out, out->streak);
 }
 
-static void note_length(bst_imgproc_locator *l, const bst_imgproc_shape *s) {
+/* Updates the longest source path of the frame. */
+static void update_longest_path(bst_imgproc_locator *l, const bst_imgproc_shape *s) {
     l->longest_px = fmax(l->longest_px, fmax(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px),
                                              0.5 * fabs(s->dy_px) + fabs(s->bend_y_px)));
 }
 
-/* Whether the filters leave the shape open. A fit's chi-square is less by the square of its
- * filter's output, so that the two outputs tell which of the shapes fits better, but for what they
- * are off between the pixels and what neighbours add. Most sources of a frame with streaks are
- * streaks: a point is always fitted as both. */
-static bool shape_is_open(const bst_locate_frame *f, const bst_imgproc_found *found) {
+/* True if the matched filters do not decide between point and streak shape. A fit lowers chi-square
+ * by the squared filter output, so the outputs rank the shapes. The ranking is uncertain by
+ * interpolation errors and by light of neighbours. In a frame with star streaks, a point is always
+ * fitted as both. */
+static bool is_shape_ambiguous(const bst_locate_frame *f, const bst_imgproc_found *found) {
     if (!f->filter->streak) {
         return false;
     }
@@ -144,8 +150,8 @@ static bool shape_is_open(const bst_locate_frame *f, const bst_imgproc_found *fo
     return point * point > best2 - CLEAR_CHI - CLEAR_SHARE * best2;
 }
 
-/* First fit: shape and place. */
-static void locate_one(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
+/* First fit of a source: shape and position. */
+static void fit_shape_and_position(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_imgproc_locator *l = w->l;
     const bst_locate_frame *f = w->f;
     if (found->bleed) {
@@ -155,8 +161,9 @@ static void locate_one(const bst_imgproc_worker *w, int i, bst_imgproc_found *fo
     double widening = l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
     found->source.widening_px2 = widening;
     bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
-    if (shape_is_open(f, found)) {
-        bst_imgproc_source point = as_shape(f, found, false), streak = as_shape(f, found, true);
+    if (is_shape_ambiguous(f, found)) {
+        bst_imgproc_source point = initial_source(f, found, false),
+                           streak = initial_source(f, found, true);
         bst_imgproc_stamp stamp = bst_deblend_stamp(l, f, &streak);
         found->source = streak;
         bool streak_ok = bst_deblend_fit(w, i, found, &stamp, false);
@@ -175,13 +182,13 @@ static void locate_one(const bst_imgproc_worker *w, int i, bst_imgproc_found *fo
     found->source.fitted = bst_deblend_fit(w, i, found, &stamp, bright);
 }
 
-/* What the fit of a bright source says of the PSF's width. */
-static void note_widening(bst_imgproc_locator *l, const bst_locate_frame *f,
-                          const bst_imgproc_found *found) {
+/* Adds a bright source's fitted width to the mean PSF widening of the frame. */
+static void add_widening(bst_imgproc_locator *l, const bst_locate_frame *f,
+                         const bst_imgproc_found *found) {
     bool measured = found->source.fitted && found->source.widening_variance > 0.0 && !found->bleed;
     double variance = f->sigma_px * f->sigma_px;
     if (measured && fabs(found->source.widening_px2) < 0.5 * variance) {
-        /* no single source counts for more than one that is good to 3 % */
+        /* the weight of a single source is limited to that of a 3 % measurement */
         double floor = 0.03 * variance;
         double weight = 1.0 / (found->source.widening_variance + floor * floor);
         l->widening_sum += weight * found->source.widening_px2;
@@ -189,8 +196,8 @@ static void note_widening(bst_imgproc_locator *l, const bst_locate_frame *f,
     }
 }
 
-/* Whether charge was taken off about a candidate: the filters answer to it besides its own place.
- */
+/* True if charge was masked near a candidate: the matched filter responds to such charge beside it
+ * too. */
 static bool is_charge_near(const bst_imgproc_locator *l, const bst_locate_frame *f,
                            const bst_imgproc_found *found) {
     bst_imgproc_source s = found->source;
@@ -201,21 +208,23 @@ static bool is_charge_near(const bst_imgproc_locator *l, const bst_locate_frame 
     return bst_cosmic_ray_in(l, f->width, &stamp);
 }
 
-/* A candidate whose fit failed keeps its maximum's place. */
-static void use_maximum(const bst_locate_frame *f, bst_imgproc_found *found) {
-    found->source = as_shape(f, found, found->streak);
+/* Falls back to the filter's peak for a source whose fit failed. */
+static void use_filter_peak(const bst_locate_frame *f, bst_imgproc_found *found) {
+    found->source = initial_source(f, found, found->streak);
     found->source.cov_xx = found->source.cov_yy = 1.0;
     found->source.cov_xy = 0.0;
     double sigma = found->noise_e / bst_locate_norm(f, found->streak);
     found->source.flux_variance = sigma * sigma + found->source.flux_e;
 }
 
+/* Half width and height of a source's light, px. */
 static void half_extent(const bst_locate_frame *f, const bst_imgproc_shape *s, double *half_x,
                         double *half_y) {
     *half_x = 0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + 2.0 * f->sigma_px;
     *half_y = 0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + 2.0 * f->sigma_px;
 }
 
+/* Flags a source whose light is cut by the frame's edge. */
 static void flag_edge(const bst_locate_frame *f, bst_imgproc_found *found) {
     const bst_imgproc_shape *s = &found->source.shape;
     double half_x, half_y;
@@ -226,14 +235,14 @@ static void flag_edge(const bst_locate_frame *f, bst_imgproc_found *found) {
     }
 }
 
-/* Flags and plausibility. The light of a source beyond the edge fits with any flux: a place outside
- * of the frame is that of the maximum instead. */
-static void judge(const bst_locate_frame *f, bst_imgproc_found *found) {
+/* Sets flags and label after the fit. Light beyond the edge fits with any flux, so a source fitted
+ * outside the frame falls back to the filter's peak and becomes an ARTEFACT. */
+static void set_flags(const bst_locate_frame *f, bst_imgproc_found *found) {
     const bst_imgproc_source *s = &found->source;
     bool outside = s->shape.x_px < -0.5 || s->shape.y_px < -0.5 || s->shape.x_px > f->width - 0.5 ||
                    s->shape.y_px > f->height - 0.5;
     if (outside) {
-        use_maximum(f, found);
+        use_filter_peak(f, found);
         found->snr = (double)found->peak_snr;
         found->flags |= BST_DETECTION_EDGE;
     }
@@ -255,7 +264,7 @@ static void judge(const bst_locate_frame *f, bst_imgproc_found *found) {
     }
 }
 
-/* A loop over the found ones from `first` on. */
+/* Parallel loop over the located sources from `first` on. */
 typedef struct loop {
     bst_imgproc_locator *l;
     const bst_locate_frame *f;
@@ -264,15 +273,17 @@ typedef struct loop {
     int first;
 } loop;
 
-static void start_some(void *user, int begin, int end) {
+/* Initialises sources begin to end - 1 at their filter peaks (loop body). */
+static void start_range(void *user, int begin, int end) {
     const loop *p = user;
     for (int i = begin; i < end; i++) {
-        start(p->f, &p->candidates->items[p->l->from[i]], &p->l->found[i]);
+        start_at_peak(p->f, &p->candidates->items[p->l->from[i]], &p->l->found[i]);
     }
 }
 
-/* Makes of each of `found` that is to be seen to what `next` becomes. */
-static void do_some(void *user, int begin, int end) {
+/* Applies `each` to the sources in a range and writes results to `next`; dropped sources and charge
+ * are skipped. */
+static void process_range(void *user, int begin, int end) {
     const loop *p = user;
     bst_imgproc_locator *l = p->l;
     int taken = bst_scratch_pool_take(&l->lent);
@@ -286,30 +297,33 @@ static void do_some(void *user, int begin, int end) {
     bst_scratch_pool_give(&l->lent, taken);
 }
 
-/* Numbers first to end all see one another, and the others, as they were before. */
-static void do_all(bst_imgproc_locator *l, const bst_locate_frame *f, int first, int end,
-                   void (*each)(const bst_imgproc_worker *, int, bst_imgproc_found *)) {
+/* Applies `each` to sources first to end - 1; all read the state before the loop, so the result
+ * does not depend on the order. */
+static void process_group(bst_imgproc_locator *l, const bst_locate_frame *f, int first, int end,
+                          void (*each)(const bst_imgproc_worker *, int, bst_imgproc_found *)) {
     loop p = {l, f, NULL, each, first};
-    bst_parallel_for(f->pool, end - first, FITS_A_TIME, do_some, &p);
+    bst_parallel_for(f->pool, end - first, FITS_A_TIME, process_range, &p);
     for (int i = first; i < end; i++) {
         l->found[i] = l->next[i];
-        note_length(l, &l->found[i].source.shape);
+        update_longest_path(l, &l->found[i].source.shape);
     }
 }
 
+/* First fit of a source unless it is charge only. */
 static void first_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     if (found->charge.pixels > 0 && bst_cosmic_ray_light(w->f, found) < BST_CHARGE_LIGHT_SNR) {
         bst_cosmic_ray_take(found);
         return;
     }
-    locate_one(w, i, found);
+    fit_shape_and_position(w, i, found);
     if (found->charge.pixels > 0 && bst_cosmic_ray_alone(found)) {
         bst_cosmic_ray_take(found);
     }
 }
 
-/* Places by the filter; charge hides some of its pixels from the filter. */
-static void place(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
+/* Locates a source at the filter's peak; one with charge is fitted, because the filter lacks its
+ * masked pixels. */
+static void locate_at_peak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     if (found->charge.pixels > 0) {
         first_fit(w, i, found);
     } else {
@@ -317,15 +331,15 @@ static void place(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) 
     }
 }
 
-/* The numbers that are fitted at a time end at powers of three times the first group. */
+/* End of the group of sources fitted concurrently: three times its begin. */
 static int group_end(int first) {
     return first < FIRST_GROUP ? FIRST_GROUP : 3 * first;
 }
 
-/* Whether number i was fitted before its neighbour had its place: with a neighbour that is gone
- * now, or held one where it is not any more. */
-static bool company_changed(const bst_imgproc_worker *w, int i, const bst_imgproc_found *found,
-                            const bst_imgproc_stamp *stamp) {
+/* True if a blended source was fitted with outdated neighbours: their number has changed or one has
+ * moved from its start position. */
+static bool neighbours_changed(const bst_imgproc_worker *w, int i, const bst_imgproc_found *found,
+                               const bst_imgproc_stamp *stamp) {
     bst_deblend c;
     bst_deblend_gather(w->l, w->f, i, &found->source, stamp, &c);
     int end = FIRST_GROUP;
@@ -343,17 +357,18 @@ static bool company_changed(const bst_imgproc_worker *w, int i, const bst_imgpro
     return changed;
 }
 
-/* Blends, now that every neighbour has its place. */
+/* Second fit of blended sources whose neighbours have moved since the first. */
 static void second_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     bst_imgproc_stamp stamp = bst_deblend_stamp(w->l, w->f, &found->source);
     if ((found->flags & BST_DETECTION_BLEND) && found->source.fitted &&
-        company_changed(w, i, found, &stamp)) {
+        neighbours_changed(w, i, found, &stamp)) {
         found->flags &= ~(unsigned)BST_DETECTION_BLEND;
         found->source.fitted = bst_deblend_fit(w, i, found, &stamp, false);
     }
 }
 
-static void finish(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
+/* Final SNR, flags and moments of a source. */
+static void finish_source(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_locate_frame *f = w->f;
     if (found->bleed) {
         bst_blooming_finish(f, found);
@@ -361,14 +376,14 @@ static void finish(const bst_imgproc_worker *w, int i, bst_imgproc_found *found)
         return;
     }
     if (!found->source.fitted) {
-        use_maximum(f, found);
+        use_filter_peak(f, found);
     }
     found->snr = found->source.flux_e * bst_locate_norm(f, found->streak) / found->noise_e;
     if (found->snr < BST_CHARGE_LIGHT_SNR && is_charge_near(w->l, f, found)) {
         found->dropped = true;
         return;
     }
-    judge(f, found);
+    set_flags(f, found);
     bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
     if (alone && !found->rough && !found->streak && found->label == BST_LABEL_UNKNOWN &&
         found->snr >= BST_EXTENT_SNR) {
@@ -382,7 +397,8 @@ static void finish(const bst_imgproc_worker *w, int i, bst_imgproc_found *found)
     }
 }
 
-static void set_laws(bst_imgproc_locator *l, const bst_locate_frame *f) {
+/* Sets the error laws of filter-peak positions for points and for the star streak. */
+static void set_peak_error_laws(bst_imgproc_locator *l, const bst_locate_frame *f) {
     bst_imgproc_worker w = {l, f, &l->fits[0]};
     bst_imgproc_shape shape = {
         .x_px = 0.5 * f->width, .y_px = 0.5 * f->height, .sigma_px = f->sigma_px};
@@ -393,15 +409,15 @@ static void set_laws(bst_imgproc_locator *l, const bst_locate_frame *f) {
     }
 }
 
-/* l->from: the brightest, of which `fits` by brightness and the others as they lie on the frame,
- * because what is near on the frame is near in memory. */
-static void choose(bst_imgproc_locator *l, const bst_candidates *candidates, int fits) {
+/* Selects the brightest candidates into l->from: `fits` of them in order of brightness, the others
+ * in order of row, because neighbours on the frame are then neighbours in memory. */
+static void select_brightest(bst_imgproc_locator *l, const bst_candidates *candidates, int fits) {
     const int *order = candidates->order;
     if (fits == l->count) {
         memcpy(l->from, order, (size_t)fits * sizeof *order);
         return;
     }
-    /* candidates are by row */
+    /* candidates are sorted by row */
     memset(l->chosen, 0, (size_t)candidates->count);
     for (int i = fits; i < l->count; i++) {
         l->chosen[order[i]] = 1;
@@ -426,33 +442,33 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
     l->longest_px = 0.0;
     int fits = l->max_fits > 0 && l->max_fits < l->count ? l->max_fits : l->count;
-    choose(l, candidates, fits);
+    select_brightest(l, candidates, fits);
     loop p = {l, f, candidates, NULL, 0};
-    bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_some, &p);
+    bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_range, &p);
     for (int i = 0; i < l->count; i++) {
-        note_length(l, &l->found[i].source.shape);
+        update_longest_path(l, &l->found[i].source.shape);
     }
     bst_deblend_index(l, f);
     double variance = f->sigma_px * f->sigma_px;
     l->widening_sum = 0.0;
-    l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
+    l->widening_weight = 1.0 / (0.0025 * variance * variance); /* prior: no widening, 1 sigma 5 % */
     bst_locate_prepare(l, f);
     bst_blooming_join(l, f);
     bst_cosmic_ray_remove(l, f);
     for (int first = 0, end; first < fits; first = end) {
         end = group_end(first) < fits ? group_end(first) : fits;
-        do_all(l, f, first, end, first_fit);
+        process_group(l, f, first, end, first_fit);
         for (int i = first; i < end; i++) {
-            note_widening(l, f, &l->found[i]);
+            add_widening(l, f, &l->found[i]);
         }
     }
     bst_deblend_drop_doubles(l, f, fits);
     if (fits < l->count) {
-        set_laws(l, f);
-        do_all(l, f, fits, l->count, place);
+        set_peak_error_laws(l, f);
+        process_group(l, f, fits, l->count, locate_at_peak);
     }
-    do_all(l, f, 0, fits, second_fit);
-    do_all(l, f, 0, l->count, finish);
+    process_group(l, f, 0, fits, second_fit);
+    process_group(l, f, 0, l->count, finish_source);
 }
 
 void bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) {
@@ -465,30 +481,31 @@ void bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) 
     found.flags = 0;
     first_fit(&w, i, &found);
     if (found.source.fitted) {
-        finish(&w, i, &found);
+        finish_source(&w, i, &found);
         l->found[i] = found;
     }
 }
 
-/* A found one that is not fitted. */
-static void keep_maximum(const bst_locate_frame *f, bst_imgproc_found *found) {
-    use_maximum(f, found);
+/* Keeps a source at the filter's peak without a fit. */
+static void keep_filter_peak(const bst_locate_frame *f, bst_imgproc_found *found) {
+    use_filter_peak(f, found);
     found->snr = (double)found->peak_snr;
     found->length_px = found->width_px = BST_FWHM_PER_SIGMA * f->sigma_px;
 }
 
+/* Initialises sources at their filter peaks without a fit (loop body). */
 static void start_roughly(void *user, int begin, int end) {
     const loop *p = user;
-    start_some(user, begin, end);
+    start_range(user, begin, end);
     for (int i = begin; i < end; i++) {
-        keep_maximum(p->f, &p->l->found[i]);
+        keep_filter_peak(p->f, &p->l->found[i]);
     }
 }
 
 void bst_locate_roughly(bst_imgproc_locator *l, const bst_locate_frame *f,
                         const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
-    choose(l, candidates, l->count);
+    select_brightest(l, candidates, l->count);
     loop p = {l, f, candidates, NULL, 0};
     bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_roughly, &p);
 }

@@ -4,8 +4,8 @@
 
 #include "imgproc/measure/cosmic_ray.h"
 
-/* Measured with boresight pd: what a quadratic through 3 x 3 outputs is off by the place in the
- * pixel, and what the filter's rounded path adds by its length, px and px per px. */
+/* Measured with boresight pd: position error of a quadratic through 3 x 3 outputs, px, and its
+ * increase per px of streak length by the rounding of the filter's path. */
 static const double FLOOR_PX = 0.012, FLOOR_SLOPE = 0.0013;
 
 bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
@@ -15,7 +15,7 @@ bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
     double s[3] = {0}, k[3] = {0}, square = 0.0, cube = 0.0;
     for (int place = 0; place < PLACES * PLACES; place++) {
         bst_imgproc_source source = {.shape = *shape};
-        /* the mean over the pixel, far from every edge */
+        /* average over positions within the pixel, far from the frame's edges */
         source.shape.x_px = 500.0 + (place % PLACES + 0.5) / PLACES;
         source.shape.y_px = 500.0 + (place / PLACES + 0.5) / PLACES;
         bst_imgproc_stamp stamp =
@@ -51,8 +51,9 @@ bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
     return law;
 }
 
-/* Whether a neighbour lies on the stamp, and whether a brighter one stands at the same place. */
-static void look_round(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
+/* Finds neighbours of a filter-peak source: flags it as a BLEND, and drops it if a brighter source
+ * was fitted at its position. */
+static void check_neighbours(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_imgproc_locator *l = w->l;
     const bst_imgproc_shape *s = &found->source.shape;
     double radius = 0.6 * BST_FWHM_PER_SIGMA * s->sigma_px, reach = bst_deblend_reach(w->f);
@@ -93,5 +94,5 @@ void bst_peak_centroid_place(const bst_imgproc_worker *w, int i, bst_imgproc_fou
     s->flux_variance = (noise2 + law->flux_photons * flux) / law->norm2;
     s->fitted = true;
     found->rough = true;
-    look_round(w, i, found);
+    check_neighbours(w, i, found);
 }

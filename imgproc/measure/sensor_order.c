@@ -2,11 +2,13 @@
 
 #include <string.h>
 
+/* Row of a source, clipped to the frame. */
 static int row_of(const bst_imgproc_found *found, int height) {
     double y = found->source.shape.y_px;
     return y > height - 1.0 ? height - 1 : y > 0.0 ? (int)y : 0;
 }
 
+/* Sort order of sources within a row: y, then x, then index. */
 static bool before_on_sensor(const bst_imgproc_found *found, int a, int b) {
     const bst_imgproc_shape *p = &found[a].source.shape, *q = &found[b].source.shape;
     if (p->y_px != q->y_px) {

@@ -16,7 +16,8 @@ static const neighbour neighbours[8] = {{-1, 0},  {1, 0}, {0, -1}, {0, 1},
 static const int first_of[BST_SHARP_GROUPS] = {0, 0, 2, 4, 6},
                  end_of[BST_SHARP_GROUPS] = {8, 2, 4, 6, 8};
 
-static double estimate(const bst_sharpness *s, int group, const double (*at)[3]) {
+/* Estimate of a pixel's signal from one group of its neighbours, by the PSF ratios. */
+static double estimate_from_neighbours(const bst_sharpness *s, int group, const double (*at)[3]) {
     double sum = 0.0;
     for (int k = first_of[group]; k < end_of[group]; k++) {
         const neighbour *n = &neighbours[k];
@@ -25,7 +26,7 @@ static double estimate(const bst_sharpness *s, int group, const double (*at)[3])
     return sum * s->inverse_square[group];
 }
 
-/* What the ratios are made from. */
+/* PSF from which the neighbour ratios are computed. */
 typedef struct source {
     const bst_imgproc_gauss *psf;
     const bst_known_psf *known;
@@ -33,8 +34,10 @@ typedef struct source {
     double sigma_px;
 } source;
 
-/* Shares of the nine pixels about one, of a source (x, y) off it; node: of a known PSF's field. */
-static void image_of(const source *from, int node, double x, double y, double image[3][3]) {
+/* PSF shares of the 3 x 3 pixels about a pixel, for a source offset by (x, y) from its centre;
+ * node: of a known PSF's field. */
+static void psf_on_nine_pixels(const source *from, int node, double x, double y,
+                               double image[3][3]) {
     if (!from->known) {
         double unused[3][9];
         bst_imgproc_stamp stamp = {-1, -1, 3, 3};
@@ -61,7 +64,7 @@ void bst_sharpness_set(bst_sharpness *s, const bst_imgproc_gauss *psf, const bst
     source from = {psf, known, binning, sigma_px};
     int nodes = known ? known->nodes : 0;
     s->sigma_px = sigma_px;
-    image_of(&from, nodes, 0.0, 0.0, image);
+    psf_on_nine_pixels(&from, nodes, 0.0, 0.0, image);
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < 3; i++) {
             s->ratio[j][i] = image[j][i] / image[1][1];
@@ -80,10 +83,10 @@ void bst_sharpness_set(bst_sharpness *s, const bst_imgproc_gauss *psf, const bst
         s->floor[g] = 1.0;
     }
     for (int p = 0; p < PHASES * PHASES * (nodes + 1); p++) {
-        image_of(&from, p / (PHASES * PHASES), (p % PHASES + 0.5) / PHASES - 0.5,
-                 (p / PHASES % PHASES + 0.5) / PHASES - 0.5, image);
+        psf_on_nine_pixels(&from, p / (PHASES * PHASES), (p % PHASES + 0.5) / PHASES - 0.5,
+                           (p / PHASES % PHASES + 0.5) / PHASES - 0.5, image);
         for (int g = 0; g < BST_SHARP_GROUPS; g++) {
-            double ratio = estimate(s, g, (const double(*)[3])image) / image[1][1];
+            double ratio = estimate_from_neighbours(s, g, (const double(*)[3])image) / image[1][1];
             s->floor[g] = fmin(s->floor[g], ratio);
         }
     }
@@ -91,7 +94,7 @@ void bst_sharpness_set(bst_sharpness *s, const bst_imgproc_gauss *psf, const bst
         const neighbour *n = &neighbours[first_of[g]];
         s->factor[g] = (float)(s->ratio[n->dy + 1][n->dx + 1] * s->inverse_square[g]);
         s->share[g] = (float)(s->inverse_square[0] / s->inverse_square[g]);
-        /* a little less than in double precision */
+        /* slightly below the double-precision limit */
         double noise = sqrt(s->floor[g] * s->floor[g] + s->inverse_square[g]);
         s->deviation[g] = (float)(0.999 * BST_SHARP_DEVIATION * noise);
     }
@@ -114,7 +117,7 @@ bool bst_sharpness_is_open(const bst_sharpness *s, const float *signal, int widt
     float all = (e1 * s->share[1] + e2 * s->share[2]) + (e3 * s->share[3] + e4 * s->share[4]);
     float f0 = (float)s->floor[0], f1 = (float)s->floor[1], f2 = (float)s->floor[2],
           f3 = (float)s->floor[3], f4 = (float)s->floor[4];
-    /* the light's own noise and the model's error would add to the deviations */
+    /* the source's shot noise and the model error would only add to the deviations */
     return (f0 * c - all > noise_e * s->deviation[0]) | (f1 * c - e1 > noise_e * s->deviation[1]) |
            (f2 * c - e2 > noise_e * s->deviation[2]) | (f3 * c - e3 > noise_e * s->deviation[3]) |
            (f4 * c - e4 > noise_e * s->deviation[4]);
@@ -129,15 +132,15 @@ bool bst_sharpness_is_telling(const bst_sharpness *s, float signal, float noise_
     return telling;
 }
 
-/* The pixel's signal and its neighbours'. */
-typedef struct surroundings {
+/* A pixel's signal and its eight neighbours'. */
+typedef struct neighbourhood {
     double centre, at[3][3];
     bool known[3][3];
-} surroundings;
+} neighbourhood;
 
-static surroundings look_around(const bst_sharpness *sharpness, const float *signal, int width,
-                                int height, int x, int y) {
-    surroundings s = {.centre = bst_sharpness_signal(sharpness, signal[(long)y * width + x])};
+static neighbourhood read_neighbourhood(const bst_sharpness *sharpness, const float *signal,
+                                        int width, int height, int x, int y) {
+    neighbourhood s = {.centre = bst_sharpness_signal(sharpness, signal[(long)y * width + x])};
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < 3; i++) {
             int u = x + i - 1, v = y + j - 1;
@@ -149,7 +152,8 @@ static surroundings look_around(const bst_sharpness *sharpness, const float *sig
     return s;
 }
 
-static bool is_whole(const surroundings *s, int group) {
+/* True if all neighbours of a group are measurements. */
+static bool is_whole(const neighbourhood *s, int group) {
     bool all = true;
     for (int k = first_of[group]; k < end_of[group]; k++) {
         all = all && s->known[neighbours[k].dy + 1][neighbours[k].dx + 1];
@@ -157,21 +161,22 @@ static bool is_whole(const surroundings *s, int group) {
     return all;
 }
 
-/* Standard deviation of the light that a group of neighbours misses, for a given signal. */
-static double deviation_of(const bst_sharpness *s, int g, double centre, double noise2) {
+/* Standard deviation of the light missing in a group of neighbours, for a given signal of the
+ * pixel. */
+static double sigma_of_group(const bst_sharpness *s, int g, double centre, double noise2) {
     double own = s->floor[g] * s->floor[g] * (noise2 + centre);
     double others = s->inverse_square[g] * noise2 + s->cube[g] * centre;
     double model = MODEL_SHARE * centre;
     return sqrt(own + others + model * model);
 }
 
-/* The greatest deviation of the groups; 0: none is short of light. */
-static double worst_of(const bst_sharpness *s, const surroundings *p, double noise_e) {
+/* Largest deviation of the groups; 0 if none lacks light. */
+static double largest_deviation(const bst_sharpness *s, const neighbourhood *p, double noise_e) {
     double worst = 0.0;
     for (int g = 0; g < BST_SHARP_GROUPS; g++) {
         if (is_whole(p, g)) {
-            double missing = s->floor[g] * p->centre - estimate(s, g, p->at);
-            worst = fmax(worst, missing / deviation_of(s, g, p->centre, noise_e * noise_e));
+            double missing = s->floor[g] * p->centre - estimate_from_neighbours(s, g, p->at);
+            worst = fmax(worst, missing / sigma_of_group(s, g, p->centre, noise_e * noise_e));
         }
     }
     return worst;
@@ -183,13 +188,13 @@ double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, 
         !(bst_sharpness_signal(s, signal[(long)y * width + x]) > 3.0 * noise_e)) {
         return 0.0;
     }
-    surroundings p = look_around(s, signal, width, height, x, y);
+    neighbourhood p = read_neighbourhood(s, signal, width, height, x, y);
     bool suspicious = false;
-    /* the group of all is a mean of the pairs: it is short only where one of them is */
+    /* the mean over all groups falls short only if one of the pairs does */
     for (int g = 1; g < BST_SHARP_GROUPS; g++) {
-        suspicious = suspicious || estimate(s, g, p.at) < s->floor[g] * p.centre;
+        suspicious = suspicious || estimate_from_neighbours(s, g, p.at) < s->floor[g] * p.centre;
     }
-    return suspicious ? worst_of(s, &p, noise_e) : 0.0;
+    return suspicious ? largest_deviation(s, &p, noise_e) : 0.0;
 }
 
 bst_sharpness_test bst_sharpness_compare(const bst_sharpness *s, const float *signal, int width,
@@ -199,21 +204,21 @@ bst_sharpness_test bst_sharpness_compare(const bst_sharpness *s, const float *si
         !(bst_sharpness_signal(s, signal[(long)y * width + x]) > 3.0 * noise_e)) {
         return out;
     }
-    surroundings p = look_around(s, signal, width, height, x, y);
+    neighbourhood p = read_neighbourhood(s, signal, width, height, x, y);
     double alone = 0.0;
     for (int g = 0; g < BST_SHARP_GROUPS; g++) {
         if (!is_whole(&p, g)) {
             continue;
         }
         double light = s->floor[g] * p.centre;
-        double deviation = deviation_of(s, g, p.centre, noise_e * noise_e);
+        double deviation = sigma_of_group(s, g, p.centre, noise_e * noise_e);
         alone = fmax(alone, light / deviation);
         if (g == 0) {
-            out.all = (float)((light - estimate(s, g, p.at)) / deviation);
+            out.all = (float)((light - estimate_from_neighbours(s, g, p.at)) / deviation);
             out.all_alone = (float)(light / deviation);
         }
     }
-    out.worst = (float)worst_of(s, &p, noise_e);
+    out.worst = (float)largest_deviation(s, &p, noise_e);
     out.worst_alone = (float)alone;
     return out;
 }

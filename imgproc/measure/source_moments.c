@@ -33,7 +33,7 @@ bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_
         bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
         double d[3];
         if (bst_fit_moments(w->fit, &data, &stamp, &found->source, others, count, d)) {
-            /* the pixel's own variance off */
+            /* subtract the pixel's own variance */
             d[0] = fmax(d[0] - 1.0 / 12.0, 0.01);
             d[2] = fmax(d[2] - 1.0 / 12.0, 0.01);
             if (d[0] * d[2] > d[1] * d[1]) {
@@ -52,10 +52,11 @@ bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_
     return measured;
 }
 
-/* Fits *found with its path set to `path` px along `angle`; chi-square, or infinity. */
-static double try_path(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
-                       const bst_imgproc_stamp *stamp, const bst_imgproc_source *start_from,
-                       double path, double angle) {
+/* Chi-square of the source fitted as a streak of `path` px along `angle`; infinity if the fit
+ * fails. */
+static double chi_square_of_path(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
+                                 const bst_imgproc_stamp *stamp,
+                                 const bst_imgproc_source *start_from, double path, double angle) {
     found->source = *start_from;
     found->source.shape.dx_px = path * cos(angle);
     found->source.shape.dy_px = path * sin(angle);
@@ -80,15 +81,17 @@ void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgpr
         bst_imgproc_stamp stamp = bst_deblend_stamp(w->l, f, &longest);
         double old_path = hypot(before.source.shape.dx_px, before.source.shape.dy_px);
         double old_angle = atan2(before.source.shape.dy_px, before.source.shape.dx_px);
-        double old_chi = try_path(w, i, found, &stamp, &before.source, old_path, old_angle);
-        double low = try_path(w, i, found, &stamp, &before.source, 0.8 * path, angle);
-        double high = try_path(w, i, found, &stamp, &before.source, 1.2 * path, angle);
-        double chi = try_path(w, i, found, &stamp, &before.source, path, angle);
+        double old_chi =
+            chi_square_of_path(w, i, found, &stamp, &before.source, old_path, old_angle);
+        double low = chi_square_of_path(w, i, found, &stamp, &before.source, 0.8 * path, angle);
+        double high = chi_square_of_path(w, i, found, &stamp, &before.source, 1.2 * path, angle);
+        double chi = chi_square_of_path(w, i, found, &stamp, &before.source, path, angle);
         double bend = low + high - 2.0 * chi, step = 0.0;
         if (isfinite(bend)) {
             step = bend > 0.0 ? 0.1 * (low - high) / bend : low < high ? -0.2 : 0.2;
             step = fmax(-0.2, fmin(step, 0.2));
-            chi = try_path(w, i, found, &stamp, &before.source, path * (1.0 + step), angle);
+            chi =
+                chi_square_of_path(w, i, found, &stamp, &before.source, path * (1.0 + step), angle);
         }
         if (!(chi < old_chi - 9.0)) {
             *found = before;

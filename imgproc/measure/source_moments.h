@@ -1,19 +1,19 @@
-/* How long and wide a source is. */
+/* Second moments of a source: length, width and angle. */
 #ifndef BST_IMGPROC_MEASURE_SOURCE_MOMENTS_H
 #define BST_IMGPROC_MEASURE_SOURCE_MOMENTS_H
 
 #include "imgproc/measure/deblend.h"
 
-#define BST_EXTENT_SNR 10.0 /* below, extents are the model's own */
+#define BST_EXTENT_SNR 10.0 /* below this SNR length and width are those of the model */
 
-/* Principal axes of the measured or modelled second moments of *found, number i, from pixels up to
- * `wider` beyond its stamp. Whether they are measured. */
+/* Sets length, width and angle of source i from its second moments, measured on pixels up to
+ * `wider` px beyond its stamp, or from the model. Returns true if they are measured. */
 bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
                                 double wider);
 
-/* A point that is longer than the PSF: fits it as a streak along the axis of its moments, as long
- * as that lowers chi-square on the same pixels. Moments give the length roughly, the parabola
- * through three values of chi-square gives it well. */
+/* Refits a point that is longer than the PSF as a streak along the axis of its moments, if that
+ * lowers chi-square on the same pixels. Moments give a first length; a parabola through three
+ * values of chi-square refines it. */
 void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found);
 
 #endif

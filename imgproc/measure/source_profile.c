@@ -74,11 +74,12 @@ size_t bst_source_profile_scratch(int max_side) {
     return 2 * BST_PSF_MAX_NODES * PARTS * side;
 }
 
-/* Nodes that reach a row or a block of columns. */
+/* Range of path nodes that affect a row or a block of columns of a stamp. */
 typedef struct range {
     short first, end;
 } range;
 
+/* Extends a range of nodes. */
 static inline void widen(range *r, int first, int end, int node) {
     for (int i = first; i < end; i++) {
         r[i].first = r[i].first < node ? r[i].first : (short)node;
@@ -86,15 +87,15 @@ static inline void widen(range *r, int first, int end, int node) {
     }
 }
 
-/* A path laid out on a stamp. */
+/* Path of a source discretised on a stamp. */
 typedef struct layout {
-    int stride, rows, used; /* rows: of the lanes; used: nodes that reach the stamp */
+    int stride, rows, used; /* rows: in lanes; used: nodes that affect the stamp */
     const float *across, *down;
     range column[SIDE / BST_LANES], row[SIDE];
     float node[BST_PSF_MAX_NODES], bow[BST_PSF_MAX_NODES];
 } layout;
 
-/* Nodes that reach row j and block b. */
+/* Nodes that affect row j and column block b. */
 static inline range reaching(const layout *l, int j, int b) {
     range r = l->row[j], c = l->column[b];
     return (range){r.first > c.first ? r.first : c.first, r.end < c.end ? r.end : c.end};

@@ -1,4 +1,4 @@
-/* What source_profile.c and source_profile_psf.c share. */
+/* Declarations shared by source_profile.c and source_profile_psf.c. */
 #ifndef BST_IMGPROC_MEASURE_SOURCE_PROFILE_INTERNAL_H
 #define BST_IMGPROC_MEASURE_SOURCE_PROFILE_INTERNAL_H
 
@@ -7,16 +7,17 @@
 
 #include "imgproc/measure/source_profile.h"
 
-enum { PARTS = 3 }; /* of a profile: it, its slope and half its curvature */
+enum { PARTS = 3 }; /* of a profile: share, slope, half the curvature */
 
-/* Where a profile about `centre` comes to lie on pixels 0 to side - 1. */
-typedef struct laid {
-    int before, phase, first, end; /* first and end of the part that is not 0 */
+/* Alignment of a profile about `centre` with pixels 0 to side - 1. */
+typedef struct profile_alignment {
+    int before, phase, first, end; /* first, end: range of non-zero pixels */
     float fraction;
-} laid;
+} profile_alignment;
 
-/* Returns false when none of it lies there. */
-static inline bool lay(const bst_source_profiles *t, double centre, int side, laid *out) {
+/* Aligns a profile with the pixels of a stamp; false if they do not overlap. */
+static inline bool align_profile(const bst_source_profiles *t, double centre, int side,
+                                 profile_alignment *out) {
     if (!(fabs(centre) < 1e6)) {
         return false;
     }

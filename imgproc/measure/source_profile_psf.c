@@ -1,12 +1,12 @@
-/* Images of sources with the PSF that is known on board. */
+/* Source images with the non-Gaussian PSF known on board. */
 #include <math.h>
 #include <string.h>
 
 #include "imgproc/measure/source_profile_internal.h"
 
-/* One function's profile about a centre that is `phase` of the table's steps past -1/2 px. */
-static void add_profile(const bst_source_profiles *p, const double *samples, int phase,
-                        float *row) {
+/* Resamples one profile about a centre that is `phase` table steps past -1/2 px. */
+static void resample_profile(const bst_source_profiles *p, const double *samples, int phase,
+                             float *row) {
     const bst_known_psf *k = p->known;
     int b = p->binning;
     double centre = (double)phase / BST_PROFILE_PHASES - 0.5 + p->half;
@@ -23,7 +23,7 @@ static void add_profile(const bst_source_profiles *p, const double *samples, int
                 }
             }
         }
-        /* by the centre, which is the other way than by the distance from it */
+        /* derivative by the centre, which has the opposite sign of that by the distance */
         row[i] = (float)v[0];
         row[p->pitch + i] = (float)(-b * v[1]);
         row[2 * p->pitch + i] = (float)(0.5 * b * b * v[2]);
@@ -47,17 +47,17 @@ void bst_source_profiles_set_known(bst_source_profiles *p) {
     int each = k->nodes * k->terms;
     for (int phase = 0; phase <= BST_PROFILE_PHASES; phase++) {
         for (int f = 0; f < each; f++) {
-            add_profile(p, k->across + (size_t)f * (size_t)k->side, phase,
-                        p->rows + BST_LANES + (size_t)(phase * each + f) * row);
+            resample_profile(p, k->across + (size_t)f * (size_t)k->side, phase,
+                             p->rows + BST_LANES + (size_t)(phase * each + f) * row);
         }
         for (int t = 0; t < k->terms; t++) {
-            add_profile(p, k->down + (size_t)t * (size_t)k->side, phase,
-                        p->down + BST_LANES + (size_t)(phase * k->terms + t) * row);
+            resample_profile(p, k->down + (size_t)t * (size_t)k->side, phase,
+                             p->down + BST_LANES + (size_t)(phase * k->terms + t) * row);
         }
     }
 }
 
-/* The nodes that mix at a source's place. */
+/* Field nodes of the PSF, with weights, at a source's position. */
 typedef struct mix {
     int count, node[4];
     float weight[4];

@@ -96,7 +96,9 @@ void bst_stack_free(bst_stack *s) {
     free(s);
 }
 
-static bool goes_on(const bst_stack *s, const bst_stack_frame *f) {
+/* True if a frame has the size, position and binning of the stack and is later than its last frame.
+ */
+static bool continues_stack(const bst_stack *s, const bst_stack_frame *f) {
     return s->count > 0 && s->count < s->config.frames && f->width == s->width &&
            f->height == s->height && f->origin_x_px == s->origin_x_px &&
            f->origin_y_px == s->origin_y_px && f->binning == s->binning &&
@@ -104,7 +106,7 @@ static bool goes_on(const bst_stack *s, const bst_stack_frame *f) {
 }
 
 int bst_stack_add(bst_stack *s, const bst_stack_frame *f) {
-    if (!goes_on(s, f)) {
+    if (!continues_stack(s, f)) {
         s->count = 0;
         s->width = f->width;
         s->height = f->height;
@@ -144,6 +146,7 @@ double bst_stack_threshold(double false_alarms, const double side_px[2], double 
     return 0.5 * (lo + hi);
 }
 
+/* Frame times relative to their mean, in frame intervals, and their variance. */
 static void set_times(bst_stack *s) {
     double mean = 0.0, square = 0.0;
     for (int i = 0; i < s->count; i++) {
@@ -162,9 +165,9 @@ static bool stronger(const void *context, int a, int b) {
     return p->snr != q->snr ? p->snr > q->snr : a < b;
 }
 
-/* Of the paths of all squares those that stand by themselves, the strongest first: each takes its
- * light away from the others. They are added to the `kept` that are there; returns the sum. */
-static int choose(bst_stack *s, int kept) {
+/* Selects the paths of all tiles that are no duplicates, strongest first; the light of a selected
+ * path is removed for the others. They are appended to the `kept` ones. Returns the total. */
+static int select_paths(bst_stack *s, int kept) {
     int columns = (s->width + STACK_TILE - 1) / STACK_TILE;
     int rows = (s->height + STACK_TILE - 1) / STACK_TILE, count = 0;
     s->followed = 0;
@@ -186,16 +189,16 @@ static int choose(bst_stack *s, int kept) {
     return kept;
 }
 
-/* The place in the last frame of what is at a place of the first frame's pixels. */
-static bool on_last(const bst_stack *s, double x, double y, double out[2]) {
+/* Position in the last frame of a position in the first frame's pixels; false if out of view. */
+static bool first_to_last_frame(const bst_stack *s, double x, double y, double out[2]) {
     bst_quat turn = bst_quat_mul(s->q[s->count - 1], bst_quat_conj(s->q[0]));
     bst_vec3 seen = bst_camera_unproject(&s->camera, s->origin_x_px + s->binning * x,
                                          s->origin_y_px + s->binning * y);
     return bst_camera_project(&s->camera, bst_quat_rotate(turn, seen), &out[0], &out[1]);
 }
 
-/* The light of a point whose output in one frame is 1: kernels have unit norm, so that their sum is
- * 1 / sqrt(sum share^2) of an axis. */
+/* Flux, e-, of a point whose filter output in one frame is 1. Kernels have unit norm, so their sum
+ * is 1 / sqrt(sum share^2) along an axis. */
 static double electrons_per_snr(const bst_stack *s) {
     double noise = 0.0, total = 0.0;
     for (int i = 0; i < s->count; i++) {
@@ -207,13 +210,15 @@ static double electrons_per_snr(const bst_stack *s) {
     return noise * total * total;
 }
 
+/* Converts a path of the stack to a detection in the last frame. */
 static bool report(const bst_stack *s, const stack_path *p, bool at_rest, bst_stack_found *out) {
     double end = s->tau[s->count - 1], now[2], before[2];
     double x = p->x + p->vx * end, y = p->y + p->vy * end;
-    if (!on_last(s, x, y, now) || !on_last(s, x - p->vx, y - p->vy, before)) {
+    if (!first_to_last_frame(s, x, y, now) ||
+        !first_to_last_frame(s, x - p->vx, y - p->vy, before)) {
         return false;
     }
-    /* the square of a maximum over four coordinates is that much above the signal's own */
+    /* a maximum over four coordinates biases the squared output by that much */
     double signal2 = p->snr * p->snr - 4.0;
     double place = s->binning * s->binning / (signal2 * s->roughness);
     double electrons = electrons_per_snr(s), root = sqrt((double)p->frames);
@@ -244,8 +249,8 @@ const bst_stack_found *bst_stack_search(bst_stack *s, int *count) {
     stack_clean_charge(s);
     int rest = stack_clean_rest(s);
     stack_search_tiles(s);
-    int count_all = choose(s, rest), kept = 0;
-    for (int pass = 0; pass < 2; pass++) { /* in motion first */
+    int count_all = select_paths(s, rest), kept = 0;
+    for (int pass = 0; pass < 2; pass++) { /* moving objects first */
         for (int i = 0; i < count_all; i++) {
             const stack_path *p = &s->paths[i];
             bool at_rest = i < rest || stack_at_rest(s, p);

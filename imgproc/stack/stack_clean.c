@@ -1,5 +1,5 @@
-/* What is taken out of the frames of a stack: charge at the same pixels of all frames, sources at
- * rest among the stars, and the light of objects that were found. */
+/* Removes from the stacked frames: charge at the same sensor pixels of all frames, sources at rest
+ * among the stars, and the light of detected objects. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,15 +7,17 @@
 #include "imgproc/measure/heapsort.h"
 #include "imgproc/stack/stack_internal.h"
 
-/* Charge: this SNR in the sum of its own pixel, and neighbours lower than a point's by as much. */
+/* Charge: SNR of the pixel's own sum over the frames, and the deficit of its neighbours against a
+ * point's. */
 static const double CHARGE_SNR = 5.5, CHARGE_SHARP = 4.0;
-/* Sources at rest: SNR of the sum at a pixel. */
+/* Sources at rest: SNR of the stacked sum at a pixel. */
 static const double REST_SNR = 4.5;
-/* Light is followed down to this many standard deviations, of the sum or of a frame. */
+/* Light is masked down to this many standard deviations, of the sum or of a frame. */
 static const double FADED = 1.5;
 enum { REACH_PX = 48 };
 
-static void blank_disc(bst_stack *s, int frame, double x, double y, double radius) {
+/* Masks a disc in an aligned frame. */
+static void mask_disc(bst_stack *s, int frame, double x, double y, double radius) {
     int8_t *map = stack_map(s, frame);
     int top = (int)fmax(ceil(y - radius), 0.0), left = (int)fmax(ceil(x - radius), 0.0);
     int bottom = (int)fmin(floor(y + radius), s->height - 1.0);
@@ -29,8 +31,9 @@ static void blank_disc(bst_stack *s, int frame, double x, double y, double radiu
     }
 }
 
-/* Where a pixel of a frame is among those of the first; false: not in front of it. */
-static bool on_first(const bst_stack *s, int frame, double x, double y, double *u, double *v) {
+/* Position of a frame's sensor pixel in the first frame; false if it is out of view. */
+static bool frame_to_first(const bst_stack *s, int frame, double x, double y, double *u,
+                           double *v) {
     bst_quat turn = bst_quat_mul(s->q[0], bst_quat_conj(s->q[frame]));
     bst_vec3 seen = bst_camera_unproject(&s->camera, s->origin_x_px + s->binning * x,
                                          s->origin_y_px + s->binning * y);
@@ -42,6 +45,7 @@ static bool on_first(const bst_stack *s, int frame, double x, double y, double *
     return true;
 }
 
+/* True if a sensor pixel is sharp and bright in the sum of all frames. */
 static bool is_charge(const bst_stack *s, size_t at, double scale) {
     const float *p = s->steady + at;
     double here = (double)p[0] * scale;
@@ -64,8 +68,8 @@ void stack_clean_charge(bst_stack *s) {
             }
             for (int i = 0; i < s->count; i++) {
                 double u, v;
-                if (on_first(s, i, x, y, &u, &v)) {
-                    blank_disc(s, i, u, v, radius);
+                if (frame_to_first(s, i, x, y, &u, &v)) {
+                    mask_disc(s, i, u, v, radius);
                 }
             }
         }
@@ -78,6 +82,7 @@ typedef struct rest_job {
     stack_path *paths;
 } rest_job;
 
+/* Sums rows of the aligned frames (loop body). */
 static void sum_rows(void *user, int begin, int end) {
     bst_stack *s = user;
     size_t first = (size_t)begin * (size_t)s->width;
@@ -88,7 +93,8 @@ static void sum_rows(void *user, int begin, int end) {
     }
 }
 
-static void climb_from(void *user, int begin, int end) {
+/* Refines the maxima of the sum to paths at rest (loop body). */
+static void refine_maxima(void *user, int begin, int end) {
     const rest_job *j = user;
     for (int i = begin; i < end; i++) {
         j->paths[i] = (stack_path){.x = j->at[i] % j->s->width, .y = j->at[i] / j->s->width};
@@ -96,7 +102,7 @@ static void climb_from(void *user, int begin, int end) {
     }
 }
 
-/* Maxima of the sum above a level, in row-major order; -1: more than there is room for. */
+/* Maxima of the stacked sum above a level, in row-major order; -1 if there are more than `room`. */
 static int find_maxima(const bst_stack *s, int level, int *out, int room) {
     int count = 0;
     long w = s->width;
@@ -117,9 +123,9 @@ static int find_maxima(const bst_stack *s, int level, int *out, int room) {
     return count;
 }
 
-/* Visits the pixels about a place that light reaches without rising again, and blanks them: in all
- * frames by the sum, or in one frame. */
-static void blank_light(bst_stack *s, int frame, int x, int y) {
+/* Masks the light of a source: pixels connected to (x, y) along which the light does not rise
+ * again. frame < 0: by the sum, in all frames; else in that frame. */
+static void mask_source_light(bst_stack *s, int frame, int x, int y) {
     int8_t *map = frame < 0 ? NULL : stack_map(s, frame);
     int level = (int)(FADED * STACK_QUANTA * (map ? 1.0 : sqrt((double)s->count)));
     int slack = level / 3, count = 0;
@@ -171,7 +177,7 @@ int stack_clean_rest(bst_stack *s) {
         level *= 1.25;
     }
     rest_job job = {s, s->maxima, s->rest_paths};
-    bst_parallel_for(s->pool, count, 16, climb_from, &job);
+    bst_parallel_for(s->pool, count, 16, refine_maxima, &job);
     for (int i = 0; i < count; i++) {
         s->order[i] = i;
     }
@@ -187,9 +193,9 @@ int stack_clean_rest(bst_stack *s) {
         }
         bool counts = p->snr > s->threshold && p->snr < seen_by_itself &&
                       kept < BST_STACK_MAX_FOUND && stack_holds(s, p);
-        blank_light(s, -1, s->maxima[k] % s->width, s->maxima[k] / s->width);
+        mask_source_light(s, -1, s->maxima[k] % s->width, s->maxima[k] / s->width);
         for (int f = 0; f < s->count; f++) {
-            blank_disc(s, f, p->x, p->y, radius);
+            mask_disc(s, f, p->x, p->y, radius);
         }
         if (counts) {
             s->paths[kept++] = *p;
@@ -202,7 +208,7 @@ void stack_clean_path(bst_stack *s, const stack_path *p) {
     double radius = 3.2 * s->sigma_px;
     for (int i = 0; i < s->count; i++) {
         double x = p->x + p->vx * s->tau[i], y = p->y + p->vy * s->tau[i];
-        blank_light(s, i, (int)floor(x + 0.5), (int)floor(y + 0.5));
-        blank_disc(s, i, x, y, radius);
+        mask_source_light(s, i, (int)floor(x + 0.5), (int)floor(y + 0.5));
+        mask_disc(s, i, x, y, radius);
     }
 }

@@ -1,4 +1,4 @@
-/* Parts of the stack that only its own files share. */
+/* Internal declarations of frame stacking. */
 #ifndef BST_IMGPROC_STACK_STACK_INTERNAL_H
 #define BST_IMGPROC_STACK_STACK_INTERNAL_H
 
@@ -8,20 +8,21 @@
 #include "sim/core/parallel.h"
 
 enum {
-    STACK_NONE = -128,                         /* a place without a measurement */
-    STACK_QUANTA = BST_STREAK_QUANTA,          /* steps per standard deviation */
-    STACK_CLAMP = 127,                         /* greatest value: 7.9 standard deviations */
-    STACK_VISIBLE = 9 * BST_STREAK_QUANTA / 2, /* seen in a frame by itself */
-    STACK_PHASES = 64,                         /* of the interpolation */
-    STACK_NODE_PX = 32,     /* between places at which the alignment is worked out */
-    STACK_TILE = 128,       /* side of the squares that are searched */
-    STACK_TILE_FOUND = 128, /* most paths kept of one */
-    STACK_REST = 65536,     /* most sources at rest */
+    STACK_NONE = -128,                         /* pixel without a measurement */
+    STACK_QUANTA = BST_STREAK_QUANTA,          /* quanta per standard deviation */
+    STACK_CLAMP = 127,                         /* largest value: 7.9 standard deviations */
+    STACK_VISIBLE = 9 * BST_STREAK_QUANTA / 2, /* visible in a single frame */
+    STACK_PHASES = 64,                         /* sub-pixel phases of the interpolation */
+    STACK_NODE_PX = 32,                        /* spacing of the alignment grid */
+    STACK_TILE = 128,                          /* side of the tiles that are searched */
+    STACK_TILE_FOUND = 128,                    /* most paths per tile */
+    STACK_REST = 65536,                        /* most sources at rest */
+    /* most pixels masked per source */
     STACK_VISITS = 8192,
 };
 
-/* A path: the place at the mean of the frames' times and the rate per mean frame interval, in
- * pixels of the first frame. */
+/* A path: position at the mean of the frame times and rate per mean frame interval, in pixels of
+ * the first frame. */
 typedef struct stack_path {
     double x, y, vx, vy;
     double snr;
@@ -34,24 +35,23 @@ struct bst_stack {
     bst_parallel *pool;
     bst_streak_map map;
     int max_width, max_height;
-    int8_t *maps;  /* [frames][max_width * max_height]: frames on the first one's pixels */
-    float *steady; /* [height][width]: sum of the pixels' own SNR, on the sensor */
-    int16_t *rest; /* [height][width]: sum of the maps */
-    double *node_x, *node_y; /* where a node of the first frame's grid is in another frame, less its
-                                own place */
-    int *maxima;             /* [STACK_REST] of `rest` */
+    int8_t *maps;  /* [frames][max_width * max_height]: filtered frames aligned with the first */
+    float *steady; /* [height][width]: sum of each sensor pixel's own SNR over the frames */
+    int16_t *rest; /* [height][width]: sum of the aligned frames */
+    double *node_x, *node_y; /* shift of each alignment node from the first frame to another */
+    int *maxima;             /* [STACK_REST] maxima of `rest` */
     stack_path *rest_paths;  /* [STACK_REST] */
-    int *visit;              /* [STACK_VISITS] pixels of a source's light */
+    int *visit;              /* [STACK_VISITS] pixels of a source */
     uint8_t *visited;        /* [height][width] */
-    /* of the stack in work */
+    /* of the current stack */
     int count, width, height;
     double origin_x_px, origin_y_px, binning, sigma_px;
-    double time_s[BST_STACK_MAX_FRAMES], tau[BST_STACK_MAX_FRAMES]; /* tau: in frame intervals from
-                                                                       their mean */
+    /* tau: in frame intervals relative to their mean */
+    double time_s[BST_STACK_MAX_FRAMES], tau[BST_STACK_MAX_FRAMES];
     double interval_s, time_variance;
     bst_quat q[BST_STACK_MAX_FRAMES];
-    double noise_e[BST_STACK_MAX_FRAMES]; /* median */
-    /* interpolation: weights by phase, scaled to unit noise; and the field's roughness */
+    double noise_e[BST_STACK_MAX_FRAMES]; /* median of the frame */
+    /* interpolation weights by phase, scaled to unit noise; roughness of the interpolated field */
     float weight[STACK_PHASES + 1][4];
     double weight_sigma, roughness;
     double threshold;
@@ -62,7 +62,7 @@ struct bst_stack {
     int64_t *tile_followed; /* [tiles] */
     int tiles_x, tiles_y;
     int64_t followed;
-    stack_path *paths; /* [BST_STACK_MAX_FOUND] at rest, then in motion */
+    stack_path *paths; /* [BST_STACK_MAX_FOUND]: at rest, then moving */
     int *order;
     bst_stack_found found[BST_STACK_MAX_FOUND];
 };
@@ -71,43 +71,45 @@ static inline int8_t *stack_map(const bst_stack *s, int frame) {
     return s->maps + (size_t)frame * (size_t)s->max_width * (size_t)s->max_height;
 }
 
-/* stack_align.c: filters a frame and lays it on the first one's pixels. */
+/* stack_align.c: filters a frame and aligns it with the first one. */
 void stack_align(bst_stack *stack, const bst_stack_frame *frame, int number);
-/* Makes the interpolation's table for a filter whose output has this correlation by lag. */
+/* Sets the interpolation table for a filter output with this autocorrelation by lag. */
 void stack_set_interpolation(bst_stack *stack, double sigma_px, const double correlation[64]);
 
 /* stack_path.c */
-/* The sum along a path over the root of the frames in it; values count up to `clamp`. 0 with fewer
- * than half of the frames. */
+/* Stacked sum along a path over the root of the number of frames; values are limited to `clamp`
+ * quanta. 0 with fewer than half of the frames. */
 double stack_sum(const bst_stack *stack, const stack_path *path, int clamp, int *frames);
-/* Moves a path to the maximum near it and fills in snr and frames. */
+/* Moves a path to the nearest maximum of the stacked sum; sets snr and frames. */
 void stack_climb(const bst_stack *stack, stack_path *path);
-/* Whether what a path shows is not due to a few frames alone. */
+/* True if a path's signal is not due to a few frames alone. */
 bool stack_holds(const bst_stack *stack, const stack_path *path);
-/* Whether its rate may be that of a star. */
+/* True if the path's rate is consistent with a star. */
 bool stack_at_rest(const bst_stack *stack, const stack_path *path);
 
 /* stack_clean.c */
-/* Takes out charge at the same pixel of the sensor in all frames. */
+/* Masks charge at the same sensor pixel in all frames. */
 void stack_clean_charge(bst_stack *stack);
-/* Finds sources at rest, takes them out and leaves those above the threshold, but not seen in a
- * frame by themselves, in stack->paths; returns their number. */
+/* Finds sources at rest, masks them, and stores in stack->paths those above the threshold that no
+ * single frame shows; returns their number. */
 int stack_clean_rest(bst_stack *stack);
-/* Takes a path's light out of the maps. */
+/* Masks a path's light in the aligned frames. */
 void stack_clean_path(bst_stack *stack, const stack_path *path);
 
 /* stack_search.c */
 bst_status stack_search_create(bst_ctx *ctx, bst_stack *stack) BST_MUST_CHECK;
 void stack_search_free(bst_stack *stack);
-/* Fills tile_paths and tile_count. */
+/* Searches all tiles; sets tile_paths and tile_count. */
 void stack_search_tiles(bst_stack *stack);
 
-/* stack_rows.c: sums of rectangles of rows, whose pointers are their first elements. */
+/* stack_rows.c: sums of rectangles; the pointers are to their first elements. */
+/* Sum of four rectangles. */
 void stack_rows_add4(const int16_t *const in[4], int in_stride, int16_t *out, int out_stride,
                      int width, int height);
-/* Greatest sum of `count` rectangles; `row` is room for one row. */
+/* Largest sum of `count` rectangles; `row` is work space for one row. */
 int stack_rows_greatest(const int16_t *const *in, int count, int stride, int16_t *row, int width,
                         int height);
+/* Adds 8-bit values to 16-bit sums. */
 void stack_rows_add_bytes(const int8_t *in, int16_t *sum, int count);
 
 #endif

@@ -2,14 +2,14 @@
 
 #include "imgproc/stack/stack_internal.h"
 
-/* Fewer frames than this share of a stack, each bright by itself, are chance: hits on a line. */
+/* A signal from fewer frames than this share of the stack is chance: cosmic rays in a line. */
 static const double CHANCE_SHARE = 0.375;
-/* Square of a rate over its standard deviation: stars, of which there are many more than of what
- * moves as slowly, exceed it once in 270,000. */
+/* Squared rate over its variance above which a source moves. Stars, far more numerous than slow
+ * objects, exceed it once in 270,000. */
 static const double REST_MOTION2 = 25.0;
 
-/* One frame's value at a place; false without a measurement there. */
-static bool sample(const bst_stack *s, int frame, double x, double y, float *out) {
+/* Value of an aligned frame at a position; false without a measurement. */
+static bool sample_frame(const bst_stack *s, int frame, double x, double y, float *out) {
     double fx = floor(x), fy = floor(y);
     if (!(fx >= 1.0 && fy >= 1.0 && fx < s->width - 2.0 && fy < s->height - 2.0)) {
         return false;
@@ -34,7 +34,7 @@ double stack_sum(const bst_stack *s, const stack_path *p, int clamp, int *frames
     int n = 0;
     for (int i = 0; i < s->count; i++) {
         float v;
-        if (sample(s, i, p->x + p->vx * s->tau[i], p->y + p->vy * s->tau[i], &v)) {
+        if (sample_frame(s, i, p->x + p->vx * s->tau[i], p->y + p->vy * s->tau[i], &v)) {
             sum += v > most ? most : v;
             n++;
         }
@@ -43,11 +43,13 @@ double stack_sum(const bst_stack *s, const stack_path *p, int clamp, int *frames
     return 2 * n < s->count ? 0.0 : (double)sum / (STACK_QUANTA * sqrt((double)n));
 }
 
+/* Coordinate k of a path: x, y, vx, vy. */
 static double *coordinate(stack_path *p, int k) {
     return k == 0 ? &p->x : k == 1 ? &p->y : k == 2 ? &p->vx : &p->vy;
 }
 
-static void keep_inside(const bst_stack *s, stack_path *p) {
+/* Limits a path to the frame and to the searched rates. */
+static void limit_path(const bst_stack *s, stack_path *p) {
     double rate = s->config.rate_px_per_frame;
     p->x = fmin(fmax(p->x, 0.0), s->width - 1.0);
     p->y = fmin(fmax(p->y, 0.0), s->height - 1.0);
@@ -55,9 +57,10 @@ static void keep_inside(const bst_stack *s, stack_path *p) {
     p->vy = fmin(fmax(p->vy, -rate), rate);
 }
 
-/* Each round fits a parabola along each coordinate, whose gradients are uncorrelated, and goes to
- * the tops of all four together, or, where that is lower, to the best place that was looked at. */
-static void climb(const bst_stack *s, stack_path *p, int clamp) {
+/* Maximises the stacked sum: each round fits a parabola along each of the four coordinates, whose
+ * gradients are uncorrelated. It moves to all four vertices together, or to the best sampled point
+ * if that is higher. */
+static void maximise_sum(const bst_stack *s, stack_path *p, int clamp) {
     enum { ROUNDS = 8 };
     double steps[4];
     steps[0] = steps[1] = 0.6 / sqrt(s->roughness);
@@ -70,7 +73,7 @@ static void climb(const bst_stack *s, stack_path *p, int clamp) {
             for (int e = 0; e < 2; e++) {
                 stack_path at = *p;
                 *coordinate(&at, k) += e ? h : -h;
-                keep_inside(s, &at);
+                limit_path(s, &at);
                 side[e] = at.snr = stack_sum(s, &at, clamp, &at.frames);
                 best = at.snr > best.snr ? at : best;
             }
@@ -80,7 +83,7 @@ static void climb(const bst_stack *s, stack_path *p, int clamp) {
             }
             *coordinate(&top, k) += move;
         }
-        keep_inside(s, &top);
+        limit_path(s, &top);
         top.snr = stack_sum(s, &top, clamp, &top.frames);
         best = top.snr > best.snr ? top : best;
         double gain = best.snr - p->snr;
@@ -96,12 +99,13 @@ static void climb(const bst_stack *s, stack_path *p, int clamp) {
     }
 }
 
-static int visible(const bst_stack *s, const stack_path *p, double *without) {
+/* Number of frames in which a path is visible by itself, and the sum without them. */
+static int count_visible(const bst_stack *s, const stack_path *p, double *without) {
     float sum = 0.0f;
     int n = 0, seen = 0;
     for (int i = 0; i < s->count; i++) {
         float v;
-        if (sample(s, i, p->x + p->vx * s->tau[i], p->y + p->vy * s->tau[i], &v)) {
+        if (sample_frame(s, i, p->x + p->vx * s->tau[i], p->y + p->vy * s->tau[i], &v)) {
             bool bright = v > (float)STACK_VISIBLE;
             seen += bright;
             n += !bright;
@@ -113,16 +117,16 @@ static int visible(const bst_stack *s, const stack_path *p, double *without) {
 }
 
 void stack_climb(const bst_stack *s, stack_path *p) {
-    climb(s, p, STACK_VISIBLE);
+    maximise_sum(s, p, STACK_VISIBLE);
     double without;
-    if (visible(s, p, &without) >= CHANCE_SHARE * s->count) {
-        climb(s, p, STACK_CLAMP);
+    if (count_visible(s, p, &without) >= CHANCE_SHARE * s->count) {
+        maximise_sum(s, p, STACK_CLAMP);
     }
 }
 
 bool stack_holds(const bst_stack *s, const stack_path *p) {
     double without;
-    int seen = visible(s, p, &without);
+    int seen = count_visible(s, p, &without);
     return seen == 0 || seen >= CHANCE_SHARE * s->count || without > s->threshold;
 }
 

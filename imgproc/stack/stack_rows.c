@@ -14,6 +14,7 @@ void stack_rows_add4(const int16_t *const in[4], int in_stride, int16_t *restric
     }
 }
 
+/* Largest sum of four rectangles. */
 BST_CLONES_256
 static int greatest4(const int16_t *const *in, int stride, int width, int height) {
     int16_t most = INT16_MIN;
@@ -28,6 +29,7 @@ static int greatest4(const int16_t *const *in, int stride, int width, int height
     return most;
 }
 
+/* Largest sum of `count` rectangles. */
 BST_CLONES_256
 static int greatest(const int16_t *const *in, int count, int stride, int16_t *restrict row,
                     int width, int height) {

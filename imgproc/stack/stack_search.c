@@ -7,12 +7,12 @@
 
 enum { GROUP = 4, MAX_GROUPS = BST_STACK_MAX_FRAMES / GROUP, HITS = 16384, MAX_RATES = 1024 };
 
-/* Steps of the grid, in the field's length 1 / sqrt(roughness) at the paths' ends: of groups and of
- * the whole. */
+/* Grid steps in units of the noise field's length 1 / sqrt(roughness) at the paths' ends: of groups
+ * and of the whole stack. */
 static const double GROUP_STEP = 1.3, STEP = 1.7;
-/* Sums on the grid this far below the threshold are followed: what the grid's steps cost. */
+/* Grid sums down to this margin below the threshold are refined: the loss of the grid's steps. */
 static const double MARGIN_SNR = 1.7;
-/* In a frame by itself no more counts than this: a radiation hit is not to make a path. */
+/* Limit of a single frame's value, quanta: one cosmic ray must not make a path. */
 static const int BRIGHT_COUNTS = 5 * STACK_QUANTA / 2;
 
 typedef struct hit {
@@ -20,7 +20,7 @@ typedef struct hit {
     float vx, vy;
 } hit;
 
-/* What searches one square at a time. */
+/* Work space for the search of one tile. */
 typedef struct stack_tile {
     int16_t *frames; /* [count][side][side] */
     int16_t *groups; /* [count / 4][group_side][group_side] */
@@ -30,15 +30,15 @@ typedef struct stack_tile {
     int count, level;
 } stack_tile;
 
-/* The grid of a stack, the same for all squares. */
+/* Search grid of a stack, the same for all tiles. */
 typedef struct grid {
     bst_stack *s;
     int groups, margin, group_margin, side, group_side;
     double group_tau[MAX_GROUPS];
     int group_rates, rates;
     double group_rate[MAX_RATES], rate[MAX_RATES];
-    int group_of[MAX_RATES]; /* the group rate nearest to a rate */
-    int level;               /* quanta of a sum that is followed */
+    int group_of[MAX_RATES]; /* nearest group rate of a rate */
+    int level;               /* sums above this, quanta, are refined */
     int workers;
 } grid;
 
@@ -82,8 +82,8 @@ void stack_search_free(bst_stack *s) {
     free(s->tile_followed);
 }
 
-/* Rates from -most to most, evenly, at most `step` apart. */
-static int spread(double most, double step, double *out) {
+/* Evenly spaced rates from -most to most, at most `step` apart; returns their number. */
+static int spread_rates(double most, double step, double *out) {
     int n = 2 * (int)fmin(ceil(most / step), (MAX_RATES - 1) / 2) + 1;
     for (int i = 0; i < n; i++) {
         out[i] = most * (2.0 * i / (n - 1) - 1.0);
@@ -91,6 +91,7 @@ static int spread(double most, double step, double *out) {
     return n;
 }
 
+/* Sets up the grid of positions and rates for the stack. */
 static void make_grid(bst_stack *s, grid *g) {
     double most = s->config.rate_px_per_frame, length = 1.0 / sqrt(s->roughness);
     double whole = s->tau[s->count - 1] - s->tau[0], longest = 0.0, group_reach = 0.0;
@@ -101,8 +102,8 @@ static void make_grid(bst_stack *s, grid *g) {
         longest = fmax(longest, t[GROUP - 1] - t[0]);
         group_reach = fmax(group_reach, fabs(g->group_tau[i]));
     }
-    g->group_rates = spread(most, GROUP_STEP * length / longest, g->group_rate);
-    g->rates = spread(most, STEP * length / whole, g->rate);
+    g->group_rates = spread_rates(most, GROUP_STEP * length / longest, g->group_rate);
+    g->rates = spread_rates(most, STEP * length / whole, g->rate);
     for (int i = 0; i < g->rates; i++) {
         g->group_of[i] =
             (int)floor((g->rate[i] + most) / (2.0 * most) * (g->group_rates - 1) + 0.5);
@@ -119,8 +120,8 @@ static int nearest(double v) {
     return (int)floor(v + 0.5);
 }
 
-/* The square's part of the frames; nothing where there is no measurement. */
-static void read_frames(const grid *g, stack_tile *t, int x0, int y0) {
+/* Copies a tile of the aligned frames; pixels without a measurement become 0. */
+static void read_tile(const grid *g, stack_tile *t, int x0, int y0) {
     const bst_stack *s = g->s;
     int side = g->side;
     for (int i = 0; i < s->count; i++) {
@@ -144,6 +145,7 @@ static void read_frames(const grid *g, stack_tile *t, int x0, int y0) {
     }
 }
 
+/* Sums groups of four frames along a group rate. */
 static void add_groups(const grid *g, stack_tile *t, double vx, double vy) {
     const bst_stack *s = g->s;
     size_t square = (size_t)g->side * (size_t)g->side;
@@ -166,8 +168,8 @@ static bool greater_hit(const void *context, int a, int b) {
     return p->value != q->value ? p->value > q->value : a < b;
 }
 
-/* Leaves of hits that one maximum may have made the greatest. */
-static void thin(const bst_stack *s, stack_tile *t) {
+/* Keeps only the strongest of hits that one maximum may have caused. */
+static void suppress_neighbours(const bst_stack *s, stack_tile *t) {
     double near = 1.5 / sqrt(s->roughness), near_rate = near / sqrt(s->time_variance);
     for (int i = 0; i < t->count; i++) {
         t->order[i] = i;
@@ -190,9 +192,9 @@ static void thin(const bst_stack *s, stack_tile *t) {
     t->count = kept;
 }
 
-/* Moves what thin() left to the front. */
-static void compact(stack_tile *t) {
-    for (int i = 1; i < t->count; i++) { /* ascending, so that none is written over unread */
+/* Moves the hits kept by suppress_neighbours to the front. */
+static void compact_hits(stack_tile *t) {
+    for (int i = 1; i < t->count; i++) { /* ascending, so that no unread hit is overwritten */
         int k = i, moved = t->order[i];
         for (; k > 0 && t->order[k - 1] > moved; k--) {
             t->order[k] = t->order[k - 1];
@@ -204,11 +206,12 @@ static void compact(stack_tile *t) {
     }
 }
 
+/* Stores a hit; a full list is thinned and, if crowded, its level is raised. */
 static void add_hit(const bst_stack *s, stack_tile *t, hit h) {
     if (t->count == HITS) {
-        thin(s, t);
-        compact(t);
-        if (t->count > HITS / 2) { /* a crowd: the faintest go */
+        suppress_neighbours(s, t);
+        compact_hits(t);
+        if (t->count > HITS / 2) { /* crowded: the faintest are dropped */
             t->level += t->level / 16;
             int kept = 0;
             for (int i = 0; i < t->count; i++) {
@@ -224,7 +227,8 @@ static void add_hit(const bst_stack *s, stack_tile *t, hit h) {
     }
 }
 
-static void look(const grid *g, stack_tile *t, int width, int height, double vx, double vy) {
+/* Searches a tile at one rate for grid sums above the level. */
+static void search_rate(const grid *g, stack_tile *t, int width, int height, double vx, double vy) {
     const int16_t *in[MAX_GROUPS];
     size_t group_square = (size_t)g->group_side * (size_t)g->group_side;
     for (int i = 0; i < g->groups; i++) {
@@ -254,9 +258,10 @@ static void look(const grid *g, stack_tile *t, int width, int height, double vx,
     }
 }
 
-static void follow(const grid *g, stack_tile *t, int tile, int x0, int y0) {
+/* Refines a tile's hits to maxima between grid points and keeps those above the threshold. */
+static void refine_hits(const grid *g, stack_tile *t, int tile, int x0, int y0) {
     bst_stack *s = g->s;
-    thin(s, t);
+    suppress_neighbours(s, t);
     stack_path *out = s->tile_paths + (size_t)tile * STACK_TILE_FOUND;
     int kept = 0;
     for (int i = 0; i < t->count && kept < STACK_TILE_FOUND; i++) {
@@ -271,12 +276,13 @@ static void follow(const grid *g, stack_tile *t, int tile, int x0, int y0) {
     s->tile_followed[tile] = t->count;
 }
 
+/* Searches one tile over all rates. */
 static void search_tile(const grid *g, stack_tile *t, int tile) {
     int columns = (g->s->width + STACK_TILE - 1) / STACK_TILE;
     int x0 = tile % columns * STACK_TILE, y0 = tile / columns * STACK_TILE;
     int width = g->s->width - x0 < STACK_TILE ? g->s->width - x0 : STACK_TILE;
     int height = g->s->height - y0 < STACK_TILE ? g->s->height - y0 : STACK_TILE;
-    read_frames(g, t, x0, y0);
+    read_tile(g, t, x0, y0);
     t->count = 0;
     t->level = g->level;
     int last_x = g->rates, last_y = g->rates;
@@ -293,14 +299,14 @@ static void search_tile(const grid *g, stack_tile *t, int tile) {
             add_groups(g, t, g->group_rate[group_x], g->group_rate[group_y]);
             for (int y = ky; y < next_y; y++) {
                 for (int x = kx; x < next_x; x++) {
-                    look(g, t, width, height, g->rate[x], g->rate[y]);
+                    search_rate(g, t, width, height, g->rate[x], g->rate[y]);
                 }
             }
             kx = next_x;
         }
         ky = next_y;
     }
-    follow(g, t, tile, x0, y0);
+    refine_hits(g, t, tile, x0, y0);
 }
 
 static void search_tiles(void *user, int begin, int end) {

@@ -8,27 +8,30 @@
 #include "imgproc/detect/simd_layout.h"
 #include "imgproc/measure/heapsort.h"
 
-/* A tile holds the lines that begin in it. */
+/* A tile holds the lines that start in it. */
 enum { TILE_COLUMNS = 512, TILE_ROWS = 256, TILE_HITS = 2048, PIECES = 8 };
 
+/* Rows per piece of a line in an octave. */
 static int piece_rows(int octave) {
     return 1 << octave;
 }
 
+/* Number of slopes in an octave. */
 static int slopes_of(int octave) {
     return 8 * piece_rows(octave) + 1;
 }
 
+/* Quotient rounded to the nearest integer. */
 static int rounded(int numerator, int denominator) {
     return (int)floor((double)numerator / denominator + 0.5);
 }
 
-/* Column of row r of a piece of a rows with slope k / a, about the piece's middle. */
+/* Column of row r of a piece of `a` rows with slope k / a, relative to the piece's middle. */
 static int piece_column(int a, int k, int r) {
     return rounded(k * (2 * r - a + 1), 2 * a);
 }
 
-/* Slope of the piece that serves slope number i - 4 a, in steps of 1 / a. */
+/* Slope, in steps of 1 / a, of the piece used for line slope number i - 4 a. */
 static int piece_slope(int a, int i) {
     return a > 1 ? rounded(i - 4 * a, 4) : 0;
 }
@@ -38,12 +41,13 @@ static int piece_shift(int a, int i, int j) {
     return rounded((i - 4 * a) * j, 4);
 }
 
-/* The longest window of a slope: no path is longer than max_px. */
+/* Longest window at a slope, rows: no path is longer than max_px. */
 static int most_rows(const bst_streak_bank *bank, int a, int i) {
     double slope = (i - 4 * a) / (4.0 * a);
     return (int)ceil(bank->max_px / sqrt(1.0 + slope * slope)) + a / 2;
 }
 
+/* Number of window lengths in an octave. */
 static int windows_of(const bst_streak_bank *bank, int octave) {
     int a = piece_rows(octave);
     return octave == bank->octaves - 1 && 7 * a < bank->max_rows ? 5 : 4;
@@ -101,7 +105,7 @@ int bst_streak_bank_capacity(const bst_streak_bank *bank) {
     return bank->max_tiles * TILE_HITS;
 }
 
-/* Variance of each window's sum of a map of unit noise, from the pixels that it really takes. */
+/* Scale of each window's sum to unit noise, from the variance over the pixels that it sums. */
 static void set_scales(bst_streak_bank *bank, const bst_streak_map *map) {
     bank->sigma_px = map->sigma_px;
     int column[BST_STREAK_MAX_ROWS + 8];
@@ -129,7 +133,7 @@ static void set_scales(bst_streak_bank *bank, const bst_streak_map *map) {
     }
 }
 
-/* out = sum of rows */
+/* Sum of rows of the streak map: out = sum of in. */
 BST_CLONES_16
 static void sum_rows(int16_t *restrict out, int count, const int16_t *const *in, int rows) {
     if (rows == 1) {
@@ -156,8 +160,8 @@ static void sum_rows(int16_t *restrict out, int count, const int16_t *const *in,
     }
 }
 
-/* Excess of the windows of 4 to 7 (8) pieces over their thresholds, the greatest of them; returns
- * whether any is above 0. */
+/* Largest excess over the thresholds among the windows of 4 to 7 (8) pieces; returns true if any is
+ * above 0. */
 BST_CLONES_16
 static bool best_window(int16_t *restrict out, int count, const int16_t *const *in,
                         const int16_t *limit, int windows) {
@@ -210,7 +214,7 @@ typedef struct run_job {
     const bst_streak_map *map;
     int first_octave;
     double threshold;
-    int tiles[2], columns[2]; /* of each plane */
+    int tiles[2], columns[2]; /* per plane */
     atomic_int next;
 } run_job;
 
@@ -219,8 +223,8 @@ static bool stronger(const void *context, int a, int b) {
     return hits[a].snr > hits[b].snr || (hits[a].snr == hits[b].snr && a < b);
 }
 
-/* Makes room by leaving only the stronger half; returns the least SNR that is still wanted. */
-static float thin_out(bst_streak_hit *hits, int *count) {
+/* Keeps the stronger half of the hits; returns the least SNR still accepted. */
+static float keep_stronger_half(bst_streak_hit *hits, int *count) {
     int order[TILE_HITS];
     for (int i = 0; i < TILE_HITS; i++) {
         order[i] = i;
@@ -246,12 +250,13 @@ typedef struct tile {
     int16_t *pieces, *line;
 } tile;
 
+/* Stores a hit of the filter bank. */
 static void add_hit(tile *t, const bst_streak_hit *hit) {
     if (hit->snr <= t->least) {
         return;
     }
     if (*t->count == TILE_HITS) {
-        t->least = thin_out(t->hits, t->count);
+        t->least = keep_stronger_half(t->hits, t->count);
         if (hit->snr <= t->least) {
             return;
         }
@@ -259,8 +264,9 @@ static void add_hit(tile *t, const bst_streak_hit *hit) {
     t->hits[(*t->count)++] = *hit;
 }
 
-/* The greatest of each run of neighbours in a line of excesses. */
-static void collect(tile *t, const int16_t *const *in, int octave, int slope, int y, int windows) {
+/* Collects the maximum of each run of adjacent excesses in a line. */
+static void collect_hits(tile *t, const int16_t *const *in, int octave, int slope, int y,
+                         int windows) {
     const bst_streak_bank *bank = t->job->bank;
     const float *scale = bank->scale[octave] + slope * BST_STREAK_WINDOWS;
     int a = piece_rows(octave), count = t->x1 - t->x0;
@@ -279,7 +285,7 @@ static void collect(tile *t, const int16_t *const *in, int octave, int slope, in
             sum += in[j][x];
             float snr = j >= 3 ? (float)sum * scale[j - 3] : 0.0f;
             if (snr > best.snr && (double)snr > t->job->threshold) {
-                /* ends at the outer edges of the first and the last row */
+                /* the path ends at the outer edges of the first and last row */
                 int rows = (j + 1) * a;
                 float middle = (float)(t->x0 + x), top = (float)y - 0.5f;
                 float u0 = middle - 0.5f * gradient * (float)a;
@@ -297,7 +303,8 @@ static void collect(tile *t, const int16_t *const *in, int octave, int slope, in
     }
 }
 
-static void run_octave(tile *t, int octave) {
+/* Sums all lines of an octave that start in a tile. */
+static void sum_octave(tile *t, int octave) {
     const bst_streak_bank *bank = t->job->bank;
     const bst_streak_map *map = t->job->map;
     int a = piece_rows(octave), kinds = 2 * a + 1;
@@ -306,11 +313,11 @@ static void run_octave(tile *t, int octave) {
     long stride = map->stride[t->plane];
     const int16_t *plane = bst_streak_map_plane(map, t->plane);
     int windows = windows_of(bank, octave), needed = windows + 3;
-    /* pieces that begin in the tile's rows and those that its last lines need */
+    /* pieces that start in the tile's rows, and those that its last lines need */
     int last = (height / a) * a;
     int pieces = (t->y1 - t->y0 + a - 1) / a + needed - 1;
     pieces = pieces < (last - t->y0) / a ? pieces : (last - t->y0) / a;
-    /* a line reaches at most its own rows to a side */
+    /* a line extends sideways by at most its number of rows */
     int margin = needed * a, left = t->x0 - margin, wide = t->x1 - t->x0 + 2 * margin;
     const int16_t *in[16];
     if (a > 1) {
@@ -331,7 +338,7 @@ static void run_octave(tile *t, int octave) {
         if (have < 4) {
             break;
         }
-        /* lines of slope +1 and -1 are in the first plane */
+        /* lines of slope +1 and -1 belong to the first plane */
         int skip = t->plane ? 1 : 0;
         for (int i = skip; i < slopes_of(octave) - skip; i++) {
             int rows = most_rows(bank, a, i) / a;
@@ -357,13 +364,13 @@ static void run_octave(tile *t, int octave) {
                 }
             }
             if (best_window(t->line, t->x1 - t->x0, in, limit, windows)) {
-                collect(t, in, octave, i, t->y0 + j * a, usable);
+                collect_hits(t, in, octave, i, t->y0 + j * a, usable);
             }
         }
     }
 }
 
-/* Workers take tiles in turn; what a tile gives does not depend on which worker takes it. */
+/* Processes tiles (loop body); a tile's result does not depend on the worker. */
 static void run_tiles(void *user, int begin, int end) {
     run_job *job = user;
     bst_streak_bank *bank = job->bank;
@@ -382,7 +389,7 @@ static void run_tiles(void *user, int begin, int end) {
             t.count = &bank->hit_count[n];
             *t.count = 0;
             for (int o = job->first_octave; o < bank->octaves; o++) {
-                run_octave(&t, o);
+                sum_octave(&t, o);
             }
         }
     }

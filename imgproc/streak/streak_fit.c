@@ -9,10 +9,11 @@
 
 enum { PARAMETERS = 5, MAX_ITERATIONS = 20 };
 
-/* Change of chi-square below which a step moves the source by less than a tenth of its error. */
+/* Convergence: a smaller change of chi-square moves the source by less than a tenth of its error.
+ */
 static const double SETTLED = 0.01;
 
-/* Of a pivot, as a share of its diagonal element. */
+/* Least pivot of the Cholesky factorisation, relative to its diagonal element. */
 static const double LEAST_PIVOT = 1e-9;
 
 static const double PATH_STEP_PX = 0.02;
@@ -40,7 +41,7 @@ typedef struct normal {
     double a[PARAMETERS][PARAMETERS], g[PARAMETERS], square;
 } normal;
 
-/* Solves a x = b for symmetric positive definite a; false when it is not. */
+/* Solves a x = b for symmetric positive definite a; false if it is not. */
 static bool solve(double a[PARAMETERS][PARAMETERS], double *b) {
     double l[PARAMETERS][PARAMETERS];
     memcpy(l, a, sizeof l);
@@ -51,10 +52,10 @@ static bool solve(double a[PARAMETERS][PARAMETERS], double *b) {
     return true;
 }
 
-/* Chi-square of the source, whose image stays in fit->image. */
-static double evaluate(bst_streak_fit *fit, const bst_fit_data *data,
-                       const bst_imgproc_stamp *stamp, const uint8_t *excluded,
-                       const bst_imgproc_source *s) {
+/* Chi-square of the streak model; its image stays in fit->image. */
+static double evaluate_streak(bst_streak_fit *fit, const bst_fit_data *data,
+                              const bst_imgproc_stamp *stamp, const uint8_t *excluded,
+                              const bst_imgproc_source *s) {
     size_t n = (size_t)stamp->width * (size_t)stamp->height;
     double *share = fit->image, *by_v = share + 3 * n, chi = 0.0;
     bst_imgproc_gauss_render(fit->psf, &s->shape, stamp, share, share + n, share + 2 * n, by_v);
@@ -74,10 +75,10 @@ static double evaluate(bst_streak_fit *fit, const bst_fit_data *data,
     return chi;
 }
 
-/* Normal equations at the source that was evaluated last. */
-static void accumulate(bst_streak_fit *fit, const bst_fit_data *data,
-                       const bst_imgproc_stamp *stamp, const uint8_t *excluded,
-                       const bst_imgproc_source *s, normal *out) {
+/* Accumulates the normal equations at the streak evaluated last. */
+static void accumulate_streak(bst_streak_fit *fit, const bst_fit_data *data,
+                              const bst_imgproc_stamp *stamp, const uint8_t *excluded,
+                              const bst_imgproc_source *s, normal *out) {
     size_t n = (size_t)stamp->width * (size_t)stamp->height;
     double *share = fit->image, *by_x = share + n, *by_y = by_x + n, *by_v = by_y + n;
     double *along_x = by_v + n, *along_y = along_x + n, *spare = fit->spare;
@@ -120,6 +121,7 @@ static void accumulate(bst_streak_fit *fit, const bst_fit_data *data,
     }
 }
 
+/* Limits a step component to +-limit. */
 static double limited(double v, double limit) {
     return v < -limit ? -limit : v > limit ? limit : v;
 }
@@ -133,8 +135,8 @@ bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data,
     }
     bst_imgproc_source best = *source;
     normal at;
-    double chi = evaluate(fit, data, stamp, excluded, &best);
-    accumulate(fit, data, stamp, excluded, &best, &at);
+    double chi = evaluate_streak(fit, data, stamp, excluded, &best);
+    accumulate_streak(fit, data, stamp, excluded, &best, &at);
     double damping = 1e-3, length = hypot(best.shape.dx_px, best.shape.dy_px);
     bool settled = false;
     for (int iteration = 0; iteration < MAX_ITERATIONS && !settled; iteration++) {
@@ -153,7 +155,7 @@ bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data,
         next.shape.dx_px += limited(step[2], 4.0);
         next.shape.dy_px += limited(step[3], 4.0);
         next.flux_e = fmax(next.flux_e + step[4], 0.2 * next.flux_e);
-        double trial = evaluate(fit, data, stamp, excluded, &next);
+        double trial = evaluate_streak(fit, data, stamp, excluded, &next);
         if (!(trial <= chi + 1e-9)) {
             damping *= 10.0;
             settled = damping > 1e3;
@@ -163,7 +165,7 @@ bool bst_streak_fit_run(bst_streak_fit *fit, const bst_fit_data *data,
         damping = fmax(0.1 * damping, 1e-6);
         best = next;
         chi = trial;
-        accumulate(fit, data, stamp, excluded, &best, &at);
+        accumulate_streak(fit, data, stamp, excluded, &best, &at);
     }
     double moved =
         hypot(best.shape.x_px - source->shape.x_px, best.shape.y_px - source->shape.y_px);

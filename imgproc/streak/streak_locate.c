@@ -9,11 +9,11 @@
 #include "imgproc/measure/cosmic_ray.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
-/* A point this many times brighter than the streak under it is a source of its own. */
+/* most point sources replaced by a streak */
 enum { MOST_PIECES = 64 };
-/* Points per pixel from which bright streaks are no longer looked for among them. */
+/* Point density, px^-2, above which bright streaks are not searched among points. */
 static const double CROWD_PER_PX = 0.0015;
-/* From here a source is a point unless it covers that much more than a point's pixels. */
+/* Above this SNR a source counts as a point unless its area exceeds a point's by these limits. */
 static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
 static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
 
@@ -49,14 +49,14 @@ void bst_streak_locator_free(bst_streak_locator *l) {
     *l = (bst_streak_locator){0};
 }
 
-/* Where the filtered image of a point of this SNR falls below half a standard deviation, and a
- * little more for a PSF that is not quite the one known. */
+/* Radius at which a matched-filtered point of this SNR falls below half a standard deviation, with
+ * a margin for PSF errors, px. */
 static double disc_radius(double snr, double sigma_px) {
     return 2.3 * sigma_px * sqrt(log(2.0 * fmax(snr, 2.0))) + 0.5;
 }
 
-/* Distance from the line and place along it, 0 to 1. */
-static double across(const bst_streak_line *line, double x, double y, double *along) {
+/* Distance from a line, px, and position along it, 0 to 1. */
+static double distance_to_line(const bst_streak_line *line, double x, double y, double *along) {
     double ux = line->x1 - line->x0, uy = line->y1 - line->y0;
     double length = fmax(hypot(ux, uy), 1e-6);
     double px = x - line->x0, py = y - line->y0;
@@ -64,16 +64,17 @@ static double across(const bst_streak_line *line, double x, double y, double *al
     return fabs(px * uy - py * ux) / length;
 }
 
-/* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance, up to
- * beyond_px past its ends; returns how many, and marks them by `pieces`. */
-static int drop_pieces(bst_streak_locator *l, bst_imgproc_locator *found, int count,
-                       const bst_streak_line *line, double sigma_px, double piece_snr,
-                       double beyond_px) {
+/* Drops point sources that are fragments of a streak, up to beyond_px past its ends. Each has at
+ * most SNR piece_snr, within noise. Returns their number and stores them in `pieces`. */
+static int drop_fragments(bst_streak_locator *l, bst_imgproc_locator *found, int count,
+                          const bst_streak_line *line, double sigma_px, double piece_snr,
+                          double beyond_px) {
     double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
     int pieces = 0;
     for (int i = 0; i < count && pieces < MOST_PIECES; i++) {
         bst_imgproc_found *f = &found->found[i];
-        double along, distance = across(line, f->source.shape.x_px, f->source.shape.y_px, &along);
+        double along,
+            distance = distance_to_line(line, f->source.shape.x_px, f->source.shape.y_px, &along);
         double beyond = fmax(-along, along - 1.0) * length;
         bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < beyond_px;
         bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
@@ -85,9 +86,10 @@ static int drop_pieces(bst_streak_locator *l, bst_imgproc_locator *found, int co
     return pieces;
 }
 
-/* Leaves out pixels with the light of other sources. */
-static void exclude(bst_streak_locator *l, const bst_locate_frame *f,
-                    const bst_imgproc_locator *found, int count, const bst_imgproc_stamp *stamp) {
+/* Masks pixels of a stamp that hold light of other sources. */
+static void mask_other_sources(bst_streak_locator *l, const bst_locate_frame *f,
+                               const bst_imgproc_locator *found, int count,
+                               const bst_imgproc_stamp *stamp) {
     memset(l->excluded, 0, (size_t)stamp->width * (size_t)stamp->height);
     for (int i = 0; i < count; i++) {
         const bst_imgproc_found *o = &found->found[i];
@@ -111,6 +113,7 @@ static void exclude(bst_streak_locator *l, const bst_locate_frame *f,
     }
 }
 
+/* True if a streak's light is cut by the frame's edge. */
 static bool at_edge(const bst_locate_frame *f, const bst_imgproc_shape *s) {
     double x = 0.5 * fabs(s->dx_px) + 2.0 * f->sigma_px;
     double y = 0.5 * fabs(s->dy_px) + 2.0 * f->sigma_px;
@@ -118,10 +121,10 @@ static bool at_edge(const bst_locate_frame *f, const bst_imgproc_shape *s) {
            s->y_px + y > f->height - 0.5;
 }
 
-/* What a line whose fit fails is worth: across it as a point of its SNR, along it a third of its
- * length. */
-static void claim_line(const bst_locate_frame *f, const bst_streak_line *line,
-                       bst_imgproc_found *out) {
+/* Covariance of a line whose fit failed: across it that of a point of its SNR, along it a third of
+ * its length. */
+static void set_line_covariance(const bst_locate_frame *f, const bst_streak_line *line,
+                                bst_imgproc_found *out) {
     bst_imgproc_source *s = &out->source;
     double length = hypot(s->shape.dx_px, s->shape.dy_px);
     double c = s->shape.dx_px / length, d = s->shape.dy_px / length;
@@ -133,16 +136,17 @@ static void claim_line(const bst_locate_frame *f, const bst_streak_line *line,
     s->flux_variance = s->flux_e * s->flux_e / (line->snr * line->snr);
 }
 
-/* The source that a line of the search shows. */
-typedef struct measured {
+/* A streak measured from a detected line. */
+typedef struct measured_streak {
     bst_imgproc_found streak;
     bst_imgproc_stamp stamp;
-    bool fitted; /* false: the fit failed, and the line itself is all there is */
-} measured;
+    bool fitted; /* false: the fit failed, and the values are those of the line */
+} measured_streak;
 
-static void measure(bst_streak_locator *l, const bst_locate_frame *f,
-                    const bst_imgproc_locator *found, int count, const bst_streak_line *line,
-                    double beyond_px, measured *result) {
+/* Measures the streak of a detected line: fits position, path and flux. */
+static void measure_streak(bst_streak_locator *l, const bst_locate_frame *f,
+                           const bst_imgproc_locator *found, int count, const bst_streak_line *line,
+                           double beyond_px, measured_streak *result) {
     bst_imgproc_found *out = &result->streak;
     bst_imgproc_stamp *stamp = &result->stamp;
     *out = (bst_imgproc_found){.peak_snr = (float)line->snr, .streak = true};
@@ -156,16 +160,16 @@ static void measure(bst_streak_locator *l, const bst_locate_frame *f,
         found->widening_weight > 0.0 ? found->widening_sum / found->widening_weight : 0.0;
     out->noise_e = bst_background_noise_at(f->background, s->shape.x_px, s->shape.y_px);
     double length = hypot(s->shape.dx_px, s->shape.dy_px);
-    /* norm of a streak that is long against the PSF: 1 / sqrt(2 sqrt(pi) sigma length) */
+    /* norm of a streak that is long compared with the PSF: 1 / sqrt(2 sqrt(pi) sigma length) */
     double norm = 1.0 / sqrt(2.0 * sqrt(BST_PI) * f->sigma_px * (length + 2.0));
     s->flux_e = line->snr * out->noise_e / norm;
     double reach = fmax(3.0, ceil(3.6 * f->sigma_px)) + 0.1 * length + beyond_px;
     *stamp = bst_fit_stamp(s, reach, l->fit.max_side, f->width, f->height);
     bst_fit_data data = {f->signal, f->width, f->height, out->noise_e};
-    exclude(l, f, found, count, stamp);
+    mask_other_sources(l, f, found, count, stamp);
     result->fitted = bst_streak_fit_run(&l->fit, &data, stamp, l->excluded, s, &norm);
     if (!result->fitted) {
-        claim_line(f, line, out);
+        set_line_covariance(f, line, out);
     }
     out->peak_x = (int)floor(s->shape.x_px + 0.5);
     out->peak_y = (int)floor(s->shape.y_px + 0.5);
@@ -189,10 +193,10 @@ static void measure(bst_streak_locator *l, const bst_locate_frame *f,
     }
 }
 
-/* Chi-square of the dropped pieces as sources of their own, on the stamp of the latest fit. */
-static double chi_of_pieces(bst_streak_locator *l, const bst_locate_frame *f,
-                            const bst_imgproc_locator *found, int pieces,
-                            const bst_imgproc_stamp *stamp, double noise) {
+/* Chi-square of the dropped fragments as separate point sources, on the stamp of the latest fit. */
+static double chi_square_of_points(bst_streak_locator *l, const bst_locate_frame *f,
+                                   const bst_imgproc_locator *found, int pieces,
+                                   const bst_imgproc_stamp *stamp, double noise) {
     size_t n = (size_t)stamp->width * (size_t)stamp->height;
     double *total = l->fit.image, *share = total + n, chi = 0.0;
     memset(total, 0, n * sizeof(double));
@@ -218,7 +222,7 @@ static double chi_of_pieces(bst_streak_locator *l, const bst_locate_frame *f,
     return chi;
 }
 
-/* SNR of the two brightest points on the line together; in the map they are cut down. */
+/* Combined SNR of the two brightest points on the line; the streak map limits their values. */
 static double snr_of_points(const bst_streak_locator *l, const bst_imgproc_locator *found,
                             int pieces, const bst_streak_line *line) {
     double first = line->point_snr[0], second = line->point_snr[1];
@@ -235,7 +239,7 @@ static double snr_of_points(const bst_streak_locator *l, const bst_imgproc_locat
     return hypot(first, second);
 }
 
-/* Whether the fit went to a streak that is there already. */
+/* True if the fit converged to a streak that is already found. */
 static bool is_known(const bst_locate_frame *f, const bst_imgproc_locator *found, int points,
                      const bst_imgproc_found *streak) {
     for (int i = points; i < found->count; i++) {
@@ -245,7 +249,7 @@ static bool is_known(const bst_locate_frame *f, const bst_imgproc_locator *found
                                 .x1 = s->x_px + 0.5 * s->dx_px,
                                 .y1 = s->y_px + 0.5 * s->dy_px};
         const bst_imgproc_shape *n = &streak->source.shape;
-        double along, distance = across(&line, n->x_px, n->y_px, &along);
+        double along, distance = distance_to_line(&line, n->x_px, n->y_px, &along);
         double turn =
             fabs(s->dx_px * n->dy_px - s->dy_px * n->dx_px) / fmax(hypot(s->dx_px, s->dy_px), 1.0);
         if (distance < 3.0 * f->sigma_px && along > -0.1 && along < 1.1 &&
@@ -256,28 +260,28 @@ static bool is_known(const bst_locate_frame *f, const bst_imgproc_locator *found
     return false;
 }
 
-/* Takes a line for a streak with the points up to beyond_px past its ends as its pieces, unless
- * `bare`, then those that are not too bright for it; false, and all as it was, when they are better
- * explained as points. */
-static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_imgproc_locator *found,
-                     int points, const bst_streak_line *line, double beyond_px, bool bare) {
+/* Adds a detected line as a streak if it explains the data better than point sources. Points up to
+ * beyond_px past its ends become its fragments; with `bare`, only those not too bright for it.
+ * Returns false, with all points restored, if the points explain the data better. */
+static bool try_streak(bst_streak_locator *l, const bst_locate_frame *f, bst_imgproc_locator *found,
+                       int points, const bst_streak_line *line, double beyond_px, bool bare) {
     double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
     double piece =
         bare ? line->snr * sqrt(3.5 * f->sigma_px / (length + 3.5 * f->sigma_px)) : INFINITY;
-    int pieces = drop_pieces(l, found, points, line, f->sigma_px, piece, beyond_px);
-    measured own;
-    measure(l, f, found, points, line, beyond_px, &own);
+    int pieces = drop_fragments(l, found, points, line, f->sigma_px, piece, beyond_px);
+    measured_streak own;
+    measure_streak(l, f, found, points, line, beyond_px, &own);
     const bst_imgproc_found *streak = &own.streak;
-    /* a line that owes its SNR to light of others keeps little of it without that */
+    /* a line whose SNR comes from other sources loses it once they are masked */
     bool good = own.fitted ? streak->snr > line->snr - LOST_SNR : bare && pieces == 0;
     good = good && !is_known(f, found, points, streak);
     if (good && pieces > 0) {
-        /* points have three parameters, streaks five */
+        /* parameters: three per point, five per streak */
         int parameters = 0;
         for (int k = 0; k < pieces; k++) {
             parameters += found->found[l->pieces[k]].streak ? 5 : 3;
         }
-        double chi = chi_of_pieces(l, f, found, pieces, &own.stamp, streak->noise_e);
+        double chi = chi_square_of_points(l, f, found, pieces, &own.stamp, streak->noise_e);
         good = streak->snr > snr_of_points(l, found, pieces, line) &&
                streak->source.chi_square + 5.0 <= chi + parameters;
     }
@@ -290,26 +294,28 @@ static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_imgpr
     return good;
 }
 
-static void add(bst_streak_locator *l, const bst_locate_frame *f, bst_imgproc_locator *found,
-                int points, int lines) {
+/* Tests the detected lines and adds the streaks among them. */
+static void add_streaks(bst_streak_locator *l, const bst_locate_frame *f,
+                        bst_imgproc_locator *found, int points, int lines) {
     for (int i = 0; i < lines && found->count < found->capacity; i++) {
         const bst_streak_line *line = &l->search.found[i];
-        /* a point may be all that shows of the streak there, or a star on it or beside it */
+        /* a point may be the only visible part of the streak, or a star on or beside it */
         double hidden = 2.0 * disc_radius(line->snr, f->sigma_px);
-        if (!add_line(l, f, found, points, line, hidden, false)) {
-            add_line(l, f, found, points, line, 3.0 * f->sigma_px, true);
+        if (!try_streak(l, f, found, points, line, hidden, false)) {
+            try_streak(l, f, found, points, line, 3.0 * f->sigma_px, true);
         }
     }
 }
 
-static void blank_point(bst_streak_locator *l, double x, double y, double snr, double sigma,
-                        double widen) {
+/* Masks a point in the streak map. */
+static void mask_point(bst_streak_locator *l, double x, double y, double snr, double sigma,
+                       double widen) {
     bst_streak_map_blank(&l->search.map, x, y, x, y, widen * disc_radius(snr, sigma));
 }
 
-/* Takes charge out: what is left of its track beside the pixels that were left out. */
-static void blank_charge(bst_streak_locator *l, const bst_imgproc_found *o) {
-    /* a track of even charge, by its second moment */
+/* Masks a cosmic-ray track in the streak map, whose faint pixels are not masked in the signal. */
+static void mask_cosmic_ray(bst_streak_locator *l, const bst_imgproc_found *o) {
+    /* half length of a uniform track, from its second moment */
     double half = 0.5 * sqrt(12.0) / FWHM_PER_SIGMA * o->length_px;
     double dx = half * cos(o->angle_rad), dy = half * sin(o->angle_rad);
     double x = o->source.shape.x_px, y = o->source.shape.y_px;
@@ -317,9 +323,10 @@ static void blank_charge(bst_streak_locator *l, const bst_imgproc_found *o) {
                          3.0 * o->source.shape.sigma_px + 1.5);
 }
 
-/* The run of pixels above the threshold of row y that touches *lo to *hi and takes its place; their
- * number, 0 when there is none. */
-static int lit_in_row(const bst_filter *filter, double threshold, int y, int *lo, int *hi) {
+/* Run of pixels above the threshold in row y that touches columns *lo to *hi, which it replaces.
+ * Returns its length; 0: none. */
+static int run_above_threshold(const bst_filter *filter, double threshold, int y, int *lo,
+                               int *hi) {
     int first = *lo - 1, last = *hi + 1, count = 0;
     while (first <= last && !(first >= 0 && first < filter->width &&
                               (double)bst_filter_point_at(filter, first, y) > threshold)) {
@@ -347,23 +354,24 @@ static int lit_in_row(const bst_filter *filter, double threshold, int y, int *lo
     return count;
 }
 
-/* Pixels above the threshold that are joined to a maximum, row by row; counting ends at `enough`.
- */
-static int lit_pixels(const bst_filter *filter, double threshold, int x, int y, double enough) {
-    int lo = x, hi = x, count = lit_in_row(filter, threshold, y, &lo, &hi);
+/* Number of pixels above the threshold connected to a maximum, row by row; counting stops at
+ * `enough`. */
+static int area_above_threshold(const bst_filter *filter, double threshold, int x, int y,
+                                double enough) {
+    int lo = x, hi = x, count = run_above_threshold(filter, threshold, y, &lo, &hi);
     for (int step = -1; step <= 1; step += 2) {
         int l = lo, h = hi, more = count;
         for (int v = y + step; more > 0 && v >= 0 && v < filter->height && count < enough;
              v += step) {
-            more = lit_in_row(filter, threshold, v, &l, &h);
+            more = run_above_threshold(filter, threshold, v, &l, &h);
             count += more;
         }
     }
     return count;
 }
 
-/* Whether a source is too bright for a piece of a streak of that many pixels: filtered, a point is
- * above a threshold t on 4 pi sigma^2 ln(snr / t) pixels. */
+/* True if a source is too bright for a streak fragment of its area. A filtered point exceeds a
+ * threshold t on 4 pi sigma^2 ln(snr / t) pixels. */
 static bool is_bright_point(const bst_locate_frame *f, const bst_imgproc_found *o) {
     double snr = (double)o->peak_snr, threshold = f->filter->threshold;
     if (o->streak || (o->flags & BST_DETECTION_BLEND) || !(snr > BRIGHT_POINT_SNR)) {
@@ -371,7 +379,7 @@ static bool is_bright_point(const bst_locate_frame *f, const bst_imgproc_found *
     }
     double area = 4.0 * BST_PI * f->sigma_px * f->sigma_px * log(fmax(snr / threshold, 1.0));
     double most = AREA_SHARE * area + AREA_PIXELS;
-    return lit_pixels(f->filter, threshold, o->peak_x, o->peak_y, most) < most;
+    return area_above_threshold(f->filter, threshold, o->peak_x, o->peak_y, most) < most;
 }
 
 void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
@@ -383,27 +391,27 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
         const bst_imgproc_found *o = &found->found[i];
         bool saturated = o->flags & BST_DETECTION_SATURATED;
         if (bst_cosmic_ray_label(o->label)) {
-            blank_charge(l, o);
+            mask_cosmic_ray(l, o);
         } else if (saturated || is_bright_point(f, o)) {
-            blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
-                        saturated ? 1.5 : 1.0);
+            mask_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
+                       saturated ? 1.5 : 1.0);
         }
     }
-    /* among so many points chains of them are everywhere */
+    /* with so many points, chance alignments of points are everywhere */
     if (candidates->count < CROWD_PER_PX * (double)f->width * (double)f->height) {
-        add(l, f, found, points, bst_streak_search_bright(&l->search));
+        add_streaks(l, f, found, points, bst_streak_search_bright(&l->search));
     }
     int light = 0;
     for (int i = 0; i < points; i++) {
         const bst_imgproc_found *o = &found->found[i];
         if (!o->dropped && !bst_cosmic_ray_label(o->label)) {
             light++;
-            blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
+            mask_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
         }
     }
     for (int i = points; i < candidates->count; i++) {
         const bst_candidate *c = &candidates->items[candidates->order[i]];
-        blank_point(l, c->x, c->y, (double)c->snr, f->sigma_px, 1.0);
+        mask_point(l, c->x, c->y, (double)c->snr, f->sigma_px, 1.0);
     }
-    add(l, f, found, points, bst_streak_search_faint(&l->search, false_alarms, light));
+    add_streaks(l, f, found, points, bst_streak_search_faint(&l->search, false_alarms, light));
 }

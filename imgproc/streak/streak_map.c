@@ -7,7 +7,8 @@
 #include "imgproc/detect/filter.h"
 #include "imgproc/detect/row_kernels.h"
 
-/* What is brighter is a point or a bright streak: a point counts for little among many rows. */
+/* CLAMP_SIGMA: brighter pixels are limited, so that a point contributes little to a sum over many
+ * rows */
 enum { BAND = 64, TURN = 32, CLAMP_SIGMA = 5 };
 static const float SUM_BOUND = 6.0f;
 
@@ -20,7 +21,7 @@ bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height, bo
     *out = (bst_streak_map){.max_width = max_width, .max_height = max_height};
     out->bands = max_height / BAND + 1;
     size_t line = (size_t)max_width + 2 * BST_FILTER_MAX_RADIUS;
-    /* normalised, level, inverse noise, sum, ring */
+    /* work rows: normalised, level, inverse noise, sum, ring */
     out->lines_per_band = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 4);
     out->lines = calloc(out->lines_per_band * (size_t)out->bands, sizeof(float));
     out->memory[0] = calloc(plane_size(max_width, max_height), sizeof(int16_t));
@@ -40,6 +41,7 @@ void bst_streak_map_free(bst_streak_map *map) {
     *map = (bst_streak_map){0};
 }
 
+/* Sets the Gaussian kernel of the map's filter. */
 static void set_kernel(bst_streak_map *map, double sigma) {
     map->sigma_px = sigma;
     map->radius = (int)fmax(1.0, fmin(ceil(3.2 * sigma), BST_FILTER_MAX_RADIUS));
@@ -63,11 +65,11 @@ static void set_kernel(bst_streak_map *map, double sigma) {
 typedef struct fill_job {
     bst_streak_map *map;
     const float *signal;
-    float *sum; /* NULL, or where each pixel's own SNR is added */
+    float *sum; /* sum of each pixel's own SNR; NULL: not wanted */
     const bst_background *background;
 } fill_job;
 
-/* One bright pixel of one frame is not to stand for many. */
+/* Adds values limited to SUM_BOUND: one bright pixel of one frame must not dominate the sum. */
 static void add_bounded(float *restrict sum, const float *restrict values, int count) {
     for (int x = 0; x < count; x++) {
         float v = values[x] > SUM_BOUND ? SUM_BOUND : values[x];
@@ -75,8 +77,8 @@ static void add_bounded(float *restrict sum, const float *restrict values, int c
     }
 }
 
-/* One band of rows of the separable filter. */
-static void fill_band(const fill_job *job, int band) {
+/* Filters one band of rows with the separable kernel. */
+static void filter_band(const fill_job *job, int band) {
     bst_streak_map *map = job->map;
     int width = map->width, height = map->height, r = map->radius, taps = 2 * r + 1;
     int padded = (taps + 3) / 4 * 4;
@@ -128,12 +130,12 @@ static void fill_band(const fill_job *job, int band) {
 
 static void fill_bands(void *user, int begin, int end) {
     for (int band = begin; band < end; band++) {
-        fill_band(user, band);
+        filter_band(user, band);
     }
 }
 
-/* Rows of the second plane, in squares that fit the cache. */
-static void turn_band(void *user, int begin, int end) {
+/* Writes rows of the second (transposed) plane, in squares that fit the cache. */
+static void transpose_band(void *user, int begin, int end) {
     bst_streak_map *map = user;
     long from = map->stride[0], to = map->stride[1];
     const int16_t *in = bst_streak_map_plane(map, 0);
@@ -174,11 +176,12 @@ void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool,
 void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool,
                          const bst_streak_map_input *input) {
     bst_streak_map_filter(map, pool, input, CLAMP_SIGMA * BST_STREAK_QUANTA, NULL);
-    bst_parallel_for(pool, (input->width + TURN - 1) / TURN, 1, turn_band, map);
+    bst_parallel_for(pool, (input->width + TURN - 1) / TURN, 1, transpose_band, map);
 }
 
-static void blank(bst_streak_map *map, int plane, double x0, double y0, double x1, double y1,
-                  double radius) {
+/* Sets a plane to zero within a strip about a segment. */
+static void mask_segment(bst_streak_map *map, int plane, double x0, double y0, double x1, double y1,
+                         double radius) {
     int width = plane ? map->height : map->width, height = plane ? map->width : map->height;
     double ux = x1 - x0, uy = y1 - y0, square = ux * ux + uy * uy;
     int top = (int)fmax(ceil(fmin(y0, y1) - radius), 0.0);
@@ -202,6 +205,6 @@ static void blank(bst_streak_map *map, int plane, double x0, double y0, double x
 
 void bst_streak_map_blank(bst_streak_map *map, double x0, double y0, double x1, double y1,
                           double radius_px) {
-    blank(map, 0, x0, y0, x1, y1, radius_px);
-    blank(map, 1, y0, x0, y1, x1, radius_px);
+    mask_segment(map, 0, x0, y0, x1, y1, radius_px);
+    mask_segment(map, 1, y0, x0, y1, x1, radius_px);
 }

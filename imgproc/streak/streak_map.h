@@ -1,5 +1,5 @@
-/* What the search for streaks looks at: the frame in units of its noise, filtered with the PSF and
- * kept in 16 bits, with the stars taken out. */
+/* Input of the streak search: the frame in units of its noise, filtered with the PSF, in 16 bits,
+ * with the stars masked. */
 #ifndef BST_IMGPROC_STREAK_STREAK_MAP_H
 #define BST_IMGPROC_STREAK_STREAK_MAP_H
 
@@ -11,45 +11,48 @@
 
 enum {
     BST_STREAK_QUANTA = 16,   /* steps of the map per standard deviation */
-    BST_STREAK_PAD = 136,     /* zeros on every side */
-    BST_STREAK_MAX_ROWS = 128 /* pixels along the longer axis of a streak */
+    BST_STREAK_PAD = 136,     /* zero padding on every side */
+    BST_STREAK_MAX_ROWS = 128 /* longest streak along its longer axis, px */
 };
 
 typedef struct bst_streak_map {
     int max_width, max_height;
     int width, height;  /* of the latest frame */
     int stride[2];      /* of each plane */
-    int16_t *memory[2]; /* [height + 2 pad][stride], and the same with x and y exchanged or NULL */
+    int16_t *memory[2]; /* [height + 2 pad][stride]; plane 1 is transposed, or NULL */
     int radius;         /* of the PSF's kernel, px */
-    float kernel[64];   /* one axis, unit norm, padded with zeros to a multiple of 4 */
-    double sigma_px;    /* that the kernel was made for */
-    double correlation[64]; /* of the map at integer lags along an axis */
-    int clamp;              /* greatest value, quanta: no sum over a streak overflows */
-    float *lines;           /* work space of each band */
+    float kernel[64];   /* kernel along one axis, unit norm, padded with zeros to a multiple of 4 */
+    double sigma_px;    /* for which the kernel was computed */
+    double correlation[64]; /* autocorrelation of the map at integer lags along an axis */
+    int clamp;              /* largest value, quanta: no sum over a streak overflows */
+    float *lines;           /* work space per band */
     size_t lines_per_band;  /* floats */
     int bands;
 } bst_streak_map;
 
-/* turned: with the second plane. */
+/* Creates a streak map. Errors: BST_ERR_MEMORY.
+ *
+ * Given:     turned  also allocates the transposed plane */
 bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height, bool turned,
                                  bst_streak_map *out) BST_MUST_CHECK;
 /* Frees the memory of a map and clears the struct, which belongs to the caller. */
 void bst_streak_map_free(bst_streak_map *map);
 
-/* A frame. */
+/* Input frame of a streak map. */
 typedef struct bst_streak_map_input {
-    const float *signal; /* [height][width], electrons above the background, see background.h: what
-                            holds no measurement counts as background */
+    /* [height][width], electrons above the background, see background.h; pixels without a
+     * measurement count as background */
+    const float *signal;
     int width, height;
     const bst_background *background;
     double sigma_px; /* of the PSF */
 } bst_streak_map_input;
 
-/* Makes both planes. */
+/* Filters a frame into both planes. */
 void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool,
                          const bst_streak_map_input *input);
-/* Makes the first plane alone, with values of at most `clamp` quanta. Unless `sum` [height][width]
- * is NULL the SNR of each pixel by itself, within 6, is added to it. */
+/* Filters a frame into the first plane only, limited to `clamp` quanta. If `sum` [height][width] is
+ * not NULL, each pixel's own SNR, limited to 6, is added to it. */
 void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool,
                            const bst_streak_map_input *input, int clamp, float *sum);
 /* Sets both planes to zero within radius_px of a segment. */

@@ -6,19 +6,21 @@
 
 #include "sim/core/cholesky.h"
 
-/* Streaks fainter than this say nothing beside bright ones. */
+/* Least SNR of a streak used for the motion. */
 static const double LEAST_SNR = 20.0;
-/* A neighbour this bright relative to a streak would bend it. */
+/* Largest relative brightness of a neighbour that does not bias a streak. */
 static const double ALONE_SHARE = 0.02;
 static const double LEAST_PATH_SIGMAS = 4.0;
-/* More of the path than this, and a bend is no correction to an even motion. */
+/* Largest bend relative to the path length that can be treated as a correction to uniform motion.
+ */
 static const double MOST_BEND = 0.1;
-/* A motion that was this nearly right needs no third round. */
+/* A motion with a smaller correction needs no third round. */
 static const double SMALL_STEP_PX = 0.2;
-/* Chi-square, COMMON degrees of freedom, of what a star wants against what all agree on. */
+/* Rejection limit: chi-square, COMMON degrees of freedom, of a star's motion against the common
+ * one. */
 static const double REJECT_CHI2 = 25.0;
 enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, ROUNDS = 4 };
-/* Brightest candidates among which stars that stand alone are looked for. */
+/* number of brightest candidates searched for isolated stars */
 enum { LOOKED_AT = 16 * BST_STREAK_MOTION_STARS };
 
 typedef struct bst_streak_motion_star {
@@ -26,13 +28,12 @@ typedef struct bst_streak_motion_star {
     bst_imgproc_stamp stamp;
     double flux_e, product_e; /* flux; flux times widening */
     double start_x, start_y, noise_e;
-    double origin_x_px, origin_y_px; /* of the frame it is in */
-    /* the local parameters' step while the motion is held, and what a step of the motion takes off
-     * it */
+    double origin_x_px, origin_y_px; /* origin of the star's frame or window */
+    /* step of the star's own parameters at fixed motion, and its change per step of the motion */
     double step[1 + COMMON][LOCAL];
-    /* of the motion, the local parameters eliminated */
+    /* normal equations of the motion, the star's own parameters eliminated */
     double information[COMMON][COMMON], gradient[COMMON];
-    const float *pixels; /* as load_pixels has them */
+    const float *pixels; /* pixels and validity, as loaded by load_pixels */
     bool used;
 } star;
 
@@ -58,8 +59,8 @@ void bst_streak_motion_free(bst_streak_motion *work) {
     *work = (bst_streak_motion){0};
 }
 
-/* Whether a stamp lies inside the frame, has only pixels that measure, and no other source that
- * matters. */
+/* True if a stamp lies inside the frame, has only usable pixels, and contains no significant
+ * neighbour. */
 static bool is_alone(const bst_locate_frame *f, const bst_candidates *candidates, int rank,
                      const bst_imgproc_stamp *s, double margin) {
     if (s->x0 <= 0 || s->y0 <= 0 || s->x0 + s->width >= f->width ||
@@ -88,11 +89,12 @@ static bool is_alone(const bst_locate_frame *f, const bst_candidates *candidates
     return true;
 }
 
-/* Room about a path for a motion that is not yet known, and for what PSF is modelled. */
-static double reach(const bst_locate_frame *f) {
+/* Margin about a path: for the PSF and an unknown motion error, px. */
+static double stamp_margin(const bst_locate_frame *f) {
     return fmax(3.0, ceil(3.6 * f->sigma_px)) + 1.0;
 }
 
+/* Initialises the parameters of a star streak from a candidate. */
 static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
                        const bst_candidates *candidates, int rank, star *out) {
     const bst_candidate *c = &candidates->items[candidates->order[rank]];
@@ -117,13 +119,13 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
     out->flux_e = snr * out->noise_e / f->filter->streak_norm;
     bst_imgproc_source source = {.shape = out->shape};
-    out->stamp = bst_fit_stamp(&source, reach(f), work->max_side, f->width, f->height);
+    out->stamp = bst_fit_stamp(&source, stamp_margin(f), work->max_side, f->width, f->height);
     double margin = 0.5 * hypot(out->shape.dx_px, out->shape.dy_px);
     return is_alone(f, candidates, rank, &out->stamp, margin);
 }
 
 /* Solves a x = v for a symmetric positive definite matrix of order n and `count` right-hand sides,
- * each a row of x, by Cholesky; false when it is not definite. */
+ * each a row of x, by Cholesky; false if it is not definite. */
 static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
     if (!bst_cholesky_factor(a[0], LOCAL, n, 0.0)) {
         return false;
@@ -139,7 +141,7 @@ enum { ALL = LOCAL + COMMON, SUMS = ALL * (ALL + 3) / 2 };
 #define BST_SIMD_KERNELS "imgproc/streak/streak_motion_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-/* The star's pixels, all of which measure, and behind them 1 for each. */
+/* Loads a star's pixels, all usable, followed by their validity 1. */
 static void load_pixels(const bst_locate_frame *f, const bst_imgproc_stamp *stamp, float *value) {
     int stride = bst_simd_layout_round_up(stamp->width), n = stride * stamp->height;
     float valid[BST_PSF_MAX_SIDE + BST_LANES];
@@ -156,9 +158,9 @@ static void load_pixels(const bst_locate_frame *f, const bst_imgproc_stamp *stam
     }
 }
 
-/* Normal equations of one star at the present motion. */
-static bool accumulate(const bst_streak_motion *work, const bst_imgproc_gauss *psf,
-                       const bst_source_profiles *profiles, star *s) {
+/* Accumulates the normal equations of one star streak at the current motion. */
+static bool accumulate_star(const bst_streak_motion *work, const bst_imgproc_gauss *psf,
+                            const bst_source_profiles *profiles, star *s) {
     int n = bst_simd_layout_round_up(s->stamp.width) * s->stamp.height;
     const double along[2] = {work->ex, work->ey};
     bst_source_profile_render_motion(profiles, psf, &s->shape, &s->stamp, along, work->scratch,
@@ -216,8 +218,8 @@ static double clamp(double v, double limit) {
     return v < -limit ? -limit : v > limit ? limit : v;
 }
 
-/* Takes the local step that belongs to a step of the motion; false when the star runs away. */
-static bool advance(star *s, const double by[COMMON], double ex, double ey) {
+/* Applies a step of the motion to a star's own parameters; false if the star diverges. */
+static bool step_star(star *s, const double by[COMMON], double ex, double ey) {
     double step[LOCAL];
     for (int p = 0; p < LOCAL; p++) {
         step[p] = s->step[0][p];
@@ -239,9 +241,9 @@ static bool advance(star *s, const double by[COMMON], double ex, double ey) {
            isfinite(s->flux_e) && isfinite(s->product_e);
 }
 
-/* The step on which the stars and the priors agree. */
-static bool agree(const star *stars, int count, const double sigma[COMMON],
-                  const double away[COMMON], double step[COMMON]) {
+/* Joint motion step of all stars and the priors. */
+static bool solve_motion(const star *stars, int count, const double sigma[COMMON],
+                         const double away[COMMON], double step[COMMON]) {
     double a[LOCAL][LOCAL] = {{0}}, x[1][LOCAL] = {{0}};
     for (int k = 0; k < COMMON; k++) {
         double prior = 1.0 / (sigma[k] * sigma[k]);
@@ -265,8 +267,8 @@ static bool agree(const star *stars, int count, const double sigma[COMMON],
     return isfinite(step[0]) && isfinite(step[1]) && isfinite(step[2]);
 }
 
-/* Leaves out stars that want another motion than all agree on: hit by radiation, double. */
-static void reject(star *stars, int count, const double step[COMMON]) {
+/* Rejects stars whose motion disagrees with the common one: cosmic-ray hits, double stars. */
+static void reject_outliers(star *stars, int count, const double step[COMMON]) {
     for (int i = 0; i < count; i++) {
         double a[LOCAL][LOCAL] = {{0}}, x[1][LOCAL] = {{0}}, left[COMMON], chi2 = 0.0;
         for (int k = 0; k < COMMON; k++) {
@@ -329,7 +331,7 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *p
     double ex = work->ex, ey = work->ey, b = work->binning;
     bst_source_profiles_on(profiles, 0.0, 0.0, (int)b);
     bst_source_profiles_set(profiles, psf, work->sigma_px);
-    /* what is known exactly leaves the matrix well conditioned */
+    /* a floor for priors known exactly keeps the matrix well conditioned */
     const double least = 1e-4;
     const double sigma[COMMON] = {fmax(length_px, least), fmax(length_px, least),
                                   fmax(bend_px, least)};
@@ -338,20 +340,20 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *p
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
             bst_source_profiles_on(profiles, stars[i].origin_x_px, stars[i].origin_y_px, (int)b);
-            stars[i].used = stars[i].used && accumulate(work, psf, profiles, &stars[i]);
+            stars[i].used = stars[i].used && accumulate_star(work, psf, profiles, &stars[i]);
         }
-        if (!agree(stars, count, sigma, away, step)) {
+        if (!solve_motion(stars, count, sigma, away, step)) {
             return false;
         }
         if (round == ROUNDS - 2) {
-            reject(stars, count, step);
-            if (!agree(stars, count, sigma, away, step)) {
+            reject_outliers(stars, count, step);
+            if (!solve_motion(stars, count, sigma, away, step)) {
                 return false;
             }
         }
         left = 0;
         for (int i = 0; i < count; i++) {
-            stars[i].used = stars[i].used && advance(&stars[i], step, ex, ey);
+            stars[i].used = stars[i].used && step_star(&stars[i], step, ex, ey);
             left += stars[i].used;
         }
         bool small = true;

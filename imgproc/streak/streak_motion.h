@@ -1,4 +1,4 @@
-/* How the stars of a frame moved, from their streaks. */
+/* Measures the camera motion during the exposure from the star streaks of a frame. */
 #ifndef BST_IMGPROC_STREAK_STREAK_MOTION_H
 #define BST_IMGPROC_STREAK_STREAK_MOTION_H
 
@@ -10,14 +10,13 @@ enum {
 };
 
 typedef struct bst_streak_motion {
-    int max_side; /* of a stamp */
-    float *
-        planes; /* of bst_source_profile_render_motion; then the pixels, and 1 where there is one */
+    int max_side;  /* of a stamp */
+    float *planes; /* planes of bst_source_profile_render_motion, then pixels and their validity */
     float *scratch;
     float *pixels; /* [BST_STREAK_MOTION_STARS]: each star's last two planes */
     struct bst_streak_motion_star *stars; /* [BST_STREAK_MOTION_STARS] */
     int count;
-    double ex, ey, binning, sigma_px; /* the path's direction; sensor pixels per pixel; PSF */
+    double ex, ey, binning, sigma_px; /* direction of the path; sensor pixels per pixel; PSF */
 } bst_streak_motion;
 
 /* Allocates the work space of the fit of the camera's motion.
@@ -30,26 +29,32 @@ bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side,
 /* Frees the memory of a work space and clears the struct, which belongs to the caller. */
 void bst_streak_motion_free(bst_streak_motion *work);
 
-/* Corrects a frame's motion by what up to BST_STREAK_MOTION_STARS bright streaks that stand alone
- * show, fitted jointly with their places, fluxes and widths (Gauss-Newton, as bst_fit_run): what
- * the telemetry does not know (drift of the platform, jitter) or gets wrong (noise). Both would
- * else move the stars: a bend that is not known shifts all along their path alike, by up to 0.7 of
- * its error, and a path of the wrong direction turns the error ellipses.
+/* Starts a new frame. Measures the camera motion from up to BST_STREAK_MOTION_STARS bright isolated
+ * star streaks, fitted jointly with their positions, fluxes and widths (Gauss-Newton, as
+ * bst_fit_run). It corrects what the telemetry lacks (platform drift, jitter) or gets wrong
+ * (noise). An unknown bend would shift all stars along their path by up to 0.7 of its error. A
+ * wrong path direction would rotate the error ellipses.
  *
- * begin: a new frame. False when stars are points or their streaks too short to tell (4 sigma of
- * the PSF), or when the motion bends by more than a tenth of its length (the camera was starting or
- * stopping): nothing is to be measured then. add: takes the streaks of the frame or of a part of
- * it. solve: the priors, 1 sigma in px of the frame, are of the difference to frame->motion:
- * length_px of the path's length and direction, bend_px of the bend. *motion: a copy of
- * frame->motion, which is corrected; `profiles` are made for the frame's sigma. False, and nothing
- * changed, when no streak was bright enough. */
+ * Call bst_streak_motion_begin, then bst_streak_motion_add for each part of the frame, then
+ * bst_streak_motion_solve.
+ *
+ * Returned:  false if there is nothing to measure: stars are points, streaks are shorter than 4
+ *            sigma of the PSF, or the path bends by more than a tenth of its length (the camera was
+ *            starting or stopping) */
 bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *frame);
 /* Adds bright isolated streaks of the frame, or of a part of it, in order of their SNR. */
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *frame,
                            const bst_candidates *candidates);
 
-/* Fits the motion jointly to all streaks added; the comment above gives the arguments. False, with
- * *motion unchanged, if the fit is not possible. */
+/* Fits the motion jointly to all streaks added.
+ *
+ * Given:     profiles   set for the frame's sigma
+ *            length_px  1 sigma prior of the error of frame->motion: length and direction of the
+ *                       path, frame px
+ *            bend_px    1 sigma prior of the error of its bend, frame px
+ *            *motion    copy of frame->motion
+ * Returned:  *motion    corrected
+ *            false, with *motion unchanged, if no streak was bright enough */
 bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *psf,
                              bst_source_profiles *profiles, const bst_camera *camera,
                              double length_px, double bend_px, bst_camera_motion *motion);

@@ -5,28 +5,28 @@
 
 enum { MOST = BST_STREAK_MAX_ROWS + 96, MOST_LAGS = 2 * 24 };
 
-/* Standard deviations by which a sample may exceed the path's mean. */
+/* Limit, sigma, by which a sample may exceed the path's mean. */
 static const double CLIP_SIGMA = 2.5;
 static const double LIT_SHARE = 0.35;
 
-/* A straight path in a plane: column s0 at row t0, s1 at row t1 (centres of rows). */
+/* Straight path in a plane of the streak map: column s0 at row t0, s1 at row t1 (row centres). */
 typedef struct path {
     double s0, s1;
-    int t0, t1; /* rows between which s0 and s1 stand */
-    int e0, e1; /* rows summed */
+    int t0, t1; /* rows of s0 and s1 */
+    int e0, e1; /* range of summed rows */
     double snr;
 } path;
 
 typedef struct profile {
     int first, count;        /* rows */
     float value[MOST];       /* sigma */
-    double before[MOST + 1]; /* sum of the values before each row */
+    double before[MOST + 1]; /* cumulative sum of the values before each row */
     float scale[MOST + 1];   /* 1 / standard deviation of a sum of n rows */
 } profile;
 
-/* Samples the path's line on rows first .. first + count - 1. */
-static void sample(const bst_streak_map *map, int plane, const path *p, int first, int count,
-                   int most_rows, profile *out) {
+/* Samples the streak map along a path on rows first to first + count - 1. */
+static void sample_path(const bst_streak_map *map, int plane, const path *p, int first, int count,
+                        int most_rows, profile *out) {
     const int16_t *pixels = bst_streak_map_plane(map, plane);
     long stride = map->stride[plane];
     double slope = p->t1 > p->t0 ? (p->s1 - p->s0) / (p->t1 - p->t0) : 0.0;
@@ -47,7 +47,7 @@ static void sample(const bst_streak_map *map, int plane, const path *p, int firs
                         (1.0f / BST_STREAK_QUANTA);
         out->before[i + 1] = out->before[i] + (double)out->value[i];
     }
-    /* mean covariance of rows a lag apart */
+    /* mean covariance of rows by lag */
     float r[MOST_LAGS + 2];
     int lags = 2 * map->radius < count - 1 ? 2 * map->radius : count - 1;
     lags = lags < MOST_LAGS - 1 ? lags : MOST_LAGS - 1;
@@ -80,7 +80,7 @@ static void sample(const bst_streak_map *map, int plane, const path *p, int firs
     }
 }
 
-/* The best pair of ends within reach of those of the path. */
+/* Best end rows of a path within `reach` rows of its current ends. */
 static void best_ends(const profile *p, int reach, int most_rows, path *at) {
     int e0 = at->e0, e1 = at->e1;
     at->snr = -1.0;
@@ -100,21 +100,21 @@ static void best_ends(const profile *p, int reach, int most_rows, path *at) {
     }
 }
 
-/* The plane of a map that a path lies in, and the longest path. */
-typedef struct field {
+/* Plane of the streak map and longest path. */
+typedef struct search_plane {
     const bst_streak_map *map;
     int plane, rows;
     double max_px;
-} field;
+} search_plane;
 
-/* How far the ends of a path are moved: across by up to `steps` steps, along by `reach` rows. */
+/* Step sizes of the refinement: ends across by up to `steps` steps, along by `reach` rows. */
 typedef struct moves {
     double step;
     int steps, reach;
 } moves;
 
-/* One round of all moves. */
-static bool improve(const field *in, const moves *by, profile *work, path *best) {
+/* One refinement round over all moves; returns true if the SNR improved. */
+static bool improve_path(const search_plane *in, const moves *by, profile *work, path *best) {
     const path start = *best;
     const int steps = by->steps, reach = by->reach;
     int first = start.e0 - reach > 0 ? start.e0 - reach : 0;
@@ -131,7 +131,7 @@ static bool improve(const field *in, const moves *by, profile *work, path *best)
             path trial = start;
             trial.s0 += i * by->step;
             trial.s1 += j * by->step;
-            sample(in->map, in->plane, &trial, first, last - first + 1, most, work);
+            sample_path(in->map, in->plane, &trial, first, last - first + 1, most, work);
             best_ends(work, reach, most, &trial);
             if (trial.snr > best->snr + 1e-9) {
                 *best = trial;
@@ -139,7 +139,7 @@ static bool improve(const field *in, const moves *by, profile *work, path *best)
             }
         }
     }
-    /* the ends that count are those that were summed */
+    /* the ends are those of the summed rows */
     double slope = best->t1 > best->t0 ? (best->s1 - best->s0) / (best->t1 - best->t0) : 0.0;
     double s0 = best->s0 + slope * (best->e0 - best->t0);
     best->s1 = best->s0 + slope * (best->e1 - best->t0);
@@ -149,7 +149,7 @@ static bool improve(const field *in, const moves *by, profile *work, path *best)
     return better;
 }
 
-/* SNR of the two brightest points on the path that are apart. */
+/* SNR of the two brightest separate points on the path. */
 static void two_points(const bst_streak_map *map, int plane, const path *p, double out[2]) {
     const int16_t *pixels = bst_streak_map_plane(map, plane);
     double slope = p->t1 > p->t0 ? (p->s1 - p->s0) / (p->t1 - p->t0) : 0.0;
@@ -174,11 +174,11 @@ static void two_points(const bst_streak_map *map, int plane, const path *p, doub
     out[1] = (double)second / BST_STREAK_QUANTA;
 }
 
-/* SNR with outstanding samples cut down, and how evenly the path is lit. */
-static void judge(const bst_streak_map *map, int plane, const path *p, profile *work,
-                  bst_streak_line *out) {
+/* SNR of a path with outliers limited, and the uniformity of its brightness. */
+static void measure_path(const bst_streak_map *map, int plane, const path *p, profile *work,
+                         bst_streak_line *out) {
     int n = p->e1 - p->e0 + 1;
-    sample(map, plane, p, p->e0, n, BST_STREAK_MAX_ROWS, work);
+    sample_path(map, plane, p, p->e0, n, BST_STREAK_MAX_ROWS, work);
     double top = work->before[n] / n + CLIP_SIGMA, sum = 0.0;
     for (int i = 0; i < n; i++) {
         sum += fmin((double)work->value[i], top);
@@ -204,14 +204,14 @@ void bst_streak_refine(const bst_streak_map *map, const bst_streak_hit *hit, dou
     best.t1 = best.e1 = best.e0 + hit->rows - 1;
     profile work;
     int reach = hit->rows / 4 > 2 ? hit->rows / 4 : 2;
-    const field in = {map, plane, rows, max_px};
+    const search_plane in = {map, plane, rows, max_px};
     const moves coarse = {0.5, 2, reach}, fine = {0.25, 1, 2};
-    improve(&in, &coarse, &work, &best);
-    for (int round = 0; round < 3 && improve(&in, &fine, &work, &best); round++) {
+    improve_path(&in, &coarse, &work, &best);
+    for (int round = 0; round < 3 && improve_path(&in, &fine, &work, &best); round++) {
     }
     *out = (bst_streak_line){0};
     if (best.snr > 0.0) {
-        judge(map, plane, &best, &work, out);
+        measure_path(map, plane, &best, &work, out);
     }
     double slope = best.t1 > best.t0 ? (best.s1 - best.s0) / (best.t1 - best.t0) : 0.0;
     double u0 = best.s0 - 0.5 * slope, u1 = best.s1 + 0.5 * slope;

@@ -6,15 +6,17 @@
 #include "boresight/vec.h"
 #include "imgproc/measure/heapsort.h"
 
-/* Lines of the bank this much below the threshold are followed up: what the bank's steps cost. */
+/* Lines of the filter bank down to this margin below the threshold are refined: the loss of the
+ * bank's steps. */
 static const double MARGIN_SNR = 0.8;
-/* Measured on noise for PSFs of sigma 0.43 to 2.2 px, lengths of 24 to 120 px and 0.05 to 60 false
- * alarms per frame of 2048^2; theory has powers of -3 and 1 where nothing is discrete. */
+/* Threshold law fitted to noise, for PSFs of sigma 0.43 to 2.2 px, lengths of 24 to 120 px and 0.05
+ * to 60 false alarms per frame of 2048^2. Continuous theory has powers of -3 and 1. */
 static const double RATE = 0.72, SIGMA_POWER = -2.35, LENGTH_PX = 200.0;
-/* Points too faint to be found, for each that is: as many as numbers that go with 1 / SNR have from
- * SNR 3 up to a threshold of 5; and how near one another two of them look like a short streak. */
+/* Undetected points per detected one, for counts proportional to 1 / SNR from SNR 3 to a threshold
+ * of 5; and the distance, px, at which two of them look like a short streak. */
 static const double FAINTER = 0.7, PAIR_PX = 9.0;
-/* The search among points: a point alone stays below this SNR, and a chain of points has gaps. */
+/* Search for bright streaks: above the SNR that a point alone reaches in a sum; a chain of points
+ * has gaps. */
 enum { BRIGHT_OCTAVE = 1 };
 static const double BRIGHT_SNR = 7.5, BRIGHT_FILLED = 0.75, BRIGHT_PX = 11.0;
 
@@ -68,18 +70,20 @@ double bst_streak_threshold(double false_alarms, double width_px, double height_
     return 0.5 * (lo + hi);
 }
 
+/* Sort order of filter-bank hits by SNR. */
 static bool stronger_hit(const void *context, int a, int b) {
     const bst_streak_hit *h = context;
     return h[a].snr > h[b].snr || (h[a].snr == h[b].snr && a < b);
 }
 
+/* Sort order of lines by SNR. */
 static bool stronger_line(const void *context, int a, int b) {
     const bst_streak_line *l = context;
     return l[a].snr > l[b].snr || (l[a].snr == l[b].snr && a < b);
 }
 
-/* Whether hit b says of the same light what the stronger hit a says. */
-static bool same(const bst_streak_hit *a, const bst_streak_hit *b) {
+/* True if hit b is caused by the same light as the stronger hit a. */
+static bool is_same_streak(const bst_streak_hit *a, const bst_streak_hit *b) {
     float ax = a->x1 - a->x0, ay = a->y1 - a->y0, length = sqrtf(ax * ax + ay * ay);
     float mx = 0.5f * (b->x0 + b->x1 - a->x0 - a->x1), my = 0.5f * (b->y0 + b->y1 - a->y0 - a->y1);
     float along = (mx * ax + my * ay) / length, across = (my * ax - mx * ay) / length;
@@ -91,6 +95,7 @@ static bool same(const bst_streak_hit *a, const bst_streak_hit *b) {
     return turn * 0.5f * fminf(length, other) < 3.0f;
 }
 
+/* Refines the selected hits to paths (loop body). */
 static void refine_all(void *user, int begin, int end) {
     const bst_streak_search *s = user;
     for (int i = begin; i < end; i++) {
@@ -98,8 +103,8 @@ static void refine_all(void *user, int begin, int end) {
     }
 }
 
-/* One of each group of hits; in order of falling SNR. */
-static int choose(bst_streak_search *s, int hits) {
+/* Selects one hit per group, by falling SNR; returns their number. */
+static int select_hits(bst_streak_search *s, int hits) {
     for (int i = 0; i < hits; i++) {
         s->order[i] = i;
     }
@@ -109,7 +114,7 @@ static int choose(bst_streak_search *s, int hits) {
         const bst_streak_hit *hit = &s->bank.hits[s->order[i]];
         bool known = false;
         for (int k = 0; k < count && !known; k++) {
-            known = same(&s->chosen[k], hit);
+            known = is_same_streak(&s->chosen[k], hit);
         }
         if (!known) {
             s->chosen[count++] = *hit;
@@ -124,13 +129,15 @@ void bst_streak_search_fill(bst_streak_search *s, const float *signal, int width
     bst_streak_map_fill(&s->map, s->pool, &input);
 }
 
-/* Leaves lines above `threshold` whose `filled` and length are at least those given in s->found.
- * more: by which the square of a line's SNR exceeds that of the two brightest points on it. */
-static int run(bst_streak_search *s, int first_octave, double margin, double threshold,
-               double filled, double least_px, double more) {
+/* Searches streaks above `threshold` with at least the given filling and length; result in
+ * s->found.
+ *
+ * Given:     more  excess of the squared SNR of a line over that of its two brightest points */
+static int search_streaks(bst_streak_search *s, int first_octave, double margin, double threshold,
+                          double filled, double least_px, double more) {
     s->threshold_snr = threshold;
     int hits = bst_streak_bank_run(&s->bank, s->pool, &s->map, first_octave, threshold - margin);
-    s->candidates = choose(s, hits);
+    s->candidates = select_hits(s, hits);
     bst_parallel_for(s->pool, s->candidates, 4, refine_all, s);
     int kept = 0;
     for (int i = 0; i < s->candidates; i++) {
@@ -143,7 +150,7 @@ static int run(bst_streak_search *s, int first_octave, double margin, double thr
     for (int i = 0; i < kept && found < BST_STREAK_MAX_FOUND; i++) {
         bst_streak_line *line = &s->lines[s->order[i]];
         if (found > 0) {
-            /* without the light that is taken already */
+            /* refine again without the light of streaks already found */
             bst_streak_refine(&s->map, &s->chosen[s->order[i]], s->max_px, line);
         }
         double of_points = hypot(line->point_snr[0], line->point_snr[1]);
@@ -159,7 +166,7 @@ static int run(bst_streak_search *s, int first_octave, double margin, double thr
 }
 
 int bst_streak_search_bright(bst_streak_search *s) {
-    return run(s, BRIGHT_OCTAVE, 0.0, BRIGHT_SNR, BRIGHT_FILLED, BRIGHT_PX, 0.0);
+    return search_streaks(s, BRIGHT_OCTAVE, 0.0, BRIGHT_SNR, BRIGHT_FILLED, BRIGHT_PX, 0.0);
 }
 
 int bst_streak_search_faint(bst_streak_search *s, double false_alarms, int points) {
@@ -167,5 +174,5 @@ int bst_streak_search_faint(bst_streak_search *s, double false_alarms, int point
     double pairs = faint * faint * BST_PI * PAIR_PX * PAIR_PX / (2.0 * pixels);
     double threshold =
         bst_streak_threshold(false_alarms, s->map.width, s->map.height, s->map.sigma_px, s->max_px);
-    return run(s, 0, MARGIN_SNR, threshold, 0.0, 0.0, 2.0 * log1p(pairs / false_alarms));
+    return search_streaks(s, 0, MARGIN_SNR, threshold, 0.0, 0.0, 2.0 * log1p(pairs / false_alarms));
 }

@@ -4,9 +4,9 @@
 
 #include "boresight/vec.h"
 
-/* Half a side of the pixels that image processing fits, in sigmas. */
+/* Half side of the stamp fitted by image processing, in sigmas. */
 static const double FITTED_SIGMAS = 3.8;
-/* log10 of the first light. */
+/* log10 of the table's first light level. */
 static const double FIRST_LIGHT = -1.0, PER_DECADE = 4.0, PER_SIGMA = 2.0;
 
 enum { RADII = 48, ANGLES = 24 };
@@ -14,7 +14,7 @@ enum { RADII = 48, ANGLES = 24 };
 void bst_blend_weights_init(bst_blend_weights *out) {
     double step = FITTED_SIGMAS / RADII, turned[BST_BLEND_DISTANCES][RADII];
     for (int k = 0; k < BST_BLEND_DISTANCES; k++) {
-        /* at no distance the limit, by a small one */
+        /* limit of zero distance, by a small one */
         double d = fmax(k / PER_SIGMA, 1e-3);
         for (int i = 0; i < RADII; i++) {
             double r = (i + 0.5) * step;
@@ -38,7 +38,7 @@ void bst_blend_weights_init(bst_blend_weights *out) {
     }
 }
 
-/* Where a light is between the rows of the table. */
+/* Row of a light level in the table (fractional). */
 static double row_of(double light) {
     double row = (log10(fmax(light, 1e-30)) - FIRST_LIGHT) * PER_DECADE;
     return fmin(fmax(row, 0.0), BST_BLEND_LIGHTS - 1.001);

@@ -4,16 +4,17 @@
 #include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
 
-/* Sources below this share of the threshold are no detections, but light. */
+/* Sources below this share of the threshold are not detected; they only contribute light. */
 static const double FAINTEST_SHARE = 0.3;
-/* Errors of places grow by no more than this between sources that are seen as one. */
+/* Largest error factor between merged sources. */
 static const double FLATTEST = 6.0;
-/* Deviation along a streak, in sigmas of the PSF, from which on the place is not that of the
- * nearest top any more; noise of its filters over white noise's that is believed. */
+/* MERGED_CENTROID: standard deviation along a streak, in PSF sigmas, above which its position is
+ * drawn from the filter output. LEAST_NOISE, MOST_NOISE: limits of the output noise relative to
+ * white noise. */
 static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
-/* Keys of such streaks. */
+/* Random stream of such streaks. */
 static const uint64_t CENTROID_ERROR = (uint64_t)1 << 52;
-/* Alone, so bright and so many FWHM long, a detection is fitted as a streak of its own. */
+/* An isolated detection above this SNR and this many FWHM long is fitted as a streak of its own. */
 static const double OWN_STREAK_SNR = 10.0, OWN_STREAK_LENGTH = 1.5;
 
 double bst_generator_overlap(const bst_generator *g, const generator_source *a,
@@ -30,8 +31,7 @@ double bst_generator_output_variance(const bst_generator *g, const generator_sou
     return filter->variance + filter->shot * fmax(s->amplitude, 0.0);
 }
 
-/* Index of the first source whose row is at most `reach` px before that of source i; sources are in
- * order of y. */
+/* Index of the first source at most `reach` px above source i; sources are in order of y. */
 static int first_near(const bst_generator *g, int i, double reach) {
     int k = i;
     while (k > 0 && g->sources[k - 1].y >= g->sources[i].y - reach) {
@@ -40,6 +40,7 @@ static int first_near(const bst_generator *g, int i, double reach) {
     return k;
 }
 
+/* qsort order by falling brightness. */
 static int brighter(const void *a, const void *b) {
     const generator_rank *p = a, *q = b;
     if (p->amplitude != q->amplitude) {
@@ -48,7 +49,7 @@ static int brighter(const void *a, const void *b) {
     return (p->index > q->index) - (p->index < q->index);
 }
 
-/* Finds which sources are detected, and which are seen in one with a brighter one. */
+/* Decides which sources are detected and which are merged with a brighter one. */
 void bst_generator_decide(bst_generator *g) {
     double most = 0.0;
     for (int i = 0; i < g->source_count; i++) {
@@ -86,7 +87,7 @@ void bst_generator_decide(bst_generator *g) {
             if (light < 0.01) {
                 continue;
             }
-            bool brighter_one = o->found || o->head >= 0; /* a maximum that merged is one as well */
+            bool brighter_one = o->found || o->head >= 0; /* a merged maximum counts as well */
             if (brighter_one && !merged && !bst_generator_separates(g, o, s)) {
                 s->head = o->found ? k : o->head;
                 merged = true;
@@ -103,14 +104,14 @@ void bst_generator_decide(bst_generator *g) {
     }
 }
 
-/* What of a source's light lies near another's place: of a streak beside one that moved less its
- * nearest part, and that share of its light which a filter there sees. */
+/* Part of a source's light near another source: the nearest part of a streak, and the share of its
+ * light in a filter there. */
 typedef struct nearest_light {
     double dx, dy, share;
 } nearest_light;
 
-static nearest_light nearest_of(const bst_generator *g, const generator_source *s,
-                                const generator_source *o) {
+static nearest_light nearest_light_of(const bst_generator *g, const generator_source *s,
+                                      const generator_source *o) {
     nearest_light n = {o->x - s->x, o->y - s->y, 1.0};
     if (o->length < s->length + 2.0) {
         return n;
@@ -123,18 +124,19 @@ static nearest_light nearest_of(const bst_generator *g, const generator_source *
     return n;
 }
 
-/* Where a streak so faint is found that the top of the filters' output scatters along it. beside:
- * of the output there, what neighbours give that are found too. */
-static void centroid_error(const bst_generator *g, const generator_source *s,
-                           const generator_source *merged, int count, double beside,
-                           generator_blend *out) {
+/* Draws the position of a faint streak, whose filter output has a peak that scatters along it.
+ *
+ * Given:     beside  part of the output caused by detected neighbours */
+static void draw_streak_position(const bst_generator *g, const generator_source *s,
+                                 const generator_source *merged, int count, double beside,
+                                 generator_blend *out) {
     if (!s->as_streak || s->length < 1.0) {
         return;
     }
     const bst_obsgen_calibration *cal = &g->calibration;
     bst_crlb_table_at bound = bst_crlb_table_of(&g->bound, s->flux_e, g->noise_e, s->length);
-    /* factors of fainter ones hold that noise has lifted them above the threshold, as it does here
-     */
+    /* below UNLIFTED_SNR the factors already include the selection by noise, which is simulated
+     * here */
     double snr = fmax(s->flux_e * bound.norm / g->noise_e, UNLIFTED_SNR);
     double along = bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr) *
                    sqrt(bound.var_along_px2 * out->widen);
@@ -150,7 +152,7 @@ static void centroid_error(const bst_generator *g, const generator_source *s,
     double gain =
         bst_obsgen_between(bst_obsgen_lengths_px, cal->gain, BST_OBSGEN_LENGTHS, s->length);
     double own = s->amplitude / gain;
-    /* the bound's deviation over that of these filters' top where nothing scatters */
+    /* standard deviation of the bound relative to the filters' peak without scatter */
     double noise = along * own * sqrt(g->centroid_error->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
     double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;
@@ -171,7 +173,7 @@ static void centroid_error(const bst_generator *g, const generator_source *s,
     bst_streak_centroid_error_peak top =
         bst_streak_centroid_error_draw(g->centroid_error, key, sources, used, noise, threshold);
     if (!(top.snr > threshold)) {
-        return; /* so faint that it is seen for another reason */
+        return; /* so faint that it is detected for another reason */
     }
     double v = turned * top.across_px;
     out->x = s->x + c * top.along_px - n * v;
@@ -181,15 +183,15 @@ static void centroid_error(const bst_generator *g, const generator_source *s,
     out->snr = top.snr;
 }
 
-/* Whether a source's light is part of another detection, which is fitted beside this one. */
+/* True if a source's light belongs to another detection, which is fitted jointly. */
 static bool is_of_another(const bst_generator *g, const generator_source *s,
                           const generator_source *o) {
     return o->head >= 0 && g->sources[o->head].item != s->item;
 }
 
-/* Greatest second moment of the light about (x, y), px^2, as image processing measures it: under a
- * Gaussian window of twice the fitted PSF's variance, which is taken off again (inverse covariances
- * add), as is the pixel's. */
+/* Largest second moment of the light about (x, y), px^2, as image processing measures it. The
+ * Gaussian window has twice the fitted PSF's variance and is removed by adding inverse covariances;
+ * the pixel's variance is subtracted. */
 static double longest_moment(const bst_generator *g, const generator_source *s,
                              const generator_source *merged, int count, double x, double y) {
     double own = g->response.source.across_px * g->response.source.along_px;
@@ -213,9 +215,9 @@ static double longest_moment(const bst_generator *g, const generator_source *s,
     return windowed * window / (window - windowed) - 1.0 / 12.0;
 }
 
-/* What stands alone and is longer than a point is fitted as a streak of its own, whose middle is
- * that of all light in it: a bright pair that is seen as one. */
-static void take_for_streak(const bst_generator *g, const generator_source *s,
+/* Replaces an isolated merged pair longer than a point by a single streak at the centroid of its
+ * light. */
+static void merge_to_streak(const bst_generator *g, const generator_source *s,
                             const generator_source *merged, int count, generator_blend *out) {
     double snr = out->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
     double point = g->fitted_sigma * g->fitted_sigma;
@@ -226,7 +228,7 @@ static void take_for_streak(const bst_generator *g, const generator_source *s,
     if (moment < OWN_STREAK_LENGTH * OWN_STREAK_LENGTH * point) {
         return;
     }
-    /* an even streak of this length has this moment */
+    /* a uniform streak of this length has this moment */
     double length = sqrt(12.0 * (moment - point)), x = 0.0, y = 0.0, sum = 0.0;
     for (int k = -1; k < count; k++) {
         const generator_source *o = k < 0 ? s : &merged[k];
@@ -241,9 +243,8 @@ static void take_for_streak(const bst_generator *g, const generator_source *s,
     out->y = s->y + y / sum;
 }
 
-/* Light of sources that are seen in this one, and of what is fitted beside it. A fit of one source
- * to several lands where the filter's output is greatest: found by moving to the mean weighted with
- * what each gives there (mean shift). */
+/* Merged light of source i and the neighbours fitted jointly. A single-source fit to several
+ * sources converges to the filter output's maximum, found by mean shift. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     enum { MOST = 24, ROUNDS = 8 };
     const generator_source *s = &g->sources[i];
@@ -261,13 +262,13 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             continue;
         }
         double share = bst_generator_overlap(g, s, o);
-        if (o->found && !g->smeared) { /* in smeared frames nothing is fitted beside another */
+        if (o->found && !g->smeared) { /* in smeared frames nothing is fitted jointly */
             beside += o->amplitude * share;
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
-            /* both fluxes and places are free: what they have in common is not known */
+            /* both fluxes and positions are free, so their common part is undetermined */
             out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
         } else if (count < MOST) {
-            nearest_light n = nearest_of(g, s, o);
+            nearest_light n = nearest_light_of(g, s, o);
             generator_source *m = &merged[count++];
             *m = *o;
             m->x = s->x + n.dx;
@@ -279,7 +280,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     for (int round = 0; round < ROUNDS && count > 0; round++) {
         at.x = out.x;
         at.y = out.y;
-        /* the fitted light's brightest pixel, over the noise's variance */
+        /* brightest pixel of the fitted light over the noise variance */
         double bright = g->smeared
                             ? 0.0
                             : out.flux_e * bst_crlb_table_norm(&g->bound, s->length) * g->fit_light;
@@ -299,10 +300,10 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         out.y = s->y + y / sum;
     }
     if (count > 0) {
-        take_for_streak(g, s, merged, count, &out);
+        merge_to_streak(g, s, merged, count, &out);
     }
     if (count > 0 && s->length > 1.0) {
-        /* two streaks on one line have a flat top between them, where noise decides the place */
+        /* two streaks in line have a flat peak between them, where noise determines the position */
         double h = fmax(g->total_sigma, 0.25 * s->length) / s->length, alone = 0.0, all = 0.0;
         for (int step = -1; step <= 1; step++) {
             double weight = step == 0 ? 2.0 : -1.0;
@@ -319,6 +320,6 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         }
         out.flat = fmin(fmax(alone / fmax(all, 1e-9 * alone), 1.0), FLATTEST);
     }
-    centroid_error(g, s, merged, count, beside, &out);
+    draw_streak_position(g, s, merged, count, beside, &out);
     return out;
 }

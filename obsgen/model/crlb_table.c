@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double FIRST_RATIO = -1.0, PER_DECADE = 4.0; /* log10 of the first; nodes */
+/* log10 of the first ratio; nodes per decade */
+static const double FIRST_RATIO = -1.0, PER_DECADE = 4.0;
 
 enum { PHASES = 3, MAX_PIXELS = 128 };
 
@@ -12,34 +13,36 @@ static double length_of(int node, double sigma) {
     return node == 0 ? 0.0 : ldexp(sigma, node - 1);
 }
 
-/* Integral over pixel k of a normal density at c. */
-static double pixel(double k, double c, double sigma) {
+/* Integral of a normal density centred at c over pixel k. */
+static double pixel_integral(double k, double c, double sigma) {
     double s = sigma * sqrt(2.0);
     return 0.5 * (erf((k + 0.5 - c) / s) - erf((k - 0.5 - c) / s));
 }
-static double slope(double k, double c, double sigma) {
+/* Derivative of pixel_integral by c. */
+static double pixel_integral_slope(double k, double c, double sigma) {
     double a = (k + 0.5 - c) / sigma, b = (k - 0.5 - c) / sigma;
     return (exp(-0.5 * b * b) - exp(-0.5 * a * a)) / (sigma * 2.5066282746310002);
 }
 
-/* Share of pixel k of a segment of this length, integrated over the pixel: the difference of second
- * antiderivatives. */
-static double segment(double k, double c, double sigma, double length) {
+/* Share of light of a smeared segment in pixel k: second difference of antiderivatives. */
+static double segment_integral(double k, double c, double sigma, double length) {
     double sum = 0.0;
     int parts = length < 0.02 * sigma ? 1 : (int)fmin(ceil(3.0 * length / sigma), 4096.0);
     double lo = k - 0.5 - 7.0 * sigma, hi = k + 0.5 + 7.0 * sigma;
     for (int i = 0; i < parts; i++) {
         double at = c + length * ((i + 0.5) / parts - 0.5);
-        sum += at > lo && at < hi ? pixel(k, at, sigma) : 0.0;
+        sum += at > lo && at < hi ? pixel_integral(k, at, sigma) : 0.0;
     }
     return sum / parts;
 }
-static double segment_slope(double k, double c, double sigma, double length) {
+static double segment_integral_slope(double k, double c, double sigma, double length) {
     if (length < 0.02 * sigma) {
-        return slope(k, c, sigma);
+        return pixel_integral_slope(k, c, sigma);
     }
-    /* d/dc of the segment: its two ends */
-    return (pixel(k, c + 0.5 * length, sigma) - pixel(k, c - 0.5 * length, sigma)) / length;
+    /* derivative by c: the segment's two ends */
+    return (pixel_integral(k, c + 0.5 * length, sigma) -
+            pixel_integral(k, c - 0.5 * length, sigma)) /
+           length;
 }
 
 typedef struct profile {
@@ -47,18 +50,20 @@ typedef struct profile {
     double share[MAX_PIXELS], slope[MAX_PIXELS];
 } profile;
 
+/* Pixel-integrated profile of a segment and its derivative. */
 static void make_profile(profile *p, double c, double sigma, double length) {
     double reach = 0.5 * length + 6.0 * sigma + 1.0;
     p->first = (int)floor(c - reach);
     p->count = (int)ceil(c + reach) - p->first + 1;
     p->count = p->count < MAX_PIXELS ? p->count : MAX_PIXELS;
     for (int i = 0; i < p->count; i++) {
-        p->share[i] = segment(p->first + i, c, sigma, length);
-        p->slope[i] = segment_slope(p->first + i, c, sigma, length);
+        p->share[i] = segment_integral(p->first + i, c, sigma, length);
+        p->slope[i] = segment_integral_slope(p->first + i, c, sigma, length);
     }
 }
 
-static void add(const profile *x, const profile *y, double ratio, double sums[3]) {
+/* Adds the Fisher information of a product image: along, across, flux. */
+static void add_information(const profile *x, const profile *y, double ratio, double sums[3]) {
     for (int j = 0; j < y->count; j++) {
         for (int i = 0; i < x->count; i++) {
             double p = x->share[i] * y->share[j];
@@ -83,8 +88,8 @@ void bst_crlb_table_init(bst_crlb_table *b, double sigma_px) {
     profile x, y;
     b->sigma_px = sigma_px = fmax(sigma_px, 0.2);
     for (int n = 0; n < BST_BOUND_LENGTHS; n++) {
-        /* of a streak that would not fit, the middle is cut out: its information per length is
-         * that of its straight part, which is all across the path and none along it */
+        /* A streak that does not fit is cut in the middle: the straight part contributes
+         * information across the path only, in proportion to its length. */
         double length = length_of(n, sigma_px), most = MAX_PIXELS - 2.0 * (6.0 * sigma_px + 2.0);
         double shown = fmin(length, most), share = length > 0.0 ? shown / length : 1.0;
         double sums[BST_BOUND_RATIOS][3] = {{0}}, squared = 0.0;
@@ -94,7 +99,7 @@ void bst_crlb_table_init(bst_crlb_table *b, double sigma_px) {
             make_profile(&x, cx, sigma_px, shown);
             make_profile(&y, cy, sigma_px, 0.0);
             for (int r = 0; r < BST_BOUND_RATIOS; r++) {
-                add(&x, &y, share * pow(10.0, FIRST_RATIO + r / PER_DECADE), sums[r]);
+                add_information(&x, &y, share * pow(10.0, FIRST_RATIO + r / PER_DECADE), sums[r]);
             }
             squared += total_square(&x) * total_square(&y);
         }
@@ -108,7 +113,8 @@ void bst_crlb_table_init(bst_crlb_table *b, double sigma_px) {
     }
 }
 
-/* Where a length lies among the nodes: the square root of its growth is straight enough. */
+/* Node of a streak length in the table, and fraction; nodes are nearly linear in the square root.
+ */
 static int length_node(const bst_crlb_table *b, double length_px, double *part) {
     double x = length_px / b->sigma_px;
     if (!(x > 0.0)) {
@@ -116,7 +122,7 @@ static int length_node(const bst_crlb_table *b, double length_px, double *part) 
         return 0;
     }
     if (x < 1.0) {
-        *part = x * x; /* a short streak counts by its variance */
+        *part = x * x; /* a short streak acts by its variance */
         return 0;
     }
     double at = 1.0 + log2(x);
@@ -126,6 +132,7 @@ static int length_node(const bst_crlb_table *b, double length_px, double *part) 
     return node;
 }
 
+/* Bilinear interpolation in a table. */
 static double between(const float (*table)[BST_BOUND_RATIOS], int n, double pn, int r, double pr) {
     double low = (double)table[n][r] + pr * (double)(table[n][r + 1] - table[n][r]);
     double high = (double)table[n + 1][r] + pr * (double)(table[n + 1][r + 1] - table[n + 1][r]);
@@ -147,7 +154,7 @@ bst_crlb_table_at bst_crlb_table_of(const bst_crlb_table *b, double flux_e, doub
     int r = (int)at;
     r = r < BST_BOUND_RATIOS - 1 ? r : BST_BOUND_RATIOS - 2;
     double pr = at - r;
-    /* beyond the table's end shot noise is all: information grows with F alone */
+    /* beyond the table only shot noise counts: information is proportional to F */
     double beyond = fmax(ratio / pow(10.0, FIRST_RATIO + (BST_BOUND_RATIOS - 1) / PER_DECADE), 1.0);
     bst_crlb_table_at out;
     out.var_along_px2 = beyond / (flux_e * ratio * between(b->along, n, pn, r, pr));
@@ -159,7 +166,7 @@ bst_crlb_table_at bst_crlb_table_of(const bst_crlb_table *b, double flux_e, doub
 
 bst_crlb_table_at bst_crlb_table_wider(const bst_crlb_table *bound, double flux_e, double noise_e,
                                        double length_px, double wider) {
-    /* in pixels that are as much larger, with the noise of as many more of them */
+    /* equivalent to larger pixels with the noise of as many more of them */
     bst_crlb_table_at b = bst_crlb_table_of(bound, flux_e, noise_e * wider, length_px / wider);
     b.var_along_px2 *= wider * wider;
     b.var_across_px2 *= wider * wider;

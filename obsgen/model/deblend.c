@@ -1,33 +1,33 @@
-/* Which sources image processing separates: those whose maxima of the filters' output, on the pixel
- * grid, have a saddle between them that is low enough. */
+/* Source separation of the image path: two sources are resolved if their maxima of the filter
+ * output on the pixel grid have a low enough saddle. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "obsgen/generator_internal.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
-/* Image processing separates two sources where the saddle between them is so much lower than the
- * fainter one; and two places closer than this share of the FWHM are one. */
+/* Depth of the saddle, sigma and share of the fainter source, that separates two sources; positions
+ * closer than CLOSEST_FWHM are one. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
-/* It looks at what is above these shares of the threshold: the output of a source between four
- * pixels on one of them. */
+/* Interpolation starts at these shares of the threshold: the output of a source between four pixels
+ * on one of them. */
 static const double LOOK_CORNER = 0.93, LOOK_SHARE = 0.65;
-/* Further apart than this, and their streaks, no two share a maximum. */
+/* Sources farther apart than this, plus their streaks, share no maximum. */
 static const double FAR_SIGMAS = 8.0;
-/* Light below this at both maxima, SNR, does not shift the saddle. */
+/* Light below this SNR at both maxima does not affect the saddle. */
 static const double LEAST_LIGHT = 0.3;
-/* A saddle that is so many deviations of the noise off needs no noise. */
+/* A saddle this many sigma away from the limit is decided without a noise draw. */
 static const double CERTAIN_SIGMAS = 4.0;
-/* Keys of the noise between two maxima: 32 draws a source. */
+/* Random stream of the noise between two maxima: 32 draws per source. */
 static const uint64_t SADDLE_NOISE = (uint64_t)1 << 54;
 
 enum { MOST_LIGHTS = 16, MOST_NOISY = 14, MOST_PIXELS = 256 };
 
-/* The light on the pixels about two sources. Places are moved towards the brighter one by the
- * calibration's factor on distances. */
+/* Light on the pixels about two sources. Distances are scaled towards the brighter one by the
+ * calibration. */
 typedef struct scene {
     const bst_generator *g;
-    double x, y; /* of the brighter */
+    double x, y; /* of the brighter source */
     generator_source light[MOST_LIGHTS];
     int count;
 } scene;
@@ -37,6 +37,7 @@ typedef struct grid_place {
     double value;
 } grid_place;
 
+/* Adds a source's light to the scene. */
 static void add_light(scene *s, const generator_source *o) {
     double factor = s->g->calibration.blend_distance_factor;
     if (s->count < MOST_LIGHTS) {
@@ -47,7 +48,9 @@ static void add_light(scene *s, const generator_source *o) {
     }
 }
 
-static void gather(scene *s, const generator_source *bright, const generator_source *faint) {
+/* Collects the sources whose light affects the saddle. */
+static void collect_lights(scene *s, const generator_source *bright,
+                           const generator_source *faint) {
     const bst_generator *g = s->g;
     add_light(s, bright);
     add_light(s, faint);
@@ -70,6 +73,7 @@ static void gather(scene *s, const generator_source *bright, const generator_sou
     }
 }
 
+/* Noise-free filter output at a pixel. */
 static double output_of(const scene *s, int x, int y) {
     generator_source pixel = {.x = x, .y = y};
     double sum = 0.0;
@@ -79,8 +83,8 @@ static double output_of(const scene *s, int x, int y) {
     return sum;
 }
 
-/* The pixel of the output's maximum about a source. */
-static grid_place climb(const scene *s, const generator_source *from) {
+/* Pixel of the output's maximum near a source. */
+static grid_place find_maximum(const scene *s, const generator_source *from) {
     enum { MOST = 8 };
     grid_place at = {(int)lround(from->x), (int)lround(from->y), 0.0};
     at.value = output_of(s, at.x, at.y);
@@ -101,7 +105,7 @@ static grid_place climb(const scene *s, const generator_source *from) {
     return at;
 }
 
-/* Correlation of the noise of the filter's output at two pixels. */
+/* Noise correlation of the filter output between two pixels. */
 static double correlation(const bst_generator *g, bool as_streak, const grid_place *a,
                           const grid_place *b) {
     double dx = b->x - a->x, dy = b->y - a->y, length = as_streak ? g->streak : 0.0;
@@ -110,8 +114,8 @@ static double correlation(const bst_generator *g, bool as_streak, const grid_pla
     return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->filter_sigma);
 }
 
-/* Adds to the outputs between two maxima what their noise is beside that of the maxima, which the
- * levels of both sources hold: normal draws with the conditional covariance (Cholesky). */
+/* Adds noise to the outputs between two maxima, conditional on the noise of the maxima (in the
+ * sources' levels): normal draws with the conditional covariance. */
 static void add_noise(const scene *s, const generator_source *faint, const grid_place ends[2],
                       grid_place *between, int count) {
     enum { ALL = MOST_NOISY + 2 };
@@ -127,7 +131,7 @@ static void add_noise(const scene *s, const generator_source *faint, const grid_
         normal[used] = bst_rng_normal(g->key, (uint64_t)g->exposure_id,
                                       SADDLE_NOISE | faint->name << 5 | (uint64_t)used);
     }
-    for (int i = 0; i < used + 2; i++) { /* Cholesky */
+    for (int i = 0; i < used + 2; i++) { /* Cholesky factorisation */
         for (int k = 0; k <= i; k++) {
             double sum = correlation(g, faint->as_streak, all[i], all[k]);
             for (int n = 0; n < k; n++) {
@@ -146,7 +150,7 @@ static void add_noise(const scene *s, const generator_source *faint, const grid_
 }
 
 double bst_generator_looks_from(const bst_generator *g) {
-    /* between the pixels a source between four of them is looked at */
+    /* output of a source between four pixels on one of them */
     double corner = exp(-0.125 / (g->filter_sigma * g->filter_sigma));
     return fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold;
 }
@@ -162,8 +166,8 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
         return true;
     }
     scene s = {.g = g, .x = bright->x, .y = bright->y};
-    gather(&s, bright, faint);
-    const grid_place ends[2] = {climb(&s, &s.light[0]), climb(&s, &s.light[1])};
+    collect_lights(&s, bright, faint);
+    const grid_place ends[2] = {find_maximum(&s, &s.light[0]), find_maximum(&s, &s.light[1])};
     int dx = ends[1].x - ends[0].x, dy = ends[1].y - ends[0].y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     double value = ends[1].value;

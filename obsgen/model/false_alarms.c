@@ -4,18 +4,19 @@
 
 #include "obsgen/generator_internal.h"
 
-/* Draws of clutter begin beyond those of sources, whose names have 33 bits. */
+/* Random streams of false alarms, beyond those of sources, whose numbers have 33 bits. */
 static const uint64_t FALSE_ALARM = (uint64_t)1 << 40, HIT = (uint64_t)1 << 41,
                       WING_ALARM = (uint64_t)1 << 42;
-/* Light of wings below this, SNR, makes no alarms to speak of; maxima above LEAST_OUTPUT are as
- * rare as the law for high ones says. */
+/* Wing light below LEAST_WING (SNR) causes a negligible number of false alarms; the law of rare
+ * maxima holds above LEAST_OUTPUT. */
 static const double LEAST_WING = 0.3, LEAST_OUTPUT = 1.5;
-/* Places of independent noise between two maxima that are near. */
+/* Number of independent noise values between two adjacent maxima. */
 static const double WAY_PLACES = 2.0;
-/* Image processing takes a source for an artefact whose brightest pixel stands so far above its
- * peak: HOT_SHARE of it and HOT_SIGMA. */
+/* Image processing labels a source as an artefact if its brightest pixel exceeds the fitted peak by
+ * HOT_SHARE and HOT_SIGMA. */
 static const double HOT_SHARE = 1.1, HOT_SIGMA = 2.5;
 
+/* Uniform draw in (0, 1). */
 static double uniform(const bst_generator *g, uint64_t draw) {
     return bst_rng_uniform(g->key, (uint64_t)g->exposure_id, draw);
 }
@@ -51,10 +52,9 @@ bst_detection bst_false_alarms_point(const bst_generator *g, double x, double y,
     return d;
 }
 
-/* False alarms where offsets of rows and columns are part of the noise, over those of white noise
- * of the same variance, which the threshold is for: the output varies by more, but less from one
- * row or column to the next. */
-static double more_alarms(const bst_generator *g) {
+/* False-alarm rate with offsets of rows and columns relative to white noise of equal variance, for
+ * which the threshold is set. The output's variance is larger, but its gradient is smaller. */
+static double offset_alarm_factor(const bst_generator *g) {
     double more = 0.0;
     for (int k = 0; k < 2; k++) {
         double share = k == 1 ? g->streak_share : 1.0 - g->streak_share;
@@ -62,20 +62,21 @@ static double more_alarms(const bst_generator *g) {
         if (!(g->streak > 0.0)) {
             share = k == 0 ? 1.0 : 0.0;
         }
-        /* maxima go with sqrt(det of the gradient's covariance) u exp(-u^2 / 2), u in deviations;
-         * the offsets' part has no gradient along them */
+        /* the density of maxima is sqrt(det of the gradient's covariance) u exp(-u^2 / 2), u in
+         * sigma; offsets have no gradient along them */
         more += share * sqrt(g->white_share / v) / sqrt(v) * exp(0.5 * t * t * (1.0 - 1.0 / v));
     }
     return more;
 }
 
-/* The output's deviation on light that gives an output of `light`, over that without. */
+/* Noise of the output on wing light relative to open sky; light: its output, SNR. */
 static double wing_noise(const bst_generator *g, double light) {
     return sqrt(1.0 + light * bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e);
 }
 
-/* How many more of the noise's maxima on such light are seen: they exceed the threshold, and a
- * place on the way to a higher one nearby is below what image processing looks at. */
+/* Additional false alarms per noise maximum on wing light. A maximum must exceed the threshold, and
+ * the path to a higher maximum nearby must drop below the interpolation limit of image processing.
+ */
 static double wing_gain(const bst_generator *g, double light) {
     double t = g->filters[0].threshold, noise = wing_noise(g, light);
     double u = fmax((t - light) / noise, LEAST_OUTPUT);
@@ -84,26 +85,26 @@ static double wing_gain(const bst_generator *g, double light) {
     return fmax(alone * u / t * exp(0.5 * (t * t - u * u)) - 1.0, 0.0);
 }
 
-/* Output so far from a source. Image and filter have the same wings, and far out their correlation
- * is the sum of both; but image processing's kernel ends before. */
-static double wing_light(const bst_generator *g, const generator_source *s, double distance_px) {
+/* Filter output caused by a source's wings at a distance. Image and filter have equal wings, whose
+ * correlation is the sum of both; but image processing's kernel is truncated, hence half. */
+static double wing_output(const bst_generator *g, const generator_source *s, double distance_px) {
     return 0.5 * s->amplitude * bst_response_falloff(&g->response, distance_px, 0.0, 0.0);
 }
 
-/* Alarms on the wings of one source: noise that its light lifts. Within the box in which image
- * processing looks for a higher maximum the source itself is one, and its flank is a ridge. */
+/* Draws false alarms on the wings of one source. Near the source none occur: it is the higher
+ * maximum, connected by its flank. */
 static void draw_wing_alarms(bst_generator *g, const generator_source *s, double per_px) {
     enum { RINGS = 64 };
     double reach = ceil(6.0 * g->fitted_sigma + g->streak) + 2.5;
     double end = (BST_FALLOFF_DISTANCES - 1.0) / BST_FALLOFF_PER_PX, step = (end - reach) / RINGS;
-    if (!(step > 0.0) || wing_light(g, s, reach) < LEAST_WING) {
+    if (!(step > 0.0) || wing_output(g, s, reach) < LEAST_WING) {
         return;
     }
     uint64_t draw = WING_ALARM | s->name << 8;
     double arrival = -log(uniform(g, draw++));
     for (int i = 0; i < RINGS; i++) {
         double r = reach + (i + 0.5) * step;
-        double light = wing_light(g, s, r);
+        double light = wing_output(g, s, r);
         if (!(light > 0.0)) {
             continue;
         }
@@ -131,11 +132,11 @@ static void draw_wing_alarms(bst_generator *g, const generator_source *s, double
 
 void bst_false_alarms_draw(bst_generator *g) {
     double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
-    /* background that is found too bright takes from noise */
+    /* an overestimated background lowers the output */
     double taken = g->background_bias_e / (bst_crlb_table_norm(&g->bound, 0.0) * g->noise_e);
     expected *= exp(-taken * (g->threshold + 0.5 * taken));
-    expected *= more_alarms(g);
-    if (g->smeared) { /* nothing is looked at between the pixels */
+    expected *= offset_alarm_factor(g);
+    if (g->smeared) { /* maxima are not interpolated */
         double least =
             g->threshold * g->noise_e / g->dark_noise_e +
             g->background_bias_e / (bst_crlb_table_norm(&g->bound, 0.0) * g->dark_noise_e);
@@ -181,7 +182,7 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
     double pixel_cm2 = h->pixel_pitch_um * h->pixel_pitch_um * 1e-8 * g->binning * g->binning;
     double expected =
         h->rate_per_cm2_s * pixel_cm2 * g->width * g->height * (g->exposure_s + h->readout_s);
-    /* a point of one electron at the filter's output: its kernel's greatest value over the noise */
+    /* filter output of a point of one electron: the kernel's maximum over the noise */
     double kernel = 1.0 / (2.0 * BST_PI * g->total_sigma * g->total_sigma) /
                     bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
     double arrival = 0.0;
@@ -199,7 +200,7 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
         double angle = 2.0 * BST_PI * uniform(g, draw + 3);
         double x = g->width * uniform(g, draw + 4) - 0.5 + 0.5 * length * cos(angle);
         double y = g->height * uniform(g, draw + 5) - 0.5 + 0.5 * length * sin(angle);
-        /* the track as the filter sees it at its middle */
+        /* output of a track at its middle, relative to a point */
         double s = g->total_sigma * sqrt(2.0);
         double seen = length > 0.05 ? s * sqrt(BST_PI) * erf(0.5 * length / s) / length : 1.0;
         double snr = charge * kernel * fmin(seen, 1.0);

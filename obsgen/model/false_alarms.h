@@ -1,19 +1,21 @@
-/* Detections that are no sources of the truth. Inside of the generator. */
+/* Generated detections without a true source: false alarms and cosmic rays. Internal to the
+ * generator. */
 #ifndef BST_OBSGEN_MODEL_FALSE_ALARMS_H
 #define BST_OBSGEN_MODEL_FALSE_ALARMS_H
 
 #include "obsgen/generator.h"
 
-/* A detection of this SNR at (x, y) px of the frame: a point, or a star's streak of this length. */
+/* Detection of a given SNR at (x, y), frame px: a point, or a star streak of `length` px. */
 bst_detection bst_false_alarms_point(const bst_generator *generator, double x, double y, double snr,
                                      double length);
 
-/* Noise above the threshold: a Poisson number, anywhere on the frame, with the upper tail of the
- * filter's output. */
+/* Draws noise detections: a Poisson number, uniform over the frame, with the upper tail of the
+ * filter output. */
 void bst_false_alarms_draw(bst_generator *generator);
 
-/* Radiation hits by the detector's law: straight tracks at random angles (cosine law) through the
- * sensitive layer, with a Landau-like spread of charge, as far as the filter shows them. */
+/* Draws cosmic-ray hits by the detector model: straight tracks at random angles (cosine law)
+ * through the sensitive layer, with a Landau-like charge distribution, as the filter detects them.
+ */
 void bst_false_alarms_cosmic_rays(bst_generator *generator);
 
 #endif

@@ -6,12 +6,12 @@
 
 #include "boresight/vec.h"
 
-/* As image processing clips pixels, and when opposite neighbours agree with a mesh, standard
- * errors. */
+/* Clip level of image processing, and agreement of opposite neighbour meshes in standard errors. */
 static const double CLIP_SIGMA = 3.0, AGREEMENT = 4.0 * 1.2247449;
 
 enum { PER_SNR = 4 };
 
+/* Tabulates light and squared light of a line below the clip, by its height. */
 static void tabulate(bst_local_sky *sky, double sigma_px) {
     for (int i = 0; i < BST_LOCAL_SKY_HEIGHTS; i++) {
         double height = (double)i / PER_SNR, peak = height / (sigma_px * sqrt(2.0 * BST_PI));
@@ -22,6 +22,7 @@ static void tabulate(bst_local_sky *sky, double sigma_px) {
     sky->sigma = sigma_px;
 }
 
+/* Mesh and fraction of a pixel coordinate. */
 static bst_local_sky_place between(double at, int mesh, int count) {
     double u = fmin(fmax((at + 0.5) / mesh - 0.5, 0.0), count - 1.0);
     int i = (int)u;
@@ -29,8 +30,8 @@ static bst_local_sky_place between(double at, int mesh, int count) {
     return (bst_local_sky_place){count > 1 ? u - i : 0.0, i};
 }
 
-/* Places of all columns and rows of pixels. */
-static bst_status set_places(bst_ctx *ctx, bst_local_sky *sky) {
+/* Computes mesh and fraction of all pixel columns and rows. */
+static bst_status set_mesh_positions(bst_ctx *ctx, bst_local_sky *sky) {
     if (sky->width + sky->height > sky->places_room) {
         int room = sky->width + sky->height;
         bst_local_sky_place *more = realloc(sky->places, (size_t)room * sizeof *more);
@@ -70,7 +71,7 @@ bst_status bst_local_sky_begin(bst_ctx *ctx, bst_local_sky *sky, int width, int 
         sky->rows = rows;
         sky->width = width;
         sky->height = height;
-        BST_TRY(set_places(ctx, sky));
+        BST_TRY(set_mesh_positions(ctx, sky));
     }
     memset(sky->level, 0, 2 * (size_t)(columns * rows) * sizeof *sky->level);
     if (sky->sigma != sigma_px) {
@@ -85,6 +86,7 @@ void bst_local_sky_free(bst_local_sky *sky) {
     *sky = (bst_local_sky){0};
 }
 
+/* Mesh of a pixel. */
 static int mesh_of(int at, int mesh, int count) {
     int i = at / mesh;
     return i < count ? i : count - 1;
@@ -103,8 +105,8 @@ static int side_of(int i, int mesh, int count, int pixels) {
     return i + 1 < count ? mesh : pixels - i * mesh;
 }
 
-/* Means with the pairs of opposite neighbours whose mean is that of the mesh. */
-static void average(const bst_local_sky *sky, float *values, double error) {
+/* Averages each mesh with the opposite neighbours that agree with it. */
+static void smooth_meshes(const bst_local_sky *sky, float *values, double error) {
     static const int across[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
     memcpy(sky->scratch, values, (size_t)(sky->columns * sky->rows) * sizeof *values);
     for (int j = 0; j < sky->rows; j++) {
@@ -138,10 +140,10 @@ void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding) {
             sky->noise[k] = (float)sqrt(1.0 + crowding * (double)sky->noise[k] / pixels);
         }
     }
-    /* of a mean; that of a standard deviation is less */
+    /* standard error of a mean; that of a standard deviation is smaller */
     double error = 1.0 / sky->mesh;
-    average(sky, sky->level, error);
-    average(sky, sky->noise, error * sqrt(0.5));
+    smooth_meshes(sky, sky->level, error);
+    smooth_meshes(sky, sky->noise, error * sqrt(0.5));
 }
 
 static void set_sides(const float *at, int right, int below, double cell[2][2]) {

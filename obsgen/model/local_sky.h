@@ -1,49 +1,54 @@
-/* Background and noise as image processing finds them mesh by mesh, where the light of long streaks
- * is part of them. Inside of the generator. */
+/* Background and noise by mesh, as image processing estimates them, with the light of long streaks.
+ * Internal to the generator. */
 #ifndef BST_OBSGEN_MODEL_LOCAL_SKY_H
 #define BST_OBSGEN_MODEL_LOCAL_SKY_H
 
 #include "boresight/status.h"
 
-/* Heights of lines, SNR, that what a clipped mean holds of them is tabulated at, four to one. */
+/* Table size of line heights (SNR, four per unit) for the light below the clip. */
 enum { BST_LOCAL_SKY_HEIGHTS = 256 };
 
-/* Where a place lies along an axis: between the middles of mesh `first` and the next. */
+/* Position of a pixel between the centres of mesh `first` and the next. */
 typedef struct bst_local_sky_place {
-    double part; /* of the way from one to the other */
+    double part; /* fraction of the distance */
     int first;
 } bst_local_sky_place;
 
-/* What is mixed between the middles of four meshes: at the upper and lower left one the value, and
- * how much more it is at the right one. */
+/* Interpolation cell between four mesh centres: value at the left centre and increment to the right
+ * one, for the upper and lower row. */
 typedef struct bst_local_sky_cell {
-    int column, row; /* of the upper left one */
+    int column, row; /* of the upper left mesh */
     double level[2][2], noise[2][2];
 } bst_local_sky_cell;
 
 typedef struct bst_local_sky {
-    int mesh, columns, rows, width, height; /* px; of meshes; px */
-    float *level, *noise;                   /* of each mesh, see below */
+    int mesh, columns, rows, width, height; /* mesh: px; columns, rows: meshes; width, height: px */
+    float *level, *noise;                   /* per mesh, see bst_local_sky_settle */
     float *scratch;
     int room;
-    bst_local_sky_place *places; /* of the frame's columns, then of its rows */
+    bst_local_sky_place *places; /* of the frame's columns, then rows */
     int places_room;
-    double sigma; /* that the tables are for; 0: none */
+    double sigma; /* for which the tables are computed; 0: none */
     float light[BST_LOCAL_SKY_HEIGHTS], square[BST_LOCAL_SKY_HEIGHTS];
 } bst_local_sky;
 
-/* Before the lines of a frame. sigma_px with the pixel's own width; mesh_px: side of a mesh; what
- * remains of less than half of one joins its neighbour. BST_ERR_MEMORY. */
+/* Begins a frame.
+ *
+ * Given:     mesh_px   side of a mesh, px; a remainder of less than half a mesh joins its neighbour
+ *            sigma_px  including the pixel width
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_local_sky_begin(bst_ctx *ctx, bst_local_sky *sky, int width, int height, int mesh_px,
                                double sigma_px) BST_MUST_CHECK;
-/* Adds length_px of a line at a pixel of the frame that is read; height: its electrons per px over
- * the noise of a pixel, which is its SNR in the filter for points. */
+/* Adds length_px of a line at a frame pixel.
+ *
+ * Given:     height  electrons per px over pixel noise: the line's SNR in the point filter */
 void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double length_px);
-/* Makes of the lines' light what is too much of the level, in noises of a pixel, and the noise over
- * what it is without them; share and crowding: of the light and of its square that count.
- * Neighbours that agree are averaged as image processing does. */
+/* Converts the accumulated light to background excess, in pixel noises, and relative noise per
+ * mesh. Meshes are smoothed as image processing does.
+ *
+ * Given:     share, crowding  shares of light and squared light that enter */
 void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding);
-/* Both at a place, bilinear between the meshes' middles. */
+/* Background excess and relative noise at a position, bilinear between mesh centres. */
 void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise);
 
 /* Loads the corner values of a cell, for bst_local_sky_next.
@@ -53,12 +58,15 @@ void bst_local_sky_enter(const bst_local_sky *sky, int column, int row, bst_loca
 /* Frees the memory of a local sky and clears the struct, which belongs to the caller. */
 void bst_local_sky_free(bst_local_sky *sky);
 
+/* Bilinear interpolation in a cell. */
 static inline double bst_local_sky_mix(const double cell[2][2], double x, double y) {
     double top = cell[0][0] + x * cell[0][1], bottom = cell[1][0] + x * cell[1][1];
     return top + y * (bottom - top);
 }
 
-/* Both at a pixel of the frame. cell: that of the pixel before, its column -1 at first. */
+/* Background excess and relative noise at a frame pixel.
+ *
+ * Given:     cell  cell of the previous pixel, for reuse; its column is -1 at first */
 static inline void bst_local_sky_next(const bst_local_sky *sky, bst_local_sky_cell *cell, int x,
                                       int y, double *level, double *noise) {
     const bst_local_sky_place *across = &sky->places[x], *down = &sky->places[sky->width + y];

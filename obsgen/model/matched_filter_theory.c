@@ -14,12 +14,12 @@ static double above(double z) {
     return 0.5 * erfc(z * 0.70710678118654752);
 }
 
-/* Second antiderivative of a normal density of deviation s. */
+/* Second antiderivative of a normal density of standard deviation s. */
 static double ramp(double z, double s) {
     return z * bst_matched_normal_below(z / s) + s * density(z / s);
 }
 
-/* Autocorrelation of a blurred segment along itself, times s. */
+/* Autocorrelation of a blurred segment along its direction, times s. */
 static double along_itself(double d, double length, double s) {
     if (length < 0.05 * s) {
         return density(d / s);
@@ -75,7 +75,7 @@ double bst_matched_falloff(double along_px, double across_px, double length_px, 
            along_itself(0.0, length_px, s);
 }
 
-/* P(next > u | this > u) of two normal deviates of correlation rho. */
+/* P(next > u | this > u) of two normal variables with correlation rho. */
 static double stays_above(double u, double rho) {
     enum { NODES = 48 };
     double root = sqrt(fmax(1.0 - rho * rho, 1e-12)), sum = 0.0, total = 0.0;
@@ -89,8 +89,8 @@ static double stays_above(double u, double rho) {
     return sum / total;
 }
 
-/* Maxima above u per pixel of a field of unit variance; roughness: sqrt of the determinant of the
- * covariance of its gradient. */
+/* Density of maxima above u per pixel of a field of unit variance; roughness: sqrt of the
+ * determinant of its gradient's covariance. */
 static double maxima(double u, double roughness) {
     return roughness * u * exp(-0.5 * u * u) / (2.0 * BST_PI * ROOT_2PI);
 }

@@ -5,20 +5,20 @@
 
 #include "boresight/vec.h"
 
-/* Of the grid that images are sampled on, px that are read: its step, how far it goes beyond a
- * streak's ends, and the longest streak that is drawn. */
+/* Sampling grid of images, read-out px: step, margin beyond a streak's ends, longest sampled
+ * streak. */
 static const double STEP_PX = 1.0 / 3.0, MARGIN_PX = 11.0, LONGEST_PX = 40.0;
-/* Cycles per sensor pixel beyond which no OTF with its pixel counts. */
+/* Frequency, cycles per sensor pixel, beyond which no pixel-integrated OTF is significant. */
 static const double MOST_FREQUENCY = 3.0;
 static const double FIRST_RATIO = -1.0, PER_DECADE = 4.0; /* as in crlb_table.c */
 
-/* Image of a streak and its gradient on the grid, share per pixel. */
+/* Streak image and its gradient on the grid, share per pixel. */
 typedef struct sampled_image {
     int width, height;
     float *value, *by_x, *by_y;
 } sampled_image;
 
-/* What the OTF's sums along y are kept in, and all of the image. */
+/* Partial sums of the OTF along y, and the image. */
 typedef struct work_space {
     double *column[2]; /* [frequencies of x][height], real and imaginary; of the image */
     double *slope[2];  /* of its derivative by y */
@@ -33,7 +33,7 @@ static void free_space(work_space *w) {
     free(w->planes);
 }
 
-/* Sums the OTF up over the frequencies of y, for one frequency of x. */
+/* Fourier sum of the OTF over the frequencies of y at one frequency of x. */
 static void sum_column(const bst_response_side *side, const bst_response_nodes *nodes, int binning,
                        double fx, double smear, double df_y, int count_y, int height,
                        double *const column[2], double *const slope[2]) {
@@ -59,9 +59,10 @@ static void sum_column(const bst_response_side *side, const bst_response_nodes *
     }
 }
 
-/* Draws the image of a streak along x. */
-static bst_status draw(bst_ctx *ctx, const bst_response_side *side, const bst_response_nodes *nodes,
-                       int binning, double length, sampled_image *out, work_space *w) {
+/* Renders a streak along x by Fourier sums. */
+static bst_status render_streak(bst_ctx *ctx, const bst_response_side *side,
+                                const bst_response_nodes *nodes, int binning, double length,
+                                sampled_image *out, work_space *w) {
     double limit = fmin(bst_response_cutoff(side), MOST_FREQUENCY) * binning;
     out->width = (int)ceil((length + 2.0 * MARGIN_PX) / STEP_PX);
     out->height = (int)ceil(2.0 * MARGIN_PX / STEP_PX);
@@ -80,7 +81,7 @@ static bst_status draw(bst_ctx *ctx, const bst_response_side *side, const bst_re
     out->value = w->planes;
     out->by_x = w->planes + pixels;
     out->by_y = w->planes + 2 * pixels;
-    for (int m = 0; m <= count_x; m++) { /* half the plane: the image is real */
+    for (int m = 0; m <= count_x; m++) { /* half plane: the image is real */
         double fx = m * df_x, drawn = BST_PI * fx * length;
         double smear = fabs(drawn) < 1e-9 ? 1.0 : sin(drawn) / drawn;
         sum_column(side, nodes, binning, fx, smear, df_y, count_y, out->height, w->column,
@@ -100,9 +101,9 @@ static bst_status draw(bst_ctx *ctx, const bst_response_side *side, const bst_re
     return BST_OK;
 }
 
-/* Information of the image for light over noise, for all ratios: along, across, flux. */
-static void add_up(const sampled_image *image, double share, double sums[BST_BOUND_RATIOS][3],
-                   double *squared) {
+/* Fisher information of the image for all flux-to-noise ratios: along, across, flux. */
+static void add_information(const sampled_image *image, double share,
+                            double sums[BST_BOUND_RATIOS][3], double *squared) {
     size_t pixels = (size_t)image->width * (size_t)image->height;
     double area = STEP_PX * STEP_PX;
     *squared = 0.0;
@@ -131,14 +132,14 @@ bst_status bst_psf_bound_init(bst_ctx *ctx, const bst_response_side *side, int b
     out->sigma_px = fmax(sigma_px, 0.2);
     for (int n = 0; n < BST_BOUND_LENGTHS; n++) {
         double length = n == 0 ? 0.0 : ldexp(out->sigma_px, n - 1);
-        /* of a longer streak the middle is cut out, as in crlb_table.c */
+        /* a longer streak is cut in the middle, as in crlb_table.c */
         double shown = fmin(length, LONGEST_PX), share = length > 0.0 ? shown / length : 1.0;
         double sums[BST_BOUND_RATIOS][3], squared;
         sampled_image image = {.width = 0};
         work_space space;
-        bst_status status = draw(ctx, side, &nodes, binning, shown, &image, &space);
+        bst_status status = render_streak(ctx, side, &nodes, binning, shown, &image, &space);
         if (status == BST_OK) {
-            add_up(&image, share, sums, &squared);
+            add_information(&image, share, sums, &squared);
         }
         free_space(&space);
         BST_TRY(status);

@@ -1,4 +1,4 @@
-/* The bound of places and fluxes for a PSF that is no Gaussian. Inside of the generator. */
+/* Cramer-Rao bound of position and flux for a non-Gaussian PSF. Internal to the generator. */
 #ifndef BST_OBSGEN_MODEL_PSF_BOUND_H
 #define BST_OBSGEN_MODEL_PSF_BOUND_H
 

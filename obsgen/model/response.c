@@ -5,22 +5,23 @@
 
 #include "boresight/vec.h"
 
+/* Variance of a pixel, px^2. */
 static const double PIXEL_VARIANCE = 1.0 / 12.0;
-/* Steps of the sums over an OTF: an image that ends within REACH_PX is exact to its square there.
- */
+/* Frequency steps of the OTF sums: exact for images that end within REACH_PX. */
 enum { REACH_PX = 24 };
-/* OTF without the pixel below which frequencies count for nothing. */
+/* OTF value, without the pixel, below which frequencies are neglected. */
 static const double LEAST_OTF = 1e-4;
-/* Cycles per sensor pixel beyond which no OTF with its pixel counts. */
+/* Frequency, cycles per sensor pixel, beyond which no pixel-integrated OTF is significant. */
 static const double MOST_FREQUENCY = 3.0;
 
-/* Sums over frequencies of the products of source and filter: at rest, and on a line. */
+/* Spectral sums of the products of source and filter image: at rest and along a line. */
 typedef struct spectral_sums {
-    double point[3], line[3];     /* source by source, filter by filter, source by filter */
-    double gradient[3], filtered; /* filter's: xx, xy, yy */
+    double point[3], line[3];     /* source x source, filter x filter, source x filter */
+    double gradient[3], filtered; /* of the filter: xx, xy, yy */
 } spectral_sums;
 
-/* Of a pixel of b x b sensor pixels instead of one of them, at f cycles per sensor pixel. */
+/* Transfer function of binning b x b, relative to one sensor pixel, at f cycles per sensor pixel.
+ */
 static double binning_factor(double f, int b) {
     double s = sin(BST_PI * f);
     return b == 1 || fabs(s) < 1e-9 ? 1.0 : sin(BST_PI * f * b) / (b * s);
@@ -30,6 +31,7 @@ static double sinc(double x) {
     return fabs(x) < 1e-9 ? 1.0 : sin(BST_PI * x) / (BST_PI * x);
 }
 
+/* OTF of an image without the pixel. */
 static void transfer(const bst_response_side *side, const int *node, const double *weight,
                      int nodes, double fx, double fy, double out[2]) {
     double blur =
@@ -48,7 +50,7 @@ static void transfer(const bst_response_side *side, const int *node, const doubl
     }
 }
 
-/* Beyond it the OTF of a side counts for nothing, cycles per sensor pixel. */
+/* Cutoff frequency of an image's OTF, cycles per sensor pixel. */
 static double cutoff(const bst_response_side *side) {
     double widened =
         side->sigma_px > 0.0 ? sqrt(-log(LEAST_OTF) / 2.0) / (BST_PI * side->sigma_px) : INFINITY;
@@ -75,8 +77,9 @@ double bst_response_cutoff(const bst_response_side *side) {
     return cutoff(side);
 }
 
-static void sum_up(spectral_sums *s, const bst_response_side *source,
-                   const bst_response_side *filter, int binning, double x_px, double y_px) {
+/* Sums source and filter spectra over all frequencies. */
+static void sum_spectra(spectral_sums *s, const bst_response_side *source,
+                        const bst_response_side *filter, int binning, double x_px, double y_px) {
     const bst_response_side *const sides[2] = {source, filter};
     int node[2][4] = {{0}}, nodes[2] = {0, 0};
     double weight[2][4] = {{0.0}}, step = 0.5 / (REACH_PX * binning);
@@ -88,7 +91,7 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
     }
     *s = (spectral_sums){.filtered = 0.0};
     int count = (int)ceil(limit / step);
-    for (int j = 0; j <= count; j++) { /* half the plane: the images are real */
+    for (int j = 0; j <= count; j++) { /* half plane: the images are real */
         for (int i = -count; i <= count; i++) {
             double fx = i * step, fy = j * step, f = hypot(fx, fy), at[2][2];
             if (f > limit) {
@@ -104,8 +107,8 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
                 at[1][0] * at[1][0] + at[1][1] * at[1][1],
                 at[0][0] * at[1][0] + at[0][1] * at[1][1],
             };
-            /* mean over all directions of the integral along a line through the origin: 1 / (pi f)
-             * of the plane; at the origin the mean of 1 / (pi f) over the cell */
+            /* mean over all directions of the line integral through the origin: 1 / (pi f) of the
+             * plane; at the origin its mean over the cell */
             double line = i == 0 && j == 0 ? 4.0 * log(1.0 + sqrt(2.0)) / (BST_PI * step)
                                            : 1.0 / (BST_PI * f);
             for (int k = 0; k < 3; k++) {
@@ -121,8 +124,8 @@ static void sum_up(spectral_sums *s, const bst_response_side *source,
     s->filtered = s->point[1];
 }
 
-/* The correlation's mean over all directions: the Hankel transform of its spectrum's, in steps so
- * fine that the cusp at 0, which makes the wings, is resolved. */
+/* Mean correlation of source and filter over all directions, as a Hankel transform of its spectrum.
+ * The steps resolve the cusp at 0, which produces the wings. */
 static void tabulate_falloff(const bst_response_side *source, const bst_response_side *filter,
                              int binning, double x_px, double y_px, bst_falloff *out) {
     enum { RINGS = 768, DIRECTIONS = 12 }; /* of the half plane */
@@ -153,6 +156,7 @@ static void tabulate_falloff(const bst_response_side *source, const bst_response
     out->tabulated = true;
 }
 
+/* Interpolated falloff at a distance. */
 static double falloff_at(const bst_response *r, double distance_px) {
     double at = distance_px * r->falloff_scale * BST_FALLOFF_PER_PX;
     int i = (int)at;
@@ -172,7 +176,7 @@ double bst_response_falloff(const bst_response *r, double along_px, double acros
     if (length_px < 0.5) {
         return falloff_at(r, hypot(along_px, across_px));
     }
-    /* places of the path and of the filter's differ by a triangle's distribution */
+    /* the difference of positions on image and filter path has a triangular distribution */
     enum { MOST = 64 };
     int half = (int)fmin(ceil(1.5 * length_px), MOST);
     double sum = 0.0, own = 0.0;
@@ -184,12 +188,14 @@ double bst_response_falloff(const bst_response *r, double along_px, double acros
     return sum / own;
 }
 
+/* Equivalent Gaussian width from point and line sums. */
 static bst_obsgen_image_width width_of(double point, double line) {
     bst_obsgen_image_width w = {.across_px = 1.0 / (2.0 * sqrt(BST_PI) * line)};
     w.along_px = 1.0 / (4.0 * BST_PI * point * w.across_px);
     return w;
 }
 
+/* Width of a circular Gaussian of this variance. */
 static bst_obsgen_image_width even(double variance_px2) {
     return (bst_obsgen_image_width){sqrt(variance_px2), sqrt(variance_px2)};
 }
@@ -208,7 +214,7 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         return;
     }
     spectral_sums sums;
-    sum_up(&sums, source, filter, binning, x_px, y_px);
+    sum_spectra(&sums, source, filter, binning, x_px, y_px);
     out->source = width_of(sums.point[0], sums.line[0]);
     out->filter = width_of(sums.point[1], sums.line[1]);
     out->both = width_of(sums.point[2], sums.line[2]);

@@ -10,28 +10,28 @@
 static double density(double z) {
     return exp(-0.5 * z * z) / 2.5066282746310002;
 }
-/* Beyond so many deviations a normal distribution is 0 or 1 to double precision. */
+/* Sigmas beyond which a normal distribution is 0 or 1 to double precision. */
 static const double ALL_SIGMAS = 9.0;
-/* Bends that are none. */
+/* Bends below this are neglected. */
 static const double STRAIGHT_PX = 0.2;
-/* Ends of a path that stands still: this far on, light is gone. */
+/* Distance beyond the ends of a path at which light is negligible. */
 static const double BEYOND_SIGMAS = 4.0;
-/* Places that are closer along either axis are one. */
+/* Positions closer than this along both axes share a node. */
 static const double SAME_PX = 0.7;
 
 enum { GROUP = 8 };
 
-/* Nodes as they are laid, and the least box about each GROUP of them. */
-typedef struct laying {
+/* Trail nodes under construction, with a bounding box per GROUP of them. */
+typedef struct trail_builder {
     bst_star_trail_node *nodes;
     int count;
     struct group_box {
         double x0, x1, y0, y1;
     } box[BST_ROUTE_NODES / GROUP];
-} laying;
+} trail_builder;
 
-/* Whether one of the nodes from number `first` on is at a place. */
-static bool is_laid(const laying *l, int first, double x, double y) {
+/* True if a node from index `first` on lies at a position. */
+static bool has_node_at(const trail_builder *l, int first, double x, double y) {
     for (int from = first / GROUP * GROUP; from < l->count; from += GROUP) {
         const struct group_box *b = &l->box[from / GROUP];
         if (!(x > b->x0 - 1.0 && x < b->x1 + 1.0 && y > b->y0 - 1.0 && y < b->y1 + 1.0)) {
@@ -46,9 +46,12 @@ static bool is_laid(const laying *l, int first, double x, double y) {
     return false;
 }
 
-static void add_node(laying *l, double x, double y, double time) {
-    enum { BACK = 48 }; /* further back a path that returns is another part of the way */
-    if (l->count == BST_ROUTE_NODES || is_laid(l, l->count > BACK ? l->count - BACK : 0, x, y)) {
+/* Appends a node unless a recent one is at the position. */
+static void add_node(trail_builder *l, double x, double y, double time) {
+    /* beyond this many nodes back, a returning path is a separate part of the trail */
+    enum { BACK = 48 };
+    if (l->count == BST_ROUTE_NODES ||
+        has_node_at(l, l->count > BACK ? l->count - BACK : 0, x, y)) {
         return;
     }
     struct group_box *b = &l->box[l->count / GROUP];
@@ -62,8 +65,8 @@ static void add_node(laying *l, double x, double y, double time) {
     l->nodes[l->count++] = (bst_star_trail_node){x, y, time, 0.0};
 }
 
-/* Straight on from one node, away from another. */
-static void lay_on(laying *l, int end, int before, double sigma_px, double time) {
+/* Extends the trail straight beyond one end. */
+static void extend_trail(trail_builder *l, int end, int before, double sigma_px, double time) {
     const bst_star_trail_node e = l->nodes[end], b = l->nodes[before];
     double dx = e.x - b.x, dy = e.y - b.y, length = hypot(dx, dy);
     for (int i = 1; i <= (int)ceil(BEYOND_SIGMAS * sigma_px) && length > 0.0; i++) {
@@ -71,13 +74,14 @@ static void lay_on(laying *l, int end, int before, double sigma_px, double time)
     }
 }
 
-/* A piece of a path: a uniform segment. */
+/* A uniform straight piece of a path. */
 typedef struct piece {
     double x, y, cx, cy; /* middle; direction */
-    double half, near;   /* length; as far as its light counts along either axis */
-    double height;       /* of its light beside its middle: an equal share for each piece */
+    double half, near;   /* half length; extent of its light along either axis */
+    double height;       /* peak light: each piece has an equal share of the exposure */
 } piece;
 
+/* Piece k of a path. */
 static piece piece_of(const bst_star_trail_path *p, int k, double s) {
     double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
     double length = hypot(dx, dy), share = 1.0 / (p->count - 1);
@@ -94,7 +98,7 @@ static piece piece_of(const bst_star_trail_path *p, int k, double s) {
     return out;
 }
 
-/* Light of a piece at a place (x, y) from its middle. */
+/* Light of a piece at (x, y) relative to its middle. */
 static double piece_light(const piece *p, double x, double y, double s) {
     if (p->cx == 0.0 && p->cy == 0.0) { /* a point */
         return p->height * exp(-0.5 * (x * x + y * y) / (s * s));
@@ -122,7 +126,7 @@ static void add_light(const bst_star_trail_path *path, double s, bst_star_trail_
 }
 
 int bst_star_trail_lay(const bst_star_trail_path *p, double sigma_px, bst_star_trail_node *nodes) {
-    laying l = {.nodes = nodes};
+    trail_builder l = {.nodes = nodes};
     add_node(&l, p->x_px[0], p->y_px[0], 0.0);
     for (int k = 1; k < p->count; k++) {
         double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
@@ -135,10 +139,10 @@ int bst_star_trail_lay(const bst_star_trail_path *p, double sigma_px, bst_star_t
     }
     int last = l.count - 1;
     if (last > 0) {
-        lay_on(&l, last, last > 2 ? last - 3 : 0, sigma_px, 1.0);
-        /* those before the start go first, so that nodes stay in the order of the way */
+        extend_trail(&l, last, last > 2 ? last - 3 : 0, sigma_px, 1.0);
+        /* nodes before the start go first, to keep the order of the trail */
         int laid = l.count;
-        lay_on(&l, 0, last > 2 ? 3 : last, sigma_px, 0.0);
+        extend_trail(&l, 0, last > 2 ? 3 : last, sigma_px, 0.0);
         int more = l.count - laid;
         for (int i = 0; i < more; i++) {
             bst_star_trail_node moved = nodes[l.count - 1];
@@ -150,7 +154,7 @@ int bst_star_trail_lay(const bst_star_trail_path *p, double sigma_px, bst_star_t
     return l.count;
 }
 
-/* The model's places at even times. */
+/* Sampled positions of a uniform streak model. */
 enum { MOST_PLACES = 48, MOST_SAMPLES = 128 };
 typedef struct model {
     double x[MOST_PLACES], y[MOST_PLACES];
@@ -170,8 +174,9 @@ static model make_model(double dx, double dy, double bend_x, double bend_y, doub
     return m;
 }
 
-/* Gradient of the overlap of a place's light with the model moved by `at`, added up. */
-static void add_pull(const model *m, double x, double y, double s, double weight, double pull[2]) {
+/* Adds the gradient of the overlap between light at a position and the model. */
+static void add_overlap_gradient(const model *m, double x, double y, double s, double weight,
+                                 double pull[2]) {
     for (int i = 0; i < m->count; i++) {
         double dx = x - m->x[i], dy = y - m->y[i];
         double w = weight * exp(-0.5 * (dx * dx + dy * dy) / (s * s));
@@ -180,8 +185,8 @@ static void add_pull(const model *m, double x, double y, double s, double weight
     }
 }
 
-/* Minus the Hessian of the model's overlap with itself. */
-static void find_curvature(const model *m, double s, double h[3]) {
+/* Negative Hessian of the model's self-overlap. */
+static void overlap_curvature(const model *m, double s, double h[3]) {
     h[0] = h[1] = h[2] = 0.0;
     for (int i = 0; i < m->count; i++) {
         for (int k = 0; k < m->count; k++) {
@@ -194,10 +199,10 @@ static void find_curvature(const model *m, double s, double h[3]) {
     }
 }
 
-/* Steps of a path that a point's bias is a mean over: neighbours together where there are more. */
+/* Most path steps for a point's bias; longer paths are averaged in groups. */
 enum { MOST_STEPS = 512 };
 
-/* The path's steps with the share of the exposure that each holds; their number. */
+/* Path steps and the share of the exposure in each; returns their number. */
 static int gather_steps(const bst_star_trail_path *p, float *x, float *y, float *share) {
     int together = (p->count + MOST_STEPS - 1) / MOST_STEPS, count = 0;
     for (int from = 0; from < p->count; from += together, count++) {
@@ -215,7 +220,7 @@ static int gather_steps(const bst_star_trail_path *p, float *x, float *y, float 
     return count;
 }
 
-/* The first step for a straight model in closed form: to first order that is all. */
+/* First-order bias of a straight model in closed form. */
 static void straight_bias(const bst_star_trail_path *p, double dx_px, double dy_px, double s,
                           double bias_px[2]) {
     double length = hypot(dx_px, dy_px), along = 0.0, across = 0.0, value = 0.0;
@@ -237,7 +242,7 @@ static void straight_bias(const bst_star_trail_path *p, double dx_px, double dy_
         value += inside;
     }
     value = fmax(value, 1e-6);
-    /* of a streak minus the second derivative of its autocorrelation */
+    /* negative second derivative of the streak's autocorrelation */
     double curve =
         drawn ? 2.0 * (density(0.0) - density(length / s)) / (s * length) : value / (s * s);
     double a = fmax(-s, fmin(along / curve, s)), b = fmax(-s, fmin(across * s * s / value, s));
@@ -286,9 +291,9 @@ void bst_star_trail_bias(const bst_star_trail_path *p, double dx_px, double dy_p
         return;
     }
     model m = make_model(dx_px, dy_px, bend_x_px, bend_y_px, s);
-    find_curvature(&m, s, h);
+    overlap_curvature(&m, s, h);
     double determinant = fmax(h[0] * h[2] - h[1] * h[1], 1e-12);
-    /* means over as many samples as show the trembling; their own mean is that of the path */
+    /* averages over samples that still resolve the jitter, about their own mean */
     int samples = p->count < MOST_SAMPLES ? p->count : MOST_SAMPLES;
     double x[MOST_SAMPLES], y[MOST_SAMPLES], weight[MOST_SAMPLES];
     for (int i = 0; i < samples; i++) {
@@ -306,8 +311,8 @@ void bst_star_trail_bias(const bst_star_trail_path *p, double dx_px, double dy_p
     for (int round = 0; round < ROUNDS; round++) {
         double pull[2] = {0.0, 0.0};
         for (int i = 0; i < samples; i++) {
-            add_pull(&m, x[i] / weight[i] - bias_px[0], y[i] / weight[i] - bias_px[1], s,
-                     weight[i] / total, pull);
+            add_overlap_gradient(&m, x[i] / weight[i] - bias_px[0], y[i] / weight[i] - bias_px[1],
+                                 s, weight[i] / total, pull);
         }
         double step[2] = {(h[2] * pull[0] - h[1] * pull[1]) / determinant,
                           (h[0] * pull[1] - h[1] * pull[0]) / determinant};

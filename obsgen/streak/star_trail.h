@@ -1,5 +1,5 @@
-/* How stars moved over the frame during an exposure, as it was, not as telemetry has it. Inside of
- * the generator. */
+/* True path of the stars over the frame during an exposure (not that of telemetry) and its centroid
+ * biases. Internal to the generator. */
 #ifndef BST_OBSGEN_STREAK_STAR_TRAIL_H
 #define BST_OBSGEN_STREAK_STAR_TRAIL_H
 
@@ -8,28 +8,29 @@
 
 enum { BST_ROUTE_NODES = 4096 };
 
-/* The way as places about a pixel apart, and beyond both ends as far as light reaches. */
+/* Trail of a star: nodes about one pixel apart, extended beyond both ends as far as its light. */
 typedef struct bst_star_trail_node {
-    double x, y; /* from the mean of the path, px */
-    double time; /* share of the exposure that had passed */
-    double
-        light; /* output of the filter for a point at that place, over that for a point at rest */
+    double x, y;  /* relative to the mean of the path, px */
+    double time;  /* elapsed share of the exposure */
+    double light; /* output of the point filter there relative to a point at rest */
 } bst_star_trail_node;
 
-/* The path of a star in the middle of the window at equal steps of the exposure, px, and a filter
- * of this width with the pixel's own. */
+/* Path of a star at the window's centre at equal steps of the exposure, px. */
 typedef struct bst_star_trail_path {
     const double *x_px, *y_px;
     int count; /* at least 2 */
 } bst_star_trail_path;
 
-/* Lays out nodes; their number. Where the path comes back to a place it has one node. */
+/* Lays out the nodes of a trail; returns their number. A path that returns to a position has one
+ * node there.
+ *
+ * Given:     sigma_px  of the filter, including the pixel */
 int bst_star_trail_lay(const bst_star_trail_path *path, double sigma_px,
                        bst_star_trail_node *nodes);
 
-/* How far the fit of a uniform straight streak (dx, dy) with the bend (the coefficient of (3u^2 -
- * 1) / 2, u from -1 to 1) lands from the mean of the path in the mean over noise: where the model
- * overlaps most with the light that is there. For a point see bst_star_trail_point_bias. */
+/* Mean centroid bias of a uniform straight streak fit (dx, dy) with bend (coefficient of (3u^2 - 1)
+ * / 2, u from -1 to 1), relative to the path's mean: the position of largest overlap with the true
+ * light. For points see bst_star_trail_point_bias. */
 void bst_star_trail_bias(const bst_star_trail_path *path, double dx_px, double dy_px,
                          double bend_x_px, double bend_y_px, double sigma_px, double bias_px[2]);
 

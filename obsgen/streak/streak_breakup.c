@@ -12,26 +12,28 @@
 #include "obsgen/streak/streak_path.h"
 #include "sim/core/pages.h"
 
-/* As image processing tells maxima apart. */
+/* Saddle criterion of image processing for separate maxima. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;
-/* What stays further below the threshold is seen here and there: the places are drawn. */
+/* Light further below the threshold is treated statistically: positions of its detections are
+ * drawn. */
 static const double FAINTEST_SIGMA = 3.0;
-/* Light below this counts for no other streak, and below SEEN it adds no alarms. */
+/* Light below LEAST_LIGHT does not affect other streaks; below LEAST_SEEN it adds no false alarms.
+ */
 static const double LEAST_LIGHT = 0.25, LEAST_SEEN = 0.25;
-/* Share of the light on a pixel from which on a source looks there itself. */
+/* Share of the light on a pixel above which a source searches that pixel itself. */
 static const double OWN_SHARE = 0.3;
-/* Draws of faint streaks; those of other clutter stay below. */
+/* Random stream of faint streaks; those of other false alarms are lower. */
 static const uint64_t FAINT_STREAK = (uint64_t)1 << 59;
 
 enum {
     ROWS = BST_STREAK_ROWS,
     WIDE = BST_STREAK_WIDE,
     SPARSE = BST_STREAK_SPARSE,
-    /* of the tables below: outputs in steps of 1/8 from 1, lights in steps of 1/8 */
+    /* table steps: outputs from 1 in steps of 1/8, lights in steps of 1/8 */
     OUTPUTS = 64,
     LIGHTS = 48,
     FLANK = 8,   /* half pixels */
-    SKY_STEP = 8 /* of so many places of a run one stands for their light in the background */
+    SKY_STEP = 8 /* one of so many places of a run represents their light in the background */
 };
 
 typedef bst_streak_section section;
@@ -48,11 +50,12 @@ struct generator_streaks {
     bst_streak_ways ways;
     bst_streak_noise noise;
     bst_local_sky sky;
-    double norm, taken; /* of the filter for points; from its output on average, see below */
-    double shot;        /* variance that an output of one adds, by the photons' own noise */
-    double log_maxima[OUTPUTS], maxima_sigma; /* logarithm of maxima per pixel above an output */
-    double alarms[LIGHTS]; /* more of them than noise alone makes, per pixel of the way */
-    float *output;         /* the frame; on the pixels `shown` what is above the threshold */
+    double norm, taken; /* norm of the point filter; mean loss of its output, see taken_from */
+    double shot;        /* variance added by shot noise per unit output */
+    /* log of the density of maxima per pixel above an output */
+    double log_maxima[OUTPUTS], maxima_sigma;
+    double alarms[LIGHTS]; /* additional false alarms per pixel of a trail */
+    float *output;         /* frame-sized; pixels marked `shown` hold outputs above the threshold */
     size_t output_room;
     int *shown;
     maximum *maxima;
@@ -82,8 +85,8 @@ static bool is_on_frame(const bst_generator *g, int x, int y) {
     return x >= 0 && y >= 0 && x < g->width && y < g->height;
 }
 
-/* Whether none of the pixels round row r of section k is as high. */
-static bool is_top(const section *s, int count, int k, int r) {
+/* True if no neighbour of row r of section k is higher. */
+static bool is_maximum(const section *s, int count, int k, int r) {
     int across = s[k].middle + r - ROWS;
     float value = s[k].output[r];
     bool top = r > 0 && r < WIDE - 1;
@@ -95,7 +98,7 @@ static bool is_top(const section *s, int count, int k, int r) {
     return top;
 }
 
-/* Shows the outputs above the threshold, and finds the maxima among them. */
+/* Stores the outputs above the threshold and finds their maxima. */
 static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, int count,
                               bool by_row, int item) {
     struct generator_streaks *w = g->streaks;
@@ -117,7 +120,7 @@ static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, 
             }
             w->shown[w->shown_count] = y * g->width + x;
             w->output[w->shown[w->shown_count++]] = value;
-            if (is_top(s, count, k, r)) {
+            if (is_maximum(s, count, k, r)) {
                 w->maxima[w->maxima_count] = (maximum){.x = x,
                                                        .y = y,
                                                        .item = item,
@@ -131,12 +134,12 @@ static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, 
     return BST_OK;
 }
 
-/* lroundf of what is small. */
+/* Fast lroundf for small values. */
 static int nearest(float value) {
     return (int)((double)value + (value < 0.0f ? -0.5 : 0.5));
 }
 
-/* Whether the output stays above `least`, the threshold or more, on the pixels between two maxima.
+/* True if the output stays above `least` (at least the threshold) on the pixels between two maxima.
  */
 static bool is_ridge(const bst_generator *g, const maximum *a, const maximum *b, float least) {
     int dx = b->x - a->x, dy = b->y - a->y;
@@ -151,8 +154,8 @@ static bool is_ridge(const bst_generator *g, const maximum *a, const maximum *b,
     return true;
 }
 
-/* By place; of one that several streaks show, the brightest's first. */
-static int by_place(const void *a, const void *b) {
+/* qsort order by position; of equal positions the brightest source first. */
+static int by_position(const void *a, const void *b) {
     const maximum *p = a, *q = b;
     if (p->y != q->y) {
         return p->y < q->y ? -1 : 1;
@@ -163,12 +166,12 @@ static int by_place(const void *a, const void *b) {
     return p->order < q->order ? -1 : 1;
 }
 
-/* Reports what no higher maximum in a box about it shares a ridge with. */
-static void report(bst_generator *g) {
+/* Keeps the maxima without a higher one connected by a ridge in the search box. */
+static void keep_maxima(bst_generator *g) {
     struct generator_streaks *w = g->streaks;
     int reach = (int)ceil(6.0 * g->fitted_sigma) + 2;
     if (w->maxima_count > 0) {
-        qsort(w->maxima, (size_t)w->maxima_count, sizeof *w->maxima, by_place);
+        qsort(w->maxima, (size_t)w->maxima_count, sizeof *w->maxima, by_position);
     }
     for (int i = 0; i < w->maxima_count; i++) {
         const maximum *m = &w->maxima[i];
@@ -181,7 +184,7 @@ static void report(bst_generator *g) {
                 if (abs(o->y - m->y) > reach) {
                     break;
                 }
-                /* where a way turns, light of both of its parts is one ridge */
+                /* where a trail turns, both of its parts form one ridge */
                 kept = !(o->value > m->value) || abs(o->x - m->x) > reach ||
                        (o->by_row == m->by_row && !is_ridge(g, m, o, least));
             }
@@ -192,22 +195,22 @@ static void report(bst_generator *g) {
     }
 }
 
-/* What the light of streaks in background and noise takes from the filter's output, in noises of
- * the frame without it, on average and at a place: the background is too much, and the threshold
- * counts by a noise that is. */
-static double taken_from(const bst_generator *g, double level, double noise) {
+/* Loss of filter output by streak light in background and noise estimates, in noises of the frame
+ * without it: the background is too high, and the threshold scales with an increased noise. */
+static double output_loss(const bst_generator *g, double level, double noise) {
     return level / g->streaks->norm + g->threshold * (noise - 1.0);
 }
 
-static void set_taken(bst_generator *g) {
+/* Sets the mean output loss over the frame. */
+static void set_mean_loss(bst_generator *g) {
     g->streaks->norm = bst_crlb_table_norm(&g->bound, 0.0);
     g->streaks->taken =
-        taken_from(g, g->background_bias_e / g->dark_noise_e, g->noise_e / g->dark_noise_e);
+        output_loss(g, g->background_bias_e / g->dark_noise_e, g->noise_e / g->dark_noise_e);
 }
 
-/* cell: of the place before, as bst_local_sky_next has it. */
-static inline double taken_at(const bst_generator *g, bst_local_sky_cell *cell,
-                              const bst_streak_place *p, bool by_row) {
+/* Output loss at a place of a run; cell: of the previous place, as in bst_local_sky_next. */
+static inline double loss_at(const bst_generator *g, bst_local_sky_cell *cell,
+                             const bst_streak_place *p, bool by_row) {
     int x = by_row ? p->middle : p->at, y = by_row ? p->at : p->middle;
     double level, noise;
     if (is_on_frame(g, x, y)) {
@@ -215,11 +218,11 @@ static inline double taken_at(const bst_generator *g, bst_local_sky_cell *cell,
     } else {
         bst_local_sky_at(&g->streaks->sky, x, y, &level, &noise);
     }
-    return taken_from(g, level, noise);
+    return output_loss(g, level, noise);
 }
 
-/* Background and noise from the light of all runs. */
-static bst_status set_sky(bst_ctx *ctx, bst_generator *g) {
+/* Background and noise by mesh with the light of all runs. */
+static bst_status set_local_sky(bst_ctx *ctx, bst_generator *g) {
     struct generator_streaks *w = g->streaks;
     const bst_streak_light *l = &w->light;
     double steep = 2.0 * g->total_sigma;
@@ -241,9 +244,9 @@ static bst_status set_sky(bst_ctx *ctx, bst_generator *g) {
     return BST_OK;
 }
 
-/* Maxima about places of a run. */
-static bst_status search_part(bst_ctx *ctx, bst_generator *g, const bst_streak_run *run, int first,
-                              int last) {
+/* Finds the maxima about places first to last of a run, with noise. */
+static bst_status search_places(bst_ctx *ctx, bst_generator *g, const bst_streak_run *run,
+                                int first, int last) {
     struct generator_streaks *w = g->streaks;
     section *s = w->sections;
     const bst_streak_place *places = &w->light.places[run->first];
@@ -251,7 +254,7 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const bst_streak_r
     bst_local_sky_cell cell = {.column = -1};
     for (int k = 0; k < count; k++) {
         const float *seen = bst_streak_seen(&w->light, run, first + k);
-        float taken = (float)taken_at(g, &cell, &places[first + k], run->by_row);
+        float taken = (float)loss_at(g, &cell, &places[first + k], run->by_row);
         s[k].at = places[first + k].at;
         s[k].middle = places[first + k].middle;
         for (int r = 0; r < WIDE; r++) {
@@ -269,11 +272,11 @@ static double log_maxima_above(const struct generator_streaks *w, double output)
     return w->log_maxima[i] + (at - i) * (w->log_maxima[i + 1] - w->log_maxima[i]);
 }
 
-/* How often light of a way that is below the threshold makes maxima above it. */
+/* Tabulates the false alarms caused by trail light below the threshold. */
 static void set_alarms(bst_generator *g) {
     struct generator_streaks *w = g->streaks;
-    /* the squares of the filter average a line's electrons over 1 / (sqrt(3 pi) S) px of it; they
-     * are the output times the noise of a pixel */
+    /* the squared filter averages a line's electrons over 1 / (sqrt(3 pi) S) px; they equal output
+     * times pixel noise */
     w->shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
     if (w->maxima_sigma != g->filter_sigma) {
         for (int i = 0; i < OUTPUTS; i++) {
@@ -284,7 +287,7 @@ static void set_alarms(bst_generator *g) {
     double threshold = g->threshold + w->taken, fall = 0.25 / (g->cross_sigma * g->cross_sigma);
     double alone = exp(log_maxima_above(w, threshold));
     for (int i = 0; i < LIGHTS; i++) {
-        double more[FLANK + 1]; /* at so many half pixels from the way */
+        double more[FLANK + 1]; /* at so many half pixels from the trail */
         for (int k = 0; k <= FLANK; k++) {
             double d = 0.5 * k, light = i / 8.0 * exp(-fall * d * d);
             double output = (threshold - light) / sqrt(1.0 + w->shot * light);
@@ -297,7 +300,7 @@ static void set_alarms(bst_generator *g) {
     }
 }
 
-/* Arrivals along the way of one source. */
+/* Poisson arrivals along the trail of one source. */
 typedef struct arrivals {
     double next;
     uint64_t draw;
@@ -307,7 +310,7 @@ static double draw_exponential(const bst_generator *g, arrivals *a) {
     return -log(bst_rng_uniform(g->key, (uint64_t)g->exposure_id, a->draw++));
 }
 
-/* An alarm that light too faint to be looked at pixel by pixel makes at a place. */
+/* Draws a false alarm at a place whose light is too faint for a pixel search. */
 static void draw_alarm(bst_generator *g, const bst_streak_run *run, const bst_streak_place *p,
                        double light, double taken, arrivals *a) {
     double noise = sqrt(1.0 + g->streaks->shot * light);
@@ -315,7 +318,7 @@ static void draw_alarm(bst_generator *g, const bst_streak_run *run, const bst_st
     double value = sqrt(least * least + 2.0 * draw_exponential(g, a));
     double off[2];
     bst_rng_normal2(g->key, (uint64_t)g->exposure_id, a->draw++, off);
-    /* alarms are the likelier, the nearer to the way */
+    /* false alarms concentrate towards the trail */
     double spread = g->total_sigma * sqrt(2.0 / (g->threshold * light + 1.0));
     double along = p->at + spread * off[0], across = p->middle + (double)p->off + spread * off[1];
     int x = (int)lround(run->by_row ? across : along);
@@ -326,22 +329,22 @@ static void draw_alarm(bst_generator *g, const bst_streak_run *run, const bst_st
     }
 }
 
-/* Alarms expected per pixel of a way with light from which this is taken. */
-static double alarms_of(const struct generator_streaks *w, double light, double taken) {
-    double at = 8.0 * (light + w->taken - taken); /* the table is for what is taken on average */
+/* Expected false alarms per pixel of a trail at this light and output loss. */
+static double alarm_density(const struct generator_streaks *w, double light, double taken) {
+    double at = 8.0 * (light + w->taken - taken); /* the table is for the mean loss */
     at = at > 0.0 ? at : 0.0;
     at = at < LIGHTS - 1.001 ? at : LIGHTS - 1.001;
     int i = (int)at;
     return w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]);
 }
 
-/* Alarms along a run where its light is below `least`; of places that are faint themselves each
- * SPARSEth stands for all. */
+/* Draws false alarms along a run where its light is below `least`; every SPARSEth faint place
+ * represents its neighbours. */
 static void draw_faint(bst_generator *g, const bst_streak_run *run, double least, arrivals *a) {
     const struct generator_streaks *w = g->streaks;
     const bst_streak_place *places = &w->light.places[run->first];
     double bright = OWN_SHARE * least, steep = 2.0 * g->total_sigma;
-    double fall = 0.0, density = 0.0; /* of the place before; pixels of the way per place */
+    double fall = 0.0, density = 0.0; /* of the previous place; trail pixels per place */
     bst_local_sky_cell cell = {.column = -1};
     for (int k = 0, step = run->dense ? 1 : SPARSE; k < run->count; k += step) {
         const bst_streak_place *p = &places[k];
@@ -359,9 +362,9 @@ static void draw_faint(bst_generator *g, const bst_streak_run *run, double least
             fall = (double)p->fall;
             density = 1.0 / (steep * sqrt(fall));
         }
-        double taken = taken_at(g, &cell, p, run->by_row);
-        /* this source's part of the light */
-        a->next -= stands * density * own / light * alarms_of(w, light, taken);
+        double taken = loss_at(g, &cell, p, run->by_row);
+        /* this source's share of the light */
+        a->next -= stands * density * own / light * alarm_density(w, light, taken);
         while (a->next < 0.0) {
             a->next += draw_exponential(g, a);
             draw_alarm(g, run, p, light, taken, a);
@@ -369,8 +372,8 @@ static void draw_faint(bst_generator *g, const bst_streak_run *run, double least
     }
 }
 
-/* Looks for maxima in a run pixel by pixel where its light is `least` or brighter, and as far about
- * that as noise is filtered. */
+/* Searches a run pixel by pixel where its light is at least `least`, with a margin for filtered
+ * noise. */
 static bst_status search_bright(bst_ctx *ctx, bst_generator *g, const bst_streak_run *run,
                                 double least) {
     const struct generator_streaks *w = g->streaks;
@@ -388,14 +391,14 @@ static bst_status search_bright(bst_ctx *ctx, bst_generator *g, const bst_streak
         if (from >= 0 && (k > last + 2 * margin || k == run->count - 1)) {
             int start = from > margin ? from - margin : 0;
             int end = last + margin < run->count ? last + margin : run->count - 1;
-            BST_TRY(search_part(ctx, g, run, start, end));
+            BST_TRY(search_places(ctx, g, run, start, end));
             from = -1;
         }
     }
     return BST_OK;
 }
 
-/* Looks for what is seen of all runs. */
+/* Searches all runs of the frame. */
 static bst_status search_runs(bst_ctx *ctx, bst_generator *g) {
     const bst_streak_light *l = &g->streaks->light;
     double least = g->threshold - FAINTEST_SIGMA;
@@ -414,7 +417,7 @@ static bst_status search_runs(bst_ctx *ctx, bst_generator *g) {
     return BST_OK;
 }
 
-/* Memory is written to, so that it is the process's from here on. */
+/* Writes to the memory, so that its pages are allocated now. */
 bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *g, int width, int height) {
     if (!g->streaks) {
         g->streaks = bst_pages_alloc(sizeof *g->streaks);
@@ -442,7 +445,7 @@ bst_status bst_streak_breakup_fragments(bst_ctx *ctx, bst_generator *g) {
     BST_TRY(bst_generator_reserve_streaks(ctx, g, g->width, g->height));
     struct generator_streaks *w = g->streaks;
     bst_streak_noise_set(&w->noise, g->filter_sigma);
-    set_taken(g);
+    set_mean_loss(g);
     set_alarms(g);
     bst_streak_light_begin(&w->light, g->width, g->height,
                            fabs(g->whole_path.dy) > fabs(g->whole_path.dx));
@@ -457,10 +460,10 @@ bst_status bst_streak_breakup_fragments(bst_ctx *ctx, bst_generator *g) {
         }
     }
     BST_TRY(bst_streak_light_add_up(ctx, &w->light));
-    BST_TRY(set_sky(ctx, g));
+    BST_TRY(set_local_sky(ctx, g));
     bst_status status = search_runs(ctx, g);
     if (status == BST_OK) {
-        report(g);
+        keep_maxima(g);
     }
     for (int i = 0; i < w->shown_count; i++) {
         w->output[w->shown[i]] = 0.0f;

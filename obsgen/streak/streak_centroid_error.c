@@ -11,12 +11,12 @@ enum {
     BLOCKS = STEPS / BST_RNG_BLOCK,
     TRIES = 8
 };
-/* Looked at beyond the streak's ends, sigmas. */
+/* Search range beyond the streak's ends, sigmas. */
 static const double BEYOND = 2.0;
-/* Distance of the rows, sigmas. */
+/* Spacing of the rows, sigmas. */
 static const double APART = 0.7;
 
-/* What makes of white rows those of the output (Cholesky). */
+/* Mixing matrix from white rows to correlated output rows (Cholesky). */
 static void set_mix(bst_streak_centroid_error *w) {
     for (int i = 0; i < ROWS; i++) {
         for (int k = 0; k <= i; k++) {
@@ -69,12 +69,12 @@ void bst_streak_centroid_error_set(bst_streak_centroid_error *w, double length_p
     set_mix(w);
 }
 
-/* Outputs along one row, from -side to side. */
+/* Filter outputs along the rows, from -side to side. */
 typedef struct rows {
     double streak[ROWS][STEPS], point[ROWS][STEPS];
 } rows;
 
-/* Light of the sources. */
+/* Adds the light of the sources to the outputs. */
 static void add_light(const bst_streak_centroid_error *w,
                       const bst_streak_centroid_error_source *sources, int count, rows *out) {
     double s = w->sigma * sqrt(2.0), half = 0.5 * w->length;
@@ -100,7 +100,7 @@ static void add_light(const bst_streak_centroid_error *w,
     }
 }
 
-/* Noise of both filters: the same white noise under both. */
+/* Adds noise to both filters' outputs, from the same white noise. */
 static void add_noise(const bst_streak_centroid_error *w, bst_rng_key key, int attempt,
                       double noise, rows *out) {
     double white[ROWS][STEPS], smooth[STEPS];
@@ -120,7 +120,7 @@ static void add_noise(const bst_streak_centroid_error *w, bst_rng_key key, int a
     }
     int smoothed = w->steps - 2 * w->reach;
     for (int r = ROWS - 1; r >= 0; r--) {
-        for (int i = 0; i < w->steps; i++) { /* rows below are white still */
+        for (int i = 0; i < w->steps; i++) { /* rows below are still white */
             double sum = 0.0;
             for (int m = 0; m <= r; m++) {
                 sum += w->mix[r][m] * white[m][i];
@@ -148,14 +148,15 @@ static void add_noise(const bst_streak_centroid_error *w, bst_rng_key key, int a
     }
 }
 
-/* Between three outputs: where the parabola through them is highest, in steps from the middle. */
+/* Vertex of the parabola through three outputs, in steps from the middle. */
 static double vertex(double before, double at, double after) {
     double bend = 2.0 * at - before - after;
     return bend > 1e-9 ? fmin(fmax(0.5 * (after - before) / bend, -0.5), 0.5) : 0.0;
 }
 
-static bst_streak_centroid_error_peak find_top(const bst_streak_centroid_error *w,
-                                               const rows *out) {
+/* Highest interpolated output of both filters. */
+static bst_streak_centroid_error_peak find_peak(const bst_streak_centroid_error *w,
+                                                const rows *out) {
     bst_streak_centroid_error_peak top = {.snr = -INFINITY};
     int row = 0, column = 0;
     for (int r = 0; r < ROWS; r++) {
@@ -202,7 +203,7 @@ bst_streak_centroid_error_peak bst_streak_centroid_error_draw(
             }
         }
         add_noise(w, key, attempt, noise, &out);
-        bst_streak_centroid_error_peak top = find_top(w, &out);
+        bst_streak_centroid_error_peak top = find_peak(w, &out);
         best = top.snr > best.snr ? top : best;
     }
     return best;

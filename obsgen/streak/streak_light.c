@@ -12,11 +12,11 @@ enum {
     ROWS = BST_STREAK_ROWS,
     WIDE = BST_STREAK_WIDE,
     SPARSE = BST_STREAK_SPARSE,
-    /* values of a band: it stays in fast memory while all runs pass */
+    /* pixels of a band: it fits the cache while all runs are added */
     BAND_VALUES = 49152
 };
 
-/* ---- runs ---- */
+/* ---- Runs ---- */
 
 void bst_streak_light_begin(bst_streak_light *l, int width, int height, bool by_row) {
     l->width = width;
@@ -34,6 +34,7 @@ void bst_streak_light_free(bst_streak_light *l) {
     *l = (bst_streak_light){0};
 }
 
+/* Grows an array. */
 static bst_status grow(bst_ctx *ctx, void **items, size_t needed, size_t *room, size_t bytes) {
     if (needed <= *room) {
         return BST_OK;
@@ -78,19 +79,19 @@ bst_status bst_streak_light_end(bst_ctx *ctx, bst_streak_light *l, double least_
     return grow(ctx, (void **)&l->seen, l->seen_count, &l->seen_room, sizeof *l->seen);
 }
 
-/* ---- bands ---- */
+/* ---- Bands ---- */
 
-/* Lines of the frame from `first` on. Most ways cross them; a line holds the frame's pixels, a
- * margin before them and one behind. */
+/* Lines of the frame from `first` on, crossed by most trails. A line holds the frame's pixels with
+ * a margin on both sides. */
 typedef struct band {
     float *values;
-    int first, end, places; /* lines; pixels of a line */
+    int first, end, places; /* lines; pixels per line */
     ptrdiff_t stride;
 } band;
 
 enum { MARGIN = LANES };
 
-/* Places of a run along the lines that are on the band: from *from on, before *to. */
+/* Range of places of a run along the lines that lie on the band: from *from, before *to. */
 static void on_band(const bst_streak_light *l, const bst_streak_run *run, const band *b, int *from,
                     int *to) {
     int at = l->places[run->first].at;
@@ -107,8 +108,8 @@ void bst_streak_light_of(const bst_streak_place *place, float light[LANES]) {
     BST_SIMD_PICK(light_of)(place, light);
 }
 
-/* Of a run along the lines that most ways cross. */
-static void lay_other(const band *b, const bst_streak_place *places, int count) {
+/* Adds the light of a run that runs along the band's lines. */
+static void add_parallel_run(const band *b, const bst_streak_place *places, int count) {
     for (int k = 0; k < count; k++) {
         const bst_streak_place *p = &places[k];
         if (p->at < 0 || p->at >= b->places || p->middle + LIGHT_ROWS < b->first ||
@@ -126,42 +127,43 @@ static void lay_other(const band *b, const bst_streak_place *places, int count) 
     }
 }
 
-/* Notes what is seen at one place, on the part of it that is on the band. */
-static void see_place(const band *b, bool across, const bst_streak_place *p, int rows, float *out) {
+/* Reads the accumulated light at one place, as far as it is on the band. */
+static void read_place(const band *b, bool across, const bst_streak_place *p, int rows,
+                       float *out) {
     for (int r = -rows; r <= rows; r++) {
         int line = across ? p->at : p->middle + r, place = across ? p->middle + r : p->at;
         if (line >= b->first && line < b->end && place >= 0 && place < b->places) {
             float all = b->values[(line - b->first) * b->stride + place + MARGIN];
-            /* what does not count for others counts for itself */
+            /* light below `least_lit` is not accumulated: at least the place's own counts */
             out[r + rows] = all > out[r + rows] ? all : out[r + rows];
         }
     }
 }
 
-/* Whether a band shows all rows of a place: where light of the run's own is part of what is seen.
- */
+/* True if a band contains all rows of a place. */
 static bool is_whole(const bst_streak_run *run, const band *b, int lines,
                      const bst_streak_place *p) {
     return run->lit && p->at >= 0 && p->at < lines && p->middle >= ROWS &&
            p->middle + ROWS < b->places;
 }
 
-/* Of a dense run that crosses the lines. */
-static void see_across(const bst_streak_run *run, const band *b, int lines,
-                       const bst_streak_place *places, int count, float *out) {
+/* Reads the light of a dense run that crosses the lines. */
+static void read_crossing_run(const bst_streak_run *run, const band *b, int lines,
+                              const bst_streak_place *places, int count, float *out) {
     for (int k = 0; k < count; k++, out += WIDE) {
         const bst_streak_place *p = &places[k];
         if (is_whole(run, b, lines, p)) {
             const float *all = b->values + (p->at - b->first) * b->stride + p->middle + MARGIN;
             memcpy(out, all - ROWS, WIDE * sizeof *out);
         } else {
-            see_place(b, true, p, ROWS, out);
+            read_place(b, true, p, ROWS, out);
         }
     }
 }
 
-static void see_run(const bst_streak_light *l, const bst_streak_run *run, const band *b,
-                    int lines) {
+/* Reads the accumulated light at a run's places on a band. */
+static void read_run(const bst_streak_light *l, const bst_streak_run *run, const band *b,
+                     int lines) {
     bool across = run->by_row == l->by_row;
     int from = 0, to = run->count;
     if (across) {
@@ -170,19 +172,19 @@ static void see_run(const bst_streak_light *l, const bst_streak_run *run, const 
     const bst_streak_place *places = &l->places[run->first];
     float *out = l->seen + run->seen;
     if (across && run->dense) {
-        see_across(run, b, lines, places + from, to - from, out + (ptrdiff_t)from * WIDE);
+        read_crossing_run(run, b, lines, places + from, to - from, out + (ptrdiff_t)from * WIDE);
         return;
     }
     int every = run->dense ? 1 : SPARSE;
     for (int k = (from + every - 1) / every * every; k < to; k += every) {
-        see_place(b, across, &places[k], run->dense ? ROWS : 0,
-                  out + (run->dense ? k * WIDE : k / SPARSE));
+        read_place(b, across, &places[k], run->dense ? ROWS : 0,
+                   out + (run->dense ? k * WIDE : k / SPARSE));
     }
 }
 
-/* What is seen where no other light is, but where the bands show all. */
-static void see_alone(const bst_streak_light *l, const bst_streak_run *run, const band *b,
-                      int lines) {
+/* Own light of places where nothing was accumulated, unless the bands contain all rows. */
+static void read_own_light(const bst_streak_light *l, const bst_streak_run *run, const band *b,
+                           int lines) {
     const bst_streak_place *places = &l->places[run->first];
     bool across = run->by_row == l->by_row;
     float *out = l->seen + run->seen;
@@ -217,7 +219,7 @@ bst_status bst_streak_light_add_up(bst_ctx *ctx, bst_streak_light *l) {
     }
     b.values = l->band;
     for (int i = 0; i < l->run_count; i++) {
-        see_alone(l, &l->runs[i], &b, lines);
+        read_own_light(l, &l->runs[i], &b, lines);
     }
     for (b.first = 0; b.first < lines; b.first = b.end) {
         b.end = b.first + high < lines ? b.first + high : lines;
@@ -229,11 +231,11 @@ bst_status bst_streak_light_add_up(bst_ctx *ctx, bst_streak_light *l) {
                 on_band(l, run, &b, &from, &to);
                 BST_SIMD_PICK(lay_run)(&b, &l->places[run->first + (size_t)from], to - from);
             } else if (run->lit) {
-                lay_other(&b, &l->places[run->first], run->count);
+                add_parallel_run(&b, &l->places[run->first], run->count);
             }
         }
         for (int i = 0; i < l->run_count; i++) {
-            see_run(l, &l->runs[i], &b, lines);
+            read_run(l, &l->runs[i], &b, lines);
         }
     }
     return BST_OK;

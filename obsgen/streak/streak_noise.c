@@ -5,14 +5,14 @@
 
 #include "sim/core/simd.h"
 
-/* Draws of pixels; those of other clutter stay below. */
+/* Random stream of pixel noise; those of other false alarms are lower. */
 static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
 
 enum {
     ROWS = BST_STREAK_ROWS,
     SHOWN = BST_STREAK_SHOWN,
     LANES = 16,
-    BEFORE = 8, /* pixels across before those that are asked for, and all */
+    BEFORE = 8, /* pixels across before the requested ones, and in all */
     WHITE = BEFORE + BST_STREAK_NOISE + 2 * BST_STREAK_TAPS + 14
 };
 
@@ -48,7 +48,7 @@ void bst_streak_noise_init(bst_streak_noise *w) {
     }
 }
 
-/* bst_philox4x32 of LANES counters. */
+/* Philox state of LANES counters (bst_philox4x32). */
 typedef struct lanes {
     uint32_t c0[LANES], c1[LANES], c2[LANES], c3[LANES];
 } lanes;
@@ -70,11 +70,11 @@ BST_CLONES static void draw_lanes(bst_rng_key key, lanes *l) {
 }
 
 /* White noise of the pixels of up to LANES sections from `first` pixels before their middles on,
- * eight to a draw; out holds as many before the first. The filter's many taps smooth the steps of
- * the table. */
-static void white(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_id, bool by_row,
-                  const bst_streak_section *s, int sections, int first, int count,
-                  float out[LANES][WHITE]) {
+ * eight per draw; `out` holds as many before the first. The steps of the quantile table are
+ * smoothed by the filter. */
+static void white_noise(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_id,
+                        bool by_row, const bst_streak_section *s, int sections, int first,
+                        int count, float out[LANES][WHITE]) {
     int offset[LANES], groups = 0;
     for (int i = 0; i < sections; i++) {
         offset[i] = (s[i].middle - first) & 7;
@@ -107,9 +107,9 @@ static void white(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_i
 #define BST_SIMD_KERNELS "obsgen/streak/streak_noise_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-/* By how many rows the way leaves a section within the filter's reach; it leaves no more than a row
- * a step, or is another part of it. */
-static int rows_left(const bst_streak_noise *w, const bst_streak_section *s, int count) {
+/* Largest offset of the trail from a section, in rows, within the filter's reach; larger offsets
+ * belong to another part of the trail. */
+static int row_drift(const bst_streak_noise *w, const bst_streak_section *s, int count) {
     int most = 0;
     for (int k = 0; k < count; k++) {
         for (int n = k + 1; n <= k + w->reach && n < count; n++) {
@@ -122,12 +122,12 @@ static int rows_left(const bst_streak_noise *w, const bst_streak_section *s, int
 
 void bst_streak_noise_add(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_id,
                           bool by_row, double shot, bst_streak_section *s, int count) {
-    int most = rows_left(w, s, count), half = ROWS + most, rows = 2 * half + 1;
+    int most = row_drift(w, s, count), half = ROWS + most, rows = 2 * half + 1;
     float noise[LANES][WHITE] = {{0.0f}};
     for (int first = 0; first < count; first += LANES) {
         int sections = count - first < LANES ? count - first : LANES;
-        white(w, key, exposure_id, by_row, &s[first], sections, half + w->reach,
-              rows + 2 * w->reach, noise);
+        white_noise(w, key, exposure_id, by_row, &s[first], sections, half + w->reach,
+                    rows + 2 * w->reach, noise);
         for (int k = 0; k < sections; k++) {
             BST_SIMD_PICK(filter)
             (noise[k] + BEFORE, w->taps, 2 * w->reach + 1, (rows + 7) & ~7, s[first + k].noise);

@@ -2,20 +2,20 @@
 
 #include <math.h>
 
-/* A source whose path differs more from the stars' has a way of its own. */
+/* A source whose path differs more than this from the stars' gets a trail of its own. */
 static const double OWN_WAY_PX = 1.0;
 
 enum { ROWS = BST_STREAK_ROWS, BLOCK = BST_STREAK_BLOCK };
 
-/* Place of a source's way relative to another: moved, and turned by this much from end to end. */
+/* Displacement of a source's trail from another: shift, and its change from end to end. */
 typedef struct shift {
     double x, y, dx, dy;
 } shift;
 
-/* ---- a way and its parts ---- */
+/* ---- A trail and its parts ---- */
 
-/* Where the way goes from a node on; it trembles from one to the next. */
-static void course(const bst_streak_way *way, int at, double *dx, double *dy) {
+/* Mean direction of a trail after a node, averaged over jitter. */
+static void mean_direction(const bst_streak_way *way, int at, double *dx, double *dy) {
     enum { AHEAD = 12 };
     int end = at + AHEAD < way->count ? at + AHEAD : way->count - 1;
     int start = end - AHEAD > 0 ? end - AHEAD : 0;
@@ -23,16 +23,17 @@ static void course(const bst_streak_way *way, int at, double *dx, double *dy) {
     *dy = way->y[end] - way->y[start];
 }
 
-static void part_way(bst_streak_way *way) {
+/* Splits a trail into parts that run mainly along one axis in one direction. */
+static void split_trail(bst_streak_way *way) {
     way->parts = 0;
     for (int first = 0, end; first + 1 < way->count; first = end) {
         double dx, dy;
-        course(way, first, &dx, &dy);
+        mean_direction(way, first, &dx, &dy);
         bool by_row = fabs(dy) > fabs(dx);
         for (end = first + 1; end + 1 < way->count; end++) {
             double ex, ey;
-            course(way, end, &ex, &ey);
-            /* a little past the diagonal is no reason to part it */
+            mean_direction(way, end, &ex, &ey);
+            /* hysteresis about the diagonal */
             bool same = by_row ? ey * dy > 0.0 && fabs(ey) > 0.6 * fabs(ex)
                                : ex * dx > 0.0 && fabs(ex) > 0.6 * fabs(ey);
             if (!same) {
@@ -45,7 +46,8 @@ static void part_way(bst_streak_way *way) {
     }
 }
 
-static void set_way(bst_streak_way *way, const bst_star_trail_node *nodes, int count) {
+/* Sets a trail from nodes, with bounding boxes of its blocks. */
+static void set_trail(bst_streak_way *way, const bst_star_trail_node *nodes, int count) {
     way->count = count;
     for (int k = 0; k < count; k++) {
         way->x[k] = nodes[k].x;
@@ -53,7 +55,7 @@ static void set_way(bst_streak_way *way, const bst_star_trail_node *nodes, int c
         way->time[k] = nodes[k].time;
         way->light[k] = nodes[k].light;
     }
-    part_way(way);
+    split_trail(way);
     for (int i = 0; i * BLOCK < count; i++) {
         double *box = way->box[i];
         box[0] = box[2] = INFINITY;
@@ -71,22 +73,21 @@ static void set_way(bst_streak_way *way, const bst_star_trail_node *nodes, int c
 void bst_streak_ways_begin(bst_streak_ways *w, const bst_generator *g,
                            const bst_streak_limits *limits) {
     w->limits = *limits;
-    set_way(&w->stars, g->route, g->route_count);
+    set_trail(&w->stars, g->route, g->route_count);
 }
 
-/* ---- runs of a source ---- */
+/* ---- Runs of a source ---- */
 
-/* Some of a source's nodes, along and across the axis that its way runs more along, and the lines
- * between each and the next. */
-typedef struct stretch {
+/* Block of a source's nodes, along and across its main axis, and the lines between them. */
+typedef struct node_block {
     double along[BLOCK + 1], across[BLOCK + 1];
     double slope[BLOCK], more[BLOCK]; /* per px along: across, light */
-    double slant[BLOCK];              /* of distances across the way over those across the axis */
-} stretch;
+    double slant[BLOCK]; /* ratio of distances across the trail to those across the axis */
+} node_block;
 
-/* Nodes from number `first` on, `count` lines. */
-static void set_stretch(const bst_streak_way *way, const shift *by, bool by_row, int first,
-                        int count, stretch *s) {
+/* Sets a block from node `first` on, `count` lines. */
+static void set_node_block(const bst_streak_way *way, const shift *by, bool by_row, int first,
+                           int count, node_block *s) {
     const double *x = by_row ? way->y + first : way->x + first;
     const double *y = by_row ? way->x + first : way->y + first;
     double bx = by_row ? by->y : by->x, by_dx = by_row ? by->dy : by->dx;
@@ -105,27 +106,27 @@ static void set_stretch(const bst_streak_way *way, const shift *by, bool by_row,
     }
 }
 
-/* A run that is being made. */
-typedef struct making {
+/* State of the run being generated. */
+typedef struct run_builder {
     bst_streak_light *light;
     int source, step; /* step: of the places along it */
     bool by_row, begun;
-    double amplitude, fall, at; /* fall: across the way; at: the next place along it */
-} making;
+    double amplitude, fall, at; /* fall: across the trail; at: next place along it */
+} run_builder;
 
 static int floor_of(double value) {
     int whole = (int)value;
     return whole - (value < whole);
 }
 
-/* Where places of a run are wanted: along and across. */
+/* Limits of a run's places, along and across. */
 typedef struct bounds {
     double first, last, low, high;
 } bounds;
 
-/* The place at `at` on line k of a stretch; whether it is wanted. */
-static inline bool place_on(const stretch *s, const double *lights, const bounds *b, int k,
-                            double at, const making *m, bst_streak_place *p) {
+/* Place at coordinate `at` on line k of a block; false if it is outside the limits. */
+static inline bool place_on(const node_block *s, const double *lights, const bounds *b, int k,
+                            double at, const run_builder *m, bst_streak_place *p) {
     double off = at - s->along[k], part = m->step * off > 0.0 ? off : 0.0;
     double c = s->across[k] + part * s->slope[k];
     int middle = floor_of(c + 0.5);
@@ -137,14 +138,15 @@ static inline bool place_on(const stretch *s, const double *lights, const bounds
     return (at >= b->first) & (at <= b->last) & (c > b->low) & (c < b->high);
 }
 
-/* The places of a stretch. */
+/* Generates the places of a block. */
 static bst_status make_places(bst_ctx *ctx, const bst_streak_limits *limits, const bounds *b,
-                              const stretch *s, const double *lights, int count, making *m) {
+                              const node_block *s, const double *lights, int count,
+                              run_builder *m) {
     bst_streak_light *l = m->light;
     double at = m->at, way = m->step;
     for (int k = 0; k < count; k++) {
         double end = s->along[k] + (s->along[k + 1] - s->along[k]);
-        if (m->begun) { /* most lines have one place or none, and it goes on */
+        if (m->begun) { /* most lines have one place or none: continue the run */
             BST_TRY(bst_streak_light_room(ctx, l));
             bst_streak_place *p = &l->places[l->place_count];
             bool here = way * (end - at) > 0.0, near = place_on(s, lights, b, k, at, m, p);
@@ -172,18 +174,18 @@ static bst_status make_places(bst_ctx *ctx, const bst_streak_limits *limits, con
     return BST_OK;
 }
 
-/* Makes runs of nodes first to last of a part of a way. */
+/* Generates the runs of nodes first to last of a part of a trail. */
 static bst_status make_runs(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
                             const bst_streak_way *way, int first, int last, const shift *by,
-                            making *m) {
+                            run_builder *m) {
     int beyond = limits->beyond, across = beyond + ROWS;
     const bounds b = {-beyond, (m->by_row ? g->height : g->width) + beyond, -across,
                       (m->by_row ? g->width : g->height) + across};
     m->begun = false;
     for (int k = first; k < last; k += BLOCK) {
         int count = last - k < BLOCK ? last - k : BLOCK;
-        stretch s;
-        set_stretch(way, by, m->by_row, k, count, &s);
+        node_block s;
+        set_node_block(way, by, m->by_row, k, count, &s);
         if (k == first) {
             m->at = m->step > 0 ? ceil(s.along[0]) : floor(s.along[0]);
         }
@@ -193,23 +195,23 @@ static bst_status make_runs(bst_ctx *ctx, const bst_generator *g, const bst_stre
                     : BST_OK;
 }
 
-/* Whether a block of nodes may come to the frame. */
-static bool block_comes_in(const bst_generator *g, int beyond, const double box[4],
-                           const shift *by) {
+/* True if a block of nodes may touch the frame. */
+static bool block_touches_frame(const bst_generator *g, int beyond, const double box[4],
+                                const shift *by) {
     double margin = beyond + ROWS + 1.0;
     double x = margin + 0.5 * fabs(by->dx), y = margin + 0.5 * fabs(by->dy);
     return by->x + box[1] > -x && by->x + box[0] < g->width + x && by->y + box[3] > -y &&
            by->y + box[2] < g->height + y;
 }
 
-/* Makes the runs of a source: parts of the way, as far as they come to the frame. */
+/* Generates the runs of a source: the parts of its trail that touch the frame. */
 static bst_status run_along(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
                             int source, const bst_streak_way *way, const shift *by,
                             bst_streak_light *light) {
-    making m = {.light = light,
-                .source = source,
-                .amplitude = g->sources[source].amplitude,
-                .fall = 0.25 / (g->cross_sigma * g->cross_sigma)};
+    run_builder m = {.light = light,
+                     .source = source,
+                     .amplitude = g->sources[source].amplitude,
+                     .fall = 0.25 / (g->cross_sigma * g->cross_sigma)};
     for (int i = 0; i < way->parts; i++) {
         int first = way->first[i], last = way->first[i + 1], from = -1;
         m.by_row = way->by_row[i];
@@ -218,7 +220,7 @@ static bst_status run_along(bst_ctx *ctx, const bst_generator *g, const bst_stre
         for (int k = first; k < last;) {
             int end = (k / BLOCK + 1) * BLOCK;
             end = end < last ? end : last;
-            bool in = block_comes_in(g, limits->beyond, way->box[k / BLOCK], by);
+            bool in = block_touches_frame(g, limits->beyond, way->box[k / BLOCK], by);
             from = in && from < 0 ? k : from;
             if (from >= 0 && (!in || end == last)) {
                 BST_TRY(make_runs(ctx, g, limits, way, from, in ? end : k, by, &m));
@@ -230,21 +232,21 @@ static bst_status run_along(bst_ctx *ctx, const bst_generator *g, const bst_stre
     return BST_OK;
 }
 
-/* Whether a source's way comes near the frame at all. */
-static bool comes_in(const bst_generator *g, const generator_source *s) {
+/* True if a source's trail touches the frame. */
+static bool touches_frame(const bst_generator *g, const generator_source *s) {
     double margin_x = ROWS + 1.0 + 0.5 * fabs(s->path.dx - g->whole_path.dx);
     double margin_y = ROWS + 1.0 + 0.5 * fabs(s->path.dy - g->whole_path.dy);
     return s->x + g->route_box[1] > -margin_x && s->x + g->route_box[0] < g->width + margin_x &&
            s->y + g->route_box[3] > -margin_y && s->y + g->route_box[2] < g->height + margin_y;
 }
 
-/* A source's way is the stars', turned by what its own ends differ; or its own, where it moves
- * otherwise. */
+/* A source follows the stars' trail, corrected for its own end points, or has a trail of its own.
+ */
 bst_status bst_streak_ways_add(bst_ctx *ctx, bst_streak_ways *w, bst_generator *g, int index,
                                bst_streak_light *light) {
     const generator_source *source = &g->sources[index];
     if ((source->star && source->amplitude * g->route_top < w->limits.seen) ||
-        !comes_in(g, source)) {
+        !touches_frame(g, source)) {
         return BST_OK;
     }
     shift by = {source->x, source->y, source->path.dx - g->whole_path.dx,
@@ -258,7 +260,7 @@ bst_status bst_streak_ways_add(bst_ctx *ctx, bst_streak_ways *w, bst_generator *
         g->object_y[k] = g->path_y[k] + u * by.dy;
     }
     const bst_star_trail_path own = {g->object_x, g->object_y, g->path.count};
-    set_way(&w->own, g->way, bst_star_trail_lay(&own, g->cross_sigma, g->way));
+    set_trail(&w->own, g->way, bst_star_trail_lay(&own, g->cross_sigma, g->way));
     by.dx = by.dy = 0.0;
     return run_along(ctx, g, &w->limits, index, &w->own, &by, light);
 }

@@ -55,7 +55,7 @@ def main():
                 geometric = planned(step.seconds)
                 rate = planned(step.seconds + 0.5) - planned(step.seconds - 0.5)
             seen = apparent(geometric, nav)
-            # telemetry is off from where the stars say the camera looks; the command is in its terms
+            # telemetry differs from the attitude by the stars; the command refers to telemetry
             if tracks is not None and tracks["attitude.valid"]:
                 q = tracks["attitude.q_cam_from_gcrf"]
                 error_gcrf = rotate_back(q, tracks["attitude.error_cam_rad"])
@@ -63,7 +63,7 @@ def main():
             step.send_command(seen, rate)
             step.send_status("track" if target is not None else "rate",
                              int(tracks["target_id"]) if target is not None else 0)
-            now = "follows the target" if target is not None else "looks where it was told to"
+            now = "follows the target" if target is not None else "points along the plan"
             if now != mode:
                 print(f"{step.seconds:8.2f} s  {now}", flush=True)
                 mode = now

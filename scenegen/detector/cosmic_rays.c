@@ -35,6 +35,7 @@ void bst_cosmic_rays_free(bst_cosmic_rays *hits) {
     }
 }
 
+/* Adds a charge deposit to a pixel. */
 static bst_status add_pixel(bst_ctx *ctx, bst_cosmic_rays *h, int x, int y, double electrons) {
     if (x < 0 || y < 0 || x >= h->width || y >= h->height || !(electrons > 0.0)) {
         return BST_OK;
@@ -52,7 +53,8 @@ static bst_status add_pixel(bst_ctx *ctx, bst_cosmic_rays *h, int x, int y, doub
     return BST_OK;
 }
 
-/* Cuts [*t0, *t1] of p + t d to where it lies between low and high; false where nothing is left. */
+/* Clips the parameter range [*t0, *t1] of p + t d to values between low and high; false if nothing
+ * is left. */
 static bool clip(double p, double d, double low, double high, double *t0, double *t1) {
     if (d == 0.0) {
         return p >= low && p < high;
@@ -63,8 +65,8 @@ static bool clip(double p, double d, double low, double high, double *t0, double
     return *t0 < *t1;
 }
 
-/* Charge of a track from (x, y) along (dx, dy) px, spread evenly over it, to the pixels it crosses
- * (Amanatides and Woo, Eurographics 1987). Pixel n reaches from n - 1/2 to n + 1/2. */
+/* Deposits the charge of a track from (x, y) along (dx, dy) px, uniform per length, in the pixels
+ * it crosses (Amanatides and Woo, Eurographics 1987). Pixel n extends from n - 1/2 to n + 1/2. */
 static bst_status add_track(bst_ctx *ctx, bst_cosmic_rays *h, double x, double y, double dx,
                             double dy, double electrons) {
     double t = 0.0, end = 1.0;
@@ -72,7 +74,7 @@ static bst_status add_track(bst_ctx *ctx, bst_cosmic_rays *h, double x, double y
         !clip(y, dy, -0.5, h->height - 0.5, &t, &end)) {
         return BST_OK;
     }
-    /* the pixel just inside the sensor where the track comes in */
+    /* the pixel just inside the sensor at which the track enters */
     double inside = fmin(1e-9, 0.5 * (end - t));
     int column = (int)floor(x + (t + inside) * dx + 0.5),
         row = (int)floor(y + (t + inside) * dy + 0.5);
@@ -89,6 +91,7 @@ static bst_status add_track(bst_ctx *ctx, bst_cosmic_rays *h, double x, double y
     return BST_OK;
 }
 
+/* qsort order by pixel index. */
 static int by_index(const void *a, const void *b) {
     int p = ((const bst_cosmic_rays_pixel *)a)->index,
         q = ((const bst_cosmic_rays_pixel *)b)->index;
@@ -102,7 +105,7 @@ bst_status bst_cosmic_rays_draw(bst_ctx *ctx, bst_cosmic_rays *h, bst_rng_key ke
     const bst_detector_cosmic_ray_config *c = &h->config;
     h->count = 0;
     *summary = (bst_cosmic_rays_summary){0};
-    /* tracks that come in beside the sensor reach it from as far as most of them are long */
+    /* tracks can enter beside the sensor, up to the length of most tracks */
     double reach = ceil(REACH * c->depth_um / c->pixel_pitch_um);
     double width = h->width + 2.0 * reach, height = h->height + 2.0 * reach;
     double pixel_cm2 = c->pixel_pitch_um * c->pixel_pitch_um * 1e-8;

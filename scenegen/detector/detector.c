@@ -11,15 +11,15 @@
 struct bst_detector {
     bst_camera camera;
     bst_rng_key pattern;
-    int stride; /* of the maps: the sensor's width, rounded up to chunks */
+    int stride; /* of the maps: sensor width rounded up to chunks of 64 */
     cl_context context;
     cl_command_queue queue;
     cl_mem gain, dark, overlay, offsets, codes, flags;
-    cl_mem deposits; /* of the present frame; borrowed */
+    cl_mem deposits; /* of the current frame; lent */
     cl_kernel deposit_kernel;
     bst_cosmic_rays *hits;
     bst_cosmic_rays_summary summary;
-    float *rows; /* fixed offsets and those of one frame, DN: [2][height] */
+    float *rows; /* row offsets, fixed and of the frame, DN: [2][height] */
 };
 
 double bst_detector_near_full_e(double full_well_e) {
@@ -38,8 +38,8 @@ static bool has_offsets(const bst_detector_config *d) {
     return d->column_offset_rms_e > 0.0 || d->row_offset_rms_e > 0.0 || d->row_noise_e > 0.0;
 }
 
-/* Whether the amplifier bends so much that read noise must not go through it: the bend changes the
- * read noise's share of the variance by more than 3e-5. */
+/* True if the amplifier's nonlinearity changes the read noise's share of the variance by more than
+ * 3e-5, so that read noise must be added after it. */
 static bool charge_first(const bst_camera *c) {
     const double *n = c->detector.nonlinearity;
     double bend = 2.0 * fabs(n[0]) + 3.0 * fabs(n[1]) + 4.0 * fabs(n[2]);
@@ -87,7 +87,7 @@ static bst_status make_map(bst_ctx *ctx, bst_detector *d,
                                               float *),
                            cl_mem *out) {
     size_t count = (size_t)d->stride * (size_t)d->camera.height_px;
-    count += make ? 0 : count / 64; /* the overlay's marks */
+    count += make ? 0 : count / 64; /* marks of the overlay's chunks */
     float *map = calloc(count, sizeof *map);
     if (!map) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a map of the detector");
@@ -100,6 +100,7 @@ static bst_status make_map(bst_ctx *ctx, bst_detector *d,
     return status;
 }
 
+/* Fixed column and row offsets on the device. */
 static bst_status make_offsets(bst_ctx *ctx, bst_detector *d) {
     size_t height = (size_t)d->camera.height_px, count = (size_t)d->stride + height;
     float *offsets = calloc(count, sizeof *offsets);
@@ -118,6 +119,7 @@ static bst_status make_offsets(bst_ctx *ctx, bst_detector *d) {
     return status;
 }
 
+/* Table of output codes on the device. */
 static bst_status make_codes(bst_ctx *ctx, bst_detector *d) {
     uint16_t *codes = malloc(65536 * sizeof *codes);
     if (!codes) {
@@ -224,13 +226,13 @@ void bst_detector_buffers(const bst_detector *d, cl_mem out[BST_DETECTOR_BUFFERS
     out[5] = d->flags;
 }
 
-/* Adds the exposure's deposits to the overlay (sign 1), or sets their pixels to 0 again (sign 0).
- */
+/* Adds the exposure's cosmic-ray deposits to the overlay (sign 1), or sets their pixels to 0 (sign
+ * 0). */
 static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
     if (d->summary.pixels == 0) {
         return BST_OK;
     }
-    /* a size of work-groups of its own for each count would have the kernel built for each */
+    /* a fixed work-group size avoids a new kernel build for each count */
     size_t local = BST_HIT_GROUP, global = ((size_t)d->summary.pixels + local - 1) / local * local;
     cl_int count = d->summary.pixels;
     cl_kernel k = d->deposit_kernel;
@@ -247,6 +249,7 @@ static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
         "placing radiation hits");
 }
 
+/* Draws and uploads the cosmic rays of an exposure. */
 static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
                              int64_t exposure_id, double collect_s) {
     const bst_cosmic_rays_pixel *pixels;
@@ -256,6 +259,7 @@ static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
     return deposit(ctx, d, 1.0f);
 }
 
+/* Draws and uploads the row offsets of an exposure. */
 static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
                              int64_t exposure_id) {
     size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);

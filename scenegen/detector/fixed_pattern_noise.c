@@ -31,7 +31,7 @@ bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera) {
            d->hot_fraction > 0.0;
 }
 
-/* A FITS map of the sensor's size, finite and not negative, times `factor`. */
+/* Loads a FITS map of the sensor's size, finite and not negative, scaled by `factor`. */
 static bst_status load_map(bst_ctx *ctx, const bst_camera *camera, const char *what,
                            const char *path, double factor, int stride, float *map) {
     int width, height;
@@ -99,7 +99,8 @@ bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, 
     if (d->dark_map[0]) {
         BST_TRY(load_map(ctx, camera, "dark_map", d->dark_map, warm, stride, dark));
     }
-    double s2 = log1p(d->dsnu_rms * d->dsnu_rms), s = sqrt(s2); /* log-normal of mean 1 */
+    /* log-normal distribution of mean 1 */
+    double s2 = log1p(d->dsnu_rms * d->dsnu_rms), s = sqrt(s2);
     for (int y = 0; y < height; y++) {
         float *row = dark + (size_t)y * (size_t)stride;
         for (int x = 0; x < width; x++) {
@@ -128,7 +129,7 @@ void bst_fixed_pattern_noise_offsets(const bst_camera *camera, bst_rng_key key, 
     }
 }
 
-/* The first numbers of the codes, from the file's lines; starts has room for 65536. */
+/* Reads the first digital number of each code from the table file; starts: [65536]. */
 static bst_status read_table(bst_ctx *ctx, const bst_camera *camera, int *starts, int *count) {
     const char *path = camera->detector.quantisation.table;
     char *text;

@@ -13,6 +13,7 @@ struct bst_readout {
     size_t bytes;
 };
 
+/* True if the camera needs a kernel of the staged read-out. */
 static bool wanted(const bst_readout *r, int kernel) {
     const bst_detector_config *d = &r->camera.detector;
     return kernel == TRANSFER ? d->frame_transfer_s > 0.0
@@ -79,6 +80,7 @@ bst_window bst_readout_light_window(const bst_readout *r, bst_window window) {
     return light;
 }
 
+/* Row stride of an image, floats. */
 static int stride_of(int width) {
     return (width + 63) / 64 * 64;
 }
@@ -103,11 +105,13 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
     return BST_OK;
 }
 
-/* Starts a kernel whose first argument is the parameters and whose others are buffers. */
-static bst_status start(bst_ctx *ctx, bst_readout *r, int kernel, const bst_kernel_frame_params *p,
-                        const cl_mem *buffers, cl_uint count, size_t items) {
+/* Enqueues a kernel whose arguments are the frame parameters and buffers. */
+static bst_status enqueue_kernel(bst_ctx *ctx, bst_readout *r, int kernel,
+                                 const bst_kernel_frame_params *p, const cl_mem *buffers,
+                                 cl_uint count, size_t items) {
     cl_kernel k = r->kernels[kernel];
-    size_t local = 64; /* left open, a driver may build the kernel anew for each number of items */
+    /* a fixed work-group size avoids a new kernel build for each number of items */
+    size_t local = 64;
     while (items % local > 0) {
         local /= 2;
     }
@@ -138,15 +142,15 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     size_t columns = (size_t)p.light_stride, rows = (size_t)p.light_height;
     if (wanted(r, TRANSFER)) {
         cl_mem b[] = {r->image, maps[0]};
-        BST_TRY(start(ctx, r, TRANSFER, &p, b, 2, columns / 64));
+        BST_TRY(enqueue_kernel(ctx, r, TRANSFER, &p, b, 2, columns / 64));
     }
     cl_mem charge[] = {r->image, maps[0], maps[1], maps[2]};
-    BST_TRY(start(ctx, r, CHARGE, &p, charge, 4, rows));
+    BST_TRY(enqueue_kernel(ctx, r, CHARGE, &p, charge, 4, rows));
     if (wanted(r, BLOOM)) {
         cl_mem b[] = {r->image, r->over};
-        BST_TRY(start(ctx, r, BLOOM, &p, b, 2, columns / 16));
+        BST_TRY(enqueue_kernel(ctx, r, BLOOM, &p, b, 2, columns / 16));
     }
     p.per_full_well /= (float)(binning * binning);
     cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5]};
-    return start(ctx, r, READ, &p, read, 6, (size_t)p.window_height);
+    return enqueue_kernel(ctx, r, READ, &p, read, 6, (size_t)p.window_height);
 }

@@ -1,5 +1,5 @@
-/* The detector in stages (kernels/readout.cl), for blooming, frame transfer and binning: from an
- * image of the sources' light to the frame. */
+/* Staged read-out (kernels/readout.cl) for blooming, frame transfer and binning: from an image of
+ * the sources' light to the frame. */
 #ifndef BST_SCENEGEN_DETECTOR_READOUT_H
 #define BST_SCENEGEN_DETECTOR_READOUT_H
 
@@ -21,16 +21,21 @@ bst_status bst_readout_create(bst_ctx *ctx, bst_device *device, const bst_camera
 /* Frees a read-out with its kernels and buffers on the device; NULL is allowed. */
 void bst_readout_free(bst_readout *readout);
 
-/* The part of the sensor whose light a frame of `window` takes: whole columns where charge or light
- * runs along them. */
+/* Part of the sensor whose light a frame of `window` needs: whole columns if charge or light moves
+ * along them. */
 bst_window bst_readout_light_window(const bst_readout *readout, bst_window window);
 
-/* The image of light for a window of bst_readout_light_window, *stride floats a row. */
+/* Image of light for a window of bst_readout_light_window.
+ *
+ * Returned:  *stride  floats per row */
 bst_status bst_readout_image(bst_ctx *ctx, bst_readout *readout, bst_window light, cl_mem *image,
                              int *stride) BST_MUST_CHECK;
 
-/* Enqueues all that makes a frame from that image. params: of the frame (window, exposure, noise);
- * window: on the sensor, before binning; saturated: room for one int per row of the frame. */
+/* Enqueues the read-out of a frame from the light image.
+ *
+ * Given:     params     of the frame: window, exposure, noise
+ *            window     on the sensor, before binning
+ *            saturated  room for one int per frame row */
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *readout, const bst_detector *detector,
                            const bst_kernel_frame_params *params, bst_window window, int binning,
                            cl_mem frame, cl_mem saturated) BST_MUST_CHECK;

@@ -1,4 +1,4 @@
-/* Vignetting in the kernels. */
+/* Build options of the vignetting kernel. */
 #ifndef BST_SCENEGEN_DETECTOR_VIGNETTING_H
 #define BST_SCENEGEN_DETECTOR_VIGNETTING_H
 

@@ -9,8 +9,8 @@ enum { PERIODS = 4 };
 
 struct bst_alias_correction {
     int cells[2]; /* x, y */
-    int size[2];  /* of the cells' transform */
-    float *room;  /* [size y][2 (size x / 2 + 1)] */
+    int size[2];  /* FFT size of the cells */
+    float *room;  /* work space [size y][2 (size x / 2 + 1)] */
     float *kernel;
     fftwf_plan forward, inverse;
 };
@@ -19,8 +19,8 @@ static int padded(int n) {
     return 2 * (n / 2 + 1);
 }
 
-/* Least size that holds `least` and has no factor but 2, 3 and 5. */
-static int good_size(int least) {
+/* Smallest size >= `least` with prime factors 2, 3 and 5 only. */
+static int fft_size(int least) {
     for (int n = (least + 7) / 8 * 8;; n += 8) {
         int rest = n;
         for (int p = 2; p <= 5; p += p == 2 ? 1 : 2) {
@@ -34,7 +34,7 @@ static int good_size(int least) {
     }
 }
 
-/* The fine lattice of displacements: half a cell, over PERIODS periods. */
+/* Fine grid of displacements: half a cell, over PERIODS periods. */
 typedef struct lattice {
     const bst_psf *psf;
     int spectrum;
@@ -70,9 +70,9 @@ static void fill_rows(void *user, int begin, int end) {
     }
 }
 
-/* Puts the kernel for displacements within the cells into the transform's room; returns the largest
- * value for displacements within the used range. */
-static double crop(bst_alias_correction *w, const lattice *l) {
+/* Copies the kernel for displacements within the cells into the FFT work space; returns its largest
+ * value within the used range. */
+static double copy_kernel(bst_alias_correction *w, const lattice *l) {
     const float *image = (const float *)l->data;
     double largest = 0.0;
     memset(w->room, 0, sizeof(float) * (size_t)w->size[1] * (size_t)padded(w->size[0]));
@@ -80,7 +80,7 @@ static double crop(bst_alias_correction *w, const lattice *l) {
         for (int dx = 1 - w->cells[0]; dx < w->cells[0]; dx++) {
             bool used = fabs(dx * l->axis[0]->cell_px) <= l->axis[0]->used_px &&
                         fabs(dy * l->axis[1]->cell_px) <= l->axis[1]->used_px;
-            /* a place on the fine lattice: its cells are half as large */
+            /* position on the fine grid, whose cells are half as large */
             int row = (2 * dy + l->n[1]) % l->n[1], column = (2 * dx + l->n[0]) % l->n[0];
             float v = image[(size_t)row * (size_t)padded(l->n[0]) + (size_t)column];
             if (used) {
@@ -104,7 +104,7 @@ static bst_status make_kernel(bst_ctx *ctx, bst_alias_correction *w, lattice *l,
     bst_parallel_for(pool, l->n[1], 16, fill_rows, l);
     fftwf_execute(plan);
     fftwf_destroy_plan(plan);
-    *largest = crop(w, l);
+    *largest = copy_kernel(w, l);
     fftwf_execute(w->forward);
     size_t count = (size_t)w->size[1] * (size_t)padded(w->size[0]);
     double scale = 1.0 / ((double)w->size[0] * w->size[1]);
@@ -126,7 +126,7 @@ bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spe
     }
     for (int a = 0; a < 2; a++) {
         w->cells[a] = l.axis[a]->cells;
-        w->size[a] = good_size(2 * w->cells[a]);
+        w->size[a] = fft_size(2 * w->cells[a]);
         l.n[a] = (int)lround(2.0 * PERIODS * l.axis[a]->pixels / l.axis[a]->cell_px);
     }
     size_t bytes = sizeof(float) * (size_t)w->size[1] * (size_t)padded(w->size[0]);

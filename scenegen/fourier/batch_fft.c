@@ -7,11 +7,11 @@
 
 enum { MOST_PASSES = 24, MOST_RADIX = 8 };
 
-/* One pass: blocks of `radix` x `step` elements; of each, radix elements that are `step` apart are
- * transformed and turned by twiddle[j][1 .. radix - 1], j the place of the first. */
+/* One FFT pass over blocks of `radix` x `step` elements: radix elements `step` apart are
+ * transformed and multiplied by twiddle[j][1 .. radix - 1], j the index of the first. */
 typedef struct fft_pass {
     int radix, step;
-    float *twiddle; /* [step][radix - 1][2]; NULL: no turn */
+    float *twiddle; /* [step][radix - 1][2]; NULL: none */
 } fft_pass;
 
 struct bst_batch_fft {
@@ -20,9 +20,9 @@ struct bst_batch_fft {
     int *order;
 };
 
-/* ------------------------------------------------------------------ passes */
+/* ------------------------------------------------------------------ Passes */
 
-/* Where the butterflies leave frequency k. */
+/* Output position of frequency k in each butterfly. */
 static const signed char places[MOST_RADIX + 1][MOST_RADIX] = {[2] = {0, 1},
                                                                [3] = {0, 1, 2},
                                                                [4] = {0, 2, 1, 3},
@@ -34,7 +34,7 @@ static const signed char places[MOST_RADIX + 1][MOST_RADIX] = {[2] = {0, 1},
 
 void bst_batch_fft_run(const bst_batch_fft *f, bst_batch *data) {
     void (*run_pass)(const fft_pass *, bst_batch *, int) = BST_SIMD_PICK(run_pass);
-    /* after the first pass its blocks are transforms of their own, each in a core's cache */
+    /* after the first pass its blocks are independent transforms, each within a core's cache */
     run_pass(&f->pass[0], data, f->n);
     int step = f->pass[0].step;
     for (int begin = 0; begin < f->n; begin += step) {
@@ -44,15 +44,15 @@ void bst_batch_fft_run(const bst_batch_fft *f, bst_batch *data) {
     }
 }
 
-/* ------------------------------------------------------------------ plans */
+/* ------------------------------------------------------------------ Plans */
 
-/* Splits n into radices, the largest first; returns how many, 0 when n has other factors. */
+/* Factors n into radices, largest first; returns their number, 0 if n has other prime factors. */
 static int split(int n, int radix[MOST_PASSES]) {
     static const int order[5] = {8, 5, 4, 3, 2};
     int count = 0;
     for (int i = 0; i < 5; i++) {
         while (n % order[i] == 0) {
-            /* two fours rather than an eight and a two */
+            /* two radix-4 passes rather than radix 8 and 2 */
             if (order[i] == 8 && n % 16 == 0 && (n / 16) % 2 != 0) {
                 break;
             }
@@ -65,7 +65,7 @@ static int split(int n, int radix[MOST_PASSES]) {
 
 double bst_batch_fft_cost(int n) {
     int radix[MOST_PASSES], count = n >= BST_LANES ? split(n, radix) : 0;
-    /* additions and multiplications per element, turns included */
+    /* operations per element, twiddle factors included */
     static const double work[MOST_RADIX + 1] = {
         [2] = 5.0, [3] = 9.3, [4] = 8.5, [5] = 14.0, [8] = 12.5};
     double sum = count > 0 ? 0.0 : INFINITY;
@@ -87,7 +87,7 @@ static bst_status make_pass(bst_ctx *ctx, fft_pass *p) {
     for (int j = 0; j < p->step; j++) {
         for (int k = 1; k < p->radix; k++) {
             float *w = p->twiddle + 2 * ((size_t)j * (size_t)(p->radix - 1));
-            /* the butterfly leaves frequency k at another place, in whose order the turns are */
+            /* twiddle factors are stored in the butterfly's output order */
             int place = places[p->radix][k];
             double a = -2.0 * BST_PI * (double)j * k / n;
             w[2 * (place - 1)] = (float)cos(a);

@@ -4,15 +4,14 @@
 #include <math.h>
 #include <string.h>
 
-/* Frequencies per axis over all that the PSF has, and samples of the image from them: four per
- * period of the highest frequency. */
+/* LATTICE: frequencies per axis over the PSF's band. SIDE: image samples, four per period of the
+ * highest frequency. */
 enum { LATTICE = 96, SIDE = 192 };
 
-/* What is imaged: all of the OTF, what the grid's first aliases along x and y add, and what lies
- * beyond the cut-off. */
+/* Images: whole OTF, first aliases along x and y, frequencies beyond the cut-off. */
 enum { WHOLE, ALIAS_X, ALIAS_Y, LOST, IMAGES };
 
-/* First class of what lies beside a point: a Gaussian three sigma away is at 0.011. */
+/* First brightness class of the wings: a Gaussian three sigma away is at 0.011. */
 enum { WINGS = 7 };
 
 typedef struct lattice {
@@ -27,18 +26,18 @@ static double frequency(const lattice *l, int i) {
     return (i - LATTICE / 2) * l->step;
 }
 
-/* The kernel's values are floats: their rounding, of its transform at 0. */
+/* Rounding of the kernel's float values, relative to its transform at 0. */
 #define ROUNDED 0x1p-24
 
-/* Transforms of the alias of order 1 over the kernel's own, at the lattice's frequencies along an
- * axis. A point between the samples turns its phase and nothing else. */
+/* Ratio of the first alias to the kernel's transform at the lattice frequencies of an axis. A point
+ * between samples only changes the phase. */
 static void find_aliases(lattice *l, const bst_fourier_axis *axis, int a) {
     double density = (double)axis->samples / axis->pixels;
     double whole = bst_nufft_kernel_transform(&axis->spread, 0.0);
     for (int i = 0; i < LATTICE; i++) {
         double nu = frequency(l, i) / density;
         double own = fabs(bst_nufft_kernel_transform(&axis->spread, nu));
-        /* beyond the grid's band all is lost */
+        /* beyond the grid's band everything is lost */
         l->alias[a][i] = fabs(nu) >= 0.5
                              ? 1.0
                              : fmin((fabs(bst_nufft_kernel_transform(&axis->spread, nu + 1.0)) +
@@ -48,6 +47,7 @@ static void find_aliases(lattice *l, const bst_fourier_axis *axis, int a) {
     }
 }
 
+/* Renders one of the images of a field node by FFT. */
 static void make_image(lattice *l, int node, int what) {
     double area = l->step * l->step, *image = l->image + what * SIDE * SIDE;
     memset(l->room, 0, sizeof *l->room * SIDE * SIDE);
@@ -72,12 +72,12 @@ static void make_image(lattice *l, int node, int what) {
     }
 }
 
-/* Faint pixels along a column of the star's were found to have up to 1.7 times this error
+/* Safety factor: faint pixels in a bright star's column had up to 1.7 times this error
  * (tests/scenegen/test_tolerance_sweep.c, scene 171). */
 #define SAFE 1.7
 
-/* Raises the errors of the classes by those of a field node. */
-static void take_node(lattice *l, int node, double peak, bst_fourier_error *out) {
+/* Raises the errors of the brightness classes to those of a field node. */
+static void add_node_errors(lattice *l, int node, double peak, bst_fourier_error *out) {
     double top = 0.0;
     for (int what = 0; what < IMAGES; what++) {
         make_image(l, node, what);
@@ -87,11 +87,11 @@ static void take_node(lattice *l, int node, double peak, bst_fourier_error *out)
     }
     for (int i = 0; i < SIDE * SIDE; i++) {
         int exponent;
-        (void)frexp(fmax(l->image[i] / top, 1e-12), &exponent); /* in [2^(e-1), 2^e) */
+        (void)frexp(fmax(l->image[i] / top, 1e-12), &exponent); /* fraction in [2^(e-1), 2^e) */
         int k = exponent > 0 ? 0 : -exponent;
         k = k < BST_LIGHT_CLASSES ? k : BST_LIGHT_CLASSES - 1;
         const double *at = l->image + i;
-        /* aliases of orders 1 and -1 are each other's conjugates */
+        /* aliases of orders 1 and -1 are complex conjugates */
         double error = SAFE * 2.0 * (at[ALIAS_X * SIDE * SIDE] + at[ALIAS_Y * SIDE * SIDE]) +
                        at[LOST * SIDE * SIDE];
         out->most[k] = fmax(out->most[k], error / peak);
@@ -113,7 +113,7 @@ bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst
         find_aliases(&l, &axis[a], a);
     }
     for (int n = 0; n < bst_psf_nodes(psf) && l.plan; n++) {
-        take_node(&l, n, band->peak, out);
+        add_node_errors(&l, n, band->peak, out);
     }
     bst_status status =
         l.plan ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the error of a grid");

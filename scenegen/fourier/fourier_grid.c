@@ -9,25 +9,26 @@
 
 enum {
     LATTICE = 128, /* frequencies per axis over the kept band */
-    IMAGE = 256,   /* PSF samples per axis from it: four per period of the highest frequency */
-    WIDE = 256,    /* coarse image of the wings */
+    IMAGE = 256,   /* PSF samples per axis: four per period of the highest frequency */
+    WIDE = 256,    /* samples of the coarse image of the wings */
     DIRECTIONS = 8
 };
 
 static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 3e-7, LEAST_DENSITY = 0.25,
                     MOST_DENSITY = 5.0;
 
-/* Derivatives of order 2, 4 and 6 of a Gaussian at sigma 1, over its peak. */
+/* Peak derivatives of order 2, 4 and 6 of a Gaussian with sigma 1, relative to its peak. */
 static const double GAUSSIAN[3] = {1.0, 3.0, 15.0};
 
+/* Modulus of a node's OTF, pixel included. */
 static double modulus(const bst_psf *psf, int node, double fx, double fy) {
     double v[2];
     bst_psf_otf(psf, node, fx, fy, v);
     return hypot(v[0], v[1]);
 }
 
-/* The band is cut where what lies beyond is a `tolerance` of the peak's bound. The pixel's own sinc
- * keeps this finite for optics that pass far more than the pixels resolve. */
+/* Chooses the cut-off frequency: the OTF beyond it contributes at most `tolerance` of the peak's
+ * bound. The pixel's sinc keeps it finite for optics that exceed the pixel resolution. */
 static void find_cutoff(const bst_psf *psf, double tolerance, bst_fourier_band *out) {
     enum { RINGS = 256, SECTORS = 24 };
     double most = bst_psf_cutoff(psf), step = most / RINGS, ring[RINGS], total = 0.0;
@@ -50,10 +51,10 @@ static void find_cutoff(const bst_psf *psf, double tolerance, bst_fourier_band *
         lost += ring[--keep];
     }
     out->cutoff = keep * step;
-    out->lost = lost; /* over the peak below */
+    out->lost = lost; /* relative to the peak below */
 }
 
-/* Inverse transform in place of a Hermitian lattice [n][n] given in natural wrap-around order. */
+/* Inverse FFT in place of a Hermitian grid [n][n] in wrap-around order. */
 static bst_status invert(bst_ctx *ctx, fftwf_complex *data, int n) {
     fftwf_plan plan = fftwf_plan_dft_2d(n, n, data, data, FFTW_BACKWARD, FFTW_ESTIMATE);
     if (!plan) {
@@ -64,15 +65,15 @@ static bst_status invert(bst_ctx *ctx, fftwf_complex *data, int n) {
     return BST_OK;
 }
 
-/* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their middle. */
+/* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their centre. */
 static double binned(double f, int binning) {
     double s = sin(BST_PI * f);
     return fabs(s) < 1e-9 ? 1.0 : sin(BST_PI * binning * f) / (binning * s);
 }
 
-/* Raises the parts of all binnings, over those of none, by those of a field node: the image's
- * derivatives are at most the sums of moduli, and its peak is at least what binned pixels about the
- * PSF's peak have. */
+/* Raises out->pixel_part to the values of a field node, for all binnings relative to none. The
+ * derivatives are bounded by sums of moduli, and the peak from below by pixels about the PSF's
+ * peak. */
 static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
                           bst_fourier_band *out) {
     enum { SIDE = LATTICE / 2 };
@@ -110,7 +111,7 @@ static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
     }
 }
 
-/* Peak, sensitivity to coarse nodes and the strength of frequencies along x and y. */
+/* Measures peak, sensitivity to coarse quadrature nodes, and spectrum along x and y. */
 static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
                                bst_fourier_band *out) {
     double step = 2.0 * out->cutoff / LATTICE, area = step * step, peak = 0.0;
@@ -190,17 +191,17 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
     return BST_OK;
 }
 
-/* The smallest distance beyond which the wings, smoothed over a few px, stay below REACH_SHARE. */
+/* Measures the distance beyond which the smoothed wings stay below REACH_SHARE. */
 static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
                                 bst_fourier_band *out) {
     double step = 1.0 / (WIDE * WIDE_CELL_PX), area = step * step, reach = 0.0;
     enum { RINGS = WIDE };
-    double ring[RINGS] = {0.0}; /* by whole cells of distance */
+    double ring[RINGS] = {0.0}; /* by distance in cells */
     for (int n = 0; n < bst_psf_nodes(psf); n++) {
         for (int j = -WIDE / 2; j < WIDE / 2; j++) {
             for (int i = -WIDE / 2; i < WIDE / 2; i++) {
                 double fx = i * step, fy = j * step, v[2];
-                /* smoothed by a Gaussian of one cell, so that the band's end leaves no ripples */
+                /* smoothed by a Gaussian of one cell to suppress ringing at the band's end */
                 double s = 2.0 * BST_PI * BST_PI * WIDE_CELL_PX * WIDE_CELL_PX,
                        smooth = exp(-s * (fx * fx + fy * fy));
                 bst_psf_otf(psf, n, fx, fy, v);

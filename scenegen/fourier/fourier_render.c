@@ -14,19 +14,19 @@
 
 enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96, DENSITY_PX = 100000 };
 
-/* Error of a widened node's image that is allowed, over its peak. */
+/* Allowed error of a widened node's image, relative to its peak. */
 static const double WIDEN_ERROR = 1e-3;
 
-/* Grids: the one for the tolerance, and a finer one for frames with brighter points. */
+/* Grid qualities: for the tolerance, and finer for frames with brighter points. */
 enum { PLAIN, FINE, QUALITIES };
 
-/* Errors of the fine grid over those of the plain one. */
+/* Error ratio of the fine to the plain grid. */
 static const double FINER = 1.0 / 16.0;
 
-/* What is ready for windows of one size. */
+/* Grid, tables and buffers for windows of one size. */
 typedef struct setup {
     int width, height, quality;
-    long long used; /* number of the call that used it last */
+    long long used; /* number of the call that last used it */
     bst_otf_convolve *fft;
     cl_mem table; /* [2][BST_SPREAD_TABLE] */
     cl_mem grid;
@@ -38,9 +38,9 @@ struct bst_fourier_render {
     bst_fourier_render_options options;
     bst_fourier_band band;
     double density[QUALITIES][2];
-    /* of any window, and of the whole sensor, whose grid is denser */
+    /* for any window, and for the whole sensor, whose grid is denser */
     bst_fourier_error error[QUALITIES][2];
-    double widest; /* widening of nodes that the spreading kernel takes, of the node variance */
+    double widest; /* largest node widening that the spreading kernel supports, in node variances */
     int margin;
     bst_parallel *pool;
     cl_context context;
@@ -49,7 +49,7 @@ struct bst_fourier_render {
     int tile_width, tile_height, group;
     setup setups[SETUPS];
     long long calls;
-    int nodes, field_nodes, field_x, field_y; /* of the PSF; of its field; lattice of weights */
+    int nodes, field_nodes, field_x, field_y; /* of the PSF; of its field; grid of field weights */
     cl_mem *fields;                           /* [field_nodes] */
 };
 
@@ -57,8 +57,7 @@ bst_fourier_render_options bst_fourier_render_default_options(void) {
     return (bst_fourier_render_options){.taps = 8, .tolerance = 3e-5};
 }
 
-/* Tiles for the deposit, and threads for the transforms: as many as the device has, if it is the
- * host's processor. */
+/* Chooses deposit tiles and FFT threads: all of the device's cores if it is the host processor. */
 static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fourier_render *l,
                                int *threads) {
     cl_device_type type = 0;
@@ -74,7 +73,7 @@ static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fourier_ren
         ctx, clGetDeviceInfo(id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL),
         "asking for the device's compute units"));
     bool cpu = (type & CL_DEVICE_TYPE_CPU) != 0, large = cpu && local_bytes >= 128 * 1024;
-    /* of a core's second cache rather than the first: fewer blocks lie on two tiles */
+    /* sized for the second-level cache: fewer node blocks lie on two tiles */
     l->tile_width = large ? local_bytes >= 512 * 1024 ? 256 : 64 : 16;
     l->tile_height = large ? 256 : 32;
     l->group = large ? 1 : 4;
@@ -100,7 +99,7 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fourier_render *l)
     return bst_device_check(ctx, code, "bst_light_deposit");
 }
 
-/* The field nodes' weights on a lattice, which the kernel interpolates again. */
+/* Uploads the field nodes' weights on a grid that the kernel interpolates. */
 static bst_status make_fields(bst_ctx *ctx, bst_fourier_render *l) {
     l->field_x = (int)l->camera.width_px / FIELD_STEP_PX + 2;
     l->field_y = (int)l->camera.height_px / FIELD_STEP_PX + 2;
@@ -136,16 +135,16 @@ static bst_status make_fields(bst_ctx *ctx, bst_fourier_render *l) {
     return status;
 }
 
-/* The grid of a window of so many pixels. */
+/* Chooses the grid axes for a window of this size. */
 static void choose_axes(const bst_fourier_render *l, int quality, int width, int height,
                         bst_fourier_axis axis[2]) {
-    /* the least distance from which wings wrap around; nearer ones are not smooth */
+    /* smallest wrap-around distance of wings; nearer ones are not smooth */
     int taps = l->options.taps, pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
     axis[0] = bst_fourier_axis_choose(&l->band, 0, taps, width + pad, l->density[quality][0]);
     axis[1] = bst_fourier_axis_choose(&l->band, 1, taps, height + pad, l->density[quality][1]);
 }
 
-/* Densities and errors of a grid; widenings that it takes. */
+/* Sets densities and errors of a grid quality, and the supported widening. */
 static bst_status prepare_quality(bst_ctx *ctx, bst_fourier_render *l, int quality) {
     double tolerance = 0.45 * l->options.tolerance * (quality == FINE ? FINER : 1.0);
     bst_fourier_axis axis[2]; /* as sparse as any window's */
@@ -196,7 +195,7 @@ bst_status bst_fourier_render_create(bst_ctx *ctx, bst_device *device, const bst
     if (!l) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for light through a general PSF");
     }
-    /* several simulations of one process may plan at a time */
+    /* several simulations in one process may plan concurrently */
     fftwf_make_planner_thread_safe();
     fftw_make_planner_thread_safe();
     l->camera = *camera;
@@ -287,8 +286,8 @@ double bst_fourier_render_mixing_error(const bst_fourier_render *l) {
     return bst_psf_mixing_error(l->psf);
 }
 
-/* Table of the spreading kernel for a point `phase` samples right of sample taps / 2 - 1, and of
- * kernels for nodes that are wider by (n / BST_WIDTHS)^2 BST_WIDEST of the node variance. */
+/* Tabulates the spreading kernel by sub-sample phase (a point `phase` samples right of sample taps
+ * / 2 - 1), also for nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the node variance. */
 static void tabulate(const bst_fourier_render *l, int a, const bst_fourier_axis *axis,
                      float *table) {
     double density = (double)axis->samples / axis->pixels;
@@ -337,7 +336,7 @@ static bst_status make_setup(bst_ctx *ctx, bst_fourier_render *l, int quality, b
     return bst_device_buffer(ctx, l->context, bytes, NULL, "allocating the light's grid", &s->grid);
 }
 
-/* The setup for a window's size; an old one makes room for a new one. */
+/* Finds or creates the setup for a window's size; replaces the least recently used one. */
 static bst_status find_setup(bst_ctx *ctx, bst_fourier_render *l, int quality, bst_window window,
                              setup **out) {
     setup *oldest = &l->setups[0];
@@ -363,6 +362,7 @@ static bst_status find_setup(bst_ctx *ctx, bst_fourier_render *l, int quality, b
     return BST_OK;
 }
 
+/* Enqueues the deposit of nodes on the grid. */
 static bst_status deposit(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue queue,
                           bst_window window, const bst_fourier_render_nodes *nodes, const setup *s,
                           int node) {

@@ -1,10 +1,9 @@
-/* Light through a general PSF: aberrated, not separable, its wings not cut.
+/* Fourier render path: light through a general PSF (aberrated, not separable, wings not truncated).
  *
- * The frame's nodes are spread on a grid of the density that the PSF's band asks for, on the
- * device; the grid is convolved by FFT on the host's threads (a CPU device's memory is used in
- * place), and the image goes to the tile kernel. The cost depends on the window and the number of
- * nodes, hardly on the PSF; a field-dependent PSF costs one grid per field node, and one with
- * several spectra that many of each. */
+ * The frame's nodes are spread on a grid on the device, as dense as the PSF's band requires. The
+ * host's threads convolve the grid by FFT (in place for a CPU device), and the image goes to the
+ * tile kernel. The cost depends on window size and number of nodes, hardly on the PSF. A
+ * field-dependent PSF costs one grid per field node, times its number of spectra. */
 #ifndef BST_SCENEGEN_FOURIER_FOURIER_RENDER_H
 #define BST_SCENEGEN_FOURIER_FOURIER_RENDER_H
 
@@ -17,15 +16,19 @@
 typedef struct bst_fourier_render bst_fourier_render;
 
 typedef struct bst_fourier_render_options {
-    int taps;               /* of the spreading kernel: 4, 6 or 8 */
-    double tolerance;       /* error of the grid in any pixel, over the PSF's peak */
-    int spatial_oversample; /* as the renderer's */
+    int taps;               /* taps of the spreading kernel: 4, 6 or 8 */
+    double tolerance;       /* grid error in any pixel, relative to the PSF's peak */
+    int spatial_oversample; /* as in bst_renderer_options */
 } bst_fourier_render_options;
 
 /* Options with their defaults: 8 taps, tolerance 3e-5 of the PSF's peak. */
 bst_fourier_render_options bst_fourier_render_default_options(void);
 
-/* Measures the PSF and builds the kernel. The PSF is borrowed. `options` may be NULL. */
+/* Creates the Fourier render path: measures the PSF and builds the kernel.
+ *
+ * Given:     psf      lent
+ *            options  NULL: defaults
+ * Errors:    BST_ERR_MEMORY, BST_ERR_DEVICE */
 bst_status bst_fourier_render_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                      const bst_psf *psf, const bst_fourier_render_options *options,
                                      bst_fourier_render **out) BST_MUST_CHECK;
@@ -35,48 +38,50 @@ void bst_fourier_render_free(bst_fourier_render *light);
 /* Band of the PSF's frequencies; it belongs to the renderer. */
 const bst_fourier_band *bst_fourier_render_band(const bst_fourier_render *light);
 
-/* Pixels outside the window from which a source's light is still drawn. */
+/* Distance outside the window, px, from which a source's light is still rendered. */
 int bst_fourier_render_margin_px(const bst_fourier_render *light);
 
-/* Least samples of its grid per px and axis. */
+/* Smallest number of grid samples per px and axis. */
 double bst_fourier_render_density(const bst_fourier_render *light);
 
-/* Sets the part of a source's record that says how far its nodes reach. */
+/* Sets the reach of a source's nodes in its record. */
 void bst_fourier_render_stamp(const bst_fourier_render *light, bst_kernel_source_record *source);
 
-/* By how many node variances (bst_fourier_band) a node may be widened. */
+/* Largest widening of a node, in node variances (bst_fourier_band). */
 double bst_fourier_render_widest(const bst_fourier_render *light);
 
-/* Spectra of the PSF (bst_psf_spectra). */
+/* Number of spectra of the PSF (bst_psf_spectra). */
 int bst_fourier_render_spectra(const bst_fourier_render *light);
 
-/* Bound of an image's error by grid and cut-off, in sigma of the worst pixel, of a source with
- * `peak_e` electrons in its brightest one (fourier_error.h). fine: with the finer of two grids.
- * wings: the window has no more than them of it. */
+/* Error bound of an image by grid and cut-off, in sigma of the worst pixel (fourier_error.h).
+ *
+ * Given:     peak_e  electrons of the source's brightest pixel
+ *            fine    the finer of the two grids
+ *            wings   the window contains only the source's wings */
 double bst_fourier_render_error_sigma(const bst_fourier_render *light, bool fine, bool wings,
                                       bst_window window, double peak_e, double dark_variance_e2);
 
-/* Bound of its error by mixing spectra (bst_psf_mixing_error), over the peak of a source that has
- * one of its own. */
+/* Error bound by mixing of spectra (bst_psf_mixing_error), relative to the peak of a source with
+ * its own spectrum. */
 double bst_fourier_render_mixing_error(const bst_fourier_render *light);
 
-/* The frame's sources and node table on the device, and the boxes that the nodes kernel made. */
+/* Sources and node table of a frame on the device, and the boxes computed by the nodes kernel. */
 typedef struct bst_fourier_render_nodes {
     cl_mem sources, table, block_box, source_box;
-    cl_mem shares; /* float [sources][BST_SPECTRA], where the PSF has several spectra */
+    cl_mem shares; /* float [sources][BST_SPECTRA] if the PSF has several spectra */
     int source_groups;
-    bool fine; /* on the finer grid */
+    bool fine; /* use the finer grid */
 } bst_fourier_render_nodes;
 
-/* Expected electrons of the window's pixels: pixel (i, j) at buffer[first + j * pitch + i]. Valid
- * until the next call. */
+/* Expected electrons of a window: pixel (i, j) at buffer[first + j * pitch + i]. Valid until the
+ * next call. */
 typedef struct bst_fourier_render_image {
     cl_mem buffer;
     int first, pitch;
 } bst_fourier_render_image;
 
-/* Makes the image of a window. Waits for the nodes on `queue`. Prepares for a window of a new size
- * first, which takes longer than the image itself; the latest few sizes are kept. */
+/* Renders the light of a window. It waits for the nodes on `queue`. A new window size needs a
+ * setup, which takes longer than the image; the latest few are kept. */
 bst_status bst_fourier_render_frame(bst_ctx *ctx, bst_fourier_render *light, cl_command_queue queue,
                                     bst_window window, const bst_fourier_render_nodes *nodes,
                                     bst_fourier_render_image *out) BST_MUST_CHECK;

@@ -12,7 +12,8 @@ double bst_nufft_kernel_value(const bst_nufft_kernel *spread, double t) {
 }
 
 double bst_nufft_kernel_transform(const bst_nufft_kernel *spread, double nu) {
-    /* t = taps / 2 sin(a): the midpoint rule in a converges exponentially down to exp(-beta) */
+    /* with t = taps / 2 sin(a), the midpoint rule in a converges exponentially down to exp(-beta)
+     */
     double half = 0.5 * spread->taps, sum = 0.0;
     for (int i = 0; i < QUADRATURE; i++) {
         double a = 0.5 * BST_PI * (i + 0.5) / QUADRATURE, c = cos(a);
@@ -21,7 +22,7 @@ double bst_nufft_kernel_transform(const bst_nufft_kernel *spread, double nu) {
     return sum * BST_PI * half / QUADRATURE;
 }
 
-/* Error of one choice: what the neighbouring bands leak into the PSF's frequencies. */
+/* Error of a spreading kernel: leakage of the aliased bands into the PSF's frequencies. */
 static double leak(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
                    double density) {
     double sum = 0.0;
@@ -30,7 +31,7 @@ static double leak(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *
         if (!(band->weight[i] > 0.0)) {
             continue;
         }
-        if (nu >= 0.5) { /* lost */
+        if (nu >= 0.5) { /* beyond the grid's band: lost */
             sum += band->weight[i];
             continue;
         }
@@ -59,7 +60,7 @@ double bst_nufft_kernel_choose(bst_nufft_kernel *spread, const bst_nufft_kernel_
     return best;
 }
 
-/* Transforms of phi(t) z^(2k) at nu, k = 0 to 2. */
+/* Fourier transforms of phi(t) z^(2k) at nu, k = 0 to 2. */
 static void transforms(const bst_nufft_kernel *spread, double nu, double out[3]) {
     double half = 0.5 * spread->taps;
     out[0] = out[1] = out[2] = 0.0;
@@ -84,8 +85,8 @@ double bst_nufft_kernel_widen(const bst_nufft_kernel *spread, const bst_nufft_ke
     if (!(variance > 0.0)) {
         return 0.0;
     }
-    /* The light is kept: c0 = 1 - (c1 T1(0) + c2 T2(0)) / T0(0), so that two unknowns are left with
-     * the functions D_k(nu) = T_k(nu) - T_k(0) / T0(0) T0(nu). */
+    /* Flux is conserved: c0 = 1 - (c1 T1(0) + c2 T2(0)) / T0(0). Two unknowns remain, with the
+     * functions D_k(nu) = T_k(nu) - T_k(0) / T0(0) T0(nu). */
     double zero[3], normal[2][2] = {{0}}, right[2] = {0};
     transforms(spread, 0.0, zero);
     double a[BST_SPREAD_BINS][2], aim[BST_SPREAD_BINS];

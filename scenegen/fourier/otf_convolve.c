@@ -10,10 +10,10 @@ static bst_batch *allocate(size_t elements) {
     return bst_pages_alloc(elements * sizeof(bst_batch));
 }
 
-/* ------------------------------------------------------------------ set-up */
+/* ------------------------------------------------------------------ Set-up */
 
-/* The transfer functions of some strips. Both kinds of rows come as the sum or the difference of
- * two numbers, hence the half. */
+/* Tabulates the transfer function of some strips. Both rows of a pair arrive as sum or difference
+ * of two numbers, hence the factor 1/2. */
 static void fill_table(void *user, int begin, int end) {
     const pass *p = user;
     const bst_otf_convolve *f = p->fft;
@@ -39,7 +39,7 @@ static void fill_table(void *user, int begin, int end) {
     }
 }
 
-/* Which frequencies are within the cut-off. */
+/* Finds the frequency strips within the cut-off. */
 static bst_status find_strips(bst_ctx *ctx, bst_otf_convolve *f) {
     const bst_fourier_axis *x = &f->shape.x, *y = &f->shape.y;
     f->used = (int)fmin(floor(f->cutoff * x->pixels) + 1.0, 0.5 * x->samples);
@@ -109,7 +109,7 @@ static int longest_line(const bst_otf_convolve_layout *s) {
 
 static bst_status make_benches(bst_ctx *ctx, bst_otf_convolve *f) {
     size_t rows = (size_t)f->row_blocks * BLOCK;
-    /* odd multiples of a block: strips a page's multiple apart would share cache sets */
+    /* odd multiples of a block: strides of whole pages would share cache sets */
     f->strip_pitch = rows + (f->row_blocks % 2 == 0 ? BLOCK : 0);
     f->image_pitch = ((size_t)f->column_blocks | 1) * BLOCK;
     f->bench_count = bst_parallel_threads(f->pool);
@@ -144,7 +144,7 @@ double bst_otf_convolve_cell_place(const bst_otf_convolve *f, const bst_fourier_
     return place - *lower;
 }
 
-/* What the far wings need in the inverse of rows. */
+/* Interpolation weights of the far wings for the inverse row FFT. */
 static bst_status make_shares(bst_ctx *ctx, bst_otf_convolve *f) {
     int blocks = (f->shape.width + BLOCK - 1) / BLOCK;
     size_t wings = (size_t)BLOCK * (size_t)(f->cells_x + SHARES);
@@ -174,7 +174,7 @@ static bst_status make_shares(bst_ctx *ctx, bst_otf_convolve *f) {
 
 static bst_status make_wrap(bst_ctx *ctx, bst_otf_convolve *f) {
     const bst_fourier_axis *x = &f->shape.x, *y = &f->shape.y;
-    /* cells well below the distance from which wings wrap */
+    /* cells much smaller than the wrap-around distance */
     f->cell = x->samples > 14 * x->pixels / 10 ? 32 : 16;
     f->cells_x = (x->samples + f->cell - 1) / f->cell;
     f->cells_y = (y->samples + f->cell - 1) / f->cell;

@@ -5,6 +5,7 @@
 #include "scenegen/fourier/otf_convolve_internal.h"
 #include "sim/core/simd.h"
 
+/* Takes a free work space. */
 static bench *take_bench(bst_otf_convolve *f) {
     for (int i = 0;; i = (i + 1) % f->bench_count) {
         if (!atomic_flag_test_and_set(&f->benches[i].taken)) {
@@ -16,9 +17,9 @@ static bench *take_bench(bst_otf_convolve *f) {
 #define BST_SIMD_KERNELS "scenegen/fourier/otf_convolve_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-/* ------------------------------------------------------------------ rows forward */
+/* ------------------------------------------------------------------ Forward rows */
 
-/* Pairs of blocks of rows, which fill whole rows of cells. */
+/* Forward FFT of pairs of row blocks, which fill whole rows of cells. */
 static void rows_forward(void *user, int begin, int end) {
     const pass *p = user;
     bst_otf_convolve *f = p->fft;
@@ -56,10 +57,10 @@ static void rows_forward(void *user, int begin, int end) {
     atomic_flag_clear(&w->taken);
 }
 
-/* ------------------------------------------------------------------ columns */
+/* ------------------------------------------------------------------ Columns */
 
-/* Far wings of all nodes' light, in place of it. */
-static void run_wrap(bst_otf_convolve *f) {
+/* Replaces the cells' light by the far-wing correction of all nodes. */
+static void correct_wings(bst_otf_convolve *f) {
     float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
     size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
     for (int s = 0; s < f->spectra; s++) {
@@ -76,7 +77,7 @@ static void run_wrap(bst_otf_convolve *f) {
     }
 }
 
-/* Blocks of the image's columns; before them, with the last node, the far wings. */
+/* Column FFTs of image column blocks; with the last node, the far-wing correction first. */
 static void columns(void *user, int begin, int end) {
     const pass *p = user;
     bst_otf_convolve *f = p->fft;
@@ -85,7 +86,7 @@ static void columns(void *user, int begin, int end) {
     for (int i = begin; i < end; i++) {
         int c = i - (p->last && f->wraps);
         if (c < 0) {
-            run_wrap(f);
+            correct_wings(f);
             continue;
         }
         bst_batch *sum = f->sum ? f->sum + (size_t)c * pixels : w->line;
@@ -113,9 +114,9 @@ void bst_otf_convolve_add(bst_otf_convolve *f, int node, bool first, bool last, 
     bst_parallel_for(f->pool, f->column_blocks + (last && f->wraps), 1, columns, &p);
 }
 
-/* ------------------------------------------------------------------ rows inverse */
+/* ------------------------------------------------------------------ Inverse rows */
 
-/* Far wings of a row at the cells' centres. */
+/* Far wings of a row at the cell centres. */
 BST_CLONES
 static void row_of_wings(const bst_otf_convolve *f, int row, float *out) {
     int j;
@@ -126,7 +127,7 @@ static void row_of_wings(const bst_otf_convolve *f, int row, float *out) {
     }
 }
 
-/* Pairs of blocks of rows of the window. */
+/* Inverse FFT of pairs of row blocks of the window. */
 static void rows_inverse(void *user, int begin, int end) {
     const pass *p = user;
     bst_otf_convolve *f = p->fft;

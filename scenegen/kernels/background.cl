@@ -1,10 +1,9 @@
-/* The part of the background that differs from pixel to pixel, added to a tile's light. Built in
- * with the option BACKGROUND only. */
+/* Varying part of the background, added to a tile's light. Built only with the option BACKGROUND. */
 #ifdef BACKGROUND
 #define BACKGROUND_ARGUMENT , global const float *background
 
-/* Bilinear between the nodes of bst_skylight_map. Nodes lie on multiples of a power of two, so
- * every weight is exact and a pixel's value does not depend on tile or window. */
+/* Bilinear interpolation between the nodes of bst_skylight_map. Nodes lie at multiples of a power
+ * of two, so weights are exact and a pixel's value does not depend on tile or window. */
 static void add_nodes(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
                       int columns, global const float *background) {
     const float16 lanes = (float16)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f, 8.0f, 9.0f,
@@ -20,7 +19,7 @@ static void add_nodes(local float *sum, bst_kernel_frame_params p, int tile_x, i
             int i = clamp(right / p.map_step, 0, p.map_columns - 2);
             float16 s = ((float)(right - i * p.map_step) + lanes) * share;
             float16 value = (float16)0.0f;
-            /* a vector may run over several cells where they are small */
+            /* a vector may span several small cells */
             for (int first = i;; i++) {
                 float v0 = above[i] + t * (below[i] - above[i]);
                 float v1 = above[i + 1] + t * (below[i + 1] - above[i + 1]);
@@ -37,7 +36,7 @@ static void add_nodes(local float *sum, bst_kernel_frame_params p, int tile_x, i
     }
 }
 
-/* Pixel by pixel: the map is the window. */
+/* Pixel by pixel: the map has the window's resolution. */
 static void add_pixels(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
                        int columns, global const float *background) {
     int first = max(0, p.map_x0 - tile_x), last = min(columns, p.map_x0 + p.map_columns - tile_x);
@@ -54,7 +53,7 @@ static void add_pixels(local float *sum, bst_kernel_frame_params p, int tile_x, 
 static void add_background(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
                            int columns, global const float *background) {
     if (p.map_step > 32768) {
-        return; /* this frame has no map */
+        return; /* this frame has no background map */
     }
     if (p.map_step == 1) {
         add_pixels(sum, p, tile_x, tile_y, rows, columns, background);

@@ -1,8 +1,8 @@
-/* Chunks of 64 columns of a row of the full sensor, the detector's unit, and their random numbers:
+/* Chunks of 64 columns of a full-sensor row, the detector's unit of work, and their random numbers:
  * one Philox call per lane, whose word v belongs to column 16 v + lane. */
 
-/* Four vectors: one chunk of 64 pixels. Loops over them would not be unrolled by every compiler,
- * and would go through memory. */
+/* One chunk of 64 pixels as four vectors. Not all compilers unroll loops over them, which would
+ * then go through memory. */
 typedef struct chunk {
     float16 a, b, c, d;
 } chunk;

@@ -1,16 +1,16 @@
-/* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
- * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
- * per work-group), those of nodes.cl, FIELD (weights by place), SPECTRA (weights by source, which may
- * be negative), NEAR_CACHE (memory has one address space; it can be written past the caches).
+/* Deposits the light of all nodes on the grid of the Fourier path: each node is spread over eight
+ * by eight samples. Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high),
+ * DEPOSIT_GROUP (work-items per work-group), those of nodes.cl, FIELD (weights by field position),
+ * SPECTRA (weights by source, possibly negative), NEAR_CACHE (one address space; writes can bypass
+ * the caches).
  *
- * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
- * the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
+ * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum
+ * is the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
  * sixteen rows. */
 
-/* Columns of a tile are a vector apart, which keeps neighbouring ones out of one another's cache
- * sets. */
+/* Tile columns are padded by one vector to avoid cache-set conflicts. */
 #define DEPOSIT_STRIDE (DEPOSIT_H + 16)
-/* Nodes that share a pass over their columns, and how many columns they may span together. */
+/* Nodes processed in one pass over their columns, and the most columns that they may span. */
 #define DEPOSIT_TEAM 4
 #define DEPOSIT_SPAN 24
 #define DEPOSIT_ROOM 40
@@ -22,7 +22,7 @@
 #endif
 
 #ifdef FIELD
-/* Bilinear weight of the field node at a place. */
+/* Bilinear weight of the field node at a position. */
 static float field_weight(bst_deposit_params p, global const float *field, float x, float y) {
     float u = clamp(x * p.field_per_px_x, 0.0f, (float)(p.field_x - 1));
     float v = clamp(y * p.field_per_px_y, 0.0f, (float)(p.field_y - 1));
@@ -34,23 +34,23 @@ static float field_weight(bst_deposit_params p, global const float *field, float
 }
 #endif
 
-/* A block of nodes against one tile. */
+/* A block of nodes relative to one tile. */
 typedef struct deposit_nodes {
     int hit[BST_BLOCK];
     int left[BST_BLOCK], top[BST_BLOCK];    /* first tap, from the tile's corner */
-    int row_x[BST_BLOCK], row_y[BST_BLOCK]; /* places in the table */
+    int row_x[BST_BLOCK], row_y[BST_BLOCK]; /* row indices in the spreading table */
     float share_x[BST_BLOCK], share_y[BST_BLOCK], share_width[BST_BLOCK];
     float electrons[BST_BLOCK];
-    int wide; /* some are widened */
+    int wide; /* some nodes are widened */
 } deposit_nodes;
 
-/* The profiles of a team, between zeros: taps from 16 on. */
+/* Spreading profiles of a team of nodes, zero-padded: taps start at 16. */
 typedef struct deposit_profiles {
     float x[DEPOSIT_TEAM][DEPOSIT_ROOM], y[DEPOSIT_TEAM][DEPOSIT_ROOM];
 } deposit_profiles;
 
-/* Taps at `row` of the table, between its phase and the next (t) and, when nodes of the block are
- * widened, between its width and the next (u). */
+/* Taps at `row` of the table, interpolated to the next phase (t) and, if nodes of the block are
+ * widened, to the next width (u). */
 static float8 spread8(global const float *row, float t, float u, int wide) {
     float8 a = vload8(0, row), b = vload8(1, row);
     a = fma((float8)t, b - a, a);
@@ -63,7 +63,7 @@ static float8 spread8(global const float *row, float t, float u, int wide) {
     return a;
 }
 
-/* The taps of one node along y on the vector of the tile that begins `shift` after its first. */
+/* Taps of one node along y on the tile vector that starts `shift` after its first tap. */
 static float16 spread_line(const float *profile, int shift) {
     if (shift <= -16 || shift >= BST_SPREAD_TAPS) {
         return (float16)0.0f;
@@ -71,11 +71,10 @@ static float16 spread_line(const float *profile, int shift) {
     return vload16(0, profile + 16 + shift);
 }
 
-/* Adds nodes n to n + count - 1 (at most DEPOSIT_TEAM, the others are left out), which together span
- * at most DEPOSIT_SPAN columns from `left`. Each vector is loaded and stored once for all of them; a
- * sample still receives them one after the other, and a zero from those that do not reach it.
- * Vectors of the tile are touched where they lie, so that what one team has stored the next can load
- * at once. */
+/* Adds nodes n to n + count - 1 (at most DEPOSIT_TEAM, the others are skipped), which together span
+ * at most DEPOSIT_SPAN columns from `left`. Each vector is loaded and stored once for all nodes; a
+ * sample still receives them in order, and zeros from nodes that do not reach it. Vectors are
+ * aligned with the tile, so that one team's stores can be loaded by the next at once. */
 static void deposit_team(local float *sum, const deposit_nodes *b, int n, int count, int top,
                          int bottom, int left, int right, global const float *table,
                          deposit_profiles *room) {
@@ -110,7 +109,7 @@ static void deposit_team(local float *sum, const deposit_nodes *b, int n, int co
     }
 }
 
-/* Places one block's nodes; returns whether any of them reaches the tile. */
+/* Positions one block's nodes on the grid; returns true if any of them reaches the tile. */
 static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block nodes,
                        global const float *field, deposit_nodes *out) {
     const float px = 1.0f / (float)(1 << PLACE_BITS);
@@ -128,7 +127,7 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block 
     int16 hit = lit & (column > (float)-BST_SPREAD_TAPS) &
                 (column < (float)DEPOSIT_W) & (row > (float)-BST_SPREAD_TAPS) &
                 (row < (float)DEPOSIT_H) &
-                /* what lies outside the grid would come in on its other side */
+                /* light outside the grid would wrap around */
                 (floor_u >= before) & (floor_v >= before) & (floor_u < (float)p.samples_x - after) &
                 (floor_v < (float)p.samples_y - after);
     if (!any16(hit)) {
@@ -181,7 +180,7 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
             deposit_team(sum, &b, n, DEPOSIT_TEAM, top, bottom, left, right, table, room);
             continue;
         }
-        for (int k = 0; k < DEPOSIT_TEAM; k++) { /* far apart: one by one */
+        for (int k = 0; k < DEPOSIT_TEAM; k++) { /* nodes far apart: one by one */
             if (h[k]) {
                 deposit_team(sum, &b, n + k, 1, t[k], t[k] + BST_SPREAD_TAPS, l[k],
                              l[k] + BST_SPREAD_TAPS, table, room);
@@ -196,9 +195,9 @@ static int16 boxes_hit(global const float *box, float4 tile) {
            (vload16(2, box) >= tile.x) & (vload16(3, box) >= tile.y);
 }
 
-/* nodes: table of nodes. grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along x
- * and y. shares: of the spectra, by source. The boxes are those of the nodes kernel, which reach at least as far as the spreading kernel.
- */
+/* nodes: table of nodes. grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along
+ * x and y. shares: of the spectra, by source. The boxes are those of the nodes kernel, which extend
+ * at least as far as the spreading kernel. */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
     bst_deposit_params p, global const bst_kernel_source_record *sources, global const float16 *nodes,
     global const float *block_box, global const float *source_box, global const float *table,
@@ -246,7 +245,7 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
 #endif
             blocks[0] = 1;
             for (int first = 0; first < s.blocks; first += BST_BLOCK) {
-                if (s.blocks > 1) { /* else the source's box is the block's */
+                if (s.blocks > 1) { /* otherwise the source's box is the block's */
                     global const float *box = block_box + (s.first_box * BST_BLOCK + first) * 4;
                     vstore16(boxes_hit(box, place), 0, blocks);
                 }

@@ -1,37 +1,37 @@
-/* The detector: from expected electrons to digital numbers. Options: CF_ORDER (terms of the noise
- * law), SINGLE_FROM (means from here on take one deviate for shot and read noise together), SEARCH
- * (some means do not); GAIN_MAP, DARK_MAP (response and dark current of each pixel), OVERLAY
- * (charge that is there besides the light's), NONLINEAR (with C1, C2, C3), OFFSETS (of columns and
- * rows), CODES (a table from digital numbers to the frame's). */
+/* The detector: from expected electrons to digital numbers. Options: CF_ORDER (order of the noise
+ * expansion), SINGLE_FROM (means from here on use one deviate for shot and read noise), SEARCH
+ * (some means do not); GAIN_MAP, DARK_MAP (response and dark current per pixel), OVERLAY (charge in
+ * addition to light), NONLINEAR (with C1, C2, C3), OFFSETS (of columns and rows), CODES (output
+ * code table). */
 
-/* gain, dark (e/s), overlay (e): [sensor rows][MAP_STRIDE], a multiple of 64. The overlay's
- * MAP_CELLS pixels are followed by a mark for each chunk of 64, not 0 where one of them is struck.
+/* gain, dark (e-/s), overlay (e-): [sensor rows][MAP_STRIDE], a multiple of 64. The overlay's
+ * MAP_CELLS pixels are followed by a mark per chunk of 64, non-zero if one of them has charge.
  * offsets (DN): columns [MAP_STRIDE], then rows. */
 typedef struct detector_maps {
     global const float *gain, *dark, *overlay, *offsets;
     global const ushort *codes;
 } detector_maps;
 
-/* Means from here on take the expansion of the Poisson quantile, below it the exact search. At 30
- * the two laws differ by a total variation of 1.4e-5, which falls as the mean to the power -1.5. */
+/* Means from here on use the expansion of the Poisson quantile, smaller ones the exact search. At
+ * 30 the two distributions differ by a total variation of 1.4e-5, decreasing as the mean to the
+ * power -1.5. */
 #define POISSON_SWITCH 30.0f
 
-/* The chance of no event in units of 2^-32, where the search below begins.
- * The chances are made smaller by 5e-7 of themselves, so that they never add up to more than one.
- */
+/* Probability of zero events in units of 2^-32, the start of the search below. Probabilities are
+ * reduced by a relative 5e-7, so that their sum never exceeds one. */
 INLINE float16 first_chance(float16 mean) {
     return exp(-fmin(mean, POISSON_SWITCH)) * (0x1p32f * (1.0f - 2e-6f));
 }
 
 /* Poisson deviates of mean < POISSON_SWITCH by sequential search of the distribution (Devroye 1986,
- * III.2), in integers, all lanes in step; lanes outside `wanted` give 0. What rounding leaves of
- * the words (2e-6 of them) gives the mean. */
+ * III.2), in integers, all lanes in step; lanes outside `wanted` give 0. The words left over by
+ * rounding (2e-6 of them) give the mean. */
 INLINE float16 poisson_search16(float16 mean, uint16 word, int16 wanted) {
     float16 count = (float16)0.0f, p = first_chance(mean);
     uint16 rest = word;
     int16 active = wanted;
     for (int k = 0; any16(active) && k < 200;) {
-        for (int step = 0; step < 4; step++) { /* lanes that are done ignore the steps too many */
+        for (int step = 0; step < 4; step++) { /* finished lanes ignore surplus steps */
             uint16 chance = convert_uint16(p);
             active &= as_int16(rest > chance);
             int16 end = (chance == 0u) & (mean < (float)k);
@@ -58,8 +58,8 @@ INLINE float16 poisson_expand16(float16 mean, float16 w) {
     return fmax(whole + floor(d), 0.0f);
 }
 
-/* Lanes for which one deviate does not do: small means with little read noise, and those near the
- * full well, where the charge is cut before the read noise comes. */
+/* Lanes for which one deviate is not accurate enough: small means with little read noise, and means
+ * near the full well, where the charge is clipped before read noise is added. */
 INLINE int16 needs_two(bst_kernel_frame_params p, float16 mean) {
 #ifdef SEARCH
     return (mean < SINGLE_FROM) | (mean > p.near_full_e);
@@ -68,7 +68,7 @@ INLINE int16 needs_two(bst_kernel_frame_params p, float16 mean) {
 #endif
 }
 
-/* What the amplifier makes of a charge. */
+/* Amplifier response (nonlinearity) to a charge. */
 INLINE float16 respond(bst_kernel_frame_params p, float16 e) {
 #ifdef NONLINEAR
     float16 u = e * p.per_full_well;
@@ -77,11 +77,12 @@ INLINE float16 respond(bst_kernel_frame_params p, float16 e) {
     return e;
 }
 
+/* Adds read noise after the amplifier. */
 INLINE float16 read_out(bst_kernel_frame_params p, float16 charge, float16 z) {
     return fma((float16)p.read_noise_e, z, respond(p, charge));
 }
 
-/* Charge from two words: a uniform one, and one that made the normal deviate w. */
+/* Charge from two random words: a uniform one, and one that gave the normal deviate w. */
 INLINE float16 draw_charge(float16 mean, uint16 word, float16 w, int16 wanted) {
     int16 small = mean < POISSON_SWITCH;
     float16 electrons = poisson_expand16(mean, w);
@@ -92,7 +93,7 @@ INLINE float16 draw_charge(float16 mean, uint16 word, float16 w, int16 wanted) {
     return electrons;
 }
 
-/* Expected electrons of one chunk from its light; map: of its first pixel. */
+/* Expected electrons of one chunk from its light; map: index of its first pixel. */
 INLINE chunk expected_chunk(bst_kernel_frame_params p, detector_maps maps, size_t map, chunk light) {
     float sky = p.background_e - p.dark_e;
     chunk m;
@@ -127,8 +128,8 @@ INLINE chunk add_dark(bst_kernel_frame_params p, detector_maps maps, size_t map,
     return m;
 }
 
-/* Electrons to digital numbers plus one half, not yet cut to the converter's range. row, column: of
- * the first pixel on the sensor. */
+/* Converts electrons to digital numbers plus one half, before clipping to the converter's range.
+ * row, column: of the first pixel on the sensor. */
 INLINE chunk convert_chunk(bst_kernel_frame_params p, detector_maps maps, int row, int column, chunk e) {
     float16 g = (float16)p.dn_per_e;
     chunk dn;
@@ -149,11 +150,11 @@ INLINE chunk convert_chunk(bst_kernel_frame_params p, detector_maps maps, int ro
     return dn;
 }
 
-/* What all pixels share that no source lights. */
+/* Noise law common to all pixels without source light. */
 typedef struct dark_law {
     noise_law law;
-    int single; /* one deviate does */
-    int steps;  /* of the search for a small mean; 0: the search does not do */
+    int single; /* one deviate is accurate enough */
+    int steps;  /* steps of the search for a small mean; 0: the search is not used */
     float mean;
 } dark_law;
 
@@ -163,7 +164,7 @@ typedef struct dark_law {
 #define SHARED_MEAN
 #endif
 
-/* steps: the search's cumulated chances. poisson_search16 ends where these do. */
+/* steps: cumulative probabilities of the search, equal to those of poisson_search16. */
 INLINE dark_law dark_law_of(bst_kernel_frame_params p, uint *steps) {
     dark_law dark;
     dark.mean = (p.background_e - p.dark_e) + p.dark_e; /* as the sum of the two below */
@@ -191,7 +192,7 @@ INLINE dark_law dark_law_of(bst_kernel_frame_params p, uint *steps) {
 }
 
 #ifdef SEARCH
-/* The search's end for the words of a dark chunk, counted instead of walked to. */
+/* Search results for the words of a dark chunk, by counting instead of stepping. */
 INLINE chunk dark_electrons(dark_law dark, const uint *steps, chunk_words w) {
     chunk_flags n = {(int16)0, (int16)0, (int16)0, (int16)0};
     uint last = 0u;
@@ -212,17 +213,17 @@ INLINE chunk dark_electrons(dark_law dark, const uint *steps, chunk_words w) {
 }
 #endif
 
-/* Electrons of 16 pixels, where `two` charge first, then read noise. full: lanes with a full well.
- */
+/* Electrons of 16 pixels; lanes `two` draw charge first, then read noise. full: lanes with a full
+ * well. */
 INLINE float16 draw_pixels(bst_kernel_frame_params p, float16 single, float16 charge, float16 z, int16 two,
                            int16 *full) {
     *full = two & (charge >= p.full_well_e);
     return select(single, read_out(p, fmin(charge, p.full_well_e), z), two);
 }
 
-/* Digital numbers plus one half, not yet cut to the converter's range, of one chunk. counter: of
+/* Digital numbers plus one half of one chunk, before clipping to the converter's range. counter: of
  * its first lane. row, column: of its first pixel on the sensor. light: electrons of the sources,
- * some of them where `lit`. brim: lanes with a full well. */
+ * present if `lit`. brim: lanes with a full well. */
 INLINE chunk detect_chunk(bst_kernel_frame_params p, detector_maps maps, dark_law dark, near_law near,
                           const uint *steps, const tail_block *tail, uint counter, int row,
                           int column, chunk light, int lit, chunk_flags *brim) {

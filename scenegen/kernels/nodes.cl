@@ -1,10 +1,11 @@
-/* A source's nodes, from its place and the node table: nodes_of, which makes a block of them where
- * they are drawn (splat.cl, deposit.cl), and a kernel that finds the boxes of pixels that blocks,
- * sources and groups of sources touch, one work-item per source. Options: PLACE_BITS
- * (scenegen/stamp/fixed_point_px.h), SPATIAL_OVERSAMPLE (parts of a pixel per axis), DISTORTED (with K1, K2, K3,
- * P1, P2 and FOLD2), FOURIER (nodes are spread on a grid, else they get stamps). */
+/* Quadrature nodes of a source from its position and the node table. nodes_of generates a block of
+ * them where they are rendered (splat.cl, deposit.cl). A kernel computes the pixel boxes of blocks,
+ * sources and groups of sources, one work-item per source. Options: PLACE_BITS
+ * (scenegen/stamp/fixed_point_px.h), SPATIAL_OVERSAMPLE (parts of a pixel per axis), DISTORTED
+ * (with K1, K2, K3, P1, P2 and FOLD2), FOURIER (nodes are spread on a grid; otherwise they have
+ * stamps). */
 
-/* any(), by halves: some compilers test lane after lane. */
+/* any() by halves: some compilers test lane by lane. */
 static int any16(int16 v) {
     int8 a = v.lo | v.hi;
     int4 b = a.lo | a.hi;
@@ -12,7 +13,7 @@ static int any16(int16 v) {
     return (c.lo | c.hi) < 0;
 }
 
-/* By comparisons: fmax() has more to do where one side is no number. */
+/* By comparisons, because fmax() also handles NaN. */
 static float max_of(float16 v) {
     float8 a = v.lo > v.hi ? v.lo : v.hi;
     float4 b = a.lo > a.hi ? a.lo : a.hi;
@@ -34,29 +35,29 @@ static int4 bounds_of(int16 x, int16 y) {
 }
 
 #ifdef FOURIER
-/* Row of the Fourier path's table, and the share of the way to the next. */
+/* Row of the Fourier path's width table, with fraction to the next row. */
 static float16 width_of(float16 widening) {
     float16 square = fmin(widening, BST_WIDEST) * (BST_WIDTHS * BST_WIDTHS / BST_WIDEST);
     float16 row = floor(sqrt(square));
     return row + (square - row * row) / (2.0f * row + 1.0f);
 }
 #else
-/* Of stamps: PSF variances by which a node is wider than the PSF. */
+/* Stamps: widening of a node in PSF variances. */
 static float16 width_of(float16 widening) {
     return widening;
 }
 #endif
 
 #ifdef DISTORTED
-/* Distortion (include/boresight/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
- * beyond the fold gives no light on the sensor. */
+/* Distortion (include/boresight/camera.h) with k1, k2, k3, p1, p2 scaled to pixels. Positions
+ * beyond the fold give no light on the sensor. */
 static void add_distortion(float16 x, float16 y, float16 *dx, float16 *dy, float16 *stretch2) {
     float16 s = x * x + y * y;
     float16 l = s * (K1 + s * (K2 + s * K3));
     float16 xy = 2.0f * x * y;
     *dx += x * l + P1 * xy + P2 * (s + 2.0f * x * x);
     *dy += y * l + P1 * (s + 2.0f * y * y) + P2 * xy;
-    /* mean square scale of the map there: half the sum of the squared derivatives */
+    /* mean square scale of the map: half the sum of the squared derivatives */
     float16 r = 2.0f * (K1 + s * (2.0f * K2 + s * 3.0f * K3));
     float16 xx = 1.0f + l + x * x * r + 2.0f * P1 * y + 6.0f * P2 * x;
     float16 yy = 1.0f + l + y * y * r + 6.0f * P1 * y + 2.0f * P2 * x;
@@ -67,17 +68,16 @@ static void add_distortion(float16 x, float16 y, float16 *dx, float16 *dy, float
 }
 #endif
 
-/* `from` pixels and `way` more from the boresight, the first also as `place` on the sensor: on the
- * sensor, in parts of a pixel. Far outside any sensor all places are alike, and so are those that
- * are no numbers. */
+/* Fixed-point position on the sensor of `from` plus `way` pixels from the boresight; `place` is
+ * `from` on the sensor. Positions far outside any sensor are clamped, NaN included. */
 static int16 place_on_sensor(int place, float from, float16 way) {
     const float parts = (float)(1 << PLACE_BITS), limit = (float)BST_PLACE_LIMIT;
     float16 moved = clamp(way * parts, -2.0f * limit, 2.0f * limit);
-    /* to the nearest, by truncation, away from zero */
+    /* rounds to nearest, half away from zero */
     float16 half_way = as_float16((as_int16(moved) & (int)0x80000000) | 0x3F000000);
     int16 at = place + convert_int16(moved + half_way);
     at = select((int16)(BST_PLACE_LIMIT), at, fabs(from + way) * parts <= limit);
-#ifdef SPATIAL_OVERSAMPLE /* the centre of one of the parts into which a pixel is cut */
+#ifdef SPATIAL_OVERSAMPLE /* the centre of one of the parts into which a pixel is divided */
     int16 whole = (at + (1 << (PLACE_BITS - 1))) >> PLACE_BITS;
     float16 rest = convert_float16(at - (whole << PLACE_BITS)) * (1.0f / parts) + 0.5f;
     float16 part = (floor(rest * SPATIAL_OVERSAMPLE) + 0.5f) * (1.0f / SPATIAL_OVERSAMPLE);
@@ -86,13 +86,13 @@ static int16 place_on_sensor(int place, float from, float16 way) {
     return at;
 }
 
-/* A block of nodes: place on the sensor in parts of a pixel, electrons, width_of. */
+/* A block of nodes: fixed-point position on the sensor, electrons, width_of. */
 typedef struct node_block {
     int16 x, y;
     float16 electrons, width;
 } node_block;
 
-/* Block b of a source. */
+/* Generates block b of a source's nodes. */
 static node_block nodes_of(bst_kernel_source_record s, int b, global const float16 *table) {
     global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
     node_block out;
@@ -113,8 +113,8 @@ static node_block nodes_of(bst_kernel_source_record s, int b, global const float
     return out;
 }
 
-/* Boxes of inclusive pixels, by groups of 16: x0[16], y0[16], x1[16], y1[16]. block_box: of the
- * blocks of a source that has several, from its first_box on; source_box: of sources; group_box: of
+/* Boxes of inclusive pixels, in groups of 16: x0[16], y0[16], x1[16], y1[16]. block_box: of the
+ * blocks of a source with several, from its first_box on; source_box: of sources; group_box: of
  * groups of sources. */
 __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nodes(
     global const bst_kernel_source_record *sources, int count, global const float16 *table,

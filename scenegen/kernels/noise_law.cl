@@ -1,7 +1,7 @@
-/* Electrons with shot and read noise from one normal deviate. Options: CF_ORDER (terms of the law),
- * SINGLE_FROM (means from here on take one deviate for shot and read noise together). */
+/* Electrons with shot and read noise from one normal deviate. Options: CF_ORDER (order of the
+ * expansion), SINGLE_FROM (means from here on use one deviate for shot and read noise). */
 
-/* Coefficients of electrons, shot and read noise, as a polynomial of a normal deviate. */
+/* Coefficients of electrons with shot and read noise as a polynomial of a normal deviate. */
 typedef struct noise_law {
     float16 c0, c1, c2, c3;
 #if CF_ORDER >= 3
@@ -34,7 +34,7 @@ INLINE noise_law noise_law_of(bst_kernel_frame_params p, float16 mean) {
              p.dn_per_e;
 #endif
 #if CF_ORDER >= 4
-    /* He5, He3, He1 of the fourth order, gathered by powers of z */
+    /* He5, He3, He1 of the fourth order, collected by powers of z */
     float16 a3 = a2 * a, b4 = b2 * b2;
     float16 h5 = fma(b4, (float16)(-252.0f / 7776),
                      fma(b3, (float16)(14.0f / 288),
@@ -54,7 +54,7 @@ INLINE noise_law noise_law_of(bst_kernel_frame_params p, float16 mean) {
     return law;
 }
 
-/* Electrons with shot and read noise. */
+/* Electrons with shot and read noise from normal deviate z. */
 INLINE float16 draw_single(noise_law law, float16 z) {
     float16 dn = law.c3;
 #if CF_ORDER >= 4
@@ -65,9 +65,9 @@ INLINE float16 draw_single(noise_law law, float16 z) {
     return fma(fma(fma(dn, z, law.c2), z, law.c1), z, law.c0);
 }
 
-/* The noise law of means about one, by cubics: its coefficients at mean + x / per_reach, |x| <= 1,
- * a quarter of the variance to either side, where the cubic of the standard deviation misses 2e-5
- * of it. */
+/* Noise law of means about one, by cubics: its coefficients at mean + x / per_reach, |x| <= 1, a
+ * quarter of the variance to either side. There the cubic of the standard deviation has a relative
+ * error of 2e-5. */
 typedef struct near_law {
     float4 c0, c1, c2, c3;
 #if CF_ORDER >= 3
@@ -77,14 +77,14 @@ typedef struct near_law {
     float4 c5;
 #endif
     float mean, per_reach;
-    int serves; /* one deviate does for all of them */
+    int serves; /* one deviate is accurate enough for all these means */
 } near_law;
 
-/* Chebyshev's four places. */
+/* The four Chebyshev nodes. */
 #define NEAR_A 0.923879533f
 #define NEAR_B 0.382683432f
 
-/* The cubic through f at A, -A, B, -B: rising powers. */
+/* Cubic through f at A, -A, B, -B: ascending powers. */
 INLINE float4 cubic_through(float16 f) {
     const float spread = NEAR_A * NEAR_A - NEAR_B * NEAR_B;
     float even_a = 0.5f * (f.s0 + f.s1), odd_a = (0.5f / NEAR_A) * (f.s0 - f.s1);
@@ -94,8 +94,8 @@ INLINE float4 cubic_through(float16 f) {
                     cube);
 }
 
-/* For pixels with little or no light of sources: from a tenth of the dark pixels' variance below
- * their mean to half of it above. */
+/* Noise law for pixels with little or no source light: from a tenth of the dark variance below the
+ * mean to half of it above. */
 static near_law near_law_of(bst_kernel_frame_params p) {
     float dark = p.background_e, read = p.read_noise_e * p.read_noise_e;
     near_law near;

@@ -1,15 +1,15 @@
 /* Random numbers, 16 lanes at a time: Philox4x32, normal deviates, elementary functions. */
 
-/* Without it compilers may keep a function apart, and outside the kernel they use short vectors. */
+/* Forces inlining: outside the kernel compilers use short vectors. */
 #define INLINE static inline __attribute__((always_inline))
 
-/* As few as its authors found to pass TestU01's BigCrush; three more are theirs for safety, which
- * host streams keep (philox_shared.h). */
+/* Number of rounds with which Philox passes TestU01's BigCrush; host streams use three more, as its
+ * authors recommend (philox_shared.h). */
 #define PHILOX_ROUNDS 7
 
-/* A round of Philox for 8 counters, a word in the low half of each lane; the high halves are of no
- * account. (c0, c1, c2, c3) becomes (high(M1 c2) ^ c1 ^ key0, low(M1 c2), high(M0 c0) ^ c3 ^ key1,
- * low(M0 c0)). */
+/* A Philox round for 8 counters, a word in the low half of each lane (the high halves are ignored).
+ * (c0, c1, c2, c3) becomes (high(M1 c2) ^ c1 ^ key0, low(M1 c2), high(M0 c0) ^ c3 ^ key1, low(M0
+ * c0)). */
 #define PHILOX_ROUND(c0, c1, c2, c3, k0, k1)                    \
     do {                                                        \
         ulong8 p0 = ((c0)&0xFFFFFFFFul) * (ulong8)0xD2511F53ul; \
@@ -20,15 +20,15 @@
         c3 = p0;                                                \
     } while (0)
 
-/* Low halves of even and odd lanes, as a shuffle: from a shift compilers make a slow product. */
+/* Low halves of even and odd lanes, as a shuffle: compilers turn a shift into a slow product. */
 INLINE uint16 low_words(ulong8 even, ulong8 odd) {
     uint16 e = as_uint16(even), o = as_uint16(odd);
     return (uint16)(e.s0, o.s0, e.s2, o.s2, e.s4, o.s4, e.s6, o.s6, e.s8, o.s8, e.sa, o.sa, e.sc,
                     o.sc, e.se, o.se);
 }
 
-/* Philox4x32 (Salmon, Moraes, Dror and Shaw 2011) for the counters (first + lane, stream, exposure_low,
- * exposure_high): even lanes and odd lanes apart, since a product fills 64 bits. */
+/* Philox4x32 (Salmon, Moraes, Dror and Shaw 2011) for the counters (first + lane, stream,
+ * exposure_low, exposure_high); even and odd lanes separately, because a product fills 64 bits. */
 INLINE void philox16(bst_kernel_frame_params p, uint first, uint stream, uint16 *w0, uint16 *w1,
                      uint16 *w2, uint16 *w3) {
     ulong8 a0 = (ulong8)(0, 2, 4, 6, 8, 10, 12, 14) + (ulong)first, b0 = a0 + 1ul;
@@ -49,8 +49,8 @@ INLINE void philox16(bst_kernel_frame_params p, uint first, uint stream, uint16 
     *w3 = low_words(a3, b3);
 }
 
-/* 1 / sqrt(v), v > 0, to 5e-6: Newton's iteration from the exponent's half, several times faster
- * than the divider. */
+/* 1 / sqrt(v), v > 0, to 5e-6: Newton's iteration from half the exponent, several times faster than
+ * division. */
 INLINE float16 rsqrt16(float16 v) {
     float16 y = as_float16((int16)0x5F375A86 - (as_int16(v) >> 1));
     float16 h = -0.5f * v;
@@ -73,8 +73,8 @@ INLINE float16 log_radius2(uint16 word) {
     return fma(convert_float16(exponent), (float16)-1.38629436f, s * series);
 }
 
-/* Two independent standard normals (Box and Muller 1958). The angle's two high bits choose the
- * quadrant, the rest an angle in [-pi/4, pi/4), where short Taylor series serve. */
+/* Two independent standard normals (Box and Muller 1958). The angle's two high bits select the
+ * quadrant, the others an angle in [-pi/4, pi/4) for short Taylor series. */
 INLINE void normal16(uint16 radius_word, uint16 angle_word, float16 *z0, float16 *z1) {
     float16 square = fmax(log_radius2(radius_word), 1e-12f);
     float16 radius = sqrt(square);

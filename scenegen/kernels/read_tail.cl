@@ -1,21 +1,21 @@
-/* The tail of the read noise: excess noise of few reads. Options: TAIL (with TAIL_GAP, which is
- * -1 / (2 ln(1 - share of the reads)), and TAIL_RMS, electrons).
+/* Tail of the read noise (random telegraph noise): excess noise in few reads. Options: TAIL (with
+ * TAIL_GAP, which is -1 / (2 ln(1 - share of the reads)), and TAIL_RMS, electrons).
  *
- * The reads come by blocks of TAIL_ROWS rows and 64 columns of what is read: few of a chunk's reads
- * are of the tail, so that drawing chunk by chunk would mostly draw for nothing. Within a block the
- * way from one to the next is geometric. */
+ * The reads are drawn in blocks of TAIL_ROWS rows and 64 columns of the read-out, because a single
+ * chunk has few reads in the tail. Within a block the distance from one to the next is
+ * geometrically distributed. */
 #define TAIL_ROWS 16
 #define TAIL_READS (TAIL_ROWS * 64)
-/* Calls of the generator that a block may need at most, a power of two. */
+/* Most generator calls of a block, a power of two. */
 #define TAIL_CALLS 64u
 
 typedef struct tail_block {
     float excess[TAIL_ROWS][64]; /* electrons */
-    uint rows;                   /* bit: that row is not all zero */
+    uint rows;                   /* bit per row: not all zero */
 } __attribute__((aligned(64))) tail_block;
 
 #ifdef TAIL
-/* Running sums of the lanes. */
+/* Prefix sums over the lanes. */
 INLINE int16 sum_up(int16 v) {
     v += (int16)(0, v.s0, v.s12, v.s3456, v.s789a, v.sbc, v.sde);
     v += (int16)(0, 0, v.s01, v.s2345, v.s6789, v.sab, v.scd);
@@ -24,12 +24,12 @@ INLINE int16 sum_up(int16 v) {
     return v;
 }
 
-/* Reads from one in the tail to the next. */
+/* Distances between successive reads in the tail. */
 INLINE int16 tail_gaps(uint16 words) {
     return 1 + convert_int16(fmin(log_radius2(words) * TAIL_GAP, (float)TAIL_READS));
 }
 
-/* The block that holds a read; width: of what is read. */
+/* Draws the block that contains a read; width: of the read-out. */
 static void draw_tail(bst_kernel_frame_params p, int row, int column, int width, tail_block *tail) {
     uint block = (uint)(row / TAIL_ROWS) * ((uint)(width + 63) / 64u) + (uint)column / 64u;
     for (int y = 0; y < TAIL_ROWS; y++) {
@@ -58,7 +58,7 @@ static void draw_tail(bst_kernel_frame_params p, int row, int column, int width,
     }
 }
 
-/* The tail of a row of a chunk. */
+/* Adds the tail to a row of a chunk. */
 INLINE chunk add_tail(const tail_block *tail, int row, chunk e) {
     row %= TAIL_ROWS;
     if (tail->rows >> row & 1u) {

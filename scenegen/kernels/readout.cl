@@ -1,7 +1,7 @@
-/* The detector in stages, for what one pixel cannot know alone: charge that flows along columns,
- * frame transfer under light, binning. The light of all rows lies in an image; charge takes its
- * place, and is read out from there. One work-item per row, or per 64 columns. Options: BLOOM,
- * TRANSFER_ROW_S (time of the transfer by one row), and those of detector.cl. */
+/* Detector in stages, for effects across pixels: blooming along columns, frame transfer under
+ * light, binning. An image holds the light of all rows; charge replaces it and is read out from
+ * there. One work-item per row, or per 64 columns. Options: BLOOM, TRANSFER_ROW_S (transfer time
+ * per row), and those of detector.cl. */
 
 /* image: [light_height][light_stride] floats, from column p.tiles_x0 and row p.light_y0 of the
  * sensor. */
@@ -19,10 +19,9 @@ INLINE void store_chunk(global float *to, chunk c) {
 }
 
 #ifdef TRANSFER_ROW_S
-/* From the sources' light to expected electrons of light: sky and response, and what each pixel
- * collects while its charge runs through all other rows of its column. One work-item per 64
- * columns.
- */
+/* Frame transfer: from source light to expected electrons including sky and response, and the light
+ * that a charge packet collects while it passes the other rows of its column. One work-item per 64
+ * columns. */
 kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image,
                                   global const float *gain) {
     detector_maps maps = {gain, 0, 0, 0, 0};
@@ -51,7 +50,7 @@ kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image
 }
 #endif
 
-/* Charge of every pixel in place of its light. One work-item per row. */
+/* Replaces the light of every pixel by its charge. One work-item per row. */
 kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, global const float *gain,
                                 global const float *dark, global const float *overlay) {
     detector_maps maps = {gain, dark, overlay, 0, 0};
@@ -91,13 +90,13 @@ kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, 
 }
 
 #ifdef BLOOM
-/* Charge above the full well leaves its pixel by halves up and down its column and fills the pixels
- * it meets; what reaches the column's end is lost. `over`: a column of the halves on their way. One
+/* Blooming: charge above the full well leaves a pixel in halves up and down its column and fills
+ * the next pixels; what reaches the column's end is lost. `over`: work column of moving charge. One
  * work-item per 16 columns. */
 kernel void bst_detector_bloom(bst_kernel_frame_params p, global float *image, global float *over) {
     int x = (int)get_global_id(0) * 16;
     float16 carry = (float16)0.0f, full = (float16)p.full_well_e;
-    for (int y = 0; y < p.light_height; y++) { /* upwards in y */
+    for (int y = 0; y < p.light_height; y++) { /* towards larger y */
         global float16 *at = (global float16 *)(image + (size_t)y * p.light_stride + x);
         global float16 *half_at = (global float16 *)(over + (size_t)y * p.light_stride + x);
         float16 q = *at, excess = 0.5f * fmax(q - full, 0.0f);
@@ -118,9 +117,9 @@ kernel void bst_detector_bloom(bst_kernel_frame_params p, global float *image, g
 }
 #endif
 
-/* Digital numbers from charge: p.binning x p.binning pixels are added before they are read. frame:
- * [window_height][window_width], both after binning. saturated: pixels per row. One work-item per
- * row of the frame. */
+/* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
+ * frame: [window_height][window_width], both after binning. saturated: pixels per row. One
+ * work-item per frame row. */
 kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags) {
@@ -130,7 +129,7 @@ kernel void bst_detector_read(bst_kernel_frame_params p, global const float *ima
     global const float *line = image + (size_t)(row - p.light_y0) * p.light_stride;
     global ushort *out = frame + (size_t)y * p.window_width;
     global uchar *marks = FLAGS_AT(flags, (size_t)y * p.window_width);
-    /* binned pixels lie on a grid that starts with the window's first pixel */
+    /* binned pixels lie on a grid that starts at the window's first pixel */
     int first = p.window_x0 / b / 64 * 64, skip = p.window_x0 / b - first;
     int16 full_count = (int16)0;
     tail_block tail;
@@ -178,7 +177,7 @@ kernel void bst_detector_read(bst_kernel_frame_params p, global const float *ima
     saturated[y] = s2.lo + s2.hi;
 }
 
-/* A pixel's charge in the overlay. deposits: index and charge. */
+/* A charge deposit of the overlay: pixel index and charge. */
 typedef struct deposit_pixel {
     int index;
     float electrons;

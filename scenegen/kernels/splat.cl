@@ -1,40 +1,38 @@
-/* Light on one tile: makes the nodes of the sources that touch it (nodes.cl) and sums their
- * pixel-integrated profiles. Options: TILE_W, TILE_H (pixels), TAPS (of the longest profile, a
- * multiple of 16), EDGE_SCALE (1 / (sqrt(2) sigma of the PSF), 1/px), DEGREE and BARELY_WIDER (of
- * the profile law, scenegen/stamp/profile_law.h; without them there is none).
+/* Light of one tile from stamps: generates the nodes of the sources that touch the tile (nodes.cl)
+ * and sums their pixel-integrated profiles. Options: TILE_W, TILE_H (pixels), TAPS (of the longest
+ * profile, a multiple of 16), EDGE_SCALE (1 / (sqrt(2) sigma of the PSF), 1/px), DEGREE and
+ * BARELY_WIDER (of the profile law, scenegen/stamp/profile_law.h; without them it is not used).
  *
- * Every pixel receives its nodes in the order of sources, blocks and nodes, whatever the tile, so
- * the float sum is the same for every window and work-group size. */
+ * Every pixel receives its nodes in the order of sources, blocks and nodes, whatever the tile. The
+ * float sum is therefore the same for every window and work-group size. */
 
-/* Rows of a tile are a vector apart, which keeps neighbouring rows out of one another's cache sets.
- */
+/* Tile rows are padded by one vector to avoid cache-set conflicts. */
 #define STRIDE (TILE_W + 16)
-/* Zeros on either side of a profile: a vector of it may begin anywhere near. */
+/* Zero padding on either side of a profile, so that a vector may start anywhere near it. */
 #define PAD 16
 #define ROW (TAPS + 2 * PAD)
-/* Taps that are made at once. */
+/* Taps computed at once. */
 #define OCTET 8
-/* Nodes that share a pass over their rows, and the rows between their first ones at most. */
+/* Nodes that share a pass over their rows, and the largest distance of their first rows. */
 #define TEAM 4
 #define SPREAD 12
 
-/* For vectors at any place: vstore16 becomes four stores on some devices. */
+/* Unaligned vectors: vstore16 becomes four stores on some devices. */
 typedef float16 loose16 __attribute__((aligned(4)));
 typedef float8 loose8 __attribute__((aligned(4)));
 
-/* A block of nodes against one tile: the taps of node n along x, which carry its electrons, follow
- * PAD zeros in row n, those along y in column n; the first belongs to column left[n] and row
- * top[n]. In every lane of a team: the bounds of its nodes' left and top, and whether it reaches
+/* A block of nodes relative to one tile. Taps of node n along x, scaled by its electrons, follow
+ * PAD zeros in row n; those along y are in column n. The first tap belongs to column left[n] and
+ * row top[n]. Lanes of a team hold the bounds of its nodes' left and top, and whether it reaches
  * the tile. */
 typedef struct splat_nodes {
     float x[BST_BLOCK][ROW], y[ROW][BST_BLOCK];
     int left[BST_BLOCK], top[BST_BLOCK];
     int left0[BST_BLOCK], left1[BST_BLOCK], top0[BST_BLOCK], top1[BST_BLOCK], near[BST_BLOCK];
-    int taps; /* that may be other than zero */
+    int taps; /* number of taps that may be non-zero */
 } __attribute__((aligned(64))) splat_nodes;
 
-/* erf(u) to 2.3e-7: inside +-3.6 a polynomial in u^2 (minimax over that range), beyond it 1, where
- * 4e-7 are left. */
+/* erf(u) to 2.3e-7: a minimax polynomial in u^2 inside +-3.6, and 1 beyond, with an error of 4e-7. */
 INLINE float16 error_function(float16 u) {
     u = clamp(u, -3.6f, 3.6f);
     float16 z = fma(u * u, (float16)(2.0f / (3.6f * 3.6f)), (float16)-1.0f);
@@ -67,8 +65,8 @@ INLINE float16 zip_high(float16 a, float16 b) {
 #ifdef DEGREE
 #define LAW_FLOATS (DEGREE + 1 + BST_LAW_FIRST + BST_LAW_SECOND)
 
-/* Sum of the even (first 0) or odd (first 1) powers in c[count], without the odd ones' last factor.
- */
+/* Sum of the even (first 0) or odd (first 1) powers in c[count], without the odd powers' last
+ * factor. */
 INLINE float16 powers(global const float *c, int count, int first, float16 g2) {
     float16 v = (float16)c[count - 2 + first];
 #pragma unroll
@@ -78,8 +76,8 @@ INLINE float16 powers(global const float *c, int count, int first, float16 g2) {
     return v;
 }
 
-/* taps of nodes that are not, or barely (`wide`, by `more` variances of the PSF), wider than the
- * PSF. Those at d and 1 - d pixels from the node's own are mirror images. */
+/* Taps by the profile law, for nodes as wide as the PSF or slightly wider (`wide`, by `more` PSF
+ * variances). Taps at d and 1 - d pixels from the node's own are mirror images. */
 INLINE void taps_by_law(float16 within, float16 more, int wide, float16 height, int radius,
                         global const float *law, float16 *taps) {
     float16 g = fma((float16)2.0f, within, (float16)-1.0f), g2 = g * g;
@@ -103,7 +101,7 @@ INLINE void taps_by_law(float16 within, float16 more, int wide, float16 height, 
 }
 #endif
 
-/* taps between the pixels' edges, for any width; scale: 1 / (sqrt(2) sigma), 1/px. */
+/* Taps by erf at the pixel edges, for any width; scale: 1 / (sqrt(2) sigma), 1/px. */
 INLINE void taps_by_edges(float16 within, float16 scale, float16 height, int radius,
                           float16 *taps) {
     height *= 0.5f;
@@ -116,13 +114,13 @@ INLINE void taps_by_edges(float16 within, float16 scale, float16 height, int rad
     }
 }
 
-/* Two nodes' taps. */
+/* Stores the taps of two nodes. */
 INLINE void store_pair(float16 taps, float *first) {
     *(loose8 *)first = taps.lo;
     *(loose8 *)(first + ROW) = taps.hi;
 }
 
-/* Eight taps [tap][node], as rows of [node][ROW]. */
+/* Transposes eight taps [tap][node] to rows of [node][ROW]. */
 INLINE void store_octet(const float16 *t, float *row) {
     float16 a = zip_low(t[0], t[4]), b = zip_low(t[1], t[5]);
     float16 c = zip_low(t[2], t[6]), d = zip_low(t[3], t[7]);
@@ -147,9 +145,8 @@ INLINE void store_octet(const float16 *t, float *row) {
     store_pair(zip_high(even, odd), row + 14 * ROW);
 }
 
-/* Profiles of a block's nodes along one axis: 2 radius + 2 taps, and zeros up to `octets`. within:
- * of the way from the node's pixel to the next; more: variances of the PSF by which it is wider;
- * height: total. */
+/* Profiles of a block's nodes along one axis: 2 radius + 2 taps, zero-padded to `octets`. within:
+ * fraction from the node's pixel to the next; more: widening in PSF variances; height: total. */
 INLINE void make_profiles(float16 within, float16 more, float16 height, int radius, int octets,
                           global const float *law, float16 *taps) {
 #ifdef DEGREE
@@ -221,20 +218,18 @@ static void place_nodes(node_block nodes, int tile_x, int tile_y, int radius,
                         (nodes.electrons > 0.0f);
 }
 
-/* Taps of node n along x on the vector of the tile that begins at `column`. */
+/* Taps of node n along x on the tile vector that starts at `column`. */
 INLINE float16 line_of(const splat_nodes *b, int n, int column, int taps) {
     return *(const loose16 *)(b->x[n] + PAD + clamp(column - b->left[n], -PAD, taps));
 }
 
-/* Taps of node n along y: that on row j of the tile at [j BST_BLOCK]. */
+/* Taps of node n along y: tile row j at [j BST_BLOCK]. */
 INLINE const float *column_of(const splat_nodes *b, int n) {
     return b->y[0] + (PAD - b->top[n]) * BST_BLOCK + n;
 }
 
-/* Adds the nodes n to n + TEAM - 1, within SPREAD rows. Each row is loaded and stored once for all
- * of them; a pixel still receives them one after the other, and a zero from those that do not reach
- * it.
- */
+/* Adds nodes n to n + TEAM - 1, within SPREAD rows. Each row is loaded and stored once for all
+ * nodes; a pixel still receives them in order, and zeros from nodes that do not reach it. */
 static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) {
     const float *h0 = column_of(b, n), *h1 = column_of(b, n + 1);
     const float *h2 = column_of(b, n + 2), *h3 = column_of(b, n + 3);
@@ -274,7 +269,7 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
     }
 }
 
-/* Adds one node, over its own rows. */
+/* Adds one node over its own rows. */
 static void splat_node(local float *sum, const splat_nodes *b, int n, int taps) {
     const float *h = column_of(b, n);
     int first = max(0, b->top[n]), last = min(b->top[n] + taps, TILE_H);
@@ -300,7 +295,7 @@ static void splat_source(local float *sum, int tile_x, int tile_y, bst_kernel_so
                          global const float *law, splat_nodes *b) {
     int hits[BST_BLOCK] = {1}, taps = 2 * s.radius + 2;
     for (int first = 0; first < s.blocks; first += BST_BLOCK) {
-        if (s.blocks > 1) { /* else the source's box is the block's */
+        if (s.blocks > 1) { /* otherwise the source's box is the block's */
             global const float *box = block_box + (s.first_box * BST_BLOCK + first) * 4;
             vstore16(boxes_hit(box, tile_x, tile_y), 0, hits);
         }
@@ -322,7 +317,7 @@ static void splat_source(local float *sum, int tile_x, int tile_y, bst_kernel_so
     }
 }
 
-/* sum: [TILE_H + BST_SPARE_ROWS][STRIDE], the tile's light in electrons. tile_x, tile_y: its first
+/* Light of a tile in electrons. sum: [TILE_H + BST_SPARE_ROWS][STRIDE]. tile_x, tile_y: its first
  * pixel on the full sensor. */
 static void splat_tile(bst_kernel_frame_params p, local float *sum, int tile_x, int tile_y,
                        global const bst_kernel_source_record *sources, global const float16 *table,

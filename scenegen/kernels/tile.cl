@@ -1,11 +1,10 @@
-/* One tile of the frame per work-item: light, vignetting, background and, for a frame, the
- * detector. Options: GROUP (work-items per work-group), NEAR_CACHE (memory has one address space,
- * and what lies in it can be fetched ahead), FOURIER (the light is an image, else it comes from
- * nodes; `light` is the image or the profiles' law), FLAGS (those of saturated pixels are kept). */
+/* Renders one tile of the frame per work-item: light, vignetting, background and, for a frame, the
+ * detector. Options: GROUP (work-items per work-group), NEAR_CACHE (one address space; memory can
+ * be prefetched), FOURIER (the light is an image, otherwise it comes from nodes; `light` is the
+ * image or the profile law), FLAGS (saturation flags are stored). */
 
-/* Where a tile lies: its first pixel on the full sensor and in the window, and its size. Tiles
- * start at columns that are multiples of 64, so the first and the last may reach beyond the window.
- */
+/* Position of a tile: its first pixel on the full sensor and in the window, and its size. Tiles
+ * start at multiples of 64 columns, so the first and last may extend beyond the window. */
 typedef struct tile_place {
     int x, y, left, top, rows, columns;
 } tile_place;
@@ -21,10 +20,10 @@ static tile_place place_tile(bst_kernel_frame_params p, int tile) {
     return t;
 }
 
-/* Rows ahead of the present one that maps are fetched. */
+/* Number of rows by which maps are prefetched. */
 #define AHEAD 2
 
-/* 16 digital numbers at once at an odd address: vstore16 may become 16 stores. */
+/* 16 digital numbers at an odd address: vstore16 may become 16 stores. */
 typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
 
 #ifdef FLAGS
@@ -33,9 +32,9 @@ typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
 #define FLAGS_AT(flags, i) 0
 #endif
 
-/* Digital numbers, plus one half, of 16 pixels to the window's row at `column`. Returns the pixels
- * that are saturated (`brim`, or converter at its top) as -1; those outside the window are none.
- * marks: the row of flags, with the option FLAGS. */
+/* Stores the digital numbers (plus one half) of 16 pixels in the window's row at `column`. Returns
+ * saturated pixels (`brim`, or converter at its maximum) as -1; pixels outside the window are 0.
+ * marks: row of flags, with the option FLAGS. */
 INLINE int16 store_dn(bst_kernel_frame_params p, detector_maps maps, float16 dn, int16 brim, int column,
                       global ushort *row, global uchar *marks) {
     ushort16 value = convert_ushort16(convert_int16(clamp(dn, 0.0f, p.max_dn)));
@@ -90,8 +89,7 @@ INLINE int16 store_dn(bst_kernel_frame_params p, detector_maps maps, float16 dn,
 #define FETCH_DARK(maps, at)
 #endif
 
-/* Asks for a row of the maps, which are too far apart from row to row for the hardware to foresee.
- */
+/* Prefetches a row of the maps, whose row distance is too large for the hardware prefetcher. */
 INLINE void fetch_maps(detector_maps maps, int row, int column, int columns) {
     size_t first = (size_t)row * MAP_STRIDE + column;
     for (int x = 0; x < columns; x += 16) {
@@ -100,8 +98,8 @@ INLINE void fetch_maps(detector_maps maps, int row, int column, int columns) {
     }
 }
 
-/* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. flags: as the
- * frame, BST_FLAG_...; with the option FLAGS. */
+/* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. flags:
+ * BST_FLAG_... of the frame, with the option FLAGS. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_kernel_frame_params p, global const bst_kernel_source_record *sources, global const float16 *table,
     global const float *block_box, global const float *source_box, global const float *group_box,

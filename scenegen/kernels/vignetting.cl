@@ -1,6 +1,6 @@
-/* Vignetting of the sources' light on a tile. Built in with the option VIGNETTING only, with the
- * boresight's place CENTRE_X, CENTRE_Y (px) and, of the squared distance s from it, either COS4
- * (1 / (1 + COS4 s)^2) or the polynomial 1 + V1 s + V2 s^2 + V3 s^3; LIMIT2: no light beyond. */
+/* Vignetting of the sources' light on a tile. Built only with the option VIGNETTING. CENTRE_X,
+ * CENTRE_Y (px): boresight. With the squared distance s from it, either COS4 (1 / (1 + COS4 s)^2)
+ * or the polynomial 1 + V1 s + V2 s^2 + V3 s^3; LIMIT2: no light beyond. */
 #ifdef VIGNETTING
 static void shade_tile(local float *sum, int tile_x, int tile_y) {
     const float16 lanes = (float16)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f, 8.0f, 9.0f,

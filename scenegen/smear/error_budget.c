@@ -6,27 +6,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Parts of the others' errors that meet where the worst source's error is greatest: of an error
- * that is told by its greatest value, and of a border's length that passes within its own thickness
- * of a place. */
+/* REST: share of the other sources' errors that adds where the worst source's error is largest.
+ * BORDERS: share of a stamp border's length that passes within its own thickness of a point. */
 #define REST 0.4f
 #define BORDERS 0.1f
 
-/* Cells as far as two stamps' radii, four standard deviations of the PSF each and more, go; and up
- * to how many cells are searched for crossings of borders. */
+/* REACH: cells within two stamp radii of four PSF sigmas each. MOST_CROSSINGS: most cells searched
+ * for crossing borders. */
 enum { REACH = 5, MOST_CROSSINGS = 1000 };
 
-/* So many spots, on cells of which one in so many has light or more, are worth a field of cells. */
+/* A dense cell array pays for at least MANY spots if one cell in SPARSE is occupied. */
 enum { MANY = 256, SPARSE = 32 };
 
-/* Sources in one place. */
+/* Sources at one position. */
 typedef struct spot {
     int64_t key;
-    unsigned frame; /* that it was filled in; an older one is empty */
+    unsigned frame; /* frame in which it was filled; older ones are empty */
     float x, y, peak, nodes, shared, excess, border;
 } spot;
 
-/* What lies in half a box, in sigma. */
+/* Error sums of sources in a cell (half a box), in sigma. */
 typedef struct cell {
     int64_t key;
     unsigned frame;
@@ -42,13 +41,12 @@ struct bst_error_budget {
     cell *cells;
     int *used; /* the frame's spots, then its cells */
     unsigned frame, mask;
-    /* Where the cells lie close enough, they have places in the order of `used`, and the field of
-     * all places has their numbers from 1 on, 0 where there is none; else columns is 0 and they
-     * have places by their keys. */
+    /* Dense cell array for close cells: index + 1 of each cell, 0: none, in the order of `used`.
+     * columns 0: cells are found by hashing. */
     int *field, field_capacity;
     int first_u, first_v, rows, columns;
-    double missing_e; /* everywhere */
-    double error;     /* negative: not known yet */
+    double missing_e; /* light missing everywhere */
+    double error;     /* negative: not computed yet */
 };
 
 bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) {
@@ -83,7 +81,8 @@ bst_error_budget_motion bst_error_budget_motion_of(const bst_smear_path_point *p
             high[i] = k == 0 ? at[i] : fmax(high[i], at[i]);
         }
     }
-    /* a tilt about x moves the image against y, one about y along x; roll moves corners any way */
+    /* a tilt about x moves the image along -y, one about y along x; roll moves corners in any
+     * direction */
     double roll = high[2] - low[2], way = 0.0;
     for (int k = 0; k + 1 < count; k++) {
         const double *p = path[k].p, *q = path[k + 1].p;
@@ -118,8 +117,7 @@ bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
         int capacity = c->capacity > 0 ? 2 * c->capacity : 1024;
         bst_error_budget_source *sources = realloc(c->sources, (size_t)capacity * sizeof *sources);
         c->sources = sources ? sources : c->sources;
-        /* twice as many places as entries, so that searches are short; the old content is done with
-         */
+        /* twice as many slots as entries, for short searches; the old content is not needed */
         free(c->spots);
         free(c->cells);
         free(c->used);
@@ -139,7 +137,7 @@ bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
     return BST_OK;
 }
 
-/* As fmaxf where `so_far` is a number, in one instruction. */
+/* fmaxf for finite `so_far`, in one instruction. */
 static inline float greater(float so_far, float x) {
     return x > so_far ? x : so_far;
 }
@@ -152,7 +150,7 @@ static unsigned place_of(int64_t key) {
     return (unsigned)((uint64_t)key * 0x9E3779B97F4A7C15u >> 32);
 }
 
-/* Number of the entry with this key, or of the empty one where it belongs. */
+/* Slot of the entry with this key, or the empty slot for it. */
 static int find_spot(const bst_error_budget *c, int64_t key) {
     unsigned i = place_of(key) & c->mask;
     while (c->spots[i].frame == c->frame && c->spots[i].key != key) {
@@ -161,7 +159,7 @@ static int find_spot(const bst_error_budget *c, int64_t key) {
     return (int)i;
 }
 
-/* Place of the cell (u, v), or of an empty one in its stead. */
+/* Slot of cell (u, v), or an empty slot for it. */
 static int find_cell(const bst_error_budget *c, int u, int v) {
     int64_t key = key_of(u, v);
     unsigned i = place_of(key) & c->mask;
@@ -175,7 +173,7 @@ static int *field_at(const bst_error_budget *c, int u, int v) {
     return &c->field[(v - c->first_v) * c->columns + u - c->first_u];
 }
 
-/* The cell (u, v), NULL where there is no light. Within REACH of one that has some. */
+/* Cell (u, v), NULL if it has no light; must be within REACH of an occupied cell. */
 static const cell *look_up(const bst_error_budget *c, int u, int v) {
     if (c->columns > 0) {
         int n = *field_at(c, u, v);
@@ -185,7 +183,7 @@ static const cell *look_up(const bst_error_budget *c, int u, int v) {
     return p->frame == c->frame ? p : NULL;
 }
 
-/* The same cell, made where there is none; *cells: how many there are. */
+/* Cell (u, v), created if there is none; *cells: number of cells. */
 static cell *make_cell(bst_error_budget *c, int u, int v, int *cells) {
     int n = c->columns > 0 ? *field_at(c, u, v) - 1 : find_cell(c, u, v);
     if (n >= 0 && c->cells[n].frame == c->frame) {
@@ -200,7 +198,8 @@ static cell *make_cell(bst_error_budget *c, int u, int v, int *cells) {
     return &c->cells[n];
 }
 
-/* Sources into spots; returns how many. *apart: the worst of those that move by themselves. */
+/* Merges sources into spots; returns their number. *apart: largest error of sources in their own
+ * motion. */
 static int fill_spots(bst_error_budget *c, float *apart) {
     float per_px = 1.0f / fmaxf((float)c->motion.sigma_px, 1.0f);
     float dark = (float)c->motion.dark_variance_e2;
@@ -228,7 +227,7 @@ static int fill_spots(bst_error_budget *c, float *apart) {
     return spots;
 }
 
-/* Half a box: its numbers per px along the motion and across. */
+/* Scale of half a box: cells per px along the motion and across it. */
 typedef struct lattice {
     float dx, dy, per_u, per_v;
 } lattice;
@@ -241,14 +240,14 @@ static lattice lattice_of(const bst_error_budget_motion *m) {
                      .per_v = 2.0f / ((float)m->width_px + psf)};
 }
 
-/* The cell of a spot. */
+/* Cell of a spot. */
 static void cell_of(const lattice *l, const spot *s, int *u, int *v) {
     *u = (int)floorf((s->x * l->dx + s->y * l->dy) * l->per_u);
     *v = (int)floorf((s->y * l->dx - s->x * l->dy) * l->per_v);
 }
 
-/* Makes the field of cells, with empty ones about it as far as is looked, where there are many
- * spots on few enough cells: neighbours are then beside each other in memory. */
+/* Creates the dense cell array, with a margin of empty cells, if there are many spots on few cells:
+ * neighbours are then adjacent in memory. */
 static void make_field(bst_error_budget *c, const lattice *l, int spots) {
     int low[2] = {INT_MAX, INT_MAX}, high[2] = {INT_MIN, INT_MIN};
     c->columns = c->rows = 0;
@@ -273,7 +272,7 @@ static void make_field(bst_error_budget *c, const lattice *l, int spots) {
         free(c->field);
         c->field = malloc((size_t)places * sizeof *c->field);
         c->field_capacity = c->field ? places : 0;
-        if (!c->field) { /* it is only for speed */
+        if (!c->field) { /* only an optimisation */
             return;
         }
     }
@@ -284,7 +283,7 @@ static void make_field(bst_error_budget *c, const lattice *l, int spots) {
     c->rows = (int)rows;
 }
 
-/* Spots into cells, whose numbers take the spots' place in `used`; returns how many. */
+/* Merges spots into cells, whose indices replace the spots' in `used`; returns their number. */
 static int fill_cells(bst_error_budget *c, int spots) {
     const lattice l = lattice_of(&c->motion);
     float dark = (float)c->motion.dark_variance_e2, quiet = 1.0f / sqrtf(dark);
@@ -334,7 +333,7 @@ static float box_error(const bst_error_budget *c, const cell *middle) {
            REST * fmaxf(others, sum.second) + BORDERS * (sum.border - sum.worst_border);
 }
 
-/* Error where the border of the stamps in a cell meets another, as two circles do that are no
+/* Error where the border of the stamps in a cell crosses another: two circles cross if they are no
  * further apart than the sum of their radii. */
 static float crossing_error(const bst_error_budget *c, const cell *middle) {
     float other = fminf(middle->border - middle->worst_border, middle->worst_border);
@@ -354,7 +353,7 @@ double bst_error_budget_error_sigma(bst_error_budget *c) {
         float worst = 0.0f, apart = 0.0f, border = 0.0f;
         c->frame++;
         int cells = fill_cells(c, fill_spots(c, &apart));
-        /* in the order of the field, if there is one */
+        /* in the order of the dense array, if there is one */
         int places = c->columns > 0 ? c->columns * c->rows : cells;
         for (int i = 0; i < places; i++) {
             int n = c->columns > 0 ? c->field[i] - 1 : c->used[i];
@@ -363,11 +362,11 @@ double bst_error_budget_error_sigma(bst_error_budget *c) {
                 border = greater(border, c->cells[n].worst_border);
             }
         }
-        if (cells > MOST_CROSSINGS) { /* some of the worst do */
+        if (cells > MOST_CROSSINGS) { /* too many cells: assume that the worst ones cross */
             worst = fmaxf(worst, 2.0f * border);
         }
-        /* both cells of a pair find it: the one with the greater border, which is at least half of
-         * the pair's error, is enough */
+        /* both cells of a pair find it; the one with the larger border, at least half of the pair's
+         * error, suffices */
         for (int i = 0; i < cells && 2.0f * border > worst; i++) {
             const cell *p = &c->cells[c->used[i]];
             worst = 2.0f * p->worst_border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;

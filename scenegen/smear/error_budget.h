@@ -1,10 +1,10 @@
-/* The error of a frame from the errors of its sources, where their images lie on one another.
+/* Error budget of a frame: combines the errors of overlapping sources.
  *
- * All stars move alike, so that those that may light one pixel have places in one box, as long and
- * wide as the motion and the PSF. Sources are sorted into cells of half a box; the error of three
- * by three cells is that of their worst source and what the others add, see
- * docs/explanation/equations/image.md. Sources within one standard deviation of the PSF count as
- * one, with the sum of their errors. Time and memory go with the number of sources. */
+ * All stars move alike. Those that may light one pixel lie in one box, as long and wide as motion
+ * and PSF. Sources are sorted into cells of half a box. The error of 3 x 3 cells is that of their
+ * worst source plus a share of the others, see docs/explanation/equations/image.md. Sources within
+ * one PSF sigma count as one, with the sum of their errors. Time and memory are proportional to the
+ * number of sources. */
 #ifndef BST_SCENEGEN_SMEAR_ERROR_BUDGET_H
 #define BST_SCENEGEN_SMEAR_ERROR_BUDGET_H
 
@@ -15,29 +15,29 @@
 
 typedef struct bst_error_budget bst_error_budget;
 
-/* How the stars of a frame move. */
+/* Motion of a frame's stars. */
 typedef struct bst_error_budget_motion {
     double direction[2];        /* unit vector */
     double length_px, width_px; /* along it and across */
-    double way_px;              /* length of the way, at most */
-    double overlap;             /* part of length times width that a star's light falls on */
+    double way_px;              /* largest path length */
+    double overlap;             /* part of length times width that a star's light covers */
     double sigma_px;            /* of the PSF */
-    double dark_variance_e2;    /* noise of a dark pixel */
+    double dark_variance_e2;    /* noise variance of a dark pixel */
 } bst_error_budget_motion;
 
 /* Direction and extent of a path of tilts about x and y and roll (px in the sensor's corners), or
- * of shifts along x and y. */
+ * of shifts along x and y (`shift`). */
 bst_error_budget_motion bst_error_budget_motion_of(const bst_smear_path_point *path, int count,
                                                    bool shift);
 
 /* Error of one source's image. */
 typedef struct bst_error_budget_source {
-    float x_px, y_px; /* anywhere on its way, the same instant for all */
+    float x_px, y_px; /* position anywhere on its path, at the same time for all sources */
     float peak_e;     /* largest light in one pixel */
-    float nodes_e;    /* error by nodes, profiles and rounding where it is greatest, e- */
-    float shared_e;   /* by a track that is not its own */
-    float excess_e;   /* light from beyond the stamp, on it */
-    float border_e;   /* missing next to the stamp */
+    float nodes_e;    /* largest error by nodes, profiles and rounding, e- */
+    float shared_e;   /* error by a shared track */
+    float excess_e;   /* light from beyond the stamp, added to it */
+    float border_e;   /* light missing next to the stamp */
     bool apart;       /* moves further than the stars do */
 } bst_error_budget_source;
 
@@ -59,10 +59,10 @@ void bst_error_budget_begin(bst_error_budget *budget, const bst_error_budget_mot
 bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *budget,
                                 const bst_error_budget_source *source) BST_MUST_CHECK;
 
-/* Adds light that any pixel may lack, e-: of sources too far away to be drawn. */
+/* Adds light that any pixel may lack, e-: of sources too far away to be rendered. */
 void bst_error_budget_miss(bst_error_budget *budget, double electrons);
 
-/* Largest error expected in any pixel, in its sigma. The work is done at the first call. */
+/* Largest expected error in any pixel, in its sigma. It is computed at the first call. */
 double bst_error_budget_error_sigma(bst_error_budget *budget);
 
 #endif

@@ -3,13 +3,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Discs up to this radius, in pixels (or standard deviations of a wider PSF), are made by
- * quadrature: there it needs fewer points. */
+/* Radius, px (or sigmas of a wider PSF), up to which discs use quadrature, which needs fewer
+ * points. */
 #define SMALL_RADIUS 12.0
-/* Panels of quadrature, in standard deviations. */
+/* Width of a quadrature panel, in PSF sigmas. */
 #define PANEL_SIGMAS 1.4
 
-/* Crescents narrower than this (px, or standard deviations) are made by quadrature as well. */
+/* Crescents narrower than this (px, or PSF sigmas) use quadrature as well. */
 #define THIN_WIDTH 6.0
 
 enum { GAUSS_MOST = 4, FINEST = 16 };
@@ -26,16 +26,16 @@ static const double gauss_weight[GAUSS_MOST][GAUSS_MOST] = {
     {0.2777777777777778, 0.4444444444444444, 0.2777777777777778},
     {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693}};
 
-/* A disc on the focal plane. */
+/* Scan of a disc on the focal plane. */
 typedef struct scan {
     const bst_extended_source_view *view;
     bst_disc disc;
     bst_quat gcrf_from_focal;
-    bst_vec3 middle;     /* of the disc, focal-plane axes, unit */
+    bst_vec3 middle;     /* disc centre, focal-plane axes, unit */
     double sine, cosine; /* of its angular radius */
-    double x0, y0;       /* px of the middle from the boresight */
-    double cell;         /* side of the squares that are filled, px */
-    int order;           /* points of the quadrature in each, along an axis */
+    double x0, y0;       /* centre relative to the boresight, px */
+    double cell;         /* side of the cells that are filled, px */
+    int order;           /* quadrature points per cell and axis */
     bst_disc_points *out;
     double total;
 } scan;
@@ -54,16 +54,16 @@ static bst_status push(bst_ctx *ctx, bst_disc_points *list, double x, double y, 
     return BST_OK;
 }
 
-/* The chord of the disc at y px; false where there is none. The limb is a cone about the middle,
- * (v . middle)^2 = cos^2 |v|^2, v = (x a, y a, 1). */
+/* Chord of the disc at y px; false if there is none. The limb is a cone about the centre: (v .
+ * middle)^2 = cos^2 |v|^2, v = (x a, y a, 1). */
 static bool chord(const scan *s, double y, double *from, double *to) {
     double a = s->view->scale_rad, t = y * a;
     bst_vec3 m = s->middle;
-    /* about the middle's x, where the terms are small */
+    /* about the centre's x, for small terms */
     double u0 = m.x / m.z, e = m.x * u0 + m.y * t + m.z, g = u0 * u0 + t * t + 1.0;
     double c2 = s->cosine * s->cosine;
     double p = c2 - m.x * m.x, q = m.x * e - c2 * u0;
-    /* e^2 - c2 g = s2 g - (|v|^2 - e^2), the latter the square of the sine's distance */
+    /* e^2 - c2 g = s2 g - (|v|^2 - e^2), the latter the squared sine of the distance */
     bst_vec3 v = {u0, t, 1.0};
     bst_vec3 across = bst_vec3_cross(v, m);
     double r = s->sine * s->sine * g - bst_vec3_dot(across, across);
@@ -77,7 +77,7 @@ static bool chord(const scan *s, double y, double *from, double *to) {
     return true;
 }
 
-/* Points between two places of a row. */
+/* Adds the points between two x positions of a row. */
 static bst_status fill(bst_ctx *ctx, scan *s, double y, double height, double from, double to) {
     double a = s->view->scale_rad;
     for (int k = 0; k < s->order; k++) {
@@ -95,7 +95,7 @@ static bst_status fill(bst_ctx *ctx, scan *s, double y, double height, double fr
     return BST_OK;
 }
 
-/* One line of points: square by square, the outer ones as far as the limb. */
+/* Adds one row of points, cell by cell; the outer cells end at the limb. */
 static bst_status fill_row(bst_ctx *ctx, scan *s, double y, double height) {
     double from, to;
     if (!chord(s, y, &from, &to)) {
@@ -113,7 +113,7 @@ static bst_status fill_row(bst_ctx *ctx, scan *s, double y, double height) {
     return BST_OK;
 }
 
-/* Into how many strips a row of squares goes: as many as the limb runs along it. */
+/* Number of strips of a row of cells: as many as the limb's slope requires. */
 static int strips_of(const scan *s, double y) {
     double a0, a1, b0, b1, run = INFINITY;
     if (chord(s, y, &a0, &a1) && chord(s, y + s->cell, &b0, &b1)) {
@@ -128,7 +128,7 @@ static int strips_of(const scan *s, double y) {
 
 static bst_status scan_disc(bst_ctx *ctx, scan *s) {
     double reach = 1.01 * tan(asin(s->sine)) / s->view->scale_rad + s->cell;
-    /* off the axis the image of a circle is larger */
+    /* off axis the image of a circle is larger */
     reach /= s->middle.z * s->middle.z;
     double first = fmax(s->y0 - reach, s->view->min_y_px);
     double last = fmin(s->y0 + reach, s->view->max_y_px);
@@ -147,7 +147,7 @@ static bst_status scan_disc(bst_ctx *ctx, scan *s) {
     return BST_OK;
 }
 
-/* Appends the points of some lights by quadrature, those that are wanted. */
+/* Appends the visible points of some light sources by quadrature. */
 static bst_status add_quadrature(bst_ctx *ctx, const bst_scene_source *source, int lights,
                                  const bst_extended_source_view *view, double x0, double y0,
                                  bst_disc_points *points) {
@@ -168,7 +168,7 @@ static bst_status add_quadrature(bst_ctx *ctx, const bst_scene_source *source, i
     return BST_OK;
 }
 
-/* Whether what a light makes of the disc is too thin a crescent to be scanned. */
+/* True if a light's crescent is too thin for the scan. */
 static bool thin(const bst_disc_aspect *aspect, double radius_px, double sigma_px) {
     return radius_px * (1.0 + aspect->cosine) < THIN_WIDTH * fmax(1.0, sigma_px);
 }

@@ -11,7 +11,7 @@ double bst_motion_spread_px(const bst_smear_path_point *path, int count, double 
     for (int k = 0; k < count; k++) {
         double tilt = hypot(path[k].p[0], path[k].p[1]) * scale_rad / stretch;
         double roll = fabs(path[k].p[2]) / roll_px;
-        /* first order, then what is left of products of turns */
+        /* first order, plus the products of rotations */
         double moved = roll * corner + tilt * corner * (corner + tilt);
         moved += 0.5 * roll * (roll * corner + tilt) + tilt * roll * corner * (1.0 + corner);
         worst = fmax(worst, moved);
@@ -57,8 +57,8 @@ bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_smear_path_point *path, 
     return BST_OK;
 }
 
-/* Light is uniform between the points of a path: where it changes they are so many in an exposure,
- * and as close as it changes by this share of the mean. */
+/* Brightness is constant between path points; a varying source gets this many parts per exposure,
+ * and a part for each change by RATE_STEP of the mean. */
 enum { RATE_PARTS = 512 };
 #define RATE_STEP 0.02
 

@@ -7,29 +7,28 @@
 #include "boresight/vec.h"
 #include "scenegen/kernels/scene_shared.h"
 
-/* Cells per axis: as many as it takes for a cell's stars to move alike, but for UNLIKE of the
- * path's length, or where most cells would have to be filled, UNLIKE_MANY; and nodes about which
- * light is summed. */
+/* Cells per axis: stars of a cell move alike to within UNLIKE of the path length, or UNLIKE_MANY if
+ * most cells are used. ANCHORS: nodes about which light is summed. */
 enum { FEW_CELLS = 6, MANY_CELLS = 96, ANCHORS = 48, FEW_SOURCES = 256 };
 #define UNLIKE 0.01
 #define UNLIKE_MANY 0.06
-/* Nodes that are nearer to each other than this, in sigma, give no scale. */
+/* Nodes closer than this, in sigma, give no motion scale. */
 #define LEAST_STEP 0.02
-/* Of a node's light at a place, exp(-MOST_EXPONENT) is left out. */
+/* Node light below exp(-MOST_EXPONENT) at a position is neglected. */
 #define MOST_EXPONENT 20.0
-/* Bounds that only save work are wider by this than rounding makes them wrong. */
+/* Margin of bounds that only save work, above their rounding error. */
 #define SAFELY 1e-9
 
-/* A node as the map needs it. */
+/* A node of the camera path as the map uses it. */
 typedef struct turn {
-    double m[9]; /* as in the table */
+    double m[9]; /* as in the node table */
     double weight, roll_rad, p[3];
-    /* to the next node: length in the path's px, and the other motion of a star 1 px away */
+    /* to the next node: path length in px, and relative motion of a star 1 px away */
     double step_px, other_step;
-    double other_still; /* the same from the reference attitude */
+    double other_still; /* the same, from the reference attitude */
 } turn;
 
-/* Place of the present cell's middle at a node. */
+/* Position of the current cell's centre at a node. */
 typedef struct place {
     double x, y;
     bool front;
@@ -42,7 +41,7 @@ struct bst_motion_map {
     int count, capacity;
     int side; /* cells per axis */
     double cell_px;
-    double other; /* between any two nodes at most, of a star 1 px away */
+    double other; /* largest relative motion between any two nodes of a star 1 px away */
     unsigned frame, filled[MANY_CELLS * MANY_CELLS];
     bst_smear_star_motion_cell cells[MANY_CELLS * MANY_CELLS];
 };
@@ -60,15 +59,15 @@ void bst_motion_map_free(bst_motion_map *map) {
     }
 }
 
-/* By how much a star's motion between two nodes differs, at most, from that of a star 1 px from it:
- * the field turns, and a tilt stretches the tangent plane. */
+/* Upper bound of the relative motion between two nodes of stars 1 px apart: field rotation and
+ * tangent-plane stretch. */
 static double other_motion(const bst_motion_map *map, const turn *a, const turn *b) {
     double tangent = map->f.reach_px * map->f.scale_rad;
     double tilt = hypot(a->p[0] - b->p[0], a->p[1] - b->p[1]) / map->f.tilt_px;
     return fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad;
 }
 
-/* What of the nodes' motion is the same in all cells. */
+/* Motion between nodes common to all cells. */
 static void measure_steps(bst_motion_map *map) {
     const turn still = {.weight = 0.0};
     for (int n = 0; n < map->count; n++) {
@@ -150,11 +149,11 @@ double bst_motion_pixel_share(double sigma_px, int binning, double *spread_px) {
     return line * line;
 }
 
-/* Largest share of the light that falls on one pixel, of any star of the cell. */
+/* Upper bound of a star's light share in one pixel, over the cell. */
 static double cell_share(const bst_motion_map *map, int binning, double radius_px) {
     double spread, line = bst_motion_pixel_share(map->f.sigma_px, binning, &spread);
     double per = 1.0 / (spread * sqrt(2.0)), best = 0.0;
-    /* nodes further than this share no pixel */
+    /* nodes further apart share no pixel */
     double reach =
         (1.0 + SAFELY) * (sqrt(MOST_EXPONENT) / per + map->other * radius_px) / map->f.shrink;
     double reach2 = reach * reach;
@@ -178,7 +177,7 @@ static double cell_share(const bst_motion_map *map, int binning, double radius_p
     return best * line;
 }
 
-/* Largest motion of a star of the cell over the path's, from node to node. */
+/* Largest motion of a star in the cell relative to the path's, from node to node. */
 static double cell_scale(const bst_motion_map *map, double radius_px) {
     double worst = 0.0, far = map->f.sensor_px + radius_px;
     double least = LEAST_STEP * map->f.sigma_px, near2 = (1.0 - SAFELY) * far * far;

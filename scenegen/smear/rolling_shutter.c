@@ -7,10 +7,10 @@
 #include "sim/world/scene/row_exposure.h"
 #include "sim/world/scene/skylight.h"
 
-/* Instants at which a moving source is looked at. */
+/* Number of times at which a moving source is sampled. */
 enum { INSTANTS = 65 };
 
-/* A source's rows on the window, from which it lights them: first > last: none. */
+/* Rows of the window that a source lights; first > last: none. */
 typedef struct source_rows {
     double first, last;
 } source_rows;
@@ -20,14 +20,14 @@ struct bst_rolling {
     double tolerance, sigma_px, share, reach_px, steepest;
     const bst_render_request *request;
     bst_row_times times;
-    bst_los_track_store store; /* of the band */
+    bst_los_track_store store; /* track of the band */
     bst_los_track track;
     source_rows *rows;            /* [count] of the request */
     bst_scene_source *sources;    /* of the band */
     bst_scene_source_part *parts; /* of the band's moving sources */
-    int *number;                  /* in the request, of the band's sources */
+    int *number;                  /* index in the request of the band's sources */
     int source_capacity, part_capacity;
-    double *slope; /* per row: error of the worst source in sigma per second of delay */
+    double *slope; /* per row: error of the worst source in sigma per second of row delay */
     int row_capacity, next;
     double moved_px, speed_pxps, margin_px, error_sigma;
 };
@@ -42,7 +42,8 @@ bst_status bst_rolling_create(bst_ctx *ctx, const bst_camera *camera, double tol
     r->camera = *camera;
     r->tolerance = tolerance_sigma;
     r->sigma_px = peak_sigma_px;
-    /* beyond, the wings do not count; and the largest slope times peak_sigma_px over the peak */
+    /* distance beyond which wings are negligible; largest slope times peak_sigma_px over the peak
+     */
     r->reach_px = gaussian ? 5.0 * peak_sigma_px + 2.0 : 20.0;
     r->steepest = gaussian ? exp(-0.5) : 1.0;
     double side = erf(0.5 / (sqrt(2.0) * peak_sigma_px));
@@ -66,13 +67,13 @@ static double duration_of(const bst_render_request *q) {
     return q->track->time_s[q->track->count - 1];
 }
 
-/* How far the image moves within the exposure of a row at most, and how fast. */
+/* Largest image motion within a row's exposure, and largest rate. */
 static void measure_motion(bst_rolling *r) {
     const bst_los_track *track = r->request->track;
     double spare = duration_of(r->request) - r->times.exposure_s, exposure = r->times.exposure_s;
     r->moved_px = r->speed_pxps = 0.0;
     for (int k = 0; k < track->count; k++) {
-        /* the way from start to end is longest where one of them is at a bend of the track */
+        /* the path is longest if its start or end is at a bend of the track */
         for (int end = 0; end < 2; end++) {
             double start = fmin(fmax(track->time_s[k] - (end ? exposure : 0.0), 0.0), spare);
             r->moved_px = fmax(r->moved_px, bst_los_track_moved_px(
@@ -88,7 +89,7 @@ static void measure_motion(bst_rolling *r) {
     }
 }
 
-/* Rows between which the source is during the track, and how far it moves in one row's exposure. */
+/* Rows that a source lights during the track, and its largest motion during one row exposure. */
 static source_rows rows_of(const bst_rolling *r, const bst_scene_source *source, double reach_px,
                            double *moved_px) {
     const bst_los_track *track = r->request->track;
@@ -123,14 +124,14 @@ static source_rows rows_of(const bst_rolling *r, const bst_scene_source *source,
                 k == 0 ? hypot(to_x - x, to_y - y) : fmax(*moved_px, hypot(to_x - x, to_y - y));
         }
     }
-    /* between the instants: as far again as from one to the next */
+    /* between samples: by another step */
     return (source_rows){rows.first - step, rows.last + step};
 }
 
-/* The image that a row gets with a delay d differs by the light of the last d of the exposure less
- * that of the first d: at most rate d times the PSF where they lie apart by `moved`, which no pixel
- * has more of than the PSF's peak. Where it is, light of the source lies that has its own noise:
- * with a as the share of the streak, exp(-z^2) / Q(z) <= 2.55 for z from the streak's end. */
+/* Error rate of a source's image with row delay d: it gains the light of the last d of the exposure
+ * and loses that of the first d. This is at most rate d times the PSF at two positions `moved`
+ * apart, bounded by the PSF's peak. The source's own noise counts there: with a the share of the
+ * streak, exp(-z^2) / Q(z) <= 2.55 at z from the streak's end. */
 static double error_per_s(const bst_rolling *r, const bst_scene_source *source, double moved_px,
                           double dark_variance) {
     double rate = source->electrons_per_s * r->share;
@@ -239,7 +240,7 @@ bst_status bst_rolling_next(bst_ctx *ctx, bst_rolling *r, bst_render_request *ba
     }
     double row_s = fabs(q->row_time_s), slope = r->slope[first];
     int end = first + 1;
-    for (; end < height; end++) { /* rows at the ends are half the band from its middle */
+    for (; end < height; end++) { /* rows at a band's ends are half a band from its middle */
         double with = fmax(slope, r->slope[end]);
         if (with * 0.5 * (end - first) * row_s > r->tolerance) {
             break;

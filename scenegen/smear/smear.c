@@ -11,8 +11,7 @@
 #include "scenegen/stamp/fixed_point_px.h"
 #include "scenegen/stamp/profile_law.h"
 
-/* Shares of the tolerance: for nodes, for the border of the stamp, and for a track that stars
- * share. */
+/* Shares of the tolerance: for nodes, for the stamp border, and for a track shared by the stars. */
 #define NODE_SHARE 0.85
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
@@ -36,8 +35,8 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     s->widest = options->widest > 0.0 ? options->widest : BST_NODE_WIDEST;
     s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
     bst_stamp_init(&s->stamp, s->sigma_px, options->node_sigma_px > 0.0);
-    /* of the error function 2.3e-7 are missed on each axis, of nodes in reach of a pixel whose
-     * light there is a quarter of the centre's on average */
+    /* the error function misses 2.3e-7 per axis, for nodes near a pixel whose light is on average a
+     * quarter of the peak */
     s->edge_error = 2.0 * 4.0 * 2.3e-7 / bst_reference_pixel_share(0.0, s->sigma_px, 0);
     s->edge_error = options->node_sigma_px > 0.0 ? 0.0 : s->edge_error;
     s->point_error = options->law_widest > 0.0 ? 2.0 * options->law_error : s->edge_error;
@@ -54,8 +53,8 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
             0.5 * hypot((double)camera->width_px + 2.0 * fabs(camera->boresight_offset_px[0]),
                         (double)camera->height_px + 2.0 * fabs(camera->boresight_offset_px[1]));
     }
-    /* a tilt by t moves the image at the tangent R by (1 + R^2) t along the way from the boresight,
-     * and what is left of the second order by R (1 + R^2) t^2 */
+    /* a tilt t moves the image at tangent R by (1 + R^2) t along the direction from the boresight;
+     * the second-order remainder is R (1 + R^2) t^2 */
     double tangent = s->half_diagonal_px / s->stretch * bst_camera_scale_rad(camera);
     s->wide_field = 1.0 + tangent * tangent;
     s->curvature = 2.0 * tangent / s->wide_field * bst_camera_scale_rad(camera) +
@@ -96,8 +95,8 @@ bst_status bst_smear_reserve(bst_ctx *ctx, void **items, int *capacity, int need
     return BST_OK;
 }
 
-/* Into how many straight parts the path from sample k to k + 1 goes: the attitude turns about one
- * axis, the image of it bends. */
+/* Number of straight parts of the path from sample k to k + 1: the attitude rotates about one axis,
+ * so its image is curved. */
 static int parts_of(const bst_smear *s, int k) {
     const bst_quat *q = s->track.q_cam_from_gcrf;
     bst_quat d = bst_quat_mul(q[k + 1], bst_quat_conj(q[k]));
@@ -119,7 +118,7 @@ static bst_quat attitude_at(const bst_los_track *track, double time_s) {
     return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
 }
 
-/* Turns a vector from camera axes to those of the focal plane (sign +1) or back (-1). */
+/* Rotates a vector from camera axes to focal-plane axes (sign +1) or back (-1). */
 static bst_vec3 turned(const bst_smear *s, bst_vec3 v, double sign) {
     if (!s->camera.geometry.general) {
         return v;
@@ -128,9 +127,8 @@ static bst_vec3 turned(const bst_smear *s, bst_vec3 v, double sign) {
     return (bst_vec3){cs * v.x + sn * v.y, cs * v.y - sn * v.x, v.z};
 }
 
-/* The camera's turn from the reference attitude as a path point, in the focal plane's axes: two
- * tilts in pixels of image motion where the distortion stretches most, and roll by what it moves in
- * the sensor's corners. */
+/* Rotation of the camera from the reference attitude as a path point, focal-plane axes: two tilts
+ * in px of image motion where distortion stretches most, and roll in px at the sensor's corners. */
 static bst_smear_path_point attitude_point(const bst_smear *s, bst_quat q, double time) {
     bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(s->q_reference)));
     r = turned(s, r, 1.0);
@@ -138,7 +136,7 @@ static bst_smear_path_point attitude_point(const bst_smear *s, bst_quat q, doubl
     return (bst_smear_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
-/* What the nodes' profiles miss of their image, over its peak. */
+/* Image error of the nodes' profiles, relative to the peak. */
 static double profile_error(const bst_smear *s, const bst_smear_node_list *list) {
     double psf = s->sigma_px * s->stretch, widest = 0.0, table = 0.0;
     for (int n = 0; n < list->count; n++) {
@@ -147,8 +145,8 @@ static double profile_error(const bst_smear *s, const bst_smear_node_list *list)
         table = fmax(table, 0.75 * w / (wide * wide));
     }
     if (s->options.node_sigma_px > 0.0) {
-        /* by the widths of the Fourier path, and by the phases of its kernel, between which linear
-         * interpolation widens by up to a quarter of a step squared, a half of that on each axis */
+        /* by table widths, and by kernel phases: linear interpolation widens by up to a quarter of
+         * a step squared, half of that per axis */
         double step = 1.0 / (BST_SPREAD_PHASES * s->options.grid_per_px * s->sigma_px);
         return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
     }
@@ -174,7 +172,7 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_node_
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
-        /* the last block is filled up with dark copies of the last node */
+        /* the last block is padded with zero-weight copies of the last node */
         to_table(s, &list->items[n < list->count ? n : list->count - 1], block + n % BST_BLOCK);
         if (n >= list->count) {
             block[9 * BST_BLOCK + n % BST_BLOCK] = 0.0f;
@@ -183,15 +181,15 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_node_
     return BST_OK;
 }
 
-/* A node's widening in PSF variances, before the distortion stretches it. */
+/* Widening of a node in PSF variances, before distortion stretches it. */
 static double widening(const bst_smear *s, const bst_smear_node *node) {
     double psf = s->sigma_px * s->stretch;
     return node->variance / (psf * psf);
 }
 
-/* Node of the camera's turn: v_node = M v_reference as a map of the undistorted tangent plane, in
- * pixels and the focal plane's axes,
- * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
+/* Table entry of a camera rotation: v_node = M v_reference as a map of the undistorted tangent
+ * plane, px, focal-plane axes, x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a
+ * (m20 x + m21 y). */
 static void attitude_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
     double a = bst_camera_scale_rad(&s->camera), tilt = a / (s->stretch * s->wide_field);
     bst_quat q = bst_quat_from_rotvec(
@@ -206,7 +204,7 @@ static void attitude_to_table(const bst_smear *s, const bst_smear_node *node, fl
     }
 }
 
-/* Node of an own path: a shift of the image. */
+/* Table entry of a source's own path: a shift of the image. */
 static void shift_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
     double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
     double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight, widening(s, node)};
@@ -269,7 +267,7 @@ static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     return BST_OK;
 }
 
-/* Lets the stars share one track where that is asked for, or good enough for the brightest. */
+/* Chooses a shared track for the stars if requested, or accurate enough for the brightest. */
 static void choose_motion(bst_smear *s, double brightest_e_per_s) {
     double scale = bst_camera_scale_rad(&s->camera), roll_px = s->half_diagonal_px;
     double half_turn_px = 1.0 / scale;
@@ -293,6 +291,7 @@ static void choose_motion(bst_smear *s, double brightest_e_per_s) {
     }
 }
 
+/* Measures the camera's rotation from the reference attitude. */
 static void measure_turn(bst_smear *s) {
     double tilt2 = 0.0, roll = 0.0;
     for (int k = 0; k < s->path_count; k++) {
@@ -304,8 +303,8 @@ static void measure_turn(bst_smear *s) {
     s->roll_rad = s->half_diagonal_px > 0.0 ? roll / s->half_diagonal_px : 0.0;
 }
 
-/* Whether a star at (x, y) px from the boresight stays too far from the window to light it. Asked
- * where a turn moves places by little more than to first order. */
+/* True if a star at (x, y) px from the boresight stays too far from the window to light it;
+ * first-order estimate. */
 static bool stays_beside(const bst_smear *s, double x, double y) {
     double scale = bst_camera_scale_rad(&s->camera), r = sqrt(x * x + y * y) * scale;
     if (s->camera.geometry.general || s->tilt_rad + s->roll_rad > 0.05 || r > 2.0) {
@@ -318,7 +317,7 @@ static bool stays_beside(const bst_smear *s, double x, double y) {
     return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
 }
 
-/* The map of how stars move, from the nodes of the coarsest level, which were made last. */
+/* Starts the motion map with the nodes of the coarsest level, which were computed last. */
 static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
     double tilt = s->tilt_rad / bst_camera_scale_rad(&s->camera) * s->wide_field;
     double from = s->half_diagonal_px / s->stretch;
@@ -416,7 +415,7 @@ int bst_smear_choose_level(const bst_smear *s, double scale) {
     if (s->options.temporal_oversample > 0) {
         return n;
     }
-    /* mostly three nodes: errors of sixth order, of motions up to the path's */
+    /* mostly three nodes per group: sixth-order errors, for motions up to the path's */
     double power = scale * scale * scale, part = fmin(power * power, 1.0);
     while (n + 1 < BST_SMEAR_LEVELS && part * s->tolerance[n] + s->point_error > allowed) {
         n++;
@@ -424,8 +423,7 @@ int bst_smear_choose_level(const bst_smear *s, double scale) {
     return n;
 }
 
-/* A level's error for stars of a cell (NULL: of all), which keeps it: it is the same whenever the
- * level is made in this frame. */
+/* Error of a level for stars of a cell (NULL: of all stars), cached in the cell. */
 static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *cell) {
     if (!cell) {
         return bst_smear_level_error(&s->levels[n], 1.0);
@@ -436,8 +434,8 @@ static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *
     return cell->error[n];
 }
 
-/* The level for a star: the coarsest one that keeps its tolerance, tried from the level that the
- * tolerance asks for. */
+/* Chooses the coarsest level that keeps the tolerance for a star, starting from the tolerance's
+ * level. */
 static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_cell *cell,
                              const bst_smear_level **out, double *error) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
@@ -485,7 +483,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     s->disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
-    /* a star that only a wide turn brings into the field is no small float from its place there */
+    /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
     double wide = 4.0 * (s->far_px + s->disc_px);
     moving = moving || !front || x * x + y * y > wide * wide;
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
@@ -514,7 +512,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     const bst_smear_level *used;
     double travel_px = s->travel_px, error;
     if (moving) {
-        /* nodes are kept as small floats relative to a place on the sensor */
+        /* nodes are stored as small floats relative to a position on the sensor */
         double far = s->far_px;
         x = front ? fmin(fmax(x, -far), far) : 0.0;
         y = front ? fmin(fmax(y, -far), far) : 0.0;
@@ -543,7 +541,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     bst_smear_set_error(s, &drawn);
     bst_smear_bring_to_window(s, &drawn);
     double parts = s->place_parts;
-    /* what the stamp leaves out is put on the stamp, so that no light is lost */
+    /* light beyond the stamp is added to it, so that flux is conserved */
     electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];
     *out = (bst_kernel_source_record){
         .x_px = (float)x,

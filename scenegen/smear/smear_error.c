@@ -1,12 +1,12 @@
-/* Errors of a source's image, from those of its nodes. */
+/* Image error of a source from the errors of its nodes. */
 #include <math.h>
 
 #include "scenegen/smear/smear_internal.h"
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
 
-/* The parts of bst_smear_node_aim for a Gaussian: its derivatives and itself, means over the side
- * of `binning` pixels; integrals of Hermite functions are those of the order below. */
+/* pixel_part of bst_smear_node_aim for a Gaussian: its derivatives and values averaged over the
+ * side of `binning` pixels; integrals of Hermite functions are those of one order less. */
 void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
     enum { STEPS = 48 };
     static const double greatest[3] = {1.0, 3.0, 15.0};
@@ -29,14 +29,14 @@ void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
     }
 }
 
-/* A level's error for an image that moves by `scale` of the path, over the peak. */
+/* Error of a level for an image that moves by `scale` of the path, relative to the peak. */
 double bst_smear_level_error(const bst_smear_level *level, double scale) {
     return bst_smear_nodes_error(level->error, scale) + level->profile_error;
 }
 
 /* Error of a star `from_boresight_px` away that follows the boresight's track, in sigma of its
- * worst pixel: a Gaussian of amplitude A on dark noise d changes by at most 0.86 / sigma of A /
- * sqrt(A + d^2) per px of shift, and by all of its light when it lies elsewhere. */
+ * worst pixel. A Gaussian of amplitude A on dark noise d changes by at most 0.86 / sigma of A /
+ * sqrt(A + d^2) per px of shift, and by all of its light at a different position. */
 double bst_smear_single_error(const bst_smear *s, double peak_e, double from_boresight_px) {
     double part = s->half_diagonal_px > 0.0 ? from_boresight_px / s->half_diagonal_px : 0.0;
     double moved = s->spread_px * part * fmax(part, 1.0) * s->stretch;
@@ -44,21 +44,21 @@ double bst_smear_single_error(const bst_smear *s, double peak_e, double from_bor
                 peak_e / sqrt(s->dark_variance_e2));
 }
 
-/* Errors of the image of a source at (x, y), wherever it falls. */
+/* Sets the image errors of a source at (x, y), wherever it falls. */
 void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     int radius = d->radius;
     double travel_px = d->travel_px;
     double lost = bst_stamp_excess(&s->stamp, radius), peak_e = s->last_read_e;
     double error = d->error + s->chord_error;
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
-    /* places in parts of a pixel, the way to the node in float, and some additions of light */
+    /* rounding of fixed-point positions, of the float offset to the node, and of some sums */
     double rounded = 0.86 / s->sigma_px * (1.0 / s->place_parts + 0x1p-24 * travel_px) + 0x1p-22;
     double shared = s->single && !d->moving
                         ? bst_smear_single_error(s, peak_e, sqrt(d->x * d->x + d->y * d->y))
                         : 0.0;
     double sigma_e = sqrt(peak_e + s->dark_variance_e2);
     double flank = sigma_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
-    /* a border crosses a pixel that is read along its side at most */
+    /* a border crosses a read-out pixel along its side at most */
     double tail = s->stamp.tail[border] * s->binning;
     s->last_error =
         (bst_error_budget_source){.x_px = (float)d->x,
@@ -71,12 +71,13 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
                                   .apart = d->moving && travel_px > s->travel_px};
 }
 
-/* Beyond this many sigma of a node its errors fall: those of a Gaussian, the sixth derivative of
- * which is 0.07 of its greatest there, by more than the sixth power of the distance, those in the
- * wings of diffraction by the third. */
+/* Distance, in sigma of a node, beyond which its errors decrease: for a Gaussian, whose sixth
+ * derivative is there 0.07 of its maximum, faster than the sixth power; in diffraction wings as the
+ * third. */
 #define NEAR_SIGMAS 3.0
 
-/* What of the last source's errors reaches the window, from where its places lie. */
+/* Reduces the latest source's errors to what reaches the window, from the range of its positions.
+ */
 void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
     const double *low = d->low, *high = d->high;
     bst_error_budget_source *e = &s->last_error;
@@ -99,7 +100,7 @@ void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
         return;
     }
     double presence = gaussian ? 0.1 * pow(near / gap, 6.0) : 0.3 * pow(near / gap, 3.0);
-    /* there is none of its light's noise */
+    /* the source's shot noise does not reach the window */
     if (presence * sqrt((double)e->peak_e + s->dark_variance_e2) > sqrt(s->dark_variance_e2)) {
         return;
     }

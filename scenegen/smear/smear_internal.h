@@ -1,4 +1,4 @@
-/* What smear.c and smear_moving.c share. */
+/* Declarations shared by smear.c and smear_moving.c. */
 #ifndef BST_SCENEGEN_SMEAR_SMEAR_INTERNAL_H
 #define BST_SCENEGEN_SMEAR_SMEAR_INTERNAL_H
 
@@ -8,17 +8,17 @@
 #include "scenegen/smear/smear_quadrature.h"
 #include "scenegen/stamp/stamp.h"
 
-/* Errors of nodes are greatest beside the middle, where a bright source's own noise is less: those
- * of third order where the light is this share of the peak. */
+/* Light share of the peak at which node errors of third order are largest: beside the centre, where
+ * a bright source's own noise is lower. */
 #define FLANK 0.76
 
-/* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
+/* Levels of detail: level n is accurate to about 0.08 * 2^-n of the smeared image's peak. */
 enum { BST_SMEAR_LEVELS = 14 };
 
 typedef struct bst_smear_level {
-    int first_block, blocks; /* blocks 0: not made in this frame */
-    /* expected, of the smeared image's peak: for motions as in bst_smear_nodes_error, and of
-     * profiles */
+    int first_block, blocks; /* blocks 0: not computed in this frame */
+    /* expected errors relative to the smeared image's peak: by motion scale as in
+     * bst_smear_nodes_error, and of profiles */
     double error[BST_NODE_SCALES], profile_error;
 } bst_smear_level;
 
@@ -29,11 +29,11 @@ struct bst_smear {
     bst_stamp stamp;
     double tolerance[BST_SMEAR_LEVELS];
     double point_error,
-        edge_error; /* of stamps by the profile law, and without it, over the peak */
+        edge_error; /* of stamps with and without the profile law, relative to the peak */
     double half_diagonal_px;
-    double stretch;             /* of the image by distortion where it is greatest */
-    double wide_field;          /* the same by the tangent plane */
-    double curvature;           /* of the image's place by the path of the stars, at most, 1/px */
+    double stretch;    /* largest image scale by distortion */
+    double wide_field; /* the same by the tangent plane */
+    double curvature;  /* largest curvature of the image position by the stars' path, 1/px */
     double far_px, place_parts; /* see fixed_point_px.h */
 
     bst_los_track track;
@@ -41,91 +41,95 @@ struct bst_smear {
     double margin_px, dark_variance_e2, duration_s;
     int binning, sources;
     double pixel_part[3]; /* as in bst_smear_node_aim */
-    double aim;           /* part of the tolerance */
+    double aim;           /* share of the tolerance */
     bst_quat q_reference;
-    bst_quat *turn; /* attitude at each point of the path */
-    int *parts;     /* straight parts of the path from each sample of the track */
+    bst_quat *turn; /* attitude at each path point */
+    int *parts;     /* straight parts of the path from each track sample */
     int turn_capacity, parts_capacity;
-    double tilt_rad, roll_rad; /* most of the camera's turn from the reference attitude */
-    /* largest share of a star's light on one pixel and on one that is read, of one track */
+    double tilt_rad, roll_rad; /* largest camera rotation from the reference attitude */
+    /* shared track: largest light share of a star in one pixel and in a read-out pixel */
     double star_share, read_share;
-    bst_motion_map *map; /* the same, and more, of stars on tracks of their own */
-    bool single;         /* stars share one track */
-    double spread_px;    /* by which stars in the corners move otherwise */
-    double travel_px;    /* largest distance of a node from its source's place */
+    bst_motion_map *map; /* the same, and more, for stars on their own tracks */
+    bool single;         /* the stars share one track */
+    double spread_px;    /* largest deviation of corner stars from a shared track */
+    double travel_px;    /* largest distance of a node from its source's position */
     double last_peak_e, last_read_e, last_presence;
     bool last_leaves;
-    double chord_error;     /* of the last source's path, over its peak */
-    double low[2], high[2]; /* box of one track's places about a star's, px */
+    double chord_error; /* error of the latest source's chord approximation, relative to its peak */
+    double low[2], high[2]; /* box of a shared track's positions relative to a star's, px */
     bst_error_budget_source last_error;
     bst_smear_level levels[BST_SMEAR_LEVELS];
 
     bst_smear_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
-    bst_smear_node_list nodes; /* scratch */
-    bst_disc_points points;    /* scratch */
-    double disc_px;            /* radius of the present source's disc; 0: a point */
+    bst_smear_node_list nodes; /* work space */
+    bst_disc_points points;    /* work space */
+    double disc_px;            /* radius of the current source's disc; 0: a point */
     float *table;
     int table_blocks, table_capacity;
 };
 
-/* Makes room for `need` items of so many bytes. */
+/* Ensures room for `need` items of `bytes` each. */
 bst_status bst_smear_reserve(bst_ctx *ctx, void **items, int *capacity, int need,
                              size_t bytes) BST_MUST_CHECK;
 
-/* Place on the focal plane from the boresight, px, without the distortion, which the kernel adds;
- * false when it is not in front of the camera or far away. */
+/* Projects to the focal plane: position from the boresight, px, without distortion, which the
+ * kernel adds. Returns false if it is behind the camera or far away. */
 bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y);
 
-/* Adds to the scratch nodes those of a path that takes `part` of the exposure. turns: a path of the
- * camera, not of the image. */
+/* Appends the nodes of a path that takes `part` of the exposure to the work list.
+ *
+ * Given:     turns  a path of camera rotations, not of the image */
 bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path_point *path,
                                 int count, double part, bool turns,
                                 double tolerance) BST_MUST_CHECK;
 
-/* Largest share of light on one pixel over the scratch nodes, where the distortion stretches the
- * image least, and on one that is read. Spoils their places. */
+/* Largest light share in one pixel over the work list's nodes, at the smallest distortion scale,
+ * and in a read-out pixel. Destroys their positions. */
 double bst_smear_largest_share(bst_smear *s, double *read_share);
 
-/* The box of the scratch nodes' places on the image, px. */
+/* Box of the work list's image positions, px. */
 void bst_smear_nodes_box(const bst_smear *s, double low[2], double high[2]);
 
-/* The error of an image that the tolerance allows, over its peak. */
+/* Image error that the tolerance allows, relative to the peak. */
 double bst_smear_allowed(const bst_smear *s, double peak_e);
 
-/* The coarsest level whose tolerance is within the aim for the last source, if its image moves by
- * `scale` of the path. */
+/* Coarsest level whose error is within the allowed one for the latest source, for an image that
+ * moves by `scale` of the path. */
 int bst_smear_choose_level(const bst_smear *s, double scale);
 
-/* Makes the scratch nodes of a source that moves by itself, changes or is a disc, relative to the
- * place (x, y), last_peak_e and last_read_e; none when it gives the sensor no light. electrons: in
- * the exposure. */
+/* Nodes of a source that moves, varies or is a disc, relative to (x, y); also sets last_peak_e and
+ * last_read_e. No nodes if it gives the sensor no light.
+ *
+ * Given:     electrons  in the exposure */
 bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                   double electrons, double x, double y) BST_MUST_CHECK;
 
-/* The parts of bst_smear_node_aim for a Gaussian whose pixels are binned. */
+/* pixel_part of bst_smear_node_aim for a Gaussian in binned pixels. */
 void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]);
 
-/* A level's error for an image that moves by `scale` of the path, over the peak. */
+/* Error of a level for an image that moves by `scale` of the path, relative to the peak. */
 double bst_smear_level_error(const bst_smear_level *level, double scale);
 
-/* Error of a star so far from the boresight that follows its track, in sigma of its worst pixel. */
+/* Error of a star this far from the boresight that follows its track, in sigma of its worst pixel.
+ */
 double bst_smear_single_error(const bst_smear *s, double peak_e, double from_boresight_px);
 
-/* The last source's drawing: its place (px from the boresight), nodes, and motion over theirs. */
+/* Rendering of the latest source: position (px from the boresight), nodes, and motion relative to
+ * theirs. */
 typedef struct bst_smear_drawn {
     double x, y, travel_px;
-    double low[2], high[2]; /* box of its places about (x, y) */
-    double error;           /* of its nodes and profiles, over the peak */
+    double low[2], high[2]; /* box of its positions relative to (x, y) */
+    double error;           /* of its nodes and profiles, relative to the peak */
     int radius;             /* of the stamp */
     bool moving;
 } bst_smear_drawn;
 
-/* Sets last_error of the image of that source, wherever it falls. */
+/* Sets last_error of that source's image, wherever it falls. */
 void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d);
 
-/* What of those errors reaches the window, from where the source's places lie: lowers last_error,
- * sets last_presence and last_leaves. */
+/* Reduces last_error to what reaches the window, from the range of the source's positions; sets
+ * last_presence and last_leaves. */
 void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d);
 
 #endif

@@ -4,22 +4,23 @@
 #include "scenegen/smear/smear_internal.h"
 #include "scenegen/stamp/fixed_point_px.h"
 
-/* Places further than this from the boresight (px, without distortion) give the sensor no light. */
+/* Distance from the boresight, px without distortion, beyond which a source gives the sensor no
+ * light. */
 static double far_px(const bst_smear *s) {
     return s->far_px + s->disc_px;
 }
 
-/* Largest distance of a path from its chords, px; as small as rounding of places allows. */
+/* Largest distance of a path from its chords, px, and its lower limit by rounding of positions. */
 #define CHORD_PX 2e-3
 #define LEAST_CHORD_PX 1e-6
-/* Share of the tolerance for chords. A parabola lies beside its chord by two thirds of the largest
- * distance in the mean, and a Gaussian changes by 0.607 / sigma of its peak per px. */
+/* Share of the tolerance for chords. A parabola is on average two thirds of the largest distance
+ * from its chord, and a Gaussian changes by 0.607 / sigma of its peak per px. */
 #define CHORD_SHARE 0.05
 #define CHORD_ERROR (0.607 * 2.0 / 3.0)
 
-/* How many chords the curved motion over the image wants for all to be off by at most miss_px:
- * of a parabola they miss (its bend) / chords^2. Seen at 17 instants; those that are off the sensor
- * do not count, but a chord must not step over it. */
+/* Number of chords of a curved image path for a deviation of at most miss_px: a parabola deviates
+ * by its bend / chords^2. It is sampled at 17 times; positions off the sensor do not count, but a
+ * chord must not step over it. */
 static double chords_of(const bst_smear *s, const bst_scene_source *source, double miss_px) {
     enum { N = 16 };
     double x[N + 1], y[N + 1], far = far_px(s), chords = 0.0;
@@ -44,7 +45,7 @@ static double chords_of(const bst_smear *s, const bst_scene_source *source, doub
     return fmin(chords, 1e4);
 }
 
-/* Neither end nor anything between is near the sensor. */
+/* True if a path segment stays away from the sensor. */
 static bool passes_by(const bst_smear *s, const bst_smear_path_point *a,
                       const bst_smear_path_point *b, double x0, double y0, double far) {
     double f = 1.0 / s->stretch;
@@ -53,8 +54,7 @@ static bool passes_by(const bst_smear *s, const bst_smear_path_point *a,
     return fmin(ax, bx) > far || fmax(ax, bx) < -far || fmin(ay, by) > far || fmax(ay, by) < -far;
 }
 
-/* A moving source's path over the image, relative to (x0, y0); NAN where the source is not in front
- * of the camera. */
+/* Image path of a moving source relative to (x0, y0); NAN where it is behind the camera. */
 static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                            double miss_px, double x0, double y0, int *count) {
     const bst_los_track *track = &s->track;
@@ -64,7 +64,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *s
     for (int k = 0; k + 1 < track->count; turn += s->parts[k++]) {
         double begin_s = track->time_s[k], length_s = track->time_s[k + 1] - begin_s;
         int all = s->parts[k] < chords ? chords : s->parts[k];
-        for (double from = 0.0, to; from < 1.0; from = to) { /* shares of the way between samples */
+        for (double from = 0.0, to; from < 1.0;
+             from = to) { /* fractions of the interval between samples */
             int parts;
             to = bst_motion_stretch(source, begin_s, length_s, s->duration_s, from, &parts);
             int least = (int)ceil(all * (to - from) - 1e-9);
@@ -90,8 +91,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *s
     return BST_OK;
 }
 
-/* Nodes of the stretches of own_path[count] that may put light on the sensor; their weights are
- * shares of the whole exposure. */
+/* Nodes of the parts of own_path[count] that may light the sensor; weights are shares of the whole
+ * exposure. */
 static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, double y0,
                             double tolerance) {
     const bst_smear_path_point *p = s->own_path;
@@ -116,8 +117,8 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     return BST_OK;
 }
 
-/* Makes the points of a disc; the scratch nodes are those of its middle about (x, y). *peak: share
- * of the light on one pixel at most, without the smear. */
+/* Computes a disc's points; the work list holds the nodes of its centre about (x, y). *peak: upper
+ * bound of the light share in one pixel, without smear. */
 static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source, double x,
                                double y, double *peak) {
     enum { MOST_NODES = 2000000 };

@@ -7,7 +7,7 @@
 #include "boresight/vec.h"
 #include "scenegen/smear/smear_quadrature_internal.h"
 
-/* A group: the path from time `from` (in segment `first`) to `to`. */
+/* A node group: the path from time `from` (in segment `first`) to `to`. */
 typedef struct group {
     int first;
     double from, to;
@@ -28,7 +28,7 @@ static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3
     return BST_OK;
 }
 
-/* The part of segment k inside the group, as its two ends; its duration. */
+/* Part of segment k inside the group: both ends; returns its duration. */
 static double clip(const bst_smear_maker *m, const group *g, int k, double a[3], double b[3]) {
     const bst_smear_path_point *p = &m->path[k], *q = p + 1;
     double length = q->s - p->s;
@@ -53,7 +53,7 @@ static bool reaches(const bst_smear_maker *m, const group *g, int k) {
     return k + 1 < m->count && m->path[k].s < g->to;
 }
 
-/* Mean and covariance of the group, exactly. */
+/* Exact mean and covariance of a group. */
 static void second_moments(const bst_smear_maker *m, const group *g, bst_smear_moments *out) {
     double weight = 0.0, a[3], b[3], origin[3] = {0}, first[3] = {0};
     bool begun = false;
@@ -92,18 +92,19 @@ static void second_moments(const bst_smear_maker *m, const group *g, bst_smear_m
     }
 }
 
-/* Four-point and two-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): the first
- * exact for the seventh order, the second for the third. */
+/* Four-point and two-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): exact for
+ * the seventh and third order. */
 static const double gauss_place[2][4] = {
     {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629},
     {0.21132486540518712, 0.78867513459481288}};
 static const double gauss_weight[2][4] = {
     {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693},
     {0.5, 0.5}};
-/* In a group of as many segments the second does: of the fourth moment 1 / segments^4 is missed. */
+/* With so many segments in a group the two-point rule suffices: its error of the fourth moment is 1
+ * / segments^4. */
 enum { MANY_SEGMENTS = 6 };
 
-/* Fills the axis and the moments about it. */
+/* Sets the principal axis and the higher moments about it. */
 static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_moments *out) {
     double a[3], b[3], weight = 0.0;
     bst_smear_nodes_main_axis(out->covariance, out->axis);
@@ -189,14 +190,14 @@ static bool single_stretch(const bst_smear_maker *m, const group *g) {
     return k + 2 >= m->count || m->path[k + 1].s >= g->to;
 }
 
-/* The next group's size from how this one's error compares with the tolerance, which goes as the
- * third power of its spread where the path is straight. */
+/* Adapts the next group's size to the tolerance: the error goes as the third power of the spread on
+ * a straight path. */
 static void adapt(bst_smear_maker *m, double error) {
     double change = error > 0.0 ? cbrt(0.8 * m->tolerance / error) : 2.0;
     m->most = fmin(m->most * fmin(fmax(change, 0.4), 1.6), m->limit);
 }
 
-/* Replaces a group by nodes, in halves of its time where no rule is good enough. */
+/* Replaces a group by nodes, or by two halves of its time if no rule is accurate enough. */
 static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int depth) {
     bst_smear_moments t;
     bst_smear_rule best = {.error = INFINITY}, r;
@@ -208,7 +209,7 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
     }
     high_moments(m, &g, &t);
     bst_smear_choose_rule(m, &t, m->tolerance, &best);
-    /* a blob rather than a line does not get thinner by halves */
+    /* a round distribution does not become thinner by halving */
     if (best.error > m->tolerance && !m->widen && t.across > 0.2 * t.along[2]) {
         bst_smear_try_rule(m, &t, 2, false, true, INFINITY, &r);
         if (r.error < best.error) {
@@ -235,7 +236,7 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
     return emit(ctx, m, &t, &best, weight);
 }
 
-/* Moments of a stretch of path about an origin, for the greedy cut. */
+/* Moments of a part of the path about an origin, for the greedy grouping. */
 typedef struct extent {
     double weight, first[3], second;
 } extent;
@@ -271,12 +272,12 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .widest = aim->widest * variance,
         .wide_field = wide,
         .curvature = aim->curvature,
-        /* of the boresight and four corners: all, and all along with 1 / wide^2 across */
+        /* mean over the boresight and four corners: full scale, and 1 / wide^2 across */
         .image_share = (2.0 + 3.0 / (wide * wide)) / 5.0};
     if (!(m.total > 0.0)) {
         return push(ctx, list, path[0].p, 1.0, 0.0, 0.0);
     }
-    /* three nodes on a uniform stretch of variance v miss 0.617 v^3 of the sixth moment */
+    /* three nodes on a uniform part of variance v miss 0.617 v^3 of the sixth moment */
     for (int k = 0; k < 3; k++) {
         m.pixel_part[k] = aim->pixel_part[k] > 0.0 ? aim->pixel_part[k] : 1.0;
     }
@@ -311,7 +312,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         for (int n = 0; n + 1 < pieces; n++) {
             BST_TRY(close_group(ctx, &m, (group){k, p->s + n * step, p->s + (n + 1) * step}, 0));
         }
-        /* the last piece begins the next group */
+        /* the last piece starts the next group */
         g = (group){k, p->s + (pieces - 1) * step, q->s};
         e = (extent){0};
         for (int i = 0; i < 3; i++) {

@@ -5,7 +5,7 @@
 #include "scenegen/smear/smear_quadrature.h"
 #include "scenegen/smear/smear_quadrature_internal.h"
 
-/* By squaring the matrix over and over, until one column is left. */
+/* Principal axis by repeated squaring of the matrix until one column dominates. */
 void bst_smear_nodes_main_axis(double a[3][3], double axis[3]) {
     double p[3][3];
     memcpy(p, a, sizeof p);
@@ -36,10 +36,10 @@ double bst_smear_nodes_error(const double error[BST_NODE_SCALES], double scale) 
         return error[0];
     }
     int n = (int)fmin(k, BST_NODE_SCALES - 1.0);
-    if (n == BST_NODE_SCALES - 1) { /* nor any more than the sixth */
+    if (n == BST_NODE_SCALES - 1) { /* nor faster than the sixth power */
         return error[n] * exp2(3.0 * (k - n));
     }
-    /* sums of powers are convex in logarithms: a chord is no less */
+    /* sums of powers are log-convex: a chord is an upper bound */
     return error[n] > 0.0 ? error[n] * pow(error[n + 1] / error[n], k - n) : error[n + 1];
 }
 

@@ -1,4 +1,4 @@
-/* What the files of the smear quadrature share. */
+/* Declarations shared by the files of the smear quadrature. */
 #ifndef BST_SCENEGEN_SMEAR_SMEAR_QUADRATURE_INTERNAL_H
 #define BST_SCENEGEN_SMEAR_SMEAR_QUADRATURE_INTERNAL_H
 
@@ -6,7 +6,7 @@
 
 #include "scenegen/smear/smear_quadrature.h"
 
-/* A path that becomes nodes, and what is asked of them. */
+/* A path to be replaced by nodes, with its requirements. */
 typedef struct bst_smear_maker {
     const bst_smear_path_point *path;
     int count;
@@ -19,47 +19,47 @@ typedef struct bst_smear_maker {
     double wide_field; /* as in bst_smear_node_aim */
     double curvature;
     double pixel_part[3];
-    double image_share; /* variance of the image per variance of the path, mean over the field */
+    double image_share; /* image variance per path variance, mean over the field */
     double most;        /* spread of the next group, px^2 */
-    double limit;       /* of it */
+    double limit;       /* of `most` */
 } bst_smear_maker;
 
-/* A group's moments about its mean: along the axis to the sixth order, and what lies across. */
+/* Moments of a group about its mean: along the axis to sixth order, and across. */
 typedef struct bst_smear_moments {
     double mean[3], axis[3];
     double covariance[3][3];
     double along[7]; /* E[x^k] */
-    double bend[3];  /* E[y x^2], y the part across the axis */
+    double bend[3];  /* E[y x^2], y across the axis */
     double drift;    /* E[x y^2] */
     double mixed;    /* E[x^2 y^2] */
     double lean[3];  /* E[y y^2] */
     double across;   /* E[y^2] */
 } bst_smear_moments;
 
-/* Weighted nodes in place of a group, and their error. */
+/* Quadrature rule of a group: weighted nodes and error. */
 typedef struct bst_smear_rule {
     int nodes;       /* 1 to 3 along the axis */
     double widening; /* px^2 */
-    double pair[3];  /* half the distance of the pair that each node is split into */
+    double pair[3];  /* half distance of the pair into which each node is split */
     double node[3], weight[3];
     double bend[3];  /* shift across the axis per unit of `curve` */
     double curve[3]; /* second orthogonal polynomial at the nodes */
-    double error;    /* all of it */
-    double missed;   /* of it, what the quadrature misses of the last moment */
-    double fixed;    /* of it, the wrong widening of images that move by less than the path */
+    double error;    /* total */
+    double missed;   /* part: missed highest moment */
+    double fixed;    /* part: wrong widening of images that move by less than the path */
 } bst_smear_rule;
 
-/* Direction of the largest eigenvalue of a symmetric matrix that is not negative. A tie gives some
- * direction between. */
+/* Direction of the largest eigenvalue of a symmetric positive semidefinite matrix; an intermediate
+ * one for equal eigenvalues. */
 void bst_smear_nodes_main_axis(double a[3][3], double axis[3]);
 
-/* Fills a rule of n nodes, widened or split into pairs, and its error: what it misses of the image,
- * over the peak. Infinite where there is no such rule, or where its error is more than `limit`. */
+/* Sets a rule of n nodes, widened or split into pairs, and its error: of the image, relative to the
+ * peak. INFINITY if there is no such rule or its error exceeds `limit`. */
 void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, int n, bool widen,
                         bool split, double limit, bst_smear_rule *r);
 
-/* Replaces *best by the rule with the fewest nodes that is good enough, else the best of those of
- * three, and of those whose error is not beyond `limit`. */
+/* Replaces *best by the rule with the fewest nodes that meets the tolerance, otherwise by the best
+ * of three nodes. Rules with an error beyond `limit` are ignored. */
 void bst_smear_choose_rule(const bst_smear_maker *m, const bst_smear_moments *g, double limit,
                            bst_smear_rule *best);
 

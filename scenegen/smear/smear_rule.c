@@ -8,9 +8,9 @@ static double norm3(const double v[3]) {
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* Gaussian quadrature of n nodes for moments e[0..2n - 1] about the mean; returns the squared norm
- * of the next orthogonal polynomial, which is what the rule misses of moment 2n; negative when the
- * moments are those of no distribution. curve: second polynomial at the nodes. */
+/* Gaussian quadrature of n nodes for moments e[0..2n - 1] about the mean. Returns the squared norm
+ * of the next orthogonal polynomial, the rule's error of moment 2n; negative if no distribution has
+ * these moments. curve: second polynomial at the nodes. */
 static double quadrature(int n, const double e[7], bst_smear_rule *r) {
     double v = e[2];
     if (n == 1) {
@@ -33,10 +33,10 @@ static double quadrature(int n, const double e[7], bst_smear_rule *r) {
     if (!(norm > 1e-9 * v * v)) {
         return -1.0;
     }
-    /* x^2 - skew x - v is the second polynomial */
+    /* second polynomial: x^2 - skew x - v */
     double centre2 =
         (e[5] - 2.0 * skew * e[4] + (skew * skew - 2.0 * v) * e[3] + 2.0 * skew * v * v) / norm;
-    /* third polynomial: (x - centre2)(x^2 - skew x - v) - (norm / v) x; its roots by cosines */
+    /* third polynomial: (x - centre2)(x^2 - skew x - v) - (norm / v) x; roots by cosines */
     double c2 = -skew - centre2, c1 = centre2 * skew - v - norm / v, c0 = centre2 * v;
     double p = (c2 * c2 - 3.0 * c1) / 9.0, q = (c2 * (2.0 * c2 * c2 - 9.0 * c1) + 27.0 * c0) / 54.0;
     if (!(p > 0.0)) {
@@ -53,10 +53,10 @@ static double quadrature(int n, const double e[7], bst_smear_rule *r) {
     return fabs(e[6] + c2 * e[5] + c1 * e[4] + c0 * e[3]);
 }
 
-/* Largest share of the peak by which the image changes for a source at the boresight or in a corner
- * when the covariance d of tilts and roll is left out and `widening` put in its place: half the
- * covariance's contraction with the PSF's second derivatives, which are at most 1 / variance on the
- * diagonal and exp(-1) / variance off it. More than `limit` may be less than it is. */
+/* Largest relative change of the image, at the boresight or in a corner, if the covariance d of
+ * tilts and roll is replaced by `widening`: half its contraction with the PSF's second derivatives,
+ * at most 1 / variance on the diagonal and exp(-1) / variance off it. Values above `limit` may be
+ * underestimated. */
 static double covariance_error(const bst_smear_maker *m, double d[3][3], double widening,
                                double limit) {
     static const double place[5][2] = {{0, 0},
@@ -67,8 +67,8 @@ static double covariance_error(const bst_smear_maker *m, double d[3][3], double 
     double worst = 0.0, per = 1.0 / m->wide_field, more = m->wide_field - 1.0;
     for (int k = 0; k < 5 && m->pixel_part[0] * worst <= limit * m->variance; k++) {
         double x = place[k][0], y = place[k][1];
-        /* image motion by the tilts and the roll; in a corner of a wide field more along the way
-         * from the boresight, as (1 + r r^T) of the tangent plane has it */
+        /* image motion by tilts and roll; in a corner of a wide field larger along the direction
+         * from the boresight, by (1 + r r^T) of the tangent plane */
         double row[2][3] = {{-more * x * y * per, (1.0 + more * x * x) * per, -y},
                             {-(1.0 + more * y * y) * per, more * x * y * per, x}};
         double moved[3] = {-widening, 0.0, -widening}; /* xx, xy, yy */
@@ -88,16 +88,16 @@ static double covariance_error(const bst_smear_maker *m, double d[3][3], double 
     return worst / m->variance;
 }
 
-/* Squared norm of the second orthogonal polynomial of the moments along the axis that, convolved
- * with a Gaussian of variance u, give the group's; not positive when there are none. */
+/* Squared norm of the second orthogonal polynomial of the moments that, convolved with a Gaussian
+ * of variance u, give the group's; not positive if there are none. */
 static double second_norm(const bst_smear_moments *g, double u) {
     double v = g->along[2] - u, third = g->along[3];
     return v > 0.0 ? g->along[4] - u * (6.0 * v + 3.0 * u) - third * third / v - v * v : 0.0;
 }
 
-/* The norm of the second polynomial of the moments without the widening, which is what the bend
- * leaves over of `trace`: one follows from the other. false when little of the line is left, where
- * its bend would be a guess. *norm: before, without widening; after, with. */
+/* Norm of the second polynomial of the moments without the widening, which depends on what the bend
+ * leaves of `trace`. Returns false if little of the line is left and its bend would be uncertain.
+ * *norm: on entry without widening, then with it. */
 static bool widened_norm(const bst_smear_moments *g, double trace, double bend2, double per_trace,
                          double *norm) {
     double low = 0.5 * *norm, high = *norm;
@@ -117,15 +117,17 @@ static bool widened_norm(const bst_smear_moments *g, double trace, double bend2,
     return low > 0.0;
 }
 
-/* What a rule leaves of a group's covariance, and what of that its Gaussian can be widened by. */
+/* Remaining covariance of a group after its nodes, and the possible widening. */
 typedef struct residual {
-    double d[3][3];   /* covariance that nodes do not have yet */
+    double d[3][3];   /* covariance not represented by the nodes */
     double trace;     /* of d across the line of sight, at least 0 */
     double per_trace; /* widening over trace */
 } residual;
 
-/* Takes the bend of a rule of three nodes off the residual. False where there is no such rule. */
-static bool take_bend(const bst_smear_moments *g, bool widen, residual *left, bst_smear_rule *r) {
+/* Removes the bend of a three-node rule from the remaining covariance. Returns false if there is no
+ * such rule. */
+static bool subtract_bend(const bst_smear_moments *g, bool widen, residual *left,
+                          bst_smear_rule *r) {
     double bend2 = g->bend[0] * g->bend[0] + g->bend[1] * g->bend[1];
     double norm = second_norm(g, 0.0);
     if (widen && !widened_norm(g, left->trace, bend2, left->per_trace, &norm)) {
@@ -144,8 +146,8 @@ static bool take_bend(const bst_smear_moments *g, bool widen, residual *left, bs
     return true;
 }
 
-/* Takes the greatest variance of the residual as a pair of nodes, one on each side. */
-static void take_pair(residual *left, bst_smear_rule *r) {
+/* Represents the largest remaining variance by a pair of nodes on either side. */
+static void split_into_pair(residual *left, bst_smear_rule *r) {
     double axis[3], length2 = 0.0;
     bst_smear_nodes_main_axis(left->d, axis);
     for (int i = 0; i < 3; i++) {
@@ -163,9 +165,10 @@ static void take_pair(residual *left, bst_smear_rule *r) {
     }
 }
 
-/* Gives the rule the group's moments up to the second. False where there is no such rule. */
-static bool take_moments(const bst_smear_maker *m, const bst_smear_moments *g, bool widen,
-                         bool split, residual *left, bst_smear_rule *r) {
+/* Fits the rule to the group's moments up to second order. Returns false if there is no such rule.
+ */
+static bool fit_moments(const bst_smear_maker *m, const bst_smear_moments *g, bool widen,
+                        bool split, residual *left, bst_smear_rule *r) {
     memcpy(left->d, g->covariance, sizeof left->d);
     for (int i = 0; i < 3 && r->nodes > 1; i++) {
         for (int j = 0; j < 3; j++) {
@@ -175,12 +178,12 @@ static bool take_moments(const bst_smear_maker *m, const bst_smear_moments *g, b
     double tilt = g->axis[0] * g->axis[0] + g->axis[1] * g->axis[1];
     left->per_trace = 1.0 / (r->nodes == 1 ? 2.0 : 2.0 - tilt);
     left->trace = fmax(left->d[0][0] + left->d[1][1], 0.0);
-    if (r->nodes == 3 && !take_bend(g, widen, left, r)) {
+    if (r->nodes == 3 && !subtract_bend(g, widen, left, r)) {
         return false;
     }
     if (widen) {
         r->widening = fmin(left->trace * left->per_trace, m->widest);
-        if (r->nodes > 1) { /* along the axis the moments make room for it */
+        if (r->nodes > 1) { /* along the axis the moments account for the widening */
             for (int i = 0; i < 3; i++) {
                 for (int j = 0; j < 3; j++) {
                     left->d[i][j] += r->widening * g->axis[i] * g->axis[j];
@@ -189,31 +192,31 @@ static bool take_moments(const bst_smear_maker *m, const bst_smear_moments *g, b
         }
     }
     if (split) {
-        take_pair(left, r);
+        split_into_pair(left, r);
     }
     return true;
 }
 
-/* Error of the image by third and fourth moments that the rule misses, over the peak. */
+/* Relative image error by third and fourth moments that the rule misses. */
 static double higher_moments_error(const bst_smear_maker *m, const bst_smear_moments *g, bool split,
                                    const bst_smear_rule *r) {
     double var = m->variance;
     int n = r->nodes;
-    /* third moments that are missed: a sixth, or half for mixed ones, times the greatest third
-     * derivative, 1.38 or 0.61 of the peak over sigma^3 */
+    /* missed third moments: a sixth, or half for mixed ones, times the largest third derivative,
+     * 1.38 or 0.61 of the peak over sigma^3 */
     double third = 0.3 * fabs(g->drift) + 0.23 * norm3(g->lean);
     third += n == 1 ? 0.23 * fabs(g->along[3]) : 0.0;
     third += n < 3 ? 0.3 * norm3(g->bend) : 0.0;
     double error = third / (var * sqrt(var));
-    /* x^2 and y^2 together: a quarter of a derivative of at most the peak over sigma^4 */
+    /* mixed x^2 y^2: a quarter of a derivative of at most the peak over sigma^4 */
     error += 0.25 * fabs(g->mixed - g->along[2] * g->across) / (var * var);
     double wide = split
                       ? r->pair[0] * r->pair[0] + r->pair[1] * r->pair[1] + r->pair[2] * r->pair[2]
                       : r->widening;
-    /* fourth cumulant of what became a Gaussian, or a pair, taken for uniform */
+    /* fourth cumulant of a uniform distribution represented by a Gaussian or a pair */
     error += 0.15 * wide * wide / (var * var);
-    /* Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds
-     * up; on straight paths it nearly cancels (factors measured on random paths) */
+    /* Groups are shorter than the PSF, so that remainders of jitter in neighbouring groups add up;
+     * on straight paths they nearly cancel (factors measured on random paths). */
     error *= 1.8 * m->pixel_part[0];
     return error;
 }
@@ -225,7 +228,7 @@ void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, in
     memset(r, 0, sizeof *r);
     r->nodes = n;
     r->error = INFINITY;
-    if (!take_moments(m, g, widen, split, &rest, r)) {
+    if (!fit_moments(m, g, widen, split, &rest, r)) {
         return;
     }
     double error = higher_moments_error(m, g, split, r);
@@ -236,8 +239,8 @@ void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, in
         m->pixel_part[0] * covariance_error(m, rest.d, r->widening * m->image_share, limit - error);
     r->fixed = r->widening > 0.0 ? left_out : 0.0;
     error += left_out;
-    /* the mean of places is no place of the mean: by half the second derivative of what is left of
-     * the variance, at 0.607 / sigma per px */
+    /* the mean position is not the position of the mean: half the second derivative times the
+     * remaining variance, at 0.607 / sigma per px */
     double left = n == 1 ? g->along[2] + g->across : g->across;
     error += 0.304 * m->curvature * left / sqrt(var);
     if (!(error <= limit)) {
@@ -253,7 +256,7 @@ void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, in
     if (missed < 0.0) {
         return;
     }
-    static const double factor[4] = {0, 0, 8.0 / 1.08, 48.0 / 1.08}; /* 2^n n!, margin */
+    static const double factor[4] = {0, 0, 8.0 / 1.08, 48.0 / 1.08}; /* 2^n n!, with margin */
     double power = n == 3 ? var * var * var : var * var;
     r->missed = n == 1 ? 0.0 : m->pixel_part[n - 1] * missed / (factor[n] * power);
     r->error = error + r->missed;

@@ -7,8 +7,8 @@
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/reference.h"
 
-/* Share of pixel d and its derivatives by the widening: the heat equation makes them derivatives by
- * place, which are those of the Gaussian at the pixel's edges. order 0 to 2, over order!. */
+/* Light share of pixel d and its derivatives by the widening over order!, order 0 to 2. By the heat
+ * equation these are derivatives by position, those of the Gaussian at the pixel's edges. */
 static double share(double sigma_px, double f, int d, int order) {
     if (order == 0) {
         return bst_reference_pixel_share(f, sigma_px, d);
@@ -23,7 +23,7 @@ static double share(double sigma_px, double f, int d, int order) {
     return value;
 }
 
-/* Powers of g, |g| <= 1, of the polynomial through `count` Chebyshev nodes. */
+/* Powers of g, |g| <= 1, of the interpolation polynomial through `count` Chebyshev nodes. */
 static void interpolate(double sigma_px, int d, int order, int count, double *power) {
     double chebyshev[BST_LAW_MOST_DEGREE + 1],
         before[BST_LAW_MOST_DEGREE + 2] = {0}, now[BST_LAW_MOST_DEGREE + 2] = {1.0};
@@ -55,7 +55,7 @@ static double value_of(const double *power, int count, double g) {
     return v;
 }
 
-/* What the law misses of pixels near the centre when the PSF is wider, over the centre's share. */
+/* Error of the law near the centre for a widened PSF, relative to the central share. */
 static double law_error(double sigma_px, int degree, double widening) {
     const int counts[3] = {degree + 1, BST_LAW_FIRST, BST_LAW_SECOND};
     double worst = 0.0;

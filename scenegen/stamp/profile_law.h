@@ -1,23 +1,24 @@
-/* The light of a Gaussian on the pixels of one axis, as polynomials of its place within a pixel. */
+/* Profile law: light of a Gaussian in the pixels of one axis as polynomials of its sub-pixel
+ * position. */
 #ifndef BST_SCENEGEN_STAMP_PROFILE_LAW_H
 #define BST_SCENEGEN_STAMP_PROFILE_LAW_H
 
 #include "sim/device/device.h"
 
 enum { BST_LAW_MOST_DEGREE = 15 };
-/* What a law may miss, of the share of the pixel that a centred Gaussian lights most. */
+/* Allowed error of a law, relative to the central pixel share of a centred Gaussian. */
 #define BST_LAW_ERROR 5e-6
 
-/* What a law of this degree misses, likewise, of nodes as wide as the PSF. */
+/* Error of a law of this degree for nodes as wide as the PSF, relative as BST_LAW_ERROR. */
 double bst_profile_law_error(double sigma_px, int degree);
 
-/* Least degree that a PSF of this sigma wants; 0: none up to BST_LAW_MOST_DEGREE is good enough. */
+/* Smallest sufficient degree for a PSF of this sigma; 0: none up to BST_LAW_MOST_DEGREE. */
 int bst_profile_law_degree(double sigma_px);
 
-/* Widening up to which a law of this degree serves, in variances of the PSF. */
+/* Largest widening that a law of this degree supports, in PSF variances. */
 double bst_profile_law_widest(double sigma_px, int degree);
 
-/* Floats of a law for so many pixels on each side. */
+/* Size of a law for `reach` pixels on each side, floats. */
 int bst_profile_law_floats(int degree, int reach);
 
 /* Fills law[reach][degree + 1 + 6 + 4]: for the pixel d = 1..reach beyond the one that holds the
@@ -27,7 +28,7 @@ int bst_profile_law_floats(int degree, int reach);
  * f + 1/2) / (sqrt(2) sigma)) / 2 - erf((d - f - 1/2) / (sqrt(2) sigma)) / 2. */
 void bst_profile_law(double sigma_px, int degree, int reach, float *law);
 
-/* The same on a device; of degree 0: something that is no law. Release it with clReleaseMemObject.
+/* Profile law in a device buffer; of degree 0: a placeholder. Release it with clReleaseMemObject.
  */
 bst_status bst_profile_law_buffer(bst_ctx *ctx, cl_context context, double sigma_px, int degree,
                                   int reach, cl_mem *out) BST_MUST_CHECK;

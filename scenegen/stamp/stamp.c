@@ -2,7 +2,7 @@
 
 #include "scenegen/reference.h"
 
-/* Mean over the sub-pixel phases of a profile's light on its two nearest pixels and r more on each
+/* Mean light share, over sub-pixel phases, within a profile's two nearest pixels and r more on each
  * side. */
 static double kept_light(double sigma_px, int r) {
     enum { PHASES = 16 };

@@ -35,6 +35,7 @@ static double seasons_s(double mjd) {
     return -(0.022 * sin(x) - 0.012 * cos(x) - 0.006 * sin(2.0 * x) + 0.007 * cos(2.0 * x));
 }
 
+/* Terms of the polar motion model: constant and two periodic pairs. */
 static void terms_at(double days, double out[TERMS]) {
     out[0] = 1.0;
     for (int i = 0; i < 2; i++) {
@@ -44,6 +45,7 @@ static void terms_at(double days, double out[TERMS]) {
     }
 }
 
+/* Pole coordinate x or y in arcsec. */
 static double pole_of(const bst_astro_eop_values *row, int axis) {
     return (axis ? row->yp_rad : row->xp_rad) / BST_ARCSEC_RAD;
 }

@@ -29,6 +29,7 @@ struct bst_forces {
     node nodes[NODES];
 };
 
+/* Checks mass, areas and coefficients of the force model's spacecraft. */
 static bst_status check(bst_ctx *ctx, const bst_force_model *m) {
     const bst_astro_spacecraft *s = &m->spacecraft;
     if ((m->solar_pressure || m->drag) && !(s->mass_kg > 0.0 && isfinite(s->mass_kg))) {
@@ -84,6 +85,7 @@ void bst_forces_free(bst_forces *forces) {
     free(forces);
 }
 
+/* Cache entry of a time node. */
 static node *slot(bst_forces *f, int64_t index) {
     node *n = &f->nodes[((index % NODES) + NODES) % NODES];
     if (n->index != index) {
@@ -93,6 +95,7 @@ static node *slot(bst_forces *f, int64_t index) {
     return n;
 }
 
+/* Sun and Moon at a time node, cached. */
 static const node *bodies_at(bst_forces *f, int64_t index) {
     node *n = slot(f, index);
     if (!n->has_bodies) {
@@ -105,6 +108,7 @@ static const node *bodies_at(bst_forces *f, int64_t index) {
     return n;
 }
 
+/* Earth rotation at a time node, cached. */
 static bst_status earth_at(bst_ctx *ctx, bst_forces *f, int64_t index, const node **out) {
     node *n = slot(f, index);
     if (!n->has_earth) {
@@ -116,6 +120,7 @@ static bst_status earth_at(bst_ctx *ctx, bst_forces *f, int64_t index, const nod
     return BST_OK;
 }
 
+/* Splits a time into the index of its node and the fraction after it. */
 static void split(double seconds, int64_t *index, double *f) {
     double steps = seconds / NODE_STEP_S, whole = floor(steps);
     *index = (int64_t)whole;
@@ -146,6 +151,7 @@ static bst_vec3 third_body(double gm, bst_vec3 r, bst_vec3 s) {
     return bst_vec3_scale(bst_vec3_axpy(r, f, s), -gm / (d2 * sqrt(d2)));
 }
 
+/* Acceleration by atmospheric drag in m/s2; the atmosphere rotates with the Earth. */
 static bst_vec3 drag(const bst_forces *f, bst_vec3 fixed, bst_vec3 r, bst_vec3 v, bst_vec3 spin) {
     bst_vec3 wind = bst_vec3_sub(v, bst_vec3_cross(spin, r));
     double density = bst_atmosphere_density_kgpm3(bst_astro_height_m(fixed));

@@ -2,6 +2,7 @@
 
 #include <stdbool.h>
 
+/* Gauss's equation of degree eight for the middle geocentric range. */
 static double octic(double a, double b, double c, double x) {
     double x3 = x * x * x;
     return x3 * x3 * (x * x + a) + b * x3 + c;
@@ -87,6 +88,7 @@ typedef struct triangle {
     double d0, d[3][3]; /* products of observer positions with normals of pairs of directions */
 } triangle;
 
+/* Ranges from the observer at the three sights. */
 static void solve_ranges(const triangle *k, double r, double a, double b, double range[3]) {
     double r3 = r * r * r, t1 = k->t1, t3 = k->t3, t = k->span, mu = k->mu;
     range[0] = ((6.0 * (k->d[2][0] * t1 / t3 + k->d[1][0] * t / t3) * r3 +
@@ -102,6 +104,7 @@ static void solve_ranges(const triangle *k, double r, double a, double b, double
                k->d0;
 }
 
+/* Makes an orbit from a root of Gauss's equation; false: no positive ranges. */
 static bool make_orbit(const triangle *k, const bst_gauss_sight s[3], double r, double a, double b,
                        bst_gauss_orbit *out) {
     out->geocentric_range_m = r;

@@ -96,6 +96,7 @@ static double least_time(const path *p, double *x) {
     return flight_time(p, *x);
 }
 
+/* Initial value of Izzo's x for a transfer of less than one revolution. */
 static double first_guess(const path *p, double target) {
     double l = p->lambda;
     double t0 = acos(l) + l * sqrt(1.0 - l * l), t1 = 2.0 / 3.0 * (1.0 - l * l * l);
@@ -108,6 +109,7 @@ static double first_guess(const path *p, double target) {
     return pow(target / t0, log(2.0) / log(t1 / t0)) - 1.0;
 }
 
+/* Solves Lambert's time equation for Izzo's x. */
 static bst_status find_x(bst_ctx *ctx, const path *p, double target, bool high_energy, double *x) {
     bool found;
     if (p->turns == 0) {

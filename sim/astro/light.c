@@ -26,6 +26,7 @@ bst_light_aberration bst_light_aberration_of(const bst_light *light) {
                                   SUN_SCHWARZSCHILD_M / bst_vec3_norm(light->sun_m)};
 }
 
+/* Apparent direction by stellar aberration. */
 static bst_vec3 aberrate(const bst_light *light, bst_vec3 p) {
     bst_light_aberration a = bst_light_aberration_of(light);
     return bst_light_aberration_apply(&a, p);

@@ -84,6 +84,7 @@ static bst_status fail_line(const reader *r, const char *problem, const char *ex
     return bst_text_fail_at(&r->source, &r->line, problem, r->line.text, r->line.length, expected);
 }
 
+/* Appends a state to the OEM ephemeris. */
 static bst_status append_row(const reader *r, const bst_astro_table_state *row) {
     bst_oem *oem = r->oem;
     if (oem->row_count == oem->row_capacity) {
@@ -149,6 +150,7 @@ static bst_status find_key(const reader *r, bst_text_span name, const char *cons
                             name.length, expected);
 }
 
+/* Reads a line of the OEM header. */
 static bst_status read_head(reader *r) {
     bst_text_span name, value;
     int k;
@@ -171,6 +173,7 @@ static bst_status read_head(reader *r) {
     return BST_OK;
 }
 
+/* Reads a line of the OEM metadata. */
 static bst_status read_meta(reader *r) {
     bst_text_span name, value;
     int k;

@@ -156,6 +156,7 @@ static void add(double *sum, double *low, double term) {
     *sum = s;
 }
 
+/* Adds a vector with compensated summation. */
 static void add_vec(bst_vec3 *sum, bst_vec3 *low, bst_vec3 term) {
     add(&sum->x, &low->x, term.x);
     add(&sum->y, &low->y, term.y);

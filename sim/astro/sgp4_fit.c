@@ -104,6 +104,7 @@ static bool solve6(double a[ELEMENTS][ELEMENTS + 1], double x[ELEMENTS]) {
 
 enum { MOST_PLACES = 256 };
 
+/* Fits mean elements to positions by damped least squares. */
 static bst_status fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, double x[ELEMENTS],
                       bst_elements *elements, double *rms_m) {
     double here[3 * MOST_PLACES], slope[ELEMENTS][3 * MOST_PLACES], sum2, damping = 1e-6;
@@ -189,6 +190,7 @@ static bool start_from(bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps, dou
     return true;
 }
 
+/* Fails: the initial orbit is no ellipse that SGP4 can represent. */
 static bst_status fail_start(bst_ctx *ctx) {
     return bst_fail(ctx, BST_ERR_NUMERIC,
                     "mean elements of SGP4 need an ellipse with an inclination below 179.9 "

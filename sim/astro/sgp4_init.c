@@ -134,6 +134,7 @@ static void set_drag(bst_sgp4 *s, double bstar) {
         (3.0 * d4 + 12.0 * c1 * d3 + 6.0 * d2 * d2 + 15.0 * c1 * c1 * (2.0 * d2 + c1 * c1));
 }
 
+/* Fails with the reason why SGP4 cannot propagate the element set. */
 static bst_status refuse(bst_ctx *ctx, const bst_elements *el, bst_sgp4_error code) {
     return bst_fail(ctx, BST_ERR_NUMERIC,
                     "SGP4 cannot propagate satellite %d: error %d, %s (eccentricity %.9g, mean "

@@ -114,6 +114,7 @@ static bst_status read_header(reader *r, const bst_text_line *line, const bst_te
     return BST_OK;
 }
 
+/* Reads the time of a row: seconds after the epoch, or UTC. */
 static bst_status read_instant(const reader *r, const bst_text_line *line, int c,
                                bst_text_span text, double *seconds) {
     bst_time t;
@@ -131,6 +132,7 @@ static bst_status read_instant(const reader *r, const bst_text_line *line, int c
     return BST_OK;
 }
 
+/* Appends a row of the state table. */
 static bst_status append(reader *r, const frame *f) {
     if (r->count == r->capacity) {
         int64_t capacity = r->capacity ? 2 * r->capacity : 64;

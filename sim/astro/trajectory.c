@@ -29,6 +29,7 @@ static bool finite(bst_vec3 v) {
     return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
 }
 
+/* Checks initial state and tolerance of a numerical orbit. */
 static bst_status check(bst_ctx *ctx, const bst_trajectory_options *o) {
     if (!finite(o->position_m) || !finite(o->velocity_mps) || !(fabs(o->at_s) <= LAST_TIME_S)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -101,6 +102,7 @@ void bst_trajectory_free(bst_trajectory *t) {
     }
 }
 
+/* Starts the integration backward in time at its first use. */
 static bst_status need_backward(bst_ctx *ctx, const bst_trajectory *t) {
     core *c = t->core;
     if (!c->backward) {

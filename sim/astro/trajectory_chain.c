@@ -40,6 +40,7 @@ static bst_status undo_impulse(bst_ctx *ctx, bst_vec3 r, bst_vec3 dv, bst_vec3 *
     return BST_OK;
 }
 
+/* Velocity after an impulsive manoeuvre given in the RTN frame. */
 static bst_vec3 kick(const bst_radau_point *p, bst_vec3 dv_rtn) {
     return bst_vec3_add(p->velocity_mps, from_rtn(p->position_m, p->velocity_mps, dv_rtn));
 }
@@ -62,12 +63,14 @@ static bst_status cross_edge(bst_ctx *ctx, const bst_trajectory_chain_context *c
     return BST_OK;
 }
 
+/* True if the point lies at a thrust edge: start or end of a burn, or an impulse. */
 static bool at_edge(const bst_trajectory_chain_context *context,
                     const bst_trajectory_chain_point *p) {
     return p->edge >= 0 && p->edge < context->edges->count &&
            context->edges->items[p->edge].time_s == p->time_s && p->time_low_s == 0.0;
 }
 
+/* Thrust acceleration in the RTN frame after the last edge. */
 static bst_vec3 thrust_now(const bst_trajectory_chain_context *context, double direction,
                            const bst_trajectory_chain_point *p) {
     int last = direction > 0.0 ? p->edge - 1 : p->edge; /* the previous edge */
@@ -75,6 +78,7 @@ static bst_vec3 thrust_now(const bst_trajectory_chain_context *context, double d
                                                      : (bst_vec3){0.0, 0.0, 0.0};
 }
 
+/* Ends the integration with its reason. */
 static void end_chain(bst_trajectory_chain *chain, double at_s, bst_status why,
                       const char *message) {
     chain->ended = true;
@@ -120,6 +124,7 @@ typedef struct step_forces {
     bst_vec3 thrust_rtn;
 } step_forces;
 
+/* Acceleration of the spacecraft: force model and thrust. */
 static bst_status force(void *user, double offset_s, bst_vec3 r, bst_vec3 v, bst_vec3 *a) {
     step_forces *f = user;
     BST_TRY(
@@ -140,6 +145,7 @@ static int light_zone(const step_forces *f, const bst_radau_step *step, double s
     return sunlight <= 0.0 ? 0 : sunlight < 1.0 ? 1 : 2;
 }
 
+/* True if the orbit is below the lowest height within a step. */
 static bool below_floor(const bst_radau_step *step, double s) {
     bst_vec3 r;
     bst_radau_state(step, s, &r, NULL);

@@ -132,10 +132,10 @@ static bst_status measure(bst_ctx *ctx, const bst_bench_options *options, const 
     int at = 0;
     for (int k = 0; k < KINDS; k++) {
         double median = bst_bench_median(ms[k], ROUNDS); /* sorts the times */
-        double told[2] = {median, ms[k][0]};
+        double times_ms[2] = {median, ms[k][0]};
         for (int i = 0; i < 2; i++, at++) {
             snprintf(out->phases[at].name, sizeof out->phases[at].name, "%s", names[k][i]);
-            out->phases[at].ms = told[i];
+            out->phases[at].ms = times_ms[i];
         }
     }
     out->ms_median = out->phases[0].ms;

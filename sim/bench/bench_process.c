@@ -130,17 +130,17 @@ bst_status bst_bench_apart(bst_ctx *ctx, bst_bench_task task, void *user, void *
         close(ends[0]);
         end.status = task(ctx, user, out);
         memcpy(end.message, ctx->message, sizeof end.message);
-        bool told = write_all(ends[1], &end, sizeof end) && write_all(ends[1], out, bytes);
+        bool ok = write_all(ends[1], &end, sizeof end) && write_all(ends[1], out, bytes);
         fflush(NULL);
-        _exit(told ? 0 : 1);
+        _exit(ok ? 0 : 1);
     }
     close(ends[1]);
-    bool told = read_all(ends[0], &end, sizeof end) && read_all(ends[0], out, bytes);
+    bool ok = read_all(ends[0], &end, sizeof end) && read_all(ends[0], out, bytes);
     close(ends[0]);
     int code = 0;
     while (waitpid(child, &code, 0) < 0 && errno == EINTR) {
     }
-    if (!told) {
+    if (!ok) {
         return WIFSIGNALED(code)
                    ? bst_fail(ctx, BST_ERR_STATE, "the measuring process died of signal %d",
                               WTERMSIG(code))

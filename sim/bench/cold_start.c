@@ -88,13 +88,13 @@ static bst_status one_process(bst_ctx *ctx, const bst_bench_options *options, do
         close(pipe_ends[0]);
         return bst_fail(ctx, BST_ERR_IO, "cannot start a fresh process: %s", strerror(failed));
     }
-    FILE *told = fdopen(pipe_ends[0], "r");
+    FILE *stream = fdopen(pipe_ends[0], "r");
     int count = 0;
-    while (told && count < STEPS && fscanf(told, "%lf", &ends[count]) == 1) {
+    while (stream && count < STEPS && fscanf(stream, "%lf", &ends[count]) == 1) {
         count++;
     }
-    if (told) {
-        fclose(told);
+    if (stream) {
+        fclose(stream);
     } else {
         close(pipe_ends[0]);
     }

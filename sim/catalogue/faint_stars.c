@@ -110,6 +110,7 @@ static const float *share_of_cell(const bst_faint_sky *sky, const faint_cell *c)
     return sky->kept[bst_faint_zone(c->centre)];
 }
 
+/* True if a synthetic faint star is kept: fainter than the catalogue's completeness limit. */
 static bool is_kept(const bst_faint_sky *sky, const float *share, bst_vec3 icrs, double v,
                     uint32_t word) {
     double complete_to_v = sky->complete_to_v;
@@ -241,6 +242,7 @@ typedef struct cone {
     int capacity;
 } cone;
 
+/* Returns the synthetic stars of a cell in the cone; draws them at first use. */
 static bst_status query_cell(bst_ctx *ctx, bst_faint_stars *f, const cone *q, int band,
                              uint32_t cell, int *found) {
     slot *s = NULL;

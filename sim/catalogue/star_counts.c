@@ -47,6 +47,7 @@ static int segment(double v) {
     return at <= 0.0 ? 0 : at >= BST_COUNT_NODES - 1 ? BST_COUNT_NODES - 2 : (int)at;
 }
 
+/* Slope of the logarithmic star count between two magnitudes. */
 static double slope(const bst_star_counts *counts, int k) {
     return counts->log_n[k + 1] - counts->log_n[k];
 }

@@ -16,6 +16,7 @@ typedef struct row_reader {
     bst_status status; /* the first error is kept */
 } row_reader;
 
+/* Fails: bytes of a star catalogue row are not a number. */
 static void bad_bytes(row_reader *r, int first, int last) {
     if (r->status == BST_OK) {
         r->status = bst_fail(r->ctx, BST_ERR_FORMAT, "bytes %d-%d hold \"%.*s\", not a number",
@@ -62,6 +63,7 @@ static bool read_fixed(row_reader *r, int first, int last, int decimals, long lo
     return true;
 }
 
+/* Reads a required fixed-point number of a star catalogue row. */
 static long long need_fixed(row_reader *r, int first, int last, int decimals) {
     long long value = 0;
     if (!read_fixed(r, first, last, decimals, &value)) {

@@ -38,6 +38,7 @@ struct bst_stars {
     bst_rng_key key;
 };
 
+/* Computes centre and radius that enclose each group of star cells. */
 static void group_cells(bst_stars *s) {
     for (uint32_t g = 0; g < GROUPS; g++) {
         cell_group *group = &s->groups[g];

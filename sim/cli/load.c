@@ -79,6 +79,7 @@ static bst_status assign_text(bst_ctx *ctx, bst_json *json, const char *pointer,
     return bst_json_assign(ctx, json, pointer, cJSON_CreateString(text));
 }
 
+/* Applies --set, --external and --link to the scenario document. */
 static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json *json) {
     for (int i = 0; i < options->set.count; i++) {
         if (bst_json_set(ctx, json, options->set.items[i]) != BST_OK) {
@@ -143,6 +144,7 @@ bst_status bst_load_check_sensor(bst_ctx *ctx, const bst_scenario *scenario, con
                     name, scenario->file, known);
 }
 
+/* Checks that no output overwrites a file that the scenario names. */
 static bst_status spare_named(bst_ctx *ctx, const bst_option *table, const cJSON *node) {
     for (const cJSON *item = node->child; item; item = item->next) {
         if (cJSON_IsString(item) && item->valuestring[0] == '/') {

@@ -18,6 +18,7 @@ static const bst_option *find(const bst_option *table, const char *name, size_t 
     return NULL;
 }
 
+/* Fails on an unknown option and suggests the nearest one. */
 static bst_status unknown(bst_ctx *ctx, const bst_option *table, const char *word) {
     char name[64];
     size_t dashes = strspn(word, "-");
@@ -69,6 +70,7 @@ static bst_status read_choice(bst_ctx *ctx, const bst_option *o, const char *tex
     }
 }
 
+/* Stores the value of a command line option. */
 static bst_status store(bst_ctx *ctx, const bst_option *o, const char *value) {
     double number = 0.0;
     switch (o->kind) {

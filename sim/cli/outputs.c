@@ -22,6 +22,7 @@ typedef struct output {
     bool exists;
 } output;
 
+/* True if the option names an output file or folder. */
 static bool is_output(const bst_option *o) {
     return o->path == BST_PATH_OUTPUT || o->path == BST_PATH_OUTPUT_INTO ||
            o->path == BST_PATH_OUTPUT_FOLDER;
@@ -35,6 +36,7 @@ static bool same(const struct stat *a, const struct stat *b) {
     return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
 }
 
+/* Fails with the option and path of an output. */
 static bst_status fail(bst_ctx *ctx, const output *o, const char *what) {
     return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s %.300s: %s", o->option->name, o->path, what);
 }
@@ -84,6 +86,7 @@ static bool is_made_anyway(const output *o) {
            (strcmp(folder, "runs") == 0 || strcmp(folder, "studies") == 0);
 }
 
+/* Checks that the folder above the output exists or will be created. */
 static bst_status check_above(bst_ctx *ctx, output *o) {
     if (stat(o->folder, &o->above) != 0) {
         if (errno == ENOENT && is_made_anyway(o)) {
@@ -104,6 +107,7 @@ static bst_status check_above(bst_ctx *ctx, output *o) {
     return BST_OK;
 }
 
+/* Checks that an existing output is a file or folder as the option requires. */
 static bst_status check_kind(bst_ctx *ctx, const output *o) {
     bool folder = o->exists && S_ISDIR(o->there.st_mode);
     if (o->option->path == BST_PATH_OUTPUT_FOLDER) {
@@ -126,6 +130,7 @@ static bst_status check_kind(bst_ctx *ctx, const output *o) {
     return BST_OK;
 }
 
+/* Checks that the output is not a file of a run's or study's folder. */
 static bst_status check_owner(bst_ctx *ctx, const output *o) {
     if (o->option->path == BST_PATH_OUTPUT_FOLDER) {
         return BST_OK;
@@ -184,6 +189,7 @@ static bst_status spare_named(bst_ctx *ctx, const output *o, const cJSON *node, 
     return BST_OK;
 }
 
+/* Checks that the output would not overwrite an input. */
 static bst_status spare(bst_ctx *ctx, const output *o, const char *input) {
     struct stat info;
     if (!o->exists || S_ISCHR(o->there.st_mode) || stat(input, &info) != 0) {
@@ -211,6 +217,7 @@ static bst_status spare(bst_ctx *ctx, const output *o, const char *input) {
     return status;
 }
 
+/* Checks that the output would not overwrite any input of the command line. */
 static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const output *o, int words,
                                char *const *word) {
     for (int i = 0; i < words; i++) {
@@ -242,6 +249,7 @@ static bool clash(const output *a, const output *b) {
     return a->exists == b->exists && same(&a->above, &b->above) && strcmp(a->name, b->name) == 0;
 }
 
+/* Applies all checks to one output path. */
 static bst_status check_one(bst_ctx *ctx, const bst_option *table, int words, char *const *word,
                             output *o) {
     BST_TRY(check_characters(ctx, o));

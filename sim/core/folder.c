@@ -10,6 +10,7 @@
 
 enum { PATH_BYTES = 4096 };
 
+/* Creates a folder unless it exists. */
 static bst_status make_one(bst_ctx *ctx, const char *path) {
     if (mkdir(path, 0777) == 0) {
         return BST_OK;

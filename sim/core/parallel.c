@@ -35,6 +35,7 @@ static void take_parts(bst_parallel *pool) {
     }
 }
 
+/* Main loop of a worker thread. */
 static void *work(void *argument) {
     bst_parallel *pool = argument;
     pthread_mutex_lock(&pool->lock);

@@ -4,6 +4,7 @@
 
 static atomic_int limit = 16;
 
+/* Widest SIMD width of the processor, in floats. */
 static int widest(void) {
 #ifdef BST_SIMD_X86
     if (__builtin_cpu_supports("avx512f")) {

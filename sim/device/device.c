@@ -148,6 +148,7 @@ static bool contains_ignoring_case(const char *text, const char *part) {
     return false;
 }
 
+/* Selects an OpenCL device by selector; by default PoCL on the CPU. */
 static int choose(const candidate *list, int count, const char *selector) {
     if (!*selector) {
         for (int i = 0; i < count; i++) {
@@ -339,6 +340,7 @@ static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_progr
     return status;
 }
 
+/* Lists a kernel source as built. */
 static void note_built(bst_device *device, const bst_device_kernel_source *source) {
     for (int i = 0; i < device->built_count; i++) {
         if (device->built[i] == source) {
@@ -393,6 +395,7 @@ static const char no_abi_warnings[] =
     "#pragma clang diagnostic ignored \"-Wpsabi\"\n"
     "#endif\n";
 
+/* Builds an OpenCL program, or returns the one already built. */
 static bst_status build(bst_ctx *ctx, bst_device *device,
                         const bst_device_kernel_source *const *sources, int count,
                         const char *options, cl_program *out) {

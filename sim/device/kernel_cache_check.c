@@ -20,6 +20,7 @@ static const char sums_name[] = "boresight.sums";
 /* Callback for each file of a program; false ends the iteration. */
 typedef bool (*visit_file)(void *user, const char *path, const char *below);
 
+/* True if the file holds compiled kernel code. */
 static bool is_code(const char *name) {
     const char *end = strrchr(name, '.');
     return end && (strcmp(end, ".so") == 0 || strcmp(end, ".bc") == 0);
@@ -52,6 +53,7 @@ static bool walk(const char *folder, size_t skip, int depth, visit_file visit, v
 
 /* ------------------------------------------------------------------ one file */
 
+/* Checksum of a file of the kernel cache. */
 static bool sum_of(const char *path, uint64_t *sum) {
     char block[16384];
     int fd = open(path, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
@@ -221,6 +223,7 @@ typedef struct sweep {
     int removed;
 } sweep;
 
+/* Checks a program folder of the kernel cache and removes it if damaged. */
 static void look_at(sweep *s, const char *program) {
     struct stat info;
     if (s->since == 0) {

@@ -56,6 +56,7 @@ static bst_status below_nyquist(bst_ctx *ctx, const char *key, double hz, double
                     key, hz, 1.0 / dt_s);
 }
 
+/* Adds a filter section, discretised by the Tustin transform. */
 static void add(bst_compensator *c, const double num[3], const double den[3], double prewarp_hz) {
     c->stage[c->stages++] = bst_dynamics_biquad_tustin(num, den, c->dt_s, prewarp_hz);
 }
@@ -157,6 +158,7 @@ bst_status bst_compensator_check(bst_ctx *ctx, const bst_compensator_config *con
     return BST_OK;
 }
 
+/* Builds the compensator of a servo loop from its configuration. */
 static bst_status build(bst_ctx *ctx, bst_compensator *c, const bst_compensator_config *config,
                         double dt_s) {
     BST_TRY(bst_compensator_check(ctx, config, dt_s));
@@ -193,6 +195,7 @@ static bst_status build(bst_ctx *ctx, bst_compensator *c, const bst_compensator_
     return BST_OK;
 }
 
+/* Sets up a compensator from a plug-in. */
 static bst_status plug(bst_ctx *ctx, bst_compensator *c, const bst_stage_use *use, double dt_s) {
     const bst_compensator_stage *stage = use->desc->functions;
     if (stage->state_bytes > BST_COMPENSATOR_STATE_BYTES || !stage->init || !stage->step) {
@@ -216,6 +219,7 @@ bst_status bst_compensator_from_gains(bst_ctx *ctx, bst_compensator *c,
     return config->plug.desc ? plug(ctx, c, &config->plug, dt_s) : build(ctx, c, config, dt_s);
 }
 
+/* Advances the state of a filter section. */
 static double advance(const bst_dynamics_biquad *q, double state[2], double x, double y,
                       double fed_back) {
     state[0] = q->b1 * x - q->a1 * fed_back + state[1];
@@ -227,6 +231,7 @@ static double clamp(double x, double low, double high) {
     return x < low ? low : x > high ? high : x;
 }
 
+/* Output of the compensator after its delay. */
 static double delayed(bst_compensator *c, double output) {
     if (c->delay_whole == 0 && c->delay_part == 0.0) {
         return output;

@@ -37,6 +37,7 @@ static double complex rest_of_loop(const design *d, double omega) {
     return d->plant(d->user, omega) * bst_compensator_response(&d->filters, omega);
 }
 
+/* Computes the unwrapped phase of plant and filters over frequency. */
 static void follow_phase(design *d, double lowest_hz) {
     d->lowest_hz = lowest_hz;
     d->log_step = log(0.5 / d->dt_s / lowest_hz) / (PHASE_POINTS - 1);
@@ -56,6 +57,7 @@ static double phase_at(const design *d, double hz, double wrapped) {
     return near + bst_wrap_angle(wrapped - near);
 }
 
+/* Phase and gain that the compensator needs at a crossover frequency. */
 static need need_at(const design *d, double hz, double phase_margin_rad) {
     double w = two_pi * hz;
     double complex p = rest_of_loop(d, w);
@@ -211,6 +213,7 @@ static double highest_crossover(const design *d, double hz, double margin_rad) {
     return low;
 }
 
+/* Fails: the compensator cannot reach the phase margin. */
 static bst_status cannot(bst_ctx *ctx, const design *d, double crossover_hz, double best_hz,
                          const char *what) {
     const bst_compensator_config *config = d->config;

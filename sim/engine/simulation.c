@@ -331,6 +331,7 @@ static int processors(int threads) {
     return threads > 0 ? threads : online > 1 ? (int)online : 1;
 }
 
+/* Creates world, onboard knowledge, device and module instances of the simulation. */
 static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,

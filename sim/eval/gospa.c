@@ -15,6 +15,7 @@ typedef struct solver {
     char *done;
 } solver;
 
+/* Cost of assigning a truth object to a track: distance^order, cut off. */
 static double cost(const solver *s, int row, int column) {
     double d = s->distance[row * s->stride_row + column * s->stride_column];
     return pow(d < s->cutoff ? d : s->cutoff, s->order);
@@ -64,6 +65,7 @@ static void augment(solver *s, int row) {
     }
 }
 
+/* Adds an assigned pair to the localisation error of GOSPA. */
 static void add_pair(const solver *s, bool turned, int row, int column, int *pair_of_truth,
                      bst_gospa_result *out) {
     double d = s->distance[row * s->stride_row + column * s->stride_column];

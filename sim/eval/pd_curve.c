@@ -22,6 +22,7 @@ typedef struct fit {
     double theta[TERMS], covariance[TERMS][TERMS];
 } fit;
 
+/* Detection probability at a point, corrected for chance matches. */
 static double share(const bst_pd_point *p, double chance) {
     return bst_pd_without_chance((double)p->detected / (double)p->trials, chance);
 }
@@ -34,6 +35,7 @@ static bool is_informative(const fit *f, const bst_pd_point *p) {
     return pd > LEAST && pd < MOST;
 }
 
+/* Basis of the fitted curve: polynomial of second degree in SNR. */
 static void basis(const fit *f, double snr, double out[TERMS]) {
     out[0] = 1.0;
     out[1] = snr - f->centre;

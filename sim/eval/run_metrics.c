@@ -142,6 +142,7 @@ void bst_run_metrics_detections(bst_run_metrics *m, const bst_detections *detect
     }
 }
 
+/* Returns the record of a track; new tracks are added. */
 static bst_status find_track(bst_ctx *ctx, bst_run_metrics *m, int64_t id, seen_track **out) {
     for (int64_t i = m->track_count - 1; i >= 0;
          i--) { /* track identities increase: search from the newest */

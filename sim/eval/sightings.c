@@ -14,12 +14,14 @@ double bst_sighting_rms(const bst_sighting_error *e) {
     return e->count > 0 ? sqrt(e->sum2 / (double)e->count) : NAN;
 }
 
+/* Adds an angular error to the sums of a sighting. */
 static void add_error(bst_sighting_error *e, double arcsec) {
     e->count++;
     e->sum2 += arcsec * arcsec;
     e->greatest = fmax(e->greatest, arcsec);
 }
 
+/* Adds the error sums of a pass to those of an object. */
 static void add_errors(bst_sighting_error *to, const bst_sighting_error *from) {
     to->count += from->count;
     to->sum2 += from->sum2;
@@ -193,6 +195,7 @@ static void note_detection(const bst_sightings *s, bst_sighting *sum, double sec
     sum->last_s = seconds;
 }
 
+/* Adds a pass to the sums of its object and sensor. */
 static void add_pass(bst_sighting *sum, const bst_eval_pass *pass) {
     sum->passes++;
     sum->passes_seen += pass->detected > 0;
@@ -205,6 +208,7 @@ static void add_pass(bst_sighting *sum, const bst_eval_pass *pass) {
     add_errors(&sum->track, &pass->track);
 }
 
+/* Ends a pass and reports it. */
 static bst_status end_pass(bst_ctx *ctx, bst_sightings *s, record *r) {
     add_pass(&r->sum, &r->pass);
     add_pass(&s->records[s->whole[r->sum.object]].sum, &r->pass);
@@ -228,6 +232,7 @@ static bst_status end_passes(bst_ctx *ctx, bst_sightings *s, sensor *e, double b
     return BST_OK;
 }
 
+/* Begins a pass of an object through a sensor's field of view. */
 static bst_status begin_pass(bst_ctx *ctx, bst_sightings *s, int sensor_index, int index,
                              double seconds) {
     sensor *e = &s->sensors[sensor_index];

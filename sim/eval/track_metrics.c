@@ -75,6 +75,7 @@ void bst_track_metrics_free(bst_track_metrics *m) {
     }
 }
 
+/* Index of the record of a track; new tracks are added. */
 static int identify(bst_track_metrics *m, int64_t id) {
     /* identities increase: search from the newest */
     for (int t = m->tracks - 1; t >= 0; t--) {
@@ -89,6 +90,7 @@ static int identify(bst_track_metrics *m, int64_t id) {
     return m->tracks++;
 }
 
+/* Counts an object as tracked; a change of the track counts as a break. */
 static void record_track(object_record *object, double seconds, int64_t id) {
     if (object->tracked++ == 0) {
         object->first_tracked_s = seconds;

@@ -130,6 +130,7 @@ static bst_status open_masks(bst_ctx *ctx, job *j) {
                : bst_fail(ctx, status, "%s", quiet.message);
 }
 
+/* Computes the bounding box and pixel count of each source in the segmentation mask. */
 static bst_status take_extents(bst_ctx *ctx, job *j) {
     const bst_fits_read_mask *m = &j->mask;
     int32_t most = 0;
@@ -212,6 +213,7 @@ static bst_status add_segmentation(bst_ctx *ctx, const job *j, const box *b, cJS
 
 /* ------------------------------------------------------------------ boxes */
 
+/* Adds the COCO annotation of one true source. */
 static bst_status add_coco_box(bst_ctx *ctx, job *j, const box *b) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddNumberToObject(node, "id", (double)(j->boxes + 1));
@@ -231,6 +233,7 @@ static bst_status add_coco_box(bst_ctx *ctx, job *j, const box *b) {
     return status;
 }
 
+/* Adds the COCO image entry of a frame. */
 static void add_coco_image(job *j, const frame_row *f) {
     char file[320];
     cJSON *node = cJSON_CreateObject();
@@ -295,6 +298,7 @@ static bst_status write_image(bst_ctx *ctx, const job *j, const char *folder, co
     return status;
 }
 
+/* Writes one frame: PNG, mask polygons, COCO annotations and YOLO labels. */
 static bst_status write_frame(bst_ctx *ctx, job *j, frame_row *f) {
     bst_fits_read_frame image;
     bool cube = bst_fits_reader_info(j->fits)->cube;
@@ -324,6 +328,7 @@ static bst_status write_frame(bst_ctx *ctx, job *j, frame_row *f) {
     return BST_OK;
 }
 
+/* Writes the selected frames of a sensor with their boxes. */
 static bst_status write_frames(bst_ctx *ctx, job *j) {
     bst_io_rows *rows;
     bool more;
@@ -356,6 +361,7 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
     return status;
 }
 
+/* Exports images and boxes of one sensor. */
 static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     char path[4096];
     bst_export_set_name(j->e->run, several ? j->sensor : NULL, j->set);
@@ -375,6 +381,7 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     return status;
 }
 
+/* Writes a text file of the training set. */
 static bst_status write_text(bst_ctx *ctx, const char *folder, const char *name, const char *text) {
     char path[4200];
     bst_draft draft;
@@ -384,6 +391,7 @@ static bst_status write_text(bst_ctx *ctx, const char *folder, const char *name,
     return bst_draft_close(ctx, &draft, BST_OK);
 }
 
+/* Writes annotations.json. */
 static bst_status write_coco(bst_ctx *ctx, const job *j, cJSON *root) {
     cJSON *info = cJSON_AddObjectToObject(root, "info");
     cJSON_AddStringToObject(info, "description", "frames of a Boresight run with true sources");
@@ -412,6 +420,7 @@ static bst_status make_folders(bst_ctx *ctx, const char *folder, bool labels) {
     return labels ? bst_folder_make(ctx, path) : BST_OK;
 }
 
+/* Exports images and boxes of every selected sensor. */
 static bst_status export_all(bst_ctx *ctx, job *j) {
     bst_run_sensor sensors[BST_EXPORT_SENSORS];
     int count, kept = 0;

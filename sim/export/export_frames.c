@@ -77,6 +77,7 @@ static bst_status find_stretch(bst_ctx *ctx, job *j) {
     return BST_OK;
 }
 
+/* Writes one frame as PNG file or adds it to the video. */
 static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
     bst_fits_read_frame frame;
     bst_io_overlay overlay;
@@ -115,6 +116,7 @@ static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
     return status;
 }
 
+/* Creates the folder of PNG files, or starts the video. */
 static bst_status open_output(bst_ctx *ctx, job *j) {
     const char *tail = j->e->film ? ".mp4" : "";
     int n = snprintf(j->path, sizeof j->path, "%s/%s%s", j->e->out, j->stem, tail);
@@ -131,6 +133,7 @@ static bst_status open_output(bst_ctx *ctx, job *j) {
     return bst_video_begin(ctx, j->path, j->width, j->height, j->e->frame_rate, &j->video);
 }
 
+/* Writes the chosen frames of a sensor and finishes the video. */
 static bst_status write_frames(bst_ctx *ctx, job *j) {
     bst_progress progress;
     bst_progress_start(&progress, j->stem, "frames", j->count);
@@ -153,6 +156,7 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
     return status;
 }
 
+/* Exports the frames of one sensor as PNG files or video. */
 static bst_status export_sensor(bst_ctx *ctx, job *j) {
     char path[4096];
     BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));

@@ -100,6 +100,7 @@ void bst_chart_fit(bst_chart_axis *axis, double low, double high, double margin)
     axis->high = high + margin * length;
 }
 
+/* Tick values of a logarithmic chart axis. */
 static int decades(double low, double high, int wanted, double *ticks, int room) {
     int first = (int)ceil(log10(low) - 1e-9), last = (int)floor(log10(high) + 1e-9), count = 0;
     int every = (last - first) / (wanted > 1 ? wanted : 1) + 1;
@@ -194,6 +195,7 @@ size_t bst_chart_thin(const double *x, const double *y, size_t n, double low, do
 
 /* ------------------------------------------------------------------ axes */
 
+/* Position of a value along a chart axis, as fraction of its length. */
 static double along(const bst_chart_axis *axis, double value) {
     if (axis->logarithmic) {
         return value > 0.0 ? log(value / axis->low) / log(axis->high / axis->low) : -OFF_SCALE;
@@ -211,6 +213,7 @@ static double inside_x(const bst_chart *c, double x) {
     return c->left + c->inner_width * clamp(along(&c->x, x), 0.0, 1.0);
 }
 
+/* Vertical position of a value, clamped to the chart, in SVG units. */
 static double inside_y(const bst_chart *c, double y) {
     return c->top + c->inner_height * (1.0 - clamp(along(&c->y, y), 0.0, 1.0));
 }
@@ -357,15 +360,18 @@ typedef struct pen {
     bool down;
 } pen;
 
+/* Horizontal position of a value in fine steps of the clipped SVG. */
 static long step_x(const bst_chart *c, double x) {
     return lround(FINE * c->inner_width * clamp(along(&c->x, x), -OFF_SCALE, 1.0 + OFF_SCALE));
 }
 
+/* Vertical position of a value in fine steps of the clipped SVG. */
 static long step_y(const bst_chart *c, double y) {
     return lround(FINE * c->inner_height *
                   (1.0 - clamp(along(&c->y, y), -OFF_SCALE, 1.0 + OFF_SCALE)));
 }
 
+/* Opens the nested SVG that clips curves to the chart. */
 static void open_clip(const bst_chart *c) {
     fprintf(c->out,
             "<svg x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" viewBox=\"0 0 %.0f %.0f\">",
@@ -373,6 +379,7 @@ static void open_clip(const bst_chart *c) {
             FINE * c->inner_height);
 }
 
+/* Continues the SVG path of a curve to the next point. */
 static void pen_to(pen *p, double x, double y) {
     long px = step_x(p->chart, x), py = step_y(p->chart, y);
     if (!p->down) {

@@ -26,6 +26,7 @@ void bst_csv_put_text(FILE *file, const char *text) {
     putc('"', file);
 }
 
+/* Writes a CSV cell, quoted if needed. */
 static void put_cell(FILE *file, const bst_io_rows *rows, int column) {
     switch (bst_io_rows_kind(rows, column)) {
         case BST_CELL_NULL:

@@ -37,6 +37,7 @@ static void card_value(const char *card, char out[CARD]) {
     snprintf(out, CARD, "%.*s", (int)(stop - value), value);
 }
 
+/* Fails with the value of a FITS card and the allowed values. */
 static bst_status wrong(const scan *c, const char *card, const char *allowed) {
     char value[CARD];
     card_value(card, value);

@@ -29,6 +29,7 @@ typedef struct bst_fits_queue {
     bst_ctx ctx;       /* of the writing thread */
 } bst_fits_queue;
 
+/* Thread that writes the queued frames to the FITS file. */
 static void *work(void *argument) {
     bst_fits *fits = argument;
     bst_fits_queue *q = fits->queue;

@@ -247,12 +247,14 @@ static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
     return BST_OK;
 }
 
+/* Reads and interprets the FITS header at the position of an HDU. */
 static bst_status look(bst_ctx *ctx, bst_fits_reader *reader, hdu *h, bool *whole) {
     bst_fits_cards cards;
     BST_TRY(load_header(ctx, reader, h, &cards));
     return interpret(ctx, reader, &cards, h, whole);
 }
 
+/* Adds the HDU of a frame to the index of the file. */
 static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h) {
     bst_fits_file_info *info = &reader->info;
     if ((size_t)info->frames == reader->frame_room) {

@@ -13,6 +13,7 @@ typedef struct bit_reader {
     size_t missing;
 } bit_reader;
 
+/* Loads compressed bytes into the bit buffer; beyond the end zeros. */
 static void refill(bit_reader *r) {
     for (; r->count <= 56; r->count += 8) {
         uint64_t byte = 0;
@@ -25,6 +26,7 @@ static void refill(bit_reader *r) {
     }
 }
 
+/* Reads the next n bits of the compressed tile. */
 static uint32_t take(bit_reader *r, int n) {
     if (r->count < n) {
         refill(r);

@@ -26,6 +26,7 @@ typedef struct tracer {
     size_t loop_count, loop_room;
 } tracer;
 
+/* True if the mask pixel belongs to the outlined source. */
 static bool has(const tracer *t, int x, int y) {
     const bst_mask_item *m = t->item;
     return x >= m->x0 && x < m->x1 && y >= m->y0 && y < m->y1 &&
@@ -47,6 +48,7 @@ static bst_status make_room(bst_ctx *ctx, void **list, size_t count, size_t *roo
     return BST_OK;
 }
 
+/* Adds a corner of the polygon. */
 static bst_status add_corner(bst_ctx *ctx, tracer *t, int x, int y) {
     BST_TRY(
         make_room(ctx, (void **)&t->corners, t->corner_count, &t->corner_room, sizeof *t->corners));
@@ -151,6 +153,7 @@ static void write_polygon(const tracer *t, size_t index, FILE *stream) {
     }
 }
 
+/* Traces all outlines of the source; holes are joined to their outer polygon. */
 static bst_status trace_all(bst_ctx *ctx, tracer *t) {
     const bst_mask_item *m = t->item;
     int width = m->x1 - m->x0;

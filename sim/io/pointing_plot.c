@@ -23,6 +23,7 @@ static double radial(const bst_io_pointing_point *p) {
     return hypot(p->dx_px, p->dy_px);
 }
 
+/* Largest radial pointing error, and spread of the points that count. */
 static extent measure(const bst_io_pointing_point *points, int count) {
     extent e = {.counted = 0};
     for (int i = 0; i < count; i++) {

@@ -44,6 +44,7 @@ static bst_status read_keyword(bst_ctx *ctx, const char *path, int most_axes, do
     return wrong ? bst_fail(ctx, BST_ERR_FORMAT, "%.400s: OVERSAMP is not a number", path) : BST_OK;
 }
 
+/* PSF samples per detector pixel: as given, else the keyword OVERSAMP. */
 static bst_status find_oversampling(bst_ctx *ctx, const char *path, int most_axes, double given,
                                     double *out) {
     *out = given;
@@ -64,6 +65,7 @@ static bst_status find_oversampling(bst_ctx *ctx, const char *path, int most_axe
     return BST_OK;
 }
 
+/* Checks the PSF samples and sums them and their squares, scaled to a maximum of 1. */
 static bst_status sum_up(bst_ctx *ctx, const char *path, const float *pixels, int width, int height,
                          double *sum, double *sum2) {
     double largest = 0.0;

@@ -43,6 +43,7 @@ void bst_io_mark_sort(bst_io_mark *marks, int count) {
     qsort(marks, (size_t)count, sizeof *marks, by_importance);
 }
 
+/* Number of detections that are drawn. */
 static int drawn_of(const bst_quicklook_frame *f) {
     return f->detection_count < BST_QUICKLOOK_MARKS ? f->detection_count : BST_QUICKLOOK_MARKS;
 }
@@ -163,6 +164,7 @@ static bst_status draw_inset(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
     return BST_OK;
 }
 
+/* Draws one frame of the quick-look image with marks, inset, scale and captions. */
 static bst_status draw_panel(bst_ctx *ctx, bst_picture *p, const bst_quicklook_frame *f, int left,
                              int top) {
     double scale = (double)PANEL / (f->width > f->height ? f->width : f->height);

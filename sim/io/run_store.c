@@ -203,6 +203,7 @@ static bst_status claim_folder(bst_ctx *ctx, bst_run *run) {
     return status;
 }
 
+/* Checks that the output folder is absent, or a run that may be overwritten. */
 static bst_status check_out(bst_ctx *ctx, const bst_run *run) {
     struct stat info;
     if (lstat(run->out, &info) != 0) {
@@ -334,6 +335,7 @@ static bst_status sync_folder(bst_ctx *ctx, const char *folder) {
     return status == BST_OK ? sync_path(ctx, folder) : status;
 }
 
+/* Renames the finished .partial folder to its final name; replaces a former run. */
 static bst_status publish(bst_ctx *ctx, bst_run *run) {
     char old[BST_RUN_PATH_BYTES] = "";
     if (run->overwrite) {

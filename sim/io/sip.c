@@ -19,11 +19,13 @@ typedef struct mapping {
     double cx, cy, hx, hy; /* centre and half size of the sensor, px */
 } mapping;
 
+/* ICRS direction of a light ray that falls on a pixel position. */
 static bst_vec3 place(const mapping *m, double x, double y) {
     bst_vec3 cam = bst_camera_unproject(m->camera, x, y);
     return bst_light_catalogue_star(m->light, bst_quat_rotate(m->q_gcrf_from_cam, cam));
 }
 
+/* Value of a SIP polynomial at (u, v). */
 static double evaluate(const double *c, int order, double u, double v) {
     double sum = 0.0, row = 1.0;
     for (int p = 0; p <= order; p++, row *= u) {
@@ -104,6 +106,7 @@ typedef struct samples {
     double c[2][NODES][NODES]; /* Chebyshev coefficients of xi and eta, rad */
 } samples;
 
+/* Chebyshev coefficients of the tangent-plane coordinates; false: outside the plane. */
 static bool transform_plane(const bst_io_sky_plane *t, samples *s) {
     double value[2][NODES][NODES];
     for (int y = 0; y < NODES; y++) {
@@ -137,6 +140,7 @@ static int choose_order(const samples *s, double scale) {
     return order < BST_SIP_ORDER ? order : BST_SIP_ORDER;
 }
 
+/* Converts the fitted coefficients to powers of u and v about the reference pixel. */
 static void powers_of(const mapping *m, const samples *s, int order,
                       double powers[2][BST_SIP_TERMS]) {
     for (int k = 0; k < 2; k++) {
@@ -150,6 +154,7 @@ static void powers_of(const mapping *m, const samples *s, int order,
     }
 }
 
+/* Multiplies tangent-plane coordinates by the inverse CD matrix. */
 static void apply_inverse(const double cd[2][2], double xi, double eta, double *u, double *v) {
     double det = cd[0][0] * cd[1][1] - cd[0][1] * cd[1][0];
     *u = (cd[1][1] * xi - cd[0][1] * eta) / det;

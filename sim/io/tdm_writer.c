@@ -14,6 +14,7 @@ bst_status bst_tdm_write_head(bst_ctx *ctx, FILE *stream, const char *creation_u
     return bst_text_stream_ok(ctx, stream);
 }
 
+/* Checks participants, angles and time order of a TDM segment. */
 static bst_status check(bst_ctx *ctx, const bst_tdm_segment *s) {
     if (!s->observer || !*s->observer || !s->object || !*s->object) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "a TDM segment needs the names of two participants");

@@ -45,6 +45,7 @@ static bst_status too_wide(bst_ctx *ctx) {
                     "pixel scale or the number of pixels");
 }
 
+/* Fits the WCS with SIP distortion to a camera with lens distortion. */
 static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
                                 const bst_light *light, bst_wcs *out) {
     double crval[2], cd[2][2];

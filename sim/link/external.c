@@ -116,6 +116,7 @@ bst_link_part bst_external_describe(const bst_module_env *env, const char *role)
     return part;
 }
 
+/* Creates an external module: output buffers and its part of the link. */
 static bst_status create(const bst_module_env *env, const bst_module_desc *desc,
                          const external_config *config, void **self) {
     external *m = calloc(1, sizeof *m);
@@ -197,12 +198,14 @@ static bst_status new_samples(external *m, bst_ctx *ctx, const bst_pointing_tele
     return BST_OK;
 }
 
+/* Retains a frame's pixels while ZeroMQ sends them. */
 static void hold_frame(void *owner) {
     const uint16_t *pixels;
     bst_frame_retain(owner);
     (void)!bst_frame_map(owner, NULL, &pixels); /* maps are counted: this one is nested */
 }
 
+/* Releases a frame after ZeroMQ has sent its pixels. */
 static void release_frame(void *owner) {
     bst_frame_unmap(owner);
     bst_frame_release(owner);
@@ -259,6 +262,7 @@ static void publish_answer(external *m, struct bst_step *step) {
     }
 }
 
+/* Publishes late answers of the peer, one by one. */
 static bst_status publish_more(external *m, struct bst_step *step) {
     for (;;) {
         bool more;
@@ -293,6 +297,7 @@ static bst_status exchange(external *m, struct bst_step *step, const bst_link_in
     return publish_more(m, step);
 }
 
+/* True if the port's channel is a queue. */
 static bool is_queue(const bst_port *port) {
     return bst_channel_type_find(port->channel)->kind == BST_CHANNEL_QUEUE;
 }

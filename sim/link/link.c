@@ -245,8 +245,8 @@ int64_t bst_link_news(bst_link *link, int index, const char **name) {
     if (!bst_link_counter(link, index, name, &count)) {
         return -1;
     }
-    int64_t grown = count - link->told[index];
-    link->told[index] = count;
+    int64_t grown = count - link->reported[index];
+    link->reported[index] = count;
     return grown;
 }
 

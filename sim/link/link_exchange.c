@@ -42,7 +42,9 @@ static void send_step(bst_link *link, link_exchange *x, sending *s) {
     }
 }
 
-static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool *answered) {
+/* Handles a step without answer: ends the run, or continues without the peer (on_silence). */
+static bst_status handle_silence(bst_link *link, link_exchange *x, double waited_s,
+                                 bool *answered) {
     link_part *part = &link->parts[x->part];
     int peer = part->peer;
     if (peer >= 0) {
@@ -182,6 +184,7 @@ static bst_status take_until(bst_link *link, link_exchange *x, double until,
     }
 }
 
+/* True if the part can accept a further step without waiting. */
 static bool has_place(bst_link *link, link_exchange *x) {
     link_part *part = &link->parts[x->part];
     bool finished = false;
@@ -191,6 +194,7 @@ static bool has_place(bst_link *link, link_exchange *x) {
     return finished || part->peer < 0 || free_place(link, part);
 }
 
+/* True if all steps sent to the part have been answered. */
 static bool newest_finished(bst_link *link, link_exchange *x) {
     link_part *part = &link->parts[x->part];
     bool waiting = false;
@@ -225,7 +229,7 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     }
     if (part->peer >= 0 && bst_wall_seconds() - oldest > link->config.timeout_s) {
         bool answered;
-        BST_TRY(silent(link, &x, bst_wall_seconds() - oldest, &answered));
+        BST_TRY(handle_silence(link, &x, bst_wall_seconds() - oldest, &answered));
     }
     *ready = part->peer >= 0 && place;
     if (!*ready) {
@@ -236,8 +240,8 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
 }
 
 /* Executes a step without waiting for its answer, or only for hold_s. */
-static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                              const bst_link_messages *m, bool *answered) {
+static bst_status exchange_ahead(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                                 const bst_link_messages *m, bool *answered) {
     link_part *part = &link->parts[number];
     *answered = false;
     for (int i = 0; i < m->output_count; i++) {
@@ -286,15 +290,16 @@ bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
             double waited = bst_wall_seconds() - began;
             if (link->parts[i].peer < 0 && waited >= link->config.connect_timeout_s) {
                 bool answered;
-                return silent(link, &x, waited, &answered);
+                return handle_silence(link, &x, waited, &answered);
             }
         }
     }
     return BST_OK;
 }
 
-static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                          const bst_link_messages *m, bool *answered) {
+/* Sends a step to the peer and waits for its answer, repeating it for a reconnected peer. */
+static bst_status exchange_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                                   const bst_link_messages *m, bool *answered) {
     link->exchanges++;
     link_part *part = &link->parts[number];
     link_exchange x = {.ctx = ctx,
@@ -343,7 +348,7 @@ static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick
             end = now + link->config.timeout_s < last ? now + link->config.timeout_s : last;
         }
         if (now >= end && !x.resend) {
-            return silent(link, &x, now - began, answered);
+            return handle_silence(link, &x, now - began, answered);
         }
     }
 }
@@ -355,8 +360,8 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t t
         return bst_link_tape_read(ctx, link, number, tick, m->outputs, m->output_count);
     }
     BST_TRY(bst_link_open(ctx, link));
-    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? awaited : not_awaited)(ctx, link, number, tick,
-                                                                          m, answered));
+    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? exchange_awaited : exchange_ahead)(
+        ctx, link, number, tick, m, answered));
     bst_link_tape_answer(link, number, tick, m->outputs, m->output_count);
     return BST_OK;
 }

@@ -127,7 +127,7 @@ struct bst_link {
     bst_link_welcome *welcome; /* with room for all parts */
     link_flying flying[LINK_FLYING];
     link_tape *tape; /* NULL: neither recorded nor replayed */
-    int64_t counts[LINK_EVENTS], told[LINK_EVENTS];
+    int64_t counts[LINK_EVENTS], reported[LINK_EVENTS];
     bst_link_end end;
     bool has_end;
     int64_t exchanges;

@@ -46,6 +46,7 @@ void bst_link_unassign(bst_link *link, int peer) {
     }
 }
 
+/* True if the peer plays a part of the simulation. */
 static bool plays_any(const bst_link *link, int peer) {
     for (int i = 0; i < link->part_count; i++) {
         if (link->parts[i].peer == peer) {
@@ -85,6 +86,7 @@ static bool serves(const char *list, const char *instance) {
     return false;
 }
 
+/* Entry of the peer table for a connection: its own, a free one, or one without a part. */
 static int place_for(bst_link *link, const link_id *id) {
     int known = find_peer(link, id);
     for (int p = 0; known < 0 && p < LINK_PEERS; p++) {
@@ -99,6 +101,7 @@ static int place_for(bst_link *link, const link_id *id) {
     return known;
 }
 
+/* Answers `hello` with `welcome`. */
 static void send_welcome(bst_link *link, int peer, const link_exchange *x) {
     bst_link_welcome *w = link->welcome;
     memset(w, 0, sizeof *w);
@@ -122,6 +125,7 @@ static void send_welcome(bst_link *link, int peer, const link_exchange *x) {
     (void)bst_link_send(link, peer, &header, w, NULL, 0);
 }
 
+/* Handles `hello`: assigns to the peer the parts that it serves. */
 static void take_hello(bst_link *link, link_exchange *x, const message *m,
                        const bst_link_hello *hello) {
     int p = place_for(link, &m->id);
@@ -193,6 +197,7 @@ static bool in_order(bst_link *link, link_exchange *x, const message *m, int p) 
     return true;
 }
 
+/* The output of this type in a peer's answer; NULL: none. */
 static bst_link_output *output_of(const link_answer *answer, bst_link_type type) {
     for (int i = 0; i < answer->output_count; i++) {
         if (answer->outputs[i].type == type) {
@@ -284,6 +289,7 @@ static void prolong_ahead(bst_link *link, int p) {
     }
 }
 
+/* Handles a decoded message of a peer: hello, done, health, end or an output. */
 static void take_content(bst_link *link, link_exchange *x, const message *m, int p,
                          const control_message *control, int dropped) {
     bst_link_output *output;
@@ -361,6 +367,7 @@ static bst_wire_fault read_header(bst_ctx *why, message *m) {
     return fault;
 }
 
+/* Checks the number of message parts, their length and checksum. */
 static bst_wire_fault check_parts(bst_ctx *why, message *m) {
     if (m->count != 3 || m->more) {
         bst_fail(why, BST_ERR_FORMAT, "%s has a header and one part; %s came",
@@ -371,6 +378,7 @@ static bst_wire_fault check_parts(bst_ctx *why, message *m) {
                                zmq_msg_size(&m->parts[2]));
 }
 
+/* Checks, decodes and handles one message of a peer. */
 static void take_message(bst_link *link, link_exchange *x, message *m) {
     int p = find_peer(link, &m->id);
     if (p < 0 && (p = place_for(link, &m->id)) >= 0) {

@@ -25,6 +25,7 @@ struct link_tape {
     int failed; /* errno of the first failed write */
 };
 
+/* Opens the file link.packets for recording or replay. */
 static bst_status open_tape(bst_ctx *ctx, bst_link *link, const char *path, bool writing) {
     if (link->exchanges > 0 || link->tape) {
         return bst_fail(ctx, BST_ERR_STATE, "link: recorded or replayed once, before it begins");
@@ -112,8 +113,9 @@ static bool grow(link_tape *tape, size_t bytes) {
     return true;
 }
 
-static void put(bst_link *link, const char *instance, int64_t tick, bst_link_type type,
-                const void *payload) {
+/* Records one message of the link. */
+static void record_message(bst_link *link, const char *instance, int64_t tick, bst_link_type type,
+                           const void *payload) {
     link_tape *tape = link->tape;
     const bst_wire_message *about = bst_wire_message_of(type);
     size_t bytes = bst_wire_payload_bytes(about, bst_wire_items(about, payload));
@@ -153,22 +155,23 @@ void bst_link_tape_answer(bst_link *link, int part, int64_t tick, const bst_link
     bst_link_done done = {.outputs = 0};
     for (int i = 0; i < count; i++) {
         if (outputs[i].given) {
-            put(link, instance, tick, outputs[i].type, outputs[i].payload);
+            record_message(link, instance, tick, outputs[i].type, outputs[i].payload);
             done.outputs++;
         }
     }
-    put(link, instance, tick, BST_LINK_DONE, &done);
+    record_message(link, instance, tick, BST_LINK_DONE, &done);
 }
 
 void bst_link_tape_note(bst_link *link, int part, int64_t tick, bool ready, bool more) {
     if (link->tape && link->tape->writing && link->tape->file) {
         const bst_link_step step = {.inputs = ready, .attempt = more};
-        put(link, link->parts[part].about.instance, tick, BST_LINK_STEP, &step);
+        record_message(link, link->parts[part].about.instance, tick, BST_LINK_STEP, &step);
     }
 }
 
-static bst_status misfit(bst_ctx *ctx, const bst_link *link, const char *instance, int64_t tick,
-                         const bst_link_header *found) {
+/* Fails: the recording does not match this run. */
+static bst_status fail_mismatch(bst_ctx *ctx, const bst_link *link, const char *instance,
+                                int64_t tick, const bst_link_header *found) {
     const link_tape *tape = link->tape;
     if (!found) {
         return bst_fail(
@@ -198,7 +201,7 @@ static bst_status get(bst_ctx *ctx, const bst_link *link, const char *instance, 
         lengths[i / 4] |= (uint32_t)ahead[i] << (8 * (i % 4));
     }
     if (got < 8) {
-        return misfit(ctx, link, instance, tick, NULL);
+        return fail_mismatch(ctx, link, instance, tick, NULL);
     }
     if (lengths[0] > HEADER_ROOM || lengths[1] > PAYLOAD_MOST) {
         return bst_fail(ctx, BST_ERR_FORMAT, "link: %s is damaged behind packet %lld", tape->path,
@@ -209,7 +212,7 @@ static bst_status get(bst_ctx *ctx, const bst_link *link, const char *instance, 
     }
     if (fread(text, 1, lengths[0], tape->file) != lengths[0] ||
         fread(tape->payload, 1, lengths[1], tape->file) != lengths[1]) {
-        return misfit(ctx, link, instance, tick, NULL);
+        return fail_mismatch(ctx, link, instance, tick, NULL);
     }
     tape->packets++;
     if (bst_link_header_read(ctx, text, lengths[0], header) != BST_WIRE_GOOD ||
@@ -219,9 +222,10 @@ static bst_status get(bst_ctx *ctx, const bst_link *link, const char *instance, 
     }
     return header->tick == tick && strcmp(header->instance, instance) == 0
                ? BST_OK
-               : misfit(ctx, link, instance, tick, header);
+               : fail_mismatch(ctx, link, instance, tick, header);
 }
 
+/* Decodes a recorded message. */
 static bst_status decode(bst_ctx *ctx, const bst_link *link, const bst_link_header *header,
                          void *payload, int capacity) {
     if (bst_wire_decode(ctx, bst_wire_message_of(header->type), link->tape->payload,
@@ -244,7 +248,7 @@ static bst_status read_answer(bst_ctx *ctx, const bst_link *link, int part, int6
             i++;
         }
         if (i == count) {
-            return misfit(ctx, link, link->parts[part].about.instance, tick, header);
+            return fail_mismatch(ctx, link, link->parts[part].about.instance, tick, header);
         }
         BST_TRY(decode(ctx, link, header, outputs[i].payload, outputs[i].capacity));
         outputs[i].given = true;
@@ -258,7 +262,7 @@ bst_status bst_link_tape_read(bst_ctx *ctx, bst_link *link, int part, int64_t ti
     bst_link_header header;
     BST_TRY(get(ctx, link, link->parts[part].about.instance, tick, &header));
     return header.type == BST_LINK_STEP
-               ? misfit(ctx, link, link->parts[part].about.instance, tick, &header)
+               ? fail_mismatch(ctx, link, link->parts[part].about.instance, tick, &header)
                : read_answer(ctx, link, part, tick, &header, outputs, count);
 }
 
@@ -273,8 +277,9 @@ bst_status bst_link_tape_read_more(bst_ctx *ctx, bst_link *link, int part, int64
         return read_answer(ctx, link, part, tick, &header, outputs, count);
     }
     BST_TRY(decode(ctx, link, &header, &step, 0));
-    return step.attempt == 1 ? BST_OK
-                             : misfit(ctx, link, link->parts[part].about.instance, tick, &header);
+    return step.attempt == 1
+               ? BST_OK
+               : fail_mismatch(ctx, link, link->parts[part].about.instance, tick, &header);
 }
 
 bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
@@ -283,12 +288,13 @@ bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int6
     bst_link_step step;
     BST_TRY(get(ctx, link, link->parts[part].about.instance, tick, &header));
     if (header.type != BST_LINK_STEP) {
-        return misfit(ctx, link, link->parts[part].about.instance, tick, &header);
+        return fail_mismatch(ctx, link, link->parts[part].about.instance, tick, &header);
     }
     BST_TRY(decode(ctx, link, &header, &step, 0));
     *ready = step.inputs != 0;
-    return step.attempt == 0 ? BST_OK
-                             : misfit(ctx, link, link->parts[part].about.instance, tick, &header);
+    return step.attempt == 0
+               ? BST_OK
+               : fail_mismatch(ctx, link, link->parts[part].about.instance, tick, &header);
 }
 
 bst_status bst_link_keep_drop(bst_ctx *ctx, bst_link *link, const char *instance, int64_t tick,
@@ -297,15 +303,15 @@ bst_status bst_link_keep_drop(bst_ctx *ctx, bst_link *link, const char *instance
     bst_link_step step = {.inputs = *dropped, .attempt = 2};
     if (!bst_link_replays(link)) {
         if (link->tape && link->tape->file) {
-            put(link, instance, tick, BST_LINK_STEP, &step);
+            record_message(link, instance, tick, BST_LINK_STEP, &step);
         }
         return BST_OK;
     }
     BST_TRY(get(ctx, link, instance, tick, &header));
     if (header.type != BST_LINK_STEP) {
-        return misfit(ctx, link, instance, tick, &header);
+        return fail_mismatch(ctx, link, instance, tick, &header);
     }
     BST_TRY(decode(ctx, link, &header, &step, 0));
     *dropped = step.inputs != 0;
-    return step.attempt == 2 ? BST_OK : misfit(ctx, link, instance, tick, &header);
+    return step.attempt == 2 ? BST_OK : fail_mismatch(ctx, link, instance, tick, &header);
 }

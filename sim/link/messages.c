@@ -389,11 +389,11 @@ static const bst_wire_message messages[BST_LINK_TYPES] = {
     [BST_LINK_DONE] = RECORD("done", PEER, bst_link_done, done,
                              "All outputs of the step that the header names have been sent."),
     [BST_LINK_ERROR] = RECORD("error", SIM, bst_link_error, error,
-                              "A message of the peer was not taken; the simulation goes on waiting "
-                              "for a right one."),
+                              "A message of the peer was rejected; the simulation waits for a "
+                              "valid one."),
     [BST_LINK_HEALTH] = RECORD("health", PEER, bst_link_health, health,
-                               "How the peer is. May come at any time; it also shows that a long "
-                               "step is still being worked on: the time-out starts anew."),
+                               "State of the peer, at any time. During a long step it restarts the "
+                               "time-out."),
     [BST_LINK_END] = RECORD("end", BOTH, bst_link_end, end, "The run is over, or the peer leaves."),
     [BST_LINK_FRAME] = {"frame", SIM, true, frame, NULL, sizeof(bst_link_frame), 0, 0,
                         "A frame: metadata, and the pixels as a second part."},

@@ -70,6 +70,7 @@ static bool take(text *t, char c) {
     return true;
 }
 
+/* Reads one given character; anything else marks the header as bad. */
 static void need(text *t, char c) {
     t->bad |= !take(t, c);
 }
@@ -165,6 +166,7 @@ typedef struct reading {
     int crcs;
 } reading;
 
+/* Marks a member as read; a duplicate marks the header as bad. */
 static bool first_time(text *t, reading *r, unsigned key) {
     t->bad |= (r->has & key) != 0; /* duplicate member */
     r->has |= key;
@@ -191,6 +193,7 @@ static int read_list(text *t, bst_link_header *h, bool hex) {
     return n;
 }
 
+/* Reads the value of one header member. */
 static void read_member(text *t, const char *key, reading *r) {
     bst_link_header *h = r->header;
     if (strcmp(key, "version") == 0 && first_time(t, r, HAS_VERSION)) {
@@ -218,6 +221,7 @@ static void read_member(text *t, const char *key, reading *r) {
     }
 }
 
+/* Fails with the reason why a header is invalid. */
 static bst_wire_fault fault(bst_ctx *ctx, bst_wire_fault kind, const char *why) {
     bst_fail(ctx, BST_ERR_FORMAT, "header: %s", why);
     return kind;
@@ -233,13 +237,13 @@ bst_wire_fault bst_link_header_read(bst_ctx *ctx, const char *bytes, size_t coun
                      "\"crc32c\":\"xxxxxxxx\"}");
     }
     text t = {bytes + count - 11, bytes + count, false}; /* "xxxxxxxx"} */
-    uint32_t told = read_hex(&t);
+    uint32_t stated = read_hex(&t);
     need(&t, '}');
     if (t.bad) {
         return fault(ctx, BST_WIRE_BAD_HEADER,
                      "its crc32c is no 8 hexadecimal digits in lower case");
     }
-    if (bst_crc32c(bytes, count - ENDING_BYTES) != told) {
+    if (bst_crc32c(bytes, count - ENDING_BYTES) != stated) {
         return fault(ctx, BST_WIRE_BAD_CRC, "its checksum is wrong");
     }
     t = (text){bytes, bytes + count, false};

@@ -30,6 +30,7 @@ typedef struct copy {
     size_t bytes;
 } copy;
 
+/* Copies pieces of a frame's pixels; run in parallel. */
 static void copy_pieces(void *user, int begin, int end) {
     const copy *c = user;
     for (int i = begin; i < end; i++) {
@@ -38,6 +39,7 @@ static void copy_pieces(void *user, int begin, int end) {
     }
 }
 
+/* Maps the shared memory of the frames; the owner allocates it. */
 static bst_status map(bst_ctx *ctx, bst_shared_frames *f, int fd) {
     size_t bytes = f->slot_bytes * (size_t)f->slots;
     struct stat about;
@@ -62,6 +64,7 @@ static bst_status map(bst_ctx *ctx, bst_shared_frames *f, int fd) {
     return BST_OK;
 }
 
+/* Creates the shared memory of the simulation, or opens it as a peer. */
 static bst_status make(bst_ctx *ctx, bst_shared_frames *made, bst_shared_frames **out) {
     bst_shared_frames *f = malloc(sizeof *f);
     if (!f) {
@@ -152,6 +155,7 @@ int64_t bst_shared_frames_next(const bst_shared_frames *f) {
     return f->next;
 }
 
+/* Memory of the frame slot with this number. */
 static unsigned char *slot_of(const bst_shared_frames *f, int64_t number) {
     return f->memory + (size_t)(number % f->slots) * f->slot_bytes;
 }

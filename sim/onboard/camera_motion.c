@@ -9,6 +9,7 @@ typedef struct moments {
     bst_vec3 zeroth, first, second; /* integrals of r, t r and t^2 r */
 } moments;
 
+/* Adds a linear piece of the camera's rotation to its time moments. */
 static void add_segment(moments *m, double t0, double t1, bst_vec3 r0, bst_vec3 r1) {
     double h = t1 - t0;
     bst_vec3 mean = bst_vec3_scale(bst_vec3_add(r0, r1), 0.5);
@@ -35,6 +36,7 @@ typedef struct roughness {
     double sum;     /* sum of squares about x and y */
 } roughness;
 
+/* Adds a pointing sample to the estimate of its noise by third differences. */
 static void add_sample(roughness *s, double step, bst_vec3 r) {
     s->run = s->run > 0 && fabs(step - s->step) > 0.5 ? 1 : s->run;
     s->step = step;
@@ -53,6 +55,7 @@ static void add_sample(roughness *s, double step, bst_vec3 r) {
 /* minimum number of third differences for a noise estimate */
 enum { FEWEST_DIFFERENCES = 5 };
 
+/* Shrinks the estimated curvature of the motion by its noise. */
 static void judge_bend(const roughness *s, double samples, bst_camera_motion *motion) {
     if (s->count < FEWEST_DIFFERENCES) {
         return;
@@ -162,6 +165,7 @@ void bst_camera_motion_bend(const bst_camera_motion *motion, const bst_camera *c
 /* possible error of a measured or commanded curvature, as a fraction */
 static const double BEND_LEFT = 0.05;
 
+/* Adds a displacement to the covariance of a detection. */
 static void widen(double x, double y, bst_detection *d) {
     d->cov_xx += x * x;
     d->cov_xy += x * y;

@@ -32,6 +32,7 @@ static void know_psf(bst_camera *c, double given_fwhm_px, const bst_psf **psf) {
     c->optics = (bst_optics_config){.vignetting = c->optics.vignetting};
 }
 
+/* Applies the calibration errors to the camera model known on board. */
 static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *errors,
                                bst_knowledge *k) {
     bst_camera *c = &k->camera;
@@ -174,10 +175,12 @@ static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, doub
     return bst_world_cue_nominal_direction(ctx, k->world, &at, out);
 }
 
+/* Rotation error of the cue; none for a task's target. */
 static bst_quat error_of(const bst_knowledge_view *view) {
     return view->tasked ? (bst_quat){0.0, 0.0, 0.0, 1.0} : view->cue_error;
 }
 
+/* Nominal cue direction at a full second, cached. */
 static const bst_onboard_cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
     bst_onboard_cue_knot *knot =
         &view->knots[((second % BST_CUE_KNOTS) + BST_CUE_KNOTS) % BST_CUE_KNOTS];

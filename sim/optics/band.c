@@ -83,6 +83,7 @@ static table preset_table(int preset) {
     }
 }
 
+/* Interpolated spectral response at a wavelength; 0 outside the table. */
 static double table_at(const bst_optics_response_point *points, int count, double wavelength_um) {
     if (count == 0 || wavelength_um < points[0].wavelength_um ||
         wavelength_um > points[count - 1].wavelength_um) {
@@ -148,6 +149,7 @@ double bst_optics_star_spectrum_k(double b_minus_v) {
         fmin(fmax(colour, COLOUR_FIRST), COLOUR_FIRST + (COLOURS - 1) * COLOUR_STEP));
 }
 
+/* Adds quadrature nodes for a wavelength interval. */
 static bst_status add_panel(bst_ctx *ctx, quadrature *q, double from_m, double to_m) {
     int pieces = (int)ceil((to_m - from_m) / (PANEL_SHARE * from_m));
     for (int p = 0; p < pieces; p++) {
@@ -248,6 +250,7 @@ static void add_sunlight(bst_band *band, double wavelength_m, double light) {
     band->sun_share[k + 1] += u * light;
 }
 
+/* Computes the mean wavelength of the band and its response to sunlight. */
 static bst_status prepare(bst_ctx *ctx, bst_band *band) {
     BST_TRY(make_rule(ctx, band));
     const quadrature *q = &band->rule;

@@ -4,10 +4,12 @@
 /* tolerance of redundant values: data sheets have three digits or more */
 static const double AGREES = 1e-3;
 
+/* True if two values of a camera parameter agree. */
 static bool agree(double a, double b) {
     return fabs(a - b) <= AGREES * fmax(fabs(a), fabs(b));
 }
 
+/* Fails: two settings of the camera give different values. */
 static bst_status contradict(bst_ctx *ctx, const char *first, double a, const char *second,
                              double b, const char *unit) {
     return bst_fail(

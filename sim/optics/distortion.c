@@ -59,6 +59,7 @@ static int roots(const double *c, int degree, double most, double *out) {
     return count;
 }
 
+/* Radial distortion factor at a squared radius. */
 static double radial(const bst_camera_distortion *d, double s) {
     return 1.0 + s * (d->k1 + s * (d->k2 + s * d->k3));
 }
@@ -66,6 +67,7 @@ static double radial_slope(const bst_camera_distortion *d, double s) {
     return 1.0 + s * (3.0 * d->k1 + s * (5.0 * d->k2 + s * 7.0 * d->k3));
 }
 
+/* Applies radial and tangential distortion to tangent-plane coordinates. */
 static plane distort(const bst_camera_distortion *d, plane u) {
     double s = u.x * u.x + u.y * u.y, l = radial(d, s), xy = 2.0 * u.x * u.y;
     return (plane){u.x * l + d->p1 * xy + d->p2 * (s + 2.0 * u.x * u.x),
@@ -137,6 +139,7 @@ static plane undistort(const bst_camera *c, plane target) {
     return u;
 }
 
+/* Rotates coordinates by the camera's rotation angle. */
 static plane to_focal(const bst_camera *c, double a, double b) {
     double cs = c->geometry.cos_rotation, sn = c->geometry.sin_rotation;
     return (plane){cs * a + sn * b, cs * b - sn * a};
@@ -238,6 +241,7 @@ void bst_camera_field_px(const bst_camera *c, double *width_px, double *height_p
     *height_px = 2.0 * half_y / scale;
 }
 
+/* Pixel position of corner i of the sensor. */
 static void corner(const bst_camera *c, int i, double *x, double *y) {
     *x = i & 1 ? (double)c->width_px - 0.5 : -0.5;
     *y = i & 2 ? (double)c->height_px - 0.5 : -0.5;

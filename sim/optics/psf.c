@@ -116,6 +116,7 @@ static double squared_shares(double sigma) {
     return erf(1.0 / (s * sqrt(2.0))) + 2.0 * s / sqrt(2.0 * BST_PI) * expm1(-0.5 / (s * s));
 }
 
+/* FWHM in px of the Gaussian with the same noise area as the PSF. */
 static double equivalent_fwhm(const bst_psf *psf, int node) {
     double want = 1.0 / sqrt(bst_psf_noise_area_px2(psf, node));
     double low = 0.1 / FWHM_PER_SIGMA, high = 1e3;
@@ -197,6 +198,7 @@ void bst_psf_free(bst_psf *psf) {
 
 /* ------------------------------------------------------------------ making */
 
+/* Makes the OTF of a Moffat profile. */
 static bst_status make_moffat(bst_ctx *ctx, bst_psf_node *node, double fwhm_px, double beta) {
     double alpha = 0.5 * fwhm_px / sqrt(exp2(1.0 / beta) - 1.0);
     /* the OTF decreases at least as (pi alpha f)^(beta - 1.5) exp(-2 pi alpha f), for large beta as
@@ -264,6 +266,7 @@ static void widen(bst_psf *psf, double sigma_px) {
     }
 }
 
+/* Makes the PSF nodes of the camera by its PSF model. */
 static bst_status fill_in(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
                           bst_psf *psf) {
     switch (camera->optics.psf) {

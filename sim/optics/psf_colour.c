@@ -89,6 +89,7 @@ static void shares_of(const anchors *a, const double moments[C], double out[C]) 
     }
 }
 
+/* Computes the moments of the anchor spectra, relative to the Sun's. */
 static void make_anchors(const bst_psf_rule *rule, anchors *a) {
     double photons[BST_PSF_WAVELENGTHS], moments[C];
     for (int s = 0; s < BST_PSF_SPECTRA; s++) {

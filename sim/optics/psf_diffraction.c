@@ -88,6 +88,7 @@ static bst_status make_spectrum(bst_ctx *ctx, bool solar, band *b, int s) {
     return BST_OK;
 }
 
+/* Chooses the wavelengths and weights of the band. */
 static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
                             const bst_psf_spectrum *spectrum, int spectra, band *b) {
     const bst_optics_config *o = &camera->optics;
@@ -173,6 +174,7 @@ static bst_status make_wavefront(bst_ctx *ctx, const bst_optics_config *o,
     return BST_OK;
 }
 
+/* True if the wavefront has a non-zero coefficient. */
 static bool aberrated(const bst_zernike_polynomial *w) {
     for (int p = 0; p <= BST_ZERNIKE_DEGREE; p++) {
         for (int q = 0; q <= BST_ZERNIKE_DEGREE; q++) {
@@ -218,6 +220,7 @@ static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *
     return BST_OK;
 }
 
+/* Creates the OTF tables of all spectra. */
 static bst_status create_tables(bst_ctx *ctx, const band *b, grid g, tables out) {
     for (int s = 0; s < b->spectra; s++) {
         BST_TRY(bst_optics_grid_otf_create(ctx, g.step, g.reach, out[s]));
@@ -252,6 +255,7 @@ static bst_status make_node(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil 
     return BST_OK;
 }
 
+/* Computes OTF tables of an aberrated or vaned pupil at each field node. */
 static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band *b,
                               bst_pupil pupil, bst_psf *psf) {
     const bst_optics_config *o = &camera->optics;

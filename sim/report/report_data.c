@@ -121,6 +121,7 @@ static bst_report_frame *add_frame(reading *r, int64_t id, double mid_s) {
     return f;
 }
 
+/* Stores a row of the table tasks: start time and target of a surveillance task. */
 static bst_status take_task(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     if ((r->task_count & (r->task_count - 1)) == 0) { /* doubles the capacity */
         task *more = realloc(r->tasks, (r->task_count ? 2 * r->task_count : 1) * sizeof *more);
@@ -190,6 +191,7 @@ static const char exposures_sql[] =
     " CAST(end_tick AS REAL) / (SELECT tick_rate_hz FROM run)"
     " FROM exposures WHERE sensor = ?1";
 
+/* Fills a report frame from a row of the table exposures, with geometry from the world. */
 static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     bst_report_frame *f = add_frame(r, bst_io_rows_int(rows, 0), bst_io_rows_real(rows, 1));
     if (!f) {
@@ -227,6 +229,7 @@ static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_io_rows *row
     return look(ctx, r, f, q, bst_io_rows_real(rows, 17));
 }
 
+/* Adds a report frame with exposure number and time only, for runs without exposures. */
 static bst_status take_frame(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
     add_frame(r, bst_io_rows_int(rows, 0), bst_io_rows_real(rows, 1));
@@ -329,6 +332,7 @@ static int64_t find_object(const bst_run_reader *run, const char *name) {
 
 /* ------------------------------------------------------------------ image processing, modes */
 
+/* Stores the number of detections and identified stars of a frame. */
 static bst_status take_detections(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
     bst_report_frame *f = find(r, bst_io_rows_int(rows, 0));
@@ -339,6 +343,7 @@ static bst_status take_detections(bst_ctx *ctx, reading *r, const bst_io_rows *r
     return BST_OK;
 }
 
+/* Appends a change of the controller's mode; rows of the same mode are skipped. */
 static bst_status take_mode(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     bst_report_sensor *s = r->out;
     int mode = -1;
@@ -360,6 +365,7 @@ static bst_status take_mode(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     return BST_OK;
 }
 
+/* Sets the controller's mode of each report frame. */
 static void spread_modes(bst_report_sensor *s) {
     size_t k = 0;
     for (size_t i = 0; i < s->count && s->mode_count > 0; i++) {
@@ -383,6 +389,7 @@ static void spread_tasks(const reading *r) {
 
 /* ------------------------------------------------------------------ all of it */
 
+/* Stores width, height and pixel scale of the sensor. */
 static bst_status take_size(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     (void)ctx;
     r->out->width_px = bst_io_rows_int(rows, 0);
@@ -395,6 +402,7 @@ static bst_status take_size(bst_ctx *ctx, reading *r, const bst_io_rows *rows) {
     "exposure_id, x_mid_px, y_mid_px, in_field, snr, occulted, sunlit_fraction, v_mag, range_m," \
     " phase_deg, ra_deg, dec_deg, id FROM truth WHERE sensor = ?1 AND kind = 'object'"
 
+/* Reads everything the report needs about a sensor: frames, truth, detections, modes, tracks. */
 static bst_status read_all(bst_ctx *ctx, reading *r) {
     bst_report_sensor *s = r->out;
     bool missing;

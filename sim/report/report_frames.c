@@ -34,6 +34,7 @@ typedef struct part {
     double marks; /* size of the marks, 1: normal */
 } part;
 
+/* Embeds a part of the frame in the SVG as a grey PNG. */
 static bst_status put_pixels(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
                              bst_io_stretch stretch, const part *p, int width, int height) {
     bst_picture *picture;
@@ -90,6 +91,7 @@ static void put_mark(FILE *out, bst_io_overlay_kind kind, double x, double y, do
             kind == BST_OVERLAY_STAR || kind == BST_OVERLAY_REST ? ".7" : "1.2");
 }
 
+/* True if the mark is a detection, identified star or source at rest among stars. */
 static bool is_detection(const bst_io_overlay_mark *m) {
     return m->kind == BST_OVERLAY_STAR || m->kind == BST_OVERLAY_REST ||
            m->kind == BST_OVERLAY_DETECTION;
@@ -102,6 +104,7 @@ static bool find_mark(const bst_io_overlay_mark *m, const part *p, double *x, do
     return *x > -20.0 && *y > -20.0 && *x < p->width + 20.0 && *y < p->height + 20.0;
 }
 
+/* Writes the label of a mark next to it. */
 static void put_label(FILE *out, const bst_io_overlay_mark *m, const part *p, double x, double y) {
     /* next to the mark; on its other side near the edge of the frame */
     bool left = x > p->width - 110.0;
@@ -203,6 +206,7 @@ typedef struct shown {
     int detections, drawn;
 } shown;
 
+/* Writes one frame as SVG: picture, marks, inset around the target, and facts. */
 static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
                             const bst_io_overlay *overlay, const bst_report_frame *facts,
                             bool tracked, shown *marks) {
@@ -274,6 +278,7 @@ static int choose(const bst_report_sensor *s, const int64_t *ids, int64_t frames
     return (int)count;
 }
 
+/* The report frame of an exposure; NULL: none. */
 static const bst_report_frame *facts_of(const bst_report_sensor *s, int64_t exposure_id) {
     for (size_t i = 0; i < s->count; i++) {
         if (s->frames[i].exposure_id == exposure_id) {
@@ -283,6 +288,7 @@ static const bst_report_frame *facts_of(const bst_report_sensor *s, int64_t expo
     return NULL;
 }
 
+/* Writes the legend and the selected frames of a sensor. */
 static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s,
                              bst_fits_reader *fits, bst_frame_marks *marks, int64_t *ids) {
     int64_t frames = bst_fits_reader_info(fits)->frames, chosen[SHOWN];

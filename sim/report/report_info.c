@@ -397,7 +397,7 @@ static void print_figures(const char *name, const cJSON *summary) {
 
 static void print_tables(const cJSON *info, bool columns) {
     const cJSON *table, *column;
-    printf("tables%s\n", columns ? "" : " (--columns tells what each holds)");
+    printf("tables%s\n", columns ? "" : " (--columns lists their columns)");
     cJSON_ArrayForEach(table, bst_json_member(info, "tables")) {
         printf("  %-18s %10.0f rows %4d columns  %s\n", bst_json_member_text(table, "name", ""),
                bst_json_member_number(table, "rows"),

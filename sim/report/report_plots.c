@@ -208,6 +208,7 @@ static void describe(char text[200], double rms, double median, double p95, doub
     "Pointing error: angle from the boresight to the target's true apparent direction at " \
     "mid-exposure, in pixels of the boresight."
 
+/* Draws the radial pointing error over time. */
 static void plot_pointing(const bst_report_drawing *d) {
     size_t n = d->sensor->count;
     double low = INFINITY, high = -INFINITY;
@@ -246,6 +247,7 @@ static void plot_pointing(const bst_report_drawing *d) {
     bst_report_page_figure_end(d->out, f->pointing_frames > 0 ? caption : POINTING_ERROR);
 }
 
+/* Draws the pointing error along columns and rows over time. */
 static void plot_axes(const bst_report_drawing *d) {
     size_t n = d->sensor->count, count = 0;
     size_t seen = bst_report_fill(d, pointing_x, d->y);
@@ -288,6 +290,7 @@ static void plot_axes(const bst_report_drawing *d) {
     "Track of interest against the target's true direction, at mid-exposure, and the root " \
     "of the trace of its covariance."
 
+/* Draws the error of the track of interest and its stated sigma over time. */
 static void plot_track(const bst_report_drawing *d) {
     size_t n = d->sensor->count;
     double low = INFINITY, high = -INFINITY;
@@ -321,6 +324,7 @@ static void plot_track(const bst_report_drawing *d) {
     bst_report_page_figure_end(d->out, caption);
 }
 
+/* Draws the NEES of the track of interest over time, with its 95 % bounds. */
 static void plot_nees(const bst_report_drawing *d) {
     /* chi-square with 2 degrees of freedom: -2 ln(upper tail) */
     const double lower = -2.0 * log(0.975), upper = -2.0 * log(0.025);
@@ -355,6 +359,7 @@ static void plot_nees(const bst_report_drawing *d) {
     bst_report_page_figure_end(d->out, caption);
 }
 
+/* Draws the true and the measured SNR of the target over time. */
 static void plot_snr(const bst_report_drawing *d) {
     size_t n = d->sensor->count;
     double low = INFINITY, high = -INFINITY;
@@ -382,6 +387,7 @@ static void plot_snr(const bst_report_drawing *d) {
     bst_report_page_figure_end(d->out, "Signal-to-noise ratio of the target.");
 }
 
+/* Draws the number of detections per frame over time. */
 static void plot_detections(const bst_report_drawing *d) {
     size_t n = d->sensor->count;
     double low = 0.0, high = -INFINITY, words[3];
@@ -416,12 +422,14 @@ static void plot_detections(const bst_report_drawing *d) {
     bst_report_page_figure_end(d->out, caption);
 }
 
+/* Density of the normal distribution; `user`: mean and sigma. */
 static double normal(double x, const void *user) {
     const double *p = user; /* mean, sigma */
     double u = (x - p[0]) / p[1];
     return exp(-0.5 * u * u) / (p[1] * sqrt(2.0 * BST_PI));
 }
 
+/* Density of the chi-square distribution with 2 degrees of freedom. */
 static double chi_square_2(double x, const void *user) {
     (void)user;
     return 0.5 * exp(-0.5 * x);
@@ -460,6 +468,7 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
     bst_report_page_figure_end(d->out, caption);
 }
 
+/* Draws histograms of the pointing error per axis and of the NEES. */
 static void plot_histograms(const bst_report_drawing *d) {
     bst_report_page_grid(d->out, BST_PAGE_THIRD);
     histogram_of_axis(d, pointing_x, "pointing error in x, px", BST_CHART_BLUE);

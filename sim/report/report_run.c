@@ -34,6 +34,7 @@ static const cJSON *summary_of(const page *p, int i) {
 
 /* ------------------------------------------------------------------ reading */
 
+/* Simulated duration of the run in s; of a run that ended early, up to its last tick. */
 static double span_of(const bst_run_reader *run) {
     const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
     double rate = bst_json_member_number(scenario, "tick_rate_hz"),
@@ -53,6 +54,7 @@ static double span_of(const bst_run_reader *run) {
     return rate > 0.0 ? (last + 1.0) / rate : whole;
 }
 
+/* Reads the sensors of the run with the data of their report. */
 static bst_status read_sensors(bst_ctx *ctx, page *p) {
     int count = 0;
     bst_ctx unheard = {0};
@@ -77,6 +79,7 @@ static bst_status read_sensors(bst_ctx *ctx, page *p) {
 
 /* ------------------------------------------------------------------ the head */
 
+/* Writes the run's state, folder and description. */
 static void put_head(const page *p) {
     static const char *const classes[] = {[BST_RUN_COMPLETE] = "good",
                                           [BST_RUN_INTERRUPTED] = "bad",
@@ -97,6 +100,7 @@ static void put_head(const page *p) {
     }
 }
 
+/* Writes rows with the UTC of start and end and the duration of the run. */
 static void put_times(const page *p) {
     const cJSON *scenario = bst_run_reader_scenario(p->run);
     bst_time epoch;
@@ -117,6 +121,7 @@ static void put_times(const page *p) {
     }
 }
 
+/* Writes rows with the scenario's objects and catalogues. */
 static void put_objects(const page *p) {
     const cJSON *world = bst_json_member(bst_run_reader_scenario(p->run), "world"),
                 *objects = bst_json_member(world, "objects"), *object;
@@ -192,6 +197,7 @@ static int64_t count_of(const page *p, const char *sql, int sensor) {
     return bst_run_reader_int(p->run, sql, p->sensors[sensor].sensor.index, 0);
 }
 
+/* Writes the key figures of a sensor: custody, acquisition, pointing, detections, speed. */
 static void put_cards(const page *p, int i) {
     const bst_report_sensor *s = &p->sensors[i];
     const bst_loop_figures *f = &s->loop;

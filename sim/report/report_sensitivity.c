@@ -18,6 +18,7 @@ typedef struct effect {
     double at[2], value[2];
 } effect;
 
+/* The swept axis of the study with this name; NULL: none. */
 static const bst_report_study_axis_view *axis_of(const bst_report_study_view *v, const char *name) {
     for (int i = 0; i < v->axis_count; i++) {
         if (v->axes[i].swept && strcmp(v->axes[i].name, name) == 0) {
@@ -63,12 +64,14 @@ static double low_of(const effect *e) {
     return isfinite(e->error) ? fmax(0.0, e->size - 1.96 * e->error) : e->size;
 }
 
+/* Upper limit of the 95 % interval of an effect. */
 static double high_of(const effect *e) {
     return isfinite(e->error) ? e->size + 1.96 * e->error : e->size;
 }
 
 /* ------------------------------------------------------------------ morris */
 
+/* Labels the rows of a chart with rank and name of the study axes. */
 static void put_row_names(const bst_chart *c, const effect *list, int count) {
     for (int i = 0; i < count; i++) {
         char text[80];
@@ -77,6 +80,7 @@ static void put_row_names(const bst_chart *c, const effect *list, int count) {
     }
 }
 
+/* Draws the ranked elementary effects (mu*) on a metric, and sigma against mu*. */
 static void put_morris(FILE *out, const bst_report_study_metric_view *m, const effect *list,
                        int count) {
     char label[128], text[160];
@@ -220,6 +224,7 @@ static void put_tornado(FILE *out, const bst_report_study_metric_view *m, const 
 
 /* ------------------------------------------------------------------ both */
 
+/* Draws the sensitivity chart of one metric: Morris effects, or tornado. */
 static bst_status put_metric(bst_ctx *ctx, FILE *out, const bst_report_study_view *v,
                              const bst_report_study_metric_view *m, const char *table,
                              bool morris) {
@@ -238,6 +243,7 @@ static bst_status put_metric(bst_ctx *ctx, FILE *out, const bst_report_study_vie
     return BST_OK;
 }
 
+/* True if a swept axis of the study belongs to this sampling design. */
 static bool has_design(const bst_report_study_view *v, const char *design) {
     for (int i = 0; i < v->axis_count; i++) {
         if (v->axes[i].swept && strcmp(v->axes[i].design, design) == 0) {

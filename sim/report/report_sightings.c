@@ -23,10 +23,12 @@ static double number_of(const cJSON *node, const char *key) {
     return cJSON_IsNumber(item) ? item->valuedouble : NAN;
 }
 
+/* Chart colour of a sensor; grey beyond the number of named sensors. */
 static int colour_of(int64_t sensor) {
     return sensor >= 0 && sensor < SENSORS ? (int)sensor : BST_CHART_GREY;
 }
 
+/* Reads the names "observer/sensor" of the run's sensors. */
 static bst_status read_names(bst_ctx *ctx, const bst_run_reader *run, sensor_names *out) {
     bst_io_rows *rows;
     bst_status status;
@@ -58,6 +60,7 @@ static void put_legend(FILE *out, const sensor_names *names, bst_chart_key key, 
 
 /* ------------------------------------------------------------------ figures */
 
+/* Writes the key figures of surveillance: objects and passes seen, revisit time, custody. */
 static void put_cards(FILE *out, const bst_run_reader *run) {
     const cJSON *f = cJSON_GetObjectItemCaseSensitive(bst_run_reader_manifest(run), "sightings");
     char text[32], note[120], more[32];
@@ -115,6 +118,7 @@ static bst_status choose(bst_ctx *ctx, const bst_run_reader *run, int64_t object
     return status;
 }
 
+/* Draws an object's passes through the fields of view as bars in its row of the timeline. */
 static bst_status put_passes(bst_ctx *ctx, const bst_chart *c, const bst_run_reader *run,
                              const sensor_names *names, int64_t object, int row, double unit_s) {
     bst_io_rows *rows;
@@ -141,6 +145,7 @@ static bst_status put_passes(bst_ctx *ctx, const bst_chart *c, const bst_run_rea
     return status;
 }
 
+/* Draws the timeline of passes of the objects with most detections. */
 static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
                                const sensor_names *names, double span_s) {
     int64_t objects[ROWS];
@@ -214,6 +219,7 @@ static bst_status put_count(bst_ctx *ctx, bst_chart *c, const bst_run_reader *ru
     return status;
 }
 
+/* Draws the cumulative number of detected objects over time, per sensor and in total. */
 static bst_status put_counts(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
                              const sensor_names *names, double span_s) {
     size_t room =

@@ -11,6 +11,7 @@
 /* Maximum rows of tables; metrics in the table of settings. */
 enum { MOST_SETTINGS = 200, MOST_FAILED = 50, MOST_WORST = 8, COLUMNS = 6 };
 
+/* Writes an HTML table cell; `number` aligns it right. */
 static void put_cell(FILE *out, bool number, const char *text) {
     fputs(number ? "<td class=\"n\">" : "<td>", out);
     bst_html_text(out, text);
@@ -35,6 +36,7 @@ static const bst_report_study_metric_view *find_metric(const bst_report_study_vi
     return NULL;
 }
 
+/* Number of runs of the study with a finite value of the metric. */
 static int64_t numbers_of(const bst_report_study_view *v, const bst_report_study_metric_view *m) {
     int64_t n = 0;
     for (int64_t r = 0; r < v->runs; r++) {
@@ -43,6 +45,7 @@ static int64_t numbers_of(const bst_report_study_view *v, const bst_report_study
     return n;
 }
 
+/* Collects the study's warnings: missing or failed runs, and runs without acquisition. */
 static void gather_warnings(const bst_report_study_view *v, bst_report_warnings *w) {
     int64_t failed = 0, done = 0;
     char text[BST_COUNT_TEXT];
@@ -179,6 +182,7 @@ static void put_identity(FILE *out, const bst_report_study_view *v) {
 
 /* ------------------------------------------------------------------ figures of all runs */
 
+/* Writes the table of statistics of each metric over all runs of the study. */
 static bst_status put_overall(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
     bst_io_rows *rows;
     bst_status status;
@@ -225,6 +229,7 @@ static bst_status put_overall(bst_ctx *ctx, FILE *out, const bst_report_study_vi
 
 /* ------------------------------------------------------------------ settings */
 
+/* Writes the table row of one setting: axis values, metric means and 95 % intervals. */
 static void put_setting(FILE *out, const bst_report_study_view *v, int64_t i, const int *metrics,
                         int count) {
     char text[32], ends[2][32], cell[120];
@@ -250,6 +255,7 @@ static void put_setting(FILE *out, const bst_report_study_view *v, int64_t i, co
     fputs("</tr>\n", out);
 }
 
+/* Writes the table of the study's settings. */
 static void put_settings(FILE *out, const bst_report_study_view *v) {
     int metrics[COLUMNS], count = bst_report_study_key_metrics(v, metrics, COLUMNS);
     if (v->settings < 2) {
@@ -289,6 +295,7 @@ static void put_settings(FILE *out, const bst_report_study_view *v) {
 /* ------------------------------------------------------------------ runs that ask to be looked at
  */
 
+/* Writes the table of failed runs, grouped by error message. */
 static bst_status put_failed(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
     bst_io_rows *rows;
     bst_status status;
@@ -326,6 +333,7 @@ typedef struct ranked {
     int64_t row;
 } ranked;
 
+/* Comparison for qsort: largest badness first, then row. */
 static int worst_first(const void *a, const void *b) {
     const ranked *x = a, *y = b;
     return x->badness != y->badness ? (x->badness < y->badness) - (x->badness > y->badness)
@@ -427,6 +435,7 @@ static void put_range_card(FILE *out, const bst_report_study_view *v,
     }
 }
 
+/* Writes the key figures of the study: number of runs and metric means. */
 static void put_cards(FILE *out, const bst_report_study_view *v) {
     char text[32], note[120];
     int metrics[COLUMNS], count = bst_report_study_key_metrics(v, metrics, 5);

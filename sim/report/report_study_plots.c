@@ -226,8 +226,8 @@ void bst_report_study_plot_axes(FILE *out, const bst_report_study_view *v) {
     for (int i = 0; i < v->axis_count; i++) {
         const bst_report_study_axis_view *a = &v->axes[i];
         /* these designs are shown by their effects */
-        bool told = strcmp(a->design, "morris") != 0 && strcmp(a->design, "one_at_a_time") != 0;
-        swept += a->swept && a->level_count > 1 && told;
+        bool plotted = strcmp(a->design, "morris") != 0 && strcmp(a->design, "one_at_a_time") != 0;
+        swept += a->swept && a->level_count > 1 && plotted;
     }
     if (swept == 0 || v->settings < 2) {
         return;

@@ -12,6 +12,7 @@
 
 /* ------------------------------------------------------------------ how it ended */
 
+/* Adds warnings about a run that did not complete, its error and its logged warnings. */
 static void add_end(const bst_run_reader *run, bst_report_warnings *w) {
     const cJSON *manifest = bst_run_reader_manifest(run),
                 *error = bst_json_member(manifest, "error");
@@ -46,12 +47,14 @@ typedef struct sensor_warnings {
     bst_report_warnings *warnings;
 } sensor_warnings;
 
+/* Adds a warning about lost data, prefixed with the sensor's name. */
 static void add_loss(void *user, bst_run_severity severity, const char *text) {
     const sensor_warnings *s = user;
     bst_report_warnings_add(s->warnings, severity, "%s%s%s.", s->name ? s->name : "",
                             s->name ? ": " : "", text);
 }
 
+/* Adds warnings about data losses of each sensor and of the run's counters. */
 static void add_losses(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
                        bst_report_warnings *w) {
     for (int i = 0; i < count; i++) {
@@ -71,6 +74,7 @@ static void add_losses(const bst_run_reader *run, const bst_report_sensor *senso
 
 /* ------------------------------------------------------------------ summaries */
 
+/* Adds warnings about acquisition, settling, custody and mode of a sensor's tracking loop. */
 static void judge_sensor(const bst_report_sensor *s, bool complete, bst_report_warnings *w) {
     const bst_loop_figures *f = &s->loop;
     bool acquired = isfinite(f->time_to_acquire_s);
@@ -112,6 +116,7 @@ static void judge_sensor(const bst_report_sensor *s, bool complete, bst_report_w
     }
 }
 
+/* Adds the tracking-loop warnings of each sensor that has a target and tracks. */
 static void add_summaries(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
                           bst_report_warnings *w) {
     bool complete = bst_run_reader_state(run) == BST_RUN_COMPLETE;
@@ -143,6 +148,7 @@ static void count_rows(const bst_run_reader *run, const bst_report_sensor *senso
     }
 }
 
+/* Adds warnings from telemetry and exposures: stuck axes, limits, radiation hits. */
 static void add_tables(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
                        bst_report_warnings *w) {
     static const struct {
@@ -177,6 +183,7 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
 
 /* ------------------------------------------------------------------ events */
 
+/* Adds one warning per kind of event of the run. */
 static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
     static const struct {
         const char *kind;
@@ -232,6 +239,7 @@ static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
 
 /* ------------------------------------------------------------------ margins */
 
+/* Log callback: adds a message of the design-margin check as a warning. */
 static void hear(void *user, bst_log_level level, const char *message) {
     (void)level;
     bst_report_warnings_add(user, BST_SEVERITY_WARNING, "%s.", message);

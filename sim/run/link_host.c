@@ -44,6 +44,7 @@ struct bst_link_host {
     const char *keys_file;
 };
 
+/* Frame operation: the pixels of a received frame. */
 static bst_status map_frame(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
     (void)ctx;
     *pixels = ((host_frame *)owner)->pixels;
@@ -52,6 +53,7 @@ static bst_status map_frame(void *owner, bst_ctx *ctx, const uint16_t **pixels) 
 static void unmap_frame(void *owner) {
     (void)owner;
 }
+/* Frame operation: marks a received frame's buffer as free. */
 static void recycle_frame(void *owner) {
     ((host_frame *)owner)->busy = false;
 }
@@ -60,6 +62,7 @@ static const bst_frame_ops frame_ops = {
 
 /* ---- the module that writes what has come ---- */
 
+/* Module interface: the source module uses the link host itself as its state. */
 static bst_status source_create(const bst_module_env *env, const void *config, void **self) {
     (void)env;
     *self = *(void *const *)config;
@@ -69,6 +72,7 @@ static void source_destroy(void *self) {
     (void)self;
 }
 
+/* Writes received pointing samples into the ring of the telemetry channel. */
 static void write_ring(bst_pointing_telemetry *ring, const bst_link_pointing_telemetry *t) {
     ring->capacity = RING;
     ring->q_body_from_gcrf = t->q_body_from_gcrf;
@@ -80,6 +84,7 @@ static void write_ring(bst_pointing_telemetry *ring, const bst_link_pointing_tel
     ring->written = t->first + t->count;
 }
 
+/* Module step: publishes the received messages on the channels of the hosted module. */
 static bst_status source_step(void *self, struct bst_step *step) {
     bst_link_host *host = self;
     for (int i = 0; i < host->pending_count; i++) {
@@ -117,6 +122,7 @@ static bst_status source_step(void *self, struct bst_step *step) {
 
 /* ---- what the module writes ---- */
 
+/* Observer of the engine: copies an output of the hosted module for the link. */
 static bst_status on_message(void *user, const char *scope, const char *channel,
                              const void *payload, int64_t tick) {
     bst_link_host *host = user;
@@ -145,6 +151,7 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     return BST_OK;
 }
 
+/* Lists the hosted module's outputs, and its inputs as ports of the source module. */
 static void find_ports(bst_link_host *host) {
     const bst_module_desc *desc = host->module->desc;
     for (int p = 0; p < desc->port_count && p < MOST_PORTS; p++) {
@@ -165,6 +172,7 @@ static void find_ports(bst_link_host *host) {
     }
 }
 
+/* Finds the module of the scenario that the link part names. */
 static bst_status find_part(bst_ctx *ctx, bst_link_host *host, const char *part) {
     const bst_observer_config *observers = host->scenario->observers.items;
     for (int m = 0; m < host->scenario->module_count && !host->module; m++) {
@@ -193,6 +201,7 @@ static bst_status find_part(bst_ctx *ctx, bst_link_host *host, const char *part)
     return BST_OK;
 }
 
+/* Creates a simulation of the hosted module and the source module alone. */
 static bst_status make(bst_ctx *ctx, bst_link_host *host, const char *part, int threads) {
     BST_TRY(find_part(ctx, host, part));
     host->source = (bst_module_desc){.abi = BST_MODULE_ABI,
@@ -298,6 +307,7 @@ static bst_status keep(bst_ctx *ctx, bst_link_host *host, const bst_link_receive
     return BST_OK;
 }
 
+/* Discards received inputs and frees their frames. */
 static void forget_inputs(bst_link_host *host) {
     for (int i = 0; i < host->pending_count; i++) {
         if (host->pending[i].frame) {
@@ -307,6 +317,7 @@ static void forget_inputs(bst_link_host *host) {
     host->pending_count = 0;
 }
 
+/* Steps the hosted module and sends its outputs; repeats them if the step was answered before. */
 static bst_status answer(bst_ctx *ctx, bst_link_host *host, bst_link_peer *peer,
                          const bst_link_header *step) {
     if (step->step != host->step) {
@@ -330,6 +341,7 @@ static bst_status answer(bst_ctx *ctx, bst_link_host *host, bst_link_peer *peer,
     return bst_link_peer_send(ctx, peer, BST_LINK_DONE, &done, step);
 }
 
+/* Checks that tick rate and period of the simulation match the scenario here. */
 static bst_status check_welcome(bst_ctx *ctx, const bst_link_host *host,
                                 const bst_link_welcome *welcome) {
     bst_log(ctx, BST_LOG_INFO, "link: plays %s of \"%s\"", host->instance, welcome->scenario);
@@ -367,6 +379,7 @@ static bst_status receive(bst_ctx *ctx, bst_link_peer *peer, double timeout_s, b
     }
 }
 
+/* Handles messages of the simulation until it sends `end`. */
 static bst_status play(bst_ctx *ctx, bst_link_host *host, bst_link_peer *peer, double timeout_s,
                        bool (*stop)(void), int *reason) {
     bst_link_received got;

@@ -49,12 +49,14 @@ static const kind kinds[] = {
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
+/* Counter of lost data at a byte offset of the struct. */
 static int64_t get(const bst_run_losses *losses, size_t at) {
     int64_t value;
     memcpy(&value, (const char *)losses + at, sizeof value);
     return value;
 }
 
+/* Sets the counter at a byte offset of the struct. */
 static void set(bst_run_losses *losses, size_t at, int64_t value) {
     memcpy((char *)losses + at, &value, sizeof value);
 }
@@ -170,6 +172,7 @@ void bst_run_losses_add(cJSON *manifest, const char *sensor, const bst_run_losse
     }
 }
 
+/* Count stored in the manifest; 0: none or invalid. */
 static int64_t count_of(const cJSON *node, const char *key) {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(node, key);
     return cJSON_IsNumber(item) && item->valuedouble >= 0.0 && item->valuedouble < 1e15

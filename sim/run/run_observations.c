@@ -227,6 +227,7 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_io_rows *rows) {
     return BST_OK;
 }
 
+/* Passes a finished track of observations to the callback. */
 static bst_status hand_over(bst_ctx *ctx, gathering *g, bst_run_track_fn take, void *user) {
     g->track.items = g->items;
     set_shared(g);

@@ -66,6 +66,7 @@ void bst_run_pictures_free(bst_run_pictures *p) {
     }
 }
 
+/* Copies the pixels of a frame for the quick-look picture. */
 static bst_status copy_frame(bst_ctx *ctx, bst_run_pictures *p, const bst_frame_message *m) {
     if (!m->frame) {
         return BST_OK;
@@ -101,6 +102,7 @@ static double pixel_of(const picture *pic, double place_px, int first) {
     return (place_px - first - middle) / pic->binning;
 }
 
+/* Marks the true centroid of the target in the picture. */
 static void mark_truth(const bst_run_pictures *p, picture *pic, const bst_truth *truth) {
     for (int i = 0; i < truth->count; i++) {
         const bst_truth_item *item = &truth->items[i];
@@ -113,6 +115,7 @@ static void mark_truth(const bst_run_pictures *p, picture *pic, const bst_truth 
     }
 }
 
+/* Marks the detections in the picture. */
 static bst_status mark_detections(bst_ctx *ctx, picture *pic, const bst_detections *detections) {
     if (detections->count > pic->mark_room) {
         bst_io_mark *more = realloc(pic->marks, (size_t)detections->count * sizeof *more);
@@ -235,6 +238,7 @@ typedef struct panel_text {
     char time[80];
 } panel_text;
 
+/* Describes a picture as a panel of the quick-look image. */
 static bst_quicklook_frame panel(const bst_run_pictures *p, const picture *pic, const char *title,
                                  panel_text *text) {
     double seconds = (double)pic->mid_tick / p->rate_hz;

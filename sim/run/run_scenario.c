@@ -57,6 +57,7 @@ typedef struct run_state {
     double started, shown; /* wall seconds */
 } run_state;
 
+/* The state of the sensor with this scope "observer/sensor". */
 static watched_sensor *find_sensor(run_state *run, const char *scope) {
     watched_sensor *sensor = run->sensors;
     while (strcmp(sensor->scope, scope) != 0) {
@@ -84,6 +85,7 @@ static bool wants(void *user, const char *scope, const char *channel, const void
     return bst_run_wants(mark->of, run->recorder, payload, tick, mark);
 }
 
+/* Feeds a channel message to the sensor's tracking-loop summary and metrics. */
 static bst_status judge(run_state *run, watched_sensor *sensor, const char *channel,
                         const void *payload, int64_t tick) {
     if (strcmp(channel, BST_CHANNEL_TRUTH) == 0) {
@@ -107,6 +109,7 @@ static bst_status judge(run_state *run, watched_sensor *sensor, const char *chan
     return BST_OK;
 }
 
+/* Observer of the engine: records, draws and evaluates a channel message. */
 static bst_status on_message(void *user, const char *scope, const char *channel,
                              const void *payload, int64_t tick) {
     run_state *run = user;
@@ -126,6 +129,7 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     return status;
 }
 
+/* Observer of the engine: records an event. */
 static bst_status on_event(void *user, int64_t tick, const char *instance, const char *kind,
                            const char *text) {
     run_state *run = user;
@@ -134,6 +138,7 @@ static bst_status on_event(void *user, int64_t tick, const char *instance, const
                : BST_OK;
 }
 
+/* Receives each evaluated frame for metrics and pictures. */
 static void on_judged(void *user, const bst_loop_frame *frame) {
     watched_sensor *sensor = user;
     bst_run_metrics_frame(sensor->metrics, frame);
@@ -142,6 +147,7 @@ static void on_judged(void *user, const bst_loop_frame *frame) {
     }
 }
 
+/* Prints the progress line on standard error, at most 5 times a second. */
 static void show_progress(run_state *run, int64_t tick, bool last) {
     double now = bst_wall_seconds();
     if (!run->progress || (!last && now - run->shown < 0.2)) {
@@ -176,6 +182,7 @@ static void show_progress(run_state *run, int64_t tick, bool last) {
     fflush(stderr);
 }
 
+/* Stop callback of the engine: true on a stop request or after the wall time limit. */
 static bool interrupted(void *user, int64_t tick) {
     run_state *run = user;
     show_progress(run, tick, false);
@@ -183,12 +190,14 @@ static bool interrupted(void *user, int64_t tick) {
     return run->cut || bst_stop_requested();
 }
 
+/* Copies the figures of a sensor. */
 static void get_figures(const watched_sensor *sensor, bst_run_sensor_figures *out) {
     snprintf(out->scope, sizeof out->scope, "%s", sensor->scope);
     bst_loop_summary_figures(sensor->summary, &out->loop);
     bst_run_metrics_figures(sensor->metrics, &out->metrics);
 }
 
+/* Summary of a sensor for the manifest. */
 static cJSON *summary_of(const watched_sensor *sensor, double real_time_factor) {
     bst_run_sensor_figures figures;
     get_figures(sensor, &figures);
@@ -303,6 +312,7 @@ static void print_losses(const run_state *run, bst_simulation *sim) {
     }
 }
 
+/* Prints the summary table of the run. */
 static void print_table(const run_state *run, bst_simulation *sim, const char *out, double wall) {
     double simulated = (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
                        (double)run->scenario->tick_rate_hz;
@@ -319,6 +329,7 @@ static void print_table(const run_state *run, bst_simulation *sim, const char *o
     printf("  %-28s %s\n", "results", out);
 }
 
+/* Creates summary, metrics and pictures for every sensor of the scenario. */
 static bst_status watch_sensors(run_state *run, const bst_world *world,
                                 const bst_run_request *request) {
     const bst_observer_config *observers = run->scenario->observers.items;
@@ -353,6 +364,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world,
     return BST_OK;
 }
 
+/* True if the sensor has an active module of this role. */
 static bool has_module(const bst_scenario *scenario, int observer, int sensor, const char *role) {
     for (int i = 0; i < scenario->module_count; i++) {
         const bst_scenario_module_config *m = &scenario->modules[i];
@@ -364,6 +376,7 @@ static bool has_module(const bst_scenario *scenario, int observer, int sensor, c
     return false;
 }
 
+/* Opens the recorder with all sensors of the run. */
 static bst_status open_recorder(run_state *run, const bst_world *world, bst_run *store) {
     const bst_scenario *scenario = run->scenario;
     const bst_observer_config *observers = scenario->observers.items;
@@ -441,6 +454,7 @@ static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *sto
     return status == BST_OK ? written : status;
 }
 
+/* Simulated time so far in s. */
 static double seconds_run(const run_state *run, bst_simulation *sim) {
     return (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
            (double)run->scenario->tick_rate_hz;

@@ -31,17 +31,17 @@ struct bst_run_sightings {
 static const bst_io_column pass_columns[] = {
     INT("sensor", "", "row of the table sensors"),
     OBJECT,
-    REAL("start_s", "s", "first frame that it was in, middle, since the epoch"),
-    REAL("end_s", "s", "last frame that it was in"),
-    INT("frames", "", "frames that it was in, not behind the Earth"),
-    INT("lit", "", "frames with light of it"),
+    REAL("start_s", "s", "middle of the first frame with the object, since the epoch"),
+    REAL("end_s", "s", "the same of the last frame"),
+    INT("frames", "", "frames with the object in the field, not behind the Earth"),
+    INT("lit", "", "frames with light from the object"),
     INT("detected", "", "frames in which it was detected"),
-    INT("tracked", "", "frames in which a confirmed track was its"),
-    INT("target", "", "of these, that of the target of interest"),
+    INT("tracked", "", "frames with a confirmed track of the object"),
+    INT("target", "", "of these, with the track of interest"),
     REAL("first_s", "s", "first detection; NULL: none"),
     REAL("last_s", "s", "last detection"),
     REAL("snr", "", "greatest true signal to noise of a frame"),
-    REAL("v_mag", "mag", "brightness then"),
+    REAL("v_mag", "mag", "brightness in that frame"),
     REAL("range_m", "m", "shortest range"),
     ERRORS,
 };
@@ -49,18 +49,19 @@ static const bst_io_column pass_columns[] = {
 static const bst_io_column sum_columns[] = {
     INT("sensor", "", "row of the table sensors; NULL: all of them together"),
     OBJECT,
-    INT("passes", "", "times that it was in the field, parted by 60 s without it"),
-    INT("passes_seen", "", "those with a detection"),
-    INT("frames", "", "frames that it was in"),
-    INT("lit", "", "frames with light of it"),
+    INT("passes", "", "passes through the field, separated by 60 s or more outside"),
+    INT("passes_seen", "", "passes with a detection"),
+    INT("frames", "", "frames with the object in the field"),
+    INT("lit", "", "frames with light from the object"),
     INT("detected", "", "frames in which it was detected"),
-    INT("tracked", "", "frames in which a confirmed track was its"),
+    INT("tracked", "", "frames with a confirmed track of the object"),
     REAL("first_s", "s", "first detection; NULL: none"),
     REAL("last_s", "s", "last detection"),
-    INT("revisits", "", "times that it was detected again after more than 60 s"),
-    REAL("revisit_mean_s", "s", "mean time between two such detections"),
-    REAL("revisit_most_s", "s", "the longest"),
-    REAL("longest_gap_s", "s", "without a detection, from the start and to the end as well"),
+    INT("revisits", "", "detections after a gap of more than 60 s"),
+    REAL("revisit_mean_s", "s", "mean duration of these gaps"),
+    REAL("revisit_most_s", "s", "longest of these gaps"),
+    REAL("longest_gap_s", "s",
+         "longest time without a detection, including start and end of the run"),
     REAL("custody_s", "s",
          "object custody: time within record/custody_timeout_s after a detection"),
     REAL("custody_fraction", "", "the same over the run's length"),
@@ -82,6 +83,7 @@ static void put_real(row *r, double value) {
         (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !isfinite(value), .as.real = value};
 }
 
+/* Adds index, name and catalogue number of an object to the table row. */
 static void put_object(row *r, const bst_world *world, int object) {
     const bst_world_object_info *info = bst_world_object(world, object);
     put_int(r, object);
@@ -89,6 +91,7 @@ static void put_object(row *r, const bst_world *world, int object) {
     put_int(r, info->norad);
 }
 
+/* Adds RMS and maximum of the position and track errors to the table row. */
 static void put_errors(row *r, const bst_sighting_error *place, const bst_sighting_error *track) {
     put_real(r, bst_sighting_rms(place));
     put_real(r, place->count > 0 ? place->greatest : NAN);
@@ -96,6 +99,7 @@ static void put_errors(row *r, const bst_sighting_error *place, const bst_sighti
     put_real(r, track->count > 0 ? track->greatest : NAN);
 }
 
+/* Writes a pass of an object through a field of view to the table passes. */
 static bst_status take_pass(void *user, bst_ctx *ctx, const bst_eval_pass *p) {
     bst_run_sightings *s = user;
     row r = {.count = 0};
@@ -125,6 +129,7 @@ typedef struct summing {
     double end_s;
 } summing;
 
+/* Writes the sums of an object and sensor to the table sightings. */
 static bst_status take_sum(void *user, bst_ctx *ctx, const bst_sighting *sum) {
     const summing *u = user;
     row r = {.count = 0};
@@ -171,8 +176,9 @@ bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
     }
     if (status == BST_OK && store) {
         status = bst_io_table_create(
-            ctx, store, "sightings", "Who saw what: by object, of each sensor and of all together.",
-            sum_columns, sizeof sum_columns / sizeof *sum_columns, &s->sums);
+            ctx, store, "sightings",
+            "Sums over the passes of each object, per sensor and for all sensors.", sum_columns,
+            sizeof sum_columns / sizeof *sum_columns, &s->sums);
     }
     if (status != BST_OK) {
         bst_run_sightings_free(s);
@@ -251,6 +257,7 @@ void bst_run_sightings_add(const bst_run_sightings *s, cJSON *manifest) {
     cJSON_AddNumberToObject(node, "tasks_lost", (double)f.tasks_lost);
 }
 
+/* Prints a figure of the sightings with its unit. */
 static void print(const char *name, double value, const char *unit) {
     char text[48] = "-";
     if (isfinite(value)) {

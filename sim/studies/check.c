@@ -61,6 +61,7 @@ static bst_status check_metrics(bst_ctx *ctx, const bst_study *study, const bst_
     return BST_OK;
 }
 
+/* Checks the scenario of one run of the study; `deep`: with its files and references. */
 static bst_status check_run(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                             const bst_study_place *place, const bst_study_value *values,
                             const bst_study_population_probe *probe, bool deep) {
@@ -166,6 +167,7 @@ static bst_status try_probe(checker *c, const bst_study_place *place, const bst_
     return bst_fail_prefix(c->ctx, status, "%s: %s: %s", c->study->file, axis->where, value);
 }
 
+/* Checks the scenario at the extreme values of each dispersion of a population. */
 static bst_status try_objects(checker *c, const bst_study_place *place,
                               const bst_study_population *population, int index) {
     bst_status status = BST_OK;
@@ -245,6 +247,7 @@ static bst_status blame(checker *c, const bst_study_place *place) {
     return bst_fail_prefix(c->ctx, status, "%s: the first setting", study->file);
 }
 
+/* Checks a base scenario alone and at the extreme values of every axis and population. */
 static bst_status try_base(checker *c, const bst_study_place *place) {
     const bst_study *study = c->study;
     int64_t levels[BST_STUDY_AXES + 1];

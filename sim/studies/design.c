@@ -34,10 +34,12 @@ static bst_study_value at_unit(const bst_study_axis *axis, double unit) {
     return (bst_study_value){true, true, c->integer ? round(value) : value, NULL};
 }
 
+/* Number of values of a study axis. */
 static int64_t own_levels(const bst_study_axis *axis) {
     return axis->values ? axis->value_count : axis->axis->count;
 }
 
+/* Value of a study axis at a level. */
 static bst_study_value at_level(const bst_study_axis *axis, int64_t level) {
     if (axis->values) {
         return bst_study_listed(axis, level);
@@ -56,6 +58,7 @@ static bst_study_value at_place(const bst_study_axis *axis, double unit, int ste
                             (int64_t)fmin(steps ? round(unit * (n - 1.0)) : unit * n, n - 1.0));
 }
 
+/* Sets the axis values of a sweep for one level of its design. */
 static void factor_values(const bst_study *study, const bst_study_factor *f, int64_t level,
                           bst_study_value *out) {
     for (int a = 0; a < f->axis_count; a++) {

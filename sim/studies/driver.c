@@ -37,11 +37,13 @@ typedef struct driver {
     bool stopping;
 } driver;
 
+/* True if a run of the study is missing, not in progress and not given up. */
 static bool is_free(const driver *d, int64_t run) {
     return d->results->state[run] == BST_ROW_MISSING && !d->flying[run] &&
            d->attempts[run] < BST_DRIVER_ATTEMPTS;
 }
 
+/* Number of runs of the next shard, from the duration of a run; small after a lost attempt. */
 static int64_t wanted_runs(const driver *d, int attempts) {
     const bst_driver_options *o = d->options;
     int64_t missing = d->results->study->runs - d->results->done;
@@ -76,6 +78,7 @@ static bst_study_shard_job next_job(driver *d) {
     return job;
 }
 
+/* Records a shard as in progress. */
 static bst_status note_flight(bst_ctx *ctx, driver *d, const bst_study_shard_job *job) {
     if (d->flight_count == d->flight_room) {
         int64_t wanted = 2 * d->flight_room + 16;
@@ -92,6 +95,7 @@ static bst_status note_flight(bst_ctx *ctx, driver *d, const bst_study_shard_job
     return BST_OK;
 }
 
+/* Passes as many shards to the executor as it accepts. */
 static bst_status start_shards(bst_ctx *ctx, driver *d) {
     enum { BATCH = 256 };
     bst_study_shard_job jobs[BATCH];
@@ -155,6 +159,7 @@ static double mean_wall_s(const driver *d, const bst_study_shard_job *job) {
     return n > 0 ? fmax(sum / (double)n, 1e-6) : 0.0;
 }
 
+/* True if a run of the shard has no result row. */
 static bool has_missing(const driver *d, const bst_study_shard_job *job) {
     for (int64_t run = job->first; run < job->first + job->count; run++) {
         if (d->results->state[run] == BST_ROW_MISSING) {
@@ -164,6 +169,7 @@ static bool has_missing(const driver *d, const bst_study_shard_job *job) {
     return false;
 }
 
+/* Loads the rows of a shard that ended and counts the attempt if runs were lost. */
 static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index,
                             const bst_study_shard_news *news) {
     flight f = d->flights[index];
@@ -193,6 +199,7 @@ static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index,
     return BST_OK;
 }
 
+/* Handles one message of the executor: progress or end of a shard. */
 static bst_status take_news(bst_ctx *ctx, driver *d, const bst_study_shard_news *news) {
     for (int64_t i = 0; i < d->flight_count; i++) {
         flight *f = &d->flights[i];
@@ -212,6 +219,7 @@ static bst_status take_news(bst_ctx *ctx, driver *d, const bst_study_shard_news 
     return BST_OK;
 }
 
+/* Reports completed and failed runs, rate and remaining time of the study. */
 static void report_progress(const driver *d) {
     if (!d->options->progress) {
         return;
@@ -254,6 +262,7 @@ static bst_status await_news(bst_ctx *ctx, driver *d, bool *more) {
     return BST_OK;
 }
 
+/* Runs all shards of the study; on a stop request cancels them, after GRACE_S by force. */
 static bst_status drive(bst_ctx *ctx, driver *d) {
     const bst_study_kind *kind = d->options->kind;
     bool more = true, interrupted = false;

@@ -36,9 +36,10 @@ typedef struct pool {
 
 typedef struct reporter {
     int fd;
-    double told;
+    double reported_s; /* wall time of the last report */
 } reporter;
 
+/* Writes all bytes to a pipe between driver and worker; false: closed. */
 static bool send_bytes(int fd, const void *data, size_t bytes) {
     const char *at = data;
     while (bytes > 0) {
@@ -58,8 +59,8 @@ static bool send_bytes(int fd, const void *data, size_t bytes) {
 static void report(void *user, const bst_study_shard_news *news) {
     reporter *r = user;
     double now = bst_wall_seconds();
-    if (now - r->told >= 0.1) {
-        r->told = now;
+    if (now - r->reported_s >= 0.1) {
+        r->reported_s = now;
         if (!send_bytes(r->fd, news, sizeof *news)) {
             raise(SIGTERM);
         }
@@ -80,6 +81,7 @@ static bool receive(int fd, void *data, size_t bytes) {
     return true;
 }
 
+/* Main loop of a worker process: receives shards and executes their simulation runs. */
 static void work(const pool *p, int index, int in, int out) {
     const bst_local_pool_options *o = &p->options;
     bst_shard_worker worker = {
@@ -104,6 +106,7 @@ static void work(const pool *p, int index, int in, int out) {
 
 /* ------------------------------------------------------------------ the pool's side */
 
+/* Closes the driver's ends of a worker's pipes. */
 static void close_ends(pool_worker *w) {
     if (w->to >= 0) {
         close(w->to);
@@ -114,6 +117,7 @@ static void close_ends(pool_worker *w) {
     w->to = w->from = -1;
 }
 
+/* Starts a worker process connected by two pipes. */
 static bst_status fork_worker(bst_ctx *ctx, pool *p, int index) {
     pool_worker *w = &p->workers[index];
     int to[2], from[2];
@@ -166,6 +170,7 @@ static bst_status fork_worker(bst_ctx *ctx, pool *p, int index) {
     return BST_OK;
 }
 
+/* Number of idle workers. */
 static int64_t room(void *self) {
     const pool *p = self;
     int64_t n = 0;
@@ -175,6 +180,7 @@ static int64_t room(void *self) {
     return p->cancelled ? 0 : n;
 }
 
+/* Sends a shard to an idle worker; forks the worker at first use. */
 static bst_status start_one(bst_ctx *ctx, pool *p, const bst_study_shard_job *job) {
     for (int i = 0; i < p->count; i++) {
         pool_worker *w = &p->workers[i];
@@ -188,13 +194,15 @@ static bst_status start_one(bst_ctx *ctx, pool *p, const bst_study_shard_job *jo
         w->job = *job;
         /* the next poll notices a worker that has died */
         if (!send_bytes(w->to, job, sizeof *job) && errno != EPIPE) {
-            return bst_fail(ctx, BST_ERR_IO, "a worker cannot be told: %s", strerror(errno));
+            return bst_fail(ctx, BST_ERR_IO, "a shard cannot be sent to a worker: %s",
+                            strerror(errno));
         }
         return BST_OK;
     }
     return bst_fail(ctx, BST_ERR_STATE, "all workers are busy");
 }
 
+/* Executor interface: sends shards to the workers. */
 static bst_status start(bst_ctx *ctx, void *self, const bst_study_shard_job *jobs, int64_t count) {
     for (int64_t i = 0; i < count; i++) {
         BST_TRY(start_one(ctx, self, &jobs[i]));
@@ -220,6 +228,7 @@ static bool reap_worker(pool_worker *w, bst_study_shard_news *news) {
     return busy;
 }
 
+/* Executor interface: waits for messages of the workers. */
 static bst_status poll_workers(bst_ctx *ctx, void *self, int timeout_ms, bst_study_shard_news *news,
                                int capacity, int *count) {
     pool *p = self;
@@ -247,6 +256,7 @@ static bst_status poll_workers(bst_ctx *ctx, void *self, int timeout_ms, bst_stu
     return BST_OK;
 }
 
+/* Executor interface: stops all workers with SIGTERM, or SIGKILL if `now`. */
 static void cancel(void *self, bool now) {
     pool *p = self;
     p->cancelled = true;
@@ -257,6 +267,7 @@ static void cancel(void *self, bool now) {
     }
 }
 
+/* Executor interface: ends all workers, after 10 s by SIGKILL, and frees the pool. */
 static void close_pool(void *self) {
     pool *p = self;
     const struct timespec pause = {0, 5000000};

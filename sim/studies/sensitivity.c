@@ -30,6 +30,7 @@ static double setting_value(const bst_results *r, int metric, int64_t setting) {
     return n == 0 ? NAN : metric < 0 ? least : sum / (double)n;
 }
 
+/* Adds the magnitude and the signed value of an effect; NAN is skipped. */
 static void add(sums *s, double magnitude, double value) {
     if (isnan(magnitude) || isnan(value)) {
         return;
@@ -63,6 +64,7 @@ static void add_paths(const bst_results *r, const bst_study_factor *f, int metri
     }
 }
 
+/* Adds the effect of each axis of a one_at_a_time sweep: range and end-to-end difference. */
 static void add_axes(const bst_results *r, const bst_study_factor *f, int metric, int64_t first,
                      int64_t stride, sums *list) {
     double own = setting_value(r, metric, first);
@@ -129,6 +131,7 @@ void bst_sensitivity_of(const bst_results *r, int factor, int metric, bst_sensit
 
 /* ------------------------------------------------------------------ tables */
 
+/* Writes the ranked effects of a sweep's axes on one metric. */
 static bst_status put_figure(bst_ctx *ctx, const bst_results *r, int factor, int metric,
                              bst_table_out *t) {
     const bst_study_factor *f = &r->study->factors[factor];
@@ -153,17 +156,19 @@ static bst_status put_figure(bst_ctx *ctx, const bst_results *r, int factor, int
     return BST_OK;
 }
 
+/* True if the sampling design yields effects: morris or one_at_a_time. */
 static bool has_effects(const bst_study_factor *f) {
     return f->design == BST_SWEEP_MORRIS || f->design == BST_SWEEP_ONE_AT_A_TIME;
 }
 
+/* Writes the table sensitivity, or speed_sensitivity if `speed`. */
 static bst_status write_table(bst_ctx *ctx, const bst_tables_job *j, const char *name,
                               const char *doc, bool speed) {
     static const bst_io_column columns[] = {
         {"sweep", BST_COLUMN_INT, "", "Number of the sweep in the study."},
         {"design", BST_COLUMN_TEXT, "", "morris or one_at_a_time."},
         {"metric", BST_COLUMN_TEXT, "", "The figure."},
-        {"rank", BST_COLUMN_INT, "", "1: the axis that matters most for it."},
+        {"rank", BST_COLUMN_INT, "", "1: the axis with the largest effect."},
         {"axis", BST_COLUMN_TEXT, "", "Name of the axis."},
         {"effect", BST_COLUMN_REAL, "",
          "Change of the figure over the axis' range: mean magnitude of elementary effects "
@@ -171,8 +176,9 @@ static bst_status write_table(bst_ctx *ctx, const bst_tables_job *j, const char 
         {"effect_error", BST_COLUMN_REAL, "", "Its standard error."},
         {"mean_effect", BST_COLUMN_REAL, "", "The same with its sign."},
         {"spread", BST_COLUMN_REAL, "",
-         "Standard deviation of the effects: curvature, or other axes having a say."},
-        {"effects", BST_COLUMN_INT, "", "Effects that it was worked out from."}};
+         "Standard deviation of the effects: large if the effect is nonlinear or depends on other "
+         "axes."},
+        {"effects", BST_COLUMN_INT, "", "Number of effects averaged."}};
     const bst_study *s = j->results->study;
     bst_table_out t;
     const bst_table_design design = {name, doc, columns, 10, true};

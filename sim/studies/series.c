@@ -8,6 +8,7 @@
 
 enum { MOST_KEYS = 4096 };
 
+/* Writes the table of all series rows of all runs. */
 static bst_status write_rows(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_results *r = j->results;
     const bst_study_kind *kind = r->kind;
@@ -44,6 +45,7 @@ typedef struct keyed {
     int64_t counts[BST_SERIES_COLUMNS];
 } keyed;
 
+/* Adds a series row to the sums of its key. */
 static void add_row(const bst_study_kind *kind, const double *row, keyed *list, int *count) {
     int k = 0, key_column = 0;
     while (key_column < kind->series_count - 1 && kind->series[key_column].kind != BST_METRIC_KEY) {
@@ -88,6 +90,7 @@ static int statistics_columns(const bst_study_kind *kind, bst_io_column *columns
     return n;
 }
 
+/* Writes the statistics of one key of a setting. */
 static bst_status put_keyed(bst_ctx *ctx, const bst_study_kind *kind, int64_t setting,
                             const keyed *k, bst_table_out *t) {
     bst_io_value row[4 * BST_SERIES_COLUMNS];
@@ -117,6 +120,7 @@ static int compare_keys(const void *a, const void *b) {
     return (x->key > y->key) - (x->key < y->key);
 }
 
+/* Writes the series statistics of each setting, by key. */
 static bst_status put_settings(bst_ctx *ctx, const bst_tables_job *j, keyed *list,
                                bst_table_out *t) {
     const bst_results *r = j->results;

@@ -68,7 +68,8 @@ static void take_state(void *user, const char *line) {
     }
 }
 
-static bst_status look(bst_ctx *ctx, bst_slurm *s) {
+/* Asks squeue for the state of the study's tasks; fails after patience_s without answer. */
+static bst_status query_queue(bst_ctx *ctx, bst_slurm *s) {
     for (int64_t i = 0; i < s->count; i++) {
         s->tasks[i].seen = false;
     }
@@ -127,6 +128,7 @@ static bool has_ended(const bst_slurm *s, const bst_slurm_task *t, int *code, ch
     return good;
 }
 
+/* Cancels the study's jobs: "running" (SIGTERM), "pending" or "all". */
 static void scancel(const bst_slurm *s, const char *which) {
     char name[64];
     snprintf(name, sizeof name, "--name=%s", s->name);
@@ -144,6 +146,7 @@ static void scancel(const bst_slurm *s, const char *which) {
     (void)ignored;
 }
 
+/* Cancels one task of a job array. */
 static void cancel_task(const bst_slurm *s, const bst_slurm_task *t) {
     char job[48];
     snprintf(job, sizeof job, "%lld_%lld", (long long)t->array, (long long)t->index);
@@ -170,8 +173,8 @@ static void add_log(const bst_slurm *s, const bst_slurm_task *t, char text[BST_S
 }
 
 /* Makes the news of a task; false: none. */
-static bool tell(const bst_slurm *s, const bst_slurm_task *t, double now,
-                 bst_study_shard_news *news) {
+static bool task_news(const bst_slurm *s, const bst_slurm_task *t, double now,
+                      bst_study_shard_news *news) {
     *news = (bst_study_shard_news){.id = t->job.id, .runs_done = -1, .runs_failed = -1};
     int code;
     char node[64];
@@ -210,28 +213,31 @@ static bool tell(const bst_slurm *s, const bst_slurm_task *t, double now,
     return false;
 }
 
-static int tell_all(bst_slurm *s, bst_study_shard_news *news, int capacity) {
+/* Collects the news of all tasks; removes tasks that have ended. */
+static int collect_news(bst_slurm *s, bst_study_shard_news *news, int capacity) {
     double now = bst_wall_seconds();
-    int told = 0;
+    int collected = 0;
     int64_t kept = 0;
     for (int64_t i = 0; i < s->count; i++) {
-        if (told < capacity && tell(s, &s->tasks[i], now, &news[told])) {
-            told++;
+        if (collected < capacity && task_news(s, &s->tasks[i], now, &news[collected])) {
+            collected++;
         } else {
             s->tasks[kept++] = s->tasks[i];
         }
     }
     s->count = kept;
-    return told;
+    return collected;
 }
 
 /* ---------------------------------------------------------------- the executor */
 
+/* Number of further tasks that the site's queue accepts. */
 static int64_t slurm_room(void *self) {
     const bst_slurm *s = self;
     return s->cancelled ? 0 : s->site.queue_size - s->count;
 }
 
+/* Executor interface: queues shards for the next submission. */
 static bst_status slurm_start(bst_ctx *ctx, void *self, const bst_study_shard_job *jobs,
                               int64_t count) {
     bst_slurm *s = self;
@@ -250,6 +256,7 @@ static bst_status slurm_start(bst_ctx *ctx, void *self, const bst_study_shard_jo
     return BST_OK;
 }
 
+/* Executor interface: submits waiting tasks and waits for news. */
 static bst_status slurm_poll(bst_ctx *ctx, void *self, int timeout_ms, bst_study_shard_news *news,
                              int capacity, int *count) {
     bst_slurm *s = self;
@@ -266,9 +273,9 @@ static bst_status slurm_poll(bst_ctx *ctx, void *self, int timeout_ms, bst_study
             BST_TRY(bst_slurm_submit(ctx, s));
         }
         if (look_now) {
-            BST_TRY(look(ctx, s));
+            BST_TRY(query_queue(ctx, s));
         }
-        *count = tell_all(s, news, capacity);
+        *count = collect_news(s, news, capacity);
         now = bst_wall_seconds();
         if (*count > 0 || now >= until) {
             return BST_OK;
@@ -280,6 +287,7 @@ static bst_status slurm_poll(bst_ctx *ctx, void *self, int timeout_ms, bst_study
     }
 }
 
+/* Executor interface: stops pending and running jobs; all at once if `now`. */
 static void slurm_cancel(void *self, bool now) {
     bst_slurm *s = self;
     s->cancelled = true;
@@ -312,6 +320,7 @@ static void slurm_close(void *self) {
     destroy(s);
 }
 
+/* Copies the command line of the worker program. */
 static bst_status copy_program(bst_ctx *ctx, bst_slurm *s, const char *const program[]) {
     size_t words = 0;
     while (program[words]) {
@@ -327,6 +336,7 @@ static bst_status copy_program(bst_ctx *ctx, bst_slurm *s, const char *const pro
     return s->program ? BST_OK : out_of_memory(ctx);
 }
 
+/* Makes the folder and job name of the study; cancels jobs of an earlier driver. */
 static bst_status prepare(bst_ctx *ctx, bst_slurm *s, const char *study_folder) {
     char full[BST_SLURM_PATH_BYTES];
     if (!realpath(study_folder, full)) {

@@ -155,7 +155,7 @@ const bst_config_desc bst_study_pd_table[] = {
              "Least distance between targets, their own length not counted."),
     BST_FORMER("apart_px", "min_separation_px"),
     BST_BOOL(bst_study_pd_config, known_rate, "false",
-             "The camera turns, and image processing is told."),
+             "The camera moves, and its motion is known to image processing."),
     BST_BOOL(bst_study_pd_config, stars, "false", "Keep the scenario's stars and sky."),
     BST_CONFIG_END};
 

@@ -73,6 +73,7 @@ typedef struct cube {
     bst_ctx *ctx;
 } cube;
 
+/* Reads the settings of a study of image cubes. */
 static bst_status read_settings(bst_ctx *ctx, const bst_study_run *run, bst_study_cubes_config *c) {
     BST_TRY(
         bst_config_read(ctx, run->study->json, run->settings, "/cubes", bst_study_cubes_table, c));
@@ -102,6 +103,7 @@ static int find_sensor(const bst_scenario *scenario, const char *wanted, int *ob
     return -1;
 }
 
+/* True if the scenario renders images for the sensor. */
 static bool renders(const bst_scenario *scenario, int observer, int sensor) {
     for (int m = 0; m < scenario->module_count; m++) {
         const bst_scenario_module_config *module = &scenario->modules[m];
@@ -181,6 +183,7 @@ static bst_status take_planes(cube *c, const bst_planes *p) {
     return bst_fits_write_plane(c->ctx, c->masks, &c->mask_frame, &plane, NULL);
 }
 
+/* Writes a frame with its labels, or keeps it until its truth arrives. */
 static bst_status take_frame(cube *c, const bst_frame_message *m) {
     int64_t rate = c->scenario->tick_rate_hz;
     c->mask_frame =

@@ -58,6 +58,7 @@ bool bst_study_stop_requested(void *user) {
     return bst_stop_requested();
 }
 
+/* True if a module of the scenario needs an OpenCL device. */
 static bool needs_device(const bst_scenario *scenario) {
     for (int m = 0; m < scenario->module_count; m++) {
         if (!scenario->modules[m].off &&
@@ -242,6 +243,7 @@ static const bst_study_metric metrics[ALL_METRICS] = {
 static const bst_study_metric series[METRICS + 1] = {
     METRIC_LIST, [METRICS] = {"sensor", "", "Number of the sensor.", BST_METRIC_KEY}};
 
+/* Copies the figures of a sensor to the metrics of the run. */
 static void fill(const bst_run_sensor_figures *f, double *out) {
     const bst_loop_figures *l = &f->loop;
     const bst_run_metric_figures *m = &f->metrics;

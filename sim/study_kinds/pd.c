@@ -75,6 +75,7 @@ static const bst_study_metric series[SERIES] = {
     [ERROR_PX] = {"error_rms_px", "px", "RMS error of location per axis.", 0},
 };
 
+/* Reads the settings of a study of detection probability. */
 static bst_status read_settings(bst_ctx *ctx, const bst_study_run *run, bst_study_pd_config *c) {
     const char *file = run->study->file;
     BST_TRY(bst_config_read(ctx, run->study->json, run->settings, "/pd", bst_study_pd_table, c));
@@ -195,6 +196,7 @@ static bst_status fill(bst_ctx *ctx, const bst_pd_scene *s, const bst_pd_result 
     return BST_OK;
 }
 
+/* Measures the detection probability of one run. */
 static bst_status measure(bst_ctx *ctx, const bst_scenario *scenario, const bst_pd_options *options,
                           bst_study_result *out) {
     bst_pd_scene *scene = calloc(1, sizeof *scene);

@@ -128,6 +128,7 @@ static void *grow(void *items, int64_t count, int64_t *capacity, size_t bytes) {
     return larger;
 }
 
+/* Adds an attitude of the camera to the frame updates; it must be a unit quaternion. */
 static bst_status add_node(reader *r, const char *key, double time_s, const double q[4]) {
     bst_frame_updates *u = r->out;
     double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -342,6 +343,7 @@ static bst_status read_json(reader *r) {
     return BST_OK;
 }
 
+/* Reads the frame updates of a sensor (boresight, window, object states per frame). */
 static bst_status make(bst_ctx *ctx, const bst_json *json, const bst_camera *camera,
                        const bst_exposure_config *exposure, bst_frame_updates **out) {
     reader r = {.ctx = ctx,
@@ -405,6 +407,7 @@ const bst_frame_update *bst_frame_updates_item(const bst_frame_updates *updates,
     return &updates->items[index];
 }
 
+/* Engine tick of a time. */
 static int64_t ticks(const bst_frame_cursor *cursor, double seconds) {
     return (int64_t)floor(seconds * cursor->tick_rate_hz + 0.5);
 }

@@ -33,6 +33,7 @@ static int compare_order(const void *a, const void *b) {
     return ((const candidate *)a)->order - ((const candidate *)b)->order;
 }
 
+/* Allocates the objects of the world and the index of their names. */
 static bst_status reserve(const bst_world_builder *b, int capacity) {
     bst_world *world = b->world;
     world->objects = calloc((size_t)capacity + 1, sizeof *world->objects);
@@ -56,6 +57,7 @@ static bst_status make_brightness(const bst_world_builder *b, const bst_brightne
     return BST_OK;
 }
 
+/* Builds the objects that the scenario lists. */
 static bst_status build_listed(const bst_world_builder *b, const bst_config_list *list) {
     bst_world *world = b->world;
     const bst_object_config *configs = list->items;
@@ -160,6 +162,7 @@ typedef struct catalogue_sets {
     int catalogues, total;
 } catalogue_sets;
 
+/* Loads the element sets of the scenario's catalogues. */
 static bst_status load_sets(const bst_world_builder *b, const bst_config_list *catalogues,
                             catalogue_sets *out) {
     const bst_catalogue_config *configs = catalogues->items;
@@ -178,6 +181,7 @@ static bst_status load_sets(const bst_world_builder *b, const bst_config_list *c
     return BST_OK;
 }
 
+/* Lists the element sets of all catalogues with their age at the epoch. */
 static bst_status list_candidates(const bst_world_builder *b, const bst_config_list *catalogues,
                                   const catalogue_sets *loaded, candidate *list) {
     int n = 0;
@@ -196,6 +200,7 @@ static bst_status list_candidates(const bst_world_builder *b, const bst_config_l
     return BST_OK;
 }
 
+/* Number of satellites in all constellations. */
 static int members_of(const bst_config_list *constellations) {
     const bst_constellation_config *list = constellations->items;
     int64_t count = 0;
@@ -241,6 +246,7 @@ static bst_status build_constellation(const bst_world_builder *b, int index) {
                                               "%s: /world/constellations/%d", b->scenario, index);
 }
 
+/* Builds listed objects, catalogue objects and constellations. */
 static bst_status build_all(const bst_world_builder *b, const bst_world_config *config,
                             const catalogue_sets *loaded, candidate *list, int *listed) {
     BST_TRY(

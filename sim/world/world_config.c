@@ -329,8 +329,8 @@ const bst_config_desc bst_sensor_config_table[] = {
                "What the onboard side knows otherwise than it is."),
     BST_ENUM(bst_sensor_config, observation_source, observation_sources, "\"image\"",
              "Where detections come from: a rendered image that is processed (image), or the "
-             "statistics of both without an image (generator): then the module obsgen stands in "
-             "for scenegen and imgproc, with their settings."),
+             "statistics of both without an image (generator): then the module obsgen replaces "
+             "scenegen and imgproc and uses their settings."),
     {.key = "modules",
      .type = BST_CONFIG_RAW,
      .doc = "The modules of this sensor by role: {\"gimbal\": {\"type\": ...}, ...}."},

@@ -300,12 +300,12 @@ static void what_is_said_twice(void **state) {
         int known;
     } cases[] = {
         {ONE("generator", IMAGES "\"obsgen\": {\"type\": \"fake\", \"sigma\": 4}"),
-         "/observers/0/sensors/0/modules/obsgen/sigma: said twice", 6},
+         "/observers/0/sensors/0/modules/obsgen/sigma: given twice", 6},
         {ONE("image", IMAGES "\"obsgen\": {\"type\": \"fake\", \"threshold\": 4}"),
          "it is the \"threshold\" of this sensor's imgproc", 6},
         {ONE("generator",
              IMAGES "\"obsgen\": {\"type\": \"fake\", \"delay_s\": {\"exposure\": 0.1}}"),
-         "modules/obsgen/delay_s: said twice", 6},
+         "modules/obsgen/delay_s: given twice", 6},
         {ONE("generator", ""), "observation_source: there is no module that generates observations",
          5},
     };

@@ -119,12 +119,12 @@ static void what_is_said_twice_is_refused(void **state) {
         SENSOR "/observation_source=generator",
         SENSOR "/modules/obsgen={\"type\": \"statistical\", \"star_limit_v_mag\": 12}"};
     refuse(twice, 2,
-           "/modules/obsgen/star_limit_v_mag: said twice (found 12; allowed: nothing here: it is "
+           "/modules/obsgen/star_limit_v_mag: given twice (found 12; allowed: nothing here: it is "
            "the \"star_limit_v_mag\" of this sensor's scenegen");
     const char *const delayed[] = {SENSOR
                                    "/modules/obsgen={\"type\": \"statistical\", \"delay_s\": "
                                    "{\"exposure\": 1}}"};
-    refuse(delayed, 1, "/modules/obsgen/delay_s: said twice");
+    refuse(delayed, 1, "/modules/obsgen/delay_s: given twice");
     const char *const unknown[] = {SENSOR "/observation_source=film"};
     refuse(unknown, 1, "/observation_source: ");
     const char *const file[] = {

@@ -10,15 +10,17 @@ typedef struct star_residual {
     double chi2;
 } star_residual;
 
-/* The identified stars of a frame. */
+/* The identified stars of a frame and their attitude residuals. */
 typedef struct star_set {
     const bst_camera *camera;
     bst_attitude_star *items;
     int count;
 } star_set;
 
-static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
-                     const bst_attitude_star *star, star_residual *out) {
+/* Residual of a star at an attitude, its derivative and weights; false if the star is behind the
+ * camera. */
+static bool star_residual_at(const bst_camera *camera, double extra_px2, bst_quat q,
+                             const bst_attitude_star *star, star_residual *out) {
     bst_vec3 v = bst_quat_rotate(q, star->apparent_gcrf);
     double x, y;
     if (!bst_camera_project(camera, v, &x, &y)) {
@@ -36,7 +38,7 @@ static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
     out->w[2] = cxx / det;
     out->chi2 = out->w[0] * out->r[0] * out->r[0] + 2 * out->w[1] * out->r[0] * out->r[1] +
                 out->w[2] * out->r[1] * out->r[1];
-    /* v turns by e x v; the pixel follows from a = vx / vz and b = vy / vz */
+    /* v rotates by e x v; the pixel is a function of a = vx / vz and b = vy / vz */
     double f = 1.0 / bst_camera_scale_rad(camera), a = v.x / v.z, b = v.y / v.z;
     const double ja[3] = {-a * b, 1 + a * a, -b}, jb[3] = {-(1 + b * b), a * b, a};
     double by_tangent[2][2];
@@ -50,13 +52,13 @@ static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
 
 typedef enum weighting { WEIGHT_CAUCHY, WEIGHT_GIVEN } weighting;
 
-/* One Gauss-Newton step; false when the normal matrix cannot be inverted. */
-static bool step(const star_set *stars, double extra_px2, weighting how, double scale2, bst_quat *q,
-                 double covariance[3][3], double *moved_rad) {
+/* One Gauss-Newton step of the attitude; false if the normal matrix is singular. */
+static bool attitude_step(const star_set *stars, double extra_px2, weighting how, double scale2,
+                          bst_quat *q, double covariance[3][3], double *moved_rad) {
     double n[3][3] = {{0}}, g[3] = {0};
     for (int i = 0; i < stars->count; i++) {
         star_residual s;
-        if (!evaluate(stars->camera, extra_px2, *q, &stars->items[i], &s)) {
+        if (!star_residual_at(stars->camera, extra_px2, *q, &stars->items[i], &s)) {
             continue;
         }
         double weight =
@@ -84,7 +86,8 @@ static bool step(const star_set *stars, double extra_px2, weighting how, double 
     return true;
 }
 
-/* Gives weight 1 to the stars within `limit`, 0 to the others; how many changed. */
+/* Selects the stars whose chi-square is within `limit` (weight 1, else 0); returns the number of
+ * changes. */
 static int select_stars(const star_set *stars, double extra_px2, double limit, bst_quat q,
                         int *used) {
     int changed = 0;
@@ -93,7 +96,7 @@ static int select_stars(const star_set *stars, double extra_px2, double limit, b
         star_residual s;
         bst_attitude_star *star = &stars->items[i];
         double weight =
-            evaluate(stars->camera, extra_px2, q, star, &s) && s.chi2 <= limit ? 1.0 : 0.0;
+            star_residual_at(stars->camera, extra_px2, q, star, &s) && s.chi2 <= limit ? 1.0 : 0.0;
         changed += weight != star->weight;
         star->weight = weight;
         *used += weight > 0.0;
@@ -106,7 +109,7 @@ static double mean_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     int n = 0;
     for (int i = 0; i < stars->count; i++) {
         star_residual s;
-        if (evaluate(stars->camera, extra_px2, q, &stars->items[i], &s)) {
+        if (star_residual_at(stars->camera, extra_px2, q, &stars->items[i], &s)) {
             sum += s.chi2;
             n++;
         }
@@ -114,17 +117,17 @@ static double mean_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     return n > 0 ? sum / n : 0.0;
 }
 
-/* The variance per axis that is missing from what all stars state. */
+/* Limits of the excess variance per axis that the stars' covariances lack. */
 enum { FEWEST_FOR_EXCESS = 6, BISECTIONS = 40 };
 static const double LARGEST_EXCESS_PX2 = 4.0;
 
-/* Median chi-square of the stars, by bisection: no memory, any order. */
+/* Median chi-square of the stars, by bisection: without memory, independent of order. */
 static double median_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     double low = 0.0, high = 1e6;
     for (int i = 0; i < stars->count; i++) {
         star_residual s;
         bst_attitude_star *star = &stars->items[i];
-        star->weight = evaluate(stars->camera, extra_px2, q, star, &s) ? s.chi2 : INFINITY;
+        star->weight = star_residual_at(stars->camera, extra_px2, q, star, &s) ? s.chi2 : INFINITY;
     }
     for (int k = 0; k < 60; k++) {
         double middle = 0.5 * (low + high);
@@ -137,8 +140,8 @@ static double median_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     return high;
 }
 
-/* From the median, which misidentified stars hardly move: 0 when it lies within three standard
- * errors of what it should be, ln 4. */
+/* Excess variance from the median chi-square, which misidentified stars hardly affect; 0 if the
+ * median lies within three standard errors of its expectation ln 4. */
 static double excess_of_median(const star_set *stars, double floor_px2, bst_quat q) {
     const double right = log(4.0), error = 2.0 / sqrt((double)stars->count);
     if (stars->count < FEWEST_FOR_EXCESS || median_chi2(stars, floor_px2, q) <= right + error) {
@@ -152,20 +155,21 @@ static double excess_of_median(const star_set *stars, double floor_px2, bst_quat
     return high;
 }
 
+/* Sum of chi-square over the stars used. */
 static double total_chi2(const star_set *stars, double extra_px2, bst_quat q) {
     double sum = 0.0;
     for (int i = 0; i < stars->count; i++) {
         star_residual s;
         const bst_attitude_star *star = &stars->items[i];
-        if (star->weight > 0.0 && evaluate(stars->camera, extra_px2, q, star, &s)) {
+        if (star->weight > 0.0 && star_residual_at(stars->camera, extra_px2, q, star, &s)) {
             sum += s.chi2;
         }
     }
     return sum;
 }
 
-/* From the sum over the stars that are used (Paule and Mandel, J. Res. NBS 87, 1982): 0 when it is
- * below its 99.9 % quantile (Wilson and Hilferty 1931). */
+/* Excess variance from the sum of chi-square over the stars used (Paule and Mandel, J. Res. NBS 87,
+ * 1982); 0 if the sum is below its 99.9 % quantile (Wilson and Hilferty 1931). */
 static double excess_of_sum(const star_set *stars, double floor_px2, bst_quat q, int dof) {
     double spread = 2.0 / (9.0 * dof), root = 1.0 - spread + 3.09 * sqrt(spread);
     if (dof < 2 * FEWEST_FOR_EXCESS - 3 ||
@@ -180,21 +184,23 @@ static double excess_of_sum(const star_set *stars, double floor_px2, bst_quat q,
     return high;
 }
 
-/* Iterations are bounded by what the scales need: each halves, from at most 1e6 sigma. */
+/* Limits of the iterations: each annealing step halves the scale, from at most 1e6 sigma. */
 enum { MAX_ANNEAL = 24, MAX_RESELECT = 8, MAX_NEWTON = 6 };
 
-static bool solve(const star_set *stars, const bst_attitude_params *params, bst_quat *q,
-                  double covariance[3][3], int *used, double *extra_px2) {
+/* Robust attitude solution: annealed Cauchy weights, rejection, then least squares. */
+static bool solve_robust(const star_set *stars, const bst_attitude_params *params, bst_quat *q,
+                         double covariance[3][3], int *used, double *extra_px2) {
     const double floor_px2 = params->floor_px * params->floor_px;
     double moved, scale2 = fmax(mean_chi2(stars, floor_px2, *q), 4.0);
     for (int i = 0; i < MAX_ANNEAL; i++) {
-        if (!step(stars, floor_px2, WEIGHT_CAUCHY, scale2, q, covariance, &moved)) {
+        if (!attitude_step(stars, floor_px2, WEIGHT_CAUCHY, scale2, q, covariance, &moved)) {
             return false;
         }
         if (scale2 <= 4.0 && moved < 1e-9) {
             break;
         }
-        /* a common shift of all stars leaves at the first step: follow what remains */
+        /* the first step removes a common shift of all stars; the scale then follows the remaining
+         * misfit */
         double now = mean_chi2(stars, floor_px2, *q);
         scale2 = fmax(fmin(0.25 * scale2, now), 4.0);
     }
@@ -210,7 +216,7 @@ static bool solve(const star_set *stars, const bst_attitude_params *params, bst_
             return false;
         }
         for (int k = 0; k < MAX_NEWTON; k++) {
-            if (!step(stars, *extra_px2, WEIGHT_GIVEN, 1.0, q, covariance, &moved)) {
+            if (!attitude_step(stars, *extra_px2, WEIGHT_GIVEN, 1.0, q, covariance, &moved)) {
                 return false;
             }
             if (moved < 1e-12) {
@@ -219,12 +225,12 @@ static bool solve(const star_set *stars, const bst_attitude_params *params, bst_
         }
         *extra_px2 = floor_px2 + excess_of_sum(stars, floor_px2, *q, 2 * *used - 3);
     }
-    return *used >= 2 && step(stars, *extra_px2, WEIGHT_GIVEN, 1.0, q, covariance, &moved);
+    return *used >= 2 && attitude_step(stars, *extra_px2, WEIGHT_GIVEN, 1.0, q, covariance, &moved);
 }
 
-/* What a star does to the attitude. */
-static void measure_pull(const star_residual *s, const double covariance[3][3],
-                         bst_attitude_star *star) {
+/* Influence of a star on the attitude: its pull and leverage. */
+static void star_influence(const star_residual *s, const double covariance[3][3],
+                           bst_attitude_star *star) {
     double g[3], gain[3] = {0.0}, info[3][3];
     for (int k = 0; k < 3; k++) {
         double a = s->w[0] * s->j[0][k] + s->w[1] * s->j[1][k];
@@ -255,16 +261,16 @@ void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *par
     int used = 0;
     double extra_px2 = 0.0;
     const star_set set = {camera, stars, count};
-    if (!solve(&set, params, &q, out->covariance, &used, &extra_px2)) {
+    if (!solve_robust(&set, params, &q, out->covariance, &used, &extra_px2)) {
         return;
     }
     double square = 0.0;
     for (int i = 0; i < count; i++) {
         star_residual s;
-        if (stars[i].weight > 0.0 && evaluate(camera, extra_px2, q, &stars[i], &s)) {
+        if (stars[i].weight > 0.0 && star_residual_at(camera, extra_px2, q, &stars[i], &s)) {
             out->chi2 += s.chi2;
             square += s.r[0] * s.r[0] + s.r[1] * s.r[1];
-            measure_pull(&s, (const double(*)[3])out->covariance, &stars[i]);
+            star_influence(&s, (const double(*)[3])out->covariance, &stars[i]);
         }
     }
     out->q_cam_from_gcrf = q;

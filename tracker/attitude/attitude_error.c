@@ -32,16 +32,17 @@ void bst_attitude_error_predict(bst_attitude_error *filter, const bst_attitude_e
     }
 }
 
-/* out = m a m^T */
-static void turn(const bst_mat3 *m, const double a[3][3], double out[3][3]) {
+/* Rotates a 3 x 3 covariance: out = m a m^T. */
+static void rotate_covariance(const bst_mat3 *m, const double a[3][3], double out[3][3]) {
     bst_mat3 b;
     memcpy(b.m, a, sizeof b.m);
     bst_mat3 t = bst_mat3_transpose(m), left = bst_mat3_mul(m, &b), all = bst_mat3_mul(&left, &t);
     memcpy(out, all.m, sizeof all.m);
 }
 
-static void start(bst_attitude_error *filter, const bst_attitude_error_params *params,
-                  const double z[3], const double r[3][3]) {
+/* Initialises the attitude error filter with the first fix. */
+static void start_filter(bst_attitude_error *filter, const bst_attitude_error_params *params,
+                         const double z[3], const double r[3][3]) {
     memset(filter, 0, sizeof *filter);
     filter->started = true;
     filter->fixes = 1;
@@ -60,12 +61,12 @@ bool bst_attitude_error_update(bst_attitude_error *filter, const bst_attitude_er
     bst_mat3 gcrf_from_cam = bst_quat_to_mat3(bst_quat_conj(q_telemetry_from_gcrf));
     bst_vec3 e = bst_mat3_mul_vec(&gcrf_from_cam, e_cam_rad);
     double z[3] = {e.x, e.y, e.z}, r[3][3], s[3][3], inverse[3][3];
-    turn(&gcrf_from_cam, covariance_cam, r);
+    rotate_covariance(&gcrf_from_cam, covariance_cam, r);
     for (int i = 0; i < 3; i++) {
         r[i][i] += params->jitter_rad * params->jitter_rad;
     }
     if (!filter->started) {
-        start(filter, params, z, r);
+        start_filter(filter, params, z, r);
         return true;
     }
     double(*p)[6] = filter->p, nu[3], chi2 = 0.0;
@@ -82,12 +83,13 @@ bool bst_attitude_error_update(bst_attitude_error *filter, const bst_attitude_er
         }
     }
     if (!invertible || chi2 > params->gate_chi2) {
-        /* two fixes only define error and rate: what contradicts them is as likely to be right */
+        /* after two fixes error and rate are barely determined: a contradicting fix is as likely to
+         * be right */
         int patience = filter->fixes - 1;
         patience = patience < 1 ? 1 : patience;
         patience = patience < params->gate_patience ? patience : params->gate_patience;
         if (++filter->rejected_in_row >= patience) {
-            start(filter, params, z, r);
+            start_filter(filter, params, z, r);
             return true;
         }
         return false;
@@ -147,5 +149,5 @@ void bst_attitude_error_get(const bst_attitude_error *filter,
             p[i][i] += params->telemetry_sigma_rad * params->telemetry_sigma_rad;
         }
     }
-    turn(&cam_from_gcrf, p, covariance_cam);
+    rotate_covariance(&cam_from_gcrf, p, covariance_cam);
 }

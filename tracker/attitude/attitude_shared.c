@@ -3,11 +3,12 @@
 #include <math.h>
 
 enum { FEWEST_STARS = 4 };
-/* What is believed beforehand: 0.2 of the standard deviation, from tests/e2e/
- * test_orbit_consistency.py, with the weight of so many frames. */
+/* Prior of the ratio: 0.2 of the standard deviation (tests/e2e/test_orbit_consistency.py), with the
+ * weight of so many frames. */
 static const double PRIOR_SHARE = 0.04, PRIOR_FRAMES = 10.0;
 static const double MOST_FRAMES = 1000.0;
-/* Of a star: beyond it residuals show the others' errors, not its own. */
+/* Largest leverage of a star used in the correction: above it residuals mainly show the errors of
+ * other stars. */
 static const double MOST_LEVERAGE = 0.5;
 
 void bst_attitude_shared_update(bst_attitude_shared *shared, const bst_attitude_solution *solution,
@@ -29,7 +30,7 @@ void bst_attitude_shared_update(bst_attitude_shared *shared, const bst_attitude_
         bst_vec3 pull = bst_quat_rotate(back, (bst_vec3){s->pull_rad.x, s->pull_rad.y, 0.0});
         uint32_t slot = (s->id * 2654435761u >> 16) & (BST_ATTITUDE_SHARED_STARS - 1);
         if (shared->stars[slot].id == s->id && shared->stars[slot].frame == shared->frame - 1) {
-            /* the star pulls the mean after itself: residuals are smaller than errors */
+            /* a star pulls the mean towards itself, so residuals are smaller than errors */
             sum += bst_vec3_dot(pull, shared->stars[slot].pull_rad) /
                    (1.0 - fmin(s->leverage, MOST_LEVERAGE));
             again++;

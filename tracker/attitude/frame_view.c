@@ -1,4 +1,4 @@
-/* What one frame's view of the sky and the cue say of a track. */
+/* Queries of the multi-target tracker answered from a frame's attitude, cue and observer state. */
 #include <math.h>
 
 #include "sim/onboard/nav_motion.h"
@@ -31,7 +31,7 @@ bool bst_tracker_frame_is_expected(const void *user, const bst_mtt_track *track)
                                   track->id == t->target.id ? &t->target : NULL);
 }
 
-/* Range rates of orbits about the Earth, 1 sigma. */
+/* 1 sigma of the range rate of any orbit about the Earth. */
 static const double ANY_RANGE_RATE_MPS = 3000.0;
 
 bool bst_tracker_frame_range_of(const void *user, const bst_mtt_track *track,

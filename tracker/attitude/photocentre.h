@@ -1,4 +1,4 @@
-/* Where the image of a star that others melt into has its centroid. */
+/* Photocentre of a star blended with its neighbours. */
 #ifndef BST_TRACKER_ATTITUDE_PHOTOCENTRE_H
 #define BST_TRACKER_ATTITUDE_PHOTOCENTRE_H
 

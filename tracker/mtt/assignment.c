@@ -8,10 +8,11 @@ struct bst_assignment {
     int max_rows, max_columns;
     double *row_dual;
     double *column_dual;
-    double *distance;   /* of a column from the row that is being placed; INFINITY: not reached */
-    int *row_of_column; /* -1: free */
-    int *from_row;      /* the row before a column on its shortest path */
-    bool *settled;      /* column's distance is final */
+    /* path cost of a detection column from the track row being assigned; INFINITY: not reached */
+    double *distance;
+    int *row_of_column; /* assigned row; -1: free */
+    int *from_row;      /* preceding row on the column's shortest path */
+    bool *settled;      /* the column's distance is final */
     int *touched;       /* columns reached in this search */
 };
 
@@ -58,10 +59,10 @@ void bst_assignment_free(bst_assignment *w) {
     free(w);
 }
 
-/* Places row `root`: the cheapest path that ends in a free column or in a row's staying
- * unassigned. */
-static void place(bst_assignment *w, int root, const bst_assignment_problem *p,
-                  int *column_of_row) {
+/* Assigns track row `root`: shortest augmenting path to a free detection column, or to a row that
+ * becomes unassigned. */
+static void augment_from_row(bst_assignment *w, int root, const bst_assignment_problem *p,
+                             int *column_of_row) {
     const int *first = p->first, *columns = p->edge_columns;
     const double *costs = p->costs, *miss = p->miss;
     int touched = 0, row = root, end_row = -1, end_column = -1;
@@ -147,6 +148,6 @@ void bst_assignment_solve(bst_assignment *w, const bst_assignment_problem *p, in
         }
         w->row_dual[i] = least;
         column_of_row[i] = -1;
-        place(w, i, p, column_of_row);
+        augment_from_row(w, i, p, column_of_row);
     }
 }

@@ -1,13 +1,13 @@
-/* Which detection belongs to which track. */
+/* Measurement-to-track association: gating and assignment. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
 
-/* Share of a frame in the smoothed number of false alarms, once there are enough frames. */
+/* Gain of the smoothed number of false alarms per frame, after the first frames. */
 #define ALARM_GAIN 0.1
 
-/* Largest standard deviation of a measurement among the frame's detections. */
+/* Largest 1 sigma of a direction measurement in the frame, rad. */
 static double largest_sigma(const bst_mtt_pool *pool) {
     double variance = 0.0;
     for (int i = 0; i < pool->count; i++) {
@@ -16,6 +16,7 @@ static double largest_sigma(const bst_mtt_pool *pool) {
     return sqrt(variance);
 }
 
+/* Largest position uncertainty of a track over its models or mixture components, rad. */
 static double largest_spread(const bst_mtt_track *track) {
     double sigma2 = track->state.covariance[0][0] + track->state.covariance[1][1];
     for (int m = 0; m < track->models.count; m++) {
@@ -27,9 +28,10 @@ static double largest_spread(const bst_mtt_track *track) {
     return sqrt(sigma2);
 }
 
-/* Candidates of track t, the BST_MTT_CANDIDATES cheapest: detections in its gate that are free or
- * its own. */
-static int collect(const bst_mtt *mtt, int t, double detection_sigma, int *columns, double *costs) {
+/* Gates the detections of track t: the BST_MTT_CANDIDATES cheapest that are free or its own.
+ * Returns their number. */
+static int gate_detections(const bst_mtt *mtt, int t, double detection_sigma, int *columns,
+                           double *costs) {
     const bst_mtt_params *params = &mtt->params;
     const bst_mtt_track *track = &mtt->tracks[t];
     double sigma = largest_spread(track);
@@ -73,11 +75,11 @@ static int collect(const bst_mtt *mtt, int t, double detection_sigma, int *colum
 
 int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns) {
     double costs[BST_MTT_CANDIDATES];
-    return collect(mtt, t, mtt->largest_sigma, columns, costs);
+    return gate_detections(mtt, t, mtt->largest_sigma, columns, costs);
 }
 
-/* The cheapest pair first. */
-static void take_nearest(bst_mtt *mtt, int rows) {
+/* Nearest-neighbour association: assigns the cheapest track-detection pair first. */
+static void assign_nearest(bst_mtt *mtt, int rows) {
     int edges = mtt->first[rows];
     for (int r = 0; r < rows; r++) {
         mtt->column_of_row[r] = -1;
@@ -98,7 +100,8 @@ static void take_nearest(bst_mtt *mtt, int rows) {
     }
 }
 
-static void assign_group(bst_mtt *mtt, bool tentative) {
+/* Associates all confirmed or all tentative tracks with the frame's detections. */
+static void associate_tracks(bst_mtt *mtt, bool tentative) {
     int rows = 0, edges = 0;
     for (int t = 0; t < mtt->track_count; t++) {
         if ((mtt->tracks[t].status == BST_TRACK_TENTATIVE) != tentative || !mtt->observable[t]) {
@@ -107,14 +110,14 @@ static void assign_group(bst_mtt *mtt, bool tentative) {
         mtt->rows[rows] = t;
         mtt->first[rows] = edges;
         mtt->miss_costs[rows] = -log(1.0 - mtt->params.detection_probability);
-        int found =
-            collect(mtt, t, mtt->largest_sigma, mtt->edge_columns + edges, mtt->edge_costs + edges);
+        int found = gate_detections(mtt, t, mtt->largest_sigma, mtt->edge_columns + edges,
+                                    mtt->edge_costs + edges);
         edges += found;
         rows += found > 0;
     }
     mtt->first[rows] = edges;
     if (mtt->params.association == BST_MTT_NEAREST) {
-        take_nearest(mtt, rows);
+        assign_nearest(mtt, rows);
     } else {
         const bst_assignment_problem problem = {.rows = rows,
                                                 .columns = mtt->now.count,
@@ -129,7 +132,7 @@ static void assign_group(bst_mtt *mtt, bool tentative) {
         mtt->detection_of_track[mtt->rows[r]] = column;
         if (column >= 0) {
             mtt->now.used[column] = true;
-            /* tentative tracks own nothing: theirs may be a confirmed track's too */
+            /* tentative tracks own no detection: a confirmed track may use it as well */
             mtt->owner[column] = tentative ? BST_MTT_NOBODY : mtt->rows[r];
         }
     }
@@ -144,8 +147,9 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     for (int i = 0; i < mtt->now.count; i++) {
         mtt->owner[i] = BST_MTT_NOBODY;
     }
-    /* confirmed tracks choose first: a false start must not take their detections */
-    assign_group(mtt, false);
+    /* confirmed tracks are associated first: a false tentative track must not take their detections
+     */
+    associate_tracks(mtt, false);
     bst_mtt_share(mtt);
     bst_mtt_gate_manoeuvres(mtt);
     int unused = 0;
@@ -159,5 +163,5 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
             fmax(fmax(mtt->clutter, unused), mtt->params.false_alarms_per_frame) /
             mtt->params.field_sr;
     }
-    assign_group(mtt, true);
+    associate_tracks(mtt, true);
 }

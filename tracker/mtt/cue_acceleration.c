@@ -1,4 +1,4 @@
-/* What tracks near the cue have of its acceleration. */
+/* Acceleration of the cue, applied to tracks near it. */
 #include "tracker/mtt/multitarget_internal.h"
 
 #define JUMP_FLOOR_RAD 1e-6
@@ -17,8 +17,8 @@ bool bst_mtt_cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 
         return false;
     }
     *step = bst_vec3_scale(bst_tangent_log(now, cue.direction), -1.0);
-    /* what accelerates evenly is off by half the change of its rate; a cue that is off by more than
-     * its rate has jumped */
+    /* under constant acceleration the offset is half the change of rate; a cue with a larger offset
+     * than its rate explains has jumped */
     if (bst_vec3_norm(*step) > 2.0 * bst_vec3_norm(frame->cue_rate_radps) * dt_s + JUMP_FLOOR_RAD) {
         return false;
     }

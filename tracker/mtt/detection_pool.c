@@ -1,5 +1,4 @@
-/* The detections of a frame: which of them are near a direction, and what their brightness says of
- * a track. */
+/* Pool of a frame's detections: spatial search by direction, and brightness likelihood. */
 #include <stdlib.h>
 
 #include "tracker/mtt/multitarget_internal.h"
@@ -24,6 +23,7 @@ static double component(bst_vec3 v, int axis) {
     return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
 }
 
+/* Heapsort: moves the root down to its place. */
 static void sift(double *key, int *order, int root, int count) {
     for (;;) {
         int child = 2 * root + 1;
@@ -83,6 +83,7 @@ void bst_mtt_pool_index(bst_mtt_pool *pool) {
     bst_mtt_sort(pool->key, pool->order, pool->count);
 }
 
+/* First sorted position whose key is at least `key` (binary search). */
 static int lower_bound(const bst_mtt_pool *pool, double key) {
     int low = 0, high = pool->count;
     while (low < high) {
@@ -106,7 +107,8 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
     }
 }
 
-/* Brightness counts, but a flare or an eclipse must not cost a track its detection. */
+/* Brightness contributes to the association cost, but is capped: a flare or an eclipse must not
+ * cost a track its detection. */
 double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection) {
     double variance =
         track->v_mag_variance + 0.09 + detection->v_mag_sigma * detection->v_mag_sigma;

@@ -1,15 +1,16 @@
-/* Tracks that were deleted after they had been confirmed: an eclipse or an occultation ends a
- * track, not an object. */
+/* Deleted tracks kept for re-identification: an eclipse or an occultation ends a track, not an
+ * object. */
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
 
-/* Log-likelihood by which the best remembered track must lead the second. */
+/* Log-likelihood margin of the best stored track over the second. */
 #define LEAD 2.0
-/* 1 sigma by which the brightness of what wakes may differ from what the shadow leaves of it. */
+/* 1 sigma of the brightness of a reappearing object about its prediction in penumbra, mag. */
 #define DIMMING_MAG 0.5
 
-static void forget(bst_mtt *m, int i) {
+/* Removes stored track i. */
+static void remove_stored(bst_mtt *m, int i) {
     m->memory_count--;
     memmove(m->memory + i, m->memory + i + 1, (size_t)(m->memory_count - i) * sizeof *m->memory);
 }
@@ -37,19 +38,20 @@ void bst_mtt_remember(bst_mtt *m, const bst_mtt_track *track) {
         return;
     }
     if (m->memory_count == m->params.max_dormant_tracks) {
-        forget(m, 0);
+        remove_stored(m, 0);
     }
     m->memory[m->memory_count++] = *track;
 }
 
-/* The best and the second of what a track may be. */
+/* The best-fitting earlier track of an object and the second misfit. */
 typedef struct resume_choice {
     bst_mtt_track *best;
     double lowest, second;
 } resume_choice;
 
-static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *before,
-                  resume_choice *choice) {
+/* Compares a confirmed track with an earlier one: misfit in direction, rate and brightness. */
+static void compare_with_earlier(const bst_mtt *m, const bst_mtt_track *track,
+                                 bst_mtt_track *before, resume_choice *choice) {
     double chi2 = bst_sky_distance2(&before->state, &track->state);
     if (before->asleep && before->full_snr > 0.0 && before->light.snr > 0.0) {
         double dimmed = before->full_v_mag - 2.5 * log10(before->light.snr / before->full_snr);
@@ -73,13 +75,13 @@ static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *b
 bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     resume_choice choice = {.lowest = INFINITY, .second = INFINITY};
     for (int i = 0; anew && i < m->memory_count; i++) {
-        weigh(m, track, &m->memory[i], &choice);
+        compare_with_earlier(m, track, &m->memory[i], &choice);
     }
     for (int t = 0; t < m->track_count; t++) {
         const bst_mtt_track *sleeper = &m->tracks[t];
         if (sleeper->asleep && !sleeper->replaced && sleeper->sight < BST_MTT_DARK &&
             track->first_tick > sleeper->last_update_tick) {
-            weigh(m, track, &m->tracks[t], &choice);
+            compare_with_earlier(m, track, &m->tracks[t], &choice);
         }
     }
     bst_mtt_track *before = choice.best;
@@ -96,7 +98,7 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     track->was_bright = before->was_bright;
     track->lit = before->lit;
     if (before->orbit.valid) {
-        /* the orbit knows more than the few detections since */
+        /* fuse: the stored orbit is more accurate than the few new detections */
         bst_orbit_track orbit = before->orbit;
         bst_sky_state state = orbit.sky;
         if (bst_sky_fuse(&state, &track->state) && bst_orbit_track_update(&orbit, &state)) {
@@ -108,7 +110,7 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     if (before->asleep && before >= m->tracks && before < m->tracks + m->track_count) {
         before->replaced = true;
     } else {
-        forget(m, (int)(before - m->memory));
+        remove_stored(m, (int)(before - m->memory));
     }
     return true;
 }

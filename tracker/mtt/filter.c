@@ -2,11 +2,11 @@
 
 #include <string.h>
 
-/* Models of an IMM. */
+/* Number of models of the IMM. */
 #define MODELS 2
 
-/* Lower Cholesky factor; columns without variance of their own are zero. */
-static void factor(const double p[4][4], double l[4][4]) {
+/* Lower Cholesky factor; columns of zero variance are zero. */
+static void cholesky_factor(const double p[4][4], double l[4][4]) {
     memset(l, 0, 16 * sizeof(double));
     for (int j = 0; j < 4; j++) {
         double v = p[j][j];
@@ -30,10 +30,10 @@ static void factor(const double p[4][4], double l[4][4]) {
 void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
     double l[4][4], weights[8];
     bst_sky_state points[8], start = *state;
-    factor(state->covariance, l);
+    cholesky_factor(state->covariance, l);
     memset(start.covariance, 0, sizeof start.covariance);
     for (int k = 0; k < 8; k++) {
-        double x[4], sign = k < 4 ? 2.0 : -2.0; /* sqrt(n + kappa), n = 4 */
+        double x[4], sign = k < 4 ? 2.0 : -2.0; /* sigma point spread sqrt(n + kappa), n = 4 */
         for (int i = 0; i < 4; i++) {
             x[i] = sign * l[i][k % 4];
         }
@@ -70,15 +70,18 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
     models->probability[0] = 1.0 - models->probability[1];
 }
 
-static void combine(const bst_filter_models *models, bst_sky_state *state) {
+/* Sets a state to the moments of its mixture. */
+static void merge_models(const bst_filter_models *models, bst_sky_state *state) {
     bst_sky_mix(models->state, models->probability, models->count, state);
 }
 
+/* IMM mixing of the two models by their transition probabilities over dt_s. */
 static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_models *models) {
     double start = 1.0 / params->quiescent_sojourn_s, end = 1.0 / params->manoeuvre_sojourn_s,
            both = start + end;
     double settled = -expm1(-both * dt_s) / both;
-    double change[2] = {start * settled, end * settled}; /* away from model 0, from model 1 */
+    /* probability flow out of model 0, out of model 1 */
+    double change[2] = {start * settled, end * settled};
     bst_filter_models before = *models;
     for (int to = 0; to < MODELS; to++) {
         double weights[MODELS];
@@ -93,7 +96,8 @@ static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_
     }
 }
 
-static void predict_one(const bst_filter_params *params, double dt_s, bst_sky_state *state) {
+/* Predicts one Gaussian by the EKF or UKF. */
+static void predict_gaussian(const bst_filter_params *params, double dt_s, bst_sky_state *state) {
     if (params->kind == BST_FILTER_UKF) {
         bst_sky_predict_unscented(state, dt_s, params->noise_rad2ps3);
     } else {
@@ -104,7 +108,7 @@ static void predict_one(const bst_filter_params *params, double dt_s, bst_sky_st
 void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_state *state,
                         bst_filter_models *models) {
     if (models->count == 0) {
-        predict_one(params, dt_s, state);
+        predict_gaussian(params, dt_s, state);
         return;
     }
     if (params->kind == BST_FILTER_IMM) {
@@ -113,10 +117,10 @@ void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_st
         bst_sky_predict(&models->state[1], dt_s, params->manoeuvre_noise_rad2ps3);
     } else {
         for (int m = 0; m < models->count; m++) {
-            predict_one(params, dt_s, &models->state[m]);
+            predict_gaussian(params, dt_s, &models->state[m]);
         }
     }
-    combine(models, state);
+    merge_models(models, state);
 }
 
 void bst_filter_shift(bst_sky_state *state, bst_filter_models *models, bst_vec3 direction_rad,
@@ -130,6 +134,7 @@ void bst_filter_shift(bst_sky_state *state, bst_filter_models *models, bst_vec3 
     bst_sky_shift(state, direction_rad, rate_radps);
 }
 
+/* Log of the Gaussian density of an innovation, rad^-2. */
 static double log_density(const bst_sky_innovation *innovation) {
     return -0.5 * innovation->chi2 - 0.5 * innovation->log_det_s - log(2.0 * BST_PI);
 }
@@ -165,10 +170,11 @@ bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *s
     return true;
 }
 
-/* Appends the hypotheses of one Gaussian of weight exp(log_weight); returns the new count. */
-static int spread(const bst_sky_state *state, double log_weight,
-                  const bst_filter_evidence *evidence, bst_sky_state *hypotheses, double *logs,
-                  int n) {
+/* Appends the association hypotheses of one Gaussian of weight exp(log_weight): each candidate
+ * detection, and a miss. Returns the new count. */
+static int branch_hypotheses(const bst_sky_state *state, double log_weight,
+                             const bst_filter_evidence *evidence, bst_sky_state *hypotheses,
+                             double *logs, int n) {
     if (evidence->miss_weight > 0.0) {
         hypotheses[n] = *state;
         logs[n++] = log_weight + log(evidence->miss_weight);
@@ -185,7 +191,7 @@ static int spread(const bst_sky_state *state, double log_weight,
     return n;
 }
 
-/* Logarithms to weights whose largest is 1; returns ln of their total before that. */
+/* Converts log weights to weights whose largest is 1; returns ln of their total before that. */
 static double to_weights(double *logs, int n) {
     double high = -INFINITY, sum = 0.0;
     for (int i = 0; i < n; i++) {
@@ -198,11 +204,12 @@ static double to_weights(double *logs, int n) {
     return high + log(sum);
 }
 
-/* Updates one Gaussian; returns ln of its hypotheses' total weight. */
-static double update_one(bst_sky_state *state, const bst_filter_evidence *evidence) {
+/* Updates one Gaussian with the candidate detections; returns ln of the total weight of its
+ * hypotheses. */
+static double update_gaussian(bst_sky_state *state, const bst_filter_evidence *evidence) {
     bst_sky_state hypotheses[BST_FILTER_CANDIDATES + 1];
     double weights[BST_FILTER_CANDIDATES + 1];
-    int n = spread(state, 0.0, evidence, hypotheses, weights, 0);
+    int n = branch_hypotheses(state, 0.0, evidence, hypotheses, weights, 0);
     if (n == 0) {
         return 0.0;
     }
@@ -215,11 +222,12 @@ static double update_one(bst_sky_state *state, const bst_filter_evidence *eviden
     return total;
 }
 
+/* Updates the models of an IMM and their probabilities. */
 static void update_models(bst_filter_models *models, const bst_filter_evidence *evidence) {
     double sum = 0.0;
     for (int m = 0; m < models->count; m++) {
         models->probability[m] =
-            log(models->probability[m]) + update_one(&models->state[m], evidence);
+            log(models->probability[m]) + update_gaussian(&models->state[m], evidence);
     }
     (void)to_weights(models->probability, models->count);
     for (int m = 0; m < models->count; m++) {
@@ -230,6 +238,7 @@ static void update_models(bst_filter_models *models, const bst_filter_evidence *
     }
 }
 
+/* Updates a mixture and reduces it to at most the given number of components. */
 static void update_mixture(const bst_sky_state *state, bst_filter_models *models,
                            const bst_filter_evidence *evidence, int components) {
     enum { MOST = BST_FILTER_COMPONENTS * (BST_FILTER_CANDIDATES + 1) };
@@ -237,11 +246,11 @@ static void update_mixture(const bst_sky_state *state, bst_filter_models *models
     double weights[MOST];
     int n = 0;
     for (int m = 0; m < models->count; m++) {
-        n = spread(&models->state[m], log(models->probability[m]), evidence, hypotheses, weights,
-                   n);
+        n = branch_hypotheses(&models->state[m], log(models->probability[m]), evidence, hypotheses,
+                              weights, n);
     }
     if (models->count == 0) {
-        n = spread(state, 0.0, evidence, hypotheses, weights, 0);
+        n = branch_hypotheses(state, 0.0, evidence, hypotheses, weights, 0);
     }
     if (n == 0) {
         return;
@@ -258,13 +267,13 @@ void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
                        int components) {
     if (params->kind == BST_FILTER_IMM && models->count > 0) {
         update_models(models, evidence);
-        combine(models, state);
+        merge_models(models, state);
     } else if (models->count > 0 || components > 1) {
         update_mixture(state, models, evidence, components);
         if (models->count > 0) {
-            combine(models, state);
+            merge_models(models, state);
         }
     } else {
-        (void)update_one(state, evidence);
+        (void)update_gaussian(state, evidence);
     }
 }

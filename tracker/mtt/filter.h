@@ -1,6 +1,5 @@
-/* Filters by name over the sky state: extended Kalman, unscented Kalman, and interacting multiple
- * models (quiet and manoeuvring); and the update by several detections that may each be the
- * object's. */
+/* Tracking filters of the sky state: extended Kalman, unscented Kalman, and interacting multiple
+ * models (quiet and manoeuvring). The update accepts several candidate detections. */
 #ifndef BST_TRACKER_MTT_FILTER_H
 #define BST_TRACKER_MTT_FILTER_H
 
@@ -14,67 +13,72 @@ typedef enum bst_filter_kind {
 
 typedef struct bst_filter_params {
     bst_filter_kind kind;
-    double noise_rad2ps3; /* acceleration's power spectral density; of the quiet model */
-    /* the rest: IMM only */
+    double noise_rad2ps3; /* power spectral density of the acceleration; IMM: of the quiet model */
+    /* IMM only */
     double manoeuvre_noise_rad2ps3;
-    double quiescent_sojourn_s, manoeuvre_sojourn_s; /* mean times between the ends and the starts
-                                    of manoeuvres, and of a manoeuvre; > 0 */
+    /* mean time between manoeuvres, and mean duration of a manoeuvre, > 0 */
+    double quiescent_sojourn_s, manoeuvre_sojourn_s;
 } bst_filter_params;
 
-/* Most components of a mixture that a filter keeps. */
+/* Most mixture components of a filter. */
 #define BST_FILTER_COMPONENTS 8
 
-/* A filter that is more than one Gaussian: the two models of an IMM (0 quiet, 1 manoeuvring), or
- * what several earlier choices of detections have led to. The state is its mean and covariance. */
+/* Models of an IMM (0 quiet, 1 manoeuvring), or components of a mixture of association hypotheses.
+ * The state is their mean and covariance. */
 typedef struct bst_filter_models {
-    int count; /* 0: the state is all there is */
+    int count; /* 0: the state is a single Gaussian */
     bst_sky_state state[BST_FILTER_COMPONENTS];
     double probability[BST_FILTER_COMPONENTS];
 } bst_filter_models;
 
-/* A detection as a predicted filter sees it. */
+/* Fit of a detection to a predicted filter. */
 typedef struct bst_filter_fit {
-    double chi2;                   /* the least of the components' */
-    double log_likelihood;         /* ln of the density of the detection, rad^-2 */
+    double chi2;                   /* smallest of the components */
+    double log_likelihood;         /* log-likelihood of the detection, rad^-2 */
     bst_sky_innovation innovation; /* of the state; IMM: of the quiet model */
 } bst_filter_fit;
 
-/* One detection that may be the object's. */
+/* A detection that may originate from the tracked object. */
 typedef struct bst_filter_candidate {
     const bst_sky_measurement *measurement;
-    const double *extra; /* as bst_sky_innovate has it; NULL: none */
+    const double *extra; /* extra covariance as in bst_sky_innovate; NULL: none */
 } bst_filter_candidate;
 
-/* Models for a state that has just been started. */
+/* Initialises the models of a newly started state. */
 void bst_filter_start(const bst_filter_params *params, const bst_sky_state *state,
                       bst_filter_models *models);
 
-/* Moves state and models by dt_s >= 0.
- * EKF: bst_sky_predict. UKF: bst_sky_predict_unscented. IMM: mixing of the two models (Blom and
- * Bar-Shalom 1988) with the transition probabilities of a two-state Markov chain in continuous
- * time, then bst_sky_predict in each; the state becomes their mixture. */
+/* Predicts state and models over dt_s >= 0.
+ *
+ * EKF: bst_sky_predict. UKF: bst_sky_predict_unscented. IMM: mixing of the two models with the
+ * transition probabilities of a two-state Markov chain in continuous time, then bst_sky_predict in
+ * each; the state becomes their mixture.
+ *
+ * Reference: Blom and Bar-Shalom 1988 */
 void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_state *state,
                         bst_filter_models *models);
 
-/* bst_sky_shift of state and models. */
+/* Shifts state and models by a known motion (bst_sky_shift). */
 void bst_filter_shift(bst_sky_state *state, bst_filter_models *models, bst_vec3 direction_rad,
                       bst_vec3 rate_radps);
 
-/* False when an innovation's covariance is not positive definite. */
+/* Evaluates the likelihood of a detection under a predicted filter. Returns false if an innovation
+ * covariance is not positive definite. */
 bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *state,
                          const bst_filter_models *models, const bst_filter_candidate *candidate,
                          bst_filter_fit *out);
 
-/* Most candidates of bst_filter_update. */
+/* Most candidate detections of bst_filter_update. */
 #define BST_FILTER_CANDIDATES 16
 
-/* The candidates of a frame, of which at most one is the object's, and the weights of hypotheses.
- */
+/* Candidate detections of a frame, of which at most one originates from the object, and the weights
+ * of the hypotheses. */
 typedef struct bst_filter_evidence {
     const bst_filter_candidate *candidates; /* [count] detections */
     int count;                              /* 0 to BST_FILTER_CANDIDATES */
-    double miss_weight;                     /* of the hypothesis of a miss */
-    double hit_weight; /* factor on the likelihood of the innovation for that of a detection */
+    double miss_weight;                     /* weight of the missed-detection hypothesis */
+    /* factor from the innovation's likelihood to the weight of a detection hypothesis */
+    double hit_weight;
 } bst_filter_evidence;
 
 /* Updates a state with the candidates of a frame.
@@ -91,10 +95,11 @@ void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
                        bst_filter_models *models, const bst_filter_evidence *evidence,
                        int components);
 
-/* bst_sky_predict with the covariance, and the mean's shift, from eight sigma points: the unscented
- * transform (Julier and Uhlmann 1997) with kappa = 0, whose weights are all positive, in the
- * tangent plane of the moved mean (Hauberg, Lauze and Pedersen 2013). Measured directions are part
- * of the state, so that the unscented update would be bst_sky_update. */
+/* Unscented prediction of state and covariance over dt_s, as bst_sky_predict. It uses eight sigma
+ * points with kappa = 0, whose weights are all positive, in the tangent plane of the predicted
+ * mean. The measurement is part of the state, so the unscented update equals bst_sky_update.
+ *
+ * Reference: Julier and Uhlmann 1997; Hauberg, Lauze and Pedersen 2013 */
 void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_rad2ps3);
 
 #endif

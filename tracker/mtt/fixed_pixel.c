@@ -1,38 +1,42 @@
-/* Is a track an object, or a place of the sensor: defective pixels that image processing has not
- * learned so far? While the camera turns steadily, a pixel moves along the sky as evenly as an
- * object does. */
+/* Tests whether a track consists of detections of defective pixels that image processing has not
+ * learned yet. While the camera turns steadily, a fixed pixel moves along the sky as uniformly as
+ * an object. */
 #include "tracker/mtt/multitarget_internal.h"
 
-/* Share of a defect's detections that scatter by their errors alone. The others, displaced by
- * noise of a neighbour that is hot too or by a star that passes, lie within DISPLACED_FWHM; so
- * many are of the defect that the track was on before. */
+/* Shares of a defect's detections. SCATTER: within the centroid error. DISPLACED: displaced by a
+ * hot neighbour pixel or a passing star, within DISPLACED_FWHM. BEFORE: of the track's previous
+ * defect. */
 static const double SCATTER_SHARE = 0.85, DISPLACED_SHARE = 0.1, BEFORE_SHARE = 0.05;
 static const double DISPLACED_FWHM = 1.5;
-/* Scatter of a defect's centroid besides its stated error, share of an image's FWHM: charge has
- * not the shape that is fitted. */
+/* Additional scatter of a defect's centroid, share of the FWHM: charge does not have the fitted PSF
+ * shape. */
 static const double SCATTER_FWHM = 0.25;
 
-static double variance_of(const bst_mtt *m, const bst_mtt_detection *d, double fwhm_px) {
+/* Variance of a detection's pixel position about a defect, px^2 per axis. */
+static double defect_scatter(const bst_mtt *m, const bst_mtt_detection *d, double fwhm_px) {
     double scatter = SCATTER_FWHM * fwhm_px, pixel = m->params.pixel_rad;
     return 0.5 * (d->sky.cov_11 + d->sky.cov_22) / (pixel * pixel) + scatter * scatter;
 }
 
+/* FWHM of a detection across its path, at least 1 px. */
 static double fwhm_of(const bst_mtt_detection *d) {
     return fmax(d->width_px, 1.0);
 }
 
+/* Squared distance of a detection from a defect, px^2. */
 static double square_distance(const bst_mtt_detection *d, const bst_mtt_defect *from) {
     double dx = d->x_px - from->x_px, dy = d->y_px - from->y_px;
     return dx * dx + dy * dy;
 }
 
-/* Density of a detection of variance r about a defect, px^-2. */
+/* Probability density of a detection about a defect, px^-2; r: variance of the detection, px^2. */
 static double density_about(const bst_mtt_detection *d, const bst_mtt_defect *defect, double r) {
     double s = defect->variance_px2 + r;
     return exp(-0.5 * square_distance(d, defect) / s) / (2.0 * BST_PI * s);
 }
 
-static void draw_to(bst_mtt_defect *defect, const bst_mtt_detection *d, double r) {
+/* Kalman update of a defect's position with a detection of variance r. */
+static void update_defect_position(bst_mtt_defect *defect, const bst_mtt_detection *d, double r) {
     double gain = defect->variance_px2 / (defect->variance_px2 + r);
     defect->x_px += gain * (d->x_px - defect->x_px);
     defect->y_px += gain * (d->y_px - defect->y_px);
@@ -41,7 +45,7 @@ static void draw_to(bst_mtt_defect *defect, const bst_mtt_detection *d, double r
 
 void bst_mtt_start_fixed(const bst_mtt *m, const bst_mtt_detection *first, bst_mtt_track *track) {
     if (m->params.pixel_rad > 0.0) {
-        double variance = variance_of(m, first, fwhm_of(first));
+        double variance = defect_scatter(m, first, fwhm_of(first));
         bst_mtt_defect defect = {first->x_px, first->y_px, variance};
         track->fixed = (bst_mtt_fixed){.now = defect, .before = defect};
     }
@@ -54,15 +58,15 @@ void bst_mtt_note_fixed(const bst_mtt *m, const bst_mtt_detection *d, double log
         return;
     }
     bst_mtt_fixed *f = &track->fixed;
-    double fwhm = fwhm_of(d), r = variance_of(m, d, fwhm), reach = DISPLACED_FWHM * fwhm;
+    double fwhm = fwhm_of(d), r = defect_scatter(m, d, fwhm), reach = DISPLACED_FWHM * fwhm;
     bool near = square_distance(d, &f->now) < reach * reach,
          back = !near && square_distance(d, &f->before) < reach * reach;
     double density = m->clutter_density * pixel * pixel +
                      SCATTER_SHARE * density_about(d, &f->now, r) +
                      BEFORE_SHARE * density_about(d, &f->before, r) +
                      (near ? DISPLACED_SHARE / (BST_PI * reach * reach) : 0.0);
-    /* both at the same resolution: a motion that foresees a place better than a defect scatters
-     * gains nothing by that */
+    /* equal resolution for both: a motion model more precise than a defect's scatter must gain
+     * nothing by it */
     double most = log(SCATTER_SHARE / (2.0 * BST_PI * r));
     f->log_odds += fmin(log_density + 2.0 * log(pixel), most) - log(density);
     if (!near) {
@@ -71,7 +75,7 @@ void bst_mtt_note_fixed(const bst_mtt *m, const bst_mtt_detection *d, double log
         f->now = now;
     }
     if (near || back) {
-        draw_to(&f->now, d, r);
+        update_defect_position(&f->now, d, r);
     }
 }
 

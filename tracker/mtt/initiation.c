@@ -1,28 +1,29 @@
-/* New tracks from pairs of detections. */
+/* Track initiation from pairs of detections (two-point initiation). */
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
 
-/* Detections of a frame, beside those of confirmed tracks, up to which `confirm_score` alone keeps
- * false tracks rare: 100 exp(-12) a frame. With more, a track's odds before its first detection are
- * less in their proportion, so that the rate of false tracks is no higher. */
+/* Number of unassociated detections in a frame up to which `confirm_score` alone keeps false tracks
+ * rare: 100 exp(-12) per frame. With more, a track's prior odds are reduced in proportion, so that
+ * the rate of false tracks stays the same. */
 static const double FEW_ALARMS = 100.0;
 
-/* What a pair must fulfil: its rate lies within `gate_radps` of `rate`. */
+/* Rate gate of a pair: its rate must lie within `gate_radps` of `rate_radps`. */
 typedef struct rate_gate {
-    bst_vec3 rate_radps; /* in the tangent plane at the new detection */
+    bst_vec3 rate_radps; /* in the tangent plane at the newer detection */
     double gate_radps;
-    int reserve; /* places of the table that such tracks leave free */
-    int history; /* number of earlier frames to look at */
-    bool rest;   /* such tracks are at rest */
+    int reserve; /* number of track slots to keep free */
+    int history; /* number of earlier frames to search */
+    bool rest;   /* the new tracks are stationary */
 } rate_gate;
 
+/* Trace of a detection's covariance, rad^2. */
 static double spread(const bst_mtt_detection *d) {
     return d->sky.cov_11 + d->sky.cov_22;
 }
 
-/* The unused earlier detection whose pairing with `detection` lies nearest to the gate's centre,
- * newest frame first; NULL when there is none. */
+/* Finds the unused earlier detection whose pair rate with `detection` is nearest to the gate's
+ * centre, newest frame first; NULL: none. */
 static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detection,
                                   const rate_gate *gate, int *partner) {
     for (int h = 0; h < mtt->history_count && h < gate->history; h++) {
@@ -33,7 +34,7 @@ static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detecti
         }
         bst_vec3 d = detection->sky.direction;
         bst_vec3 back = bst_tangent_exp(d, bst_vec3_scale(gate->rate_radps, -dt));
-        /* sums of two variances are the largest that the error's ellipse can be across */
+        /* the trace bounds the largest axis of the error ellipse */
         double reach = gate->gate_radps * dt + 3.0 * sqrt(2.0 * spread(detection));
         int begin, end;
         double best = INFINITY;
@@ -59,6 +60,7 @@ static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detecti
     return NULL;
 }
 
+/* Starts a tentative track from a pair of detections. */
 static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bst_mtt_pool *pool,
                         const bst_mtt_detection *later, const rate_gate *gate,
                         const bst_mtt_frame *frame) {
@@ -66,7 +68,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
     double floor = mtt->params.brightness_systematic_mag;
     double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
-    /* of what was taken for charge the like may have been taken for light */
+    /* prior odds: besides clutter, undetected charge may be as frequent as the charge recognised */
     double alarms = mtt->clutter_density * mtt->params.field_sr + (double)mtt->charged;
     bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
     *track = (bst_mtt_track){
@@ -96,7 +98,8 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     mtt->rest_count += gate->rest;
     bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
     if (mtt->cue_lag_valid && bst_mtt_shares_acceleration(mtt, track, frame)) {
-        /* the pair tells the mean rate between its detections, not that of the later one */
+        /* the pair's rate is the mean over the interval; correct it to the newer detection by the
+         * cue's acceleration */
         bst_vec3 lag = bst_vec3_scale(mtt->cue_lag_radps2, dt);
         track->state.rate_radps =
             bst_vec3_add(track->state.rate_radps,
@@ -106,7 +109,8 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));
 }
 
-static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
+/* Starts tracks from all pairs of detections in the rate gate. */
+static void start_pairs(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
     for (int i = 0; i < mtt->now.count; i++) {
         if (mtt->now.used[i]) {
             continue;
@@ -138,21 +142,21 @@ static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, 
 
 void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
     const bst_mtt_params *params = &mtt->params;
-    /* in a field of many unknown stars two detections at one place are one star, and two at the
-     * cue's rate may be two */
+    /* In a field of many uncatalogued stars, two detections at one position are one star, while two
+     * at the cue's rate may be two stars: pair stationary ones first. */
     if (params->star_rate_radps > 0.0) {
         rate_gate rest = {.history = BST_MTT_HISTORY, .rest = true};
-        start_all(mtt, rest, frame, false);
+        start_pairs(mtt, rest, frame, false);
     }
     if (frame->cue_valid) {
         rate_gate gate = {
             .gate_radps = 4.0 * frame->cue_rate_sigma_radps + params->cue_rate_margin_radps,
             .history = BST_MTT_HISTORY};
-        start_all(mtt, gate, frame, true);
+        start_pairs(mtt, gate, frame, true);
     }
-    /* without the cue the gate is wide: only the newest frame, and a quarter of the table stays
-     * free for what looks like the target */
+    /* without the cue the gate is wide: search only the newest frame, and keep a quarter of the
+     * slots free for pairs at the cue's rate */
     rate_gate gate = {
         .gate_radps = params->max_rate_radps, .reserve = params->max_tracks / 4, .history = 1};
-    start_all(mtt, gate, frame, false);
+    start_pairs(mtt, gate, frame, false);
 }

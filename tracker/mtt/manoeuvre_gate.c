@@ -1,22 +1,25 @@
-/* A second, wider gate for tracks that have no detection in their own: the object may have begun to
+/* Second, wider gate for tracks without a detection in their own: the object may have begun to
  * manoeuvre (two-level gating: Blackman and Popoli, Design and Analysis of Modern Tracking Systems,
- * 1999, section 6.4). Type imm needs none: its second model has such a gate at all times. */
+ * 1999, section 6.4). Filter imm does not use it, because its second model always provides such a
+ * gate. */
 #include "tracker/mtt/multitarget_internal.h"
 
-/* A track as it is when the object has manoeuvred since its latest detection. */
+/* Predicted track under the hypothesis of a manoeuvre since its latest detection. */
 typedef struct hypothesis {
     bst_sky_state state;
     bst_filter_models models;
-    double log_prior; /* ln of the chance that a manoeuvre began since then */
+    double log_prior; /* ln of the probability that a manoeuvre began since then */
 } hypothesis;
 
+/* Detection chosen for a manoeuvring track. */
 typedef struct choice {
-    int column;        /* of the detection; -1: none */
+    int column;        /* index of the detection; -1: none */
     double cost;       /* -ln of its likelihood ratio against clutter */
-    double quiet_chi2; /* its misfit to steady motion */
-    double alarms;     /* clutter to be expected at least as near */
+    double quiet_chi2; /* its misfit to the quiet model */
+    double alarms;     /* expected number of false alarms at least as near */
 } choice;
 
+/* True if a track without a detection is tested for a manoeuvre. */
 static bool may_manoeuvre(const bst_mtt *m, int t) {
     const bst_mtt_track *track = &m->tracks[t];
     return m->detection_of_track[t] < 0 && m->shared[t] == BST_MTT_ALONE && m->observable[t] &&
@@ -24,7 +27,9 @@ static bool may_manoeuvre(const bst_mtt *m, int t) {
            track->may_miss && m->seconds >= track->manoeuvre_end_s;
 }
 
-static void widen(const bst_mtt *m, const bst_mtt_track *track, hypothesis *h) {
+/* Increases the covariance of a track by the process noise of a manoeuvre since its latest
+ * detection. */
+static void inflate_for_manoeuvre(const bst_mtt *m, const bst_mtt_track *track, hypothesis *h) {
     double dt = m->now.seconds - track->last_update_s;
     double more = m->params.manoeuvre_noise_rad2ps3 - m->params.noise_rad2ps3;
     h->state = track->state;
@@ -36,8 +41,8 @@ static void widen(const bst_mtt *m, const bst_mtt_track *track, hypothesis *h) {
     }
 }
 
-/* The likeliest unused detection that a manoeuvre explains better than steady motion does. */
-static choice choose(const bst_mtt *m, int t, const hypothesis *h) {
+/* Likeliest unused detection that a manoeuvre explains better than the quiet model. */
+static choice choose_detection(const bst_mtt *m, int t, const hypothesis *h) {
     const bst_mtt_params *p = &m->params;
     const bst_mtt_track *track = &m->tracks[t];
     choice best = {.column = -1, .cost = -log(1.0 - p->detection_probability)};
@@ -81,8 +86,8 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
             continue;
         }
         hypothesis h;
-        widen(m, track, &h);
-        choice best = choose(m, t, &h);
+        inflate_for_manoeuvre(m, track, &h);
+        choice best = choose_detection(m, t, &h);
         if (best.column < 0) {
             continue;
         }

@@ -1,33 +1,32 @@
-/* Tracks whose objects are seen as one: their light has melted into one detection, or they are one
- * object with two tracks. */
+/* Merged measurements: two unresolved objects in one detection, or one object with two tracks. */
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
 
-/* Frames in a row with one detection after which two tracks may prove to be the same, and frames
- * with a detection for each of two neighbours after which they are known to be two. */
+/* Frames in a row with one shared detection after which two tracks may be duplicates; also frames
+ * with separate detections after which two tracks are known to be two objects. */
 #define SAME_FRAMES 5
-/* Of merge_rad: as far apart two that are seen side by side are looked for. */
+/* Distance, in merge_rad, within which two detections count as resolved neighbours. */
 #define SIDE_BY_SIDE 3.0
-/* Of two lights: one with a greater share than this has the image, and hides the other one. */
+/* Share of the combined light above which one object dominates the image and hides the other. */
 #define OUTSHINES (2.0 / 3.0)
 
-/* Share of a's light in that of a and b. */
-static double share_of_light(const bst_mtt_track *a, const bst_mtt_track *b) {
+/* Share of object a in the combined light of a and b. */
+static double flux_ratio(const bst_mtt_track *a, const bst_mtt_track *b) {
     return 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag)));
 }
 
-/* Have both been seen, side by side, and one as much the brighter? */
-static bool one_hides(const bst_mtt_track *a, const bst_mtt_track *b) {
-    double light = share_of_light(a, b);
+/* True if both tracks are known as separate objects and one dominates the light. */
+static bool is_one_dominant(const bst_mtt_track *a, const bst_mtt_track *b) {
+    double light = flux_ratio(a, b);
     return a->apart >= SAME_FRAMES && b->apart >= SAME_FRAMES &&
            (light > OUTSHINES || light < 1.0 - OUTSHINES);
 }
 
-/* Widening of a detection that tracks a and b may share, in a's axes: the light's centroid lies
- * somewhere between them. */
-static void widen(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b,
-                  double out[3]) {
+/* Extra covariance of a detection shared by tracks a and b, in a's tangent axes: the merged
+ * centroid lies between them. */
+static void merged_covariance(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b,
+                              double out[3]) {
     bst_tangent axes = bst_tangent_at(a->state.direction);
     bst_vec3 to = bst_tangent_log(a->state.direction, b->state.direction);
     double s1 = bst_vec3_dot(to, axes.e1), s2 = bst_vec3_dot(to, axes.e2);
@@ -37,6 +36,7 @@ static void widen(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_trac
     out[2] = s2 * s2 + floor2;
 }
 
+/* True if a detection with extra covariance lies in a track's gate. */
 static bool fits(const bst_mtt *mtt, const bst_mtt_track *track, int column,
                  const double extra[3]) {
     bst_sky_innovation innovation;
@@ -44,45 +44,46 @@ static bool fits(const bst_mtt *mtt, const bst_mtt_track *track, int column,
            innovation.chi2 <= mtt->params.gate_chi2;
 }
 
-static void give(bst_mtt *m, int t, int column, bst_mtt_sharing sharing) {
+/* Assigns a detection to a track. */
+static void assign(bst_mtt *m, int t, int column, bst_mtt_sharing sharing) {
     m->detection_of_track[t] = column;
     m->shared[t] = sharing;
 }
 
-/* Of two tracks with much and with little light the former has the detection, whose centroid the
- * latter's light draws aside, and the latter is hidden. False where it does not fit the former, or
- * is as dim as the latter. */
-static bool outshine(bst_mtt *m, int bright, int dim, int column) {
+/* Assigns a merged detection to the brighter track, with a covariance for the shift by the fainter
+ * one's light; the fainter track is marked hidden. Returns false if the detection does not fit the
+ * brighter track or is nearer in magnitude to the fainter one. */
+static bool assign_to_brighter(bst_mtt *m, int bright, int dim, int column) {
     const bst_mtt_track *a = &m->tracks[bright], *b = &m->tracks[dim];
-    double extra[3], share = 1.0 - share_of_light(a, b), v = m->now.items[column].v_mag;
+    double extra[3], share = 1.0 - flux_ratio(a, b), v = m->now.items[column].v_mag;
     double floor2 = m->params.merge_floor_rad * m->params.merge_floor_rad;
-    widen(m, a, b, extra);
+    merged_covariance(m, a, b, extra);
     extra[0] = share * share * (extra[0] - floor2) + floor2;
     extra[1] *= share * share;
     extra[2] = share * share * (extra[2] - floor2) + floor2;
     if (fabs(v - b->v_mag) < fabs(v - a->v_mag) || !fits(m, a, column, extra)) {
         return false;
     }
-    give(m, bright, column, BST_MTT_OUTSHINING);
-    give(m, dim, column, BST_MTT_HIDDEN);
+    assign(m, bright, column, BST_MTT_OUTSHINING);
+    assign(m, dim, column, BST_MTT_HIDDEN);
     memcpy(m->extra[bright], extra, sizeof extra);
     m->owner[column] = bright;
     m->now.used[column] = true;
     return true;
 }
 
-/* A missed track and its neighbour, one of which hides the other: the detection that the neighbour
- * or nobody has is the bright one's; the dim one is not missed while the bright one is seen. */
-static void hide(bst_mtt *m, int missed, int partner, int column) {
+/* Resolves a missed track and its neighbour, of which one dominates. Their common detection belongs
+ * to the brighter one; the fainter one counts as hidden, not as missed. */
+static void resolve_hidden(bst_mtt *m, int missed, int partner, int column) {
     bool owned = m->detection_of_track[partner] >= 0;
-    if (share_of_light(&m->tracks[missed], &m->tracks[partner]) > OUTSHINES) {
-        (void)outshine(m, missed, partner, column);
-    } else if (!outshine(m, partner, missed, column) && owned) {
-        give(m, missed, column, BST_MTT_HIDDEN);
+    if (flux_ratio(&m->tracks[missed], &m->tracks[partner]) > OUTSHINES) {
+        (void)assign_to_brighter(m, missed, partner, column);
+    } else if (!assign_to_brighter(m, partner, missed, column) && owned) {
+        assign(m, missed, column, BST_MTT_HIDDEN);
     }
 }
 
-/* The free detection nearest to the middle of a and b, within merge_rad of it. */
+/* Nearest free detection to the midpoint of tracks a and b, within merge_rad; -1: none. */
 static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
     bst_vec3 middle = bst_vec3_unit(bst_vec3_add(a->state.direction, b->state.direction));
     int begin, end, best = -1;
@@ -99,8 +100,8 @@ static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mt
     return best;
 }
 
-/* Notes which confirmed tracks have a detection beside that of another one. */
-static void note_apart(bst_mtt *mtt) {
+/* Counts, per confirmed track, the frames in which a neighbour was resolved. */
+static void count_resolved(bst_mtt *mtt) {
     for (int t = 0; t < mtt->track_count; t++) {
         int column = mtt->detection_of_track[t], begin, end;
         if (column < 0 || mtt->tracks[t].status == BST_TRACK_TENTATIVE || mtt->tracks[t].star) {
@@ -119,9 +120,9 @@ static void note_apart(bst_mtt *mtt) {
     }
 }
 
-/* Two tracks nearer to each other than any two objects are seen apart, moving alike, have one
- * object, which has started a second track by a detection far off. */
-static bool same(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
+/* True if two tracks are duplicates of one object: closer than any resolved pair, at the same rate,
+ * both on shared detections for SAME_FRAMES. */
+static bool is_duplicate(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
     bst_vec3 apart = bst_vec3_sub(a->state.direction, b->state.direction);
     bst_vec3 rate = bst_vec3_sub(a->state.rate_radps, b->state.rate_radps);
     double variance = a->state.covariance[2][2] + a->state.covariance[3][3] +
@@ -131,10 +132,10 @@ static bool same(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track
            bst_vec3_dot(rate, rate) < 9.0 * variance;
 }
 
-/* Of two tracks that have lived on one detection for too long, the one that was seen more often
- * goes on with it, alone; where they are the same, the other one ends. False while the detection is
- * not that one's without widening. */
-static bool settle(bst_mtt *mtt, int missed, int owner, bool alike) {
+/* Ends a long-lasting merge of two tracks: the one with more hits keeps the detection alone; a
+ * duplicate is terminated. Returns false if the detection does not fit that track without extra
+ * covariance. */
+static bool end_merge(bst_mtt *mtt, int missed, int owner, bool alike) {
     int column = mtt->detection_of_track[owner];
     if (mtt->tracks[missed].hits > mtt->tracks[owner].hits) {
         if (!fits(mtt, &mtt->tracks[missed], column, NULL)) {
@@ -151,11 +152,11 @@ static bool settle(bst_mtt *mtt, int missed, int owner, bool alike) {
     return true;
 }
 
-/* A missed confirmed track beside another one, or beside a star that is seen, may have melted into
- * one detection with it: both then take that detection, widened along the line between them. Of two
- * known to be two, a bright one has it alone. */
+/* Assigns merged detections to missed confirmed tracks next to another track or a detected star.
+ * Both then use the detection with extra covariance along the line between them. If they are known
+ * as two objects and one dominates, that one gets the detection alone. */
 void bst_mtt_share(bst_mtt *mtt) {
-    note_apart(mtt);
+    count_resolved(mtt);
     double near2 = mtt->params.merge_rad * mtt->params.merge_rad;
     for (int t = 0; t < mtt->track_count; t++) {
         bst_mtt_track *missed = &mtt->tracks[t];
@@ -181,11 +182,11 @@ void bst_mtt_share(bst_mtt *mtt) {
         }
         bst_mtt_track *other = &mtt->tracks[partner];
         int column = mtt->detection_of_track[partner], most = mtt->params.max_merged_frames;
-        bool alike = same(mtt, missed, other);
+        bool alike = is_duplicate(mtt, missed, other);
         bool long_since = missed->merged_in_row >= most && other->merged_in_row >= most;
-        bool hides = !other->star && one_hides(missed, other);
+        bool hides = !other->star && is_one_dominant(missed, other);
         if (column >= 0 && !hides && !other->star && !mtt->shared[partner] && most > 0 &&
-            (alike || long_since) && settle(mtt, t, partner, alike)) {
+            (alike || long_since) && end_merge(mtt, t, partner, alike)) {
             continue;
         }
         if (column < 0) {
@@ -195,19 +196,19 @@ void bst_mtt_share(bst_mtt *mtt) {
             continue;
         }
         if (hides && mtt->shared[partner] == BST_MTT_ALONE) {
-            hide(mtt, t, partner, column);
+            resolve_hidden(mtt, t, partner, column);
             continue;
         }
         double extra[3], extra_other[3];
-        widen(mtt, missed, other, extra);
-        widen(mtt, other, missed, extra_other);
+        merged_covariance(mtt, missed, other, extra);
+        merged_covariance(mtt, other, missed, extra_other);
         if (!fits(mtt, missed, column, extra) || !fits(mtt, other, column, extra_other)) {
             continue;
         }
-        give(mtt, t, column, BST_MTT_WIDENED);
+        assign(mtt, t, column, BST_MTT_WIDENED);
         memcpy(mtt->extra[t], extra, sizeof extra);
         if (mtt->shared[partner] < BST_MTT_HIDDEN) {
-            give(mtt, partner, column, BST_MTT_WIDENED);
+            assign(mtt, partner, column, BST_MTT_WIDENED);
             memcpy(mtt->extra[partner], extra_other, sizeof extra_other);
         }
         mtt->now.used[column] = true;

@@ -1,21 +1,21 @@
-/* Mixtures of states: moments, and reduction to fewer components. */
+/* Gaussian mixtures of sky states: moments and reduction. */
 #include "tracker/mtt/mixture.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Components lighter than this share of the whole are dropped. */
+/* Components below this share of the total weight are dropped. */
 #define LEAST_WEIGHT 1e-4
-/* Components that the search for the best pair looks at: the heaviest. */
+/* Number of heaviest components considered for merging. */
 #define MOST 40
 
-/* A component in the tangent axes of a common state. */
+/* A mixture component in the tangent axes of a common state. */
 typedef struct component {
     double weight, log_det;
     double x[4], p[4][4];
 } component;
 
-/* Components of state b's mean in the tangent axes at a: direction, then rate. */
+/* Difference b - a of the means in the tangent axes at a: direction, then rate. */
 static void difference(const bst_sky_state *a, const bst_sky_state *b, double out[4]) {
     bst_tangent axes = bst_tangent_at(a->direction);
     bst_vec3 step = bst_tangent_log(a->direction, b->direction);
@@ -33,14 +33,16 @@ void bst_sky_shift_by(bst_sky_state *state, const double x[4]) {
                   bst_tangent_vector(&axes, x[2], x[3]));
 }
 
-static void express(const bst_sky_state *base, const bst_sky_state *state, double weight,
-                    component *out) {
+/* Expresses a state as a component in the tangent axes of `base`. */
+static void to_component(const bst_sky_state *base, const bst_sky_state *state, double weight,
+                         component *out) {
     out->weight = weight;
     difference(base, state, out->x);
     bst_sky_turn_covariance(state, base->direction, out->p);
 }
 
-static void add(component *sum, const component *c, double share) {
+/* Accumulates first and second moments of a component. */
+static void add_moments(component *sum, const component *c, double share) {
     for (int a = 0; a < 4; a++) {
         sum->x[a] += share * c->x[a];
         for (int b = 0; b < 4; b++) {
@@ -49,7 +51,8 @@ static void add(component *sum, const component *c, double share) {
     }
 }
 
-static void centre(component *sum) {
+/* Converts accumulated moments to mean and central covariance. */
+static void centre_moments(component *sum) {
     for (int a = 0; a < 4; a++) {
         for (int b = 0; b < 4; b++) {
             sum->p[a][b] -= sum->x[a] * sum->x[b];
@@ -57,6 +60,7 @@ static void centre(component *sum) {
     }
 }
 
+/* Sky state of a component. */
 static bst_sky_state state_of(const bst_sky_state *base, const component *c) {
     bst_sky_state out = *base;
     memcpy(out.covariance, c->p, sizeof out.covariance);
@@ -77,11 +81,11 @@ void bst_sky_mix(const bst_sky_state *states, const double *weights, int count,
     for (int i = 0; i < count; i++) {
         if (weights[i] > 0.0) {
             component c;
-            express(&base, &states[i], weights[i], &c);
-            add(&sum, &c, weights[i] / total);
+            to_component(&base, &states[i], weights[i], &c);
+            add_moments(&sum, &c, weights[i] / total);
         }
     }
-    centre(&sum);
+    centre_moments(&sum);
     *out = state_of(&base, &sum);
 }
 
@@ -103,18 +107,19 @@ double bst_mixture_log_det4(const double p[4][4]) {
     return sum;
 }
 
-static component merge(const component *a, const component *b) {
+/* Moment-preserving merge of two components. */
+static component merge_components(const component *a, const component *b) {
     component sum = {.weight = a->weight + b->weight};
-    add(&sum, a, a->weight / sum.weight);
-    add(&sum, b, b->weight / sum.weight);
-    centre(&sum);
+    add_moments(&sum, a, a->weight / sum.weight);
+    add_moments(&sum, b, b->weight / sum.weight);
+    centre_moments(&sum);
     sum.log_det = bst_mixture_log_det4(sum.p);
     return sum;
 }
 
-/* Bound on the growth of the Kullback-Leibler divergence by merging (Runnalls 2007, eq. 21). */
-static double price(const component *a, const component *b) {
-    component both = merge(a, b);
+/* Bound on the increase of the Kullback-Leibler divergence by merging (Runnalls 2007, eq. 21). */
+static double merge_cost(const component *a, const component *b) {
+    component both = merge_components(a, b);
     return both.weight * both.log_det - a->weight * a->log_det - b->weight * b->log_det;
 }
 
@@ -143,13 +148,13 @@ int bst_sky_reduce(bst_sky_state *states, double *weights, int count, int keep) 
         } else {
             n++;
         }
-        express(&base, &states[i], weights[i], &list[at]);
+        to_component(&base, &states[i], weights[i], &list[at]);
         list[at].log_det = bst_mixture_log_det4(list[at].p);
     }
     double prices[MOST][MOST];
     for (int i = 0; n > keep && i < n; i++) {
         for (int j = 0; j < i; j++) {
-            prices[i][j] = price(&list[i], &list[j]);
+            prices[i][j] = merge_cost(&list[i], &list[j]);
         }
     }
     while (n > keep) {
@@ -162,7 +167,7 @@ int bst_sky_reduce(bst_sky_state *states, double *weights, int count, int keep) 
                 }
             }
         }
-        list[b] = merge(&list[a], &list[b]);
+        list[b] = merge_components(&list[a], &list[b]);
         n--;
         if (a < n) {
             list[a] = list[n];
@@ -174,7 +179,7 @@ int bst_sky_reduce(bst_sky_state *states, double *weights, int count, int keep) 
         }
         for (int j = 0; j < n; j++) {
             if (j != b) {
-                prices[b > j ? b : j][b > j ? j : b] = price(&list[b], &list[j]);
+                prices[b > j ? b : j][b > j ? j : b] = merge_cost(&list[b], &list[j]);
             }
         }
     }

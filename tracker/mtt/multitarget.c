@@ -5,6 +5,7 @@
 
 #include "tracker/mtt/multitarget_internal.h"
 
+/* Checks the parameters of the multi-target tracker. */
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
         p->confirm_frames < p->confirm_hits || p->max_stationary_tracks < 0 ||
@@ -120,20 +121,23 @@ void bst_mtt_free(bst_mtt *m) {
     free(m);
 }
 
-static void record(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *track,
-                   double statistic) {
+/* Appends a track event of this frame. */
+static void record_event(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *track,
+                         double statistic) {
     m->events[m->event_count++] =
         (bst_mtt_event){.kind = kind, .statistic = statistic, .track = *track};
 }
 
-static void shift(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 step, bst_vec3 rate) {
+/* Shifts a track by the cue's acceleration, transported from the cue's direction. */
+static void shift_track(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 step,
+                        bst_vec3 rate) {
     bst_vec3 d = track->state.direction;
     bst_filter_shift(&track->state, &track->models,
                      bst_tangent_carry(frame->cue_direction, d, step),
                      bst_tangent_carry(frame->cue_direction, d, rate));
 }
 
-/* The filter for a track: one that is no IMM has the noise of its manoeuvring model while the
+/* Filter parameters of a track. A filter other than IMM uses the manoeuvre process noise while the
  * innovations show a manoeuvre (adjustable process noise: Bar-Shalom, Li and Kirubarajan,
  * Estimation with Applications to Tracking and Navigation, 2001, section 11.2). */
 static bst_filter_params filter_of(const bst_mtt *m, const bst_mtt_track *track) {
@@ -144,7 +148,8 @@ static bst_filter_params filter_of(const bst_mtt *m, const bst_mtt_track *track)
     return filter;
 }
 
-static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
+/* Predicts all tracks and stored tracks to the frame's time. */
+static void predict_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
     m->sleepers = 0;
@@ -165,7 +170,7 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
             const bst_filter_params filter = filter_of(m, track);
             bst_filter_predict(&filter, dt, &track->state, &track->models);
             if (forward && bst_mtt_shares_acceleration(m, track, frame)) {
-                shift(track, frame, step, rate);
+                shift_track(track, frame, step, rate);
             }
         }
         m->observable[t] =
@@ -176,7 +181,7 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     bst_mtt_predict_memory(m, frame);
     for (int i = 0; forward && i < m->memory_count; i++) {
         if (!m->memory[i].orbit.valid && bst_mtt_shares_acceleration(m, &m->memory[i], frame)) {
-            shift(&m->memory[i], frame, step, rate);
+            shift_track(&m->memory[i], frame, step, rate);
         }
     }
     m->seconds = frame->seconds;
@@ -185,6 +190,7 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     m->lost = 0;
 }
 
+/* Loads the frame's detections into the pool. */
 static void load_detections(bst_mtt *m, const bst_mtt_frame *frame) {
     bst_mtt_pool *now = &m->now;
     now->seconds = frame->seconds;
@@ -198,8 +204,9 @@ static void load_detections(bst_mtt *m, const bst_mtt_frame *frame) {
     bst_mtt_pool_index(now);
 }
 
-static void take_brightness(bst_mtt *m, bst_mtt_track *track, const bst_mtt_detection *detection,
-                            double dt_s) {
+/* Kalman update of a track's magnitude, and test for a change of brightness. */
+static void update_brightness(bst_mtt *m, bst_mtt_track *track, const bst_mtt_detection *detection,
+                              double dt_s) {
     double floor = m->params.brightness_systematic_mag, walk = m->params.brightness_random_walk_mag;
     double r = floor * floor + detection->v_mag_sigma * detection->v_mag_sigma;
     if (!isfinite(r) || !isfinite(detection->v_mag)) {
@@ -211,12 +218,12 @@ static void take_brightness(bst_mtt *m, bst_mtt_track *track, const bst_mtt_dete
     track->v_mag_variance = (1.0 - gain) * p;
     if (track->status != BST_TRACK_TENTATIVE && !track->star &&
         bst_mtt_note_brightness(&m->params, track, off / sqrt(p + r), dt_s, &statistic)) {
-        record(m, BST_MTT_BRIGHTNESS, track, statistic);
+        record_event(m, BST_MTT_BRIGHTNESS, track, statistic);
     }
 }
 
-/* The filter's update by what may be the object's: the detection that it was given, or with
- * probabilistic data association all in its gate. */
+/* Filter update of a track: with its assigned detection, or with all detections in its gate for
+ * probabilistic data association. */
 static void update_filter(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
     int given = m->detection_of_track[t];
@@ -245,7 +252,8 @@ static void update_filter(bst_mtt *m, int t) {
     }
 }
 
-static void hit(bst_mtt *m, int t) {
+/* Updates a track with its detection: filter, score, brightness and event tests. */
+static void update_track(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
     int given = m->detection_of_track[t];
     const bst_mtt_detection *detection = given >= 0 ? &m->now.items[given] : NULL;
@@ -283,15 +291,15 @@ static void hit(bst_mtt *m, int t) {
     track->last_update_tick = m->now.tick;
     track->last_update_s = m->now.seconds;
     if (m->departed_chi2[t] > 0.0) {
-        record(m, BST_MTT_MANOEUVRE, track, m->departed_chi2[t]);
+        record_event(m, BST_MTT_MANOEUVRE, track, m->departed_chi2[t]);
         track->innovation_count = 0;
     } else if (track->status != BST_TRACK_TENTATIVE && !track->star &&
                bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
-        record(m, BST_MTT_MANOEUVRE, track, statistic);
+        record_event(m, BST_MTT_MANOEUVRE, track, statistic);
         track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_sojourn_s;
     }
-    if (!outshines) { /* the other one's light is in it */
-        take_brightness(m, track, detection, dt);
+    if (!outshines) { /* otherwise the brightness contains the hidden object's light */
+        update_brightness(m, track, detection, dt);
         bst_mtt_note_light(track);
     }
 }
@@ -302,6 +310,7 @@ static double chi2_limit(int dof) {
     return dof * c * c * c;
 }
 
+/* True if a tentative track meets the confirmation criteria. */
 static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
     if (track->at_rest || track->hits < m->params.confirm_hits ||
@@ -309,7 +318,7 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
         bst_mtt_may_be_fixed(m, track)) {
         return false;
     }
-    /* a second copy of what is tracked already is no new object */
+    /* a second track of an object that is already tracked is not confirmed */
     for (int u = 0; u < m->track_count; u++) {
         const bst_mtt_track *other = &m->tracks[u];
         if (other != track && !other->asleep && other->status != BST_TRACK_TENTATIVE &&
@@ -321,8 +330,8 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     return true;
 }
 
-/* Should this track go? */
-static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
+/* True if a track is to be deleted. */
+static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
     if (track->asleep) {
@@ -330,7 +339,7 @@ static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool obser
                !(variance < p->memory_sigma_rad * p->memory_sigma_rad) ||
                track->misses_in_row > p->max_misses;
     }
-    /* nothing is known of a tentative track that would be worth waiting for */
+    /* a tentative track is not worth coasting */
     double patience_s =
         track->status == BST_TRACK_TENTATIVE
             ? fmin(p->max_coast_s, p->initiation_gap_s * (p->confirm_frames - p->confirm_hits + 1))
@@ -353,23 +362,25 @@ static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool obser
            track->frames >= 3 * p->confirm_frames;
 }
 
+/* Turns a stationary track into a star. */
 static void become_star(bst_mtt *m, bst_mtt_track *track) {
     bst_mtt_set_rest(m, track, true);
     if (track->at_rest) {
         if (track->status != BST_TRACK_TENTATIVE) {
-            record(m, BST_MTT_LOST, track, 0.0);
+            record_event(m, BST_MTT_LOST, track, 0.0);
         }
         bst_mtt_make_star(track);
     }
 }
 
-static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
+/* Track maintenance after the update: misses, confirmation, re-identification, deletion. */
+static void maintain_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
         if (track->star) {
             continue;
         }
-        /* what is known to be hidden by its neighbour's light is not missed */
+        /* a track hidden by its neighbour's light is not missed */
         bool taken =
             m->detection_of_track[t] >= 0 &&
             (track->merged_in_row <= m->params.max_merged_frames || m->shared[t] == BST_MTT_HIDDEN);
@@ -390,12 +401,12 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         if (track->status != BST_TRACK_TENTATIVE) {
             track->status = taken ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING;
             if (taken && m->sleepers > 0 && bst_mtt_resume(m, track, false)) {
-                record(m, BST_MTT_RESUMED, track, 0.0);
+                record_event(m, BST_MTT_RESUMED, track, 0.0);
             }
         } else if (taken && may_confirm(m, track)) {
             track->status = BST_TRACK_CONFIRMED;
             bool resumed = bst_mtt_resume(m, track, true);
-            record(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
+            record_event(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
         }
     }
     int kept = 0;
@@ -405,22 +416,22 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         if (track->replaced) {
             continue;
         }
-        if (!is_finished(m, track, m->observable[t])) {
+        if (!must_delete(m, track, m->observable[t])) {
             m->rest_count += track->at_rest;
             if (kept != t) {
                 m->tracks[kept] = *track;
             }
             kept++;
         } else if (track->status != BST_TRACK_TENTATIVE && !track->star) {
-            record(m, BST_MTT_LOST, track, 0.0);
+            record_event(m, BST_MTT_LOST, track, 0.0);
             bst_mtt_remember(m, track);
         }
     }
     m->track_count = kept;
 }
 
-/* The frame's unused detections wait for partners. */
-static void remember(bst_mtt *m) {
+/* Stores the frame's unused detections for two-point initiation in later frames. */
+static void store_unused(bst_mtt *m) {
     bst_mtt_pool oldest = m->history[BST_MTT_HISTORY - 1];
     for (int h = BST_MTT_HISTORY - 1; h > 0; h--) {
         m->history[h] = m->history[h - 1];
@@ -443,7 +454,7 @@ static void remember(bst_mtt *m) {
 }
 
 void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
-    predict(m, frame);
+    predict_tracks(m, frame);
     load_detections(m, frame);
     double floor = m->params.false_alarms_per_frame;
     m->bad_pixels = frame->bad_pixels;
@@ -454,27 +465,27 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     int unused = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->tracks[t].last_chi2 = -1.0;
-        hit(m, t);
+        update_track(m, t);
     }
     for (int i = 0; i < m->now.count; i++) {
         unused += !m->now.used[i];
     }
     m->clutter += frame->partial ? 0.0 : 0.1 * (unused - m->clutter);
     bst_mtt_update_orbits(m, frame);
-    judge(m, frame);
+    maintain_tracks(m, frame);
     bst_mtt_initiate(m, frame);
-    remember(m);
+    store_unused(m);
 }
 
 void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
-    predict(m, frame);
+    predict_tracks(m, frame);
     m->now.count = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->observable[t] = m->tracks[t].may_miss = false;
         m->detection_of_track[t] = -1;
         m->tracks[t].last_chi2 = -1.0;
     }
-    judge(m, frame);
+    maintain_tracks(m, frame);
 }
 
 const bst_mtt_track *bst_mtt_tracks(const bst_mtt *m, int *count) {

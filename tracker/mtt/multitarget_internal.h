@@ -1,25 +1,25 @@
-/* Shared by the files of the multi-target tracker. */
+/* Declarations shared by the files of the multi-target tracker. */
 #ifndef BST_TRACKER_MTT_MULTITARGET_INTERNAL_H
 #define BST_TRACKER_MTT_MULTITARGET_INTERNAL_H
 
 #include "tracker/mtt/assignment.h"
 #include "tracker/mtt/multitarget.h"
 
-/* Frames whose unused detections wait for a partner. */
+/* Number of frames whose unused detections are kept for two-point initiation. */
 #define BST_MTT_HISTORY 3
-/* Candidates kept per track: the likeliest. */
+/* Candidate detections per track: the likeliest. */
 #define BST_MTT_CANDIDATES BST_FILTER_CANDIDATES
 
-/* Owners of a detection beside the confirmed tracks. */
+/* Values of `owner` for detections without a single confirmed track. */
 #define BST_MTT_NOBODY (-1)
 #define BST_MTT_SEVERAL (-2)
 
-/* How a track has its detection. */
+/* How a track shares its detection. */
 typedef enum bst_mtt_sharing {
     BST_MTT_ALONE = 0,
-    BST_MTT_WIDENED,    /* shared, and widened by `extra` */
-    BST_MTT_HIDDEN,     /* another's, which hides it: its filter gets nothing */
-    BST_MTT_OUTSHINING, /* its own, widened by `extra`: it hides another */
+    BST_MTT_WIDENED,    /* shared; covariance increased by `extra` */
+    BST_MTT_HIDDEN,     /* belongs to a brighter object that hides this one: no filter update */
+    BST_MTT_OUTSHINING, /* its own, increased by `extra`: it hides another object */
 } bst_mtt_sharing;
 
 /* Unused detections of one frame, sorted along one axis. */
@@ -27,7 +27,7 @@ typedef struct bst_mtt_pool {
     double seconds;
     int64_t tick;
     int count;
-    int axis;    /* 0, 1, 2: of the direction's component that detections are sorted by */
+    int axis;    /* 0, 1, 2: direction component by which detections are sorted */
     int *order;  /* indices into items by ascending component */
     double *key; /* component of items[order[i]] */
     bst_mtt_detection *items;
@@ -38,23 +38,23 @@ struct bst_mtt {
     bst_mtt_params params;
     bst_filter_params filter;
     bst_mtt_track *tracks;
-    bst_mtt_track *memory; /* what was deleted, oldest first */
+    bst_mtt_track *memory; /* stored deleted tracks, oldest first */
     int memory_count;
     int track_count;
-    int rest_count; /* of them at rest */
-    int sleepers;   /* of them asleep in this frame */
+    int rest_count; /* number of stationary tracks */
+    int sleepers;   /* number of dormant tracks in this frame */
     int64_t next_id;
-    double seconds; /* of the latest frame */
+    double seconds; /* time of the latest frame */
     bool started;
-    /* By how much the cue's mean rate of the time before the frame is behind its rate at the frame,
-     * per second of that time; in the tangent plane at the cue. */
+    /* Difference of the cue's rate at the frame and its mean rate over the interval before, per
+     * second of the interval; in the tangent plane at the cue. */
     bool cue_lag_valid;
     bst_vec3 cue_lag_radps2;
     int bad_pixels;         /* of the latest frame */
-    int charged;            /* the same */
+    int charged;            /* charge detections of the latest frame */
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
-    /* smoothed number of detections that no confirmed track has, of how many frames, and their
+    /* smoothed number of detections without a confirmed track, number of frames averaged, and
      * density */
     double alarms;
     int alarm_frames;
@@ -66,56 +66,57 @@ struct bst_mtt {
     bst_mtt_pool now;
     bst_mtt_pool history[BST_MTT_HISTORY]; /* newest first */
     int history_count;
-    /* work space of association, per track or per edge */
+    /* association work space, per track or per edge */
     int *rows; /* track of each assignment row */
     int *first, *edge_columns, *column_of_row;
     double *edge_costs, *miss_costs;
-    int *edge_order, *edge_row; /* for the cheapest pair first */
+    int *edge_order, *edge_row; /* edges sorted by cost */
     double *edge_key;
-    int *owner; /* index of the confirmed track that has a detection; negative: none or several */
+    int *owner; /* index of the confirmed track that owns a detection; negative: none or several */
     double largest_sigma;    /* of the frame's detections, rad */
     int *detection_of_track; /* index into now.items, -1 none */
-    double (*extra)[3];      /* widening of a shared detection, tangent axes of the track */
+    double (*extra)[3];      /* extra covariance of a shared detection, tangent axes of the track */
     bst_mtt_sharing *shared;
     bool *observable;
-    double
-        *departed_chi2; /* chi2 of a manoeuvre found in this frame with the wider gate; 0: none */
+    double *departed_chi2; /* chi-square of a manoeuvre detected in this frame with the wider gate;
+                              0: none */
 };
 
-/* A pool with room for `capacity` detections; false without memory. Either way freed by
- * bst_mtt_pool_free. */
+/* Creates a detection pool for `capacity` detections; false if out of memory. Free it with
+ * bst_mtt_pool_free in either case. */
 bool bst_mtt_pool_create(bst_mtt_pool *pool, int capacity);
-/* Frees what bst_mtt_pool_create made. */
+/* Frees the memory of a detection pool. */
 void bst_mtt_pool_free(bst_mtt_pool *pool);
-/* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
- * library sort that may allocate. */
+/* Heapsort of `count` keys, ascending, with their indices: in place and without allocation. */
 void bst_mtt_sort(double *key, int *order, int count);
-/* Sorts the pool's detections so that ranges can be looked up. */
+/* Sorts the pool's detections for range searches. */
 void bst_mtt_pool_index(bst_mtt_pool *pool);
-/* Range of sorted positions whose component lies within `chord` of direction's. */
+/* Range of sorted positions of detections whose component lies within `chord` of the direction's.
+ */
 void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double chord, int *begin,
                         int *end);
 
-/* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
+/* Associates the frame's detections with the predicted tracks: sets detection_of_track, shared and
+ * extra. */
 void bst_mtt_associate(bst_mtt *mtt, bool partial);
 
-/* What a detection's brightness adds to -ln of its likelihood, at most 4.5. */
+/* Brightness term of the association cost (-ln likelihood), at most 4.5. */
 double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection);
 
-/* Gives missed confirmed tracks a detection that they share with a neighbour. */
+/* Assigns shared detections to missed confirmed tracks next to a neighbour. */
 void bst_mtt_share(bst_mtt *mtt);
 
 /* Detections in the gate of track t that no other confirmed track has: at most BST_MTT_CANDIDATES,
  * the likeliest. Returns their number. */
 int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
 
-/* Notes what there is to see of track t, already predicted, and whether it sleeps; sets observable
- * and may_miss, the former having said whether its place is in the field. */
+/* Sets the visibility of predicted track t and whether it is dormant; updates observable (on entry:
+ * in the field) and may_miss. */
 void bst_mtt_look(bst_mtt *mtt, int t, const bst_mtt_frame *frame);
-/* After a detection: notes what the track looks like in full light, if it is in that. */
+/* Updates a track's brightness in full sunlight after a detection, if it is in full sunlight. */
 void bst_mtt_note_light(bst_mtt_track *track);
 
-/* Predicts the kept tracks to a frame; drops those that are too old or too uncertain. */
+/* Predicts the stored tracks to a frame; drops those too old or too uncertain. */
 void bst_mtt_predict_memory(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* Predicts a track to a frame by its orbit.
  *
@@ -123,7 +124,7 @@ void bst_mtt_predict_memory(bst_mtt *mtt, const bst_mtt_frame *frame);
 bool bst_mtt_predict_orbit(const bst_mtt *mtt, bst_mtt_track *track, const bst_mtt_frame *frame);
 /* Updates the orbits of tracks with the frame's detections, and starts new orbits. */
 void bst_mtt_update_orbits(bst_mtt *mtt, const bst_mtt_frame *frame);
-/* Keeps a confirmed track that is deleted, for bst_mtt_resume. */
+/* Stores a deleted confirmed track for bst_mtt_resume. */
 void bst_mtt_remember(bst_mtt *mtt, const bst_mtt_track *track);
 /* Gives a confirmed track the identity of an earlier track of the same object.
  *
@@ -140,11 +141,11 @@ bool bst_mtt_resume(bst_mtt *mtt, bst_mtt_track *track, bool anew);
  *            them is false is at most the sum of theirs. */
 double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s);
 
-/* Gates the detections that are left for a manoeuvre of confirmed tracks without a detection.
+/* Associates remaining detections with confirmed tracks under the hypothesis of a manoeuvre.
  *
  * Notes:     the manoeuvre began after the track's latest detection. A track gets the likeliest
- *            detection if that is likelier than a miss and clutter together; then its covariance
- *            is increased by the manoeuvre's process noise over that time. */
+ *            detection if that is likelier than a miss and clutter together; then its covariance is
+ *            increased by the manoeuvre's process noise over that time. */
 void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
 
 /* Tests the innovations of a track's latest hits for a manoeuvre.
@@ -165,42 +166,44 @@ bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
 bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track, double z,
                              double dt_s, double *statistic);
 
-/* Whether there is room for one more track, at rest or not, with `reserve` places left over. */
+/* True if there is a free slot for one more track, stationary or not, with `reserve` slots left. */
 bool bst_mtt_has_room(const bst_mtt *mtt, bool at_rest, int reserve);
 
-/* Does a track show no motion, and is it not what the cue expects? */
+/* True if a track shows no motion and the cue does not expect it. */
 bool bst_mtt_is_at_rest(const bst_mtt *mtt, const bst_mtt_frame *frame, const bst_mtt_track *track);
 
-/* Is the rate of a track at rest known to be less than any object's? */
+/* True if the rate of a stationary track is known to be below any object's. */
 bool bst_mtt_is_star(const bst_mtt *mtt, const bst_mtt_frame *frame, const bst_mtt_track *track);
 
-/* Notes whether a track's newest detection shows it to have moved. */
+/* Updates `moved`: the newest detection is displaced from the first. */
 void bst_mtt_note_place(bst_mtt_track *track, const bst_mtt_detection *detection);
 
-/* Moves a track to what is at rest or from there, if there is room for it. */
+/* Makes a track stationary or not, if there is capacity. */
 void bst_mtt_set_rest(bst_mtt *mtt, bst_mtt_track *track, bool at_rest);
 
-/* Makes a track at rest a star. */
+/* Converts a stationary track to a star. */
 void bst_mtt_make_star(bst_mtt_track *track);
 
-/* Carries a star over dt_s. */
+/* Predicts a star over dt_s. */
 void bst_mtt_predict_star(const bst_mtt *mtt, double dt_s, bst_mtt_track *track);
 
-/* Begins the comparison of a track with a fixed place of the sensor. */
+/* Starts the defective-pixel test of a track. */
 void bst_mtt_start_fixed(const bst_mtt *mtt, const bst_mtt_detection *first, bst_mtt_track *track);
-/* Compares the track's next detection, which has `log_density` (rad^-2) by its motion. */
+/* Updates the defective-pixel test with the track's next detection.
+ *
+ * Given:     log_density  log-likelihood of the detection under the track's motion, rad^-2 */
 void bst_mtt_note_fixed(const bst_mtt *mtt, const bst_mtt_detection *detection, double log_density,
                         bst_mtt_track *track);
-/* Whether a track may be a defective pixel for all that its detections say. */
+/* True if the track's detections are consistent with a defective pixel. */
 bool bst_mtt_may_be_fixed(const bst_mtt *mtt, const bst_mtt_track *track);
 
-/* Whether a track has the cue's acceleration. What the observer's motion adds to a rate falls with
- * the range, as the rate itself does: what is at rest, or nearly so beside the cue, is too far away
- * to share it. */
+/* True if a track shares the cue's acceleration. The observer's motion contributes to rates in
+ * inverse proportion to range. A track at rest, or much slower than the cue, is too far away to
+ * share it. */
 bool bst_mtt_shares_acceleration(const bst_mtt *mtt, const bst_mtt_track *track,
                                  const bst_mtt_frame *frame);
-/* What the cue's motion over dt_s has that a constant rate has not, as tangent vectors at the cue's
- * present direction; false: it cannot be told. */
+/* Departure of the cue's motion over dt_s from a constant rate, as tangent vectors at the cue's
+ * current direction. Returns false if it is unknown. */
 bool bst_mtt_cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *step,
                               bst_vec3 *rate);
 

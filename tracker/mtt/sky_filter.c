@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-/* Both 2-blocks of the covariance in axes turned by (c, s). */
-static void turn_blocks(double p[4][4], double c, double s) {
+/* Rotates both 2 x 2 blocks of the covariance to axes turned by (c, s). */
+static void rotate_blocks(double p[4][4], double c, double s) {
     for (int j = 0; j < 4; j++) {
         for (int b = 0; b < 4; b += 2) {
             double x = p[b][j], y = p[b + 1][j];
@@ -28,8 +28,8 @@ static void symmetrise(double p[4][4]) {
     }
 }
 
-/* out = a p a^T */
-static void sandwich(const double a[4][4], double p[4][4]) {
+/* Congruence transform: out = a p a^T. */
+static void congruence(const double a[4][4], double p[4][4]) {
     double t[4][4];
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 4; j++) {
@@ -67,14 +67,14 @@ void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
                       {0, 0, 1, 0},
                       {0, -speed * sin(angle), 0, cos(angle)}};
     bst_tangent axes0 = bst_tangent_at(d0);
-    /* axes along and across the track */
+    /* axes along and across the motion */
     double c = 1.0, s = 0.0;
     if (speed > 0.0) {
         c = bst_vec3_dot(r0, axes0.e1) / speed;
         s = bst_vec3_dot(r0, axes0.e2) / speed;
     }
-    turn_blocks(p, c, s);
-    sandwich(f, p);
+    rotate_blocks(p, c, s);
+    congruence(f, p);
     bst_sky_add_noise(state, dt_s, noise_rad2ps3);
     if (speed > 0.0) {
         bst_vec3 along = bst_vec3_scale(r0, 1.0 / speed);
@@ -86,18 +86,18 @@ void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
         bst_tangent axes1 = bst_tangent_at(d1);
         state->direction = d1;
         state->rate_radps = bst_vec3_scale(along1, speed);
-        turn_blocks(p, bst_vec3_dot(along1, axes1.e1), -bst_vec3_dot(along1, axes1.e2));
+        rotate_blocks(p, bst_vec3_dot(along1, axes1.e1), -bst_vec3_dot(along1, axes1.e2));
     }
     symmetrise(p);
 }
 
-/* New mean at direction d1 with the rate vector `rate` given at the old direction. */
-static void move_to(bst_sky_state *state, bst_vec3 d1, bst_vec3 rate) {
+/* Moves the mean to direction d1; `rate` is given at the old direction and transported. */
+static void transport_mean(bst_sky_state *state, bst_vec3 d1, bst_vec3 rate) {
     bst_vec3 d0 = state->direction;
     bst_tangent axes0 = bst_tangent_at(d0), axes1 = bst_tangent_at(d1);
     double c, s;
     bst_tangent_turn(d0, &axes0, d1, &axes1, &c, &s);
-    turn_blocks(state->covariance, c, s);
+    rotate_blocks(state->covariance, c, s);
     state->direction = d1;
     state->rate_radps = bst_tangent_carry(d0, d1, rate);
 }
@@ -106,7 +106,7 @@ void bst_sky_shift(bst_sky_state *state, bst_vec3 direction_rad, bst_vec3 rate_r
     bst_vec3 d = state->direction;
     bst_vec3 step = bst_tangent_project(d, direction_rad);
     bst_vec3 rate = bst_vec3_add(state->rate_radps, bst_tangent_project(d, rate_radps));
-    move_to(state, bst_tangent_exp(d, step), rate);
+    transport_mean(state, bst_tangent_exp(d, step), rate);
     symmetrise(state->covariance);
 }
 
@@ -154,7 +154,7 @@ void bst_sky_update(bst_sky_state *state, const bst_sky_innovation *innovation) 
         a[i][0] -= k[i][0];
         a[i][1] -= k[i][1];
     }
-    sandwich(a, p);
+    congruence(a, p);
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 4; j++) {
             p[i][j] += k[i][0] * (r[0] * k[j][0] + r[1] * k[j][1]) +
@@ -164,7 +164,7 @@ void bst_sky_update(bst_sky_state *state, const bst_sky_innovation *innovation) 
     bst_vec3 d = state->direction;
     bst_tangent axes = bst_tangent_at(d);
     bst_vec3 rate = bst_vec3_add(state->rate_radps, bst_tangent_vector(&axes, delta[2], delta[3]));
-    move_to(state, bst_tangent_exp(d, bst_tangent_vector(&axes, delta[0], delta[1])), rate);
+    transport_mean(state, bst_tangent_exp(d, bst_tangent_vector(&axes, delta[0], delta[1])), rate);
     symmetrise(p);
 }
 
@@ -175,7 +175,7 @@ void bst_sky_from_pair(const bst_sky_measurement *first, const bst_sky_measureme
     out->rate_radps = bst_vec3_scale(back, -1.0 / dt_s);
     bst_sky_state at_second = {.direction = second->direction};
     bst_sky_innovation turned;
-    /* the first covariance in the second's axes; whether S could be inverted does not matter */
+    /* the first covariance in the second's axes; the return value concerns only S */
     (void)bst_sky_innovate(&at_second, first, NULL, &turned);
     double r2[3] = {second->cov_11, second->cov_12, second->cov_22};
     for (int i = 0; i < 2; i++) {
@@ -194,10 +194,10 @@ void bst_sky_turn_covariance(const bst_sky_state *state, bst_vec3 direction, dou
     double c, s;
     bst_tangent_turn(state->direction, &from, direction, &to, &c, &s);
     memcpy(out, state->covariance, sizeof state->covariance);
-    turn_blocks(out, c, s);
+    rotate_blocks(out, c, s);
 }
 
-/* x^T P^-1 x by Cholesky; INFINITY when P is not positive definite. */
+/* Quadratic form x^T P^-1 x by Cholesky; INFINITY if P is not positive definite. */
 static double quadratic_inverse(double p[4][4], const double x[4]) {
     double y[4], sum = 0.0;
     for (int i = 0; i < 4; i++) {

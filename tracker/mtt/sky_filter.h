@@ -2,7 +2,8 @@
  *
  * Mean: unit direction d and rate r (perpendicular to d) as 3-vectors. Covariance: 4x4 in the
  * tangent axes at d (bst_tangent_at), order d1, d2, r1, r2. Motion: constant rate along a great
- * circle, driven by white acceleration. Singular nowhere: axes are turned as they are carried. */
+ * circle, driven by white acceleration. It has no singularities, because the axes are
+ * parallel-transported. */
 #ifndef BST_TRACKER_MTT_SKY_FILTER_H
 #define BST_TRACKER_MTT_SKY_FILTER_H
 
@@ -22,7 +23,7 @@ typedef struct bst_sky_measurement {
     double cov_11, cov_12, cov_22;
 } bst_sky_measurement;
 
-/* A measurement as a predicted state sees it, in the tangent axes at the state's direction. */
+/* Innovation of a measurement in the tangent axes at the predicted state's direction. */
 typedef struct bst_sky_innovation {
     double nu[2];      /* rad */
     double r[3], s[3]; /* 11, 12, 22 of the measurement's and the innovation's covariance, rad^2 */
@@ -30,38 +31,42 @@ typedef struct bst_sky_innovation {
     double log_det_s;  /* ln det S */
 } bst_sky_innovation;
 
-/* Moves the state by dt_s (any sign or length; noise is added for |dt_s|). noise is the power
- * spectral density of the acceleration, rad^2/s^3. The covariance follows the Jacobi equation of
- * the unit sphere: along the track linearly, across it J'' + |r|^2 J = 0 (do Carmo, Riemannian
- * Geometry, chapter 5). */
+/* Predicts the state over dt_s (any sign; noise is added for |dt_s|).
+ *
+ * Given:     noise_rad2ps3  power spectral density of the acceleration
+ * Notes:     The covariance follows the Jacobi equation of the unit sphere: linear along the track,
+ *            J'' + |r|^2 J = 0 across it.
+ * Reference: do Carmo, Riemannian Geometry, chapter 5 */
 void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3);
 
-/* Adds to the covariance what white acceleration of that power spectral density brings in |dt_s|:
- * noise [dt^3/3, dt^2/2; dt^2/2, dt] per axis (Bar-Shalom, Li and Kirubarajan 2001, eq. 6.2.2-12).
- */
+/* Adds the process noise of white acceleration over |dt_s|: noise [dt^3/3, dt^2/2; dt^2/2, dt] per
+ * axis (Bar-Shalom, Li and Kirubarajan 2001, eq. 6.2.2-12). */
 void bst_sky_add_noise(bst_sky_state *state, double dt_s, double noise_rad2ps3);
 
-/* Shifts the mean by tangent vectors (any part along the direction is dropped); the covariance is
- * carried along. Used for a known acceleration. */
+/* Shifts the mean by tangent vectors (components along the direction are dropped), for a known
+ * acceleration. The covariance is parallel-transported. */
 void bst_sky_shift(bst_sky_state *state, bst_vec3 direction_rad, bst_vec3 rate_radps);
 
-/* Innovation of a measurement whose covariance is widened by `extra` (11, 12, 22 in the state's
- * tangent axes, rad^2; NULL: none). False when S is not positive definite. */
+/* Innovation of a direction measurement. Returns false if S is not positive definite.
+ *
+ * Given:     extra  added covariance (11, 12, 22 in the state's tangent axes, rad^2); NULL: none */
 bool bst_sky_innovate(const bst_sky_state *state, const bst_sky_measurement *measurement,
                       const double extra[3], bst_sky_innovation *out);
 
 /* Kalman update in Joseph form (Bucy and Joseph 1968), symmetric afterwards. */
 void bst_sky_update(bst_sky_state *state, const bst_sky_innovation *innovation);
 
-/* State from two measurements dt_s > 0 apart, valid at the second one's time. */
+/* Two-point initiation: state from two measurements dt_s > 0 apart, at the time of the second. */
 void bst_sky_from_pair(const bst_sky_measurement *first, const bst_sky_measurement *second,
                        double dt_s, double noise_rad2ps3, bst_sky_state *out);
 
-/* (a - b)^T (Pa + Pb)^-1 (a - b) over direction and rate, 4 degrees of freedom; INFINITY when the
- * sum of covariances is not positive definite or the directions are more than 0.2 rad apart. */
+/* Mahalanobis distance (a - b)^T (Pa + Pb)^-1 (a - b) over direction and rate, 4 degrees of
+ * freedom. INFINITY if the sum of covariances is not positive definite or the directions are more
+ * than 0.2 rad apart. */
 double bst_sky_distance2(const bst_sky_state *a, const bst_sky_state *b);
 
-/* Covariance block of the state in the axes of another direction nearby (carried and turned). */
+/* Covariance of the state in the tangent axes of another direction nearby (parallel-transported).
+ */
 void bst_sky_turn_covariance(const bst_sky_state *state, bst_vec3 direction, double out[4][4]);
 
 #endif

@@ -1,10 +1,10 @@
-/* What stands still among the stars: stars that no catalogue has. */
+/* Stationary tracks: stars that are in no catalogue. */
 #include "tracker/mtt/multitarget_internal.h"
 
-/* Errors of the camera's model turn a star's way across the field into a slow motion of its own.
- * A tenth of the slowest object's rate, 1 sigma, stands for them. */
+/* Camera model errors give a star crossing the field a slow apparent motion: 1 sigma, as a share of
+ * the slowest object's rate. */
 #define MODEL_SHARE 0.1
-/* Sigmas between a rate's estimate and the greatest that it may be. */
+/* Number of sigmas from the rate estimate to its upper limit. */
 #define RATE_SIGMAS 3.0
 
 bool bst_mtt_has_room(const bst_mtt *m, bool at_rest, int reserve) {
@@ -12,8 +12,9 @@ bool bst_mtt_has_room(const bst_mtt *m, bool at_rest, int reserve) {
                    : m->track_count - m->rest_count + reserve < m->params.max_tracks;
 }
 
-/* Variance per axis of what a star's rate may seem to be besides the track's own covariance. */
-static double seeming_variance(const bst_mtt *m, const bst_mtt_frame *frame) {
+/* Variance per axis of a star's apparent rate, in addition to the track's own covariance,
+ * (rad/s)^2. */
+static double apparent_rate_variance(const bst_mtt *m, const bst_mtt_frame *frame) {
     double model = MODEL_SHARE * m->params.star_rate_radps, common = frame->common_rate_sigma_radps;
     return model * model + common * common;
 }
@@ -24,7 +25,7 @@ bool bst_mtt_is_at_rest(const bst_mtt *m, const bst_mtt_frame *frame, const bst_
     }
     const bst_sky_state *s = &track->state;
     bst_tangent axes = bst_tangent_at(s->direction);
-    double seeming = seeming_variance(m, frame);
+    double seeming = apparent_rate_variance(m, frame);
     double a = s->covariance[2][2] + seeming, b = s->covariance[2][3],
            c = s->covariance[3][3] + seeming;
     double r1 = bst_vec3_dot(s->rate_radps, axes.e1), r2 = bst_vec3_dot(s->rate_radps, axes.e2);
@@ -35,7 +36,8 @@ bool bst_mtt_is_at_rest(const bst_mtt *m, const bst_mtt_frame *frame, const bst_
 
 bool bst_mtt_is_star(const bst_mtt *m, const bst_mtt_frame *frame, const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
-    double variance = fmax(s->covariance[2][2], s->covariance[3][3]) + seeming_variance(m, frame);
+    double variance =
+        fmax(s->covariance[2][2], s->covariance[3][3]) + apparent_rate_variance(m, frame);
     return track->hits >= m->params.confirm_hits &&
            bst_vec3_norm(s->rate_radps) + RATE_SIGMAS * sqrt(variance) < m->params.star_rate_radps;
 }

@@ -1,5 +1,5 @@
-/* Tangent planes of the unit sphere: axes, exponential and logarithm, parallel transport.
- * Everything is free of singularities but for antipodal points. */
+/* Tangent planes of the unit sphere: axes, exponential and logarithm map, parallel transport. The
+ * only singularity is at antipodal points. */
 #ifndef BST_TRACKER_MTT_TANGENT_H
 #define BST_TRACKER_MTT_TANGENT_H
 
@@ -13,8 +13,8 @@ typedef struct bst_tangent {
 /* Distance from the z axis below which the axes are built from x instead of z. */
 #define BST_TANGENT_POLE 1e-6
 
-/* Axes as bst_track defines them: e1 = unit(z x d), or unit(x x d) within BST_TANGENT_POLE of a
- * pole, e2 = d x e1. */
+/* Axes of the tangent plane as in bst_track: e1 = unit(z x d), or unit(x x d) within
+ * BST_TANGENT_POLE of a pole; e2 = d x e1. */
 static inline bst_tangent bst_tangent_at(bst_vec3 d) {
     bst_tangent t;
     t.e1 = hypot(d.x, d.y) < BST_TANGENT_POLE ? bst_vec3_make(0.0, -d.z, d.y)
@@ -24,23 +24,24 @@ static inline bst_tangent bst_tangent_at(bst_vec3 d) {
     return t;
 }
 
+/* Tangent vector of two components. */
 static inline bst_vec3 bst_tangent_vector(const bst_tangent *t, double a1, double a2) {
     return bst_vec3_axpy(bst_vec3_scale(t->e1, a1), a2, t->e2);
 }
 
-/* v less its part along unit d. */
+/* Projects v on the tangent plane at unit vector d. */
 static inline bst_vec3 bst_tangent_project(bst_vec3 d, bst_vec3 v) {
     return bst_vec3_axpy(v, -bst_vec3_dot(d, v), d);
 }
 
-/* The point |v| rad from unit d along tangent vector v. */
+/* Exponential map: the point at distance |v| rad from unit vector d along tangent vector v. */
 static inline bst_vec3 bst_tangent_exp(bst_vec3 d, bst_vec3 v) {
     double angle = bst_vec3_norm(v);
     double s = angle > 1e-4 ? sin(angle) / angle : 1.0 - angle * angle / 6.0;
     return bst_vec3_unit(bst_vec3_axpy(bst_vec3_scale(d, cos(angle)), s, v));
 }
 
-/* The tangent vector at unit d that leads to unit b: the inverse of bst_tangent_exp. */
+/* Logarithm map: the tangent vector at d that leads to unit vector b. */
 static inline bst_vec3 bst_tangent_log(bst_vec3 d, bst_vec3 b) {
     bst_vec3 across = bst_tangent_project(d, bst_vec3_sub(b, d));
     double s = bst_vec3_norm(across);
@@ -48,14 +49,14 @@ static inline bst_vec3 bst_tangent_log(bst_vec3 d, bst_vec3 b) {
     return s > 0.0 ? bst_vec3_scale(across, angle / s) : across;
 }
 
-/* Tangent vector v at unit a carried without turning to unit b along the great circle. */
+/* Parallel transport of tangent vector v from unit vector a to b along the great circle. */
 static inline bst_vec3 bst_tangent_carry(bst_vec3 a, bst_vec3 b, bst_vec3 v) {
     double f = bst_vec3_dot(b, v) / (1.0 + bst_vec3_dot(a, b));
     return bst_tangent_project(b, bst_vec3_axpy(v, -f, bst_vec3_add(a, b)));
 }
 
-/* Cosine and sine of the angle by which axes `from` at unit a, carried to unit b, must be turned
- * to lie on axes `to` at b: components there are (c v1 + s v2, -s v1 + c v2). */
+/* Rotation between tangent axes: cosine and sine of the angle from axes `from` at a,
+ * parallel-transported to b, to axes `to` at b. Components become (c v1 + s v2, -s v1 + c v2). */
 static inline void bst_tangent_turn(bst_vec3 a, const bst_tangent *from, bst_vec3 b,
                                     const bst_tangent *to, double *c, double *s) {
     bst_vec3 e1 = bst_tangent_carry(a, b, from->e1);

@@ -1,27 +1,26 @@
-/* What there is to see of tracks: the Earth's shadow and the Earth itself hide objects. */
+/* Visibility of tracked objects: Earth's shadow, occultation and brightness. */
 #include "tracker/mtt/visibility.h"
 
 #include "tracker/mtt/multitarget_internal.h"
 
-/* The Earth is taken to be larger by this share for what may be hidden: its atmosphere, and errors
- * of the orbit. */
+/* Margin of the Earth's radius for possible shadow and occultation: atmosphere and orbit errors. */
 #define LIMB_SHARE 0.02
-/* The pole's distance from the Earth's centre, over the equator's: what passes below that is behind
- * the Earth for sure. */
+/* Earth's polar radius in equatorial radii: a line of sight below it is certainly occulted. */
 #define POLE (1.0 - BST_EARTH_FLATTENING)
-/* Of the detection threshold: dimmer than this hardly anything is seen, and what is has a centroid
- * that noise has drawn to itself; and above it by so much, nearly everything is. */
+/* DARK_SHARE: share of the detection threshold below which an object is practically undetectable
+ * and its centroid biased by noise. BRIGHT_ABOVE: margin above the threshold, sigma, beyond which
+ * nearly every frame detects it. */
 #define DARK_SHARE 0.6
 #define BRIGHT_ABOVE 3.0
-/* Variance of a track that falls asleep over what its filter says: blends with stars and the last
- * dim detections have left errors that the filter takes for smaller. */
+/* Factor on the covariance of a track that becomes dormant: blends with stars and the last faint
+ * detections leave errors that the filter underestimates. */
 #define DOUBT 4.0
 #define LIGHT_GAIN 0.1
-/* Of the time that a track is kept without a detection. */
+/* Share of max_coast_s without a detection after which a faint track becomes dormant. */
 #define FADED_SHARE 0.5
 #define FULL_LIGHT 0.99
 
-/* Least distance of the segment between two geocentric points from the Earth's centre. */
+/* Smallest distance of the segment between two geocentric points from the Earth's centre, m. */
 static double least_distance(bst_vec3 a, bst_vec3 b) {
     bst_vec3 along = bst_vec3_sub(b, a);
     double length2 = bst_vec3_dot(along, along);
@@ -57,7 +56,8 @@ bst_mtt_sight bst_visibility_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3
     return dim || distance < 1.0 + LIMB_SHARE ? BST_MTT_FAINT : BST_MTT_CLEAR;
 }
 
-static void doubt(bst_mtt_track *track) {
+/* Increases the covariance of a track that becomes dormant. */
+static void inflate_covariance(bst_mtt_track *track) {
     for (int i = 0; i < 6; i++) {
         for (int j = 0; j < 6; j++) {
             track->orbit.covariance[i][j] *= DOUBT;
@@ -74,7 +74,7 @@ static void doubt(bst_mtt_track *track) {
     track->state = track->orbit.sky;
 }
 
-/* Hardly seen any more, before it is dark: it would not be kept for longer. */
+/* True if a faint track had no detection for so long that it would soon be deleted. */
 static bool has_faded(const bst_mtt *m, const bst_mtt_track *track) {
     return track->sight == BST_MTT_FAINT &&
            m->now.seconds - track->last_update_s > FADED_SHARE * m->params.max_coast_s;
@@ -90,10 +90,10 @@ void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
         track->was_bright = track->was_bright || track->light.bright;
         track->lit = track->lit || track->sight < BST_MTT_SHADOW;
         if (!track->lit) {
-            track->sight = BST_MTT_CLEAR; /* what is first seen in the dark is not where it seems */
+            track->sight = BST_MTT_CLEAR; /* never predicted visible: the orbit cannot be right */
         } else if (!track->asleep && (track->sight >= BST_MTT_SHADOW || has_faded(m, track))) {
             track->asleep = true;
-            doubt(track);
+            inflate_covariance(track);
         }
     }
     m->sleepers += track->asleep;
@@ -104,7 +104,7 @@ void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
 void bst_mtt_note_light(bst_mtt_track *track) {
     const bst_mtt_light *light = &track->light;
     bool seen = track->full_snr > 0.0;
-    /* of what is dim, the threshold picks the detections that noise has made brighter */
+    /* selection bias: near the threshold only detections brightened by noise are found */
     bool picked = seen && track->sight != BST_MTT_CLEAR && track->snr < light->snr + BRIGHT_ABOVE;
     if (track->orbit.valid && (light->sunlight < FULL_LIGHT || picked)) {
         return;

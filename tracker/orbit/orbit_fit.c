@@ -9,12 +9,12 @@
 
 enum { PARAMETERS = 6, MAX_ITERATIONS = 60, MAX_ROUNDS = 6 };
 
-/* Of the range's logarithm: beyond that the range is not known. */
+/* Largest 1 sigma of the logarithm of range for which the range counts as determined. */
 static const double MOST_LOG_SIGMA = 0.5;
 
-/* The state as the observer in the middle of the arc has it: r = R + range q, v = V + range (u q +
- * w), with R and V the observer's state. Steps in it are (direction along two axes, rate times span
- * along the same axes, ln range, u times span): all of them angles. */
+/* Orbit state in coordinates of the mid-arc observer: r = R + range q, v = V + range (u q + w),
+ * with R and V the observer's state. Steps are (direction along two axes, rate times span along the
+ * same axes, ln range, u times span): all are angles. */
 typedef struct chart {
     const bst_od_observer *observer;
     double span_s;
@@ -29,11 +29,12 @@ typedef struct work {
     const bst_od_options *options;
     bool *used;
     double (*white)[3];             /* inverse Cholesky factor of each covariance: 11, 21, 22 */
-    double (*residual)[2];          /* whitened, of the present state */
-    double (*side[2])[2];           /* whitened, of displaced ones */
+    double (*residual)[2];          /* whitened, at the current state */
+    double (*side[2])[2];           /* whitened, at displaced states */
     double (*slope)[PARAMETERS][2]; /* d(residual)/d(step) */
 } work;
 
+/* Coordinates of a state as the mid-arc observer sees it. */
 static chart chart_of(const bst_od_observer *observer, double span_s, const bst_od_state *s) {
     chart c = {.observer = observer, .span_s = span_s};
     bst_vec3 line = bst_vec3_sub(s->position_m, observer->position_m);
@@ -45,6 +46,7 @@ static chart chart_of(const bst_od_observer *observer, double span_s, const bst_
     return c;
 }
 
+/* State of given coordinates. */
 static bst_od_state state_of(const chart *c) {
     bst_vec3 rate = bst_vec3_axpy(c->w, c->u_ps, c->q);
     return (bst_od_state){
@@ -53,6 +55,7 @@ static bst_od_state state_of(const chart *c) {
         .velocity_mps = bst_vec3_axpy(c->observer->velocity_mps, c->range_m, rate)};
 }
 
+/* Coordinates after a step. */
 static chart moved(const chart *c, const double step[PARAMETERS]) {
     bst_tangent axes = bst_tangent_at(c->q);
     chart out = *c;
@@ -65,8 +68,8 @@ static chart moved(const chart *c, const double step[PARAMETERS]) {
     return out;
 }
 
-/* The derivative of (r, v) by the chart's steps. */
-static void chart_slope(const chart *c, double out[6][PARAMETERS]) {
+/* Jacobian of (r, v) by the coordinate steps. */
+static void chart_jacobian(const chart *c, double out[6][PARAMETERS]) {
     bst_tangent axes = bst_tangent_at(c->q);
     const bst_vec3 e[2] = {axes.e1, axes.e2};
     bst_vec3 rate = bst_vec3_axpy(c->w, c->u_ps, c->q);
@@ -89,8 +92,9 @@ static void chart_slope(const chart *c, double out[6][PARAMETERS]) {
     }
 }
 
-/* ------------------------------------------------------------------ residuals */
+/* ------------------------------------------------------------------ Residuals */
 
+/* Whitened residual of one observation along a propagated orbit. */
 static bst_status residual_at(work *w, const bst_od_path *path, int i, double out[2]) {
     const bst_od_observation *o = &w->items[i];
     bst_od_state then;
@@ -105,12 +109,12 @@ static bst_status residual_at(work *w, const bst_od_path *path, int i, double ou
     return BST_OK;
 }
 
-/* Whitened residuals, predicted less measured, of all observations. */
+/* Whitened residuals, predicted minus measured, of all observations. */
 static bst_status residuals(work *w, const bst_od_state *state, double (*out)[2]) {
     bst_od_path *path;
     BST_TRY(bst_od_path_create(w->ctx, &w->options->motion, state, &path));
     bst_status status = BST_OK;
-    /* away from the middle on both sides, so that an integration never starts anew */
+    /* outward from the middle on both sides, so that the integration never restarts */
     for (int i = w->middle; i < w->count && status == BST_OK; i++) {
         status = residual_at(w, path, i, out[i]);
     }
@@ -125,7 +129,8 @@ static double chi2_of(const double r[2]) {
     return r[0] * r[0] + r[1] * r[1];
 }
 
-static double total(const work *w, double (*r)[2]) {
+/* Chi-square over the observations in use. */
+static double total_chi2(const work *w, double (*r)[2]) {
     double sum = 0.0;
     for (int i = 0; i < w->count; i++) {
         sum += w->used[i] ? chi2_of(r[i]) : 0.0;
@@ -133,8 +138,9 @@ static double total(const work *w, double (*r)[2]) {
     return sum;
 }
 
-static bst_status slopes(work *w, const chart *c) {
-    /* what a displacement of the range does grows with the arc: it is kept within the linear */
+/* Jacobian of the residuals by central differences. */
+static bst_status residual_jacobian(work *w, const chart *c) {
+    /* the effect of a range displacement grows with the arc: the step is reduced to stay linear */
     double fine = 1e-4 / (1.0 + c->span_s / 600.0);
     const double step[PARAMETERS] = {1e-5, 1e-5, 1e-5, 1e-5, fine, fine};
     for (int k = 0; k < PARAMETERS; k++) {
@@ -176,10 +182,10 @@ static void normal_equations(const work *w, double n[PARAMETERS][PARAMETERS],
     }
 }
 
-/* Cholesky factor of n with its diagonal times 1 + damping, scaled to a unit diagonal first; the
- * scale goes to `size`. False when a pivot is below `least`. */
-static bool factor(const double n[PARAMETERS][PARAMETERS], double damping, double least,
-                   double l[PARAMETERS][PARAMETERS], double size[PARAMETERS]) {
+/* Cholesky factor of the damped normal matrix n (diagonal times 1 + damping), scaled to a unit
+ * diagonal; the scale goes to `size`. Returns false if a pivot is below `least`. */
+static bool factor_damped(const double n[PARAMETERS][PARAMETERS], double damping, double least,
+                          double l[PARAMETERS][PARAMETERS], double size[PARAMETERS]) {
     for (int i = 0; i < PARAMETERS; i++) {
         size[i] = sqrt(n[i][i]);
         if (!(size[i] > 0.0) || !isfinite(size[i])) {
@@ -205,8 +211,8 @@ static void solve(const double l[PARAMETERS][PARAMETERS], const double size[PARA
     }
 }
 
-/* Keeps a step where the linear picture can hold at all. */
-static void limit(double x[PARAMETERS]) {
+/* Limits a step to the range in which linearisation can hold. */
+static void limit_step(double x[PARAMETERS]) {
     static const double most[PARAMETERS] = {0.2, 0.2, 0.5, 0.5, 0.7, 0.7};
     double shrink = 1.0;
     for (int i = 0; i < PARAMETERS; i++) {
@@ -226,12 +232,11 @@ static bst_status fail_range(const work *w) {
         w->count, w->items[w->count - 1].observer.time_s - w->items[0].observer.time_s);
 }
 
-/* The reason why an iteration did not end: where the range is not determined there is no minimum to
- * find. */
-static bst_status fail_minimise(const work *w, const double n[PARAMETERS][PARAMETERS]) {
+/* Error of an iteration that did not converge: an undetermined range has no minimum. */
+static bst_status fail_to_converge(const work *w, const double n[PARAMETERS][PARAMETERS]) {
     double l[PARAMETERS][PARAMETERS], size[PARAMETERS], x[PARAMETERS];
     const double range[PARAMETERS] = {[4] = 1.0};
-    if (!factor(n, 0.0, 1e-15, l, size)) {
+    if (!factor_damped(n, 0.0, 1e-15, l, size)) {
         return fail_range(w);
     }
     solve(l, size, range, x);
@@ -245,63 +250,63 @@ static bst_status fail_minimise(const work *w, const double n[PARAMETERS][PARAME
                     MAX_ITERATIONS);
 }
 
-/* Iterates to the least sum of squares of the observations in use. */
+/* Levenberg-Marquardt iteration over the observations in use. */
 static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], int *iterations) {
     bst_od_state state = state_of(c);
     BST_TRY(residuals(w, &state, w->residual));
-    double cost = total(w, w->residual), damping = 1e-3;
+    double cost = total_chi2(w, w->residual), damping = 1e-3;
     for (*iterations = 1; *iterations <= MAX_ITERATIONS; ++*iterations) {
         double b[PARAMETERS], l[PARAMETERS][PARAMETERS], size[PARAMETERS], x[PARAMETERS];
-        BST_TRY(slopes(w, c));
+        BST_TRY(residual_jacobian(w, c));
         normal_equations(w, n, b);
         bool better = false;
-        double foreseen = INFINITY;
+        double predicted = INFINITY;
         for (int attempt = 0; attempt < 12 && !better; attempt++) {
-            if (!factor(n, damping, 1e-16, l, size)) {
+            if (!factor_damped(n, damping, 1e-16, l, size)) {
                 damping = fmax(10.0 * damping, 1e-12);
                 continue;
             }
             solve(l, size, b, x);
-            foreseen = 0.0; /* decrease of the sum of squares along the step */
+            predicted = 0.0; /* of the decrease of chi2 by this step */
             for (int i = 0; i < PARAMETERS; i++) {
-                foreseen += b[i] * x[i];
+                predicted += b[i] * x[i];
             }
-            limit(x);
+            limit_step(x);
             chart next = moved(c, x);
             state = state_of(&next);
             bst_status status = residuals(w, &state, w->side[0]);
-            double then = status == BST_OK ? total(w, w->side[0]) : INFINITY;
+            double then = status == BST_OK ? total_chi2(w, w->side[0]) : INFINITY;
             if (then <= cost) {
                 better = true;
                 *c = next;
                 memcpy(w->residual, w->side[0], (size_t)w->count * sizeof *w->residual);
-                foreseen = fmax(foreseen, cost - then);
+                predicted = fmax(predicted, cost - then);
                 cost = then;
                 damping = fmax(0.1 * damping, 1e-14);
             } else {
-                if (foreseen < 1e-6 + 1e-9 * cost) {
-                    break; /* nothing left to gain */
+                if (predicted < 1e-6 + 1e-9 * cost) {
+                    break; /* converged */
                 }
                 damping = fmax(10.0 * damping, 1e-12);
             }
         }
-        if (foreseen < 1e-6 + 1e-9 * cost) {
+        if (predicted < 1e-6 + 1e-9 * cost) {
             return BST_OK;
         }
         if (!better) {
-            return fail_minimise(w, (const double(*)[PARAMETERS])n);
+            return fail_to_converge(w, (const double(*)[PARAMETERS])n);
         }
         if (!(c->range_m > 1.0 && c->range_m < 1e10)) {
             return fail_range(w);
         }
     }
-    return fail_minimise(w, (const double(*)[PARAMETERS])n);
+    return fail_to_converge(w, (const double(*)[PARAMETERS])n);
 }
 
-/* ------------------------------------------------------------------ the whole fit */
+/* ------------------------------------------------------------------ Complete fit */
 
-/* Leaves out what does not fit; true when that changed anything. */
-static bool reject(work *w, bool *changed, double *scratch) {
+/* Rejects outlying observations; true if the selection changed. */
+static bool reject_outliers(work *w, bool *changed, double *scratch) {
     int count = 0;
     for (int i = 0; i < w->count; i++) {
         scratch[i] = chi2_of(w->residual[i]);
@@ -318,10 +323,11 @@ static bool reject(work *w, bool *changed, double *scratch) {
     return count >= BST_OD_LEAST;
 }
 
+/* Checks order of time and covariances of the observations. */
 static bst_status check(work *w) {
     for (int i = 0; i < w->count; i++) {
         const bst_od_observation *o = &w->items[i];
-        /* what it does not share with others */
+        /* covariance without the part shared with other observations */
         const double(*s)[2] = o->shared_rad;
         double c11 = o->cov_11 - s[0][0] * s[0][0] - s[0][1] * s[0][1];
         double c12 = o->cov_12 - s[0][0] * s[1][0] - s[0][1] * s[1][1];
@@ -346,12 +352,12 @@ static bst_status check(work *w) {
     return BST_OK;
 }
 
-/* What shared errors make of the solution's covariance, as consider parameters (Tapley, Schutz and
+/* Adds the effect of shared errors to the covariance, as consider parameters (Tapley, Schutz and
  * Born, Statistical Orbit Determination, 2004, section 6.3): the sum over all pairs of observations
- * of g_i g_j^T exp(-|change between them|), with g_i what the error of one moves the solution by.
- * The exponential makes it one pass: a = exp(-change) a + g, sum += g a^T + a g^T - g g^T. */
-static void add_shared(const work *w, const double l[PARAMETERS][PARAMETERS],
-                       const double size[PARAMETERS], double p[PARAMETERS][PARAMETERS]) {
+ * of g_i g_j^T exp(-|change between them|), g_i the sensitivity of the solution to the error of
+ * one. The exponential permits one pass: a = exp(-change) a + g, sum += g a^T + a g^T - g g^T. */
+static void add_shared_errors(const work *w, const double l[PARAMETERS][PARAMETERS],
+                              const double size[PARAMETERS], double p[PARAMETERS][PARAMETERS]) {
     double past[2][PARAMETERS] = {{0.0}};
     for (int i = 0; i < w->count; i++) {
         const double *white = w->white[i];
@@ -376,8 +382,8 @@ static void add_shared(const work *w, const double l[PARAMETERS][PARAMETERS],
     }
 }
 
-/* Covariance of the chart's steps: that of the observations' independent errors times the variance
- * factor, and that of their shared errors. */
+/* Covariance of the coordinate steps: independent errors times the variance factor, plus shared
+ * errors. */
 static void covariance_of_steps(const work *w, const double l[PARAMETERS][PARAMETERS],
                                 const double size[PARAMETERS], double variance_factor,
                                 double p[PARAMETERS][PARAMETERS]) {
@@ -389,13 +395,13 @@ static void covariance_of_steps(const work *w, const double l[PARAMETERS][PARAME
             p[i][k] = variance_factor * x[i];
         }
     }
-    add_shared(w, l, size, p);
+    add_shared_errors(w, l, size, p);
 }
 
-/* Observations and residuals of the solution in numbers. */
+/* Counts used and rejected observations; RMS residual of the solution. */
 static void count_residuals(work *w, bst_od_solution *out) {
     double squares = 0.0;
-    out->chi2 = total(w, w->residual);
+    out->chi2 = total_chi2(w, w->residual);
     out->used = 0;
     for (int i = 0; i < w->count; i++) {
         if (w->used[i]) {
@@ -413,16 +419,17 @@ static void count_residuals(work *w, bst_od_solution *out) {
                                : 1.0;
 }
 
-static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
-                         bst_od_solution *out) {
+/* Converts the fit to a solution: state, covariance, range sigma. */
+static bst_status finish_solution(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
+                                  bst_od_solution *out) {
     double l[PARAMETERS][PARAMETERS], size[PARAMETERS], p[PARAMETERS][PARAMETERS];
     double map[6][PARAMETERS];
-    if (!factor(n, 0.0, 1e-15, l, size)) {
+    if (!factor_damped(n, 0.0, 1e-15, l, size)) {
         return fail_range(w);
     }
     count_residuals(w, out);
     covariance_of_steps(w, (const double(*)[PARAMETERS])l, size, out->variance_factor, p);
-    chart_slope(c, map);
+    chart_jacobian(c, map);
     for (int i = 0; i < 6; i++) {
         for (int j = 0; j <= i; j++) {
             double sum = 0.0;
@@ -445,13 +452,13 @@ static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PAR
     return isfinite(log_sigma) && log_sigma < MOST_LOG_SIGMA ? BST_OK : fail_range(w);
 }
 
-/* How far the sum of squares is from what the covariance foresees, two standard deviations of the
- * range away along the valley: 0 where the problem is linear. */
-static double bend_of(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
-                      const bst_od_solution *s) {
+/* Nonlinearity of the fit: relative departure of the sum of squares from the covariance's
+ * prediction, two standard deviations of range along the valley; 0 if linear. */
+static double nonlinearity(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
+                           const bst_od_solution *s) {
     double l[PARAMETERS][PARAMETERS], size[PARAMETERS], column[PARAMETERS], worst = 0.0;
     const double range[PARAMETERS] = {[4] = 1.0};
-    if (!factor(n, 0.0, 1e-15, l, size)) {
+    if (!factor_damped(n, 0.0, 1e-15, l, size)) {
         return INFINITY;
     }
     solve(l, size, range, column);
@@ -467,13 +474,16 @@ static double bend_of(work *w, const chart *c, const double n[PARAMETERS][PARAME
         w->ctx = &quiet;
         bst_status status = residuals(w, &state, w->side[0]);
         w->ctx = ctx;
-        double excess = status == BST_OK ? (total(w, w->side[0]) - s->chi2) / 4.0 - 1.0 : INFINITY;
+        double excess =
+            status == BST_OK ? (total_chi2(w, w->side[0]) - s->chi2) / 4.0 - 1.0 : INFINITY;
         worst = fmax(worst, fabs(excess));
     }
     return worst;
 }
 
-static bst_status fit(work *w, const bst_od_state *first, double *scratch, bst_od_solution *out) {
+/* Fit with outlier rejection rounds. */
+static bst_status fit_rounds(work *w, const bst_od_state *first, double *scratch,
+                             bst_od_solution *out) {
     const bst_od_observer *middle = &w->items[w->middle].observer;
     double start = w->items[0].observer.time_s, end = w->items[w->count - 1].observer.time_s;
     bst_od_path *path;
@@ -491,15 +501,15 @@ static bst_status fit(work *w, const bst_od_state *first, double *scratch, bst_o
         BST_TRY(minimise(w, &c, n, &iterations));
         out->iterations += iterations;
         changed = false;
-        if (w->options->reject_chi2 > 0.0 && !reject(w, &changed, scratch)) {
+        if (w->options->reject_chi2 > 0.0 && !reject_outliers(w, &changed, scratch)) {
             return bst_fail(w->ctx, BST_ERR_NUMERIC,
                             "no orbit fits %d of the observations; they are of several objects, or "
                             "their errors are underestimated",
                             BST_OD_LEAST);
         }
     }
-    BST_TRY(finish(w, &c, (const double(*)[PARAMETERS])n, out));
-    out->bend = bend_of(w, &c, (const double(*)[PARAMETERS])n, out);
+    BST_TRY(finish_solution(w, &c, (const double(*)[PARAMETERS])n, out));
+    out->bend = nonlinearity(w, &c, (const double(*)[PARAMETERS])n, out);
     return BST_OK;
 }
 
@@ -532,7 +542,7 @@ bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int 
         status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d observations", count);
     }
     status = status == BST_OK ? check(&w) : status;
-    status = status == BST_OK ? fit(&w, first, scratch, out) : status;
+    status = status == BST_OK ? fit_rounds(&w, first, scratch, out) : status;
     for (int i = 0; i < count && status == BST_OK && residual_chi2; i++) {
         residual_chi2[i] = chi2_of(w.residual[i]);
     }

@@ -1,67 +1,73 @@
-/* Batch least squares: the orbit that explains a list of directions best, with its covariance. */
+/* Batch least-squares orbit determination from directions, with covariance. */
 #ifndef BST_TRACKER_ORBIT_ORBIT_FIT_H
 #define BST_TRACKER_ORBIT_ORBIT_FIT_H
 
 #include "tracker/orbit/orbit_motion.h"
 
-/* One measured direction. */
+/* One measured direction of an object. */
 typedef struct bst_od_observation {
     bst_od_observer observer; /* at mid exposure, when the light arrived */
-    bst_vec3 direction;       /* unit, geometric: aberration removed, light time contained */
-    /* of its error, the shared part below included, in the tangent axes at the direction
-     * (bst_tangent_at), rad^2 */
+    bst_vec3 direction;       /* unit, geometric: without aberration, light time included */
+    /* covariance of its error, including the shared part below, in the tangent axes at the
+     * direction (bst_tangent_at), rad^2 */
     double cov_11, cov_12, cov_22;
-    /* of what it has in common with the others: the error along axis i is the sum of
-     * shared_rad[i][c] times two numbers of mean 0 and variance 1, whose correlation with those of
-     * the observation before is exp(-shared_change); 0: the same for all of the arc. Not fitted,
-     * but part of the covariance. */
+    /* Error part correlated between observations: along axis i, the sum of shared_rad[i][c] times
+     * two numbers of mean 0 and variance 1. Their correlation with those of the previous
+     * observation is exp(-shared_change); 0: the same for the whole arc. It is not fitted, but
+     * increases the covariance. */
     double shared_rad[2][2], shared_change;
 } bst_od_observation;
 
 typedef struct bst_od_options {
     bst_od_motion motion;
-    double reject_chi2; /* an observation whose chi-square (2 degrees of freedom) is above this, and
-                           above 10 times the median, is left out; 0: none */
-    bool scale_variance; /* estimate one factor on the observations' covariances from the residuals
-                            (see bst_od_solution.variance_factor); false: they are taken as true */
+    /* an observation is rejected if its chi-square (2 degrees of freedom) exceeds this and 10 times
+     * the median; 0: never */
+    double reject_chi2;
+    /* estimate one factor on the covariances from the residuals (see
+     * bst_od_solution.variance_factor); false: they are taken as true */
+    bool scale_variance;
 } bst_od_options;
 
 typedef struct bst_od_solution {
     bst_od_state state;      /* at the time of an observation near the middle of the arc */
     double covariance[6][6]; /* GCRF, m and m/s, order r, v */
-    double chi2;             /* of the observations used, for their covariances as stated */
+    double chi2;             /* of the used observations, with their stated covariances */
     int dof;                 /* 2 * used - 6 */
-    /* On the observations' covariances; `covariance` contains it. The a-posteriori variance of unit
-     * weight, (k + chi2) / (k + dof) with k = BST_OD_PRIOR_DOF; 1 without scale_variance.
+    /* Factor on the observations' covariances, included in `covariance`: the a-posteriori variance
+     * of unit weight, (k + chi2) / (k + dof) with k = BST_OD_PRIOR_DOF; 1 without scale_variance.
      * Source: Koch, Parameter Estimation and Hypothesis Testing in Linear Models (1999), 4.3. */
     double variance_factor;
     int used, rejected;
-    double rms_rad;                /* of the residuals used, per axis */
+    double rms_rad;                /* of the used residuals, per axis */
     double range_m, range_sigma_m; /* at state.time_s */
     double range_rate_sigma_mps;   /* likewise */
-    double bend; /* how far the problem is from linear two standard deviations of the range away:
-                    the sum of squares' rise over 4, less 1, in size. Well below 1: the covariance
-                    is true; above: errors may be larger than it says */
+    /* nonlinearity: |rise of the sum of squares / 4 - 1| two standard deviations of range away.
+     * Well below 1 the covariance is valid; above 1 errors may be larger than it states */
+    double bend;
     int iterations;
 } bst_od_solution;
 
 enum {
-    BST_OD_LEAST = 3,     /* observations that are needed */
-    BST_OD_PRIOR_DOF = 20 /* weight of the covariances as stated: their variances are believed to
-                             within sqrt(2 / 20), a third */
+    BST_OD_LEAST = 3, /* fewest observations */
+    /* weight of the stated covariances: their variances are trusted to sqrt(2 / 20), a third */
+    BST_OD_PRIOR_DOF = 20
 };
 
-/* Fits from a first state. Observations in order of time (equal times allowed). Levenberg and
- * Marquardt's iteration in the coordinates that angles determine: direction and its rate, the
- * logarithm of range and range rate over range, seen from the observer in the middle of the arc;
- * the valley of short arcs is straight in them. Derivatives by central differences of the motion.
- * The covariance is the inverse of the normal matrix, turned to GCRF. `residual_chi2` (count
- * values, may be NULL) gets each observation's chi-square, of those left out as well.
- * Errors: BST_ERR_ARGUMENT for fewer than BST_OD_LEAST observations, times that fall, covariances
- * that are not positive definite; BST_ERR_NUMERIC, with the reason and what to do, for no
- * convergence, a singular geometry, or an orbit that leaves the Earth's surroundings.
- * Source: Montenbruck and Gill, Satellite Orbits, section 8.1; Marquardt, J. SIAM 11 (1963) 431;
- * Milani et al., Icarus 195 (2008) 474, for the coordinates. */
+/* Fits an orbit to directions, starting from a first state.
+ *
+ * Levenberg-Marquardt in coordinates that angles determine well, seen from the mid-arc observer:
+ * direction and rate, logarithm of range, range rate over range. The valley of short arcs is
+ * straight in them. Derivatives are central differences of the motion. The covariance is the
+ * inverse normal matrix, transformed to GCRF.
+ *
+ * Given:     observations   in order of time (equal times allowed)
+ * Returned:  residual_chi2  [count] chi-square of each observation, rejected ones included; may be
+ *                           NULL
+ * Errors:    BST_ERR_ARGUMENT for fewer than BST_OD_LEAST observations, descending times,
+ *            covariances that are not positive definite; BST_ERR_NUMERIC, with reason and remedy,
+ *            for no convergence, a singular geometry, or an orbit that leaves the Earth's vicinity
+ * Reference: Montenbruck and Gill, Satellite Orbits, section 8.1; Marquardt, J. SIAM 11 (1963) 431;
+ * Milani et al., Icarus 195 (2008) 474, for the coordinates */
 bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int count,
                       const bst_od_options *options, const bst_od_state *first,
                       double *residual_chi2, bst_od_solution *out) BST_MUST_CHECK;

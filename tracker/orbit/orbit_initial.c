@@ -12,10 +12,10 @@
 static const double MU = BST_EARTH_MU_M3PS2;
 
 enum {
-    SAMPLES = 10, /* observations that candidates are judged by */
-    RANGES = 64,  /* of the admissible region */
+    SAMPLES = 10, /* number of observations by which candidates are ranked */
+    RANGES = 64,  /* grid of ranges over the admissible region */
     RATES = 17,
-    ENDS = 40, /* ranges of each end for Lambert's problem */
+    ENDS = 40, /* ranges per end for Lambert's problem */
 };
 static const double NEAREST_M = 1e4, FARTHEST_M = 1.2e8;
 
@@ -24,23 +24,25 @@ const char *bst_od_method_name(bst_od_method method) {
     return names[method];
 }
 
-/* The direction from the observer at reception to the body at emission in geocentric axes: the
- * light's path without what the Earth moves meanwhile, which is along its velocity and in
- * proportion to the path. *stretch: geocentric over barycentric length. */
-static bst_vec3 geocentric(const bst_od_observation *o, double *stretch) {
+/* Direction from the observer at reception to the body at emission in geocentric axes: the light
+ * path minus the Earth's displacement during the light time, which is proportional to the path.
+ * *stretch: geocentric over barycentric length. */
+static bst_vec3 geocentric_direction(const bst_od_observation *o, double *stretch) {
     bst_vec3 line =
         bst_vec3_axpy(o->direction, 1.0 / BST_LIGHT_SPEED_MPS, o->observer.earth_bary_mps);
     *stretch = bst_vec3_norm(line);
     return bst_vec3_unit(line);
 }
 
-static bst_vec3 place_at(const bst_od_observation *o, double range_m, double *emitted_s) {
+/* Geocentric position of a body at a given range; emission time. */
+static bst_vec3 position_at_range(const bst_od_observation *o, double range_m, double *emitted_s) {
     double stretch;
-    bst_vec3 q = geocentric(o, &stretch);
+    bst_vec3 q = geocentric_direction(o, &stretch);
     *emitted_s = o->observer.time_s - range_m / (stretch * BST_LIGHT_SPEED_MPS);
     return bst_vec3_axpy(o->observer.position_m, range_m, q);
 }
 
+/* True if a state is a bound orbit above the Earth. */
 static bool is_bound(const bst_od_state *s) {
     double r = bst_vec3_norm(s->position_m), v2 = bst_vec3_dot(s->velocity_mps, s->velocity_mps);
     double h = bst_vec3_norm(bst_vec3_cross(s->position_m, s->velocity_mps)), p = h * h / MU;
@@ -49,12 +51,13 @@ static bool is_bound(const bst_od_state *s) {
         return false;
     }
     double e = sqrt(fmax(0.0, 1.0 + 2.0 * energy * p / MU));
-    /* some way into the Earth: a first orbit need not be good */
+    /* perigee may be somewhat inside the Earth: an initial orbit need not be accurate */
     return p / (1.0 + e) > 0.75 * BST_EARTH_RADIUS_M && p / (1.0 - e) < 1e9;
 }
 
-static bst_status see_at(const bst_od_state *orbit, const bst_od_observation *o,
-                         bst_od_sight *out) {
+/* Direction in which an orbit would be observed at the time of an observation. */
+static bst_status predict_direction(const bst_od_state *orbit, const bst_od_observation *o,
+                                    bst_od_sight *out) {
     bst_od_state then = {.time_s = o->observer.time_s};
     BST_TRY(bst_kepler_propagate(NULL, MU, orbit->position_m, orbit->velocity_mps,
                                  then.time_s - orbit->time_s, &then.position_m,
@@ -65,18 +68,19 @@ static bst_status see_at(const bst_od_state *orbit, const bst_od_observation *o,
 
 /* ------------------------------------------------------------------ Gooding's iteration */
 
-/* The orbit through the outer two of three observations at given ranges (state at the first
- * emission), and by how much it misses the middle one. */
-static bool miss(const bst_od_observation o[3], bst_lambert_way way, double range_1_m,
-                 double range_3_m, bst_od_state *orbit, double out[2]) {
+/* Orbit through the first and third observation at given ranges (state at the first emission), and
+ * its miss of the middle direction. */
+static bool middle_miss(const bst_od_observation o[3], bst_lambert_way way, double range_1_m,
+                        double range_3_m, bst_od_state *orbit, double out[2]) {
     double t1, t3;
     bst_vec3 v3;
-    bst_vec3 r1 = place_at(&o[0], range_1_m, &t1), r3 = place_at(&o[2], range_3_m, &t3);
+    bst_vec3 r1 = position_at_range(&o[0], range_1_m, &t1),
+             r3 = position_at_range(&o[2], range_3_m, &t3);
     bst_od_sight sight;
     orbit->time_s = t1;
     orbit->position_m = r1;
     if (bst_lambert(NULL, MU, r1, r3, t3 - t1, way, &orbit->velocity_mps, &v3) != BST_OK ||
-        see_at(orbit, &o[1], &sight) != BST_OK) {
+        predict_direction(orbit, &o[1], &sight) != BST_OK) {
         return false;
     }
     bst_tangent axes = bst_tangent_at(o[1].direction);
@@ -90,17 +94,17 @@ bst_status bst_od_gooding(bst_ctx *ctx, const bst_od_observation o[3], bst_lambe
                           double range_1_m, double range_3_m, bst_od_state *out) {
     double x[2] = {log(range_1_m), log(range_3_m)}, f[2];
     bst_od_state orbit;
-    bool good = miss(o, way, range_1_m, range_3_m, &orbit, f);
+    bool good = middle_miss(o, way, range_1_m, range_3_m, &orbit, f);
     for (int iteration = 0; iteration < 40 && good; iteration++) {
         double slope[2][2];
         const double h = 1e-6;
         for (int k = 0; k < 2 && good; k++) {
             double up[2] = {0.0}, down[2] = {0.0};
             bst_od_state near;
-            good = miss(o, way, exp(x[0] + (k == 0 ? h : 0.0)), exp(x[1] + (k ? h : 0.0)), &near,
-                        up) &&
-                   miss(o, way, exp(x[0] - (k == 0 ? h : 0.0)), exp(x[1] - (k ? h : 0.0)), &near,
-                        down);
+            good = middle_miss(o, way, exp(x[0] + (k == 0 ? h : 0.0)), exp(x[1] + (k ? h : 0.0)),
+                               &near, up) &&
+                   middle_miss(o, way, exp(x[0] - (k == 0 ? h : 0.0)), exp(x[1] - (k ? h : 0.0)),
+                               &near, down);
             slope[0][k] = (up[0] - down[0]) / (2.0 * h);
             slope[1][k] = (up[1] - down[1]) / (2.0 * h);
         }
@@ -116,7 +120,7 @@ bst_status bst_od_gooding(bst_ctx *ctx, const bst_od_observation o[3], bst_lambe
         for (int half = 0; half < 8 && !better; half++, scale *= 0.5) {
             double g[2];
             double y0 = x[0] + scale * step[0], y1 = x[1] + scale * step[1];
-            better = miss(o, way, exp(y0), exp(y1), &orbit, g) && hypot(g[0], g[1]) < before;
+            better = middle_miss(o, way, exp(y0), exp(y1), &orbit, g) && hypot(g[0], g[1]) < before;
             if (better) {
                 x[0] = y0;
                 x[1] = y1;
@@ -124,9 +128,9 @@ bst_status bst_od_gooding(bst_ctx *ctx, const bst_od_observation o[3], bst_lambe
                 f[1] = g[1];
             }
         }
-        /* rounding of directions, some 1e-16, over slopes that may be 1e-4 */
+        /* limit: rounding of directions, about 1e-16, over slopes down to 1e-4 */
         if (longest < 1e-11 || (!better && before < 1e-12)) {
-            good = miss(o, way, exp(x[0]), exp(x[1]), &orbit, f);
+            good = middle_miss(o, way, exp(x[0]), exp(x[1]), &orbit, f);
             out->time_s = o[1].observer.time_s;
             return good ? bst_kepler_propagate(ctx, MU, orbit.position_m, orbit.velocity_mps,
                                                out->time_s - orbit.time_s, &out->position_m,
@@ -141,23 +145,24 @@ bst_status bst_od_gooding(bst_ctx *ctx, const bst_od_observation o[3], bst_lambe
                     "no two-body orbit through the three directions was found from these ranges");
 }
 
-/* ------------------------------------------------------------------ candidates */
+/* ------------------------------------------------------------------ Candidates */
 
 typedef struct search {
     const bst_od_observation *items;
     int count;
-    int sample[SAMPLES]; /* by index */
+    int sample[SAMPLES]; /* indices of the sampled observations */
     int samples;
     bst_od_candidate *best;
     int found;
 } search;
 
+/* RMS residual of an orbit over the sampled observations, rad; stops above `give_up`. */
 static double rms_of(const search *s, const bst_od_state *orbit, double give_up) {
     double sum = 0.0, most = 2.0 * s->samples * give_up * give_up;
     for (int i = 0; i < s->samples; i++) {
         const bst_od_observation *o = &s->items[s->sample[i]];
         bst_od_sight sight;
-        if (see_at(orbit, o, &sight) != BST_OK) {
+        if (predict_direction(orbit, o, &sight) != BST_OK) {
             return INFINITY;
         }
         double off = bst_vec3_angle(o->direction, sight.direction);
@@ -169,8 +174,8 @@ static double rms_of(const search *s, const bst_od_state *orbit, double give_up)
     return sqrt(0.5 * sum / s->samples);
 }
 
-/* Whether two orbits are one for the purpose of a start. */
-static bool is_near(const search *s, const bst_od_state *a, const bst_od_state *b) {
+/* True if two candidate orbits are equivalent as a start. */
+static bool is_equivalent(const search *s, const bst_od_state *a, const bst_od_state *b) {
     bst_od_state there = *b;
     const bst_od_observer *eye = &s->items[s->count / 2].observer;
     if (bst_kepler_propagate(NULL, MU, b->position_m, b->velocity_mps, a->time_s - b->time_s,
@@ -183,8 +188,8 @@ static bool is_near(const search *s, const bst_od_state *a, const bst_od_state *
            bst_vec3_norm(bst_vec3_sub(a->velocity_mps, there.velocity_mps)) < 0.1 * v;
 }
 
-/* Keeps an orbit when it is among the best and not near a better one. */
-static void offer(search *s, const bst_od_state *orbit, bst_od_method method) {
+/* Keeps a candidate orbit if it is among the best and not equivalent to a better one. */
+static void offer_candidate(search *s, const bst_od_state *orbit, bst_od_method method) {
     if (!is_bound(orbit)) {
         return;
     }
@@ -195,7 +200,7 @@ static void offer(search *s, const bst_od_state *orbit, bst_od_method method) {
     }
     int place = s->found;
     for (int i = 0; i < s->found; i++) {
-        if (is_near(s, orbit, &s->best[i].state)) {
+        if (is_equivalent(s, orbit, &s->best[i].state)) {
             if (!(rms < s->best[i].rms_rad)) {
                 return;
             }
@@ -214,6 +219,7 @@ static void offer(search *s, const bst_od_state *orbit, bst_od_method method) {
     s->best[place] = (bst_od_candidate){.state = *orbit, .method = method, .rms_rad = rms};
 }
 
+/* Adds the roots of Gauss's method for three observations. */
 static void try_gauss(search *s, int first, int middle, int last) {
     const bst_od_observation o[3] = {s->items[first], s->items[middle], s->items[last]};
     bst_gauss_sight sights[3];
@@ -222,7 +228,7 @@ static void try_gauss(search *s, int first, int middle, int last) {
     for (int i = 0; i < 3; i++) {
         double stretch;
         sights[i] = (bst_gauss_sight){.time_s = o[i].observer.time_s,
-                                      .direction = geocentric(&o[i], &stretch),
+                                      .direction = geocentric_direction(&o[i], &stretch),
                                       .observer_m = o[i].observer.position_m};
     }
     if (bst_gauss_angles(NULL, MU, sights, orbits, &count) != BST_OK) {
@@ -233,23 +239,23 @@ static void try_gauss(search *s, int first, int middle, int last) {
         bst_od_state plain = {.time_s = sights[1].time_s,
                               .position_m = g->position_m[1],
                               .velocity_mps = g->velocity_mps};
-        offer(s, &plain, BST_OD_GAUSS);
+        offer_candidate(s, &plain, BST_OD_GAUSS);
         bst_vec3 turn = bst_vec3_cross(g->position_m[0], g->position_m[2]);
         bst_vec3 h = bst_vec3_cross(g->position_m[1], g->velocity_mps);
         bst_od_state refined;
         if (bst_od_gooding(NULL, o, (bst_lambert_way){.long_way = bst_vec3_dot(turn, h) < 0.0},
                            g->range_m[0], g->range_m[2], &refined) == BST_OK) {
-            offer(s, &refined, BST_OD_GAUSS);
+            offer_candidate(s, &refined, BST_OD_GAUSS);
         }
     }
 }
 
-/* Direction and rate at an observation: a polynomial through those within 17 degrees, in the plane
- * that touches the sphere there. False when there are too few. */
+/* Direction and rate (attributable) at an observation: a polynomial through observations within 17
+ * degrees, in the tangent plane. Returns false if there are too few. */
 static bool attributable(const search *s, int middle, bst_vec3 *q, bst_vec3 *w) {
     const bst_od_observation *m = &s->items[middle];
     double stretch, t0 = m->observer.time_s;
-    bst_vec3 q0 = geocentric(m, &stretch);
+    bst_vec3 q0 = geocentric_direction(m, &stretch);
     int first = middle, last = middle;
     while (first > 0 && bst_vec3_dot(s->items[first - 1].direction, m->direction) > 0.955) {
         first--;
@@ -266,7 +272,7 @@ static bool attributable(const search *s, int middle, bst_vec3 *q, bst_vec3 *w) 
     bst_tangent axes = bst_tangent_at(q0);
     double a[4][6] = {{0}};
     for (int i = first; i <= last; i++) {
-        bst_vec3 d = geocentric(&s->items[i], &stretch);
+        bst_vec3 d = geocentric_direction(&s->items[i], &stretch);
         double x = (s->items[i].observer.time_s - t0) / span, z = bst_vec3_dot(d, q0);
         const double power[4] = {1.0, x, x * x, x * x * x};
         for (int k = 0; k < terms; k++) {
@@ -277,7 +283,8 @@ static bool attributable(const search *s, int middle, bst_vec3 *q, bst_vec3 *w) 
             a[k][5] += power[k] * bst_vec3_dot(axes.e2, d) / z;
         }
     }
-    for (int k = 0; k < terms; k++) { /* Gauss and Jordan; the matrix is positive definite */
+    for (int k = 0; k < terms;
+         k++) { /* Gauss-Jordan elimination; the matrix is positive definite */
         if (!(a[k][k] > 1e-9)) {
             return false;
         }
@@ -300,6 +307,7 @@ static bool attributable(const search *s, int middle, bst_vec3 *q, bst_vec3 *w) 
     return true;
 }
 
+/* Searches the admissible region of range and range rate at an observation. */
 static void try_admissible(search *s, int middle) {
     bst_vec3 q, w;
     if (!attributable(s, middle, &q, &w)) {
@@ -307,7 +315,7 @@ static void try_admissible(search *s, int middle) {
     }
     const bst_od_observer *eye = &s->items[middle].observer;
     double stretch;
-    (void)geocentric(&s->items[middle], &stretch);
+    (void)geocentric_direction(&s->items[middle], &stretch);
     double v_along = bst_vec3_dot(eye->velocity_mps, q);
     for (int i = 0; i < RANGES; i++) {
         double range = NEAREST_M * pow(FARTHEST_M / NEAREST_M, i / (RANGES - 1.0));
@@ -319,29 +327,30 @@ static void try_admissible(search *s, int middle) {
             bst_od_state orbit = {.time_s = eye->time_s - range / (stretch * BST_LIGHT_SPEED_MPS),
                                   .position_m = place,
                                   .velocity_mps = bst_vec3_axpy(across, along, q)};
-            offer(s, &orbit, BST_OD_ADMISSIBLE);
+            offer_candidate(s, &orbit, BST_OD_ADMISSIBLE);
         }
     }
 }
 
+/* Searches Lambert's problem over a grid of both end ranges. */
 static void try_lambert(search *s, int first, int last, bst_lambert_way way) {
     const bst_od_observation *a = &s->items[first], *b = &s->items[last];
     for (int i = 0; i < ENDS; i++) {
         for (int k = 0; k < ENDS; k++) {
             const double steps = ENDS - 1.0, reach = FARTHEST_M / (10.0 * NEAREST_M);
             double t1, t3;
-            bst_vec3 v3, r1 = place_at(a, 10.0 * NEAREST_M * pow(reach, i / steps), &t1);
-            bst_vec3 r3 = place_at(b, 10.0 * NEAREST_M * pow(reach, k / steps), &t3);
+            bst_vec3 v3, r1 = position_at_range(a, 10.0 * NEAREST_M * pow(reach, i / steps), &t1);
+            bst_vec3 r3 = position_at_range(b, 10.0 * NEAREST_M * pow(reach, k / steps), &t3);
             bst_od_state orbit = {.time_s = t1, .position_m = r1};
             if (t3 > t1 &&
                 bst_lambert(NULL, MU, r1, r3, t3 - t1, way, &orbit.velocity_mps, &v3) == BST_OK) {
-                offer(s, &orbit, BST_OD_LAMBERT);
+                offer_candidate(s, &orbit, BST_OD_LAMBERT);
             }
         }
     }
 }
 
-/* Indices of up to SAMPLES observations of different times, evenly. */
+/* Indices of up to SAMPLES observations at different times, evenly spaced. */
 static void choose_samples(search *s) {
     for (int i = 0; i < SAMPLES; i++) {
         int index = (int)((int64_t)i * (s->count - 1) / (SAMPLES - 1));
@@ -378,7 +387,7 @@ bst_status bst_od_initial(bst_ctx *ctx, const bst_od_observation *observations, 
         try_admissible(&s, k[n / 4]);
         try_admissible(&s, k[3 * n / 4]);
     }
-    /* 84 minutes is the least that a revolution takes */
+    /* 84 minutes is the shortest orbital period */
     int most = (int)fmin(span / 5040.0, 16.0);
     for (int turns = 0; turns <= most; turns++) {
         for (int kind = 0; kind < (turns ? 4 : 2); kind++) {

@@ -12,8 +12,8 @@
 struct bst_od_path {
     bst_od_state state;
     double gm;
-    bst_trajectory *trajectory; /* of forces */
-    bst_sgp4 *sgp4;             /* both NULL: two bodies */
+    bst_trajectory *trajectory; /* numerical integration */
+    bst_sgp4 *sgp4;             /* both NULL: two-body motion */
     bst_od_motion motion;
 };
 
@@ -38,8 +38,8 @@ static bst_status teme_at_hour(bst_ctx *ctx, const bst_od_motion *motion, int64_
     return BST_OK;
 }
 
-/* gcrf_from_teme at a time and its derivative (1/s), linear between hours: nutation bends by 5e-11
- * rad in between, 2 mm at a geostationary distance. */
+/* gcrf_from_teme at a time and its derivative (1/s), linear between full hours. Nutation is
+ * nonlinear by 5e-11 rad within an hour: 2 mm at geostationary distance. */
 static bst_status teme_at(bst_ctx *ctx, const bst_od_motion *motion, double time_s,
                           bst_mat3 *rotation, bst_mat3 *rate) {
     double hour = floor(time_s / 3600.0), f = time_s / 3600.0 - hour;
@@ -140,7 +140,7 @@ void bst_od_see(const bst_od_state *state, const bst_od_observer *observer, bst_
     double distance = bst_vec3_norm(r), u = BST_EARTH_MU_M3PS2 / (distance * distance * distance);
     bst_vec3 a = bst_vec3_scale(r, -u);
     bst_vec3 away = bst_vec3_sub(r, observer->position_m);
-    /* all that moves by -tau while the light is under way */
+    /* velocity of the emission point by light time tau */
     bst_vec3 drift = bst_vec3_add(v, observer->earth_bary_mps);
     bst_vec3 line = away;
     double tau = bst_vec3_norm(away) / BST_LIGHT_SPEED_MPS;
@@ -160,16 +160,17 @@ void bst_od_see(const bst_od_state *state, const bst_od_observer *observer, bst_
     out->rate_radps = bst_vec3_scale(bst_tangent_project(out->direction, rate), 1.0 / out->range_m);
 }
 
-/* ------------------------------------------------------------------ covariance */
+/* ------------------------------------------------------------------ Covariance */
 
+/* Displaces one component of an orbit state. */
 static void add_to_state(bst_od_state *s, int axis, double amount) {
     double *place[6] = {&s->position_m.x,   &s->position_m.y,   &s->position_m.z,
                         &s->velocity_mps.x, &s->velocity_mps.y, &s->velocity_mps.z};
     *place[axis] += amount;
 }
 
-/* Steps of central differences: far above rounding (1e-9 m), and small against the scale on which
- * two-body motion bends. */
+/* Step of central differences: far above rounding (1e-9 m) and small against the scale on which
+ * two-body motion is nonlinear. */
 static double step_of(const bst_od_state *s, int axis) {
     double r = bst_vec3_norm(s->position_m), v = bst_vec3_norm(s->velocity_mps);
     return axis < 3 ? 1e-6 * r : 1e-6 * v;
@@ -227,7 +228,7 @@ void bst_od_project(const bst_od_state *state, const double covariance[6][6],
     bst_od_see(state, observer, out);
     bst_tangent axes = bst_tangent_at(out->direction);
     for (int k = 0; k < 6; k++) {
-        /* within a thousandth of the range, which may be far below that of the orbit */
+        /* within a thousandth of the range, which may be much smaller than the orbit's radius */
         double step = k < 3 ? 1e-5 * out->range_m : step_of(state, k);
         bst_od_sight side[2];
         for (int i = 0; i < 2; i++) {
@@ -274,14 +275,14 @@ void bst_od_from_track(const bst_od_observer *observer, bst_vec3 direction, bst_
     const double range_m = range->range_m, range_rate_mps = range->range_rate_mps;
     double tau = range_m / BST_LIGHT_SPEED_MPS;
     bst_tangent axes = bst_tangent_at(direction);
-    /* the line from observer to body holds -tau times the Earth's velocity and the body's own */
+    /* the line of sight contains -tau times the Earth's velocity and the body's own */
     bst_vec3 line =
         bst_vec3_axpy(bst_vec3_scale(direction, range_m), tau, observer->earth_bary_mps);
     double slow = 1.0 + range_rate_mps / BST_LIGHT_SPEED_MPS;
     bst_vec3 rate = bst_vec3_axpy(bst_vec3_scale(direction, range_rate_mps), range_m, rate_radps);
     rate = bst_vec3_axpy(rate, range_rate_mps / BST_LIGHT_SPEED_MPS, observer->earth_bary_mps);
     out->time_s = observer->time_s;
-    /* the line's change is v (1 - tau') - v_observer */
+    /* rate of the line of sight: v (1 - tau') - v_observer */
     out->velocity_mps = bst_vec3_scale(bst_vec3_add(observer->velocity_mps, rate), slow);
     out->position_m =
         bst_vec3_axpy(bst_vec3_add(observer->position_m, line), tau, out->velocity_mps);
@@ -299,7 +300,7 @@ void bst_od_from_track(const bst_od_observer *observer, bst_vec3 direction, bst_
     velocity[4] = rate_radps;
     velocity[5] = bst_vec3_axpy(bst_vec3_axpy(direction, 1.0 / c, observer->earth_bary_mps),
                                 1.0 / c, out->velocity_mps);
-    /* the body goes on while the light is under way, for the longer the farther it is */
+    /* a farther body moves longer during the light time */
     position[4] = bst_vec3_axpy(position[4], 1.0 / c, out->velocity_mps);
     for (int k = 0; k < 6; k++) {
         position[k] = bst_vec3_axpy(position[k], tau, velocity[k]);

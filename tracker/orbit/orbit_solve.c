@@ -1,4 +1,5 @@
-/* The whole way from directions to an orbit. */
+/* Orbit determination from directions: candidate choice on a first part, then growth to the whole
+ * arc. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,11 +8,11 @@
 #include "tracker/orbit/orbit_initial.h"
 
 enum {
-    FIRST_SAMPLES = 40,   /* observations of the first part that candidates are fitted to */
-    GROWING_SAMPLES = 200 /* of an arc that is not the whole one */
+    FIRST_SAMPLES = 40,   /* observations of the first part to which candidates are fitted */
+    GROWING_SAMPLES = 200 /* most observations of an intermediate arc */
 };
 
-/* The first part is as long as this, where it holds enough. */
+/* Length of the first part of the arc, if it contains enough observations. */
 static const double FIRST_SPAN_S = 1800.0;
 
 typedef struct part {
@@ -22,8 +23,8 @@ static double time_of(const bst_od_observation *o, int i) {
     return o[i].observer.time_s;
 }
 
-/* The stretch of `span_s` with the most observations. */
-static part fullest(const bst_od_observation *o, int count, double span_s) {
+/* Part of length `span_s` with the most observations. */
+static part densest_part(const bst_od_observation *o, int count, double span_s) {
     part best = {0, 0};
     for (int first = 0, last = 0; first < count; first++) {
         while (last + 1 < count && time_of(o, last + 1) - time_of(o, first) <= span_s) {
@@ -36,8 +37,8 @@ static part fullest(const bst_od_observation *o, int count, double span_s) {
     return best;
 }
 
-/* Different times among the observations of a part, counted up to 8, spread over half of `span_s`
- * at least unless there are no others. */
+/* True if a part has enough observations at different times: up to 8, spread over at least half of
+ * `span_s` if possible. */
 static bool is_enough(const bst_od_observation *o, int count, part p) {
     int times = 1, wanted = count < 8 ? count : 8;
     for (int i = p.first + 1; i <= p.last; i++) {
@@ -46,19 +47,20 @@ static bool is_enough(const bst_od_observation *o, int count, part p) {
     return times >= wanted;
 }
 
+/* Chooses the first part of the arc. */
 static part first_part(const bst_od_observation *o, int count, double *span_s) {
     double whole = time_of(o, count - 1) - time_of(o, 0);
     *span_s = FIRST_SPAN_S;
-    part p = fullest(o, count, *span_s);
+    part p = densest_part(o, count, *span_s);
     while (!is_enough(o, count, p) && *span_s < whole) {
         *span_s *= 2.0;
-        p = fullest(o, count, *span_s);
+        p = densest_part(o, count, *span_s);
     }
     return p;
 }
 
-/* Up to `most` observations of a part, evenly; returns how many. */
-static int thin(const bst_od_observation *o, part p, int most, bst_od_observation *out) {
+/* Selects up to `most` observations of a part, evenly; returns their number. */
+static int select_evenly(const bst_od_observation *o, part p, int most, bst_od_observation *out) {
     int n = p.last - p.first + 1, count = n < most ? n : most;
     for (int i = 0; i < count; i++) {
         out[i] = o[p.first + (count > 1 ? (int)((int64_t)i * (n - 1) / (count - 1)) : 0)];
@@ -74,6 +76,7 @@ static double eccentricity(const bst_od_state *s, double mu) {
     return bst_vec3_norm(e);
 }
 
+/* A candidate fitted to the first part. */
 typedef struct started {
     bst_od_solution solution;
     bst_od_method method;
@@ -85,9 +88,9 @@ static int by_chi2(const void *a, const void *b) {
     return (p > q) - (p < q);
 }
 
-/* Fits each candidate to the first part, two bodies; the ones that converge, best first. */
-static bst_status start(bst_ctx *ctx, const bst_od_observation *items, int count,
-                        started out[BST_OD_CANDIDATES], int *found, int *tried) {
+/* Fits each candidate orbit to the first part with two-body motion; converged ones, best first. */
+static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, int count,
+                                 started out[BST_OD_CANDIDATES], int *found, int *tried) {
     bst_od_candidate candidates[BST_OD_CANDIDATES];
     const bst_od_options options = {0};
     BST_TRY(bst_od_initial(ctx, items, count, candidates, tried));
@@ -121,14 +124,14 @@ static bst_status start(bst_ctx *ctx, const bst_od_observation *items, int count
     return BST_OK;
 }
 
-/* Whether two solutions of one part are the same minimum. */
+/* True if two solutions of a part are the same minimum. */
 static bool is_same(const bst_od_solution *a, const bst_od_solution *b) {
     return fabs(log(a->range_m / b->range_m)) < 0.02 &&
            bst_vec3_norm(bst_vec3_sub(a->state.velocity_mps, b->state.velocity_mps)) <
                0.02 * bst_vec3_norm(a->state.velocity_mps);
 }
 
-/* All observations, how they are to be fitted, and room for GROWING_SAMPLES of them. */
+/* The arc: all observations, fit options, and room for GROWING_SAMPLES of them. */
 typedef struct arc {
     const bst_od_observation *items;
     int count;
@@ -136,9 +139,9 @@ typedef struct arc {
     bst_od_observation *room;
 } arc;
 
-/* From an orbit that fits the part to one that fits all. */
-static bst_status grow(bst_ctx *ctx, const arc *a, part p, double span_s, const bst_od_state *from,
-                       bst_od_solution *out) {
+/* Extends a fit from a part to the whole arc. */
+static bst_status extend_to_arc(bst_ctx *ctx, const arc *a, part p, double span_s,
+                                const bst_od_state *from, bst_od_solution *out) {
     const bst_od_observation *o = a->items;
     const int count = a->count;
     bst_od_state state = *from;
@@ -156,25 +159,25 @@ static bst_status grow(bst_ctx *ctx, const arc *a, part p, double span_s, const 
             p.last++;
         }
         if (p.last - p.first + 1 > n && p.last - p.first + 1 < count) {
-            int used = thin(o, p, GROWING_SAMPLES, a->room);
+            int used = select_evenly(o, p, GROWING_SAMPLES, a->room);
             BST_TRY(bst_od_fit(ctx, a->room, used, &growing, &state, NULL, out));
             state = out->state;
         }
     }
-    if (count > GROWING_SAMPLES) { /* near first, then all */
-        int used = thin(o, (part){0, count - 1}, GROWING_SAMPLES, a->room);
+    if (count > GROWING_SAMPLES) { /* a selection first, then all observations */
+        int used = select_evenly(o, (part){0, count - 1}, GROWING_SAMPLES, a->room);
         BST_TRY(bst_od_fit(ctx, a->room, used, &growing, &state, NULL, out));
         state = out->state;
     }
     return bst_od_fit(ctx, o, count, a->options, &state, NULL, out);
 }
 
-/* From a first part of the arc. */
+/* Determines the orbit from a given first part of the arc. */
 static bst_status solve_from(bst_ctx *ctx, const arc *a, part p, double span_s,
                              double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
     started starts[BST_OD_CANDIDATES];
-    int found, used = thin(a->items, p, FIRST_SAMPLES, a->room);
-    BST_TRY(start(ctx, a->room, used, starts, &found, &report->candidates));
+    int found, used = select_evenly(a->items, p, FIRST_SAMPLES, a->room);
+    BST_TRY(fit_candidates(ctx, a->room, used, starts, &found, &report->candidates));
     bst_status status = BST_OK;
     bool done = false;
     bst_ctx quiet = {0};
@@ -190,14 +193,15 @@ static bst_status solve_from(bst_ctx *ctx, const arc *a, part p, double span_s,
         if (done && !isfinite(report->other_chi2)) {
             report->other_chi2 = starts[i].solution.chi2;
         }
-        /* a whole arc that fits needs no other orbit */
+        /* a good fit to the whole arc needs no other candidate */
         if (done && best < 3.0) {
             break;
         }
         bst_od_solution solution;
-        bst_status grown = grow(&quiet, a, p, span_s, &starts[i].solution.state, &solution);
+        bst_status grown =
+            extend_to_arc(&quiet, a, p, span_s, &starts[i].solution.state, &solution);
         double excess = grown == BST_OK && solution.dof > 0 ? solution.chi2 / solution.dof : 1.0;
-        /* leaving observations out is no way to fit */
+        /* penalty: rejecting observations must not improve the rank */
         excess += grown == BST_OK ? 100.0 * solution.rejected / a->count : 0.0;
         if (grown == BST_OK &&
             !(eccentricity(&solution.state, bst_od_gm(&a->options->motion)) < 1.0)) {
@@ -226,8 +230,9 @@ static bst_status solve_from(bst_ctx *ctx, const arc *a, part p, double span_s,
     return BST_OK;
 }
 
-static bst_status solve(bst_ctx *ctx, const arc *a, double *residual_chi2, bst_od_solution *out,
-                        bst_od_report *report) {
+/* Determines the orbit; on failure with longer first parts. */
+static bst_status solve_arc(bst_ctx *ctx, const arc *a, double *residual_chi2, bst_od_solution *out,
+                            bst_od_report *report) {
     const bst_od_observation *o = a->items;
     const int count = a->count;
     double span_s, whole = time_of(o, count - 1) - time_of(o, 0);
@@ -237,9 +242,9 @@ static bst_status solve(bst_ctx *ctx, const arc *a, double *residual_chi2, bst_o
         if (status != BST_ERR_NUMERIC || span_s >= whole) {
             return status;
         }
-        /* what a part does not tell, a longer one may */
+        /* a longer part may determine what a shorter one does not */
         span_s *= 2.0;
-        p = fullest(o, count, span_s);
+        p = densest_part(o, count, span_s);
     }
 }
 
@@ -259,7 +264,7 @@ bst_status bst_od_determine(bst_ctx *ctx, const bst_od_observation *observations
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for observations");
     }
     const arc all = {observations, count, options, room};
-    bst_status status = solve(ctx, &all, residual_chi2, out, report);
+    bst_status status = solve_arc(ctx, &all, residual_chi2, out, report);
     free(room);
     return status;
 }

@@ -7,8 +7,8 @@
 #include "sim/core/symmetric.h"
 #include "tracker/mtt/mixture.h"
 
-/* Sets sky and cross from state and covariance. */
-static void look(bst_orbit_track *t, const bst_od_observer *observer) {
+/* Sets sky state and cross-covariance of a track's orbit from its state and covariance. */
+static void project_to_sky(bst_orbit_track *t, const bst_od_observer *observer) {
     bst_od_sight sight;
     double slope[4][6];
     bst_od_project(&t->state, t->covariance, observer, &sight, slope, t->sky.covariance);
@@ -29,11 +29,11 @@ void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *obse
     *out = (bst_orbit_track){.valid = true};
     bst_od_from_track(observer, sky->direction, sky->rate_radps, sky->covariance, range,
                       &out->state, out->covariance);
-    look(out, observer);
+    project_to_sky(out, observer);
 }
 
-/* Acceleration by the Earth's oblateness (Montenbruck and Gill 2000, 3.2.5, with J2 alone), m/s^2.
- * Its axis is taken along z of GCRF: 0.1 degree of precession change it by less than 1 %. */
+/* Acceleration by the Earth's oblateness (J2 only), m/s^2 (Montenbruck and Gill 2000, 3.2.5). The
+ * axis is taken along z of GCRF: 0.1 degree of precession changes it by less than 1 %. */
 static bst_vec3 oblateness(bst_vec3 r) {
     const double j2 = 1.08263e-3;
     double n2 = bst_vec3_dot(r, r), n = sqrt(n2);
@@ -43,11 +43,11 @@ static bst_vec3 oblateness(bst_vec3 r) {
     return (bst_vec3){k * r.x * (1.0 - z2), k * r.y * (1.0 - z2), k * r.z * (3.0 - z2)};
 }
 
-/* Greatest step between two pushes by the oblateness: they miss a ten-thousandth of it. */
+/* Longest step between two J2 kicks; the error is a ten-thousandth of the J2 effect. */
 #define PUSH_S 30.0
 
-/* Two-body motion between half pushes (Strang splitting). */
-static bst_status move(bst_ctx *ctx, bst_orbit_track *t, double to_s) {
+/* Two-body motion with half kicks of J2 before and after (Strang splitting). */
+static bst_status propagate_j2(bst_ctx *ctx, bst_orbit_track *t, double to_s) {
     const bst_od_motion motion = {.forces = NULL};
     double span = to_s - t->state.time_s;
     int steps = (int)ceil(fabs(span) / PUSH_S);
@@ -70,7 +70,7 @@ bool bst_orbit_track_predict(bst_orbit_track *t, double noise_m2ps3,
                              const bst_od_observer *observer) {
     bst_ctx quiet = {0}; /* an orbit that ends is no failure of the run */
     double dt = fabs(observer->time_s - t->state.time_s);
-    t->valid = t->valid && move(&quiet, t, observer->time_s) == BST_OK;
+    t->valid = t->valid && propagate_j2(&quiet, t, observer->time_s) == BST_OK;
     if (!t->valid) {
         return false;
     }
@@ -80,16 +80,16 @@ bool bst_orbit_track_predict(bst_orbit_track *t, double noise_m2ps3,
         t->covariance[i + 3][i] += noise_m2ps3 * dt * dt / 2.0;
         t->covariance[i + 3][i + 3] += noise_m2ps3 * dt;
     }
-    look(t, observer);
+    project_to_sky(t, observer);
     for (int i = 0; i < 4; i++) {
         t->valid = t->valid && t->sky.covariance[i][i] > 0.0 && isfinite(t->sky.covariance[i][i]);
     }
     return t->valid;
 }
 
-/* b - a in the tangent axes at a, and b's covariance there. */
-static void compare(const bst_sky_state *a, const bst_sky_state *b, double difference[4],
-                    double covariance[4][4]) {
+/* Difference b - a of two sky states in the tangent axes at a, and b's covariance there. */
+static void sky_difference(const bst_sky_state *a, const bst_sky_state *b, double difference[4],
+                           double covariance[4][4]) {
     bst_tangent axes = bst_tangent_at(a->direction);
     bst_vec3 step = bst_tangent_log(a->direction, b->direction);
     bst_vec3 rate =
@@ -107,7 +107,7 @@ bool bst_orbit_track_update(bst_orbit_track *t, const bst_sky_state *posterior) 
     if (!t->valid) {
         return false;
     }
-    compare(&t->sky, posterior, d, after);
+    sky_difference(&t->sky, posterior, d, after);
     double x[6];
     for (int i = 0; i < 6; i++) {
         x[i] = 0.0;
@@ -145,7 +145,7 @@ bool bst_orbit_track_update(bst_orbit_track *t, const bst_sky_state *posterior) 
 
 bool bst_sky_fuse(bst_sky_state *a, const bst_sky_state *b) {
     double d[4], pb[4][4], sum[4][4], inverse[4][4], gain[4][4], after[4][4], x[4];
-    compare(a, b, d, pb);
+    sky_difference(a, b, d, pb);
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 4; j++) {
             sum[i][j] = a->covariance[i][j] + pb[i][j];

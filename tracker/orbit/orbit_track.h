@@ -1,5 +1,5 @@
-/* Orbital motion of a track whose range is known or assumed: the six elements of its orbit stand
- * behind the direction and rate that association and filters work on. */
+/* Orbital motion of a track whose range is known or assumed: its six-dimensional orbit state
+ * underlies the direction and rate used by association and filters. */
 #ifndef BST_TRACKER_ORBIT_ORBIT_TRACK_H
 #define BST_TRACKER_ORBIT_ORBIT_TRACK_H
 
@@ -10,19 +10,21 @@ typedef struct bst_orbit_track {
     bool valid;
     bst_od_state state;      /* geocentric, GCRF */
     double covariance[6][6]; /* r, v */
-    /* of the latest prediction: direction and rate, and their covariance with r, v */
+    /* of the latest prediction: direction and rate, and their cross-covariance with r, v */
     bst_sky_state sky;
     double cross[6][4];
 } bst_orbit_track;
 
-/* An orbit from a track (bst_od_from_track); predicted to the same time. */
+/* Starts an orbit from a track's sky state and a range prior (bst_od_from_track), at the same time.
+ */
 void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *observer,
                            const bst_orbit_range *range, bst_orbit_track *out);
 
-/* Moves the orbit to observer->time_s (either way) with white acceleration of power spectral
- * density noise_m2ps3 along each axis for what two-body motion and J2 leave out, and sets
- * track->sky to what the observer then sees, to first order in the covariance. False, and the orbit
- * no longer valid, when there is no such orbit. */
+/* Predicts the orbit to observer->time_s (either direction) and sets track->sky, to first order.
+ *
+ * Given:     noise_m2ps3  power spectral density of white acceleration per axis, for forces beyond
+ *                         two-body motion and J2
+ * Returned:  false, with the orbit no longer valid, if the orbit does not exist */
 bool bst_orbit_track_predict(bst_orbit_track *track, double noise_m2ps3,
                              const bst_od_observer *observer);
 
@@ -36,8 +38,8 @@ bool bst_orbit_track_predict(bst_orbit_track *track, double noise_m2ps3,
  * Reference: Anderson and Moore 1979, chapter 5 */
 bool bst_orbit_track_update(bst_orbit_track *track, const bst_sky_state *posterior);
 
-/* The mean of two independent estimates of the same sky state, in place of the first; false when
- * their covariances do not allow it. */
+/* Fuses two independent estimates of the same sky state into the first; false if their covariances
+ * are not usable. */
 bool bst_sky_fuse(bst_sky_state *a, const bst_sky_state *b);
 
 #endif

@@ -1,4 +1,4 @@
-/* Tracks that move along orbits. */
+/* Prediction and update of tracks by their orbits. */
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"

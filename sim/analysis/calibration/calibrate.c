@@ -59,6 +59,7 @@ static bst_status grow(bst_ctx *ctx, void **items, long count, long *room, size_
     return BST_OK;
 }
 
+/* Length in px of a source's streak in the frame. */
 static double length_of(const bst_truth_item *t) {
     double length = hypot(t->x_end_px - t->x_start_px, t->y_end_px - t->y_start_px);
     return isfinite(length) ? length : 0.0;
@@ -97,6 +98,7 @@ static bool is_free(const bst_truth *truth, double x, double y, double reach, in
     return true;
 }
 
+/* Node of the calibration's SNR grid that is nearest on a logarithmic scale. */
 static int snr_node(double snr) {
     int best = 0;
     for (int i = 1; i < BST_OBSGEN_SNRS; i++) {
@@ -113,12 +115,14 @@ typedef struct common_error {
     int count;
 } common_error;
 
+/* Weight of a star in the common centroid error: inverse Cramér-Rao variance. */
 static double place_weight(const bst_calibration_fitter *c, const bst_truth_item *t,
                            double noise_e) {
     bst_crlb_table_at at = bst_crlb_table_of(&c->bound, t->electrons, noise_e, length_of(t));
     return 1.0 / (at.var_along_px2 + at.var_across_px2 + 1e-4);
 }
 
+/* Adds the squared centroid error of a detection, in units of the Cramér-Rao bound. */
 static void add_place(bst_calibration_fitter *c, const bst_truth_item *t, const bst_detection *d,
                       double noise_e, const common_error *common) {
     /* each star contributes its own weight to the mean */
@@ -153,6 +157,7 @@ static void add_place(bst_calibration_fitter *c, const bst_truth_item *t, const 
     }
 }
 
+/* Adds a detection trial of a source near the threshold. */
 static bst_status add_trial(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth_item *t,
                             double amplitude, double threshold, const bst_generator_filter *filter,
                             bool detected) {
@@ -202,6 +207,7 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibration_fitter *c, const bst_
     return BST_OK;
 }
 
+/* Adds the measured noise and background of a frame to their fit. */
 static void add_noise(bst_calibration_fitter *c, const bst_detections *detections,
                       const bst_generator_result *theory) {
     double variance = theory->noise_e * theory->noise_e, n = 1.0,

@@ -54,6 +54,7 @@ static double best_gain(const bst_calibration_fitter *c, int node, double slope,
     return 0.5 * (low + high);
 }
 
+/* Fits the gains of the detection probability per streak length. */
 static void fit_detection(const bst_calibration_fitter *c, bst_obsgen_calibration *out) {
     long count[BST_OBSGEN_LENGTHS] = {0};
     for (long i = 0; i < c->trial_count; i++) {
@@ -113,6 +114,7 @@ static double untruncated_sigma(double square) {
     return 0.5 * (low + high);
 }
 
+/* Fits the ratio of centroid error to bound at each SNR. */
 static void fit_places(const calibrate_mean *seen, double *factors) {
     double before = 1.0;
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {

@@ -35,6 +35,7 @@ typedef struct job {
     char name[160]; /* observer/sensor */
 } job;
 
+/* Renders and writes one bias, dark or flat frame. */
 static bst_status write_frame(bst_ctx *ctx, const job *j, const series *s, int64_t i,
                               bst_fits *fits) {
     const bst_camera *camera = &j->sensor->camera;
@@ -81,6 +82,7 @@ static bst_status draft_of(bst_ctx *ctx, const char *path, char *draft, size_t b
     return BST_OK;
 }
 
+/* Writes the FITS file of one series: bias, dark or flat. */
 static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
     if (s->count == 0) {
         return BST_OK;
@@ -127,6 +129,7 @@ static double half_level_e(const bst_camera *c) {
     return 0.5 * fmin(c->full_well_e, top_e);
 }
 
+/* Writes the calibration frames of one sensor. */
 static bst_status do_sensor(bst_ctx *ctx, job *j) {
     const bst_calibration_frames *r = j->request;
     const bst_sensor_config *s = j->sensor;

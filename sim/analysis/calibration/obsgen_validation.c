@@ -40,6 +40,7 @@ typedef struct judging {
     double fwhm_px;
 } judging;
 
+/* Sums detection probability and centroid errors of a frame. */
 static bst_status on_frame(void *user, bst_ctx *ctx, const bst_truth *truth,
                            const bst_detections *detections) {
     judging *j = user;
@@ -73,12 +74,14 @@ static bst_status on_frame(void *user, bst_ctx *ctx, const bst_truth *truth,
     return BST_OK;
 }
 
+/* Sums the error of the track of interest. */
 static void on_track(void *user, double error_px) {
     judging *j = user;
     j->sums->figure[TRACK].sum += error_px * error_px;
     j->sums->figure[TRACK].count += 1.0;
 }
 
+/* Runs the scenario once, from images or with the statistical observation generator. */
 static bst_status play(bst_ctx *ctx, const bst_obsgen_validation_options *o, bool generator,
                        int number, run_sums *sums) {
     static const char *const sensor = "/observers/0/sensors/0";
@@ -128,6 +131,7 @@ typedef struct figure_of {
     double margin;
 } figure_of;
 
+/* Value of a validation figure over the chosen seeds. */
 static double value_of(const figure_of *f, const run_sums *runs, const int *chosen, int seeds) {
     double sum = 0.0, count = 0.0;
     for (int i = 0; i < seeds; i++) {
@@ -175,6 +179,7 @@ static sampling bootstrap(const figure_of *f, const run_sums *image, const run_s
                       sqrt(fmax(square / n - mean * mean, 0.0))};
 }
 
+/* Compares a figure of generator and image processing; bootstrap interval against the margin. */
 static bool judge(const figure_of *f, const run_sums *image, const run_sums *generator, int seeds,
                   int *chosen, cJSON *list) {
     double a = value_of(f, image, NULL, seeds), b = value_of(f, generator, NULL, seeds);
@@ -205,6 +210,7 @@ static bool judge(const figure_of *f, const run_sums *image, const run_sums *gen
     return inside;
 }
 
+/* Compares all figures of generator and image processing. */
 static bool judge_all(const run_sums *image, const run_sums *generator, int seeds, int *chosen,
                       cJSON *list) {
     bool all = true;

@@ -20,6 +20,7 @@ typedef struct watch {
     int target;
 } watch;
 
+/* Keeps the true sources of a frame until its detections arrive. */
 static bst_status keep_truth(watch *w, const bst_truth *truth) {
     int place = (int)(truth->exposure_id % WAITING);
     if (truth->count > w->room[place] || !w->waiting[place]) {
@@ -40,6 +41,7 @@ static const bst_truth *truth_of(const watch *w, int64_t exposure_id) {
     return truth && truth->exposure_id == exposure_id ? truth : NULL;
 }
 
+/* Passes on the error of the confirmed track of interest. */
 static void judge_track(const watch *w, const bst_tracks *tracks) {
     const bst_truth *truth = truth_of(w, tracks->exposure_id);
     for (int i = 0; truth && i < tracks->count; i++) {

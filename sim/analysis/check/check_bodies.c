@@ -45,6 +45,7 @@ static bool has_tasking(const bst_scenario *scenario) {
     return false;
 }
 
+/* How the sensor's pointing can be predicted: ideal gimbal, cue, stare, or not at all. */
 static gaze gaze_of(const bst_scenario *scenario, looking *l) {
     const bst_scenario_module_config *gimbal =
         bst_scenario_module(scenario, l->observer, l->sensor, "gimbal");
@@ -141,6 +142,7 @@ typedef struct meeting {
     double from_s;
 } meeting;
 
+/* Finds the spans in which the Sun, Moon or Earth is in the field of view. */
 static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_check_body_spans *out) {
     double step = fmin(fmax(1e-3 * duration_s, LEAST_STEP_S), MOST_STEP_S);
     double clear[BST_FIELD_BODIES];
@@ -173,6 +175,7 @@ static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_chec
     return BST_OK;
 }
 
+/* Predicts the sensor's pointing and finds the bodies in its field of view. */
 static bst_status look_ahead(bst_ctx *ctx, const bst_scenario *scenario, looking *l,
                              bst_check_body_spans *out) {
     l->gaze = gaze_of(scenario, l);

@@ -29,13 +29,14 @@ static bool limits_of(const bst_scenario *scenario, int observer, int sensor, li
     bst_loop_timing timing;
     bst_loop_timing_of(scenario, observer, sensor, &timing);
     /* without manoeuvre detection the tracker keeps its quiet model */
-    bool told = strcmp(tracker->desc->type, "imm") == 0 || (events > 0.0 && window > 0.0);
+    bool detects = strcmp(tracker->desc->type, "imm") == 0 || (events > 0.0 && window > 0.0);
     double followed = quiet * BST_ARCSEC_RAD * sqrt(gate / timing.period_s);
-    double found = told ? 0.5 * swift * BST_ARCSEC_RAD * sqrt(gate / (3.0 * timing.period_s)) : 0.0;
+    double found =
+        detects ? 0.5 * swift * BST_ARCSEC_RAD * sqrt(gate / (3.0 * timing.period_s)) : 0.0;
     out->period_s = timing.period_s;
     out->acceleration_radps2 = fmax(followed, found);
     out->jump_radps = 2.0 * timing.period_s * found;
-    if (!told) {
+    if (!detects) {
         out->jump_radps = followed * timing.period_s;
     }
     out->type = tracker->desc->type;

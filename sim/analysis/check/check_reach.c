@@ -31,6 +31,7 @@ typedef struct seeing {
     bst_mount_status mount;
 } seeing;
 
+/* Direction of the cue, attitude of the body and position of the observer at a time. */
 static bst_status look(void *user, bst_ctx *ctx, double seconds,
                        bst_pointing_feasibility_look *out) {
     seeing *s = user;
@@ -71,6 +72,7 @@ typedef struct found {
     bst_check_spans spans[BST_REACH_COUNT];
 } found;
 
+/* Warns of the spans in which the mount cannot point at the cue, by reason. */
 static void warn(bst_ctx *ctx, const char *name, const found *f, double examined_s,
                  double duration_s, bool rolls) {
     for (int reason = BST_REACH_BEHIND_EARTH; reason < BST_REACH_COUNT; reason++) {
@@ -106,6 +108,7 @@ static bst_status chase(bst_ctx *ctx, const bst_pointing_feasibility_problem *pr
     return BST_OK;
 }
 
+/* Finds the spans in which the mount cannot point at the cue. */
 static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double tolerance_rad,
                         found *f) {
     f->duration_s = duration_s;
@@ -140,6 +143,7 @@ static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double toler
 
 /* ---- a sensor ---- */
 
+/* Sets the mount's axes and limits and the attitude law of its platform. */
 static bst_status set_mount(bst_ctx *ctx, const bst_scenario_module_config *gimbal, double dt_s,
                             bst_quat nominal, seeing *s) {
     const bst_platform_config *platform;

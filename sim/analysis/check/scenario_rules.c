@@ -54,6 +54,7 @@ typedef struct ages {
     const char *oldest;
 } ages;
 
+/* Notes the age of an object's orbital elements over the run. */
 static void note_age(ages *a, const bst_world *world, int body, const char *name,
                      double duration_s) {
     double offset_s;
@@ -99,6 +100,7 @@ static bst_status old_elements(bst_ctx *ctx, const bst_scenario *scenario, const
     return BST_OK;
 }
 
+/* Warns if the run lies beyond the measured Earth orientation parameters. */
 static bst_status predicted_earth(bst_ctx *ctx, const bst_scenario *scenario,
                                   const bst_world *world) {
     bst_world_warn_earth_orientation(ctx, scenario->file, world, scenario->duration_s);
@@ -254,6 +256,7 @@ typedef struct rule {
     bst_status (*of_simulation)(bst_ctx *, const bst_scenario *, const bst_simulation *);
 } rule;
 
+/* Warns of small stability margins of the control loops. */
 static bst_status loops(bst_ctx *ctx, const bst_scenario *scenario, const bst_simulation *sim) {
     (void)sim;
     bst_loop_warn(ctx, scenario);

@@ -4,12 +4,14 @@
 #include "gimbal/mount/axis.h"
 #include "sim/analysis/loop/loop_model.h"
 
+/* Open-loop response of a mount axis: compensator times plant. */
 static double complex servo_open(const void *user, double omega) {
     const bst_loop_servo *servo = user;
     return bst_compensator_response(&servo->mount.compensator, omega) *
            bst_mount_linear_encoder(&servo->mount.linear, omega);
 }
 
+/* Builds the servo loop model of mount axis k. */
 static bst_status build_servo(bst_ctx *ctx, int type, const bst_mount_config *config, int k,
                               double dt_s, bst_loop_servo *servo) {
     double angle[BST_CHAIN_MOST] = {0.0};
@@ -91,6 +93,7 @@ static int mount_response(const bst_mount_axis_model *model, const bst_axis_spec
     return n;
 }
 
+/* Computes step response and ramp lag of a mount axis at the control rate. */
 static bst_status respond(bst_ctx *ctx, const bst_mount_config *config,
                           const bst_mount_axis_model *model, int k, double dt_s,
                           bst_control_servo_response *out) {

@@ -1,6 +1,7 @@
 /* The tracking loop of a mount axis: closes it and predicts the residual pointing error. */
 #include "sim/analysis/loop/loop_model.h"
 
+/* Predicts the pointing error of an axis: jitter, centroid noise and lag. */
 static void predict(bst_loop_axis *axis, double drift_pxps, const bst_loop_options *options,
                     double period_s) {
     bst_loop_prediction *p = &axis->prediction;

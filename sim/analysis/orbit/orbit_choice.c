@@ -8,6 +8,7 @@
 
 #include "sim/run/track_files.h"
 
+/* Keeps the track with the most observations, of the target if possible. */
 static bst_status consider(void *user, bst_ctx *ctx, const bst_run_track *track) {
     bst_orbit_choice *c = user;
     const bst_run_track *best = &c->track;
@@ -29,6 +30,7 @@ static bst_status consider(void *user, bst_ctx *ctx, const bst_run_track *track)
     return BST_OK;
 }
 
+/* Selects the track of a run for orbit determination. */
 static bst_status choose(bst_ctx *ctx, const bst_orbit_request *q, bst_run_scene *scene,
                          bst_orbit_choice *out) {
     bst_run_sensor sensors[BST_EXPORT_SENSORS];

@@ -76,6 +76,7 @@ static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const sources
     return BST_OK;
 }
 
+/* Collects the observations of a sensor and object from the segments of a TDM. */
 static bst_status gather(bst_ctx *ctx, const bst_tdm_request *q, sources *s,
                          const bst_tdm_pair *pair, bst_run_sensor *sensor,
                          bst_run_observation *items) {

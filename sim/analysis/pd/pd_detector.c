@@ -35,7 +35,7 @@ struct bst_pd_detector {
     int64_t period_ticks, steps;
     bst_detections *out; /* detections of the current frame */
     int capacity;
-    bool told; /* the module has published them */
+    bool published; /* the module has published them */
 };
 
 enum { PORT_EXPOSURE, PORT_FRAME, PORT_POINTING, PORT_NAV, PORT_COUNT };
@@ -47,6 +47,7 @@ static const bst_port feed_ports[PORT_COUNT] = {
     [PORT_NAV] = {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_OUT, 0, 0.0, 0},
 };
 
+/* Creates the module that feeds rendered frames to an image processing module. */
 static bst_status create_feed(const bst_module_env *env, const void *config, void **self) {
     (void)env;
     *self = *(feed *const *)config;
@@ -71,6 +72,7 @@ static void tell_pointing(const feed *f, bst_pointing_telemetry *t, int capacity
     }
 }
 
+/* Publishes one frame with its exposure, pointing and navigation telemetry. */
 static bst_status step_feed(void *self, struct bst_step *step) {
     feed *f = self;
     if (!f->frame) {
@@ -122,7 +124,7 @@ static bst_status keep_detections(void *user, const char *scope, const char *cha
     d->out->count = kept;
     d->out->lost += found->count - kept;
     memcpy(d->out->items, found->items, (size_t)kept * sizeof found->items[0]);
-    d->told = true;
+    d->published = true;
     return BST_OK;
 }
 
@@ -169,6 +171,7 @@ static bst_status open_engine(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *d)
     return BST_OK;
 }
 
+/* Opens the built-in image processing with a capacity for all artificial targets. */
 static bst_status open_function(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *d) {
     d->config = *(const bst_imgproc_config *)s->imgproc->config;
     if (s->options.false_alarms > 0.0) {
@@ -269,7 +272,7 @@ bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *d, const bst_pd_scene *s
     if (d->ip) {
         return detect_by_function(ctx, d, s, frame, targets);
     }
-    d->told = false;
+    d->published = false;
     bst_frame_retain(frame);
     d->feed.frame = frame;
     d->feed.targets = targets;
@@ -279,7 +282,7 @@ bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *d, const bst_pd_scene *s
     bst_frame_release(d->feed.frame); /* NULL after publication */
     d->feed.frame = NULL;
     BST_TRY(status);
-    if (!d->told) {
+    if (!d->published) {
         return bst_fail(ctx, BST_ERR_STATE,
                         "%s/%s published no detections within %.3g s of a frame: pd can measure "
                         "only detectors that answer each frame",

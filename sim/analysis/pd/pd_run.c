@@ -25,6 +25,7 @@ typedef struct runner {
     bst_pd_result *result;
 } runner;
 
+/* Adds the Cramér-Rao bound of an artificial target's position to the tally. */
 static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_eval_match_target *place,
                             const bst_pd_target *target, bst_pd_tally *tally) {
     const bst_pd_scene *s = r->scene;
@@ -59,6 +60,7 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_eval_match_
     return BST_OK;
 }
 
+/* Adds the position and flux errors of a matched detection to the tally. */
 static void add_error(const bst_eval_match_target *place, const bst_pd_target *target,
                       const bst_detection *d, bst_pd_tally *tally) {
     double x = d->x_px - place->x_px, y = d->y_px - place->y_px;
@@ -85,6 +87,7 @@ static void add_error(const bst_eval_match_target *place, const bst_pd_target *t
     }
 }
 
+/* Counts detected and missed artificial targets of a frame. */
 static bst_status count_targets(bst_ctx *ctx, runner *r, const bst_pd_frame *f) {
     bst_pd_result *out = r->result;
     int taken = 0, near = 0;
@@ -109,6 +112,7 @@ static bst_status count_targets(bst_ctx *ctx, runner *r, const bst_pd_frame *f) 
     return BST_OK;
 }
 
+/* Counts false alarms and chance matches in a frame without artificial targets. */
 static void count_chance(runner *r, const bst_pd_frame *f) {
     bst_pd_result *out = r->result;
     out->chance_hits += bst_eval_match_targets(f->places, f->count, r->scene->fwhm_px,
@@ -223,6 +227,7 @@ bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *detector,
     return status;
 }
 
+/* Standard error of the SNR loss in dB. */
 static double loss_sigma(bst_pd_needed needed, double pfa, int64_t alarms, double pd) {
     /* d ln(snr) of both; Q^-1(pfa) changes by -d ln(pfa) / hazard; the hazard of a normal tail is
      * about Q^-1 */

@@ -196,6 +196,7 @@ bst_status bst_engine_step_tick(bst_ctx *ctx, bst_engine *engine, bst_heap *heap
     return BST_OK;
 }
 
+/* Steps all due module instances up to a tick. */
 static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
     double asked = bst_wall_seconds();
     int since_clock = 0;
@@ -230,6 +231,7 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
     return BST_OK;
 }
 
+/* Calls the finish function of each module instance. */
 static bst_status finish_instances(bst_ctx *ctx, bst_engine *engine) {
     for (int i = 0; i < engine->instance_count; i++) {
         instance *self = engine->instances[i];

@@ -52,6 +52,7 @@ static sample_point *next_look(bst_executor *x, logical_process **of) {
     return NULL;
 }
 
+/* Steps a logical process without the executor's lock. */
 static void step_process(bst_executor *x, logical_process *self) {
     self->busy = true;
     pthread_mutex_unlock(&x->lock);
@@ -60,6 +61,7 @@ static void step_process(bst_executor *x, logical_process *self) {
     bst_sync_end_window(x, self);
 }
 
+/* Lets a logical process compute ahead at a sample point, without the lock. */
 static void look_ahead(bst_executor *x, logical_process *self, sample_point *sample) {
     sample_point copy = *sample;
     sample->look = BST_LOOK_BUSY;

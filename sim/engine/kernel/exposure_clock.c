@@ -126,6 +126,7 @@ static bool loses_frame(exposure_clock *clock) {
     return clock->in_burst;
 }
 
+/* Module interface: creates the exposure clock of a sensor. */
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
     const bst_exposure_config *c = config;
     exposure_clock *clock = calloc(1, sizeof *clock);
@@ -195,6 +196,7 @@ static int64_t commanded_ticks(const exposure_clock *clock, double seconds) {
     return (int64_t)floor(fmin(seconds, 86400.0) * (double)clock->tick_rate_hz + 0.5);
 }
 
+/* End of a window along one axis, at most the sensor size. */
 static int clip_end(int start, int length, int limit) {
     int64_t end = (int64_t)start + length;
     return end < limit ? (int)end : limit;
@@ -263,6 +265,7 @@ static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) 
     clock->start_tick = clock->next_start_tick;
 }
 
+/* Module step: opens and closes exposures and publishes them. */
 static bst_status step(void *self, struct bst_step *step) {
     exposure_clock *clock = self;
     int64_t tick = bst_step_tick(step);

@@ -26,6 +26,7 @@ enum { RECORD_BYTES = (sizeof(record) + ALIGN - 1) / ALIGN * ALIGN };
 
 /* ---- recording ---- */
 
+/* Appends a message or event to the records of a process. */
 static bst_status append(bst_ctx *ctx, record_segment *to, const record *head, const void *content,
                          size_t bytes) {
     size_t whole = RECORD_BYTES + (bytes + ALIGN - 1) / ALIGN * ALIGN;

@@ -13,6 +13,7 @@ static bool belongs_to_sensor(const instance *self) {
     return !self->deferred && !is_multi_sensor(self);
 }
 
+/* True if a module modifies messages of the channel. */
 static bool is_modified(const bst_engine *engine, const channel *ch) {
     for (int r = 0; r < ch->reader_count; r++) {
         const channel_reader *reader = &ch->readers[r];
@@ -109,6 +110,7 @@ static int number_processes(bst_executor *x, bool separate) {
     return count;
 }
 
+/* Kind of logical process an instance belongs to. */
 static process_kind kind_of(const bst_executor *x, const instance *self) {
     return self->deferred                             ? BST_PROCESS_DEFERRED
            : x->link >= 0 && self->process == x->link ? BST_PROCESS_LINK

@@ -156,6 +156,7 @@ static void frames_file(const bst_recorder *recorder, const bst_recorder_state *
     }
 }
 
+/* Sets up the state of each recorded sensor and the tables. */
 static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_info *info) {
     BST_TRY(copy_name(ctx, recorder->program, sizeof recorder->program, info->program));
     for (int i = 0; i < info->sensor_count; i++) {

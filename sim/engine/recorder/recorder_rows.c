@@ -42,6 +42,7 @@ static void put_radec(row *r, bst_vec3 v) {
     put_real(r, ra * DEG);
     put_real(r, dec * DEG);
 }
+/* Direction of the camera's boresight in GCRF. */
 static bst_vec3 boresight(bst_quat q_cam_from_gcrf) {
     return bst_quat_rotate(bst_quat_conj(q_cam_from_gcrf), (bst_vec3){0, 0, 1});
 }
@@ -71,6 +72,7 @@ bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last)
     return true;
 }
 
+/* Appends a row to a table of the run. */
 static bst_status append(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_table table,
                          const row *r) {
     return bst_io_table_append(ctx, recorder->tables[table], r->cells);
@@ -352,6 +354,7 @@ static const char *track_status_name(int32_t status) {
                                           : "tentative";
 }
 
+/* Writes a track to the table tracks. */
 static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, const bst_tracks *t,
                             const bst_track *k) {
     double ra, dec;

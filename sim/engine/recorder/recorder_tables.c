@@ -200,7 +200,7 @@ static const bst_io_column track_frame_columns[] = {
     INT("tracks", "", "tracks kept"),
     INT("lost", "", "tracks that found no room"),
     INT("at_rest", "",
-        "tracks not told: at rest among the stars, as stars that the catalogue lacks are"),
+        "tracks not reported: at rest among the stars, such as stars missing in the catalogue"),
     INT("attitude_valid", "", "1: attitude found from stars"),
     INT("attitude_stars", "", "stars used"),
     QUATERNION("attitude_q_cam_from_gcrf", "attitude from stars"),

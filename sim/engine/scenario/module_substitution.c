@@ -68,6 +68,7 @@ bool bst_module_substitution_delayed(const bst_scenario *s,
     return false;
 }
 
+/* Copies settings of the substituted modules; rejects keys given twice. */
 static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scenario *s,
                                 bst_scenario_module_config *module) {
     for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
@@ -82,10 +83,10 @@ static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scena
             snprintf(path, sizeof path, "/observers/%d/sensors/%d/modules/%s/%s", module->observer,
                      module->sensor, module->name, d->key);
             snprintf(allowed, sizeof allowed,
-                     "nothing here: it is the \"%s\" of this sensor's %s, for which this module "
-                     "stands in",
+                     "nothing here: it is the \"%s\" of this sensor's %s, which this module "
+                     "replaces",
                      d->key, other->desc->role);
-            return bst_config_fail(ctx, s->file, path, said, "said twice", allowed);
+            return bst_config_fail(ctx, s->file, path, said, "given twice", allowed);
         }
         memcpy((char *)module->config + d->offset, (const char *)other->config + theirs->offset,
                d->size);
@@ -93,6 +94,7 @@ static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scena
     return BST_OK;
 }
 
+/* True if the module writes the channel. */
 static bool writes(const bst_module_desc *desc, const char *channel) {
     for (int p = 0; p < desc->port_count; p++) {
         if (desc->ports[p].direction == BST_PORT_OUT &&
@@ -116,6 +118,7 @@ static bool is_inner(const bst_scenario *s, const bst_scenario_module_config *mo
     return false;
 }
 
+/* Adds a delay to an input of the substituting module. */
 static bst_status add_delay(bst_ctx *ctx, bst_scenario_module_config *module, int port,
                             int64_t ticks) {
     for (int i = 0; i < module->delay_count; i++) {
@@ -126,8 +129,7 @@ static bst_status add_delay(bst_ctx *ctx, bst_scenario_module_config *module, in
     }
     if (module->delay_count == BST_MAX_DELAYS) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "/observers/%d/sensors/%d/modules: too many delays for the %s that stands "
-                        "in",
+                        "/observers/%d/sensors/%d/modules: too many delays for the module %s",
                         module->observer, module->sensor, module->name);
     }
     module->delays[module->delay_count++] = (bst_input_delay){port, ticks};
@@ -145,9 +147,9 @@ static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s,
     }
     if (module->delay_count > 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "%s: /observers/%d/sensors/%d/modules/%s/delay_s: said twice (allowed: "
-                        "nothing here: delays are those of the modules for which this one stands "
-                        "in)",
+                        "%s: /observers/%d/sensors/%d/modules/%s/delay_s: given twice (allowed: "
+                        "nothing here: delays are those of the modules that this one "
+                        "replaces)",
                         s->file, module->observer, module->sensor, module->name);
     }
     for (int p = 0; p < own->port_count; p++) {
@@ -178,6 +180,7 @@ static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s,
     return BST_OK;
 }
 
+/* Adds the default observation generator module to a sensor. */
 static bst_status make_default(bst_ctx *ctx, const bst_scenario_registry *registry, int observer,
                                int sensor, bst_scenario *s, bst_scenario_module_config **out) {
     const bst_module_desc *desc = NULL;

@@ -29,6 +29,7 @@ const bst_config_desc bst_module_common_table[] = {
     BST_CONFIG_END,
 };
 
+/* True if the key is one that every module block has. */
 static bool is_common(const char *key) {
     for (const bst_config_desc *d = bst_module_common_table; d->key; d++) {
         if (strcmp(d->key, key) == 0) {
@@ -149,6 +150,7 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
     return BST_OK;
 }
 
+/* True if the module type matches the place of its block: sensor or all sensors. */
 static bool fits(const bst_module_desc *desc, const bst_scenario_module_config *module) {
     return (desc->flags & BST_MODULE_MULTI_SENSOR) ==
            (module->observer < 0 ? BST_MODULE_MULTI_SENSOR : 0);

@@ -75,6 +75,7 @@ struct bst_ephemeris {
     double *table_memory;
 };
 
+/* Knot spacing in s of a step class of the object ephemeris. */
 static double step_of(int step_class) {
     return (double)(SHORTEST_STEP_S << step_class);
 }
@@ -137,6 +138,7 @@ static bool spans_jump(const bst_world_orbit *orbit, double step, int64_t first)
 
 /* ---- knots ---- */
 
+/* Place of a knot in its ring. */
 static int slot_of(int64_t knot, int slots) {
     return (int)((uint64_t)knot & (uint64_t)(slots - 1));
 }
@@ -271,6 +273,7 @@ static bool table_row_directly(const table_job *job, const bst_world_orbit *orbi
     return !none;
 }
 
+/* Interpolates the objects' positions for the table; run in parallel. */
 static void table_rows(void *user, int begin, int end) {
     const table_job *job = user;
     table *t = job->table;
@@ -303,6 +306,7 @@ static void table_rows(void *user, int begin, int end) {
     }
 }
 
+/* Makes the table of all objects' positions at one time. */
 static void make_table(bst_ephemeris *e, table *t, int64_t index) {
     table_job job = {.e = e, .table = t};
     double seconds = (double)index * TABLE_STEP_S;

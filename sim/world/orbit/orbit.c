@@ -11,10 +11,12 @@ static void rtn_axes(const bst_world_state *s, bst_vec3 *r, bst_vec3 *t, bst_vec
     *t = bst_vec3_cross(*n, *r);
 }
 
+/* Converts a vector from the radial, transverse, normal frame of an orbit. */
 static bst_vec3 from_rtn(bst_vec3 r, bst_vec3 t, bst_vec3 n, bst_vec3 v) {
     return bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(r, v.x), v.y, t), v.z, n);
 }
 
+/* State of an SGP4 orbit in GCRF. */
 static bst_status sgp4_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
                              bst_time epoch, double seconds, bst_world_state *out) {
     double r_km[3], v_kmps[3];
@@ -34,6 +36,7 @@ static bst_status sgp4_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky
     return BST_OK;
 }
 
+/* State of a numerically propagated orbit in GCRF. */
 static bst_status numerical_state(bst_ctx *ctx, const bst_world_orbit *orbit, double seconds,
                                   bool with_burns, bst_world_state *out) {
     const bst_trajectory *path = with_burns && orbit->burnt ? orbit->burnt : orbit->unburnt;
@@ -42,6 +45,7 @@ static bst_status numerical_state(bst_ctx *ctx, const bst_world_orbit *orbit, do
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
 }
 
+/* State of an object on a relative orbit about its chief. */
 static bst_status relative_state(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
                                  bst_time epoch, double seconds, bool with_burns,
                                  bst_world_state *out) {

@@ -38,6 +38,7 @@ static bst_world_file *find_file(bst_world *world, const char *key) {
     return file;
 }
 
+/* Opens an orbit from a CCSDS OEM ephemeris file. */
 static bst_status open_oem(const bst_world_builder *b, const char *object, bst_world_file *file,
                            const char *path, bst_world_orbit *orbit) {
     if (!file->oem) {
@@ -52,6 +53,7 @@ static bst_status open_oem(const bst_world_builder *b, const char *object, bst_w
     return BST_OK;
 }
 
+/* Opens an orbit from injected states: a state table or frame updates. */
 static bst_status open_injected(const bst_world_builder *b, const char *object,
                                 bst_world_file *file, const char *path, bst_world_orbit *orbit) {
     size_t length = strlen(path);
@@ -92,6 +94,7 @@ bst_status bst_world_orbit_build_file(const bst_world_builder *b, const bst_orbi
                                  "%s: %s/%s", b->scenario, path, key);
 }
 
+/* State of an object from its orbit file in GCRF. */
 static bst_status state_within(bst_ctx *ctx, const bst_world_orbit *orbit, bst_sky_clock *clock,
                                bst_time epoch, double seconds, bst_world_state *out) {
     if (orbit->source == BST_ORBIT_OEM) {

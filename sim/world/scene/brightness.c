@@ -92,6 +92,7 @@ static const double gauss_place[4] = {0.1834346424956498, 0.5255324099163290, 0.
 static const double gauss_weight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
                                        0.1012285362903763};
 
+/* Node and weight of the 8-point Gauss-Legendre quadrature on [-1, 1]. */
 static double gauss8(int i, double *weight) {
     int k = i < 4 ? 3 - i : i - 4;
     *weight = gauss_weight[k];
@@ -208,6 +209,7 @@ static double full_v_mag(const bst_brightness *b, const bst_scene_lighting *l, d
     return curve > 0.0 ? v - 2.5 * log10(curve) : (double)INFINITY;
 }
 
+/* Flux of a V magnitude relative to the Sun. */
 static double ratio_of(double v_mag) {
     return pow(10.0, -0.4 * (v_mag - BST_SUN_V_MAG));
 }

@@ -15,6 +15,7 @@ static const double gauss_weight[GAUSS] = {0.17392742256872693, 0.32607257743127
 
 typedef bst_disc_aspect aspect;
 
+/* Frame and illumination geometry of a resolved sphere. */
 static aspect make_aspect(const bst_scene_source *source, bst_vec3 light) {
     aspect a = {.z = bst_vec3_scale(bst_vec3_unit(source->apparent_mid), -1.0),
                 .radius = source->shape->radius};
@@ -38,12 +39,14 @@ static double incidence(const aspect *a, double x, double y) {
     return (far * near + k * q2) * a->cosine + (near - k * far) * x * a->sine;
 }
 
+/* Direction offset of a point on the disc. */
 static bst_vec3 offset_at(const aspect *a, double x, double y) {
     double q2 = x * x + y * y;
     double scale = a->radius / sqrt(1.0 - a->radius * a->radius * fmin(q2, 1.0));
     return bst_vec3_axpy(bst_vec3_scale(a->x, scale * x), scale * y, a->y);
 }
 
+/* Adds a point source of a resolved disc. */
 static bst_status push(bst_ctx *ctx, bst_disc_points *list, bst_vec3 offset, double share) {
     if (list->count == list->capacity) {
         int capacity = list->capacity ? 2 * list->capacity : 256;
@@ -136,6 +139,7 @@ bst_status bst_disc_make_points(bst_ctx *ctx, const bst_scene_source *source, in
     return BST_OK;
 }
 
+/* Aspect of a sphere whose diffuse reflection has the given flux. */
 static aspect lit_aspect(const bst_scene_source *source, bst_vec3 light, double share) {
     aspect a = make_aspect(source, light);
     double phase = atan2(a.sine, a.cosine);
@@ -154,6 +158,7 @@ void bst_disc_begin(const bst_scene_source *source, bst_disc *out) {
                       .thermal = s->thermal * (1.0 + sqrt(1.0 - r2)) / (2.0 * BST_PI * r2)};
 }
 
+/* Radiance of the lit sphere in a direction; 0 on the dark side. */
 static double radiance(const aspect *a, bst_vec3 direction) {
     double x = bst_vec3_dot(direction, a->x) / a->radius;
     double y = bst_vec3_dot(direction, a->y) / a->radius;

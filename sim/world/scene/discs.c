@@ -13,6 +13,7 @@
  * glow is 2 % of that sky (tests/world/test_skylight.c). */
 #define LIMB_HEIGHTS 22.0
 
+/* Flux of the Sun at a distance, relative to a source of V magnitude 0. */
 static double sun_radiance_scale(double sun_distance_m) {
     double au = sun_distance_m / BST_AU_M;
     return pow(10.0, -0.4 * BST_SUN_V_MAG) / (au * au);
@@ -25,6 +26,7 @@ static bst_vec3 eye_at(const bst_scene_surroundings *a, double dt) {
     return bst_vec3_axpy(bst_vec3_scale(a->eye_m, 1.0 + fall), dt, a->eye_mps);
 }
 
+/* Scales an Earth-fixed vector so that the Earth's ellipsoid becomes a sphere. */
 static bst_vec3 to_unit_sphere(const bst_mat3 *itrf_from_gcrf, bst_vec3 v) {
     bst_vec3 p = bst_mat3_mul_vec(itrf_from_gcrf, v);
     p.z /= 1.0 - BST_EARTH_FLATTENING;
@@ -54,6 +56,7 @@ static double earth_edge(const bst_scene_body_disc *d, int k, bst_vec3 direction
     return atan2(depth, along) - asin(1.0 / distance);
 }
 
+/* Angle in rad from a direction to the edge of a body's disc. */
 static double edge_at(const bst_scene_body_disc *d, int body, int k, bst_vec3 direction) {
     bst_vec3 near;
     double height;
@@ -86,6 +89,7 @@ static double limb_fade_rad(const bst_discs *discs, double distance) {
     return discs->limb_scale / sqrt(fmax(distance * distance - 1.0, 1e-4));
 }
 
+/* Sets the disc of the Earth during an exposure. */
 static void make_earth(const bst_camera *camera, const bst_scene_surroundings *a, bst_discs *out) {
     bst_scene_body_disc *d = &out->body[BST_BODY_EARTH];
     d->present = camera->background.earth;
@@ -122,6 +126,7 @@ static void make_earth(const bst_camera *camera, const bst_scene_surroundings *a
     d->reach_px = fade_px < 128.0 ? LIMB_HEIGHTS * fade_px : 0.0;
 }
 
+/* Sets the disc of the Sun or the Moon during an exposure. */
 static void make_round(const bst_camera *camera, const bst_scene_surroundings *a, int body,
                        bst_discs *out) {
     bool moon = body == BST_BODY_MOON;

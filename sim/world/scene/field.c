@@ -208,6 +208,7 @@ static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
+/* True if a direction projects into the window with its margin. */
 static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
                         double margin_px) {
     double x, y;

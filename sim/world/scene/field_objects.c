@@ -107,6 +107,7 @@ typedef struct course {
     const bst_scene_path_light *light;
 } course;
 
+/* Light of an object in electrons/s at a fraction of the exposure. */
 static double course_at(void *user, double u) {
     const course *c = user;
     bst_world_sight sight;

@@ -8,6 +8,7 @@ double bst_row_start_s(const bst_row_times *rows, const bst_los_track *track, do
     return 0.5 * spare + (y_px - middle) * rows->row_time_s;
 }
 
+/* Sensor row of a source's image at a time, clamped to the window. */
 static bool row_of(const bst_camera *camera, const bst_row_times *rows, const bst_los_track *track,
                    const bst_scene_source *source, double time_s, double *y) {
     double x, u = time_s / track->time_s[track->count - 1];
@@ -43,6 +44,7 @@ void bst_row_source_times(const bst_camera *camera, const bst_row_times *rows,
     u[1] = fmax(u[0], u[1]);
 }
 
+/* Restricts the light curve of a source to a part of the exposure. */
 static void rate_during(const bst_scene_source *source, double u0, double u1,
                         bst_scene_source_part *part, bst_scene_source *out) {
     const bst_scene_source_rate *r = source->rate;

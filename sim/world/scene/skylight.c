@@ -139,6 +139,7 @@ static bst_status set_nodes(bst_ctx *ctx, lattice *l, int step, bst_window w) {
     return BST_OK;
 }
 
+/* Rotates a direction from the camera frame to GCRF. */
 static bst_vec3 to_gcrf(const painter *p, bst_vec3 direction) {
     return bst_mat3_mul_vec(&p->gcrf_from_cam, direction);
 }
@@ -240,6 +241,7 @@ static bool cell_has_edge(const painter *p, int x, int y) {
            near < 1.06 * step / bst_camera_shrink(p->b->camera);
 }
 
+/* True if the edge of a body's disc or of the vignetting crosses the sensor. */
 static bool sensor_has_edge(const painter *p) {
     const bst_camera *camera = p->b->camera;
     int step = p->b->step;
@@ -280,6 +282,7 @@ static bst_status paint_pixels(bst_ctx *ctx, const painter *p, bst_skylight *b, 
     return BST_OK;
 }
 
+/* Computes the quantities of the sky background that all pixels share. */
 static void prepare(painter *p) {
     const bst_camera *camera = p->b->camera;
     const bst_background_config *c = &camera->background;

@@ -12,6 +12,7 @@ struct bst_scene_pst {
     bst_optics_pst_point points[];
 };
 
+/* Loads a table of point source transmittance. */
 static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst_curve *curve) {
     static const char *const angle[] = {"angle_deg", NULL};
     static const char *const value[] = {"pst", NULL};
@@ -24,6 +25,7 @@ static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst
     return status == BST_OK ? status : bst_fail_prefix(ctx, BST_ERR_CONFIG, "pst_file");
 }
 
+/* Checks the pixel pitch and the angles of a point source transmittance. */
 static bst_status check(bst_ctx *ctx, const bst_scene_pst *pst) {
     if (!(pst->pixel_m > 0.0)) {
         return bst_fail(

@@ -67,6 +67,7 @@ void bst_world_view_free(bst_world_view *view) {
     }
 }
 
+/* Orbit of an object, or of an observer. */
 static const bst_world_orbit *orbit_of(const bst_world *world, int body) {
     return body < world->object_count ? &world->objects[body].orbit
                                       : &world->observers[body - world->object_count].orbit;
@@ -261,6 +262,7 @@ static void shine(const bst_world_view *view, const eye *e, int object, bst_vec3
     out->occulted = bst_astro_earth_occults(e->state.position_m, emitted_m, e->sky.bodies.pole);
 }
 
+/* True if object and observer are too near for the interpolated ephemeris. */
 static bool too_near(bst_vec3 a_m, bst_vec3 b_m) {
     return bst_vec3_norm(bst_vec3_sub(a_m, b_m)) < BST_EPHEMERIS_NEAREST_M;
 }
@@ -282,6 +284,7 @@ bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer
     return BST_OK;
 }
 
+/* Computes the apparent path of an object seen by an observer during an exposure. */
 static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
                             const eye *const eyes[BST_PATH_NODES], looked_at b,
                             bst_scene_source_path *path, bst_scene_path_light *light,

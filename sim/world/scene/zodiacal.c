@@ -33,6 +33,7 @@ static const short table[LONGITUDES][LATITUDES] = {
 #define INNER_SLOPE 2.3
 #define SOLAR_LIMB_DEG 0.27
 
+/* Segment of a table axis that contains a value, and the fraction in it. */
 static int segment(const double *nodes, int count, double v, double *share) {
     int i = 0;
     while (i + 2 < count && v > nodes[i + 1]) {
@@ -42,6 +43,7 @@ static int segment(const double *nodes, int count, double v, double *share) {
     return i;
 }
 
+/* Zodiacal light by logarithmic interpolation in the table; longitude from the Sun. */
 static double from_table(double longitude, double latitude) {
     double s, t;
     int i = segment(longitude_deg, LONGITUDES, longitude, &s);
