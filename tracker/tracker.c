@@ -73,7 +73,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .false_events_per_hour = c->false_events_per_hour,
         .max_dormant_tracks = (int)c->max_dormant_tracks,
         .max_dormant_s = c->max_dormant_s,
-        .memory_sigma_rad = c->max_dormant_sigma_deg * BST_DEG_RAD,
+        .max_dormant_sigma_rad = c->max_dormant_sigma_deg * BST_DEG_RAD,
         .dormant_gate_chi2 = c->dormant_gate_chi2,
         .orbits = c->motion == 1,
         .orbit_noise_m2ps3 = square(c->orbit_noise_mps15),

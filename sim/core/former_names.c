@@ -166,11 +166,12 @@ static const cJSON *child_of(const cJSON *node, const char *segment) {
 }
 
 /* Writes the pointer `path`, which is cut into its parts, in present names to `out`; `path_bytes`:
- * room of both. */
-static void present_parts(const renamer *r, const cJSON *node, char *parts, size_t bytes,
+ * room of both. True if a name differs. */
+static bool present_parts(const renamer *r, const cJSON *node, char *parts, size_t bytes,
                           char *given, char *out, place *at) {
     char *save = NULL;
     size_t used = 0, read = 0;
+    bool renamed = false;
     *given = *out = '\0';
     for (char *part = strtok_r(parts, "/", &save); part; part = strtok_r(NULL, "/", &save)) {
         const char *name = present_name(at, part);
@@ -178,18 +179,20 @@ static void present_parts(const renamer *r, const cJSON *node, char *parts, size
         used += (size_t)snprintf(out + used, bytes - used, "/%s", name);
         if (name != part) {
             warn(r, given, name);
+            renamed = true;
         }
         place child;
         node = child_of(node, name);
         enter(r->tables, at, name, node, &child);
         *at = child;
     }
+    return renamed;
 }
 
 bst_status bst_json_present_pointer(bst_ctx *ctx, const bst_document_tables *tables,
                                     const cJSON *root, const char *pointer, cJSON *value,
                                     const char *where, char **out) {
-    size_t bytes = strlen(pointer) + 1;
+    size_t bytes = strlen(pointer) + 2 + BST_CONFIG_KEY_BYTES;
     for (const char *p = pointer; *p; p++) {
         bytes += *p == '/' ? BST_CONFIG_KEY_BYTES : 0;
     }
@@ -203,7 +206,9 @@ bst_status bst_json_present_pointer(bst_ctx *ctx, const bst_document_tables *tab
     } else {
         const renamer r = {ctx, tables, NULL, where};
         place at = {.tables = {tables->root}, .count = 1};
-        present_parts(&r, root, parts, bytes, given, *out, &at);
+        if (!present_parts(&r, root, parts, bytes, given, *out, &at)) {
+            snprintf(*out, bytes, "%s", pointer); /* as it is, also where it is no pointer */
+        }
         if (cJSON_IsString(cJSON_GetObjectItemCaseSensitive(value, "plugin"))) {
             at = (place){.count = 0};
         }

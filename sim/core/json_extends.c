@@ -73,9 +73,8 @@ static bst_status check_once(bst_ctx *ctx, const bst_json *own, const cJSON *set
     for (const cJSON *item = set->child; item; item = item->next) {
         if (item->string[0] == '/' &&
             cJSON_GetObjectItemCaseSensitive(own->root, item->string + 1)) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "%s: %.200s: is given relative_path \"set\" and in it", own->name,
-                            item->string);
+            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %.200s: is given beside \"set\" and in it",
+                            own->name, item->string);
         }
     }
     return BST_OK;

@@ -229,6 +229,21 @@ static void extended(void **state) {
     assert_int_equal(rmdir(folder), 0);
 }
 
+/* What is no pointer, or has no former name, stays as it is, for the reader's message. */
+static void other_pointers(void **state) {
+    (void)state;
+    static const char *const texts[] = {"", "/", "most_nodes", "//rays//rate", "/sensors/0/x/"};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        bst_ctx ctx = {0};
+        char *present;
+        bst_assert_ok(
+            &ctx, bst_json_present_pointer(&ctx, &tables, NULL, texts[i], NULL, "test", &present));
+        assert_string_equal(present, texts[i]);
+        assert_int_equal(ctx.warnings, 0);
+        free(present);
+    }
+}
+
 static void schema(void **state) {
     (void)state;
     cJSON *node = bst_config_schema(sensor_table);
@@ -245,8 +260,9 @@ static void schema(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(read_tables), cmocka_unit_test(wrong_values), cmocka_unit_test(documents),
-        cmocka_unit_test(extended),    cmocka_unit_test(schema),
+        cmocka_unit_test(read_tables), cmocka_unit_test(wrong_values),
+        cmocka_unit_test(documents),   cmocka_unit_test(extended),
+        cmocka_unit_test(schema),      cmocka_unit_test(other_pointers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -48,7 +48,7 @@ static inline bst_mtt_params defaults(void) {
                             .event_window = 8,
                             .max_dormant_tracks = 64,
                             .max_dormant_s = 7200,
-                            .memory_sigma_rad = 1.0 * BST_DEG_RAD,
+                            .max_dormant_sigma_rad = 1.0 * BST_DEG_RAD,
                             .dormant_gate_chi2 = 18.5};
 }
 

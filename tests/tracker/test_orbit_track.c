@@ -176,7 +176,7 @@ static void identity_over_the_gap(void **state) {
                                      .max_sigma_rad = 60 * AS,
                                      .max_dormant_tracks = 16,
                                      .max_dormant_s = 7200,
-                                     .memory_sigma_rad = BST_DEG_RAD,
+                                     .max_dormant_sigma_rad = BST_DEG_RAD,
                                      .dormant_gate_chi2 = 18.5};
             bst_mtt *mtt;
             bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));

@@ -179,7 +179,7 @@ static void run_night(night *g, uint64_t seed) {
                              .max_sigma_rad = 60 * AS,
                              .max_dormant_tracks = 16,
                              .max_dormant_s = g->max_dormant_s,
-                             .memory_sigma_rad = BST_DEG_RAD,
+                             .max_dormant_sigma_rad = BST_DEG_RAD,
                              .dormant_gate_chi2 = 18.5};
     bst_mtt *mtt;
     bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));

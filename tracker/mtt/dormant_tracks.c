@@ -18,7 +18,7 @@ static void remove_stored(bst_mtt *m, int i) {
 
 void bst_mtt_predict_memory(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt_s = frame->seconds - m->seconds;
-    double limit2 = m->params.memory_sigma_rad * m->params.memory_sigma_rad;
+    double limit2 = m->params.max_dormant_sigma_rad * m->params.max_dormant_sigma_rad;
     int kept = 0;
     for (int i = 0; i < m->memory_count; i++) {
         bst_mtt_track *track = &m->memory[i];

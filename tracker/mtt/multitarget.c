@@ -339,7 +339,7 @@ static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool obser
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
     if (track->asleep) {
         return m->seconds - track->last_update_s > p->max_dormant_s ||
-               !(variance < p->memory_sigma_rad * p->memory_sigma_rad) ||
+               !(variance < p->max_dormant_sigma_rad * p->max_dormant_sigma_rad) ||
                track->misses_in_row > p->max_misses;
     }
     /* a tentative track is not worth coasting */

@@ -76,10 +76,10 @@ typedef struct bst_mtt_params {
     double false_events_per_hour;
     /* Deleted tracks that had been confirmed are kept. A new confirmed track whose direction and
      * rate fit the prediction of a kept one takes over its identity. */
-    int max_dormant_tracks;   /* most tracks kept; 0: none */
-    double max_dormant_s;     /* time that they are kept, s */
-    double memory_sigma_rad;  /* and while the 1 sigma of their direction is below this */
-    double dormant_gate_chi2; /* largest misfit of direction and rate, 4 degrees of freedom */
+    int max_dormant_tracks;       /* most tracks kept; 0: none */
+    double max_dormant_s;         /* time that they are kept, s */
+    double max_dormant_sigma_rad; /* and while the 1 sigma of their direction is below this */
+    double dormant_gate_chi2;     /* largest misfit of direction and rate, 4 degrees of freedom */
 } bst_mtt_params;
 
 #define BST_MTT_EVENT_WINDOW 16
