@@ -97,7 +97,6 @@ static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
                : BST_OK;
 }
 
-/* Creates the plug-in detector. */
 static bst_status open_plugin(const bst_module_env *env, imgproc_module *m) {
     if (!m->config->detector.desc) {
         return BST_OK;

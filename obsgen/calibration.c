@@ -51,12 +51,12 @@ const bst_config_desc bst_obsgen_calibration_table[] = {
              "Amplitude of the bias of a place by where in the pixel it is: bias = amplitude sin(2 "
              "pi place)."),
     BST_REAL(C, blend_distance_factor, "", 0.1, 10, NULL,
-             "Distance at which two sources are told apart, over that at which the saddle between "
+             "Distance at which two sources are resolved, over that at which the saddle between "
              "them is deep enough without noise."),
     BST_REAL(C, star_id_probability, "", 0, 1, NULL,
              "Probability that a detected catalogue star is identified where stars are."),
     BST_REAL(C, cosmic_ray_flag_probability, "", 0, 1, NULL,
-             "Probability that a radiation hit with one pixel that stands out is told to be one."),
+             "Probability that a radiation hit with one pixel that stands out is recognised."),
     BST_FORMER("hit_told_probability", "cosmic_ray_flag_probability"),
     BST_CONFIG_END};
 #undef C

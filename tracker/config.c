@@ -137,12 +137,12 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Standard deviation by which an object's brightness changes from frame to frame."),
     BST_FORMER("brightness_walk_mag", "brightness_random_walk_mag"),
     BST_INT(C, event_window, "", 0, 16, "8",
-            "Manoeuvres and changes of brightness are told from so many detections of a track; 0: "
-            "none are."),
+            "Manoeuvres and changes of brightness are detected from so many detections of a track; "
+            "0: none are."),
     BST_REAL(
         C, false_events_per_hour, "1/h", 0, 1e4, "0.01",
         "Greatest number of false manoeuvres, and of false changes of brightness, per hour and "
-        "track; 0: none are told."),
+        "track; 0: none are detected."),
     BST_INT(C, max_dormant_tracks, "", 0, 100000, "64",
             "Room for tracks that were lost; what is confirmed where one of them should be is that "
             "track again."),

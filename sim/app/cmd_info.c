@@ -8,7 +8,7 @@
 static const char help_text[] =
     "usage: boresight info RUN [options]\n"
     "\n"
-    "Tells what the folder of a run holds: scenario, version, seed, device, span of time, how the "
+    "Prints what the folder of a run holds: scenario, version, seed, device, span of time, how the "
     "run ended,\n"
     "frames per sensor, tables, summary figures, events and files. It reads folders of complete, "
     "interrupted\n"

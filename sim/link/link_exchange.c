@@ -76,7 +76,7 @@ static bst_status handle_silence(bst_link *link, link_exchange *x, double waited
     return bst_fail(x->ctx, BST_ERR_IO,
                     "link: %s plays %s at %s, for which the run waited %.3g s; start one, for "
                     "example: boresight serve SCENARIO.json --part %s --link %s",
-                    part->had_peer ? "its peer has left and nobody" : "nobody",
+                    part->had_peer ? "its peer has left and no peer" : "no peer",
                     part->about.instance, link->address, waited_s, part->about.instance,
                     link->address);
 }
