@@ -77,7 +77,7 @@ class Keys(unittest.TestCase):
             link = boresight_link.Link(address, serves="*", keys_file=keys)
             said = ended(run, expected=1)
             link._socket.close(linger=0)
-            self.assertIn("nobody plays neossat/telescope/control", said)
+            self.assertIn("no peer plays neossat/telescope/control", said)
             counters = runs.manifest(out + ".partial")["counters"]
             self.assertEqual(counters.get("link_hello", 0), 0)
             self.assertEqual(counters.get("link_no_key", 0) > 0, refused, counters)

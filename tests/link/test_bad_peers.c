@@ -257,7 +257,7 @@ static void nobody_comes(void **state) {
     scene_open(&s, false, 0.2, BST_LINK_STOP, false);
     double began = bst_wall_seconds();
     assert_int_equal(scene_step(&s), BST_ERR_IO);
-    assert_non_null(strstr(s.ctx.message, "nobody plays craft/camera/imgproc"));
+    assert_non_null(strstr(s.ctx.message, "no peer plays craft/camera/imgproc"));
     assert_true(bst_wall_seconds() - began < 30.0); /* a hang, not a slow machine */
     assert_int_equal(scene_count(&s, "link_unanswered"), 1);
     scene_close(&s);
