@@ -402,7 +402,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
 }
 
 void bst_smear_restart(bst_smear *s, double aim) {
-    assert(s && aim > 0.0 && aim <= 1.0);
+    assert(s && aim > 0.0 && isfinite(aim)); /* above 1 where nodes are limited */
     s->aim = aim;
     s->table_blocks = s->levels[0].first_block + s->levels[0].blocks;
     for (int n = 1; n < BST_SMEAR_LEVELS; n++) {
