@@ -66,7 +66,7 @@ typedef struct bst_smear_frame {
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear,
                            const bst_smear_frame *frame) BST_MUST_CHECK;
 
-/* Restarts the sources of the frame, aiming at `aim` (0 to 1) of the tolerance. */
+/* Restarts the sources of the frame, aiming at `aim` (> 0; above 1: coarser) of the tolerance. */
 void bst_smear_restart(bst_smear *smear, double aim);
 
 /* True if the frame's stars follow one track as an image shift. */
