@@ -138,7 +138,7 @@ static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak)
  * The PSF widening by jitter is measured on sources above SNR 20; its mean is used for fainter
  * ones. A point that proves elongated is fitted again as a streak of its own length and angle.
  *
- * With locator->most_fits, fainter sources beyond that number are located at the filter's peak
+ * With locator->max_fits, fainter sources beyond that number are located at the filter's peak
  * (peak_centroid.h), unless charge lies on them. */
 void bst_locate(bst_imgproc_locator *locator, const bst_locate_frame *frame,
                 const bst_candidates *candidates);

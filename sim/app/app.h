@@ -1,16 +1,12 @@
-/* The program's commands: each takes its own argv (argv[0] is the command's name) and returns the
- * exit code: 0 done, 1 failed, 2 called wrongly, 3 the run ended without its target in track (only
- * where asked), 4 a study with runs that failed, 130 interrupted. */
+/* The commands of the program. Each takes its own argv (argv[0] is the name of the command) and
+ * returns the exit status (sim/cli/cli.h). */
 #ifndef BST_APP_APP_H
 #define BST_APP_APP_H
 
 #include "sim/cli/cli.h"
 #include "sim/registry/registry.h"
 
-/* boresight new: writes a scenario for an observer and a target.
- *
- * Given:     argc, argv  argv[0] is the name of the command; so for the commands below
- * Returned:  exit status of the program; so for all commands below */
+/* boresight new: writes a scenario for an observer and a target. */
 int bst_cmd_new(int argc, char **argv);
 /* boresight run: runs a scenario and records it. */
 int bst_cmd_run(int argc, char **argv);

@@ -1,8 +1,10 @@
+/* boresight run: runs a scenario and records it. */
 #include <stdio.h>
 #include <unistd.h>
 
 #include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
+#include "sim/cli/command_line.h"
 #include "sim/cli/load.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/run/run_link.h"
@@ -32,19 +34,6 @@ typedef struct run_request {
     bool help, overwrite, quiet, serial, force;
 } run_request;
 
-/* An option that says how peers connect has no effect without one. */
-static bst_status check_link(bst_ctx *ctx, const run_request *r, const bst_scenario *scenario,
-                             bst_simulation *sim) {
-    if ((!r->load.link && !r->load.link_keys) || bst_simulation_link(sim)) {
-        return BST_OK;
-    }
-    const char *option = r->load.link ? "link" : "link-keys";
-    return bst_fail(ctx, BST_ERR_ARGUMENT,
-                    "--%s: no module of %s is of type \"external\", so that no peer would be "
-                    "waited for: add --external MODULE,... or leave --%s out",
-                    option, scenario->file, option);
-}
-
 static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                              const bst_scenario *scenario) {
     char default_out[128];
@@ -60,7 +49,7 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
         bst_json_name_file(ctx, json);
     }
     if (status == BST_OK) {
-        status = check_link(ctx, r, scenario, sim);
+        status = bst_run_link_check(ctx, &r->load, scenario, sim);
     }
     if (status == BST_OK) {
         status = r->replay ? bst_run_link_replay(ctx, sim, r->replay)
@@ -127,14 +116,10 @@ int bst_cmd_run(int argc, char **argv) {
     bst_options_bind(OPTIONS, &r, table);
     bst_ctx ctx;
     bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_INFO);
-    int arguments = 0;
-    if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
-        return bst_options_misuse(&ctx, "run");
-    }
-    if (r.help) {
-        fputs(help_text, stdout);
-        bst_options_print(stdout, table);
-        return BST_EXIT_OK;
+    const bst_command_line line = {"run", help_text, table, &r.help};
+    int arguments = 0, code = BST_EXIT_OK;
+    if (!bst_command_line_read(&ctx, &line, argc, argv, &arguments, &code)) {
+        return code;
     }
     if (arguments != 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);

@@ -5,7 +5,7 @@
 
 #include "boresight/version.h"
 #include "sim/app/app.h"
-#include "sim/cli/plugins.h"
+#include "sim/cli/plugin_options.h"
 #include "sim/cli/stack.h"
 #include "sim/core/text.h"
 
@@ -107,46 +107,8 @@ static int help(int argc, char **argv) {
     return bst_cli_run_with_stack(found->run, 2, words);
 }
 
-/* Takes the options before the command: argv[*first] is the command then. */
-static int before_command(int argc, char **argv, int *first) {
-    for (; *first < argc && strncmp(argv[*first], "--", 2) == 0; ++*first) {
-        bst_ctx ctx = {0};
-        const char *word = argv[*first];
-        bst_status status = BST_OK;
-        if (strcmp(word, "--no-plugins") == 0) {
-            status = bst_plugins_refuse(&ctx);
-        } else if (strcmp(word, "--plugin") != 0) {
-            bool plugin = bst_text_distance(word, "--plugin") <= 2;
-            fprintf(stderr, "boresight: unknown option %.80s%s; see boresight --help\n", word,
-                    plugin                                         ? "; did you mean --plugin?"
-                    : bst_text_distance(word, "--no-plugins") <= 2 ? "; did you mean --no-plugins?"
-                                                                   : "");
-            return BST_EXIT_USAGE;
-        } else if (*first + 2 >= argc) {
-            break;
-        } else {
-            status = bst_plugins_add(&ctx, argv[++*first]);
-        }
-        if (status != BST_OK) {
-            fprintf(stderr, "boresight: %s\n", ctx.message);
-            return BST_EXIT_USAGE;
-        }
-    }
-    if (*first < argc && strncmp(argv[*first], "--", 2) != 0) {
-        return BST_EXIT_OK;
-    }
-    if (*first < argc) {
-        fprintf(stderr,
-                "boresight: --plugin takes the path of a shared library, and a command "
-                "after it; see boresight --help\n");
-    } else {
-        usage(stderr);
-    }
-    return BST_EXIT_USAGE;
-}
-
 int main(int argc, char **argv) {
-    signal(SIGXFSZ, SIG_IGN); /* a limit on the size of files is an error of a write */
+    signal(SIGXFSZ, SIG_IGN); /* a write beyond a limit on file sizes then returns an error */
     if (argc < 2) {
         usage(stderr);
         return BST_EXIT_USAGE;
@@ -162,9 +124,15 @@ int main(int argc, char **argv) {
         printf("boresight %s (%s)\n", bst_version(), bst_version_git_revision());
         return BST_EXIT_OK;
     }
-    int first = 1, code = before_command(argc, argv, &first);
-    if (code != BST_EXIT_OK) {
-        return code;
+    bst_ctx ctx = {0};
+    int first = 1;
+    if (bst_plugin_options_take(&ctx, argc, argv, &first) != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+        return BST_EXIT_USAGE;
+    }
+    if (first == argc) {
+        usage(stderr);
+        return BST_EXIT_USAGE;
     }
     const command *found = find_command(argv[first]);
     return found ? bst_cli_run_with_stack(found->run, argc - first, argv + first)

@@ -15,4 +15,9 @@ enum {
 /* Log sink that writes to standard error: "boresight: warning: ...". */
 void bst_cli_log(void *user, bst_log_level level, const char *message);
 
+/* Log sink that writes to standard error without the level: "boresight NAME: ...".
+ *
+ * Given:     user  NAME, a const char * */
+void bst_cli_log_as(void *user, bst_log_level level, const char *message);
+
 #endif

@@ -11,3 +11,8 @@ void bst_cli_log(void *user, bst_log_level level, const char *message) {
         fprintf(stderr, "boresight: %s: %s\n", names[level], message);
     }
 }
+
+void bst_cli_log_as(void *user, bst_log_level level, const char *message) {
+    (void)level;
+    fprintf(stderr, "boresight %s: %s\n", (const char *)user, message);
+}

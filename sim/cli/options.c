@@ -7,8 +7,6 @@
 #include "sim/cli/outputs.h"
 #include "sim/core/text.h"
 
-enum { MOST_OPTIONS = 96 };
-
 static const bst_option *find(const bst_option *table, const char *name, size_t length) {
     for (const bst_option *o = table; o->name; o++) {
         if (strlen(o->name) == length && strncmp(o->name, name, length) == 0) {
@@ -147,8 +145,8 @@ static bst_status check_table(bst_ctx *ctx, const bst_option *table) {
                                 o->name, o->argument);
             }
         }
-        if (o - table == MOST_OPTIONS) {
-            return bst_fail(ctx, BST_ERR_STATE, "more than %d options in a table", MOST_OPTIONS);
+        if (o - table == BST_OPTIONS_MAX) {
+            return bst_fail(ctx, BST_ERR_STATE, "more than %d options in a table", BST_OPTIONS_MAX);
         }
     }
     return BST_OK;
@@ -214,7 +212,7 @@ void bst_options_bind(const bst_option *table, void *request, bst_option *out) {
 
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) {
-    bool given[MOST_OPTIONS] = {false};
+    bool given[BST_OPTIONS_MAX] = {false};
     int kept = 0;
     BST_TRY(check_table(ctx, table));
     bool options_end = false;

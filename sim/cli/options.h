@@ -28,7 +28,7 @@ typedef enum bst_option_path {
     BST_PATH_OUTPUT_FOLDER /* a folder for output, created if necessary */
 } bst_option_path;
 
-enum { BST_OPTION_LIST_MAX = 256 };
+enum { BST_OPTION_LIST_MAX = 256, BST_OPTIONS_MAX = 96 /* entries of a table */ };
 
 typedef struct bst_option_list {
     const char *items[BST_OPTION_LIST_MAX]; /* point into argv */

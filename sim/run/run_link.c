@@ -18,6 +18,18 @@ bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) {
     return bst_link_open(ctx, link);
 }
 
+bst_status bst_run_link_check(bst_ctx *ctx, const bst_load_options *load,
+                              const bst_scenario *scenario, bst_simulation *simulation) {
+    if ((!load->link && !load->link_keys) || bst_simulation_link(simulation)) {
+        return BST_OK;
+    }
+    const char *option = load->link ? "link" : "link-keys";
+    return bst_fail(ctx, BST_ERR_ARGUMENT,
+                    "--%s: no module of %s is of type \"external\", so that no peer would be "
+                    "waited for: add --external MODULE,... or leave --%s out",
+                    option, scenario->file, option);
+}
+
 static const char tape[] = "link.packets";
 
 bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {

@@ -2,7 +2,15 @@
 #ifndef BST_RUN_RUN_LINK_H
 #define BST_RUN_RUN_LINK_H
 
+#include "sim/cli/load.h"
 #include "sim/engine/simulation.h"
+
+/* Checks that the options --link and --link-keys have an effect.
+ *
+ * Errors:    BST_ERR_ARGUMENT if one is given and no module of the scenario is external */
+bst_status bst_run_link_check(bst_ctx *ctx, const bst_load_options *load,
+                              const bst_scenario *scenario,
+                              bst_simulation *simulation) BST_MUST_CHECK;
 
 /* Binds the address if modules are external; stop signals end its waits. */
 bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) BST_MUST_CHECK;

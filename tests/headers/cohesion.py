@@ -8,6 +8,7 @@
 - long parameter lists: 8 parameters or more
 - copies: a static function of three lines or more that stands in several files with the same name and text
 - namesakes: a function or type that several headers declare under one name
+- long command files: files of sim/app with 150 lines or more; what a command does belongs into the libraries
 """
 
 import collections
@@ -16,9 +17,11 @@ import sys
 
 from c_sources import files, prototypes, without_comments
 
-ALLOWED = {"call cycles": 5, "long functions": 0, "long parameter lists": 30, "copies": 0, "namesakes": 0}
+ALLOWED = {"call cycles": 5, "long functions": 0, "long parameter lists": 30, "copies": 0, "namesakes": 0,
+           "long command files": 0}
 LONGEST = 80
 MOST_PARAMETERS = 7
+LONGEST_COMMAND = 149
 
 HEAD = re.compile(r"^(?!typedef|struct|enum|union|extern|#)((?:[A-Za-z_][\w\*]*[ \t\n\*]+)+)(\w+)\(", re.M)
 CALL = re.compile(r"\b([a-z_]\w+)\s*\(")
@@ -104,6 +107,17 @@ def namesakes():
     return [f"{name}: {', '.join(sorted(paths))}" for name, paths in sorted(places.items()) if len(paths) > 1]
 
 
+def long_commands():
+    found = []
+    for path in files((".c",)):
+        if path.startswith("sim/app/"):
+            with open(path, encoding="utf-8") as file:
+                lines = len(file.readlines())
+            if lines > LONGEST_COMMAND:
+                found.append(f"{path}: {lines} lines")
+    return found
+
+
 def main():
     sys.setrecursionlimit(10000)
     everything = [f for path in files((".c", ".inc")) for f in functions(path)]
@@ -127,6 +141,7 @@ def main():
                                  if f.parameters > MOST_PARAMETERS],
         "copies": [f"{name}: {', '.join(sorted(paths))}" for (name, _), paths in sorted(copies.items()) if len(paths) > 1],
         "namesakes": namesakes(),
+        "long command files": long_commands(),
     }
     for what, found in cases.items():
         print(f"{what}: {len(found)}, at most {ALLOWED[what]}")

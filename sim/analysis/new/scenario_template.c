@@ -1,10 +1,10 @@
+#include "sim/analysis/new/scenario_template.h"
+
+#include <cjson/cJSON.h>
 #include <math.h>
 #include <stdlib.h>
 
-#include <cjson/cJSON.h>
-
-#include "sim/app/new_scene.h"
-#include "sim/app/new_sensor.h"
+#include "sim/analysis/new/reference_sensor.h"
 
 /* From this rate on the line of sight bends within seconds, and an orbit fits what a steady rate
  * does not. */
@@ -162,7 +162,7 @@ static void put_modules(FILE *f, const bst_new_scene *s) {
             command_s, s->exposure_s);
 }
 
-void bst_new_scene_write(FILE *f, const bst_new_request *q, const bst_new_scene *s) {
+void bst_new_scenario_write(FILE *f, const bst_new_request *q, const bst_new_scene *s) {
     put_head(f, q, s);
     fprintf(f,
             "    \"world\": {\n        \"star_catalogue\": \"default\",\n"

@@ -1,8 +1,6 @@
-/* A scenario for two satellites: when one sees the other, and what sensor and loop follow it. */
-#ifndef BST_APP_NEW_SCENE_H
-#define BST_APP_NEW_SCENE_H
-
-#include <stdio.h>
+/* Search for a time at which one satellite can follow another with a telescope. */
+#ifndef BST_ANALYSIS_NEW_SCENE_SEARCH_H
+#define BST_ANALYSIS_NEW_SCENE_SEARCH_H
 
 #include "boresight/status.h"
 #include "sim/astro/tle.h"
@@ -27,7 +25,7 @@ typedef struct bst_new_request {
     const char *observer_label; /* name of the observer in it: letters, digits, _ - . */
 } bst_new_request;
 
-/* A time at which the target is in view for the whole run, and what the loop needs for it. */
+/* A time at which the target is in view for the whole run, and the sensor settings for it. */
 typedef struct bst_new_scene {
     bst_time epoch;
     double duration_s, period_s, exposure_s, pixel_arcsec;
@@ -39,19 +37,19 @@ typedef struct bst_new_scene {
     double rate_arcsec_per_s; /* greatest, of the line of sight among the stars */
 } bst_new_scene;
 
-/* Whether a scene will do; *why: in words, where it will not. */
+/* Decides if a scene is good enough: *holds; *why in words if it is not. */
 typedef bst_status (*bst_new_judge)(void *user, bst_ctx *ctx, const bst_new_scene *scene,
                                     bool *holds, char why[256]);
 
-/* Finds a scene.
- * Given: request; judge, which is asked of each of the best times until it says yes.
- * Errors: BST_ERR_NOT_FOUND where there is no such time within two days, with the reasons and how
- * often each was met; BST_ERR_RANGE where the element sets are too far apart in time; those of the
- * orbits and of the judge. */
+/* Finds a time at which the target is sunlit, bright enough and clear of Earth, Moon and Sun for
+ * the whole run, and slow.
+ *
+ * Given:     request
+ *            judge    called with `user` for the best times, in order, until it accepts one
+ * Errors:    BST_ERR_NOT_FOUND if two days hold no such time; the message lists the reasons with
+ *            their shares of the time. BST_ERR_RANGE if the epochs of the element sets are too far
+ *            apart. Those of the orbits and of the judge */
 bst_status bst_new_scene_find(bst_ctx *ctx, const bst_new_request *request, bst_new_judge judge,
                               void *user, bst_new_scene *out) BST_MUST_CHECK;
-
-/* Writes the scenario as JSON with descriptions. */
-void bst_new_scene_write(FILE *stream, const bst_new_request *request, const bst_new_scene *scene);
 
 #endif

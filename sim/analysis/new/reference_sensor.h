@@ -1,6 +1,6 @@
 /* The sensor and the target of the scenarios that `boresight new` writes. */
-#ifndef BST_APP_NEW_SENSOR_H
-#define BST_APP_NEW_SENSOR_H
+#ifndef BST_ANALYSIS_NEW_REFERENCE_SENSOR_H
+#define BST_ANALYSIS_NEW_REFERENCE_SENSOR_H
 
 /* A small satellite's telescope: as in scenarios/neossat_geo_track.json, with a quieter read-out.
  */

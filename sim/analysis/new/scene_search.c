@@ -1,53 +1,41 @@
-#include "sim/app/new_scene.h"
+#include "sim/analysis/new/scene_search.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/app/new_sensor.h"
+#include "sim/analysis/new/scenario_template.h"
+#include "sim/analysis/new/sensor_design.h"
 #include "sim/cli/plugins.h"
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
 
-/* The search: an instant every LOOK_S for two days; check warns of element sets older than two
- * weeks. */
+/* The search looks at one instant every LOOK_S for two days. Element sets may be AGE_S old at its
+ * end: `boresight check` warns of sets older than two weeks. */
 #define SEARCH_S (2.0 * 86400.0)
 #define LOOK_S 20.0
 #define AGE_S (13.9 * 86400.0)
 #define DURATION_S 120.0
 #define LEAST_FRAMES 60.0
-/* How near to the boresight bodies may be: stray light of the bright ones is not simulated. */
+/* Least angles between boresight and bodies: stray light of bright bodies is not simulated. */
 #define SUN_CLEAR_DEG 30.0
 #define EARTH_CLEAR_DEG 0.4
 #define EARTH_WISHED_DEG 5.0
-/* Between a body and the corner of the field. */
+/* Least angle between a body and the corner of the field. */
 #define MARGIN_DEG 0.15
-/* There are 3 stars of V < 9, the limit of those built into the program, in a square degree, and 30
- * of V < 11.5: the attitude needs some 8 in the field. */
-#define ENOUGH_STARS_V_MAG 11.0
-#define FEW_STARS_ARCSEC 8.0
-#define FEW_STARS_FAST_ARCSEC 10.0
-/* Slower targets are followed by the attitude telemetry alone. */
-#define STARLESS_RATE_ARCSEC_PER_S 60.0
-/* Stars of the catalogue in the field at any time of the run: half of them are found and identified
- * in frames of smeared stars, and a run whose field has 8 to 12 loses its attitude. */
+/* Least number of catalogue stars in the field at any time of the run. In frames of smeared stars
+ * image processing identifies about half of them; runs with 8 to 12 lost the attitude. */
 #define LEAST_STARS 14
-/* They are smeared over some pixels. */
+/* Least SNR of such a star, as a point; its light is smeared over several pixels. */
 #define STAR_SNR 20.0
 #define FAINTEST_STARS_V_MAG 12.5
 #define SIDE_PX 1024
 #define SMALL_SIDE_PX 512
 #define MOON_CLEAR_DEG 3.0
-/* Nearer ones are discs, not points, to a telescope. */
+/* Nearer targets are discs, not points, to a telescope. */
 #define LEAST_RANGE_M 20e3
-/* Twice as fast is what the mount of leo_leo_pass.json follows. */
+/* Half of the rate that the mount of leo_leo_pass.json follows. */
 #define MOST_RATE_ARCSEC_PER_S 3600.0
-#define LEAST_SNR 12.0
-#define MOST_EXPOSURE_S 2.0
-#define LEAST_EXPOSURE_S 0.005
-/* Of stars: in an exposure, and from one to the next. */
-#define MOST_STREAK_PX 6.0
-#define MOST_STEP_PX 24.0
 enum { LOOKS = (int)(SEARCH_S / LOOK_S) + 1, MOST_JUDGED = 12 };
 
 typedef enum reason {
@@ -93,69 +81,6 @@ typedef struct search {
     double best_v_mag;         /* of what was too faint only */
 } search;
 
-/* ------------------------------------------------------------------ sensor */
-
-static double signal_e_per_s(double aperture_m, double v_mag) {
-    return BST_NEW_FLUX_V0 * 0.25 * BST_PI * aperture_m * aperture_m * BST_NEW_THROUGHPUT *
-           BST_NEW_QUANTUM_EFFICIENCY * pow(10.0, -0.4 * v_mag);
-}
-
-/* Of a point in the pixels of a circle twice the FWHM wide. */
-static double snr_of(double aperture_m, double pixel_arcsec, double v_mag, double exposure_s) {
-    double pixels = BST_PI * BST_NEW_FWHM_PX * BST_NEW_FWHM_PX;
-    double s = signal_e_per_s(aperture_m, v_mag) * exposure_s;
-    double sky = signal_e_per_s(aperture_m, BST_NEW_SKY_MAG_ARCSEC2) * pixel_arcsec * pixel_arcsec;
-    double noise2 = pixels * (BST_NEW_READ_NOISE_E * BST_NEW_READ_NOISE_E +
-                              (sky + BST_NEW_DARK_E_PER_S) * exposure_s);
-    return s / sqrt(s + noise2);
-}
-
-static double pixel_of(const bst_new_request *q, double rate, double complete_v_mag) {
-    if (q->focal_m > 0.0) {
-        return 1e-6 * BST_NEW_PIXEL_UM / q->focal_m / BST_ARCSEC_RAD;
-    }
-    if (q->pixel_arcsec > 0.0) {
-        return q->pixel_arcsec;
-    }
-    double least = complete_v_mag >= ENOUGH_STARS_V_MAG ? 0.0
-                   : rate <= STARLESS_RATE_ARCSEC_PER_S ? FEW_STARS_ARCSEC
-                                                        : FEW_STARS_FAST_ARCSEC;
-    return fmax(rate <= 60.0 ? 3.0 : rate <= 600.0 ? 5.0 : 10.0, least);
-}
-
-/* The mount follows the target, so that it is the stars that are streaks. */
-static double period_of(const bst_new_request *q, double rate, double pixel) {
-    static const double steps[] = {1.0, 0.5, 0.2};
-    if (q->period_s > 0.0) {
-        return q->period_s;
-    }
-    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
-        if (rate * steps[i] <= (rate > 600.0 ? 0.5 : 1.0) * MOST_STEP_PX * pixel) {
-            return steps[i];
-        }
-    }
-    return 0.1;
-}
-
-/* Exposure that has LEAST_SNR at the faintest; 0: none has. Two digits. */
-static double exposure_of(const bst_new_request *q, const bst_new_scene *s, double brightest) {
-    const double peak = 0.2; /* share of a point's light in its brightest pixel, FWHM of 2 px */
-    double most = fmin(MOST_EXPOSURE_S, 0.5 * s->period_s);
-    double wanted = fmin(MOST_STREAK_PX * s->pixel_arcsec / fmax(s->rate_arcsec_per_s, 1e-3), most);
-    wanted =
-        fmin(wanted, 0.5 * BST_NEW_FULL_WELL_E / peak / signal_e_per_s(q->aperture_m, brightest));
-    wanted = fmin(fmax(wanted, LEAST_EXPOSURE_S), most);
-    double longest = q->period_s > 0.0 ? fmin(MOST_EXPOSURE_S, 0.8 * s->period_s) : most;
-    while (snr_of(q->aperture_m, s->pixel_arcsec, s->faintest_v_mag, wanted) < LEAST_SNR) {
-        if (wanted >= longest) {
-            return 0.0;
-        }
-        wanted = fmin(1.2 * wanted, longest);
-    }
-    double unit = fmax(pow(10.0, floor(log10(wanted)) - 1.0), 1e-3); /* whole ticks */
-    return fmax(ceil(wanted / unit - 1e-9) * unit, LEAST_EXPOSURE_S);
-}
-
 /* ------------------------------------------------------------------ what is seen */
 
 static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *out) {
@@ -194,10 +119,11 @@ static double free_of_earth(const bst_new_scene *s) {
 static bool fit_field(search *s, bst_vec3 direction, bst_new_scene *out) {
     const bst_new_request *q = s->request;
     const double rate = out->rate_arcsec_per_s;
-    double half = 0.5 * SIDE_PX * FEW_STARS_ARCSEC * BST_ARCSEC_RAD;
+    double half = 0.5 * SIDE_PX * BST_NEW_FEW_STARS_ARCSEC * BST_ARCSEC_RAD;
     double complete = bst_stars_complete_to(bst_world_stars(s->world), direction, half);
-    const double pixel[] = {pixel_of(q, rate, complete), pixel_of(q, rate, complete),
-                            pixel_of(q, rate, ENOUGH_STARS_V_MAG)};
+    const double pixel[] = {bst_new_pixel_arcsec(q, rate, complete),
+                            bst_new_pixel_arcsec(q, rate, complete),
+                            bst_new_pixel_arcsec(q, rate, BST_NEW_ENOUGH_STARS_V_MAG)};
     const int side[] = {SIDE_PX, SMALL_SIDE_PX, SMALL_SIDE_PX};
     for (size_t k = 0; k < sizeof side / sizeof *side; k++) {
         out->pixel_arcsec = pixel[k];
@@ -205,7 +131,7 @@ static bool fit_field(search *s, bst_vec3 direction, bst_new_scene *out) {
         if (out->limb_rad < free_of_earth(out)) {
             continue;
         }
-        if (pixel[k] >= pixel[0] || rate <= STARLESS_RATE_ARCSEC_PER_S) {
+        if (pixel[k] >= pixel[0] || rate <= BST_NEW_STARLESS_RATE_ARCSEC_PER_S) {
             return true;
         }
         s->few_stars++;
@@ -225,13 +151,13 @@ static bst_status count_stars(bst_ctx *ctx, const search *s, int i, const bst_ne
     double year = 2000.0 + (jd1 - 2451545.0 + jd2) / 365.25;
     int last = i + (int)ceil(scene->duration_s / LOOK_S);
     double faintest = FAINTEST_STARS_V_MAG;
-    while (snr_of(s->request->aperture_m, scene->pixel_arcsec, faintest, scene->exposure_s) <
+    while (bst_new_snr(s->request->aperture_m, scene->pixel_arcsec, faintest, scene->exposure_s) <
                STAR_SNR &&
            faintest > 0.0) {
         faintest -= 0.25;
     }
     *enough = true;
-    if (scene->rate_arcsec_per_s <= STARLESS_RATE_ARCSEC_PER_S) {
+    if (scene->rate_arcsec_per_s <= BST_NEW_STARLESS_RATE_ARCSEC_PER_S) {
         return BST_OK;
     }
     for (int k = i; k <= last && *enough; k++) {
@@ -269,8 +195,8 @@ static bool scene_at(search *s, int i, bst_new_scene *out) {
     if (!fit_field(s, s->looks[(i + last) / 2].direction, out)) {
         return false;
     }
-    out->period_s = period_of(q, out->rate_arcsec_per_s, out->pixel_arcsec);
-    out->exposure_s = exposure_of(q, out, brightest);
+    out->period_s = bst_new_period_s(q, out->rate_arcsec_per_s, out->pixel_arcsec);
+    out->exposure_s = bst_new_exposure_s(q, out, brightest);
     if (out->exposure_s == 0.0) {
         s->best_v_mag = fmin(s->best_v_mag, out->faintest_v_mag);
         return false;
@@ -299,7 +225,7 @@ static bst_status open_world(bst_ctx *ctx, search *s) {
     if (!stream) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
     }
-    bst_new_scene_write(stream, s->request, &first);
+    bst_new_scenario_write(stream, s->request, &first);
     fclose(stream);
     bst_json *json = NULL;
     bst_scenario scenario;
@@ -374,8 +300,10 @@ static bst_status nothing(bst_ctx *ctx, const search *s, const char *judged) {
     if (isfinite(s->best_v_mag)) {
         double needed = s->request->aperture_m;
         double period = s->request->period_s > 0.0 ? s->request->period_s : 1.0;
-        while (needed < 20.0 && snr_of(needed, pixel_of(s->request, 0.0, ENOUGH_STARS_V_MAG),
-                                       s->best_v_mag, 0.5 * period) < LEAST_SNR) {
+        while (needed < 20.0 &&
+               bst_new_snr(needed,
+                           bst_new_pixel_arcsec(s->request, 0.0, BST_NEW_ENOUGH_STARS_V_MAG),
+                           s->best_v_mag, 0.5 * period) < BST_NEW_LEAST_SNR) {
             needed *= 1.05;
         }
         return bst_fail(

@@ -1,0 +1,205 @@
+#include "sim/analysis/pd/pd_request.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FIELD(member) .offset = offsetof(bst_pd_request, member)
+
+const bst_option bst_pd_option_table[] = {
+    {.name = "snr",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_pd_request, range),
+     .argument = "FIRST:LAST:STEP",
+     .doc = "SNRs of the targets (default 2:12:0.5)"},
+    {.name = "magnitude",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_pd_request, magnitudes),
+     .argument = "FIRST:LAST:STEP",
+     .doc = "V magnitudes instead of SNRs"},
+    {.name = "trials",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(bst_pd_request, options.trials),
+     .argument = "N",
+     .doc = "targets of each SNR (default 1000)",
+     .minimum = 1,
+     .maximum = 1e9},
+    {.name = "json",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_pd_request, json),
+     .path = BST_PATH_OUTPUT,
+     .argument = "FILE",
+     .doc = "write the figures there"},
+    {.name = "plot",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_pd_request, plot),
+     .path = BST_PATH_OUTPUT,
+     .argument = "FILE",
+     .doc = "draw Pd beside the ideal, and errors over bounds, as a PNG"},
+    {.name = "streak",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.streak_px),
+     .argument = "PX",
+     .doc = "length of the targets' streaks, each in a direction of its own (default 0: "
+            "points)",
+     .minimum = 0,
+     .maximum = 1000},
+    {.name = "stack",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(bst_pd_request, options.stack),
+     .argument = "N",
+     .doc = "search N frames together, in which targets move at rates of their own; SNRs are of "
+            "one frame (default 0: each frame by itself)",
+     .minimum = 0,
+     .maximum = BST_STACK_MAX_FRAMES},
+    {.name = "rates",
+     .needs = "stack",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.rates_px),
+     .argument = "PX",
+     .doc = "greatest rate of the targets of a stack and of the search, px per frame in x and "
+            "in y (default 3)",
+     .minimum = 0.05,
+     .maximum = 16},
+    {.name = "known-rate",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_pd_request, options.known_rate),
+     .doc = "the camera turns, each frame in its own direction, and image processing knows it"},
+    {.name = "false-alarms",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.false_alarms),
+     .argument = "PER_FRAME",
+     .doc = "asked of the detector (default: the scenario's)",
+     .minimum = 1e-6,
+     .maximum = 1e4},
+    {.name = "empty-frames",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(bst_pd_request, options.empty_frames),
+     .argument = "N",
+     .doc = "frames without targets (default: for 400 false alarms, 50 to 400)",
+     .minimum = 1,
+     .maximum = 1e7},
+    {.name = "background",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.background_e),
+     .argument = "E",
+     .doc = "sky per pixel and exposure, electrons (default: the camera's)",
+     .minimum = 0,
+     .maximum = 1e6},
+    {.name = "jitter",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.jitter_px),
+     .argument = "PX",
+     .doc = "RMS per axis by which the image is blurred (default: jitter_px of imgproc)",
+     .minimum = 0,
+     .maximum = 5},
+    {.name = "apart",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.min_separation_px),
+     .argument = "PX",
+     .doc = "least distance between targets, their own length not counted (default 24)",
+     .minimum = 1,
+     .maximum = 1000},
+    {.name = "cell",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.cell_px),
+     .argument = "PX",
+     .doc = "one target in each square of this side (default: 40 more than they are apart)",
+     .minimum = 3,
+     .maximum = 32768},
+    {.name = "stars",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_pd_request, options.stars),
+     .doc = "keep the scenario's stars and sky, the camera rolled from frame to frame; what "
+            "may be a star of SNR 1 or more is no false alarm"},
+    {.name = "star-streak",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.star_streak_px),
+     .argument = "PX",
+     .doc = "the camera turns with the targets, each frame in a direction of its own, so that "
+            "stars streak by this; image processing knows it (default 0)",
+     .minimum = 0,
+     .maximum = 1000},
+    {.name = "module",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_pd_request, options.by_module),
+     .doc = "step the scenario's imgproc module as a run does; always so of one that does not "
+            "come with Boresight"},
+    {.name = "sensor",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_pd_request, options.sensor),
+     .argument = "OBSERVER/SENSOR",
+     .doc = "whose camera and detector (default the first)"},
+    BST_LOAD_OPTIONS_AT(FIELD, load),
+    BST_DEVICE_OPTIONS_AT(FIELD, options.device, threads),
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_pd_request, help),
+     .doc = "print this"},
+    {.name = NULL},
+};
+
+bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, double low,
+                             double high, bst_pd_options *out) {
+    double v[3];
+    char *end = (char *)text;
+    for (int i = 0; i < 3; i++) {
+        const char *from = end;
+        v[i] = strtod(from, &end);
+        if (end == from || !isfinite(v[i]) || *end != (i < 2 ? ':' : '\0')) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s \"%s\" is not FIRST:LAST:STEP, for example %s", name, text,
+                            strcmp(name, "snr") == 0 ? "2:12:0.5" : "12:18:0.25");
+        }
+        end += i < 2;
+    }
+    if (!(v[0] >= low && v[1] <= high && v[0] <= v[1] && v[2] > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--%s \"%s\": %g to %g, the first not above the last, and a step above 0",
+                        name, text, low, high);
+    }
+    if ((v[1] - v[0]) / v[2] >= BST_PD_POINTS) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s \"%s\" has more than %d steps", name, text,
+                        BST_PD_POINTS);
+    }
+    out->low = v[0];
+    out->high = v[1];
+    out->step = v[2];
+    return BST_OK;
+}
+
+bst_status bst_pd_request_settle(bst_ctx *ctx, bst_pd_request *r, const bst_option *table) {
+    bst_pd_options *o = &r->options;
+    if (r->range && r->magnitudes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "give --snr or --magnitude, not both");
+    }
+    o->by_magnitude = r->magnitudes;
+    BST_TRY(r->magnitudes ? bst_pd_range_read(ctx, "magnitude", r->magnitudes, -30.0, 40.0, o)
+                          : bst_pd_range_read(ctx, "snr",
+                                              r->range       ? r->range
+                                              : o->stack > 0 ? "0.8:2.4:0.1"
+                                                             : "2:12:0.5",
+                                              0.1, 1e4, o));
+    if (o->known_rate && !(o->streak_px > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--known-rate is of streaks: give their length with --streak PX");
+    }
+    if (o->known_rate && o->star_streak_px > 0.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "with --known-rate stars streak as targets do: leave out --star-streak");
+    }
+    if (o->stack % 4 != 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "--stack %lld: a multiple of 4",
+                        (long long)o->stack);
+    }
+    if (o->stack > 0 && (o->streak_px > 0.0 || o->star_streak_px > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--stack is of points: leave out --streak and --star-streak");
+    }
+    if (o->stars && o->background_e >= 0.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--stars keeps the scenario's sky, --background sets another: give one");
+    }
+    o->threads = (int)r->threads;
+    return bst_load_check(ctx, &r->load, table);
+}

@@ -1,0 +1,200 @@
+/* boresight new: satellites by name, the sensor's design against the SNR equation, the text. */
+#include <unistd.h>
+
+#include "sim/analysis/new/new_scenario.h"
+#include "sim/analysis/new/satellite_lookup.h"
+#include "sim/analysis/new/scenario_template.h"
+#include "sim/analysis/new/sensor_design.h"
+#include "sim/cli/plugins.h"
+#include "tests/test_support.h"
+
+#define CATALOGUE "scenarios/catalogue_2022-06.tle"
+
+static void test_plain_names(void **state) {
+    (void)state;
+    char out[28], small[5];
+    bst_new_plain_name("NEOSSAT (X)", out, sizeof out);
+    assert_string_equal(out, "neossat_x");
+    bst_new_plain_name("  -ISS (ZARYA)--", out, sizeof out);
+    assert_string_equal(out, "iss_zarya");
+    bst_new_plain_name("abc defg", small, sizeof small);
+    assert_string_equal(small, "abc");
+}
+
+static void test_satellites_are_found(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_new_satellite found;
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "target-tle", "39089", &found));
+    assert_string_equal(found.name, "NEOSSAT");
+    /* the lines of the file itself */
+    assert_memory_equal(found.line1, "1 39089U 13009D   22166.78481540", 32);
+    assert_memory_equal(found.line2, "2 39089  98.4228   3.1337 0010095", 33);
+    assert_true(found.file[0] == '/');
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "target-tle", "inmarsat gx5", &found));
+    assert_int_equal(found.elements.norad, 44801);
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "target-tle", CATALOGUE ":44801", &found));
+    assert_int_equal(found.elements.norad, 44801);
+}
+
+static void test_satellites_are_refused(void **state) {
+    (void)state;
+    static const struct {
+        const char *which, *message;
+        bst_status status;
+    } cases[] = {
+        {"INMARSAT GX4", "did you mean \"INMARSAT GX5\"?", BST_ERR_NOT_FOUND},
+        {CATALOGUE, "holds more than one satellite; say which", BST_ERR_ARGUMENT},
+        {CATALOGUE ":x44", "\"x44\" is no catalogue number", BST_ERR_ARGUMENT},
+        {"nofile:44801", "--target-tle: nofile", BST_ERR_IO},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        bst_ctx ctx = {0};
+        bst_new_satellite found;
+        bst_status status = bst_new_satellite_find(&ctx, "target-tle", cases[i].which, &found);
+        if (status == BST_OK || !strstr(ctx.message, cases[i].message)) {
+            fail_msg("%s: %s: %s", cases[i].which, bst_status_name(status), ctx.message);
+        }
+        assert_true(cases[i].status == BST_ERR_IO || status == cases[i].status);
+    }
+}
+
+/* A line of an element set with its checksum: digits add up, minus signs count 1, modulo 10. */
+static void write_line(FILE *file, const char *text) {
+    int sum = 0;
+    for (const char *c = text; *c; c++) {
+        sum += *c >= '0' && *c <= '9' ? *c - '0' : *c == '-';
+    }
+    fprintf(file, "%s%d\n", text, sum % 10);
+}
+
+static void test_the_latest_set_is_taken(void **state) {
+    (void)state;
+    char path[BST_TEST_PATH];
+    bst_test_template(path, "sets");
+    int fd = mkstemp(path);
+    FILE *file = fdopen(fd, "w");
+    assert_non_null(file);
+    static const char *const days[] = {"22166.78481540", "22168.50000000", "22167.10000000"};
+    for (int i = 0; i < 3; i++) {
+        char line[80];
+        snprintf(line, sizeof line, "1 39089U 13009D   %s  .00000151  00000+0  68433-4 0  999",
+                 days[i]);
+        write_line(file, line);
+        write_line(file, "2 39089  98.4228   3.1337 0010095 284.4434  75.5631 14.3466465048697");
+    }
+    assert_int_equal(fclose(file), 0);
+    bst_ctx ctx = {0};
+    bst_new_satellite found;
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "observer-tle", path, &found));
+    assert_memory_equal(found.line1 + 18, "22168.5", 7);
+    assert_string_equal(found.name, "NORAD 39089");
+    unlink(path);
+}
+
+static void test_snr(void **state) {
+    (void)state;
+    /* By hand: 3.6e10 photons/s/m2 of V = 0, 0.15 m, 0.7 x 0.7, V 10, 0.5 s: 15586 e. In 4 pi
+     * pixels of 3 arcsec, sky of V 22 per square arcsec gives 4.447 e/s each, dark 0.5 e/s, read
+     * noise 5 e. Tolerance: rounding of the operands. */
+    bst_assert_close(bst_new_snr(0.15, 3.0, 10.0, 0.5), 123.48469228, 1e-7);
+    /* shot noise of the source alone: SNR grows as the aperture */
+    bst_assert_close(bst_new_snr(2.0, 3.0, 2.0, 1.0) / bst_new_snr(1.0, 3.0, 2.0, 1.0), 2.0, 1e-4);
+}
+
+static void test_pixel_scale(void **state) {
+    (void)state;
+    bst_new_request free_choice = {.aperture_m = 0.15}, by_focal = {.focal_m = 0.9},
+                    given = {.pixel_arcsec = 4.5};
+    /* 13 um / 0.9 m in arcsec, 206264.806 to the radian */
+    bst_assert_close(bst_new_pixel_arcsec(&by_focal, 0.0, 0.0), 206264.806 * 13e-6 / 0.9, 1e-7);
+    assert_true(bst_new_pixel_arcsec(&given, 500.0, 9.0) == 4.5);
+    assert_true(bst_new_pixel_arcsec(&free_choice, 10.0, 11.5) == 3.0);
+    assert_true(bst_new_pixel_arcsec(&free_choice, 700.0, 11.5) == 10.0);
+    /* with few known stars a field of 1024 pixels is wider than 2 degrees: 8 stars at 3 / deg2 */
+    double field_deg = 1024 * bst_new_pixel_arcsec(&free_choice, 10.0, 9.0) / 3600.0;
+    assert_true(3.0 * field_deg * field_deg >= 8.0);
+}
+
+static void test_period_and_exposure(void **state) {
+    (void)state;
+    bst_new_request q = {.aperture_m = 0.15}, fixed = {.aperture_m = 0.15, .period_s = 2.5};
+    assert_true(bst_new_period_s(&fixed, 1e4, 3.0) == 2.5);
+    for (double rate = 1.0; rate < 2000.0; rate *= 1.3) {
+        double pixel = bst_new_pixel_arcsec(&q, rate, 11.5),
+               period = bst_new_period_s(&q, rate, pixel);
+        bst_new_scene s = {.period_s = period,
+                           .pixel_arcsec = pixel,
+                           .rate_arcsec_per_s = rate,
+                           .faintest_v_mag = 9.5};
+        double exposure = bst_new_exposure_s(&q, &s, 9.0);
+        assert_true(period == 0.1 || rate * period <= 24.0 * pixel);
+        if (exposure > 0.0) {
+            assert_true(exposure <= 0.5 * period * 1.1);
+            assert_true(bst_new_snr(0.15, pixel, 9.5, exposure) >= 12.0);
+        }
+    }
+    /* the faintest target needs the whole period, a fainter one has no exposure */
+    bst_new_scene s = {.period_s = 1.0, .pixel_arcsec = 3.0, .faintest_v_mag = 12.0};
+    assert_true(bst_new_exposure_s(&q, &s, 12.0) > 0.0);
+    s.faintest_v_mag = 16.0;
+    assert_true(bst_new_snr(0.15, 3.0, 16.0, 0.5) < 12.0);
+    assert_true(bst_new_exposure_s(&q, &s, 16.0) == 0.0);
+}
+
+/* The strict reader of scenarios takes the text, and finds in it what it was made from. */
+static void test_the_text_is_a_scenario(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_new_request q = {.aperture_m = 0.2, .name = "a \"quoted\" name", .observer_label = "eye"};
+    bst_new_scene s = {.duration_s = 90.0,
+                       .period_s = 2.0,
+                       .exposure_s = 0.75,
+                       .pixel_arcsec = 4.25,
+                       .side_px = 512,
+                       .v_mag = 11.2,
+                       .range_m = 4e7,
+                       .rate_arcsec_per_s = 250.0};
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "o", "39089", &q.observer));
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "t", "44801", &q.target));
+    bst_assert_ok(&ctx, bst_time_from_utc(&ctx, "2022-06-16T22:10:00Z", &s.epoch));
+    char *text = NULL;
+    size_t bytes = 0;
+    FILE *stream = open_memstream(&text, &bytes);
+    assert_non_null(stream);
+    bst_new_scenario_write(stream, &q, &s);
+    assert_int_equal(fclose(stream), 0);
+    assert_non_null(strstr(text, "a \\\"quoted\\\" name"));
+    char *name = strstr(text, "a \\\"quoted\\\" name");
+    memcpy(name, "a_..quoted..name", 16); /* names hold letters, digits, _ - . */
+    name[14] = 'm';
+    bst_json *json = NULL;
+    bst_scenario scenario;
+    bst_assert_ok(&ctx, bst_json_parse(&ctx, "new", text, bytes, &json));
+    bst_assert_ok(&ctx, bst_plugins_scenario_read(&ctx, json, &scenario));
+    const bst_observer_config *observer = scenario.observers.items;
+    const bst_sensor_config *sensor = observer->sensors.items;
+    assert_string_equal(scenario.epoch_utc, "2022-06-16T22:10:00Z");
+    assert_true(scenario.duration_s == 90.0);
+    assert_string_equal(observer->name, "eye");
+    assert_true(sensor->exposure.period_s == 2.0 && sensor->exposure.exposure_s == 0.75);
+    assert_int_equal(sensor->camera.width_px, 512);
+    bst_assert_close(sensor->camera.aperture_m, 0.2, 1e-12); /* nine digits are written */
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+    free(text);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_plain_names),
+        cmocka_unit_test(test_satellites_are_found),
+        cmocka_unit_test(test_satellites_are_refused),
+        cmocka_unit_test(test_the_latest_set_is_taken),
+        cmocka_unit_test(test_snr),
+        cmocka_unit_test(test_pixel_scale),
+        cmocka_unit_test(test_period_and_exposure),
+        cmocka_unit_test(test_the_text_is_a_scenario),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
