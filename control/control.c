@@ -145,6 +145,9 @@ bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
     bst_control_forget_aims(c);
     if (on_image_error(c)) {
         bst_image_loop_update(&c->image_loop, &c->pointing_error, tick, &tracks->attitude);
+        for (int a = 0; a < 3; a++) {
+            BST_TRY(bst_compensator_plug_status(ctx, &c->image_loop.axis[a]));
+        }
     } else if (c->config.compensate_attitude) {
         bst_attitude_fix fix =
             bst_model_error_apply(&c->model_error, &c->pointing_error, &tracks->attitude);

@@ -82,6 +82,9 @@ static bst_status step(void *self, struct bst_step *s) {
                            .q_believed_from_gcrf = m->platform.q_believed_from_gcrf,
                            .believed_rate_radps = m->platform.rate_believed_radps};
     bst_mount_step(mount, &body, command, age, measure);
+    for (int k = 0; k < mount->axes; k++) {
+        BST_TRY(bst_compensator_plug_status(bst_step_ctx(s), &mount->servo[k].compensator));
+    }
     report_stuck(m, s);
     bst_gimbal_publish_sight(s, &m->platform,
                              bst_platform_true_camera(&m->platform, n, (double)n * m->base.dt_s,

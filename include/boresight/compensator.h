@@ -186,6 +186,8 @@ typedef struct bst_compensator {
     int delay_next; /* next write position in `past` */
     double past[BST_COMPENSATOR_DELAY];
     const bst_compensator_stage *plug; /* not NULL: plug-in with its state; no stages */
+    const char *plugin;                /* its path, lent by the configuration; NULL: none */
+    bool plug_failed;                  /* it gave an output that is not finite */
     _Alignas(16) unsigned char plug_state[BST_COMPENSATOR_STATE_BYTES];
 } bst_compensator;
 
@@ -242,6 +244,11 @@ bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *compensator,
  *            plug-in's output has neither a rate limit nor a delay.
  * Reference: Astrom and Wittenmark, Computer-Controlled Systems, 3rd ed., section 9.4 */
 double bst_compensator_step(bst_compensator *compensator, double error, double feed_forward);
+
+/* Checks the outputs that a plug-in has given so far: BST_ERR_STATE if one was not finite. 0 took
+ * its place in bst_compensator_step. */
+bst_status bst_compensator_plug_status(bst_ctx *ctx,
+                                       const bst_compensator *compensator) BST_MUST_CHECK;
 
 /* Bumpless transfer: sets the states so that the next step with the same inputs returns `output`.
  *

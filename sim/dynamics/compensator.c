@@ -211,7 +211,8 @@ static bst_status plug(bst_ctx *ctx, bst_compensator *c, const bst_stage_use *us
                            .feed_forward = 1.0,
                            .limit = INFINITY,
                            .rate_limit = INFINITY,
-                           .plug = stage};
+                           .plug = stage,
+                           .plugin = use->plugin};
     bst_status status = stage->init(ctx, use->config, dt_s, c->plug_state);
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "plug-in %s", use->plugin);
 }
@@ -247,14 +248,27 @@ static double delayed(bst_compensator *c, double output) {
 }
 
 static double step_plug(bst_compensator *c, double error, double feed_forward) {
-    double wanted = c->plug->step(c->plug_state, error) + c->feed_forward * feed_forward;
+    double given = c->plug->step(c->plug_state, error);
+    if (!isfinite(given)) {
+        c->plug_failed = true;
+        given = 0.0;
+    }
+    double wanted = given + c->feed_forward * feed_forward;
     c->output = clamp(wanted, -c->limit, c->limit);
     c->limited = c->output != wanted;
     return c->output;
 }
 
+bst_status bst_compensator_plug_status(bst_ctx *ctx, const bst_compensator *c) {
+    return c->plug_failed
+               ? bst_fail(ctx, BST_ERR_STATE,
+                          "plug-in %s: its compensator gave an output that is not finite",
+                          c->plugin)
+               : BST_OK;
+}
+
 double bst_compensator_step(bst_compensator *c, double error, double feed_forward) {
-    assert(c && isfinite(error) && isfinite(feed_forward));
+    assert(c);
     if (c->plug) {
         return step_plug(c, error, feed_forward);
     }

@@ -166,6 +166,7 @@ static bst_status add_multi_sensor(bst_ctx *ctx, const bst_scenario *scenario,
         bst_instance_spec spec = {.scope = "",
                                   .instance = module->name,
                                   .desc = module->desc,
+                                  .plugin = module->plugin,
                                   .config = module->config,
                                   .period_ticks = module->period_ticks,
                                   .offset_ticks = module->offset_ticks,
@@ -222,6 +223,7 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
                 snprintf(name, sizeof name, "%s/%s", scope, module->name);
                 spec.instance = name;
                 spec.desc = module->desc;
+                spec.plugin = module->plugin;
                 spec.config = module->config;
                 spec.period_ticks = module->period_ticks;
                 spec.offset_ticks = module->offset_ticks;

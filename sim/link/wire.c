@@ -236,3 +236,29 @@ bst_wire_fault bst_wire_decode(bst_ctx *ctx, const bst_wire_message *message, co
     }
     return fault;
 }
+
+/* Checks a record of a struct in its packed form. */
+static bst_status check_record(bst_ctx *ctx, const bst_wire_message *message,
+                               const bst_wire_field *table, const char *from, int item) {
+    uint8_t packed[4096];
+    assert(bst_wire_bytes(table) <= sizeof packed);
+    encode_record(table, from, packed);
+    return decode_record(ctx, message, table, packed, item, NULL) == BST_WIRE_GOOD ? BST_OK
+                                                                                   : BST_ERR_FORMAT;
+}
+
+bst_status bst_wire_check_struct(bst_ctx *ctx, const bst_wire_message *message, const void *payload,
+                                 int capacity) {
+    assert(message && payload && capacity >= 0);
+    int count = bst_wire_items(message, payload);
+    if (count < 0 || (message->items && count > capacity)) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "%s: %d items (allowed: 0 to %d)", message->name,
+                        count, capacity);
+    }
+    BST_TRY(check_record(ctx, message, message->record, payload, -1));
+    const char *item = (const char *)payload + message->header_bytes;
+    for (int i = 0; i < count; i++, item += message->item_bytes) {
+        BST_TRY(check_record(ctx, message, message->items, item, i));
+    }
+    return BST_OK;
+}

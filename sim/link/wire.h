@@ -121,4 +121,9 @@ bst_wire_fault bst_wire_decode(bst_ctx *ctx, const bst_wire_message *message, co
                                size_t bytes, void *payload, int capacity,
                                int *dropped) BST_MUST_CHECK;
 
+/* Checks every number of a struct with room for `capacity` items, by the rules for a peer's
+ * messages. BST_ERR_FORMAT with the field, its value and what is allowed. */
+bst_status bst_wire_check_struct(bst_ctx *ctx, const bst_wire_message *message, const void *payload,
+                                 int capacity) BST_MUST_CHECK;
+
 #endif

@@ -372,10 +372,16 @@ static void test_plug(void **state) {
     bst_compensator_set(&c, 1.0, 0.0, 2.0);
     bst_assert_close(((const summed *)(const void *)c.plug_state)->sum, -3.0, ROUNDING);
     bst_assert_close(c.output, 2.0, ROUNDING);
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, bst_compensator_plug_status(&ctx, &c));
+    ((summed *)(void *)c.plug_state)->sum = (double)INFINITY;
+    bst_assert_close(bst_compensator_step(&c, 1.0, -3.0), -3.0, ROUNDING);
+    assert_int_equal(bst_compensator_plug_status(&ctx, &c), BST_ERR_STATE);
+    assert_string_equal(ctx.message,
+                        "plug-in lib.so: its compensator gave an output that is not finite");
     stage.response = NULL;
     assert_false(bst_compensator_is_linear(&config));
     assert_true(isnan(creal(bst_compensator_response(&c, 8.0))));
-    bst_ctx ctx = {0};
     gain = -1.0;
     assert_int_equal(bst_compensator_init(&ctx, &c, &config, 0.25, NULL, NULL), BST_ERR_CONFIG);
     assert_string_equal(ctx.message, "plug-in lib.so: a gain below zero");

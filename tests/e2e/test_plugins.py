@@ -45,6 +45,9 @@ class Plugins(unittest.TestCase):
         jobs.append(cls.start("aged.c", cls.text["stare_at.c"].replace("BST_MODULE_ABI", "2")))
         jobs.append(cls.start("empty.c", "extern int a;\nint a;\n"))
         jobs.append(cls.start("mad.c", detector.replace("d->snr =", "d->x_px = NAN; d->snr =")))
+        jobs.append(cls.start("mad_law.c", cls.text["leaky.c"].replace("return s->kp * error", "return NAN * error")))
+        jobs.append(cls.start("mad_aim.c", cls.text["stare_at.c"].replace(
+            "bst_light_apparent_star(&light, m->icrs)}", "bst_vec3_scale(bst_light_apparent_star(&light, m->icrs), 2)}")))
         for job in jobs:
             _, errors = job.communicate(timeout=300)
             assert job.returncode == 0, errors
@@ -166,6 +169,15 @@ class Plugins(unittest.TestCase):
             "run", self.scenario, "--out", "mad", "--quiet", "--duration", "2", "--set",
             runs.NO_FRAMES, "--set", f'{block}={{"plugin": "mad.so"}}', code=1),
             r"plug-in .*mad.so gave a detection at \(nan,")
+        for plugin, keys, message in (
+                ("mad_law.so", '/compensator={"plugin": "mad_law.so"}',
+                 "plug-in .*mad_law.so: its compensator gave an output that is not finite"),
+                ("mad_aim.so", '={"plugin": "mad_aim.so", "ra_deg": 1, "dec_deg": 2}',
+                 "neossat/telescope/control: its plug-in wrote a wrong message: los_command: direction.* is 2 "
+                 ".allowed: finite, of length 1 within 5e-7")):
+            self.assertRegex(self.call(
+                "run", self.scenario, "--out", plugin + ".run", "--quiet", "--duration", "40", "--set",
+                runs.NO_FRAMES, "--set", control + keys, code=1), message)
 
     def test_schema(self):
         scenario = json.loads(self.check(M + '/imgproc/detector={"plugin": "box_detector.so"}',

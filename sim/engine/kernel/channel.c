@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/engine/kernel/engine_internal.h"
+#include "sim/link/wire.h"
 
 void bst_engine_count(bst_engine *engine, const char *what) {
     pthread_mutex_lock(&engine->counting);
@@ -157,11 +158,27 @@ static bst_status reach(struct bst_step *step, const channel *ch, const slot *s,
     return BST_OK;
 }
 
+/* Checks a message of a plug-in. Built-in modules assert what holds of theirs
+ * (sim/messages/message_invariants.h). */
+static bst_status check_message(struct bst_step *step, const channel *ch, const void *payload) {
+    bst_link_type type = bst_wire_type_of(ch->type->name);
+    if (!step->self->spec.plugin || type == BST_LINK_TYPES) {
+        return BST_OK;
+    }
+    bst_status status =
+        bst_wire_check_struct(step->ctx, bst_wire_message_of(type), payload, ch->capacity);
+    return status == BST_OK
+               ? BST_OK
+               : bst_fail_prefix(step->ctx, BST_ERR_STATE, "%s: its plug-in wrote a wrong message",
+                                 step->self->name);
+}
+
 /* Publishes what a module instance has written to an output port. */
 static bst_status publish(struct bst_step *step, int port_index) {
     bst_engine *engine = step->engine;
     channel *ch = &engine->channels[step->self->ports[port_index].channel];
     slot *s = &ch->log.slots[ch->log.head];
+    BST_TRY(check_message(step, ch, s->payload));
     s->written_tick = step->tick;
     s->sequence = ch->log.written;
     s->owned = ch->type->release != NULL;

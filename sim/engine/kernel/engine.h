@@ -18,6 +18,7 @@ enum { BST_MAX_DELAYS = 16 };
 /* One module to run. */
 typedef struct bst_instance_spec {
     const bst_module_desc *desc;
+    bool plugin;          /* of a plug-in: each message is checked before it is published */
     const char *scope;    /* "observer/sensor": scope of its channels */
     const char *instance; /* "observer/sensor/module": unique */
     const void *config;   /* outlives the engine */
