@@ -11,7 +11,6 @@
 #include "obsgen/streak/streak_breakup.h"
 #include "sim/optics/column_level.h"
 
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* In a smeared frame, sources that move less than this are seen as one maximum. */
 static const double ROUGH_PX = 8.0;
 /* Clip level of image processing for background and noise, sigma. */
@@ -496,7 +495,7 @@ void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, 
     d->flux_e = snr * sigma;
     d->flux_sigma_e = sqrt(sigma * sigma + d->flux_e);
     d->snr = snr;
-    d->length_px = d->width_px = b * FWHM_PER_SIGMA * g->sigma;
+    d->length_px = d->width_px = b * BST_FWHM_PER_SIGMA * g->sigma;
     d->v_mag = -2.5 * log10(d->flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     bst_generator_keep(g, &out);
 }

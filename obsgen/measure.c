@@ -2,7 +2,6 @@
 
 #include "obsgen/generator_internal.h"
 
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* SNR above which size and own streak of a source are measured. */
 static const double MOMENTS_SNR = 10.0;
 /* Lower limit of the visible share used for errors. */
@@ -139,7 +138,7 @@ static void measure_place(const bst_generator *g, const generator_source *s,
 /* True if image processing would measure an image of this length as longer than a point. */
 static bool is_drawn_out(const bst_generator *g, const generator_source *s) {
     double across2 = g->sigma * g->sigma, along2 = across2 + s->length * s->length / 12.0;
-    return FWHM_PER_SIGMA * sqrt(along2) > 1.5 * fmax(FWHM_PER_SIGMA * sqrt(across2), 1.0);
+    return BST_FWHM_PER_SIGMA * sqrt(along2) > 1.5 * fmax(BST_FWHM_PER_SIGMA * sqrt(across2), 1.0);
 }
 
 /* Sets length, width and angle of a detection. */
@@ -148,8 +147,8 @@ static void set_extent(const bst_generator *g, const generator_source *s, bool a
     double modelled = as_streak ? g->streak : 0.0, b = g->binning;
     double length = d->snr >= MOMENTS_SNR ? s->length : modelled;
     double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
-    d->length_px = b * FWHM_PER_SIGMA * sqrt(along2);
-    d->width_px = b * FWHM_PER_SIGMA * sqrt(across2);
+    d->length_px = b * BST_FWHM_PER_SIGMA * sqrt(along2);
+    d->width_px = b * BST_FWHM_PER_SIGMA * sqrt(across2);
     d->angle_rad = length > 0.01 ? atan2(s->path.dy, s->path.dx) : 0.0;
     if (d->angle_rad > 0.5 * BST_PI) {
         d->angle_rad -= BST_PI;

@@ -156,7 +156,7 @@ static double gaussian_px(const bst_camera *c) {
     }
     return bst_psf_equivalent_fwhm_px(c->psf, 0.5 * (double)(c->width_px - 1),
                                       0.5 * (double)(c->height_px - 1)) /
-           2.3548200450309493;
+           BST_FWHM_PER_SIGMA;
 }
 
 static bst_status prepare(const bst_module_env *env, obsgen *o) {

@@ -13,7 +13,7 @@ bst_status bst_render_camera_check(bst_ctx *ctx, const bst_camera *c) {
                         "pixels and 8 to 16 bits",
                         (long long)c->width_px, (long long)c->height_px, (long long)c->bits);
     }
-    double fwhm_px = 2.3548200450309493 * bst_camera_psf_sigma_px(c);
+    double fwhm_px = BST_FWHM_PER_SIGMA * bst_camera_psf_sigma_px(c);
     if (!(c->psf_fwhm_px > 0.0) || fwhm_px > 70.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "cannot render a PSF of psf_fwhm_px %g, with charge diffusion and fast "

@@ -33,7 +33,7 @@ void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *foun
             continue;
         }
         bst_detection *d = &out->items[out->count++];
-        double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
+        double width = BST_FWHM_PER_SIGMA * ip->left.sigma_px * ip->left.binning;
         /* the stack is filtered with the Gaussian nearest to the PSF */
         double like = ip->known ? ip->known->like_flux : 1.0;
         *d = (bst_detection){.x_px = f->x_px,

@@ -181,7 +181,7 @@ bst_status bst_known_psf_create(bst_ctx *ctx, const bst_psf *psf, double width_p
     k->nodes = bst_psf_nodes(psf) / bst_psf_spectra(psf);
     double fwhm_px =
         hypot(bst_psf_equivalent_fwhm_px(psf, 0.5 * (width_px - 1.0), 0.5 * (height_px - 1.0)),
-              2.3548200450309493 * blur_px);
+              BST_FWHM_PER_SIGMA * blur_px);
     k->reach_px = (int)fmin(fmax(ceil(REACH_FWHM * fwhm_px), LEAST_REACH_PX), MOST_REACH_PX);
     double per_px = ceil(SAMPLES_PER_CYCLE * bst_psf_cutoff(psf));
     k->per_px = (int)fmin(fmax(per_px, LEAST_PER_PX), MOST_PER_PX);
@@ -193,7 +193,7 @@ bst_status bst_known_psf_create(bst_ctx *ctx, const bst_psf *psf, double width_p
         return status;
     }
     set_field_mean(k, width_px, height_px);
-    fit_nearest_gaussian(k, fwhm_px / 2.3548200450309493);
+    fit_nearest_gaussian(k, fwhm_px / BST_FWHM_PER_SIGMA);
     *out = k;
     return BST_OK;
 }

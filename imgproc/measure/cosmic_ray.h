@@ -7,7 +7,6 @@
 
 /* SNR of light beside charge above which there is also a source. */
 #define BST_CHARGE_LIGHT_SNR 4.0
-#define BST_FWHM_PER_SIGMA 2.3548200450309493
 
 /* True if a label stands for charge (hot pixel or cosmic ray) instead of light. */
 static inline bool bst_cosmic_ray_label(int32_t label) {

@@ -9,7 +9,6 @@
 #include "boresight/vec.h"
 #include "imgproc/measure/cosmic_ray.h"
 
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* most point sources replaced by a streak */
 enum { MOST_PIECES = 64 };
 /* Point density, px^-2, above which bright streaks are not searched among points. */
@@ -178,8 +177,8 @@ static void measure_streak(bst_streak_locator *l, const bst_locate_frame *f,
     out->snr = s->flux_e * norm / out->noise_e;
     double path = hypot(s->shape.dx_px, s->shape.dy_px);
     double variance = f->sigma_px * f->sigma_px;
-    out->length_px = FWHM_PER_SIGMA * sqrt(path * path / 12.0 + variance);
-    out->width_px = FWHM_PER_SIGMA * f->sigma_px;
+    out->length_px = BST_FWHM_PER_SIGMA * sqrt(path * path / 12.0 + variance);
+    out->width_px = BST_FWHM_PER_SIGMA * f->sigma_px;
     double angle = atan2(s->shape.dy_px, s->shape.dx_px);
     out->angle_rad = angle > 0.5 * BST_PI     ? angle - BST_PI
                      : angle <= -0.5 * BST_PI ? angle + BST_PI
@@ -319,7 +318,7 @@ static void mask_point(bst_streak_locator *l, double x, double y, double snr, do
 /* Masks a cosmic-ray track in the streak map, whose faint pixels are not masked in the signal. */
 static void mask_cosmic_ray(bst_streak_locator *l, const bst_imgproc_found *o) {
     /* half length of a uniform track, from its second moment */
-    double half = 0.5 * sqrt(12.0) / FWHM_PER_SIGMA * o->length_px;
+    double half = 0.5 * sqrt(12.0) / BST_FWHM_PER_SIGMA * o->length_px;
     double dx = half * cos(o->angle_rad), dy = half * sin(o->angle_rad);
     double x = o->source.shape.x_px, y = o->source.shape.y_px;
     bst_streak_map_blank(&l->search.map, x - dx, y - dy, x + dx, y + dy,

@@ -110,7 +110,7 @@ static inline double bst_camera_scale_rad(const bst_camera *c) {
 /* Standard deviation of the Gaussian PSF with charge diffusion, px, before integration over the
  * pixel. */
 static inline double bst_camera_psf_sigma_px(const bst_camera *c) {
-    double sigma = c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
+    double sigma = c->psf_fwhm_px / BST_FWHM_PER_SIGMA; /* 2 sqrt(2 ln 2) */
     return c->optics.diffusion_px > 0.0 ? hypot(sigma, c->optics.diffusion_px) : sigma;
 }
 

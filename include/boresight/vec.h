@@ -13,6 +13,7 @@
 #define BST_PI 3.14159265358979323846
 #define BST_ARCSEC_RAD (BST_PI / 648000.0)
 #define BST_DEG_RAD (BST_PI / 180.0)
+#define BST_FWHM_PER_SIGMA 2.3548200450309493 /* of a Gaussian: 2 sqrt(2 ln 2) */
 
 typedef struct bst_vec3 {
     double x, y, z;

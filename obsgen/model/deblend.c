@@ -5,7 +5,6 @@
 
 #include "obsgen/generator_internal.h"
 
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* Depth of the saddle, sigma and share of the fainter source, that separates two sources; positions
  * closer than CLOSEST_FWHM are one. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
@@ -159,7 +158,7 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
                              const generator_source *faint) {
     double factor = g->calibration.blend_distance_factor;
     double apart = hypot(faint->x - bright->x, faint->y - bright->y) / factor;
-    if (apart < CLOSEST_FWHM * FWHM_PER_SIGMA * g->fitted_sigma) {
+    if (apart < CLOSEST_FWHM * BST_FWHM_PER_SIGMA * g->fitted_sigma) {
         return false;
     }
     if (apart > FAR_SIGMAS * g->cross_sigma + fmax(bright->length, faint->length)) {

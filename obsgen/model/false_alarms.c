@@ -37,7 +37,7 @@ bst_detection bst_false_alarms_point(const bst_generator *g, double x, double y,
     d.cov_yy = s * s * a2 + c * c * b2;
     d.flux_sigma_e = sqrt(bound.flux_variance);
     d.snr = snr;
-    const double fwhm = 2.3548200450309493;
+    const double fwhm = BST_FWHM_PER_SIGMA;
     d.width_px = b * fwhm * g->sigma;
     d.length_px = b * fwhm * sqrt(g->sigma * g->sigma + length * length / 12.0);
     d.angle_rad = length > 0.0 ? atan(s / c) : 0.0;

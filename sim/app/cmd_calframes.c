@@ -3,6 +3,7 @@
 
 #include "sim/analysis/calibration/calibration_frames.h"
 #include "sim/app/app.h"
+#include "sim/cli/command_line.h"
 #include "sim/cli/load.h"
 #include "sim/cli/stop_signals.h"
 
@@ -118,12 +119,7 @@ int bst_cmd_calframes(int argc, char **argv) {
     if (status == BST_OK) {
         status = bst_calibration_frames_make(&ctx, &r.frames, &scenario);
     }
-    if (status != BST_OK) {
-        fprintf(stderr, "boresight: %s\n", ctx.message);
-    }
     bst_scenario_free(&scenario);
     bst_json_free(json);
-    return status == BST_OK                ? BST_EXIT_OK
-           : status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED
-                                           : BST_EXIT_FAILED;
+    return bst_command_line_end(&ctx, status);
 }

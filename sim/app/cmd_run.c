@@ -143,7 +143,5 @@ int bst_cmd_run(int argc, char **argv) {
     bst_status status = run_loaded(&ctx, &r, json, &scenario);
     bst_scenario_free(&scenario);
     bst_json_free(json);
-    return status == BST_OK                ? BST_EXIT_OK
-           : status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED
-                                           : BST_EXIT_FAILED;
+    return bst_command_line_exit_code(status);
 }

@@ -54,7 +54,7 @@ bst_status bst_bench_stack(bst_ctx *ctx, const bst_bench *self, const bst_bench_
                                      .background = &n.background,
                                      .width = SIDE,
                                      .height = SIDE,
-                                     .sigma_px = 2.0 / 2.3548200450309493,
+                                     .sigma_px = 2.0 / BST_FWHM_PER_SIGMA,
                                      .time_s = i,
                                      .q_cam_from_gcrf = BST_QUAT_IDENTITY,
                                      .binning = 1.0};

@@ -15,7 +15,7 @@ bool bst_command_line_read(bst_ctx *ctx, const bst_command_line *line, int argc,
     return true;
 }
 
-static int exit_code(bst_status status) {
+int bst_command_line_exit_code(bst_status status) {
     return status == BST_OK                ? BST_EXIT_OK
            : status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED
                                            : BST_EXIT_FAILED;
@@ -25,14 +25,14 @@ int bst_command_line_end(const bst_ctx *ctx, bst_status status) {
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
     }
-    return exit_code(status);
+    return bst_command_line_exit_code(status);
 }
 
 int bst_command_line_end_as(const char *name, const bst_ctx *ctx, bst_status status) {
     if (status != BST_OK) {
         fprintf(stderr, "boresight %s: %s\n", name, ctx->message);
     }
-    return exit_code(status);
+    return bst_command_line_exit_code(status);
 }
 
 int bst_command_line_misuse(const char *name, const char *what, const char *word) {

@@ -22,9 +22,12 @@ typedef struct bst_command_line {
 bool bst_command_line_read(bst_ctx *ctx, const bst_command_line *line, int argc, char **argv,
                            int *arguments, int *code);
 
+/* Exit status of a command: BST_EXIT_OK, BST_EXIT_INTERRUPTED or BST_EXIT_FAILED. */
+int bst_command_line_exit_code(bst_status status);
+
 /* Ends a command: prints "boresight: message" of an error to the standard error.
  *
- * Returned:  exit status of the command: BST_EXIT_OK, BST_EXIT_INTERRUPTED or BST_EXIT_FAILED */
+ * Returned:  bst_command_line_exit_code */
 int bst_command_line_end(const bst_ctx *ctx, bst_status status);
 
 /* The same with the command's name: "boresight NAME: message". */

@@ -222,3 +222,21 @@ bst_status bst_json_present_pointer(bst_ctx *ctx, const bst_document_tables *tab
     }
     return status;
 }
+
+bst_status bst_json_check_set(bst_ctx *ctx, const bst_document_tables *tables, const cJSON *root,
+                              const cJSON *set, const char *file) {
+    for (const cJSON *item = set ? set->child : NULL; item; item = item->next) {
+        char *present;
+        BST_TRY(bst_json_present_pointer(ctx, tables, root, item->string, NULL, NULL, &present));
+        bool twice = strcmp(present, item->string) != 0 &&
+                     cJSON_GetObjectItemCaseSensitive(set, present) != NULL;
+        free(present);
+        if (twice) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: /set: %.200s is given under its present name too (allowed: one "
+                            "of the two)",
+                            file, item->string);
+        }
+    }
+    return BST_OK;
+}

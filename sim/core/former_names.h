@@ -52,4 +52,14 @@ bst_status bst_json_present_pointer(bst_ctx *ctx, const bst_document_tables *tab
                                     struct cJSON *value, const char *where,
                                     char **out) BST_MUST_CHECK;
 
+/* Checks that an object of values by JSON pointer gives none under a former and the present name.
+ *
+ * Given:     tables, root  as bst_json_present_pointer
+ *            set           the object; NULL: nothing to check
+ *            file          file that has it as "set", for the message
+ * Errors:    BST_ERR_CONFIG, BST_ERR_MEMORY */
+bst_status bst_json_check_set(bst_ctx *ctx, const bst_document_tables *tables,
+                              const struct cJSON *root, const struct cJSON *set,
+                              const char *file) BST_MUST_CHECK;
+
 #endif

@@ -80,26 +80,6 @@ static bst_status check_once(bst_ctx *ctx, const bst_json *own, const cJSON *set
     return BST_OK;
 }
 
-/* A value that "set" gives under a former and under the present name. */
-static bst_status check_former(bst_ctx *ctx, const bst_json *base, const cJSON *set,
-                               const char *file) {
-    for (const cJSON *item = set ? set->child : NULL; item; item = item->next) {
-        char *present;
-        BST_TRY(bst_json_present_pointer(ctx, base->tables, base->root, item->string, NULL, NULL,
-                                         &present));
-        bool twice = strcmp(present, item->string) != 0 &&
-                     cJSON_GetObjectItemCaseSensitive(set, present) != NULL;
-        free(present);
-        if (twice) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "%s: /set: %.200s is given under its present name too (allowed: one "
-                            "of the two)",
-                            file, item->string);
-        }
-    }
-    return BST_OK;
-}
-
 /* Applies the changes of `own` to `base`. */
 static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
     const cJSON *given = cJSON_GetObjectItemCaseSensitive(own->root, "set");
@@ -120,7 +100,7 @@ static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
                                  "an object of values by JSON pointer");
     }
     if (status == BST_OK) {
-        status = check_former(ctx, base, set, base->name);
+        status = bst_json_check_set(ctx, base->tables, base->root, set, base->name);
     }
     if (status == BST_OK) {
         status = move_values(ctx, own->root, false, base);

@@ -115,7 +115,7 @@ bst_status bst_psf_fits_read(bst_ctx *ctx, const char *path, double oversampling
                              .height = height,
                              .oversampling = samples,
                              .noise_equivalent_px = area,
-                             .fwhm_px = 2.3548200450309493 * sqrt(area / (4.0 * BST_PI))};
+                             .fwhm_px = BST_FWHM_PER_SIGMA * sqrt(area / (4.0 * BST_PI))};
     return BST_OK;
 }
 

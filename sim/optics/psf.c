@@ -14,8 +14,6 @@
 /* radius in units of sigma at which a Gaussian is 1e-9 of its peak */
 #define GAUSSIAN_REACH 6.437899
 
-#define FWHM_PER_SIGMA 2.3548200450309493 /* 2 sqrt(2 ln 2) */
-
 static double sinc(double x) {
     double a = BST_PI * x;
     return fabs(a) < 1e-4 ? 1.0 - a * a / 6.0 : sin(a) / a;
@@ -90,7 +88,7 @@ bool bst_psf_gaussian(const bst_psf *psf, double *sigma_px) {
         return false;
     }
     for (int k = 0; k < bst_psf_nodes(psf); k++) {
-        if (psf->nodes[k].sigma_px != psf->fwhm_px / FWHM_PER_SIGMA) {
+        if (psf->nodes[k].sigma_px != psf->fwhm_px / BST_FWHM_PER_SIGMA) {
             return false;
         }
     }
@@ -121,12 +119,12 @@ static double squared_shares(double sigma) {
 /* FWHM in px of the Gaussian with the same noise area as the PSF. */
 static double equivalent_fwhm(const bst_psf *psf, int node) {
     double want = 1.0 / sqrt(bst_psf_noise_area_px2(psf, node));
-    double low = 0.1 / FWHM_PER_SIGMA, high = 1e3;
+    double low = 0.1 / BST_FWHM_PER_SIGMA, high = 1e3;
     for (int k = 0; k < 60; k++) {
         double middle = sqrt(low * high);
         *(squared_shares(middle) > want ? &low : &high) = middle;
     }
-    return FWHM_PER_SIGMA * sqrt(low * high);
+    return BST_FWHM_PER_SIGMA * sqrt(low * high);
 }
 
 double bst_psf_coloured_fwhm_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS],
@@ -237,7 +235,7 @@ static bst_status make_profiles(bst_ctx *ctx, const bst_camera *camera, bst_psf 
             return bst_fail(ctx, BST_ERR_CONFIG, "psf_fwhm_px must be above 0 (found %g)", fwhm);
         }
         if (optics->psf == BST_PSF_GAUSSIAN) {
-            psf->nodes[k].sigma_px = fwhm / FWHM_PER_SIGMA;
+            psf->nodes[k].sigma_px = fwhm / BST_FWHM_PER_SIGMA;
             psf->cutoff = fmax(psf->cutoff, GAUSSIAN_CUTOFF / psf->nodes[k].sigma_px);
             psf->reach_px = fmax(psf->reach_px, GAUSSIAN_REACH * psf->nodes[k].sigma_px);
         } else {
@@ -261,7 +259,7 @@ static void widen(bst_psf *psf, double sigma_px) {
     bool gaussian = bst_psf_gaussian(psf, &sigma);
     for (int k = 0; k < bst_psf_nodes(psf); k++) {
         psf->nodes[k].equivalent_fwhm_px =
-            gaussian ? FWHM_PER_SIGMA * sigma : equivalent_fwhm(psf, k);
+            gaussian ? BST_FWHM_PER_SIGMA * sigma : equivalent_fwhm(psf, k);
         if (!gaussian) {
             bst_psf_fit_gaussians(psf, k, &psf->nodes[k]);
         }

@@ -94,23 +94,15 @@ static bst_status rename_lists(bst_ctx *ctx, const bst_study *study,
 static bst_status rename_set(bst_ctx *ctx, const bst_study *study) {
     const cJSON *set = cJSON_GetObjectItemCaseSensitive(bst_json_root(study->json), "set");
     char where[320];
+    if (!cJSON_IsObject(set)) {
+        return BST_OK; /* the reader's error */
+    }
+    BST_TRY(bst_json_check_set(ctx, study->tables, NULL, set, study->file));
     snprintf(where, sizeof where, "%.300s: /set", study->file);
-    for (cJSON *item = cJSON_IsObject(set) ? set->child : NULL; item; item = item->next) {
+    for (cJSON *item = set->child; item; item = item->next) {
         char *present;
         BST_TRY(bst_json_present_pointer(ctx, study->tables, NULL, item->string, item, where,
                                          &present));
-        if (strcmp(present, item->string) == 0) {
-            free(present);
-            continue;
-        }
-        if (cJSON_GetObjectItemCaseSensitive(set, present)) {
-            bst_status status =
-                bst_fail(ctx, BST_ERR_CONFIG,
-                         "%s: %s is given under its present name too (allowed: one of the two)",
-                         where, item->string);
-            free(present);
-            return status;
-        }
         cJSON_free(item->string);
         item->string = present;
     }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "sim/cli/cli.h"
+#include "sim/cli/command_line.h"
 #include "sim/studies/local_pool.h"
 #include "sim/studies/results.h"
 #include "sim/studies/shard_range.h"
@@ -64,9 +64,7 @@ int bst_study_execute_shard(bst_ctx *ctx, const bst_study_request *r, const bst_
         status = run_part(ctx, &part, &worker, &results, &done);
         bst_shard_worker_close(&worker);
     }
-    if (status != BST_OK) {
-        fprintf(stderr, "boresight: %s\n", ctx->message);
-    } else {
+    if (status == BST_OK) {
         printf("runs %" PRId64 " to %" PRId64 ": %" PRId64
                " made; tables when all are there: "
                "boresight study %s --resume\n",
@@ -76,7 +74,5 @@ int bst_study_execute_shard(bst_ctx *ctx, const bst_study_request *r, const bst_
     if (lock >= 0) {
         close(lock);
     }
-    return status == BST_OK                ? BST_EXIT_OK
-           : status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED
-                                           : BST_EXIT_FAILED;
+    return bst_command_line_end(ctx, status);
 }

@@ -1,6 +1,6 @@
 /* Measures the constants of imgproc/measure/deblend.c: how far a fit takes a source from its
- * maximum (LIMIT_PX, LIMIT_PER_PATH), what a stamp leaves out of the light (REACH_SIGMAS), and how
- * alike two sources at the least distance are (SAME_FWHM). Prints what it finds. */
+ * maximum (LIMIT_PX, LIMIT_PER_PATH), what a stamp leaves out of the light (REACH_SIGMAS), and the
+ * correlation of two images at the smallest separation (SAME_FWHM). Prints the results. */
 #include <stdlib.h>
 
 #include "imgproc/detect/detect_internal.h"
@@ -88,7 +88,8 @@ static void fits_stay_within_their_limit(void **state) {
     }
 }
 
-/* Closed forms of a Gaussian: light outside of the reach, correlation at the least distance. */
+/* Closed forms of a Gaussian PSF: light beyond the stamp, correlation at the smallest separation.
+ */
 static void reach_and_least_distance(void **state) {
     (void)state;
     bst_locate_frame f = {.sigma_px = 5.0}; /* the reach is whole: 18 px */

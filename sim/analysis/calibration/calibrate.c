@@ -8,7 +8,6 @@
 /* SNR around the threshold in which Pd is fitted */
 static const double PD_REACH = 4.0;
 enum { LEAST_COMMON = 8, GRID = 48, CAPACITY = 4096 };
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 bst_status bst_calibration_fitter_create(bst_ctx *ctx, bst_calibration_fitter **out) {
     *out = calloc(1, sizeof **out);
@@ -292,7 +291,7 @@ bst_status bst_calibration_fitter_add(bst_ctx *ctx, bst_calibration_fitter *c,
     c->frames++;
     c->threshold_offset += detections->threshold_snr - theory.threshold_snr;
     add_noise(c, detections, &theory);
-    double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
+    double fwhm = BST_FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
     /* first the common error, then each star */
     common_error common = {0.0, 0.0, 0.0, 0};

@@ -12,7 +12,6 @@
 typedef struct collecting {
     bst_calibration_fitter *calibrator;
     double tick_rate_hz;
-    int64_t width, height;
 } collecting;
 
 static bst_status on_frame(void *user, bst_ctx *ctx, const bst_truth *truth,
@@ -22,25 +21,34 @@ static bst_status on_frame(void *user, bst_ctx *ctx, const bst_truth *truth,
     return bst_calibration_fitter_add(ctx, c->calibrator, truth, detections, exposure_s);
 }
 
-/* Reads a real value of the configuration of a module of the first sensor. */
-static bst_status setting(bst_ctx *ctx, const bst_scenario *s, const char *role, const char *key,
-                          double *out) {
-    for (int m = 0; m < s->module_count; m++) {
-        const bst_scenario_module_config *module = &s->modules[m];
-        if (module->observer != 0 || module->sensor != 0 || strcmp(module->desc->role, role) != 0) {
-            continue;
-        }
-        for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
-            if (strcmp(d->key, key) == 0 && d->type == BST_CONFIG_REAL) {
-                memcpy(out, (const char *)module->config + d->offset, sizeof *out);
-                return BST_OK;
-            }
+/* Reads what the calibration needs of the first sensor: its camera and settings of imgproc. */
+static bst_status read_path(bst_ctx *ctx, const bst_scenario *s, bst_calibration_path *out) {
+    const bst_observer_config *observer = s->observers.items;
+    const bst_sensor_config *sensor = observer->sensors.items;
+    if (sensor->observation_source != BST_OBSERVE_IMAGE || sensor->exposure.binning > 1) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /observers/0/sensors/0: a calibration needs observation_source "
+                        "\"image\" and exposure/binning 1",
+                        s->file);
+    }
+    *out = (bst_calibration_path){.camera = &sensor->camera};
+    const struct {
+        const char *key;
+        double *value;
+    } settings[] = {{"false_alarms_per_frame", &out->false_alarms_per_frame},
+                    {"jitter_px", &out->jitter_px},
+                    {"streak_min_px", &out->streak_min_px},
+                    {"streak_max_px", &out->streak_max_px}};
+    const bst_scenario_module_config *imgproc = bst_scenario_module(s, 0, 0, "imgproc");
+    for (size_t i = 0; i < sizeof settings / sizeof *settings; i++) {
+        if (!bst_scenario_module_number(imgproc, settings[i].key, settings[i].value)) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: the first sensor has no module \"imgproc\" with a key \"%s\": "
+                            "give a scenario with the whole image path",
+                            s->file, settings[i].key);
         }
     }
-    return bst_fail(ctx, BST_ERR_CONFIG,
-                    "%s: the first sensor has no module \"%s\" with a key \"%s\": give a scenario "
-                    "with the whole image path",
-                    s->file, role, key);
+    return BST_OK;
 }
 
 static bst_status collect(bst_ctx *ctx, const bst_calibration_order *e, const char *file, int64_t n,
@@ -49,34 +57,13 @@ static bst_status collect(bst_ctx *ctx, const bst_calibration_order *e, const ch
     bst_scenario scenario;
     BST_TRY(bst_load_scenario(ctx, file, &e->load, &json, &scenario));
     scenario.run += n;
-    bst_observer_config *observer = scenario.observers.items;
-    bst_sensor_config *sensor = observer->sensors.items;
-    bst_calibration_path path = {.camera = &sensor->camera};
-    bst_status status = BST_OK;
-    if (sensor->observation_source != BST_OBSERVE_IMAGE || sensor->exposure.binning > 1) {
-        status = bst_fail(ctx, BST_ERR_CONFIG,
-                          "%s: /observers/0/sensors/0: a calibration needs observation_source "
-                          "\"image\" and exposure/binning 1",
-                          file);
-    }
-    if (status == BST_OK) {
-        status = setting(ctx, &scenario, "imgproc", "false_alarms_per_frame",
-                         &path.false_alarms_per_frame);
-    }
-    if (status == BST_OK) {
-        status = setting(ctx, &scenario, "imgproc", "jitter_px", &path.jitter_px);
-    }
-    if (status == BST_OK) {
-        status = setting(ctx, &scenario, "imgproc", "streak_min_px", &path.streak_min_px);
-    }
-    if (status == BST_OK) {
-        status = setting(ctx, &scenario, "imgproc", "streak_max_px", &path.streak_max_px);
-    }
+    bst_calibration_path path;
+    bst_status status = read_path(ctx, &scenario, &path);
     if (status == BST_OK) {
         status = bst_calibration_fitter_begin(ctx, calibrator, &path);
     }
     if (status == BST_OK) {
-        collecting c = {calibrator, (double)scenario.tick_rate_hz, 0, 0};
+        collecting c = {calibrator, (double)scenario.tick_rate_hz};
         const bst_calibration_watcher watcher = {.user = &c, .frame = on_frame};
         status = bst_watch_run(ctx, &scenario, &watcher, e->device, (int)e->threads, NULL);
     }

@@ -109,7 +109,7 @@ static bst_status play(bst_ctx *ctx, const bst_obsgen_validation_options *o, boo
     const bst_observer_config *observer = scenario.observers.items;
     const bst_sensor_config *first = observer->sensors.items;
     judging j = {.sums = sums,
-                 .fwhm_px = 2.3548200450309493 * bst_camera_psf_sigma_px(&first->camera)};
+                 .fwhm_px = BST_FWHM_PER_SIGMA * bst_camera_psf_sigma_px(&first->camera)};
     const bst_calibration_watcher watcher = {
         .user = &j, .frame = on_frame, .track_error = on_track};
     bst_loop_figures figures;

@@ -16,8 +16,6 @@
 /* number of angles at which a streak's sum of squares is tabulated, over 90 degrees */
 enum { ANGLES = 46 };
 
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
-
 static const bst_sensor_config *sensor_config(const bst_scenario *scenario, int observer,
                                               int sensor) {
     const bst_observer_config *observers = scenario->observers.items;
@@ -127,7 +125,7 @@ static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
         bst_psf_free(psf);
         return BST_OK;
     }
-    s->sigma_px = s->fwhm_px / FWHM_PER_SIGMA;
+    s->sigma_px = s->fwhm_px / BST_FWHM_PER_SIGMA;
     s->seen = psf;
     /* distortion by camera rotation lengthens some targets */
     return bst_pd_image_create(ctx, psf, 1.1 * s->options.streak_px, &s->image);

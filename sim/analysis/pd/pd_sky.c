@@ -32,12 +32,9 @@ static double v_limit_of(const bst_pd_scene *s) {
             strcmp(module->desc->role, "scenegen") != 0) {
             continue;
         }
-        for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
-            if (d->type == BST_CONFIG_REAL && strcmp(d->key, "star_limit_v_mag") == 0) {
-                double value;
-                memcpy(&value, (const char *)module->config + d->offset, sizeof value);
-                return value;
-            }
+        double value;
+        if (bst_scenario_module_number(module, "star_limit_v_mag", &value)) {
+            return value;
         }
     }
     return USUAL_V_LIMIT;

@@ -103,7 +103,7 @@ void bst_scene_image_centroid(const bst_camera *camera, const bst_scene_source *
     if (camera->psf) {
         bst_psf_centroid_px(camera->psf, source->colour, m->x_mean, m->y_mean, shift);
         sigma = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
-                2.3548200450309493;
+                BST_FWHM_PER_SIGMA;
     }
     /* a light distribution of variance v on an illumination with slope s per px shifts by v s */
     double here = bst_camera_illumination(camera, m->x_mean, m->y_mean), variance = sigma * sigma;
@@ -232,7 +232,7 @@ double bst_image_blur(const bst_camera *camera, const bst_scene_source *source,
     double psf = bst_camera_psf_sigma_px(camera), sigma;
     if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
         psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
-              2.3548200450309493;
+              BST_FWHM_PER_SIGMA;
     }
     double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
     double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
