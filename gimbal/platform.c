@@ -150,7 +150,7 @@ bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seco
 bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
                                           double seconds, bst_quat q_cam_from_body) {
     assert(platform && n >= 0 && bst_is_share(fraction));
-    assert(bst_is_unit_quat(q_cam_from_body, 1.1e-6));
+    assert(bst_is_unit_quat(q_cam_from_body, BST_LINK_UNIT_TOLERANCE));
     double shake[2], next[2];
     bst_jitter_at(&platform->jitter, n, shake);
     if (fraction > 0.0) {
@@ -206,7 +206,7 @@ bst_status bst_platform_divider(bst_ctx *ctx, const char *key, double plant_rate
 
 void bst_platform_append_los(bst_los_history *history, int capacity, int64_t tick,
                              bst_quat q_cam_from_gcrf) {
-    assert(history && capacity > 0 && bst_is_unit_quat(q_cam_from_gcrf, 1.1e-6));
+    assert(history && capacity > 0 && bst_is_unit_quat(q_cam_from_gcrf, BST_LINK_UNIT_TOLERANCE));
     history->capacity = capacity;
     bst_los_sample *sample = &history->items[history->written % capacity];
     sample->tick = tick;

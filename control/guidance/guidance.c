@@ -430,7 +430,7 @@ bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *b
                                 bst_los_command *command, bool *give) {
     assert(g && command && give && bst_is_unit_vec3(command->direction_gcrf, BST_UNIT_TOLERANCE));
     /* after the first command the boresight is not read */
-    assert(!boresight || g->commanded || bst_is_unit_vec3(*boresight, 1.1e-6));
+    assert(!boresight || g->commanded || bst_is_unit_vec3(*boresight, BST_LINK_UNIT_TOLERANCE));
     *give = true;
     if (g->config.prediction_horizon_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =

@@ -356,7 +356,7 @@ static void control(bst_mount *m, const request *wanted, bst_vec3 believed_rate_
 void bst_mount_step(bst_mount *m, const bst_mount_body *body, const bst_los_command *command,
                     double command_age_s, bool measure) {
     assert(m && body && bst_is_finite_vec3(body->rate_radps));
-    assert(!command || bst_is_unit_vec3(command->direction_gcrf, 1.1e-6)); /* of another program */
+    assert(!command || bst_is_unit_vec3(command->direction_gcrf, BST_LINK_UNIT_TOLERANCE));
     int64_t n = m->steps;
     double torque[M] = {0.0};
     for (int k = 0; k < m->axes; k++) {

@@ -220,7 +220,8 @@ void bst_mount_two_axis_status(const bst_mount_two_axis *plant, int64_t tick,
 
 void bst_mount_two_axis_step(bst_mount_two_axis *plant, const bst_los_command *command,
                              double command_age_s, bool measure) {
-    assert(plant && (!command || bst_is_unit_vec3(command->direction_gcrf, 1.1e-6)));
+    assert(plant &&
+           (!command || bst_is_unit_vec3(command->direction_gcrf, BST_LINK_UNIT_TOLERANCE)));
     int64_t n = plant->steps++;
     double noise[2] = {0.0, 0.0};
     if (plant->encoder_noise_rad > 0.0) {

@@ -110,7 +110,7 @@ static bool continues_stack(const bst_stack *s, const bst_stack_frame *f) {
 
 int bst_stack_add(bst_stack *s, const bst_stack_frame *f) {
     assert(s && f && s->count >= 0 && s->count <= BST_STACK_MAX_FRAMES);
-    assert(bst_is_unit_quat(f->q_cam_from_gcrf, 1.1e-6));
+    assert(bst_is_unit_quat(f->q_cam_from_gcrf, BST_LINK_UNIT_TOLERANCE));
     if (!continues_stack(s, f)) {
         s->count = 0;
         s->width = f->width;

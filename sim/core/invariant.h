@@ -13,6 +13,8 @@
 /* Deviation of a squared norm from 1 that is allowed of a unit vector or quaternion: 1e-9 of the
  * norm, some thousand products of rotations. */
 #define BST_UNIT_TOLERANCE 2e-9
+/* The same where the value may come from another program: the link allows 5e-7 of the norm. */
+#define BST_LINK_UNIT_TOLERANCE 1.1e-6
 
 /* All components are finite. */
 static inline bool bst_is_finite_vec3(bst_vec3 v) {

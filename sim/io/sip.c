@@ -313,7 +313,7 @@ static double fit_best_inverse(const pair *pairs, const pair *grid, bst_sip *out
 
 bool bst_sip_fit(const bst_camera *camera, bst_quat q_cam_from_gcrf, const bst_light *light,
                  double crval_rad[2], double cd[2][2], bst_sip *out, double *residual_px) {
-    assert(camera && light && out && bst_is_unit_quat(q_cam_from_gcrf, 1.1e-6));
+    assert(camera && light && out && bst_is_unit_quat(q_cam_from_gcrf, BST_LINK_UNIT_TOLERANCE));
     double w = (double)camera->width_px, h = (double)camera->height_px;
     mapping m = {.camera = camera,
                  .q_gcrf_from_cam = bst_quat_conj(q_cam_from_gcrf),

@@ -67,7 +67,7 @@ static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat
 
 bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
                        const bst_light *light, bst_wcs *out) {
-    assert(camera && light && out && bst_is_unit_quat(q_cam_from_gcrf, 1.1e-6));
+    assert(camera && light && out && bst_is_unit_quat(q_cam_from_gcrf, BST_LINK_UNIT_TOLERANCE));
     if (bst_camera_distorted(camera)) {
         return fit_distorted(ctx, camera, q_cam_from_gcrf, light, out);
     }

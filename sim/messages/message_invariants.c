@@ -4,11 +4,8 @@
 
 #include "sim/core/invariant.h"
 
-/* Attitudes may come from another program, which the link allows 5e-7 of the length. */
-static const double LINK_TOLERANCE = 1.1e-6;
-
 static bool is_attitude(bst_quat q) {
-    return bst_is_unit_quat(q, LINK_TOLERANCE);
+    return bst_is_unit_quat(q, BST_LINK_UNIT_TOLERANCE);
 }
 
 bool bst_window_is_valid(const bst_window *w) {

@@ -257,7 +257,7 @@ void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *par
                         bst_quat q_start, bst_attitude_star *stars, int count,
                         bst_attitude_solution *out) {
     assert(camera && params && out && count >= 0 && (stars || count == 0));
-    assert(bst_is_unit_quat(q_start, 1.1e-6)); /* telemetry of another program */
+    assert(bst_is_unit_quat(q_start, BST_LINK_UNIT_TOLERANCE));
     *out = (bst_attitude_solution){.q_cam_from_gcrf = q_start};
     if (count < 2) {
         return;

@@ -9,7 +9,7 @@ bst_sky_measurement bst_sky_of_detection(const bst_camera *camera, const bst_det
                                          const double covariance_cam[3][3],
                                          const bst_light *light) {
     assert(camera && item && light && bst_is_variance(extra_px2));
-    assert(bst_is_unit_quat(q_cam_from_gcrf, 1.1e-6));
+    assert(bst_is_unit_quat(q_cam_from_gcrf, BST_LINK_UNIT_TOLERANCE));
     bst_vec3 v = bst_camera_unproject(camera, item->x_px, item->y_px);
     bst_quat back = bst_quat_conj(q_cam_from_gcrf);
     bst_vec3 apparent = bst_quat_rotate(back, v);
