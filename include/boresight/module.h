@@ -2,13 +2,14 @@
 #ifndef BORESIGHT_MODULE_H
 #define BORESIGHT_MODULE_H
 
+#include "boresight/archive.h"
 #include "boresight/config.h"
 #include "boresight/messages.h"
 #include "boresight/rng.h"
 
 #pragma GCC visibility push(default)
 
-#define BST_MODULE_ABI 3
+#define BST_MODULE_ABI 4
 
 struct bst_world;     /* sim/world: the truth */
 struct bst_knowledge; /* sim/world: onboard knowledge */
@@ -132,6 +133,11 @@ typedef struct bst_module_desc {
      * them. */
     const char *const *substitutes_for;
     const char *also; /* alternative name for "type"; NULL: none */
+    /* Saves the state of a module, or restores it into an instance that was created from the same
+     * configuration, between two steps. After a restore every later step gives the same bytes as
+     * that of the module that was saved. What `create` makes and no step changes is not archived.
+     * NULL: a simulation with this module cannot be saved. */
+    bst_status (*archive)(void *self, bst_archive *archive);
 } bst_module_desc;
 
 /* In create: sets the number of items that an output's payload holds.

@@ -1,0 +1,53 @@
+/* Archives in memory: records that a simulation's parts write and read in the same order. */
+#ifndef BST_CORE_ARCHIVE_H
+#define BST_CORE_ARCHIVE_H
+
+#include <stdint.h>
+
+#include "boresight/archive.h"
+
+/* Creates an empty archive to save to.
+ *
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_archive_free */
+bst_status bst_archive_create(bst_ctx *ctx, bst_archive **out) BST_MUST_CHECK;
+
+/* Creates an archive that restores from bytes.
+ *
+ * Given:     bytes  [size] must outlive the archive; not changed
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_archive_free */
+bst_status bst_archive_open(bst_ctx *ctx, const void *bytes, size_t size,
+                            bst_archive **out) BST_MUST_CHECK;
+
+/* Frees an archive and the bytes that it saved; NULL is allowed. */
+void bst_archive_free(bst_archive *archive);
+
+/* Discards what an archive has saved and keeps its memory. */
+void bst_archive_clear(bst_archive *archive);
+
+/* Bytes saved so far.
+ *
+ * Returned:  [*size], valid until the next call that saves */
+const void *bst_archive_data(const bst_archive *archive, size_t *size);
+
+/* Begins a record. While saving, the record gets this name. While restoring, the next record must
+ * have it.
+ *
+ * Given:     name  at most 255 bytes, for messages and checks
+ * Errors:    BST_ERR_FORMAT: another record follows, or none; BST_ERR_MEMORY */
+bst_status bst_archive_begin(bst_ctx *ctx, bst_archive *archive, const char *name) BST_MUST_CHECK;
+
+/* Ends the record.
+ *
+ * Errors:    BST_ERR_FORMAT: the record was not read exactly to its end, or a number of items was
+ *            out of range; BST_ERR_MEMORY */
+bst_status bst_archive_end(bst_ctx *ctx, bst_archive *archive) BST_MUST_CHECK;
+
+/* Skips the next record, which must have this name.
+ *
+ * Errors:    BST_ERR_FORMAT */
+bst_status bst_archive_skip(bst_ctx *ctx, bst_archive *archive, const char *name) BST_MUST_CHECK;
+
+#endif
