@@ -32,6 +32,17 @@ void bst_archive_clear(bst_archive *archive);
  * Returned:  [*size], valid until the next call that saves */
 const void *bst_archive_data(const bst_archive *archive, size_t *size);
 
+/* Saves bytes outside of records, such as the head of a file. */
+void bst_archive_raw(bst_archive *archive, const void *data, size_t bytes);
+
+/* Gives what an archive has saved to the caller, and empties the archive.
+ *
+ * Returned:  [*size] to be freed with free; NULL: there was no memory for a part of it */
+void *bst_archive_take(bst_archive *archive, size_t *size);
+
+/* Bytes of the open record that are not yet restored. */
+size_t bst_archive_remaining(const bst_archive *archive);
+
 /* Begins a record. While saving, the record gets this name. While restoring, the next record must
  * have it.
  *

@@ -37,6 +37,11 @@ bst_status bst_json_load_described(bst_ctx *ctx, const char *path,
                                    const bst_document_tables *tables,
                                    bst_json **out) BST_MUST_CHECK;
 
+/* bst_json_load_described of a text. Files that it extends are relative to the folder of `name`. */
+bst_status bst_json_parse_described(bst_ctx *ctx, const char *name, const char *text,
+                                    const bst_document_tables *tables,
+                                    bst_json **out) BST_MUST_CHECK;
+
 /* Replaces the former names in a JSON pointer and in the value that belongs there.
  *
  * Given:     tables   NULL: nothing is replaced

@@ -144,10 +144,12 @@ static char *relative_path(const char *file, const char *given) {
     return path;
 }
 
-static bst_status load(bst_ctx *ctx, const char *path, const bst_document_tables *tables,
-                       file_chain *chain, bst_json **out) {
+/* Reads a file, or the text that stands for it, and the files that it extends. */
+static bst_status load(bst_ctx *ctx, const char *path, const char *text,
+                       const bst_document_tables *tables, file_chain *chain, bst_json **out) {
     BST_TRY(add_link(ctx, path, chain));
-    BST_TRY(bst_json_load(ctx, path, out));
+    BST_TRY(text ? bst_json_parse(ctx, path, text, strlen(text), out)
+                 : bst_json_load(ctx, path, out));
     bst_json *own = *out;
     bst_status described = tables ? bst_json_describe(ctx, own, tables, true) : BST_OK;
     if (described != BST_OK) {
@@ -167,7 +169,7 @@ static bst_status load(bst_ctx *ctx, const char *path, const bst_document_tables
                                  "a string, the file that this one changes");
     } else {
         char *file = relative_path(path, extends->valuestring);
-        status = file ? load(ctx, file, tables, chain, &base)
+        status = file ? load(ctx, file, NULL, tables, chain, &base)
                       : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
         free(file);
         if (status != BST_OK) {
@@ -193,13 +195,24 @@ bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out
     return bst_json_load_described(ctx, path, NULL, out);
 }
 
-bst_status bst_json_load_described(bst_ctx *ctx, const char *path,
-                                   const bst_document_tables *tables, bst_json **out) {
+/* Reads a document from its file or its text. */
+static bst_status load_document(bst_ctx *ctx, const char *path, const char *text,
+                                const bst_document_tables *tables, bst_json **out) {
     *out = NULL;
     file_chain chain = {.count = 0};
-    bst_status status = load(ctx, path, tables, &chain, out);
+    bst_status status = load(ctx, path, text, tables, &chain, out);
     for (int i = 0; i < chain.count; i++) {
         free(chain.files[i]);
     }
     return status;
+}
+
+bst_status bst_json_load_described(bst_ctx *ctx, const char *path,
+                                   const bst_document_tables *tables, bst_json **out) {
+    return load_document(ctx, path, NULL, tables, out);
+}
+
+bst_status bst_json_parse_described(bst_ctx *ctx, const char *name, const char *text,
+                                    const bst_document_tables *tables, bst_json **out) {
+    return load_document(ctx, name, text, tables, out);
 }

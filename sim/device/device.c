@@ -24,6 +24,7 @@ typedef struct kept_program {
 } kept_program;
 
 struct bst_device {
+    bst_device *origin; /* the device whose context and programs this one shares; NULL: none */
     cl_device_id parent, id; /* equal unless it is a sub-device */
     cl_context context;
     cl_command_queue queue;
@@ -284,6 +285,7 @@ void bst_device_close(bst_device *device) {
     if (!device) {
         return;
     }
+    const bool first = device->origin == NULL;
     for (int i = 0; i < device->program_count; i++) {
         clReleaseProgram(device->programs[i].program);
         free(device->programs[i].options);
@@ -293,17 +295,43 @@ void bst_device_close(bst_device *device) {
         wait_for_workers(device->queue);
         clReleaseCommandQueue(device->queue);
     }
-    if (device->context) {
+    if (device->context && first) {
         clReleaseContext(device->context);
     }
-    if (device->id != device->parent) {
+    if (device->id != device->parent && first) {
         clReleaseDevice(device->id);
     }
-    if (device->pocl && device->built_count > 0) {
+    if (device->pocl && first && device->built_count > 0) {
         bst_kernel_cache_settle(device->opened);
     }
     pthread_mutex_destroy(&device->lock);
     free(device);
+}
+
+bst_status bst_device_share(bst_ctx *ctx, bst_device *device, bst_device **out) {
+    bst_device *origin = device->origin ? device->origin : device;
+    *out = NULL;
+    bst_device *copy = calloc(1, sizeof *copy);
+    if (!copy) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the OpenCL device");
+    }
+    pthread_mutex_init(&copy->lock, NULL);
+    copy->origin = origin;
+    copy->parent = origin->parent;
+    copy->id = origin->id;
+    copy->context = origin->context;
+    copy->pocl = origin->pocl;
+    memcpy(copy->description, origin->description, sizeof copy->description);
+    cl_int code;
+    copy->queue = clCreateCommandQueue(copy->context, copy->id, 0, &code);
+    bst_status status = bst_device_check(ctx, code, "creating an OpenCL queue");
+    if (status != BST_OK) {
+        copy->queue = NULL;
+        bst_device_close(copy);
+        return status;
+    }
+    *out = copy;
+    return BST_OK;
 }
 
 cl_context bst_device_context(const bst_device *device) {
@@ -453,8 +481,16 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_device_kernel_source *const *sources, int count,
                             const char *options, cl_program *out) {
     assert(device && sources && count >= 1 && options && out);
-    pthread_mutex_lock(&device->lock);
-    bst_status status = build(ctx, device, sources, count, options, out);
-    pthread_mutex_unlock(&device->lock);
+    bst_device *origin = device->origin ? device->origin : device;
+    pthread_mutex_lock(&origin->lock);
+    bst_status status = build(ctx, origin, sources, count, options, out);
+    pthread_mutex_unlock(&origin->lock);
+    if (status == BST_OK && device != origin) {
+        pthread_mutex_lock(&device->lock);
+        for (int i = 0; i < count; i++) {
+            note_built(device, sources[i]);
+        }
+        pthread_mutex_unlock(&device->lock);
+    }
     return status;
 }

@@ -15,6 +15,13 @@ typedef struct bst_device bst_device;
  * devices. */
 bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads,
                            bst_device **out) BST_MUST_CHECK;
+/* Opens a device a second time: with a queue of its own, and the context and the programs of the
+ * first one.
+ *
+ * Given:     device  must outlive *out
+ * Errors:    BST_ERR_DEVICE, BST_ERR_MEMORY
+ * Ownership: free *out with bst_device_close */
+bst_status bst_device_share(bst_ctx *ctx, bst_device *device, bst_device **out) BST_MUST_CHECK;
 /* Waits for the queue and frees a device with its programs; NULL is allowed. */
 void bst_device_close(bst_device *device);
 

@@ -11,47 +11,23 @@
 #include "sim/engine/kernel/exposure_clock.h"
 #include "sim/engine/recorder/recorder.h"
 #include "sim/engine/scenario/loop_timing.h"
-#include "sim/io/psf_fits.h"
+#include "sim/engine/shared_model.h"
 #include "sim/io/wcs.h"
 #include "sim/onboard/knowledge.h"
 
 struct bst_simulation {
-    bst_world *world;
+    bst_shared_model *own;          /* NULL: options->shared is used */
+    const bst_shared_model *shared; /* own or that of the caller */
     bst_device *device;
     bool lent;                 /* the caller owns the device */
-    bst_knowledge **knowledge; /* [sensors of all observers] */
-    bst_fleet_member *members; /* [knowledge_count] */
-    char (*scopes)[160];       /* [knowledge_count] of the members */
-    int knowledge_count;
+    bst_fleet_member *members; /* [sensors of all observers] */
+    char (*scopes)[160];       /* [sensors] of the members */
     bst_engine *engine;
+    uint64_t run; /* number of the run, which keys its random streams */
     bst_link *link;
     bst_module_desc only; /* options->only without input delays */
     bst_port only_ports[BST_MAX_DELAYS];
 };
-
-/* Creates the onboard knowledge of each sensor: camera, catalogue, cue. */
-static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
-    const bst_observer_config *observers = scenario->observers.items;
-    int total = 0;
-    for (int i = 0; i < scenario->observers.count; i++) {
-        total += observers[i].sensors.count;
-    }
-    sim->knowledge = calloc((size_t)total + 1, sizeof *sim->knowledge);
-    if (!sim->knowledge) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", total);
-    }
-    for (int i = 0; i < scenario->observers.count; i++) {
-        for (int s = 0; s < observers[i].sensors.count; s++) {
-            bst_status status =
-                bst_knowledge_create(ctx, sim->world, i, s, &sim->knowledge[sim->knowledge_count]);
-            if (status != BST_OK) {
-                return bst_fail_prefix(ctx, status, "%s", scenario->file);
-            }
-            sim->knowledge_count++;
-        }
-    }
-    return BST_OK;
-}
 
 /* The longest exposure time that the scenario sets for a sensor: of its exposure block, or
  * exposure_s of a module that commands it. */
@@ -108,8 +84,8 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
     bst_loop_timing timing;
     bst_loop_timing_of(scenario, observer, sensor, &timing);
     return (bst_instance_spec){.scope = scope,
-                               .world = sim->world,
-                               .knowledge = sim->knowledge[index],
+                               .world = sim->shared->world,
+                               .knowledge = sim->shared->knowledge[index],
                                .device = sim->device,
                                .link = sim->link,
                                .observer = observer,
@@ -121,7 +97,7 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .planes = scenario->record.planes,
                                .mask_threshold_sigma = scenario->record.mask_threshold_sigma,
                                .seed = scenario->seed,
-                               .run = (uint64_t)scenario->run};
+                               .run = sim->run};
 }
 
 /* Adds the module that options->only names, and the source of its inputs. */
@@ -171,14 +147,14 @@ static bst_status add_multi_sensor(bst_ctx *ctx, const bst_scenario *scenario,
                                   .period_ticks = module->period_ticks,
                                   .offset_ticks = module->offset_ticks,
                                   .delay_count = module->delay_count,
-                                  .world = sim->world,
+                                  .world = sim->shared->world,
                                   .device = sim->device,
                                   .observer = -1,
                                   .sensor = -1,
                                   .members = sim->members,
-                                  .member_count = sim->knowledge_count,
+                                  .member_count = sim->shared->knowledge_count,
                                   .seed = scenario->seed,
-                                  .run = (uint64_t)scenario->run};
+                                  .run = sim->run};
         memcpy(spec.delays, module->delays, sizeof spec.delays);
         BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
     }
@@ -188,10 +164,10 @@ static bst_status add_multi_sensor(bst_ctx *ctx, const bst_scenario *scenario,
 static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
                               const bst_simulation_options *options, bst_simulation *sim) {
     const bst_observer_config *observers = scenario->observers.items;
-    sim->members = calloc((size_t)sim->knowledge_count + 1, sizeof *sim->members);
-    sim->scopes = calloc((size_t)sim->knowledge_count + 1, sizeof *sim->scopes);
+    sim->members = calloc((size_t)sim->shared->knowledge_count + 1, sizeof *sim->members);
+    sim->scopes = calloc((size_t)sim->shared->knowledge_count + 1, sizeof *sim->scopes);
     if (!sim->members || !sim->scopes) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", sim->knowledge_count);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", sim->shared->knowledge_count);
     }
     int count = 0;
     for (int i = 0; i < scenario->observers.count; i++) {
@@ -239,32 +215,6 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
     return options->only ? BST_OK : add_multi_sensor(ctx, scenario, sim);
 }
 
-/* Reads the PSFs of sensors from their files. */
-static bst_status read_psfs(bst_ctx *ctx, const bst_scenario *scenario, bst_world *world) {
-    const bst_observer_config *observers = scenario->observers.items;
-    for (int o = 0; o < scenario->observers.count; o++) {
-        for (int s = 0; s < observers[o].sensors.count; s++) {
-            const bst_optics_config *optics = &bst_world_camera(world, o, s)->optics;
-            if (optics->psf != BST_PSF_FILE) {
-                continue;
-            }
-            bst_psf_samples samples;
-            bst_status status =
-                bst_psf_fits_samples(ctx, optics->psf_file, optics->psf_oversampling, &samples);
-            if (status == BST_OK) {
-                status = bst_world_set_psf(ctx, world, o, s, &samples);
-                free((float *)samples.samples);
-            }
-            if (status != BST_OK) {
-                return bst_fail_prefix(ctx, status,
-                                       "%s: /observers/%d/sensors/%d/camera/optics/psf_file",
-                                       scenario->file, o, s);
-            }
-        }
-    }
-    return BST_OK;
-}
-
 /* Warns of frames whose fitted WCS has a larger error than a star's centroid. */
 static void warn_of_misfits(bst_ctx *ctx, const bst_scenario *scenario) {
     const double allowed_px = 1e-3;
@@ -296,7 +246,8 @@ static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
     if (!needed) {
         return BST_OK;
     }
-    if (!*scenario->link.address) {
+    bool local = options->local_link && !*scenario->link.address;
+    if (!local && !*scenario->link.address) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "/link/address: a module is of type \"external\" and there is no address "
                         "where its peer could connect (allowed: tcp://127.0.0.1:PORT, ipc://PATH)");
@@ -305,6 +256,9 @@ static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
                         .epoch = scenario->epoch,
                         .tick_rate_hz = scenario->tick_rate_hz,
                         .duration_ticks = scenario->duration_ticks};
+    if (local) {
+        return bst_link_create_local(ctx, &run, &sim->link);
+    }
     const bst_pacing_config *pacing = &scenario->pacing;
     if (options->pace && pacing->mode == BST_PACING_FAST) {
         run.waiting = BST_LINK_RUSH;
@@ -334,29 +288,33 @@ static int processors(int threads) {
     return threads > 0 ? threads : online > 1 ? (int)online : 1;
 }
 
-/* Creates world, onboard knowledge, device and module instances of the simulation. */
-static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
-                        const bst_simulation_options *options, bst_simulation *sim) {
-    BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
-                             scenario->base_dir, scenario->epoch, &sim->world));
-    BST_TRY(read_psfs(ctx, scenario, sim->world));
-    BST_TRY(bst_world_check_spans(ctx, scenario->file, sim->world, scenario->duration_s));
-    BST_TRY(bst_world_prepare(ctx, sim->world, options->threads));
-    BST_TRY(make_knowledge(ctx, scenario, sim));
-    for (int m = 0; m < scenario->module_count && !sim->device; m++) {
-        if (scenario->modules[m].off || options->only ||
-            !(scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE)) {
-            continue;
-        }
+/* Takes or creates what simulations share, and the device. */
+static bst_status take_shared(bst_ctx *ctx, const bst_scenario *scenario,
+                              const bst_simulation_options *options, bst_simulation *sim) {
+    if (!options->shared) {
+        const bst_shared_model_options how = {.device = options->device,
+                                              .threads = options->threads,
+                                              .no_device = options->only || options->opened};
+        BST_TRY(bst_shared_model_create(ctx, scenario, &how, &sim->own));
+    }
+    sim->shared = options->shared ? options->shared : sim->own;
+    if (!options->only && bst_shared_model_needs_device(scenario)) {
         if (options->opened) {
             sim->device = options->opened;
             sim->lent = true;
             bst_device_begin_list(sim->device);
         } else {
-            BST_TRY(bst_device_open(ctx, options->device ? options->device : "", options->threads,
-                                    &sim->device));
+            BST_TRY(bst_device_share(ctx, sim->shared->device, &sim->device));
         }
     }
+    return BST_OK;
+}
+
+/* Takes what is shared and creates the module instances of the simulation. */
+static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
+                        const bst_simulation_options *options, bst_simulation *sim) {
+    sim->run = options->other_run ? options->run : (uint64_t)scenario->run;
+    BST_TRY(take_shared(ctx, scenario, options, sim));
     BST_TRY(bst_engine_create(ctx, scenario->tick_rate_hz, &sim->engine));
     bst_status status = make_link(ctx, scenario, options, sim);
     if (status == BST_OK) {
@@ -372,6 +330,9 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
         bst_pacing_config pacing = scenario->pacing;
         pacing.replay = options->replay;
         status = bst_engine_pace(ctx, sim->engine, &pacing);
+    }
+    if (status == BST_OK && options->restore) {
+        status = options->restore(ctx, sim, options->restore_user);
     }
     if (status == BST_OK && options->parallel) {
         status = bst_engine_parallel(ctx, sim->engine, processors(options->threads));
@@ -406,16 +367,12 @@ void bst_simulation_free(bst_simulation *sim) {
     bst_link_close(sim->link, 2,
                    "the simulation has ended"); /* frames held by the peer come back */
     bst_engine_free(sim->engine);
-    for (int i = 0; i < sim->knowledge_count; i++) {
-        bst_knowledge_free(sim->knowledge[i]);
-    }
-    free(sim->knowledge);
     free(sim->members);
     free(sim->scopes);
     if (!sim->lent) {
         bst_device_close(sim->device);
     }
-    bst_world_free(sim->world);
+    bst_shared_model_free(sim->own);
     free(sim);
 }
 
@@ -426,7 +383,10 @@ struct bst_link *bst_simulation_link(bst_simulation *sim) {
     return sim ? sim->link : NULL;
 }
 const struct bst_world *bst_simulation_world(const bst_simulation *sim) {
-    return sim->world;
+    return sim->shared->world;
+}
+uint64_t bst_simulation_run(const bst_simulation *sim) {
+    return sim->run;
 }
 const struct bst_device *bst_simulation_device(const bst_simulation *sim) {
     return sim->device;

@@ -117,7 +117,7 @@ static bst_status bind_address(bst_ctx *ctx, bst_link *link) {
 }
 
 bst_status bst_link_open(bst_ctx *ctx, bst_link *link) {
-    if (link->router || bst_link_replays(link)) {
+    if (link->router || link->local || bst_link_replays(link)) {
         return BST_OK;
     }
     link->welcome =
@@ -187,6 +187,7 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     bst_shared_frames_free(link->shared);
     free(link->welcome);
     for (int i = 0; i < link->part_count; i++) {
+        bst_link_local_free(&link->parts[i]);
         for (int a = 0; a < LINK_AHEAD; a++) {
             link_answer *answer = &link->parts[i].ahead[a];
             for (int o = 0; o < answer->output_count; o++) {

@@ -6,6 +6,7 @@
 #ifndef BST_LINK_LINK_H
 #define BST_LINK_LINK_H
 
+#include "boresight/archive.h"
 #include "boresight/config.h"
 #include "sim/astro/time.h"
 #include "sim/link/packet.h"
@@ -47,6 +48,26 @@ typedef struct bst_link_run {
 /* Checks the address; nothing is bound yet. */
 bst_status bst_link_create(bst_ctx *ctx, const bst_link_config *config, const bst_link_run *run,
                            bst_link **out) BST_MUST_CHECK;
+/* Creates a link without socket and peers: bst_link_put gives the answers of the parts.
+ *
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_link_close */
+bst_status bst_link_create_local(bst_ctx *ctx, const bst_link_run *run,
+                                 bst_link **out) BST_MUST_CHECK;
+/* True for a link of bst_link_create_local. */
+bool bst_link_is_local(const bst_link *link);
+/* Gives a part of a local link the answer to its next step.
+ *
+ * Given:     scope    "observer/sensor"; NULL: the first sensor with a part that sends such messages
+ *            type     of the message
+ *            payload  struct of the type; copied
+ * Errors:    BST_ERR_NOT_FOUND: no such part; BST_ERR_FORMAT: a value out of range; BST_ERR_MEMORY */
+bst_status bst_link_put(bst_ctx *ctx, bst_link *link, const char *scope, bst_link_type type,
+                        const void *payload) BST_MUST_CHECK;
+/* Archives the commands that a part of a local link has not taken.
+ *
+ * Errors:    BST_ERR_STATE: a peer plays the part; BST_ERR_FORMAT, BST_ERR_MEMORY */
+bst_status bst_link_archive(bst_link *link, int part, bst_archive *archive) BST_MUST_CHECK;
 /* Sets the reason of the run's end, for bst_link_close. */
 void bst_link_set_end(bst_link *link, int reason, const char *text);
 /* Sends `end` with the reason to the peers (bst_link_end.reason; the reason of bst_link_set_end

@@ -277,7 +277,7 @@ static bst_status exchange_ahead(bst_ctx *ctx, bst_link *link, int number, int64
 }
 
 bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
-    if (bst_link_replays(link)) {
+    if (link->local || bst_link_replays(link)) {
         return BST_OK;
     }
     BST_TRY(bst_link_open(ctx, link));
@@ -359,6 +359,11 @@ static bst_status exchange_awaited(bst_ctx *ctx, bst_link *link, int number, int
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
                              const bst_link_messages *m, bool *answered) {
     assert(link && m && answered && number >= 0 && number < link->part_count);
+    if (link->local) {
+        *answered = true;
+        bst_link_local_answer(link, number, m);
+        return BST_OK;
+    }
     if (bst_link_replays(link)) {
         *answered = true;
         return bst_link_tape_read(ctx, link, number, tick, m->outputs, m->output_count);

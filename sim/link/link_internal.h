@@ -90,8 +90,16 @@ typedef struct link_flow {
     int64_t taken;
 } link_flow;
 
+/* A message that the program itself gives to a part (link_local.c). */
+typedef struct link_given {
+    void *payload; /* owned; NULL: none yet */
+    size_t bytes;
+    bool pending; /* the part has not taken it */
+} link_given;
+
 typedef struct link_part {
     bst_link_part about;
+    link_given given[BST_LINK_TYPES]; /* of a local link */
     int peer; /* -1: none */
     bool had_peer;
     int64_t step;                  /* number of the next exchange */
@@ -109,6 +117,7 @@ typedef struct link_flying {
 } link_flying;
 
 struct bst_link {
+    bool local; /* no socket: bst_link_put gives the answers */
     bst_link_config config;
     char address[BST_LINK_ENDPOINT_BYTES];
     char scenario[BST_LINK_NAME_BYTES];
@@ -182,6 +191,11 @@ bst_status bst_link_tape_read_more(bst_ctx *ctx, bst_link *link, int part, int64
  * Errors:    BST_ERR_FORMAT if the recording does not fit the run */
 bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                                     bool *ready) BST_MUST_CHECK;
+/* link_local.c */
+/* Answers a step of a part with what bst_link_put has given. */
+void bst_link_local_answer(bst_link *link, int part, const bst_link_messages *messages);
+/* Frees what a part was given. */
+void bst_link_local_free(link_part *part);
 /* link_send.c */
 /* Sends a message to a peer. False: disconnected or its queue is full. `crc`: of the pixels. */
 bool bst_link_send(bst_link *link, int peer, bst_link_header *header, const void *payload,

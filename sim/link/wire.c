@@ -59,6 +59,14 @@ int bst_wire_items(const bst_wire_message *message, const void *payload) {
     return count;
 }
 
+void bst_wire_set_items(const bst_wire_message *message, void *payload, int items) {
+    const bst_wire_field *f = count_field(message);
+    int32_t count = items;
+    if (f) {
+        memcpy((char *)payload + f->offset, &count, sizeof count);
+    }
+}
+
 static size_t encode_record(const bst_wire_field *table, const char *from, uint8_t *out) {
     uint8_t *p = out;
     for (const bst_wire_field *f = table; f->name; f++) {

@@ -94,6 +94,8 @@ size_t bst_wire_offset(const bst_wire_field *table, const bst_wire_field *field)
 size_t bst_wire_number_bytes(bst_wire_type type);
 /* Number of items in a struct, from its count field; 0 for messages without items. */
 int bst_wire_items(const bst_wire_message *message, const void *payload);
+/* Sets the number of items in a struct; nothing for messages without items. */
+void bst_wire_set_items(const bst_wire_message *message, void *payload, int items);
 
 /* Encodes a struct of a message type; `out` has room for bst_wire_payload_bytes of its items.
  * Returns the bytes written. */

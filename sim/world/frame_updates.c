@@ -460,6 +460,24 @@ void bst_frame_cursor_next(bst_frame_cursor *c) {
     apply(c);
 }
 
+void bst_frame_cursor_archive(bst_frame_cursor *c, bst_archive *archive) {
+    const int count = c->updates ? c->updates->count : 0;
+    int update = c->update ? (int)(c->update - c->updates->items) : -1;
+    c->next = bst_archive_count(archive, c->next, count);
+    update = (int)bst_archive_integer(archive, update, -1, count - 1);
+    c->update = update >= 0 ? &c->updates->items[update] : NULL;
+    BST_ARCHIVE(archive, c->frame);
+    BST_ARCHIVE(archive, c->start_s);
+    BST_ARCHIVE(archive, c->exposure_s);
+    BST_ARCHIVE(archive, c->period_s);
+    BST_ARCHIVE(archive, c->start_tick);
+    BST_ARCHIVE(archive, c->exposure_ticks);
+    BST_ARCHIVE(archive, c->period_ticks);
+    BST_ARCHIVE(archive, c->window);
+    BST_ARCHIVE(archive, c->binning);
+    BST_ARCHIVE(archive, c->pixel_scale_arcsec);
+}
+
 void bst_frame_updates_limits(const bst_frame_updates *updates, const bst_camera *camera,
                               const bst_exposure_config *exposure, double *longest_exposure_s,
                               double *shortest_cycle_s) {

@@ -3,6 +3,7 @@
 #ifndef BST_WORLD_FRAME_UPDATES_H
 #define BST_WORLD_FRAME_UPDATES_H
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "sim/world/world_config.h"
 
@@ -78,6 +79,9 @@ bst_frame_cursor bst_frame_cursor_begin(const bst_frame_updates *updates, const 
 /* Advances to the next frame. It starts one period after the start of the previous frame, or at the
  * end of that frame if this is later. */
 void bst_frame_cursor_next(bst_frame_cursor *cursor);
+
+/* Archives the position of a cursor. */
+void bst_frame_cursor_archive(bst_frame_cursor *cursor, bst_archive *archive);
 
 /* Longest exposure (from the first to the last row of a rolling shutter) and shortest frame period
  * that a file sets. */

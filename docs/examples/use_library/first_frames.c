@@ -62,13 +62,14 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
 
 static bst_status run(bst_ctx *ctx, const char *path, int64_t frames) {
     const char *const assignments[] = {"/record/frames=none"};
-    const bst_sim_options options = {.threads = 1};
+    const bst_model_options options = {
+        .assignments = assignments, .assignment_count = 1, .threads = 1};
     watch w = {.ctx = ctx};
     const bst_sim_observer observer = {.user = &w, .message = on_message};
     bst_model *model = NULL;
     bst_sim *sim = NULL;
-    BST_TRY(bst_model_load(ctx, path, assignments, 1, &model));
-    bst_status status = bst_sim_create(ctx, model, &options, &sim);
+    BST_TRY(bst_model_load(ctx, path, &options, &model));
+    bst_status status = bst_sim_create(ctx, model, NULL, &sim);
     if (status == BST_OK) {
         bst_sim_observe(sim, &observer);
     }

@@ -250,7 +250,7 @@ void bst_engine_release_read(bst_engine *engine, int process) {
         if (ch->process != process || ch->released == ch->log.written) {
             continue;
         }
-        int64_t read_by_all = ch->log.written;
+        int64_t read_by_all = ch->log.written - engine->holds_frames;
         for (int r = 0; r < ch->reader_count; r++) {
             const instance *other = engine->instances[ch->readers[r].instance];
             int p = ch->readers[r].port;

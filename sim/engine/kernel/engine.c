@@ -191,7 +191,7 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
 
 bst_status bst_engine_step_tick(bst_ctx *ctx, bst_engine *engine, bst_heap *heap, int64_t tick,
                                 bool *long_step, int *failed) {
-    while (engine->due[heap->items[0]] <= tick) {
+    while (engine->due[heap->items[0]] <= tick && !engine->paused) {
         int index = heap->items[0];
         *long_step |= engine->instances[index]->spec.period_ticks == 0;
         *failed = index;
@@ -205,7 +205,8 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
     double asked = bst_wall_seconds();
     int since_clock = 0;
     const bool by_clock = bst_pacing_by_clock(engine);
-    while (engine->instance_count > 0) {
+    engine->paused = false;
+    while (engine->instance_count > 0 && !engine->paused) {
         int64_t tick = engine->due[engine->heap.items[0]];
         if (tick >= until_tick) {
             break;
@@ -277,11 +278,65 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
 }
 
 bst_status bst_engine_advance(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
-    if (!engine->loaded || engine->executor) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "an engine advances tick by tick once loaded, and on one thread");
+    assert(engine && until_tick >= 0);
+    if (!engine->loaded) {
+        return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
     }
-    return run_until(ctx, engine, until_tick);
+    return engine->executor ? bst_executor_run(ctx, engine, until_tick)
+                            : run_until(ctx, engine, until_tick);
+}
+
+void bst_engine_pause(bst_engine *engine) {
+    engine->paused = engine->executor == NULL;
+}
+bool bst_engine_is_paused(const bst_engine *engine) {
+    return engine->paused;
+}
+
+int64_t bst_engine_next_tick(const bst_engine *engine) {
+    assert(engine->loaded && !engine->executor);
+    return engine->instance_count > 0 ? engine->due[engine->heap.items[0]] : INT64_MAX;
+}
+
+void bst_engine_hold_frames(bst_engine *engine) {
+    engine->holds_frames = true;
+}
+
+int bst_engine_channel_count(const bst_engine *engine) {
+    return engine->channel_count;
+}
+
+const char *bst_engine_channel(const bst_engine *engine, int index, const char **scope,
+                               int *capacity) {
+    assert(index >= 0 && index < engine->channel_count);
+    const channel *ch = &engine->channels[index];
+    if (scope) {
+        *scope = ch->scope;
+    }
+    if (capacity) {
+        *capacity = ch->capacity;
+    }
+    return ch->type->name;
+}
+
+bst_sample bst_engine_newest(const bst_engine *engine, int index) {
+    assert(index >= 0 && index < engine->channel_count);
+    const message_log *log = &engine->channels[index].log;
+    if (log->written == 0) {
+        return (bst_sample){.sequence = -1, .stale = true};
+    }
+    const slot *s = bst_log_slot(log, log->written - 1);
+    return (bst_sample){s->payload, s->written_tick, s->sequence, false};
+}
+
+int bst_engine_find_channel(const bst_engine *engine, const char *scope, const char *name) {
+    for (int c = 0; c < engine->channel_count; c++) {
+        const channel *ch = &engine->channels[c];
+        if (strcmp(ch->type->name, name) == 0 && (!scope || strcmp(ch->scope, scope) == 0)) {
+            return c;
+        }
+    }
+    return -1;
 }
 
 bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *name, int64_t tick) {

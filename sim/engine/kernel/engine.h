@@ -116,12 +116,42 @@ bool bst_engine_pacing(const bst_engine *engine, bst_pacing_figures *out);
 /* Steps all module instances that are due before `until_tick` (exclusive), and finishes the run. */
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
 
-/* As bst_engine_run, without the modules' actions at the end of a run: more steps follow. */
+/* As bst_engine_run, without the modules' actions at the end of a run: more steps follow. With
+ * threads, all of them have reached the tick when it returns, and all observers were called. */
 bst_status bst_engine_advance(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
 /* Schedules one additional step of an instance at a tick, between two calls of bst_engine_advance.
  * BST_ERR_NOT_FOUND: no instance has the name. */
 bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *instance,
                            int64_t tick) BST_MUST_CHECK;
+
+/* Makes the bst_engine_advance in progress return after the current step, also within a tick; the
+ * next one goes on there. An observer may call it. With threads it has no effect. */
+void bst_engine_pause(bst_engine *engine);
+/* True if the last bst_engine_advance was paused. */
+bool bst_engine_is_paused(const bst_engine *engine);
+/* Earliest tick at which an instance is due; INT64_MAX: none. Without threads only. */
+int64_t bst_engine_next_tick(const bst_engine *engine);
+/* Keeps the newest frame of each channel until the next one, for bst_engine_newest. Call it before
+ * the engine runs. */
+void bst_engine_hold_frames(bst_engine *engine);
+
+/* Number of channels, in a fixed order. */
+int bst_engine_channel_count(const bst_engine *engine);
+/* Scope, name and number of items of a channel; they belong to the engine.
+ *
+ * Given:     index  0 to one less than the number of channels
+ * Returned:  *scope, *capacity  NULL allowed; capacity: items that a message has room for
+ * Notes:     the function's value is the name of the channel. */
+const char *bst_engine_channel(const bst_engine *engine, int index, const char **scope,
+                               int *capacity);
+/* Newest message of a channel.
+ *
+ * Given:     index  see bst_engine_channel
+ * Returned:  payload NULL: none yet. Valid until the next call that steps the engine
+ * Notes:     between two calls of bst_engine_advance. */
+bst_sample bst_engine_newest(const bst_engine *engine, int index);
+/* Index of a channel; -1: there is none. scope NULL: the first of this name. */
+int bst_engine_find_channel(const bst_engine *engine, const char *scope, const char *name);
 
 /* Tick of the last step of any module instance; -1 before the first. */
 int64_t bst_engine_tick(const bst_engine *engine);

@@ -135,6 +135,8 @@ struct bst_engine {
     bst_engine_hooks hooks;
     int64_t tick;
     bool loaded;
+    bool paused;       /* an observer has asked for the end of bst_engine_advance */
+    bool holds_frames; /* the newest frame of a channel is kept until the next one */
     pthread_mutex_t counting;
     counter counters[MAX_COUNTERS]; /* sorted by name */
     int counter_count;

@@ -261,9 +261,9 @@ static bst_status start_threads(bst_ctx *ctx, bst_executor *x, int wanted) {
 }
 
 bst_status bst_engine_parallel(bst_ctx *ctx, bst_engine *engine, int threads) {
-    if (!engine->loaded || engine->executor || engine->tick >= 0) {
+    if (!engine->loaded || engine->executor || engine->paused) {
         return bst_fail(ctx, BST_ERR_STATE,
-                        "an engine gets its threads once, after loading and before it runs");
+                        "an engine gets its threads once, after loading and not within a tick");
     }
     bst_executor *x = calloc(1, sizeof *x);
     if (!x) {

@@ -288,6 +288,23 @@ static bst_status step(void *self, struct bst_step *step) {
     }
 }
 
+/* Module interface: archives the settings in force and the exposure in progress. */
+static bst_status archive(void *self, bst_archive *archive) {
+    exposure_clock *clock = self;
+    BST_ARCHIVE(archive, clock->exposure_ticks);
+    BST_ARCHIVE(archive, clock->period_ticks);
+    BST_ARCHIVE(archive, clock->window);
+    BST_ARCHIVE(archive, clock->binning);
+    BST_ARCHIVE(archive, clock->pixel_scale_arcsec);
+    bst_archive_bool(archive, &clock->in_burst);
+    BST_ARCHIVE(archive, clock->id);
+    BST_ARCHIVE(archive, clock->start_tick);
+    BST_ARCHIVE(archive, clock->next_start_tick);
+    bst_archive_bool(archive, &clock->open);
+    bst_frame_cursor_archive(&clock->updates, archive);
+    return BST_OK;
+}
+
 static void destroy(void *self) {
     free(self);
 }
@@ -311,4 +328,5 @@ const bst_module_desc bst_exposure_clock_module = {
     .create = create,
     .step = step,
     .destroy = destroy,
+    .archive = archive,
 };

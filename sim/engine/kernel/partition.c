@@ -181,6 +181,71 @@ static bst_status connect(bst_ctx *ctx, bst_executor *x, instance *reader, int p
     return BST_OK;
 }
 
+/* ---- an engine that has already run: its state was restored ---- */
+
+/* First message of a channel that an input still needs a copy of, and the end of those that exist
+ * at this time. */
+static void range_to_copy(bst_engine *engine, const channel *ch, port_state *port, int64_t *first,
+                          int64_t *end) {
+    const message_log *log = &ch->log;
+    int64_t newest = bst_log_newest(log, port->delay_ticks, engine->tick);
+    if (ch->type->kind == BST_CHANNEL_QUEUE) {
+        (void)bst_log_unread(engine, log, &port->cursor, port->delay_ticks, engine->tick);
+        *first = port->cursor;
+    } else {
+        *first = newest > log->oldest ? newest : log->oldest;
+    }
+    *end = port->copies == BST_COPY_EACH ? log->written : newest + 1;
+    *end = *end > *first ? *end : *first;
+}
+
+static int64_t within(int64_t position, int64_t first, int64_t end) {
+    return (position < first ? first : position > end ? end : position) - first;
+}
+
+/* Copies the messages that an input from another process has not read, and converts its cursors to
+ * positions of the copy. */
+static bst_status take_over(bst_ctx *ctx, bst_engine *engine, const channel *ch, port_state *port) {
+    int64_t first, end;
+    range_to_copy(engine, ch, port, &first, &end);
+    for (int64_t k = first; k < end; k++) {
+        BST_TRY(bst_log_copy(ctx, port->log, ch, bst_log_slot(&ch->log, k)));
+    }
+    port->copied = end;
+    port->announced = port->trigger_cursor;
+    port->cursor = within(port->cursor, first, end);
+    port->trigger_cursor = within(port->trigger_cursor, first, end);
+    return BST_OK;
+}
+
+/* Sets the clocks and the schedules of the processes to the state of the engine. */
+static void continue_processes(bst_executor *x) {
+    bst_engine *engine = x->engine;
+    for (int i = 0; i < engine->instance_count; i++) {
+        instance *self = engine->instances[i];
+        bst_engine_set_due(engine, i, bst_engine_earliest(self));
+        for (int p = 0; p < self->port_count; p++) {
+            self->ports[p].lookahead = self->ports[p].silent_until;
+        }
+    }
+    for (int k = 0; k < x->count; k++) {
+        logical_process *self = &x->processes[k];
+        self->clock = self->reached = engine->tick + 1;
+        self->horizon = self->heap.count > 0 ? engine->due[self->heap.items[0]] : INT64_MAX;
+        for (int m = 0; self->kind == BST_PROCESS_DEFERRED && m < self->member_count; m++) {
+            const instance *member = engine->instances[self->members[m]];
+            for (int t = 0; t < member->trigger_count; t++) {
+                const port_state *port = &member->ports[member->triggers[t]];
+                int64_t next = bst_log_next_visible(&engine->channels[port->channel].log,
+                                                    port->announced, port->delay_ticks);
+                if (port->copies == BST_COPY_SAMPLED && next < self->sample_due) {
+                    self->sample_due = next;
+                }
+            }
+        }
+    }
+}
+
 /* Selects the first instance with `ahead` whose triggers all come from other processes. */
 static bst_status find_looker(bst_ctx *ctx, bst_executor *x, logical_process *self) {
     for (int m = 0; m < self->member_count && self->looker < 0; m++) {
@@ -232,8 +297,12 @@ bst_status bst_partition_make(bst_ctx *ctx, bst_executor *x, int threads) {
             instance *reader = engine->instances[ch->readers[r].instance];
             if (reader->process != ch->process) {
                 BST_TRY(connect(ctx, x, reader, ch->readers[r].port));
+                BST_TRY(take_over(ctx, engine, ch, &reader->ports[ch->readers[r].port]));
             }
         }
+    }
+    if (engine->tick >= 0) {
+        continue_processes(x);
     }
     x->link_ahead = steps_by_periods(x);
     for (int k = 0; k < x->count; k++) {
