@@ -33,7 +33,7 @@ typedef struct bst_imgproc_stamp {
     int x0, y0, width, height;
 } bst_imgproc_stamp;
 
-/* Computes the tables of the normal distribution and of Gauss-Legendre rules; needed once. */
+/* Fills the tables of the normal distribution and of Gauss-Legendre rules. Any thread. */
 void bst_imgproc_gauss_init(bst_imgproc_gauss *psf);
 
 /* Renders a source on a stamp: share of its light in each pixel, and derivatives by x, y and

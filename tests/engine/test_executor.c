@@ -7,6 +7,7 @@
  */
 #include <time.h>
 
+#include "sim/engine/kernel/engine_state.h"
 #include "tests/engine/fake_module.h"
 
 enum { MOST_SENSORS = 5, MOST_MODULES = 5 * 6 + 2, RING = 8, POOL = 64, RECORDS = 60000 };
@@ -116,8 +117,20 @@ static void recycle(void *owner) {
     __atomic_store_n(&f->lent, 0, __ATOMIC_RELEASE);
 }
 
+/* Pixels of all frames; only their size is compared. */
+static bst_status map_frame(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
+    static const uint16_t dark[0x10000];
+    (void)owner, (void)ctx;
+    *pixels = dark;
+    return BST_OK;
+}
+static void unmap_frame(void *owner) {
+    (void)owner;
+}
+
 static void write_frame(module *self, struct bst_step *step, int p) {
-    static const bst_frame_ops ops = {.recycle = recycle};
+    static const bst_frame_ops ops = {
+        .map = map_frame, .unmap = unmap_frame, .recycle = recycle};
     pool *from = &self->s->pools[self->sensor];
     int out = from->made - __atomic_load_n(&from->recycled, __ATOMIC_RELAXED);
     from->most = out + 1 > from->most ? out + 1 : from->most;
@@ -131,7 +144,8 @@ static void write_frame(module *self, struct bst_step *step, int p) {
     }
     pooled *f = &from->frames[i];
     int64_t id = (int64_t)self->state;
-    f->frame = (bst_frame){.ops = &ops, .owner = f, .references = 1, .width = (int)(id & 0xffff)};
+    f->frame = (bst_frame){.ops = &ops, .owner = f, .references = 1, .height = 1};
+    f->frame.width = 1 + (int)(id & 0xfffe);
     f->recycled = &from->recycled;
     f->lent = 1;
     from->made++;
@@ -247,6 +261,13 @@ static bst_status declare_rate(fake *base, const bst_module_env *env) {
     return BST_OK;
 }
 
+static bst_status archive_any(void *module_, bst_archive *archive) {
+    module *self = module_;
+    BST_ARCHIVE(archive, self->state);
+    BST_ARCHIVE(archive, self->lent);
+    return BST_OK;
+}
+
 /* ---- engines ---- */
 
 #define IN(channel_, flags_) \
@@ -301,6 +322,9 @@ static void describe(const make *m, bst_module_desc descs[ROLES + 1]) {
     all[ROLES].port_count -= !m->link_tracks;
     all[ROLES].flags =
         BST_MODULE_MULTI_SENSOR | (m->wakes ? 0u : (unsigned)BST_MODULE_HAS_LOOKAHEAD);
+    for (int r = 0; r <= ROLES; r++) {
+        all[r].archive = archive_any;
+    }
     memcpy(descs, all, sizeof all);
 }
 
@@ -425,7 +449,23 @@ typedef struct result {
     int64_t reported, stale, overflow, steps;
 } result;
 
-static result play(scene *s, int threads) {
+enum { END = 800 };
+
+/* Where a run is saved, and the state that it is restored from. */
+typedef struct saving {
+    int64_t tick;         /* saved at this tick, or restored there */
+    bst_archive *archive; /* NULL: neither */
+} saving;
+
+static bst_status run_to_end(bst_ctx *ctx, bst_engine *engine) {
+    bst_status status = bst_engine_run(ctx, engine, 333);
+    for (int64_t until = 334; status == BST_OK && until <= END; until += 233) {
+        status = bst_engine_run(ctx, engine, until);
+    }
+    return status;
+}
+
+static result play_part(scene *s, int threads, const saving *save, const saving *restored) {
     bst_ctx ctx = {0};
     static module modules[MOST_MODULES];
     static fake *pointers[MOST_MODULES];
@@ -435,6 +475,10 @@ static result play(scene *s, int threads) {
     bst_engine *engine = fake_engine(&ctx, 100);
     add_modules(&ctx, engine, s, descs, modules, pointers, members);
     bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
+    if (restored) {
+        bst_assert_ok(&ctx,
+                      bst_engine_archive(&ctx, engine, restored->archive, BST_STATE_ALL));
+    }
     if (threads > 0) {
         bst_assert_ok(&ctx, bst_engine_parallel(&ctx, engine, threads));
     }
@@ -444,9 +488,10 @@ static result play(scene *s, int threads) {
                                                      .interrupted = interrupted,
                                                      .wants = wants,
                                                      .ctx = &s->observers});
-    result r = {.status = bst_engine_run(&ctx, engine, 333)};
-    for (int64_t until = 334; r.status == BST_OK && until <= 800; until += 233) {
-        r.status = bst_engine_run(&ctx, engine, until);
+    result r = {.status = save ? bst_engine_advance(&ctx, engine, save->tick)
+                               : run_to_end(&ctx, engine)};
+    if (save && r.status == BST_OK) {
+        bst_assert_ok(&ctx, bst_engine_archive(&ctx, engine, save->archive, BST_STATE_ALL));
     }
     snprintf(r.message, sizeof r.message, "%.199s", ctx.message);
     r.reported = fake_counter(engine, "reported");
@@ -457,6 +502,10 @@ static result play(scene *s, int threads) {
     }
     bst_engine_free(engine);
     return r;
+}
+
+static result play(scene *s, int threads) {
+    return play_part(s, threads, NULL, NULL);
 }
 
 static scene *new_scene(const make *m, bool delays) {
@@ -543,10 +592,62 @@ static void failures_leave_what_came_before(void **state) {
     }
 }
 
+/* A run that is saved at a random tick and restored in another engine gives the records, counters
+ * and steps of a run without interruption, with any number of threads before and after. */
+static void saved_runs_go_on(void **state) {
+    (void)state;
+    static const int threads[] = {0, 1, 3};
+    uint64_t r = mix(first_seed, 9);
+    for (int k = 0; k < engines; k++) {
+        make m = make_of(first_seed + (uint64_t)k);
+        m.stops_at = m.full_at = m.fails_at = -1;
+        scene *whole = new_scene(&m, false);
+        result expected = play(whole, 0);
+        for (int trial = 0; trial < 4; trial++) {
+            bst_ctx ctx = {0};
+            scene *s = new_scene(&m, false);
+            saving save = {.tick = 1 + below(&r, END - 2)};
+            int before = threads[below(&r, 3)], after = threads[below(&r, 3)];
+            bst_assert_ok(&ctx, bst_archive_create(&ctx, &save.archive));
+            result first = play_part(s, before, &save, NULL);
+            assert_int_equal(first.status, BST_OK);
+            int made[MOST_SENSORS];
+            for (int i = 0; i < m.sensors; i++) {
+                made[i] = s->pools[i].made;
+                assert_int_equal(s->pools[i].recycled, made[i]);
+            }
+            size_t size;
+            const void *bytes = bst_archive_data(save.archive, &size);
+            saving restored = {.tick = save.tick};
+            bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &restored.archive));
+            result last = play_part(s, after, NULL, &restored);
+            for (int i = 0; i < s->count && i < whole->count; i++) {
+                if (s->records[i] != whole->records[i]) {
+                    fail_msg("seed %llu, saved at %lld, %d and %d threads: record %d of %d differs",
+                             (unsigned long long)m.seed, (long long)save.tick, before, after, i,
+                             whole->count);
+                }
+            }
+            assert_int_equal(s->count, whole->count);
+            assert_int_equal(s->faults, 0);
+            assert_int_equal(last.status, expected.status);
+            assert_int_equal(last.reported, expected.reported);
+            assert_int_equal(last.stale, expected.stale);
+            assert_int_equal(last.overflow, expected.overflow);
+            assert_int_equal(last.steps, expected.steps);
+            bst_archive_free(restored.archive);
+            bst_archive_free(save.archive);
+            test_free(s);
+        }
+        test_free(whole);
+    }
+}
+
 int main(int argc, char **argv) {
     engines = argc > 1 ? atoi(argv[1]) : engines;
     first_seed = argc > 2 ? (uint64_t)atoll(argv[2]) : first_seed;
     const struct CMUnitTest tests[] = {cmocka_unit_test(threads_change_nothing),
-                                       cmocka_unit_test(failures_leave_what_came_before)};
+                                       cmocka_unit_test(failures_leave_what_came_before),
+                                       cmocka_unit_test(saved_runs_go_on)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
