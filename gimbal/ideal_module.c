@@ -129,7 +129,8 @@ static bst_status archive_module(void *self, bst_archive *archive) {
     module *m = self;
     m->steps = bst_archive_integer(archive, m->steps, 0, BST_PLANT_STEPS_MOST);
     bst_ideal_archive(&m->ideal, archive);
-    return bst_platform_archive(&m->platform, archive);
+    bst_platform_archive(&m->platform, archive);
+    return BST_OK;
 }
 
 const bst_module_desc bst_gimbal_ideal_module = {

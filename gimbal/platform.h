@@ -84,10 +84,8 @@ void bst_platform_free(bst_platform *platform);
 #define BST_PLANT_STEPS_MOST (INT64_MAX / 4)
 
 /* Archives attitude and rate of the body, true and estimated, and its spacecraft. The jitter is not
- * archived: it depends only on the step number.
- *
- * Errors:    those of bst_spacecraft_archive */
-bst_status bst_platform_archive(bst_platform *platform, bst_archive *archive) BST_MUST_CHECK;
+ * archived: it depends only on the step number. */
+void bst_platform_archive(bst_platform *platform, bst_archive *archive);
 
 /* Advances the body to plant step n = 0, 1, 2, ... in order, `seconds` after the epoch. Updates
  * body, q_believed_from_gcrf, rate_believed_radps, unresolved_rad2 and the flags.

@@ -95,7 +95,7 @@ bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
     return BST_OK;
 }
 
-bst_status bst_platform_archive(bst_platform *platform, bst_archive *archive) {
+void bst_platform_archive(bst_platform *platform, bst_archive *archive) {
     BST_ARCHIVE(archive, platform->q_believed_from_gcrf);
     BST_ARCHIVE(archive, platform->rate_believed_radps);
     BST_ARCHIVE(archive, platform->body);
@@ -105,7 +105,9 @@ bst_status bst_platform_archive(bst_platform *platform, bst_archive *archive) {
     if (platform->sky && platform->sky->knowledge) {
         bst_knowledge_view_archive(platform->sky->knowledge, archive);
     }
-    return platform->spacecraft ? bst_spacecraft_archive(platform->spacecraft, archive) : BST_OK;
+    if (platform->spacecraft) {
+        bst_spacecraft_archive(platform->spacecraft, archive);
+    }
 }
 
 void bst_platform_free(bst_platform *platform) {

@@ -114,7 +114,8 @@ static bst_status archive_module(void *self, bst_archive *archive) {
     module *m = self;
     m->frame = bst_archive_is_restoring(archive) ? m->first_frame : m->frame;
     m->origin_tick = bst_archive_integer(archive, m->origin_tick, -1, INT64_MAX / 4);
-    return bst_platform_archive(&m->platform, archive);
+    bst_platform_archive(&m->platform, archive);
+    return BST_OK;
 }
 
 const bst_module_desc bst_gimbal_scripted_module = {

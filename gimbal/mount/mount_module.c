@@ -107,7 +107,7 @@ static bst_status step(void *self, struct bst_step *s) {
 
 static bst_status archive_module(void *self, bst_archive *archive) {
     module *m = self;
-    BST_TRY(bst_platform_archive(&m->platform, archive));
+    bst_platform_archive(&m->platform, archive);
     BST_TRY(bst_mount_archive(&m->mount, archive));
     for (int k = 0; k < BST_MOUNT_MOST; k++) {
         bst_archive_bool(archive, &m->stuck[k]);

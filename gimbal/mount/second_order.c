@@ -58,8 +58,8 @@ bst_status bst_mount_two_axis_init(bst_ctx *ctx, bst_mount_two_axis *plant,
     return bst_platform_init(ctx, &plant->platform, &config->platform, &setup);
 }
 
-bst_status bst_mount_two_axis_archive(bst_mount_two_axis *plant, bst_archive *archive) {
-    BST_TRY(bst_platform_archive(&plant->platform, archive));
+void bst_mount_two_axis_archive(bst_mount_two_axis *plant, bst_archive *archive) {
+    bst_platform_archive(&plant->platform, archive);
     bst_axis_archive(&plant->axis[0], archive);
     bst_axis_archive(&plant->axis[1], archive);
     plant->steps = bst_archive_integer(archive, plant->steps, 0, BST_PLANT_STEPS_MOST);
@@ -72,7 +72,6 @@ bst_status bst_mount_two_axis_archive(bst_mount_two_axis *plant, bst_archive *ar
     bst_archive_bool(archive, &plant->settled);
     bst_archive_bool(archive, &plant->limited);
     bst_archive_bool(archive, &plant->at_stop);
-    return BST_OK;
 }
 
 void bst_mount_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_rad,

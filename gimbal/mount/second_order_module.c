@@ -65,7 +65,8 @@ static bst_status step(void *self, struct bst_step *s) {
 
 static bst_status archive_module(void *self, bst_archive *archive) {
     module *m = self;
-    return bst_mount_two_axis_archive(&m->plant, archive);
+    bst_mount_two_axis_archive(&m->plant, archive);
+    return BST_OK;
 }
 
 const bst_module_desc bst_gimbal_second_order_module = {

@@ -312,7 +312,7 @@ static void archive_now(bst_spacecraft_now *now, bst_archive *archive) {
     BST_ARCHIVE(archive, now->unresolved_rad2);
 }
 
-bst_status bst_spacecraft_archive(bst_spacecraft *craft, bst_archive *archive) {
+void bst_spacecraft_archive(bst_spacecraft *craft, bst_archive *archive) {
     bst_spacecraft_body_archive(&craft->body, archive);
     BST_ARCHIVE(archive, craft->wheel_phase_rad);
     BST_ARCHIVE(archive, craft->motor_nm);
@@ -332,7 +332,6 @@ bst_status bst_spacecraft_archive(bst_spacecraft *craft, bst_archive *archive) {
     bst_spacecraft_sky_grid_archive(&craft->grid, archive);
     BST_ARCHIVE(archive, craft->sky);
     archive_now(&craft->now, archive);
-    return BST_OK;
 }
 
 /* Highest resolved wheel imbalance frequency, rad/s. */

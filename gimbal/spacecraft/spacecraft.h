@@ -46,10 +46,8 @@ void bst_spacecraft_free(bst_spacecraft *craft); /* NULL allowed */
 bst_status bst_spacecraft_step(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double seconds,
                                bst_vec3 reaction_nm) BST_MUST_CHECK;
 
-/* Archives body, wheels, sensors, attitude filter, controller and environment.
- *
- * Errors:    those of bst_archive_end */
-bst_status bst_spacecraft_archive(bst_spacecraft *craft, bst_archive *archive) BST_MUST_CHECK;
+/* Archives body, wheels, sensors, attitude filter, controller and environment. */
+void bst_spacecraft_archive(bst_spacecraft *craft, bst_archive *archive);
 
 /* True and estimated state after a step; lent, changed by the next one. */
 typedef struct bst_spacecraft_now {
