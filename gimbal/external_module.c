@@ -297,6 +297,13 @@ static bst_status step(void *self, struct bst_step *s) {
     return bst_gimbal_publish_exact(s, &m->platform, &m->base, n, q_cam_from_body);
 }
 
+static bst_status archive_module(void *self, bst_archive *archive) {
+    (void)self;
+    return bst_fail(bst_archive_ctx(archive), BST_ERR_STATE,
+                    "a gimbal of type \"external\" cannot be saved: its state is that of another "
+                    "program; use another type of gimbal");
+}
+
 const bst_module_desc bst_gimbal_external_module = {
     .abi = BST_MODULE_ABI,
     .role = "gimbal",
@@ -313,4 +320,5 @@ const bst_module_desc bst_gimbal_external_module = {
     .create = create_external,
     .step = step,
     .destroy = destroy,
+    .archive = archive_module,
 };

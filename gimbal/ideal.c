@@ -34,3 +34,9 @@ bst_status bst_ideal_at(bst_ideal *ideal, bst_ctx *ctx, double seconds, bst_vec3
     *direction = bst_vec3_unit(v);
     return BST_OK;
 }
+
+void bst_ideal_archive(bst_ideal *ideal, bst_archive *archive) {
+    ideal->first = bst_archive_integer(archive, ideal->first, INT64_MIN / 4, INT64_MAX / 4);
+    ideal->filled = (int)bst_archive_integer(archive, ideal->filled, 0, 4);
+    BST_ARCHIVE(archive, ideal->node);
+}

@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/status.h"
 #include "boresight/vec.h"
 #include "gimbal/platform.h"
@@ -34,6 +35,9 @@ typedef struct bst_ideal {
     int filled;    /* 0 or 4 */
     bst_vec3 node[4];
 } bst_ideal;
+
+/* Archives the nodes. */
+void bst_ideal_archive(bst_ideal *ideal, bst_archive *archive);
 
 /* Interpolated direction at `seconds`. For seconds >= 0 no node is before time 0, and nodes are at
  * most two grid steps later than `seconds`. Errors: those of direction_at. */

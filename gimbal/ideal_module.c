@@ -125,6 +125,14 @@ static bst_status step(void *self, struct bst_step *s) {
     return bst_gimbal_publish_nav(s, &m->base, n);
 }
 
+static bst_status archive_module(void *self, bst_archive *archive) {
+    module *m = self;
+    m->steps = bst_archive_integer(archive, m->steps, 0, BST_PLANT_STEPS_MOST);
+    bst_ideal_archive(&m->ideal, archive);
+    bst_platform_archive(&m->platform, archive);
+    return BST_OK;
+}
+
 const bst_module_desc bst_gimbal_ideal_module = {
     .abi = BST_MODULE_ABI,
     .role = "gimbal",
@@ -141,4 +149,5 @@ const bst_module_desc bst_gimbal_ideal_module = {
     .create = create_ideal,
     .step = step,
     .destroy = bst_gimbal_destroy,
+    .archive = archive_module,
 };

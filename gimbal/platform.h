@@ -80,6 +80,13 @@ bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
 /* Frees what bst_platform_init and bst_platform_equip allocated; a zeroed platform is allowed. */
 void bst_platform_free(bst_platform *platform);
 
+/* largest step number in a saved state: later ones stay within int64_t */
+#define BST_PLANT_STEPS_MOST (INT64_MAX / 4)
+
+/* Archives attitude and rate of the body, true and estimated, and its spacecraft. The jitter is not
+ * archived: it depends only on the step number. */
+void bst_platform_archive(bst_platform *platform, bst_archive *archive);
+
 /* Advances the body to plant step n = 0, 1, 2, ... in order, `seconds` after the epoch. Updates
  * body, q_believed_from_gcrf, rate_believed_radps, unresolved_rad2 and the flags.
  *

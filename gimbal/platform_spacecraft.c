@@ -95,6 +95,21 @@ bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
     return BST_OK;
 }
 
+void bst_platform_archive(bst_platform *platform, bst_archive *archive) {
+    BST_ARCHIVE(archive, platform->q_believed_from_gcrf);
+    BST_ARCHIVE(archive, platform->rate_believed_radps);
+    BST_ARCHIVE(archive, platform->body);
+    BST_ARCHIVE(archive, platform->unresolved_rad2);
+    bst_archive_bool(archive, &platform->wheels_saturated);
+    bst_archive_bool(archive, &platform->trackers_blind);
+    if (platform->sky && platform->sky->knowledge) {
+        bst_knowledge_view_archive(platform->sky->knowledge, archive);
+    }
+    if (platform->spacecraft) {
+        bst_spacecraft_archive(platform->spacecraft, archive);
+    }
+}
+
 void bst_platform_free(bst_platform *platform) {
     bst_spacecraft_free(platform->spacecraft);
     free_sky(platform->sky);

@@ -27,7 +27,7 @@ typedef struct module {
     bst_gimbal_base base;
     bst_platform platform;
     bst_scripted *scripted;
-    bst_frame_cursor frame; /* first frame that has not ended */
+    bst_frame_cursor frame, first_frame; /* frame: the first that has not ended */
     int64_t period_ticks;
     int64_t origin_tick; /* of the first step; -1: not started */
 } module;
@@ -69,7 +69,8 @@ static bst_status prepare_scripted(const bst_module_env *env, const void *config
     }
     BST_TRY(bst_scripted_create(env->ctx, updates, camera, exposure, env->tick_rate_hz,
                                 (bst_scripted_missing)c->missing_frames, &m->scripted));
-    m->frame = bst_frame_cursor_begin(updates, camera, exposure, m->base.tick_rate_hz);
+    m->frame = m->first_frame =
+        bst_frame_cursor_begin(updates, camera, exposure, m->base.tick_rate_hz);
     /* besides the plant steps: two samples per frame, and up to two per attitude of the file */
     int crowd = bst_scripted_crowd(m->scripted, platform->history_s * m->base.tick_rate_hz);
     double frames = 2.0 * platform->history_s / cycle_s + 4.0;
@@ -85,8 +86,8 @@ static bst_status step(void *self, struct bst_step *s) {
     module *m = self;
     int64_t tick = bst_step_tick(s);
     m->origin_tick = m->origin_tick < 0 ? tick : m->origin_tick;
-    int64_t n = (tick - m->origin_tick) / m->period_ticks;
-    int64_t past = (tick - m->origin_tick) % m->period_ticks;
+    int64_t since = tick > m->origin_tick ? tick - m->origin_tick : 0;
+    int64_t n = since / m->period_ticks, past = since % m->period_ticks;
     bst_quat q_cam_from_body = bst_quat_mul(bst_scripted_at(m->scripted, tick),
                                             bst_quat_conj(m->platform.q_nominal_from_gcrf));
     bst_gimbal_publish_sight(
@@ -108,6 +109,15 @@ static bst_status step(void *self, struct bst_step *s) {
     return bst_gimbal_publish_exact(s, &m->platform, &m->base, n, q_cam_from_body);
 }
 
+/* The look-up positions in the file are not archived: the next step finds them from its tick. */
+static bst_status archive_module(void *self, bst_archive *archive) {
+    module *m = self;
+    m->frame = bst_archive_is_restoring(archive) ? m->first_frame : m->frame;
+    m->origin_tick = bst_archive_integer(archive, m->origin_tick, -1, INT64_MAX / 4);
+    bst_platform_archive(&m->platform, archive);
+    return BST_OK;
+}
+
 const bst_module_desc bst_gimbal_scripted_module = {
     .abi = BST_MODULE_ABI,
     .role = "gimbal",
@@ -124,4 +134,5 @@ const bst_module_desc bst_gimbal_scripted_module = {
     .create = create_scripted,
     .step = step,
     .destroy = destroy,
+    .archive = archive_module,
 };

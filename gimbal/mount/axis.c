@@ -44,6 +44,15 @@ void bst_axis_init(bst_axis *axis, const bst_axis_spec *spec) {
     axis->gamma[1] = axis->phi[0][1];
 }
 
+void bst_axis_archive(bst_axis *axis, bst_archive *archive) {
+    BST_ARCHIVE(archive, axis->reference_rad);
+    BST_ARCHIVE(archive, axis->reference_radps);
+    BST_ARCHIVE(archive, axis->angle_rad);
+    BST_ARCHIVE(archive, axis->rate_radps);
+    BST_ARCHIVE(archive, axis->accel_radps2);
+    bst_archive_bool(archive, &axis->limited);
+}
+
 double bst_axis_shape(bst_axis *axis, double target_rad, double target_radps) {
     double h = axis->spec.dt_s;
     double accel_limit = SHAPED_SHARE * axis->spec.accel_limit_radps2;

@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/archive.h"
+
 typedef struct bst_axis_spec {
     double rate_limit_radps, accel_limit_radps2;
     double natural_frequency_radps, damping;
@@ -40,6 +42,9 @@ double bst_axis_shape(bst_axis *axis, double target_rad, double target_radps);
  *            y - noise). With e = y - p, driven by -A - wn^2 noise held over the step, the
  *            transition matrix is exact for any damping. Motion beyond a limit is clipped. */
 void bst_axis_step(bst_axis *axis, double target_rad, double target_radps, double noise_rad);
+
+/* Archives reference and motion of an axis. */
+void bst_axis_archive(bst_axis *axis, bst_archive *archive);
 
 /* Adds turns * 2 pi to both angle and reference. */
 void bst_axis_unwind(bst_axis *axis, double turns);

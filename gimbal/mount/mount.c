@@ -88,6 +88,40 @@ bst_status bst_mount_init(bst_ctx *ctx, bst_mount *m, int type, const bst_mount_
     return BST_OK;
 }
 
+static bst_status archive_servo(bst_mount_servo *servo, bst_archive *archive) {
+    bst_axis_archive(&servo->shaper, archive);
+    BST_TRY(bst_compensator_archive(&servo->compensator, archive));
+    BST_ARCHIVE(archive, servo->ring_rad);
+    BST_ARCHIVE(archive, servo->ring_radps);
+    BST_ARCHIVE(archive, servo->waiting_nm);
+    BST_ARCHIVE(archive, servo->torque_nm);
+    BST_ARCHIVE(archive, servo->reading_rad);
+    BST_ARCHIVE(archive, servo->unwrapped_rad);
+    BST_ARCHIVE(archive, servo->rate_radps);
+    BST_ARCHIVE(archive, servo->before_rad);
+    BST_ARCHIVE(archive, servo->watched_rad);
+    servo->pushed = bst_archive_integer(archive, servo->pushed, 0, BST_PLANT_STEPS_MOST);
+    bst_archive_bool(archive, &servo->saturated);
+    bst_archive_bool(archive, &servo->stuck);
+    return BST_OK;
+}
+
+bst_status bst_mount_archive(bst_mount *m, bst_archive *archive) {
+    bst_mount_joints_archive(&m->joints, archive);
+    for (int k = 0; k < m->axes; k++) {
+        BST_TRY(archive_servo(&m->servo[k], archive));
+    }
+    m->steps = bst_archive_integer(archive, m->steps, 0, BST_PLANT_STEPS_MOST);
+    BST_ARCHIVE(archive, m->base_rate_radps);
+    BST_ARCHIVE(archive, m->target_body);
+    BST_ARCHIVE(archive, m->q_cam_from_body);
+    BST_ARCHIVE(archive, m->q_seen_from_body);
+    BST_ARCHIVE(archive, m->reaction_nm);
+    bst_archive_bool(archive, &m->settled);
+    bst_archive_bool(archive, &m->limited);
+    return BST_OK;
+}
+
 /* Requested angles and rates of the axes at one time. */
 typedef struct request {
     double angle_rad[M], rate_radps[M];

@@ -64,6 +64,11 @@ typedef struct bst_mount {
 bst_status bst_mount_init(bst_ctx *ctx, bst_mount *mount, int type, const bst_mount_config *config,
                           double dt_s, bst_rng_key encoder_key) BST_MUST_CHECK;
 
+/* Archives joints, servos and the results of the last step.
+ *
+ * Errors:    those of bst_compensator_archive */
+bst_status bst_mount_archive(bst_mount *mount, bst_archive *archive) BST_MUST_CHECK;
+
 /* Advances the mount to step n = 0, 1, 2, ... (time n * dt_s), then reads the encoders and computes
  * the next torque.
  *

@@ -46,6 +46,18 @@ void bst_mount_joints_init(bst_mount_joints *j, const double angle_rad[N]) {
     refresh(j);
 }
 
+void bst_mount_joints_archive(bst_mount_joints *j, bst_archive *archive) {
+    BST_ARCHIVE(archive, j->state);
+    BST_ARCHIVE(archive, j->sine);
+    BST_ARCHIVE(archive, j->cosine);
+    for (int k = 0; k < N; k++) {
+        bst_archive_bool(archive, &j->joint[k].stuck);
+        j->slide[k] = (int8_t)bst_archive_integer(archive, j->slide[k], -1, 1);
+        bst_archive_bool(archive, &j->at_stop[k]);
+    }
+    j->events = bst_archive_integer(archive, j->events, 0, INT64_MAX / 2);
+}
+
 /* Friction torque without its viscous part, opposing a rate. */
 static inline double sliding_nm(const bst_mount_joint *joint, double rate) {
     double x = rate / joint->stribeck_radps;

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "gimbal/mount/mount_chain.h"
 
 /* Friction of a sliding joint at rate v, opposing it:
@@ -51,6 +52,9 @@ void bst_mount_joints_init(bst_mount_joints *joints, const double angle_rad[BST_
 void bst_mount_joints_step(bst_mount_joints *joints, double dt_s,
                            const double torque_nm[BST_CHAIN_MOST], bst_vec3 rate_before,
                            bst_vec3 rate_after);
+
+/* Archives the motion of the joints and their faults. */
+void bst_mount_joints_archive(bst_mount_joints *joints, bst_archive *archive);
 
 /* Kinetic energy plus energy of modes and cables, J. */
 double bst_mount_joints_energy(const bst_mount_joints *joints, bst_vec3 base_rate_radps);

@@ -105,6 +105,16 @@ static bst_status step(void *self, struct bst_step *s) {
     return bst_gimbal_publish_nav(s, &m->base, n);
 }
 
+static bst_status archive_module(void *self, bst_archive *archive) {
+    module *m = self;
+    bst_platform_archive(&m->platform, archive);
+    BST_TRY(bst_mount_archive(&m->mount, archive));
+    for (int k = 0; k < BST_MOUNT_MOST; k++) {
+        bst_archive_bool(archive, &m->stuck[k]);
+    }
+    return BST_OK;
+}
+
 const bst_module_desc bst_gimbal_azimuth_elevation_module = {
     .abi = BST_MODULE_ABI,
     .role = "gimbal",
@@ -121,6 +131,7 @@ const bst_module_desc bst_gimbal_azimuth_elevation_module = {
     .create = create_azimuth,
     .step = step,
     .destroy = bst_gimbal_destroy,
+    .archive = archive_module,
 };
 
 const bst_module_desc bst_gimbal_cross_elevation_module = {
@@ -139,4 +150,5 @@ const bst_module_desc bst_gimbal_cross_elevation_module = {
     .create = create_cross,
     .step = step,
     .destroy = bst_gimbal_destroy,
+    .archive = archive_module,
 };

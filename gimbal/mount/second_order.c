@@ -58,6 +58,22 @@ bst_status bst_mount_two_axis_init(bst_ctx *ctx, bst_mount_two_axis *plant,
     return bst_platform_init(ctx, &plant->platform, &config->platform, &setup);
 }
 
+void bst_mount_two_axis_archive(bst_mount_two_axis *plant, bst_archive *archive) {
+    bst_platform_archive(&plant->platform, archive);
+    bst_axis_archive(&plant->axis[0], archive);
+    bst_axis_archive(&plant->axis[1], archive);
+    plant->steps = bst_archive_integer(archive, plant->steps, 0, BST_PLANT_STEPS_MOST);
+    BST_ARCHIVE(archive, plant->encoder_noise);
+    BST_ARCHIVE(archive, plant->near);
+    BST_ARCHIVE(archive, plant->q_cam_from_gcrf);
+    BST_ARCHIVE(archive, plant->q_measured_from_gcrf);
+    BST_ARCHIVE(archive, plant->q_measured_body_from_gcrf);
+    BST_ARCHIVE(archive, plant->encoder_rad);
+    bst_archive_bool(archive, &plant->settled);
+    bst_archive_bool(archive, &plant->limited);
+    bst_archive_bool(archive, &plant->at_stop);
+}
+
 void bst_mount_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_rad,
                               double angle_rad[2], double rate_radps[2]) {
     double h2 = b.x * b.x + b.z * b.z;

@@ -57,6 +57,9 @@ bst_status bst_mount_two_axis_init(bst_ctx *ctx, bst_mount_two_axis *plant,
                                    bst_quat q_nominal_from_gcrf, double pixel_rad, double dt_s,
                                    const bst_mount_two_axis_keys *keys) BST_MUST_CHECK;
 
+/* Archives the axes, the platform and the results of the last step. */
+void bst_mount_two_axis_archive(bst_mount_two_axis *plant, bst_archive *archive);
+
 /* Advances the gimbal to step n = 0, 1, 2, ... (time n * dt_s).
  *
  * Given:     command  NULL: hold the angles; evaluated command_age_s after its reference

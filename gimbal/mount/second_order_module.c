@@ -63,6 +63,12 @@ static bst_status step(void *self, struct bst_step *s) {
     return bst_gimbal_publish_nav(s, &m->base, n);
 }
 
+static bst_status archive_module(void *self, bst_archive *archive) {
+    module *m = self;
+    bst_mount_two_axis_archive(&m->plant, archive);
+    return BST_OK;
+}
+
 const bst_module_desc bst_gimbal_second_order_module = {
     .abi = BST_MODULE_ABI,
     .role = "gimbal",
@@ -80,4 +86,5 @@ const bst_module_desc bst_gimbal_second_order_module = {
     .create = create,
     .step = step,
     .destroy = bst_gimbal_destroy,
+    .archive = archive_module,
 };

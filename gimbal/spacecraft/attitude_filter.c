@@ -19,6 +19,12 @@ void bst_attitude_filter_init(bst_attitude_filter *filter, bst_quat q_body_from_
     }
 }
 
+void bst_attitude_filter_archive(bst_attitude_filter *filter, bst_archive *archive) {
+    BST_ARCHIVE(archive, filter->q_body_from_gcrf);
+    BST_ARCHIVE(archive, filter->bias_radps);
+    BST_ARCHIVE(archive, filter->covariance);
+}
+
 bst_vec3 bst_attitude_filter_error(bst_quat q, bst_quat estimate) {
     return bst_vec3_scale(bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(estimate))), -1.0);
 }

@@ -8,6 +8,7 @@
 #ifndef BST_GIMBAL_SPACECRAFT_ATTITUDE_FILTER_H
 #define BST_GIMBAL_SPACECRAFT_ATTITUDE_FILTER_H
 
+#include "boresight/archive.h"
 #include "boresight/vec.h"
 
 typedef struct bst_attitude_filter {
@@ -22,6 +23,9 @@ typedef struct bst_attitude_filter {
 void bst_attitude_filter_init(bst_attitude_filter *filter, bst_quat q_body_from_gcrf,
                               double sigma_rad, double bias_sigma_radps, double angle_walk,
                               double rate_walk);
+
+/* Archives the estimate and its covariance. */
+void bst_attitude_filter_archive(bst_attitude_filter *filter, bst_archive *archive);
 
 /* Propagates the estimate over a gyro sample.
  *

@@ -148,3 +148,8 @@ bst_vec3 bst_spacecraft_gyro_measure(bst_spacecraft_gyro *gyro, bst_vec3 turn_ra
     gyro->bias_radps = next;
     return bst_vec3_axpy(out, sqrt(v * v * dt + u * u * dt * dt * dt / 12.0), noise);
 }
+
+void bst_spacecraft_gyro_archive(bst_spacecraft_gyro *gyro, bst_archive *archive) {
+    BST_ARCHIVE(archive, gyro->bias_radps);
+    gyro->samples = bst_archive_integer(archive, gyro->samples, 0, INT64_MAX / 2);
+}

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/config.h"
 #include "boresight/rng.h"
 #include "boresight/vec.h"
@@ -91,5 +92,8 @@ void bst_spacecraft_gyro_init(bst_spacecraft_gyro *gyro, const bst_spacecraft_gy
  *
  * Given:     turn_rad  true rotation vector of the body since the previous sample */
 bst_vec3 bst_spacecraft_gyro_measure(bst_spacecraft_gyro *gyro, bst_vec3 turn_rad);
+
+/* Archives the gyro's bias and its number of samples. */
+void bst_spacecraft_gyro_archive(bst_spacecraft_gyro *gyro, bst_archive *archive);
 
 #endif

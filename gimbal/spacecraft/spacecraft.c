@@ -1,6 +1,7 @@
 #include "gimbal/spacecraft/spacecraft.h"
 
 #include <assert.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -285,6 +286,54 @@ bst_status bst_spacecraft_create(bst_ctx *ctx, const bst_spacecraft_config *conf
     return BST_OK;
 }
 
+/* Archives the measurements that are under way. */
+static void archive_pending(bst_spacecraft *craft, bst_archive *archive) {
+    craft->pendings = bst_archive_count(archive, craft->pendings, craft->pending_room);
+    for (int k = 0; k < craft->pendings; k++) {
+        pending *p = &craft->pending[k];
+        p->tracker = (int)bst_archive_integer(archive, p->tracker, 0, craft->trackers - 1);
+        p->sampled = bst_archive_integer(archive, p->sampled, 0, INT64_MAX / 4);
+        p->due = bst_archive_integer(archive, p->due, 0, INT64_MAX / 4);
+        BST_ARCHIVE(archive, p->measured);
+        BST_ARCHIVE(archive, p->estimate);
+    }
+}
+
+/* Archives bst_spacecraft_now. */
+static void archive_now(bst_spacecraft_now *now, bst_archive *archive) {
+    BST_ARCHIVE(archive, now->body);
+    BST_ARCHIVE(archive, now->q_believed_from_gcrf);
+    BST_ARCHIVE(archive, now->rate_believed_radps);
+    BST_ARCHIVE(archive, now->reference);
+    BST_ARCHIVE(archive, now->wheel_radps);
+    BST_ARCHIVE(archive, now->wheel_flags);
+    bst_archive_bool(archive, &now->tracked);
+    BST_ARCHIVE(archive, now->roll);
+    BST_ARCHIVE(archive, now->unresolved_rad2);
+}
+
+void bst_spacecraft_archive(bst_spacecraft *craft, bst_archive *archive) {
+    bst_spacecraft_body_archive(&craft->body, archive);
+    BST_ARCHIVE(archive, craft->wheel_phase_rad);
+    BST_ARCHIVE(archive, craft->motor_nm);
+    BST_ARCHIVE(archive, craft->disturbance_nm);
+    bst_spacecraft_gyro_archive(&craft->gyro, archive);
+    BST_ARCHIVE(archive, craft->q_at_gyro);
+    BST_ARCHIVE(archive, craft->turn_since_control);
+    craft->samples_since_control =
+        (int)bst_archive_integer(archive, craft->samples_since_control, 0, INT_MAX / 2);
+    BST_ARCHIVE(archive, craft->rate_control_radps);
+    archive_pending(craft, archive);
+    bst_attitude_filter_archive(&craft->filter, archive);
+    craft->filter_step = bst_archive_integer(archive, craft->filter_step, 0, INT64_MAX / 4);
+    bst_spacecraft_attitude_control_archive(&craft->control, archive);
+    bst_axis_archive(&craft->roll, archive);
+    BST_ARCHIVE(archive, craft->roll_target_rad);
+    bst_spacecraft_sky_grid_archive(&craft->grid, archive);
+    BST_ARCHIVE(archive, craft->sky);
+    archive_now(&craft->now, archive);
+}
+
 /* Highest resolved wheel imbalance frequency, rad/s. */
 static double followed_radps(const bst_spacecraft *craft) {
     return 2.0 * BST_PI * BST_JITTER_RESOLVED / craft->dt_s;
@@ -354,6 +403,9 @@ static void read_trackers(bst_spacecraft *craft, int64_t n, double seconds) {
             continue;
         }
         seen = true;
+        if (craft->pendings == craft->pending_room) {
+            continue; /* only after a restore of damaged data: there is room for all until due */
+        }
         craft->pending[craft->pendings++] =
             (pending){.sampled = n,
                       .due = n + craft->tracker_latency[i],

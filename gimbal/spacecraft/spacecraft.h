@@ -3,6 +3,7 @@
 #ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_H
 #define BST_GIMBAL_SPACECRAFT_SPACECRAFT_H
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "gimbal/spacecraft/attitude_filter.h"
 #include "gimbal/spacecraft/body_state.h"
@@ -44,6 +45,9 @@ void bst_spacecraft_free(bst_spacecraft *craft); /* NULL allowed */
  */
 bst_status bst_spacecraft_step(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double seconds,
                                bst_vec3 reaction_nm) BST_MUST_CHECK;
+
+/* Archives body, wheels, sensors, attitude filter, controller and environment. */
+void bst_spacecraft_archive(bst_spacecraft *craft, bst_archive *archive);
 
 /* True and estimated state after a step; lent, changed by the next one. */
 typedef struct bst_spacecraft_now {

@@ -188,6 +188,15 @@ bst_status bst_spacecraft_body_init(bst_ctx *ctx, bst_spacecraft_body *body,
     return BST_OK;
 }
 
+void bst_spacecraft_body_archive(bst_spacecraft_body *body, bst_archive *archive) {
+    BST_ARCHIVE(archive, body->q);
+    BST_ARCHIVE(archive, body->momentum_gcrf);
+    BST_ARCHIVE(archive, body->wheel_momentum);
+    BST_ARCHIVE(archive, body->mode_place);
+    BST_ARCHIVE(archive, body->mode_momentum);
+    BST_ARCHIVE(archive, body->rate_principal);
+}
+
 /* Steps the modes over half a step with the body's momentum held. */
 static void step_modes(bst_spacecraft_body *body, bst_vec3 pi_without_wheels) {
     int m = body->spec.modes;

@@ -12,6 +12,7 @@
 #ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_BODY_H
 #define BST_GIMBAL_SPACECRAFT_SPACECRAFT_BODY_H
 
+#include "boresight/archive.h"
 #include "boresight/status.h"
 #include "gimbal/spacecraft/body_state.h"
 #include "sim/dynamics/integrators.h"
@@ -81,6 +82,9 @@ bst_status bst_spacecraft_body_init(bst_ctx *ctx, bst_spacecraft_body *body,
  *            rk4 all variables are integrated together. */
 void bst_spacecraft_body_step(bst_spacecraft_body *body, bst_vec3 torque_nm,
                               const double *wheel_torque_nm);
+
+/* Archives the state of body, wheels and modes. */
+void bst_spacecraft_body_archive(bst_spacecraft_body *body, bst_archive *archive);
 
 bst_quat bst_spacecraft_body_attitude(const bst_spacecraft_body *body); /* q_body_from_gcrf */
 bst_vec3 bst_spacecraft_body_rate(const bst_spacecraft_body *body);     /* body axes */

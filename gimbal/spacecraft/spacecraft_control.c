@@ -16,6 +16,12 @@ void bst_spacecraft_attitude_control_init(bst_spacecraft_attitude_control *contr
     *control = (bst_spacecraft_attitude_control){.spec = *spec};
 }
 
+void bst_spacecraft_attitude_control_archive(bst_spacecraft_attitude_control *control,
+                                             bst_archive *archive) {
+    BST_ARCHIVE(archive, control->integral_radps2);
+    BST_ARCHIVE(archive, control->error_rad);
+}
+
 /* Rotation from the wanted attitude, in the direction taken last if both are similarly long. */
 static bst_vec3 error_of(bst_spacecraft_attitude_control *control, bst_quat q, bst_quat wanted) {
     bst_vec3 e = bst_attitude_filter_error(q, wanted);

@@ -2,6 +2,7 @@
 #ifndef BST_GIMBAL_SPACECRAFT_SPACECRAFT_CONTROL_H
 #define BST_GIMBAL_SPACECRAFT_SPACECRAFT_CONTROL_H
 
+#include "boresight/archive.h"
 #include "gimbal/spacecraft/pointing_law.h"
 
 typedef struct bst_spacecraft_attitude_control_spec {
@@ -21,6 +22,10 @@ typedef struct bst_spacecraft_attitude_control {
 /* Initialises the attitude controller at rest; its integrators are zero. */
 void bst_spacecraft_attitude_control_init(bst_spacecraft_attitude_control *control,
                                           const bst_spacecraft_attitude_control_spec *spec);
+
+/* Archives the controller's integrals and its last error. */
+void bst_spacecraft_attitude_control_archive(bst_spacecraft_attitude_control *control,
+                                             bst_archive *archive);
 
 /* Controller step: wanted torque on the body, N m, body axes.
  *

@@ -42,3 +42,10 @@ bst_status bst_spacecraft_sky_grid_at(bst_spacecraft_sky_grid *grid, bst_ctx *ct
     *reference = bst_spacecraft_attitude_reference_at(grid->attitude, 1.0 / BST_SKY_NODES_PER_S, a);
     return BST_OK;
 }
+
+void bst_spacecraft_sky_grid_archive(bst_spacecraft_sky_grid *grid, bst_archive *archive) {
+    grid->first = bst_archive_integer(archive, grid->first, INT64_MIN / 4, INT64_MAX / 4);
+    grid->filled = (int)bst_archive_integer(archive, grid->filled, 0, 4);
+    BST_ARCHIVE(archive, grid->node);
+    BST_ARCHIVE(archive, grid->attitude);
+}

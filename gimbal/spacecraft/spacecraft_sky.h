@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/status.h"
 #include "gimbal/spacecraft/pointing_law.h"
 
@@ -38,5 +39,8 @@ typedef struct bst_spacecraft_sky_grid {
 bst_status bst_spacecraft_sky_grid_at(bst_spacecraft_sky_grid *grid, bst_ctx *ctx, double seconds,
                                       bst_spacecraft_sky *sky,
                                       bst_spacecraft_attitude_reference *reference) BST_MUST_CHECK;
+
+/* Archives the nodes of a grid. */
+void bst_spacecraft_sky_grid_archive(bst_spacecraft_sky_grid *grid, bst_archive *archive);
 
 #endif

@@ -46,7 +46,7 @@ static bst_status archive_sim(bst_ctx *ctx, bst_sim *sim, bst_archive *archive,
         return bst_archive_skip(ctx, archive, "world");
     }
     BST_TRY(bst_archive_begin(ctx, archive, "world"));
-    /* bst_world_archive(bst_simulation_world(sim->simulation), archive); */
+    bst_world_archive(bst_simulation_world(sim->simulation), archive);
     return bst_archive_end(ctx, archive);
 }
 

@@ -3,6 +3,7 @@
 #ifndef BST_ONBOARD_KNOWLEDGE_H
 #define BST_ONBOARD_KNOWLEDGE_H
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "sim/astro/belt.h"
 #include "sim/onboard/region.h"
@@ -49,6 +50,10 @@ bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledg
                                      bst_knowledge_view **out) BST_MUST_CHECK;
 /* Frees a view; the knowledge itself stays; NULL is allowed. */
 void bst_knowledge_view_free(bst_knowledge_view *view);
+
+/* Archives the task of a view and its directions of the cue. A task for an object that the
+ * catalogue lacks is a range error of the archive. */
+void bst_knowledge_view_archive(bst_knowledge_view *view, bst_archive *archive);
 
 /* The cue at `seconds` after the epoch. */
 bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,

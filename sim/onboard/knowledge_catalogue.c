@@ -115,3 +115,24 @@ bool bst_knowledge_view_task(bst_knowledge_view *view, const bst_task *task) {
     memset(view->knots, 0, sizeof view->knots);
     return true;
 }
+
+void bst_knowledge_view_archive(bst_knowledge_view *view, bst_archive *archive) {
+    int64_t last = view->knowledge->world->object_count - 1;
+    int64_t tasked = bst_archive_integer(archive, view->tasked ? view->task.object : -1, -1, last);
+    BST_ARCHIVE(archive, view->task);
+    if (bst_archive_is_restoring(archive)) {
+        view->tasked = tasked >= 0;
+        view->task.object = view->tasked ? (int32_t)tasked : view->task.object;
+    }
+    for (int i = 0; i < BST_CUE_KNOTS; i++) {
+        bst_onboard_cue_knot *knot = &view->knots[i];
+        bst_archive_bool(archive, &knot->made);
+        bst_archive_bool(archive, &knot->known);
+        BST_ARCHIVE(archive, knot->second);
+        BST_ARCHIVE(archive, knot->direction);
+    }
+    BST_ARCHIVE(archive, view->checked);
+    bst_archive_bool(archive, &view->any_checked);
+    bst_archive_bool(archive, &view->smooth);
+    BST_ARCHIVE(archive, view->cued);
+}

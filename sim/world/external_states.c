@@ -74,6 +74,22 @@ bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *s, doubl
                     : BST_OK;
 }
 
+void bst_external_states_archive(bst_external_states *s, bst_archive *archive) {
+    pthread_mutex_lock(&s->lock);
+    s->count = bst_archive_integer(archive, s->count, 0, INT64_MAX - KEPT);
+    int kept = s->count < KEPT ? (int)s->count : KEPT;
+    bst_archive_bytes(archive, s->states, (size_t)kept * sizeof *s->states);
+    pthread_mutex_unlock(&s->lock);
+}
+
+void bst_world_archive(const bst_world *world, bst_archive *archive) {
+    for (int i = 0; i < world->object_count; i++) {
+        if (world->objects[i].orbit.external) {
+            bst_external_states_archive(world->objects[i].orbit.external, archive);
+        }
+    }
+}
+
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
                            const bst_world_state *state) {
     int object = bst_world_find_object(world, name);

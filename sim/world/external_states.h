@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "boresight/archive.h"
 #include "sim/world/world.h"
 
 /* Ring of the latest states of one object; several threads may use it. */
@@ -25,5 +26,8 @@ bst_status bst_external_states_add(bst_ctx *ctx, bst_external_states *external, 
  * of bst_kepler_propagate. */
 bst_status bst_external_states_state(bst_ctx *ctx, bst_external_states *external, double seconds,
                                      bool *steered, bst_world_state *out) BST_MUST_CHECK;
+
+/* Archives the states that the ring holds; thread-safe. */
+void bst_external_states_archive(bst_external_states *external, bst_archive *archive);
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef BST_WORLD_WORLD_H
 #define BST_WORLD_WORLD_H
 
+#include "boresight/archive.h"
 #include "boresight/camera.h"
 #include "boresight/config.h"
 #include "sim/astro/bodies.h"
@@ -11,8 +12,9 @@
 
 typedef struct bst_world bst_world; /* immutable after creation; shareable between threads */
 
-/* A user's view of the world: caches rotations and body positions near the requested times. One per
- * module instance; for one thread; constant memory. */
+/* A user's view of the world: caches rotations and body positions near the requested times. Its
+ * results do not depend on earlier requests. One per module instance; for one thread; constant
+ * memory. */
 typedef struct bst_world_view bst_world_view;
 
 typedef struct bst_world_object_info {
@@ -67,6 +69,10 @@ int bst_world_find_object(const bst_world *world, const char *name);
  * object accepts states; BST_ERR_ARGUMENT: not later than the previous state. */
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
                            const bst_world_state *state) BST_MUST_CHECK;
+/* Archives what a run changes of the world: the states of externally commanded objects. All other
+ * members are constant or caches whose values depend on the time alone; so are those of
+ * bst_world_view. */
+void bst_world_archive(const bst_world *world, bst_archive *archive);
 /* Number of observers in the world. */
 int bst_world_observer_count(const bst_world *world);
 /* Number of sensors of an observer. */

@@ -1,7 +1,7 @@
 /* Compensators against the closed forms of their continuous and discrete responses. */
 #include "boresight/compensator.h"
 #include "boresight/vec.h"
-#include "tests/test_support.h"
+#include "tests/archive_support.h"
 
 /* Rounding of a few dozen operations on numbers near one. */
 #define ROUNDING 1e-12
@@ -396,6 +396,99 @@ static void test_plug(void **state) {
     assert_non_null(strstr(ctx.message, "lacks init or step"));
 }
 
+static bst_status archive_compensator(void *c, bst_archive *archive) {
+    return bst_compensator_archive(c, archive);
+}
+
+/* Restores `from` into a new compensator, and compares their outputs from then on. */
+static void expect_copy(const bst_compensator_config *config, bst_compensator *from) {
+    bst_ctx ctx = {0};
+    bst_compensator to = made(config, 0.01);
+    for (int n = 0; n < 9; n++) { /* a state of its own, which the restored one replaces */
+        (void)bst_compensator_step(&to, 5.0 - n, 0.3);
+    }
+    test_saved saved = test_save(archive_compensator, from);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_compensator, &to, saved));
+    assert_true(to.limited == from->limited && to.output == from->output);
+    bst_compensator other = *from;
+    for (int n = 0; n < 3000; n++) {
+        double error = sin(0.1 * n) + 0.02 * (n % 7), feed = 0.1 * cos(0.3 * n);
+        assert_true(bst_compensator_step(&other, error, feed) ==
+                    bst_compensator_step(&to, error, feed));
+        assert_true(other.limited == to.limited);
+    }
+    test_restore_damaged(archive_compensator, &to, saved, 1);
+    for (int n = 0; n < 50; n++) { /* restored once more by the line above */
+        assert_true(bst_compensator_step(from, 1.0, 0.5) == bst_compensator_step(&to, 1.0, 0.5));
+    }
+    free(saved.bytes);
+}
+
+/* All types with filters, limits and a delay between samples, saved in the middle of a limit. */
+static void test_archive(void **state) {
+    (void)state;
+    bst_dynamics_notch_config notches[] = {{3.0, 1.0, 20.0}, {11.0, 2.0, 40.0}};
+    for (int type = 0; type < BST_COMPENSATOR_TYPE_COUNT; type++) {
+        for (int steps = 0; steps < 200; steps += 37) {
+            bst_compensator_config config = plain(type);
+            config.proportional = config.gain = 2.0;
+            config.integral_per_s = 3.0;
+            config.derivative_s = 0.02;
+            config.lag_zero_hz = 0.1;
+            config.low_pass_hz = 20.0;
+            config.notches = (bst_config_list){notches, 2};
+            config.output_limit = 1.5;
+            config.output_rate_limit_per_s = 30.0;
+            config.delay_s = steps % 2 ? 0.0 : 0.127;
+            bst_compensator c = made(&config, 0.01);
+            for (int n = 0; n < steps; n++) {
+                (void)bst_compensator_step(&c, sin(0.2 * n) + 0.1, 0.01 * n);
+            }
+            c.limit = steps % 3 ? c.limit : 1.1; /* as a mount's servo changes it */
+            expect_copy(&config, &c);
+        }
+    }
+}
+
+static bst_status summed_archive(void *state, bst_archive *archive) {
+    summed *s = state;
+    BST_ARCHIVE(archive, s->sum);
+    BST_ARCHIVE(archive, s->last);
+    return BST_OK;
+}
+
+static void test_archive_of_a_plug(void **state) {
+    (void)state;
+    bst_compensator_stage stage = {.state_bytes = sizeof(summed),
+                                   .init = summed_init,
+                                   .step = summed_step,
+                                   .archive = summed_archive};
+    const bst_stage_desc desc = {.type = "summed", .functions = &stage};
+    double gain = 1.0;
+    bst_compensator_config config = plain(BST_COMPENSATOR_PI);
+    config.plug = (bst_stage_use){.plugin = "lib.so", .desc = &desc, .config = &gain};
+    bst_compensator c = made(&config, 0.01);
+    (void)bst_compensator_step(&c, 3.0, 0.5);
+    expect_copy(&config, &c);
+    /* that it has failed is not forgotten */
+    bst_ctx ctx = {0};
+    c.plug_failed = true;
+    test_saved saved = test_save(archive_compensator, &c);
+    c = made(&config, 0.01);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_compensator, &c, saved));
+    assert_int_equal(bst_compensator_plug_status(&ctx, &c), BST_ERR_STATE);
+    free(saved.bytes);
+    stage.archive = NULL;
+    bst_archive *archive;
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &archive));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, archive, "it"));
+    assert_int_equal(bst_compensator_archive(&c, archive), BST_ERR_STATE);
+    assert_string_equal(ctx.message,
+                        "plug-in lib.so: the state of its compensator cannot be saved: it has no "
+                        "function `archive`");
+    bst_archive_free(archive);
+}
+
 /* Each key by itself, at the border of what is allowed and beyond it; 100 samples a second. */
 static void test_refusals(void **state) {
     (void)state;
@@ -464,6 +557,7 @@ int main(void) {
         cmocka_unit_test(test_bumpless),    cmocka_unit_test(test_delay),
         cmocka_unit_test(test_limits),      cmocka_unit_test(test_config),
         cmocka_unit_test(test_plug),        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_archive),     cmocka_unit_test(test_archive_of_a_plug),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

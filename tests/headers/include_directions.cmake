@@ -2,7 +2,7 @@
 # includes another one. What flies (imgproc, tracker, control) never includes the truth: sim/world.
 include(${CMAKE_CURRENT_LIST_DIR}/folders.cmake)
 # The public headers, by the layer that holds what they declare. They include nothing but each other.
-set(api_sim/core status.h version.h vec.h rng.h philox_shared.h config.h frame.h stage.h)
+set(api_sim/core archive.h status.h version.h vec.h rng.h philox_shared.h config.h frame.h stage.h)
 set(api_sim/messages messages.h messages module.h)
 set(api_sim/dynamics compensator.h)
 set(api_sim/astro light.h)

@@ -2,6 +2,7 @@
 #include "sim/onboard/knowledge.h"
 
 #include "sim/optics/psf.h"
+#include "tests/archive_support.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
@@ -283,6 +284,54 @@ static void stars_are_dropped_and_displaced(void **state) {
     drop(&s);
 }
 
+static bst_status archive_view(void *view, bst_archive *archive) {
+    bst_knowledge_view_archive(view, archive);
+    return BST_OK;
+}
+
+/* A view that has a task, restored into a new one: the same cue to the bit. */
+static void a_view_is_saved_and_restored(void **state) {
+    (void)state;
+    for (int tasked = 0; tasked < 3; tasked++) { /* no task, an object's, that of the own cue */
+        scene s = make("");
+        bst_knowledge_view *other;
+        bst_assert_ok(&s.ctx, bst_knowledge_view_create(&s.ctx, s.knowledge, &other));
+        /* of the restored view before: nothing must be left of it */
+        const bst_task old = {.id = 9, .object = 0, .sigma_rad = 0.5};
+        assert_true(bst_knowledge_view_task(other, &old));
+        const bst_task task = {.id = 3,
+                               .object = tasked == 1 ? 0 : -1,
+                               .sigma_rad = 1e-3,
+                               .rate_sigma_radps = 1e-6,
+                               .v_mag = 12.5,
+                               .v_mag_sigma = 0.3};
+        if (tasked > 0) {
+            assert_true(bst_knowledge_view_task(s.kview, &task));
+        }
+        (void)cue_at(&s, 3.3);
+        test_saved saved = test_save(archive_view, s.kview);
+        bst_assert_ok(&s.ctx, test_restore(&s.ctx, archive_view, other, saved));
+        for (int k = 0; k < 40; k++) {
+            bst_onboard_cue was = cue_at(&s, 3.3 + 0.4 * k), is;
+            bst_assert_ok(&s.ctx, bst_knowledge_cue_at(&s.ctx, other, 3.3 + 0.4 * k, &is));
+            assert_memory_equal(&was.direction_gcrf, &is.direction_gcrf, sizeof(bst_vec3));
+            assert_memory_equal(&was.rate_gcrf_radps, &is.rate_gcrf_radps, sizeof(bst_vec3));
+            assert_true(was.sigma_rad == is.sigma_rad && was.v_mag == is.v_mag);
+            assert_true(was.rate_sigma_radps == is.rate_sigma_radps);
+        }
+        /* the same task is no new one */
+        assert_int_equal(bst_knowledge_view_task(other, &task), tasked == 0);
+        test_restore_damaged(archive_view, other, saved, 1);
+        /* an object that the catalogue lacks */
+        const int64_t beyond = bst_knowledge_object_count(s.knowledge);
+        memcpy(saved.bytes + 16 + 2, &beyond, sizeof beyond); /* after the head and its name */
+        assert_int_equal(test_restore(&s.ctx, archive_view, other, saved), BST_ERR_FORMAT);
+        free(saved.bytes);
+        bst_knowledge_view_free(other);
+        drop(&s);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_truth_by_default),
@@ -293,6 +342,7 @@ int main(void) {
         cmocka_unit_test(the_onboard_psf_is_a_gaussian),
         cmocka_unit_test(the_camera_may_be_known_wrongly),
         cmocka_unit_test(stars_are_dropped_and_displaced),
+        cmocka_unit_test(a_view_is_saved_and_restored),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

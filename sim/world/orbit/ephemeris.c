@@ -276,6 +276,17 @@ static bool table_row_directly(const table_job *job, const bst_world_orbit *orbi
     return !none;
 }
 
+/* Interpolates a position without the knots of weight 0. These come from earlier requests, and
+ * where the orbit has decayed at one of them, its NAN must not reach the result. */
+static void sum_used_knots(const table_class *c, const body *b, double p[3]) {
+    for (int j = 0; j < 3; j++) {
+        p[j] = 0.0;
+        for (int slot = 0; slot < RING; slot++) {
+            p[j] += c->weight[slot] != 0.0 ? c->weight[slot] * b->place_m[j][slot] : 0.0;
+        }
+    }
+}
+
 /* Interpolates the objects' positions for the table; run in parallel. */
 static void table_rows(void *user, int begin, int end) {
     const table_job *job = user;
@@ -294,6 +305,9 @@ static void table_rows(void *user, int begin, int end) {
             for (int j = 0; j < 3; j++) {
                 p[j] += c->weight[slot] * b->place_m[j][slot];
             }
+        }
+        if (isnan(p[0])) {
+            sum_used_knots(c, b, p);
         }
         t->x_m[i] = p[0];
         t->y_m[i] = p[1];

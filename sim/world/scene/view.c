@@ -196,11 +196,21 @@ static bst_status eye_at(bst_ctx *ctx, bst_world_view *view, int observer, doubl
     return BST_OK;
 }
 
+/* True if states that come during a run change an orbit: also at times that were requested before.
+ */
+static bool is_external(const bst_world_orbit *orbit) {
+    while (orbit && !orbit->external) {
+        orbit = orbit->reference;
+    }
+    return orbit != NULL;
+}
+
 /* State of an observer at a node of the exposure, from the view's cache. */
 static bst_status known_eye(bst_ctx *ctx, bst_world_view *view, int observer, double seconds,
                             int place, const eye **out) {
     eye *e = &view->eyes[place];
-    if (!e->valid || e->observer != observer || e->seconds != seconds) {
+    if (!e->valid || e->observer != observer || e->seconds != seconds ||
+        is_external(&view->world->observers[observer].orbit)) {
         BST_TRY(eye_at(ctx, view, observer, seconds, FROM_EPHEMERIS, e));
     }
     *out = e;
